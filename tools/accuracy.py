@@ -17,8 +17,8 @@ import typer
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from kiks.cli.engine_start import ready_engine
-from kiks.cli.options import written_file, written_folder
-from kiks.model.atomic_files import replace_file
+from kiks.cli.options import written_folder
+from kiks.model.atomic_files import check_writable, replace_file
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -26,6 +26,17 @@ if TYPE_CHECKING:
     from tools.sensors.card import Card
 
     from kiks.fit.samples import Samples
+
+
+def written_file(param: typer.CallbackParam, value: Path | None) -> Path | None:
+    """Check the file of an option before the work whose result goes there.
+
+    Raises:
+        ParameterError: If it could not be written.
+    """
+    if value is not None:
+        check_writable(value, param.opts[0])
+    return value
 
 
 def accuracy(

@@ -23,6 +23,9 @@ from kiks.sim.simulation import Simulation
 if TYPE_CHECKING:
     from PIL.Image import Image
 
+PICTURES = {".png": "PNG", ".svg": "SVG", ".pdf": "PDF", ".jpg": "JPEG"}
+"""The types of pictures by their endings."""
+
 _LONGEST_SIDE = 1200
 _PAGE_INCHES = 7.0
 
@@ -138,7 +141,7 @@ def save_simulation(sim: Simulation, path: str | Path, trace: Trace | None = Non
     Raises:
         ParameterError: If the place cannot be written or the ending names no type of picture.
     """
-    if not _is_svg(path):
+    if _picture_type(path) != "SVG":
         save_picture(draw_simulation(sim, trace), path)
         return
     sheet = _sheet_of(sim.arena, _LONGEST_SIDE, of_lines := _SvgPen())
@@ -178,10 +181,10 @@ def save_picture(image: Image, path: str | Path) -> None:
     Raises:
         ParameterError: If the place cannot be written or the ending names no type of picture.
     """
-    if _is_svg(path):
+    pixels, kind = BytesIO(), _picture_type(path)
+    if kind == "SVG":
         replace_file(path, _svg(image, []), "a picture")
         return
-    pixels, kind = BytesIO(), _picture_type(path)
     # PDF: so many pixels an inch that it fits a page across, and pixels as they are.
     image.save(pixels, kind, **({"resolution": image.width / _PAGE_INCHES, "quality": 95} if kind == "PDF" else {}))
     replace_file(path, pixels.getvalue(), "a picture")
@@ -193,28 +196,17 @@ def check_picture(path: str | Path) -> None:
     Raises:
         ParameterError: If the place cannot be written or the ending names no type of picture.
     """
-    if not _is_svg(path):
-        _picture_type(path)
+    _picture_type(path)
     check_writable(path, "a picture")
 
 
-def _is_svg(path: str | Path) -> bool:
-    return Path(path).suffix.lower() == ".svg"
-
-
 def _picture_type(path: str | Path) -> str:
-    from PIL import Image
-
-    Image.init()
-    kind = Image.registered_extensions().get(Path(path).suffix.lower(), "")
-    try:
-        # Some types can be read only, or need a library that is not there.
-        Image.new("RGB", (1, 1)).save(BytesIO(), kind)
-    except (KeyError, OSError, ValueError):
+    kind = PICTURES.get(Path(path).suffix.lower())
+    if kind is None:
         raise ParameterError(
             f"a picture must go to a file like 'run.png', but {str(path)!r} ends like no picture that can be written. "
-            "Let it end in .png, .svg or .pdf."
-        ) from None
+            f"Let it end in {', '.join(PICTURES)}."
+        )
     return kind
 
 

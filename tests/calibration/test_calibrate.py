@@ -19,11 +19,12 @@ from kiks.calibration.measurements import CalibrationError, Run, processing_ms, 
 from kiks.calibration.placements import Instruction, Place, SimPlacements
 from kiks.cli.calibrate import calibrate as command
 from kiks.cli.calibrate import parse_gaps
+from kiks.cli.outputs import Command
 from kiks.model.robot import robot_toml, save_robot
 from kiks.sim.simulation import SimPort
 
 app = typer.Typer()
-app.command()(command)
+app.command(cls=Command)(command)
 
 BASE = kiks.RobotSpec.load("khepera")
 KHEPERA_II = kiks.RobotSpec.load("khepera_ii")
@@ -119,7 +120,7 @@ def test_command_checks_its_options_before_it_measures(tmp_path: Path) -> None:
     out.write_text("precious")
     sim = kiks.Simulation()
     for arguments, words in (
-        (["--out", str(out)], "Add --overwrite to replace it"),
+        (["--out", str(out)], "--out must be new, but"),
         (["--out", str(tmp_path / "no" / "x.toml")], "a file that can be written"),
         (["--out", str(tmp_path / "x.toml"), "--gaps", "5;15"], "--gaps must be numbers with commas"),
         (["--out", str(tmp_path / "x.toml"), "--gaps", "5"], "at least two different numbers from 2 to"),

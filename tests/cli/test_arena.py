@@ -71,7 +71,7 @@ def test_files_that_are_there_stay_without_force(tmp_path, there, command):
     with pytest.raises(KiksError) as error:
         kiks_arena(*command, tmp_path / "x.toml")
     assert str(error.value) == (
-        f"The arena's files must be new, but {str(tmp_path / there)!r} exists. Choose another name or add --force."
+        f"OUT must be new, but {str(tmp_path / there)!r} exists. Choose another name or add --force."
     )
     assert [path.name for path in tmp_path.iterdir()] == [there]
     assert (tmp_path / there).read_text() == "precious"
@@ -82,7 +82,7 @@ def test_files_that_are_there_stay_without_force(tmp_path, there, command):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (("maze", "maze.txt"), "path must end in '.toml', but it was 'maze.txt'."),
+        (("maze", "maze.txt"), "OUT must end in .toml, but it was 'maze.txt'."),
         (("maze", ""), "OUT must go to a file that can be written, but '.' cannot (it is a folder)"),
         (("maze", "no/such/folder/maze.toml"), "but 'no/such/folder/maze.toml' cannot (No such file or directory)"),
         (("maze", "m.toml", "--path-mm", 80), "path_mm must be a whole number from 97 to 10000, but it was 80."),

@@ -104,7 +104,7 @@ def test_mistakes_end_in_one_clear_line(tmp_path: Path) -> None:
         (("table", "text.mcap", "out.xlsx"), "must end in .csv or .parquet"),
         (("page", "text.mcap"), "must be an MCAP file"),
         (("page", "text.mcap", "none/page.html"), "OUT must go to a file that can be written"),
-        (("run", "--record", "run.txt", str(PROGRAMS / "drive.py")), "ends in .mcap"),
+        (("run", "--record", "run.txt", str(PROGRAMS / "drive.py")), "--record must end in .mcap"),
     ):
         result = forked.run(*words, cwd=tmp_path)
         assert result.returncode == 2

@@ -134,7 +134,7 @@ def test_an_arena_in_place_of_the_project_s(folder: Path) -> None:
         (("nowhere.kiks",), "Project file 'nowhere.kiks' must exist"),
         (("exercise.kiks", "nowhere.py"), "PROGRAM must be a Python file, but there is no file 'nowhere.py'"),
         (("exercise.kiks", "--robot", "kephera"), "Did you mean 'khepera'"),
-        (("exercise.kiks", "--picture", "run.doc"), "Let it end in .png, .svg or .pdf."),
+        (("exercise.kiks", "--picture", "run.doc"), "--picture must end in .png or .svg or .pdf or .jpg"),
         (("champion.toml", "student.py"), "a champion must drive all robots alone, but 'student.py' follows it"),
     ],
 )

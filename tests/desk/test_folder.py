@@ -91,8 +91,8 @@ def test_files_are_kept_and_listed(home):
     assert folder.names() == ["old.KAD", "room.kiks", "sub/other.kiks"]
     assert folder.open("room.kiks").to_bytes() == project.to_bytes()
     assert folder.open("old.KAD").arena.width_mm == 300
-    assert folder.has("room")
-    assert not folder.has("rooms")
+    assert folder.question("room") == "room.kiks exists. Replace it?"
+    assert folder.question("rooms") == ""
     with pytest.raises(ParameterError, match="exists"):
         folder.save(project, "room")
     folder.save(replace(project, seed=6), "room", may_replace=True)
@@ -103,6 +103,24 @@ def test_files_are_kept_and_listed(home):
     (home / "dir.kiks").mkdir()
     with pytest.raises(ParameterError, match="folder"):
         folder.save(project, "dir", may_replace=True)
+
+
+def test_the_second_of_two_desks_is_told_that_a_file_has_changed(home):
+    project, changed = Project(Arena.box(300, 200)), "was changed elsewhere since you opened or saved it here"
+    Folder(home).save(project, "room")
+    one, two = Folder(home), Folder(home)
+    assert "exists" in one.question("room")
+    assert "exists" in two.question("room")
+    one.save(replace(project, seed=1), "room", may_replace=True)
+    with pytest.raises(ParameterError, match="exists"):
+        two.save(replace(project, seed=2), "room", may_replace=True)
+    assert changed in two.question("room")
+    two.save(replace(project, seed=2), "room", may_replace=True)
+    assert changed in one.question("room")
+    assert one.open("room.kiks").seed == 2
+    assert "exists" in one.question("room")
+    two.save(project, "new")
+    assert changed in one.question("new")
 
 
 def test_long_lists_are_cut(home):

@@ -45,6 +45,16 @@ def test_saved_programs_are_read_again(tmp_path: Path) -> None:
         save_script(tmp_path, "mine.py", "1\n", may_replace=EXAMPLE)
 
 
+def test_the_second_of_two_editors_is_told_that_a_program_has_changed(tmp_path: Path) -> None:
+    mine = save_script(tmp_path, "mine.py", "1\n")
+    save_script(tmp_path, "mine.py", "2\n", may_replace=mine, known="1\n")
+    with pytest.raises(ParameterError, match=r"'mine.py' has changed meanwhile, in another editor"):
+        save_script(tmp_path, "mine.py", "3\n", may_replace=mine, known="1\n")
+    assert read_script(tmp_path, mine) == "2\n"
+    path_of(tmp_path, mine).unlink()
+    save_script(tmp_path, "mine.py", "3\n", may_replace=mine, known="1\n")
+
+
 @pytest.mark.parametrize("name", ["../a.py", "/etc/a.py", "a/b.py", ".a.py", "", "a\\b.py", "con.py", "a\0.py"])
 def test_names_do_not_leave_the_folder(name: str, tmp_path: Path) -> None:
     folder = tmp_path / "folder"

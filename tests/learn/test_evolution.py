@@ -121,6 +121,13 @@ def test_a_folder_of_another_evolution_is_an_error(tmp_path: Path) -> None:
         kiks.Evolution(small(seconds=2.0), "cma", population=8, seed=3, folder=tmp_path)
 
 
+def test_a_champion_of_no_evolution_is_not_replaced(tmp_path: Path) -> None:
+    (tmp_path / "champion.toml").write_text("the best of all")
+    with pytest.raises(ParameterError, match=r"must hold an evolution or no champion\.toml"):
+        kiks.Evolution(small(), "cma", population=8, seed=3, folder=tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["champion.toml"]
+
+
 @pytest.mark.parametrize(
     "data", [b"", b"[]", b"[" * 100_000, b'"x"', b"{}", b"\xff", b'{"seed": 1' + b"0" * 5000, b'{"task": ' + b"9" * 400]
 )

@@ -6,7 +6,7 @@ import os
 import resource
 import stat
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +20,15 @@ from kiks.errors import ParameterError
 from kiks.learn.champion import Champion
 from kiks.model.arena import Arena
 from kiks.model.arena_file import save_arena
-from kiks.model.atomic_files import check_writable, make_folder, path_of, replace_file, replace_files
+from kiks.model.atomic_files import (
+    FileBeside,
+    check_writable,
+    make_folder,
+    path_of,
+    replace_file,
+    replace_files,
+    target_of,
+)
 from kiks.model.kad import save_kad
 from kiks.model.project import Project
 from kiks.model.robot import RobotSpec, save_robot
@@ -166,6 +174,49 @@ def test_a_protected_file_is_not_replaced(tmp_path: Path) -> None:
     for attempt in (lambda: check_writable(path, "--out"), lambda: replace_file(path, b"", "--out")):
         with pytest.raises(ParameterError, match="write-protected"):
             attempt()
+
+
+def test_what_a_killed_writer_left_goes_and_what_a_living_one_writes_stays(tmp_path: Path) -> None:
+    left, note, folder = tmp_path / f".kiks-{'0' * 16}", tmp_path / ".kiks-note", tmp_path / f".kiks-{'1' * 16}"
+    with closing(FileBeside(tmp_path / "living")) as living:
+        for path in (left, note):
+            path.write_text("half")
+        folder.mkdir()
+        replace_file(tmp_path / "next", "whole")
+        assert set(tmp_path.iterdir()) == {living.path, note, folder, tmp_path / "next"}
+        living.take_place()
+    assert set(tmp_path.iterdir()) == {tmp_path / "living", note, folder, tmp_path / "next"}
+
+
+@pytest.mark.parametrize("earlier", [None, b"", b"old"])
+@pytest.mark.parametrize("name", ["file", "link"])
+def test_of_those_that_want_to_be_the_only_one_there_is_one(name: str, earlier: bytes | None, tmp_path: Path) -> None:
+    target = tmp_path / "file"
+    (tmp_path / "link").symlink_to(target)
+    if earlier is not None:
+        target.write_bytes(earlier)
+
+    def refused() -> None:
+        with pytest.raises(BlockingIOError):
+            FileBeside(target_of(tmp_path / name), is_only=True)
+
+    with closing(FileBeside(target, is_only=True)) as one:
+        assert one.has_earlier == bool(earlier)
+        refused()
+        one.file.write(b"new")
+        one.settle()
+        one.take_place()
+        refused()
+    with closing(FileBeside(target, is_only=True)) as other:
+        assert other.has_earlier
+    assert content(tmp_path) == {"file": b"new", "link": b"new"}
+
+
+def test_an_empty_file_that_was_made_for_the_lock_goes(tmp_path: Path) -> None:
+    FileBeside(tmp_path / "new", is_only=True).close()
+    with pytest.raises(IsADirectoryError):
+        FileBeside(tmp_path, is_only=True)
+    assert content(tmp_path) == {}
 
 
 @pytest.mark.parametrize("path", [5, None, b"a", "", "a\0b", "a" * 256, "a/" * 4096, "\ud800"])

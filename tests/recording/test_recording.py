@@ -479,6 +479,71 @@ def test_a_recording_leaves_a_reserve_of_its_disk_free(
     assert Recording(file).is_whole
 
 
+def test_the_first_chunk_leaves_the_reserve_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = tmp_path / "run.mcap"
+    with Simulation().record(file):
+        pass
+    before = file.read_bytes()
+
+    def disk_usage(folder: Path) -> SimpleNamespace:
+        used = sum(each.stat().st_size for each in folder.iterdir())
+        return SimpleNamespace(total=3 << 20, used=used, free=(160 << 10) + len(before) - used)
+
+    monkeypatch.setattr("shutil.disk_usage", disk_usage)
+    sim = Simulation()
+    with pytest.raises(ParameterError, match="the recording cannot begin"):
+        sim.record(file)
+    assert sim.loop.recorder is None
+    assert [(path, path.read_bytes()) for path in tmp_path.iterdir()] == [(file, before)]
+
+
+def test_a_recording_has_one_writer(tmp_path: Path) -> None:
+    file, link = tmp_path / "run.mcap", tmp_path / "link.mcap"
+    link.symlink_to(file)
+    for _ in range(2):  # where there is no file, and where there is one
+        sim = Simulation(seed=1)
+        with sim.record(file):
+            for seconds in (0.0, 2.0):
+                drive(sim, seconds)
+                for name in (file, link):
+                    with pytest.raises(ParameterError, match="another run is writing it"):
+                        Simulation().record(name)
+        assert check_recording(Recording(file).log).equal_count == 3
+    assert sorted(tmp_path.iterdir()) == [link, file]
+
+
+def test_a_run_in_which_nothing_happens_keeps_the_recording_of_before(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    file, sim = tmp_path / "run.mcap", Simulation(seed=1)
+    with sim.record(file):
+        drive(sim, 1.0)
+    before = file.read_bytes()
+    with Simulation().record(file) as recorder:
+        recorder.say(0, "SyntaxError")
+        assert file.read_bytes() == before
+    assert "nothing has happened" in caplog.text
+    assert [(path, path.read_bytes()) for path in tmp_path.iterdir()] == [(file, before)]
+    with (other := Simulation()).record(file):
+        other.place(1, 100, 100, 0)
+    assert Recording(file).duration_s == 0
+
+
+def test_a_killed_run_leaves_the_recording_of_before_or_its_own_without_the_last_second(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("kiks.recording.recorder.CHUNK_S", 0.0)
+    file = tmp_path / "run.mcap"
+    with (sim := Simulation(seed=1)).record(file):
+        drive(sim, 4.0)
+    recorder = (sim := Simulation(seed=1)).record(file)
+    for driven_s, found_s in ((0.5, 4.0), (1.0, 1.0), (1.0, 2.0)):
+        drive(sim, driven_s)
+        assert Recording(file).duration_s == pytest.approx(found_s, abs=0.05)
+    recorder.close()
+    assert Recording(file).is_whole
+
+
 def test_of_a_small_disk_the_reserve_is_a_share(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("shutil.disk_usage", lambda _folder: SimpleNamespace(total=10**8, used=0, free=10**7))
     assert room_of(tmp_path) == (10**7, 5 * 10**6)

@@ -30,6 +30,12 @@ KIKS = [sys.executable, "-m", "kiks"]
 STARTER = [sys.executable, "-c", "import subprocess, sys; subprocess.run(sys.argv[1:])"]
 """A process that starts another one and waits for it."""
 
+COMPILES_FOR_EVER = """
+import importlib, threading
+importlib.import_module("kiks.cli.session").ready_engine = threading.Event().wait
+importlib.import_module("kiks.cli").main()
+"""
+
 
 class Session:
     """A process of a session, and the command that waits for it: a fork (tests/forked.py) unless one is given."""
@@ -206,6 +212,41 @@ def test_sigint_is_ignored_and_sigterm_ends_the_session(tmp_path: Path) -> None:
         session.process.send_signal(signal.SIGTERM)
         assert session.wait() == 0
         assert not list((tmp_path / "kiks").iterdir())
+
+
+def test_ctrl_c_ends_a_listening_session_until_its_first_client_comes(tmp_path: Path) -> None:
+    for has_client in (False, True):
+        file = tmp_path / f"address-{has_client}"
+        command = [*KIKS, "session", "--listen", str(file)]
+        with (
+            subprocess.Popen(command, env={**os.environ, "XDG_RUNTIME_DIR": str(tmp_path)}) as process,
+            ExitStack() as end,
+        ):
+            end.callback(process.kill)
+            wait_until(file.exists)
+            if has_client:
+                words = file.read_text().split()
+                client = end.enter_context(socket.create_connection(("127.0.0.1", int(words[5])), timeout=GUARD_S))
+                client.sendall(f"{words[7]}\nactive\n".encode())
+                heard = client.makefile("rb")
+                assert b"KiKS" in heard.read(96)
+                client.sendall(b"active\n")
+                assert heard.read(96)
+            process.send_signal(signal.SIGINT)
+            if has_client:
+                client.sendall(b"active\n")
+                assert heard.read(96)
+                heard.close()
+                client.close()
+            assert process.wait(GUARD_S) == 0
+
+
+def test_a_session_whose_engine_is_being_compiled_ends_with_its_program(tmp_path: Path) -> None:
+    with started(folder=tmp_path, command=[sys.executable, "-c", COMPILES_FOR_EVER]) as session:
+        session.say("world default")
+        assert session.hear_frame() == "~"
+        session.hang_up()
+        assert session.wait() == 0
 
 
 def test_a_paused_world_does_not_keep_a_session_alive(tmp_path: Path) -> None:

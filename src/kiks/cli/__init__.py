@@ -18,6 +18,7 @@ from kiks.cli.fit import fit
 from kiks.cli.matlab import matlab
 from kiks.cli.monitor import monitor
 from kiks.cli.options import show_log
+from kiks.cli.outputs import Command
 from kiks.cli.replay import page, plot, replay, table
 from kiks.cli.run import RunCommand, run
 from kiks.cli.schema import schema
@@ -57,7 +58,7 @@ for _command in (
     schema,
     warmup,
 ):
-    app.command(cls=RunCommand if _command is run else None)(_command)
+    app.command(cls=RunCommand if _command is run else Command)(_command)
 app.add_typer(arena, name="arena")
 
 

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from kiks.cli.options import written_file
-from kiks.errors import ParameterError
+from kiks.cli.outputs import Command, output
 
 if TYPE_CHECKING:
     from kiks.model.arena import Arena
@@ -16,15 +15,16 @@ if TYPE_CHECKING:
 Out = Annotated[
     Path,
     typer.Argument(
-        metavar="OUT.toml", help="The arena file; its picture goes beside it as .png.", callback=written_file
+        metavar="OUT.toml",
+        help="The arena file; its picture goes beside it as .png.",
+        callback=output(".toml", beside=".png"),
     ),
 ]
-Force = Annotated[bool, typer.Option("--force", help="Replace existing files.")]
 
 arena = typer.Typer(help="Create arenas, or describe one.", no_args_is_help=True, rich_markup_mode=None)
 
 
-@arena.command()
+@arena.command(cls=Command)
 def maze(
     out: Out,
     columns: Annotated[int, typer.Option(help="Cells side by side, without entrance and exit.")] = 4,
@@ -32,7 +32,6 @@ def maze(
     path_mm: Annotated[int, typer.Option(help="Width of the passages [mm].")] = 120,
     wall_mm: Annotated[int, typer.Option(help="Thickness of the walls between them [mm].")] = 10,
     seed: Annotated[int, typer.Option(help="Seed: the same seed, the same maze.", min=0)] = 0,
-    force: Force = False,
 ) -> None:
     """Create a random maze: a robot starts at the entrance, upper left, and a lamp hangs at the exit, lower right.
 
@@ -40,10 +39,10 @@ def maze(
     """
     from kiks.model.arena import Arena
 
-    _save(Arena.maze(columns=columns, rows=rows, path_mm=path_mm, wall_mm=wall_mm, seed=seed), out, force=force)
+    _save(Arena.maze(columns=columns, rows=rows, path_mm=path_mm, wall_mm=wall_mm, seed=seed), out)
 
 
-@arena.command()
+@arena.command(cls=Command)
 def new(
     out: Out,
     width_mm: Annotated[int, typer.Option(help="Outer width [mm].")],
@@ -51,7 +50,6 @@ def new(
     wall_mm: Annotated[int, typer.Option(help="Thickness of the wall around it [mm].")] = 10,
     rounded_mm: Annotated[int, typer.Option(help="Radius of the corners [mm].")] = 0,
     brightness: Annotated[str, typer.Option(help="Brightness of the wall, 1 to 255, or a material: wood.")] = "255",
-    force: Force = False,
 ) -> None:
     """Create an empty box whose picture, one pixel per millimetre, is ready to draw in.
 
@@ -61,10 +59,10 @@ def new(
 
     shade = int(brightness) if brightness.removeprefix("-").isdecimal() else brightness
     box = Arena.box(width_mm, height_mm, wall_mm=wall_mm, rounded_mm=rounded_mm, brightness=shade)
-    _save(box, out, force=force)
+    _save(box, out)
 
 
-@arena.command()
+@arena.command(cls=Command)
 def info(file: Annotated[Path, typer.Argument(metavar="ARENA", help="Arena file (.toml) or picture.")]) -> None:
     """Print an arena's size and contents, and whether a Khepera fits at the starts.
 
@@ -109,17 +107,11 @@ def _at(x_mm: float, y_mm: float) -> str:
     return f"({x_mm:g}, {y_mm:g}) mm"
 
 
-def _save(made: Arena, out: Path, *, force: bool) -> None:
-    """Write an arena, named after its file; `save_arena` refuses other suffixes than .toml."""
+def _save(made: Arena, out: Path) -> None:
+    """Write an arena, named after its file."""
     from dataclasses import replace
 
     from kiks.model.arena_file import save_arena
 
-    if out.suffix.lower() == ".toml" and not force:
-        for file in (out, out.with_suffix(".png")):
-            if file.exists():
-                raise ParameterError(
-                    f"The arena's files must be new, but {str(file)!r} exists. Choose another name or add --force."
-                )
     save_arena(replace(made, name=out.stem), out)
     typer.echo(f"Arena: {out}   Picture: {out.with_suffix('.png')}")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from kiks.cli.engine_start import ready_engine
-from kiks.cli.options import written_file
+from kiks.cli.outputs import output
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import ParameterError
 
@@ -21,7 +21,7 @@ REPEAT_MAX_MM = 2000.0
 
 def calibrate(
     port: Annotated[str, typer.Option(help="Port of the robot: /dev/ttyUSB0, COM3, socket://host:port, kiks://1.")],
-    out: Annotated[Path, typer.Option(help="Robot file to write, for --robot.", callback=written_file)],
+    out: Annotated[Path, typer.Option(help="Robot file to write, .toml, for --robot.", callback=output(".toml"))],
     base: Annotated[str, typer.Option(help="Its kind, for all that is not measured: khepera, khepera_ii, a file.")] = (
         "khepera"
     ),
@@ -30,7 +30,6 @@ def calibrate(
         str | None, typer.Option(help="Marks [mm] from the wall at which the robot spins: 5,15,25.")
     ] = None,
     run_up: Annotated[float, typer.Option(help="Mark [mm] from which it drives towards the wall.")] = 500.0,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace an existing file.")] = False,
     yes: Annotated[bool, typer.Option("--yes", help="Take every default: for simulated robots.")] = False,
 ) -> None:
     """Measure a robot in front of a white wall and write a robot file for a simulated robot like it.
@@ -46,8 +45,6 @@ def calibrate(
 
     kind = RobotSpec.load(base)
     marks = None if gaps is None else parse_gaps(gaps)
-    if out.exists() and not overwrite:
-        raise ParameterError(f"--out must name a new file, but {str(out)!r} exists. Add --overwrite to replace it.")
     end_as_with_ctrl_c()
     with Khepera(port, baud=baud) as robot:
         placements = TerminalPlacements(hand_of(robot), asks=not yes)

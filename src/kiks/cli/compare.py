@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from kiks.cli.options import written_file
+from kiks.cli.outputs import output
 from kiks.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 def compare(
     first: Annotated[Path, typer.Argument(help="A folder of kiks evolve, best with --seeds.")],
     second: Annotated[Path, typer.Argument(help="Another folder, with evolutions of the same task.")],
-    picture: Annotated[
-        Path | None, typer.Option(help="File of the picture; kiks-compare.png if left out.", callback=written_file)
-    ] = None,
+    picture: Annotated[Path, typer.Option(help="File of the picture, .png.", callback=output(".png"))] = Path(
+        "kiks-compare.png"
+    ),
 ) -> None:
     """Compare the evolutions in two folders: medians, exams, and the Mann-Whitney test with its effect size.
 
@@ -43,9 +43,8 @@ def compare(
             f"{name}: U = {found.u:g}, p = {found.p:.3g}, A = {found.a:.2f} ({found.effect}): the share of pairs in "
             f"which {first} is better"
         )
-    target = picture or Path("kiks-compare.png")
-    save_results_plot(groups, target)
-    typer.echo(f"Picture: {target}")
+    save_results_plot(groups, picture)
+    typer.echo(f"Picture: {picture}")
 
 
 def print_seeds(results: Sequence[Result]) -> None:

@@ -13,6 +13,7 @@ import typer
 from kiks.cli.desk import NoWait, WithDesk, open_desk
 from kiks.cli.engine_start import ready_engine
 from kiks.cli.options import SeedOrOwn, load_arena, say, say_without_world, shipped_folder
+from kiks.cli.outputs import PICTURES, leave_out, output
 from kiks.cli.record import RecordFile, recorded
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import ParameterError, nearest, shown
@@ -40,6 +41,7 @@ class Behaviour(enum.StrEnum):
 
 
 def demo(
+    context: typer.Context,
     behaviour: Annotated[
         str,
         typer.Argument(
@@ -57,7 +59,13 @@ def demo(
         int | None,
         typer.Option(help="Speed of the simulated serial line [bit/s]; each demonstration's own if left out."),
     ] = None,
-    picture: Annotated[Path | None, typer.Option(help="File of the picture; kiks-NAME.png if left out.")] = None,
+    picture: Annotated[
+        Path | None,
+        typer.Option(
+            help="File of the picture; kiks-NAME.png if left out.",
+            callback=output(*PICTURES, default=lambda told: Path(f"kiks-{_name_of(told['behaviour'])}.png")),
+        ),
+    ] = None,
     left: Annotated[
         str | None, typer.Option(help="soccer: the Python program of the left side; with its arguments, in quotes.")
     ] = None,
@@ -100,32 +108,23 @@ def demo(
             f"{nearest(behaviour, [each.value for each in Behaviour])}"
         )
     is_soccer = behaviour == Behaviour.SOCCER
-    for name, value in (("--arena", arena), ("--baud", baud)) if is_soccer else (("--left", left), ("--right", right)):
-        if value is not None:
-            raise ParameterError(
-                f"{name} must be left out with {behaviour}, but it was {shown(value)}. Other demos take it."
-            )
+    leave_out(context, f"with {behaviour}", *(("arena", "baud") if is_soccer else ("left", "right")))
+    if not desk:
+        leave_out(context, "without --desk", "no_wait")
     # The folder of a co-evolution has champions, but no single one.
     is_contest = any(Path(behaviour).glob("*.toml")) and not Path(behaviour, "champion.toml").exists()
     if generation is None:
-        for option, is_given in (("--rank", rank != 1), ("--world", world != 0), ("--task", task is not None)):
-            if is_given:
-                raise ParameterError(f"{option} must come with --generation, but that is missing. Give the generation.")
+        leave_out(context, "without --generation", "rank", "world", "task")
     else:
-        for option, value in (("--arena", arena), ("--seed", seed), ("--baud", baud), ("--at", at)):
-            if value is not None:
-                raise ParameterError(f"{option} must be left out with --generation, but it was {shown(value)}.")
+        leave_out(context, "with --generation", "arena", "seed", "baud", "at")
     for option, value in (("--generation", generation), ("--at", at)):
         if value is not None and (behaviour in list(Behaviour) or is_contest or not Path(behaviour).is_dir()):
             raise ParameterError(
                 f"{option} must come with the folder of an evolution of one controller, but with it came "
                 f"{shown(behaviour)}."
             )
-    from kiks.drawing import check_picture
-
-    name = behaviour if behaviour in list(Behaviour) else Path(behaviour).resolve().stem
+    name = _name_of(behaviour)
     picture = picture or Path(f"kiks-{name}.png")
-    check_picture(picture)
     ready_engine(as_needed=not (is_soccer or desk))
     if is_soccer:
         sys.path.append(str(shipped_folder("examples/soccer", "player.py")))
@@ -163,6 +162,10 @@ def demo(
         open_desk(Desk(scene.sim), work=work, waits=not no_wait)
     else:
         work()
+
+
+def _name_of(behaviour: str) -> str:
+    return behaviour if behaviour in list(Behaviour) else Path(behaviour).resolve().stem
 
 
 def _individual(folder: str, generation: int, rank: int, world: int, task: str | None) -> tuple[Champion, float]:

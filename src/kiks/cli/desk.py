@@ -32,7 +32,8 @@ NoWait = Annotated[bool, typer.Option("--no-wait", help="Begin at once, without 
 
 def desk(
     program: Annotated[
-        list[str] | None, typer.Argument(help="Programs to begin with: the first drives robot 1, and so on.")
+        list[str] | None,
+        typer.Argument(help="Programs to begin with, in robots 1, 2, and so on; a project may stand first."),
     ] = None,
     arena: Annotated[
         str | None,
@@ -83,6 +84,8 @@ def desk(
     from kiks.ports.program_process import commands_of
     from kiks.sim.from_project import simulation_of
 
+    if program and is_project(program[0]) and arena is None:
+        arena, *program = program
     project = Project() if arena is None else Project.load(arena)
     home = folder or (Path(arena).parent if arena is not None and is_project(arena) else Path())
     if not home.is_dir():

@@ -59,13 +59,13 @@ def run_champion(
 
     def work() -> None:
         doubt = "it was interrupted"
-        try:
-            with recorded(sim, *files, programs=[file]):
+        with recorded(sim, *files, programs=[file]):
+            try:
                 loop_count = champion.drive(ports, seconds=seconds)
-            say(f"{loop_count} loops")
-            doubt = ""
-        finally:
-            tell_run(sim, doubt)
+                say(f"{loop_count} loops")
+                doubt = ""
+            finally:
+                tell_run(sim, doubt)
 
     if on_desk:
         from kiks.desk.server.desk import Desk

@@ -12,6 +12,7 @@ import typer
 from kiks.cli.engine_start import ready_batch, ready_engine
 from kiks.cli.evolution_progress import progress_of
 from kiks.cli.options import Seed, written_folder
+from kiks.cli.outputs import leave_out
 from kiks.cli.record import RecordFile, recorded
 from kiks.control.controller_kinds import ControllerKind
 from kiks.ending import end_as_with_ctrl_c
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 
 
 def evolve(
+    context: typer.Context,
     task: Annotated[str, typer.Argument(help="A task (--list shows them), or a Python file that holds one.")] = "avoid",
     out: Annotated[
         Path | None,
@@ -69,6 +71,7 @@ def evolve(
     from kiks.learn import tasks
 
     if list_:
+        leave_out(context, "with --list", *(set(context.params) - {"list_"}))
         for name in tasks.TASKS:
             typer.echo(f"{name:10} {tasks.load(name).about}")
         for name, make in tasks.CONTESTS.items():
@@ -78,9 +81,7 @@ def evolve(
     if task in tasks.CONTESTS:
         from kiks.cli.coevolve import coevolve
 
-        for option, value in (("--controller", controller), ("--seeds", seeds), ("--record", record)):
-            if value is not None:
-                raise ParameterError(f"{option} must be left out with {task}, but it was {value}.")
+        leave_out(context, f"with {task}", "controller", "seeds", "record")
         coevolve(
             tasks.CONTESTS[task](),
             str(algorithm or AlgorithmName.GA),

@@ -10,14 +10,16 @@ from typing import Annotated
 
 import typer
 
-from kiks.cli.options import written_file
+from kiks.cli.outputs import output
 from kiks.cli.replay import RecordingFile
 from kiks.errors import ParameterError, counted, shown
 
 
 def film(
     file: RecordingFile,
-    out: Annotated[Path, typer.Argument(help="The film: .mp4, .gif or .webp.", callback=written_file)],
+    out: Annotated[
+        Path, typer.Argument(help="The film: .mp4, .gif or .webp.", callback=output(".mp4", ".gif", ".webp"))
+    ],
     size: Annotated[str, typer.Option(help="Width and height [pixels].")] = "1280x720",
     fps: Annotated[int, typer.Option(help="Pictures per second.")] = 25,
     speed: Annotated[float, typer.Option(help="Simulated seconds per second of the film.")] = 1.0,
@@ -42,6 +44,8 @@ def film(
     from kiks.films.film import save_film
     from kiks.recording.recording import Recording
 
+    if plain and robot is not None:
+        raise ParameterError(f"--robot must be left out with --plain, but it was {robot}.")
     with _progress_bar(out.name) as show:
         count = save_film(
             Recording(file),
@@ -63,7 +67,7 @@ def film(
 
 def photo(
     file: RecordingFile,
-    out: Annotated[Path, typer.Argument(help="The photo: .png or .jpg.", callback=written_file)],
+    out: Annotated[Path, typer.Argument(help="The photo: .png or .jpg.", callback=output(".png", ".jpg"))],
     time: Annotated[float | None, typer.Option(help="When [s of simulated time]; the end if left out.")] = None,
     size: Annotated[str, typer.Option(help="Width and height [pixels].")] = "1280x720",
     follow: Annotated[int | None, typer.Option(help="The robot that is in the middle.")] = None,

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from kiks.cli.options import written_file
+from kiks.cli.outputs import output
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import ParameterError, shown
 
@@ -20,7 +20,7 @@ def fit(
         typer.Argument(help="Files of samples; =RADIUS in mm after that of a round object: post.sam=12.5."),
     ],
     robot: Annotated[
-        Path | None, typer.Option(help="Write the fitted robot here: mine.toml.", callback=written_file)
+        Path | None, typer.Option(help="Write the fitted robot here: mine.toml.", callback=output(".toml"))
     ] = None,
 ) -> None:
     """Fit the proximity sensors to samples of a real robot: on every other angle, and test them on the rest.

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from kiks.cli.engine_start import ready_engine
-from kiks.cli.options import new_file
+from kiks.cli.outputs import output
 from kiks.ending import end_as_with_ctrl_c
 
 if TYPE_CHECKING:
@@ -31,7 +31,9 @@ def monitor(
     port: Annotated[str, typer.Option(help="Port of the robot: /dev/ttyUSB0, COM3, socket://host:port, kiks://1.")],
     baud: Annotated[int, typer.Option(help="Line speed [bit/s].", min=75, max=4_000_000)] = 9600,
     rate: Annotated[float, typer.Option(help="Samples per second; the line may allow fewer.")] = 10.0,
-    csv: Annotated[Path | None, typer.Option(help="Log all readings to this new file.", callback=new_file)] = None,
+    csv: Annotated[
+        Path | None, typer.Option(help="Log all readings to this new file.", callback=output(".csv", is_new=True))
+    ] = None,
     seconds: Annotated[float | None, typer.Option(help="End after this time [s]; otherwise Ctrl-C ends.")] = None,
 ) -> None:
     """Show and log all readings of a real or simulated robot.

@@ -12,7 +12,7 @@ import typer
 
 import kiks
 from kiks.errors import ParameterError, shown
-from kiks.model.atomic_files import check_writable, make_folder
+from kiks.model.atomic_files import make_folder
 from kiks.model.checks import ROBOTS_MAX
 
 if TYPE_CHECKING:
@@ -51,28 +51,6 @@ SeedOrOwn = Annotated[
 ]
 
 
-def written_file(param: typer.CallbackParam, value: Path | None) -> Path | None:
-    """Check an option's file before the run whose result goes there: callback of every option that names one.
-
-    Raises:
-        ParameterError: If it could not be written.
-    """
-    if value is not None:
-        check_writable(value, _name(param))
-    return value
-
-
-def new_file(param: typer.CallbackParam, value: Path | None) -> Path | None:
-    """Check the file of an option that replaces none.
-
-    Raises:
-        ParameterError: If it is there or could not be written.
-    """
-    if value is not None:
-        check_writable(value, _name(param), is_new=True)
-    return value
-
-
 def written_folder(param: typer.CallbackParam, value: Path | None) -> Path | None:
     """Make the folder of an option whose results go there.
 
@@ -80,12 +58,8 @@ def written_folder(param: typer.CallbackParam, value: Path | None) -> Path | Non
         ParameterError: If nothing could be written into it.
     """
     if value is not None:
-        make_folder(value, _name(param))
+        make_folder(value, param.opts[0])
     return value
-
-
-def _name(param: typer.CallbackParam) -> str:
-    return param.opts[0] if param.opts[0].startswith("-") else param.opts[0].upper()
 
 
 def load_arena(file: str | None) -> Arena:
@@ -129,12 +103,19 @@ def with_robots(project: Project, count: int | None, least: int) -> Project:
 
     Args:
         project: The project.
-        count: Number of robots; None for the project's.
+        count: Number of robots; None for the project's, or more if they are too few.
         least: Smallest number of robots.
+
+    Raises:
+        ParameterError: If the number is smaller.
     """
     from kiks.model.project import ProjectRobot
 
     robots = project.robots
+    if count is not None and count < least:
+        raise ParameterError(
+            f"--robots must be at least {least}, for so many are named, but it was {count}. Leave it out."
+        )
     count = max(len(robots) if count is None else count, least)
     kind = robots[-1].kind if robots else "khepera"
     more = (ProjectRobot(kind=kind),) * (count - len(robots))
@@ -209,13 +190,17 @@ def parse_words(words: list[str]) -> list[Command]:
     begins with a .py file, it is a program with all its arguments, which may be .py files themselves.
 
     Raises:
-        ParameterError: If the first word is no file.
+        ParameterError: If the first word is no file, or one names a project.
     """
     from kiks.ports.program_process import Command
 
     commands: list[Command] = []
     for word in words:
         parts = _split(word)
+        if is_project(word):
+            raise ParameterError(
+                f"a project must come first, but {shown(word)} stands among the programs. Put it before them."
+            )
         if Path(word).is_file() and (word.endswith(".py") or not commands):
             commands.append(Command(Path(word)))
         elif len(parts) > 1 and parts[0].endswith(".py") and Path(parts[0]).is_file():

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from kiks.cli.options import say, written_file
-from kiks.errors import ParameterError
+from kiks.cli.options import say
+from kiks.cli.outputs import PICTURES, output
 from kiks.model.atomic_files import GrowingFile
 
 if TYPE_CHECKING:
@@ -32,45 +32,24 @@ POINTS_MAX, LEAST_POINTS_MAX = 200_000, 1000
 """Most points of all paths of a picture together, but of each path at least so many."""
 
 
-def _drawable(param: typer.CallbackParam, value: Path | None) -> Path | None:
-    """Check the file of a picture before the run.
-
-    Raises:
-        ParameterError: If it could not be written, or its ending names no type of picture.
-    """
-    if value is not None:
-        from kiks.drawing import check_picture
-
-        check_picture(value)
-    return value
-
-
 Picture = Annotated[
     Path | None,
-    typer.Option(help="Draw the arena with the paths of all robots here: .png, .svg or .pdf.", callback=_drawable),
+    typer.Option(
+        help="Draw the arena with the paths of all robots here: .png, .svg, .pdf or .jpg.", callback=output(*PICTURES)
+    ),
 ]
 Table = Annotated[
     Path | None,
-    typer.Option("--csv", help="Write here where each robot is, every 50 ms of simulated time.", callback=written_file),
+    typer.Option("--csv", help="Write here where each robot is every 50 ms: .csv.", callback=output(".csv")),
 ]
-
-
-def _recordable(param: typer.CallbackParam, value: Path | None) -> Path | None:
-    """Check the file of a recording before the run.
-
-    Raises:
-        ParameterError: If it could not be written, or its name has another ending.
-    """
-    value = written_file(param, value)
-    if value is not None and value.suffix.lower() != ".mcap":
-        raise ParameterError(f"--record must name a file that ends in .mcap, but it was {str(value)!r}.")
-    return value
 
 
 RecordFile = Annotated[
     Path | None,
     typer.Option(
-        "--record", help="Record the whole run here, a .mcap file: kiks replay shows it again.", callback=_recordable
+        "--record",
+        help="Record the whole run here, .mcap: kiks replay shows it again.",
+        callback=output(".mcap"),
     ),
 ]
 

@@ -9,7 +9,8 @@ import typer
 
 from kiks.cli.desk import NoWait, open_desk
 from kiks.cli.engine_start import ready_engine
-from kiks.cli.options import say, written_file
+from kiks.cli.options import say
+from kiks.cli.outputs import leave_out, output
 from kiks.errors import ParameterError, counted
 from kiks.units import TICK_NS, s_from_ns
 from kiks.version import __version__
@@ -23,6 +24,7 @@ RecordingFile = Annotated[Path, typer.Argument(help="A recording (.mcap) of --re
 
 
 def replay(
+    context: typer.Context,
     file: RecordingFile,
     check: Annotated[
         bool, typer.Option("--check", help="Make the run again at full speed, and compare each second, to the bit.")
@@ -38,6 +40,8 @@ def replay(
 
     Example: kiks replay run.mcap --check
     """
+    if check:
+        leave_out(context, "with --check", "start", "speed")
     ready_engine()
     from kiks.recording.recording import Recording
 
@@ -45,7 +49,7 @@ def replay(
     if not recording.is_whole:
         say(f"the run that wrote {str(file)!r} was killed, or goes on: this is what it has written so far.")
     if check:
-        raise typer.Exit(_check(recording))
+        raise typer.Exit(_check(recording, file))
     from kiks.desk.server.desk import Desk
     from kiks.recording.replay import Replay
 
@@ -56,11 +60,16 @@ def replay(
     open_desk(desk, waits=not no_wait)
 
 
-def _check(recording: Recording) -> int:
+def _check(recording: Recording, file: Path) -> int:
     """Check a recording, and say what was found; return the exit code."""
     from kiks.recording.check import check_recording
 
     found = check_recording(recording.log)
+    if found.differs_ns is None and not found.equal_count:
+        raise ParameterError(
+            f"a recording must have a checkpoint to be compared, but {str(file)!r} has none: its run was "
+            "killed before the first one, or goes on."
+        )
     version = recording.about.get("kiks", "of an unknown version")
     if found.differs_ns is None:
         typer.echo(
@@ -82,9 +91,8 @@ def _check(recording: Recording) -> int:
 def plot(
     files: Annotated[list[Path], typer.Argument(help="Recordings (.mcap), side by side.", metavar="FILE...")],
     out: Annotated[
-        Path | None,
-        typer.Option(help="The picture: .png, .svg or .pdf; kiks-plot.png if left out.", callback=written_file),
-    ] = None,
+        Path, typer.Option(help="The picture: .png, .svg or .pdf.", callback=output(".png", ".svg", ".pdf"))
+    ] = Path("kiks-plot.png"),
     robot: Annotated[int, typer.Option(help="The robot whose readings, speeds and time are drawn.", min=1)] = 1,
 ) -> None:
     """Draw recordings: paths and odometry, where robots were, readings, speeds, and where the milliseconds went.
@@ -94,15 +102,18 @@ def plot(
     from kiks.plots import save_plot
     from kiks.recording.recording import Recording
 
-    path = out or Path("kiks-plot.png")
-    save_plot([Recording(file) for file in files], path, robot=robot)
-    typer.echo(f"Picture: {path}")
+    save_plot([Recording(file) for file in files], out, robot=robot)
+    typer.echo(f"Picture: {out}")
 
 
 def page(
     file: RecordingFile,
     out: Annotated[
-        Path | None, typer.Argument(help="The page; FILE with .html if left out.", callback=written_file)
+        Path | None,
+        typer.Argument(
+            help="The page, .html; FILE with .html if left out.",
+            callback=output(".html", default=lambda told: told["file"].with_suffix(".html")),
+        ),
     ] = None,
     title: Annotated[str | None, typer.Option(help="Its title; the programs' names if left out.")] = None,
     robot: Annotated[int, typer.Option(help="The robot whose readings, speeds, time and wire are shown.", min=1)] = 1,
@@ -133,7 +144,7 @@ def page(
 
 def table(
     file: RecordingFile,
-    out: Annotated[Path, typer.Argument(help="The table's file: .csv or .parquet.", callback=written_file)],
+    out: Annotated[Path, typer.Argument(help="The table: .csv or .parquet.", callback=output(".csv", ".parquet"))],
     name: Annotated[str, typer.Option("--table", help="Which: poses, wheels, readings, wire or events.")] = "poses",
     robot: Annotated[int | None, typer.Option(help="Of this robot alone.")] = None,
 ) -> None:
@@ -143,8 +154,6 @@ def table(
     """
     from kiks.recording.recording import Recording
 
-    if out.suffix.lower() not in (".csv", ".parquet"):
-        raise ParameterError(f"OUT must end in .csv or .parquet, but it was {str(out)!r}.")
     rows = Recording(file).table(name, robot)
     columns = {}
     for column in rows.dtype.names or ():

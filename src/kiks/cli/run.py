@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from typer.core import TyperCommand
 
 from kiks.cli.desk import NoWait, WithDesk, open_desk
 from kiks.cli.engine_start import ready_engine
@@ -29,8 +28,9 @@ from kiks.cli.options import (
     say,
     show_log,
     with_robots,
-    written_file,
 )
+from kiks.cli.outputs import Command as CheckedCommand
+from kiks.cli.outputs import leave_out, output
 from kiks.cli.record import Picture, RecordFile, Table, noting_output, recorded, tell_run
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import ParameterError, shown
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from kiks.sim.simulation import Simulation
 
 
-class RunCommand(TyperCommand):
+class RunCommand(CheckedCommand):
     """Also takes options after a project or a champion, which have no arguments of their own, unlike programs."""
 
     allow_interspersed_args = False  # all words after a program's name belong to the program
@@ -63,6 +63,7 @@ class RunCommand(TyperCommand):
 
 
 def run(
+    context: typer.Context,
     program: Annotated[
         Path,
         typer.Argument(
@@ -91,7 +92,7 @@ def run(
     ] = None,
     save_thinking: Annotated[
         Path | None,
-        typer.Option(help="Write the thinking times of a live run here, for replay:FILE.", callback=written_file),
+        typer.Option(help="Write the thinking times of a live run here, for replay:FILE.", callback=output()),
     ] = None,
     when_silent: WhenSilent = "ignore",
     patience: PatienceS = 2.0,
@@ -116,6 +117,8 @@ def run(
     """
     ready_engine()
     show_log()
+    if not desk:
+        leave_out(context, "without --desk", "no_wait")
     if program.suffix == ".toml":
         from kiks.cli.drive import run_champion
 
@@ -123,10 +126,12 @@ def run(
             raise ParameterError(
                 f"a champion must drive all robots alone, but {shown(arguments[0])} follows it. Leave it out."
             )
+        leave_out(context, "of a champion", "robot", "thinking", "map_", "save_thinking", "when_silent", "patience")
         run_champion(
             program, arena, robots, turret, seed, seconds, (picture, csv, record), on_desk=desk, waits=not no_wait
         )
         return
+    leave_out(context, "with a program, which ends by itself", "seconds")
     kinds = robot or []
     from kiks.ports.program_process import Labels, commands_of
     from kiks.ports.program_scheduler import check_policy
@@ -153,9 +158,15 @@ def run(
     mapping = dict(parse_map(entry) for entry in map_ or [])
     check_policy(when_silent, patience)
     thinking = thinking_of(project, home) if thinking is None else thinking
+    if not thinking.startswith("live"):
+        leave_out(context, f"with --thinking {thinking}", "save_thinking")
+    if len(commands) == 1 and not desk:
+        leave_out(context, "with one program", "when_silent", "patience")
     # A program may change the working folder.
     thoughts = None if save_thinking is None else save_thinking.absolute()
     sim = simulation_of(project, home, kinds=kinds, thinking=thinking if len(commands) == 1 else "none")
+    for number in mapping.values():
+        sim.world.index_of(number)
     fit_turrets(sim, turret)
     names = [each.program.name for each in commands if each is not None]
     labels = Labels(names) if len(names) > 1 else None
@@ -180,19 +191,19 @@ def run(
         return
     end_as_with_ctrl_c()
     code, doubt = 1, ""
-    try:
-        with recorded(sim, *files):
+    with recorded(sim, *files):
+        try:
             if len(commands) == 1 and commands[0] is not None:
                 code = _run_one(sim, commands[0], mapping, thoughts)
             else:
                 programs = host(sim, commands)
                 code = programs.run()
                 doubt = programs.doubt
-    except KeyboardInterrupt:
-        doubt = "it was interrupted"
-        raise
-    finally:
-        _tell(sim, thinking, doubt)
+        except KeyboardInterrupt:
+            doubt = "it was interrupted"
+            raise
+        finally:
+            _tell(sim, thinking, doubt)
     raise typer.Exit(code)
 
 

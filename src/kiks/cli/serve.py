@@ -24,6 +24,7 @@ from kiks.cli.options import (
     show_log,
     with_robots,
 )
+from kiks.cli.outputs import leave_out
 from kiks.cli.record import RecordFile, recorded
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import LinkError
@@ -39,6 +40,7 @@ TCP_PORT = 10020
 
 
 def serve(
+    context: typer.Context,
     arena: ArenaFile = None,
     robots: Robots = None,
     robot: RobotKinds = None,
@@ -93,6 +95,12 @@ def serve(
         if not quiet:
             typer.echo(text)
 
+    if thinking == "live":
+        leave_out(context, "with --thinking live", "programs", "when_silent", "patience")
+    elif not desk:
+        leave_out(context, f"with --thinking {thinking}", "speed")
+    if not pty:
+        leave_out(context, "with --no-pty", "link")
     show_log(is_quiet=quiet)
     kinds = robot or []
     project, home = load_world(arena)

@@ -6,6 +6,7 @@ import os
 import signal
 import sys
 from pathlib import Path
+from types import FrameType
 from typing import Annotated
 
 import typer
@@ -38,8 +39,10 @@ def session(
     # Only answers go to the standard output: other output goes to the error output.
     sink = os.dup(1)
     os.dup2(2, 1)
-    # Ctrl-C in Octave is meant for the program there. Octave blocks all signals in its children.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # Ctrl-C in Octave is meant for the program there. At a terminal, and before a first client comes, it is meant for
+    # this process. Octave blocks all signals in its children.
+    if listen is None and not os.isatty(0):
+        signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_SETMASK, ())
     if where is None and listen is None:
         # Octave waits for the greeting, and handles Ctrl-C when a frame has arrived: the first one comes at once.
@@ -81,6 +84,13 @@ def _serve(
 
     end_as_with_ctrl_c()
     host = SessionProcess(Session(ready=ready_engine, has_window=has_screen() if window is None else window), heartbeat)
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        if not host.was_joined:
+            signal.default_int_handler(number, frame)
+
+    if signal.getsignal(signal.SIGINT) is not signal.SIG_IGN:
+        signal.signal(signal.SIGINT, interrupt)
     try:
         if exchange is not None:
             host.add(exchange)

@@ -116,10 +116,15 @@ class Folder:
         """Write the identity of an evolution into the folder, which is made if need be, or compare it with that there.
 
         Raises:
-            ParameterError: If the folder belongs to another evolution, or cannot be written.
+            ParameterError: If the folder belongs to another evolution, or has a champion of none, or cannot be written.
         """
-        make_folder(self.path / GENERATIONS, "an evolution")
         file = self.path / IDENTITY
+        if not file.exists() and (self.path / "champion.toml").exists():
+            raise ParameterError(
+                f"the folder {str(self.path)!r} must hold an evolution or no champion.toml, but it holds one without "
+                f"{IDENTITY}, which would be replaced. Take a new folder."
+            )
+        make_folder(self.path / GENERATIONS, "an evolution")
         if not file.exists():
             replace_file(file, json.dumps(asdict(identity), indent=1) + "\n", "an evolution")
             tell_unseen(identity.task_digest, f"The evolution in {str(self.path)!r} continues")

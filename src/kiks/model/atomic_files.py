@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import stat
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, closing, contextmanager, suppress
 from pathlib import Path, PurePosixPath
+from typing import IO, BinaryIO, cast
 
 from kiks.errors import KiksError, ParameterError, shown
 
 NAME_BYTES_MAX, PATH_BYTES_MAX = 255, 4000
 """Most bytes of a file's name, and of a path, less than Linux allows."""
+
+_PREFIX = ".kiks-"
 
 
 def replace_file(path: str | Path, data: bytes | str, what: str = "The file", *, rights: int | None = None) -> None:
@@ -37,28 +41,137 @@ def replace_files(files: Mapping[Path, bytes | str], what: str = "The file", *, 
     Raises:
         ParameterError: If one of them cannot be written; the earlier ones are then as they were.
     """
-    fresh: dict[Path, Path] = {}
     path = Path()
     try:
-        for path, data in files.items():
-            target = _target(path)
-            content = data.encode() if isinstance(data, str) else data
-            if target.exists() and not target.is_file():
-                target.write_bytes(content)
-                continue
-            fresh[target] = _name_beside(target)
-            _write(fresh[target], content, 0o666 if rights is None else rights)
-            if rights is None:
-                _take_rights(fresh[target], target)
-        for path, beside in fresh.items():
-            os.replace(beside, path)
-            _settle(path.parent)
+        with ExitStack() as stack:
+            fresh = []
+            for path, data in files.items():
+                target = target_of(path)
+                content = data.encode() if isinstance(data, str) else data
+                fresh.append(stack.enter_context(closing(FileBeside(target, 0o666 if rights is None else rights))))
+                fresh[-1].file.write(content)
+                fresh[-1].settle()
+            for beside in fresh:
+                beside.take_place(keeps_rights=rights is None)
     except (OSError, ValueError) as error:
-        raise _unwritable(what, "file", path, error) from error
-    finally:
-        for beside in fresh.values():
+        raise unwritable(what, "file", path, error) from error
+
+
+class FileBeside:
+    """A new file beside another, whose place it takes when it is told to; if it never is, it goes.
+
+    What is no file (a pipe, a terminal) is written to as it is. A lock tells that a living process writes it. What a
+    killed one has left in the folder goes when the next begins.
+
+    Args:
+        target: The file whose place it takes, which may not be there; no link.
+        mode: Its permissions, at most.
+        is_only: Whether no other file that is the only one may wait for this place, or grow in it, until `close`.
+
+    Attributes:
+        path: Where it begins.
+        file: Its content.
+        has_earlier: Whether the target holds something; known if it is the only one.
+        is_in_place: Whether it has taken the place.
+
+    Raises:
+        OSError: If it cannot be written, or another is the only one.
+    """
+
+    def __init__(self, target: Path, mode: int = 0o666, *, is_only: bool = False) -> None:
+        for path in target.parent.glob(_PREFIX + "[0-9a-f]" * 16):
+            with suppress(OSError), open(os.open(path, os.O_RDWR | os.O_NOFOLLOW | os.O_NONBLOCK), "rb") as file:
+                if _lock(file, path):
+                    path.unlink()
+        self._target = target
+        self.has_earlier, self._claim = False, None
+        self.is_in_place = target.exists() and not target.is_file()
+        if self.is_in_place:
+            self.path, self.file = target, cast(BinaryIO, target.open("wb"))
+            return
+        # While the target is locked, only the owner of that lock replaces it.
+        self._claim = _opened(target, os.O_CREAT, 0o666) if is_only else None
+        try:
+            self.has_earlier = self._claim is not None and os.fstat(self._claim.fileno()).st_size > 0
+            self.path = target.with_name(f"{_PREFIX}{os.urandom(8).hex()}")
+            self.file = _opened(self.path, os.O_CREAT | os.O_EXCL, mode)
+        except OSError:
+            self._end_claim()
+            raise
+
+    def settle(self) -> None:
+        """See that all of it is on the disk."""
+        self.file.flush()
+        if not self.is_in_place:
+            os.fsync(self.file.fileno())
+
+    def take_place(self, *, keeps_rights: bool = True) -> None:
+        """Replace the target, and take the permissions of an earlier one; it may go on to grow."""
+        self.settle()
+        if self.is_in_place:
+            return
+        if keeps_rights and self._target.exists():
+            self.path.chmod(stat.S_IMODE(self._target.stat().st_mode))
+        os.replace(self.path, self._target)
+        self.is_in_place = True
+        self._end_claim()
+        _settle(self._target.parent)
+
+    def close(self) -> None:
+        """End it; unless it has taken the place, it is removed."""
+        if not self.is_in_place:
             with suppress(OSError):
-                beside.unlink()
+                self.path.unlink()
+        _release(self.file)
+        self._end_claim()
+
+    def _end_claim(self) -> None:
+        if self._claim is not None:
+            if not (self.has_earlier or self.is_in_place):
+                with suppress(OSError):
+                    self._target.unlink()  # it is empty, and was made for the lock
+            _release(self._claim)
+            self._claim = None
+
+
+def _opened(path: Path, flags: int, mode: int) -> BinaryIO:
+    """Open a file to be written, and lock it.
+
+    Raises:
+        OSError: If it cannot be written, or another process holds the lock of a file that was there.
+    """
+    is_new = bool(flags & os.O_EXCL)
+    while True:
+        file = open(os.open(path, os.O_RDWR | flags, mode), "wb")  # noqa: SIM115
+        try:
+            # Who takes a new file for an abandoned one locks it for a moment, and removes it.
+            if _lock(file, path, waits=is_new):
+                return file
+        except BlockingIOError:
+            file.close()
+            raise BlockingIOError(None, "another run is writing it") from None
+        except OSError:  # a network drive without locks
+            return file
+        file.close()
+
+
+def _lock(file: IO[bytes], path: Path, *, waits: bool = False) -> bool:
+    """Lock an open file, and return whether it still has its name.
+
+    Raises:
+        BlockingIOError: If it is locked already.
+        OSError: If it cannot be locked.
+    """
+    fcntl.flock(file, fcntl.LOCK_EX | (0 if waits else fcntl.LOCK_NB))
+    with suppress(FileNotFoundError):
+        return os.path.samestat(os.fstat(file.fileno()), os.lstat(path))
+    return False
+
+
+def _release(file: IO[bytes]) -> None:
+    """Close a file without its lock, which a process that was forked meanwhile may hold, too."""
+    with suppress(OSError), file:
+        fcntl.flock(file, fcntl.LOCK_UN)
 
 
 class GrowingFile:
@@ -78,20 +191,15 @@ class GrowingFile:
         self._path, self._what = path, what
         self._error: Exception | None = None
         try:
-            self._target = self._beside = _target(path_of(path, what))
-            flags = os.O_WRONLY
-            if not self._target.exists() or self._target.is_file():
-                self._beside = _name_beside(self._target)
-                flags |= os.O_CREAT | os.O_EXCL
-            self._file = open(os.open(self._beside, flags, 0o666), "w", encoding="utf-8", newline="\n")  # noqa: SIM115
+            self._beside = FileBeside(target_of(path_of(path, what)))
         except OSError as error:
-            raise _unwritable(what, "file", path, error) from error
+            raise unwritable(what, "file", path, error) from error
 
     def write(self, text: str) -> None:
         """Append text."""
         if self._error is None:
             try:
-                self._file.write(text)
+                self._beside.file.write(text.encode())
             except OSError as error:
                 self._error = error
 
@@ -101,26 +209,13 @@ class GrowingFile:
         Raises:
             ParameterError: If it could not be written; an earlier file is then as it was.
         """
-        is_other = self._beside != self._target
         try:
-            try:
-                self._file.flush()
-                if is_other:
-                    os.fsync(self._file.fileno())
-            finally:
-                self._file.close()
-            if self._error is not None:
-                raise self._error
-            if is_other:
-                _take_rights(self._beside, self._target)
-                os.replace(self._beside, self._target)
-                _settle(self._target.parent)
+            with closing(self._beside):
+                if self._error is not None:
+                    raise self._error
+                self._beside.take_place()
         except OSError as error:
-            raise _unwritable(self._what, "file", self._path, error) from error
-        finally:
-            if is_other:
-                with suppress(OSError):
-                    self._beside.unlink()
+            raise unwritable(self._what, "file", self._path, error) from error
 
 
 @contextmanager
@@ -134,27 +229,17 @@ def file_beside(path: str | Path, what: str) -> Iterator[Path]:
     Raises:
         ParameterError: If it cannot be written; an earlier file is then as it was.
     """
-    beside: Path | None = None
     try:
-        target = _target(path_of(path, what))
+        target = target_of(path_of(path, what))
         if target.exists() and not target.is_file():
             raise OSError(None, "it is no file")
-        beside = _name_beside(target)
-        _write(beside, b"", 0o666)
-        yield beside
-        with beside.open("rb") as file:
-            os.fsync(file.fileno())
-        _take_rights(beside, target)
-        os.replace(beside, target)
-        _settle(target.parent)
+        with closing(FileBeside(target)) as beside:
+            yield beside.path
+            beside.take_place()
     except KiksError:  # one may be an OSError, too
         raise
     except OSError as error:
-        raise _unwritable(what, "file", path, error) from error
-    finally:
-        if beside is not None:
-            with suppress(OSError):
-                beside.unlink()
+        raise unwritable(what, "file", path, error) from error
 
 
 def check_writable(path: str | Path, what: str, *, is_new: bool = False) -> None:
@@ -173,13 +258,11 @@ def check_writable(path: str | Path, what: str, *, is_new: bool = False) -> None
     if is_new and os.path.lexists(path):
         raise ParameterError(f"{what} must name a new file, but {str(path)!r} exists. Choose another name.")
     try:
-        target = _target(path_of(path, what))
+        target = target_of(path_of(path, what))
         if not target.exists() or target.is_file():
-            beside = _name_beside(target)
-            _write(beside, b"", 0o600)
-            beside.unlink()
+            FileBeside(target, 0o600).close()
     except OSError as error:
-        raise _unwritable(what, "file", path, error) from error
+        raise unwritable(what, "file", path, error) from error
 
 
 def make_folder(path: str | Path, what: str) -> None:
@@ -190,14 +273,12 @@ def make_folder(path: str | Path, what: str) -> None:
     """
     try:
         Path(path).mkdir(parents=True, exist_ok=True)
-        beside = _name_beside(Path(path, "file"))
-        _write(beside, b"", 0o600)
-        beside.unlink()
+        FileBeside(Path(path, "file"), 0o600).close()
     except (OSError, ValueError) as error:
-        raise _unwritable(what, "folder", path, error) from error
+        raise unwritable(what, "folder", path, error) from error
 
 
-def _target(path: str | Path) -> Path:
+def target_of(path: str | Path) -> Path:
     """Return the target of a path, through links; it may not exist.
 
     Raises:
@@ -212,24 +293,6 @@ def _target(path: str | Path) -> Path:
     return target
 
 
-def _name_beside(target: Path) -> Path:
-    return target.with_name(f".kiks-{os.urandom(8).hex()}")
-
-
-def _write(path: Path, data: bytes, mode: int) -> None:
-    """Write a new file and flush it to the disk."""
-    with open(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode), "wb") as file:
-        file.write(data)
-        file.flush()
-        os.fsync(file.fileno())
-
-
-def _take_rights(beside: Path, target: Path) -> None:
-    """Give a new file the permissions of the one that it replaces, if there is one."""
-    if target.exists():
-        beside.chmod(stat.S_IMODE(target.stat().st_mode))
-
-
 def _settle(folder: Path) -> None:
     """Flush a folder's entries to the disk, if the system supports that."""
     with suppress(OSError):
@@ -240,7 +303,8 @@ def _settle(folder: Path) -> None:
             os.close(descriptor)
 
 
-def _unwritable(what: str, kind: str, path: str | Path, error: Exception) -> ParameterError:
+def unwritable(what: str, kind: str, path: str | Path, error: Exception) -> ParameterError:
+    """Return what is told of a file or folder that cannot be written."""
     why = error.strerror if isinstance(error, OSError) else error
     return ParameterError(
         f"{what} must go to a {kind} that can be written, but {str(path)!r} cannot ({why}). Choose another place."

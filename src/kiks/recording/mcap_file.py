@@ -25,7 +25,7 @@ from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 
 from kiks.errors import ParameterError
-from kiks.model.atomic_files import path_of
+from kiks.model.atomic_files import FileBeside, path_of, target_of, unwritable
 from kiks.version import __version__
 
 ENDING = ".mcap"
@@ -88,17 +88,20 @@ class Topic(NamedTuple):
 
 
 class McapFile:
-    """A file that grows chunk by chunk.
+    """A file that grows chunk by chunk, while no other recording does there.
+
+    It begins beside an earlier file, and takes its place when there is something that is worth it.
 
     The first chunk announces all channels, so that every chunk can be read without an index. After an error of the
     disk nothing more is written, and `close` raises it: a recording never ends the run.
 
     Args:
-        path: The file; an earlier one is replaced.
+        path: The file.
         topics: The channels.
 
     Raises:
-        ParameterError: If its name does not end in .mcap, it cannot be written, or its disk has only the reserve left.
+        ParameterError: If its name does not end in .mcap, it cannot be written, another recording grows there, or its
+            disk has only the reserve left.
     """
 
     def __init__(self, path: str | Path, topics: Iterable[Topic]) -> None:
@@ -106,17 +109,19 @@ class McapFile:
         if self._path.suffix.lower() != ENDING:
             raise ParameterError(f"A recording's file must end in '{ENDING}', but it was {str(self._path)!r}.")
         self._error: OSError | None = None
-        self._folder = Path(os.path.realpath(self._path)).parent
         try:
+            target = target_of(self._path)
+            self._folder = target.parent
             if (room := room_of(self._folder)).is_too_small:
                 raise ParameterError(
-                    f"a recording must leave {room.reserve_bytes >> 20} MiB of its disk free, but that of "
-                    f"{str(self._path)!r} has {room.free_bytes >> 20} MiB. Free some space, or choose another place."
+                    f"a recording must leave {room.reserve_bytes / 2**20:.3g} MiB of its disk free, but that of "
+                    f"{str(self._path)!r} has {room.free_bytes / 2**20:.3g} MiB. Free some space, or choose another "
+                    "place."
                 )
-            self._stream: BinaryIO = self._path.open("wb")
+            self._beside = FileBeside(target, is_only=True)
         except OSError as error:
             raise self._unwritable(error) from None
-        self._writer = Writer(self._stream, chunk_size=RECORD_BYTES_MAX, compression=CompressionType.LZ4)
+        self._writer = Writer(self._beside.file, chunk_size=RECORD_BYTES_MAX, compression=CompressionType.LZ4)
         self._do(lambda: self._writer.start(profile=PROFILE, library=f"kiks {__version__}"))
         self._channels = {topic: self._channel(topic) for topic in topics}
 
@@ -133,6 +138,16 @@ class McapFile:
         except OSError:  # the folder has another name now
             return False
 
+    @property
+    def is_in_place(self) -> bool:
+        """Whether it has the place of its path; else an earlier file may stand there."""
+        return self._beside.is_in_place
+
+    def take_place(self) -> None:
+        """Take the place of its path, unless it has it."""
+        if not self.is_in_place:
+            self._do(self._beside.take_place)
+
     def attach(self, name: str, data: bytes, media_type: str, time_ns: int = 0) -> None:
         """Write a file within the file."""
         self._do(lambda: self._writer.add_attachment(0, time_ns, name, media_type, data))
@@ -141,8 +156,13 @@ class McapFile:
         """Write texts by name."""
         self._do(lambda: self._writer.add_metadata(name, dict(values)))
 
-    def write(self, messages: list[tuple[Topic, int, bytes]]) -> None:
-        """Write messages as one chunk: the topic of each, its time [ns] and its data."""
+    def write(self, messages: list[tuple[Topic, int, bytes]], *, keeps_earlier: bool = False) -> None:
+        """Write messages as one chunk, and take the place.
+
+        Args:
+            messages: The topic of each, its time [ns] and its data.
+            keeps_earlier: Whether not to take that of an earlier file, or any on a full disk.
+        """
 
         def add_all() -> None:
             for topic, time_ns, data in messages:
@@ -150,6 +170,8 @@ class McapFile:
             self._writer.flush()  # type: ignore[no-untyped-call]
 
         self._do(add_all)
+        if not (keeps_earlier and (self._beside.has_earlier or self.is_disk_full)):
+            self.take_place()
 
     def _channel(self, topic: Topic) -> int:
         encoding = "jsonschema" if topic.schema else ""
@@ -157,20 +179,18 @@ class McapFile:
         return self._writer.register_channel(topic.name, topic.encoding, schema)
 
     def close(self) -> None:
-        """Write the index, and close the file.
+        """Write the index, and close the file; it goes if it never took its place.
 
         Raises:
             ParameterError: If something could not be written.
         """
         self._do(self._writer.finish)
-        try:
-            self._stream.close()
-        except OSError as error:
-            self._error = self._error or error
+        self._do(self._beside.file.flush)
+        self._beside.close()
         if self._error is not None:
             raise self._unwritable(self._error)
 
-    def _do(self, write: Callable[[], None]) -> None:
+    def _do(self, write: Callable[[], object]) -> None:
         if self._error is None:
             try:
                 write()
@@ -178,10 +198,7 @@ class McapFile:
                 self._error = error
 
     def _unwritable(self, error: OSError) -> ParameterError:
-        return ParameterError(
-            f"a recording must go to a file that can be written, but {str(self._path)!r} cannot "
-            f"({error.strerror}). Choose another place."
-        )
+        return unwritable("a recording", "file", self._path, error)
 
 
 @dataclass(frozen=True)

@@ -57,8 +57,9 @@ WAITING_BYTES_MAX = 16 << 20
 class RunRecorder:
     """Records a simulation from now on, as a `kiks.sim.event_loop.Recorder`; `close`, or the end of `with`, ends it.
 
-    It ends by itself, with a warning, when only the reserve of the disk is left or the file cannot be written. The run
-    goes on, and the recording can be read up to there.
+    An earlier recording in the file stays there until time passes or something changes: a run that fails at its start
+    costs none. It ends by itself, with a warning, when only the reserve of the disk is left or the file cannot be
+    written. The run goes on, and the recording can be read up to there.
 
     Args:
         sim: The simulation.
@@ -75,8 +76,8 @@ class RunRecorder:
         change_count: Of the world, when its changes were noted last.
 
     Raises:
-        ParameterError: If the file cannot be written, its disk has only the reserve left, or the simulation is being
-            recorded already.
+        ParameterError: If the file cannot be written, another recording is being written there, its disk would have
+            less than the reserve left, or the simulation is being recorded already.
     """
 
     def __init__(
@@ -119,9 +120,12 @@ class RunRecorder:
             told = {"kiks": __version__, "thinking": sim.thinking, "arena": sim.arena.name, **(about or {})}
             self._file.describe("run", told)
             self.note_state()
+            self._began = self._world.now_ns, self._world.change_count
             sim.world.watch(self._motion)
             self._loop.recorder = self
             self._write_chunk()
+            if not (self._is_on or self._file.is_in_place):
+                self.close()  # which tells why
 
     def __enter__(self) -> RunRecorder:
         """Return itself."""
@@ -140,9 +144,11 @@ class RunRecorder:
             ParameterError: If it has ended by itself; once.
         """
         with self._sim.lock, postponing_endings():
-            self.flush()
+            self.flush(is_asked=False)
             if self._is_on:
                 self._end()
+                if not (self._error or self._file.is_in_place):
+                    _log.warning("nothing has happened, so that %r keeps the recording of before.", str(self.path))
             error, self._error = self._error, None
         if error is not None:
             raise error
@@ -163,26 +169,31 @@ class RunRecorder:
         except ParameterError as error:
             self._error = error
 
-    def _end_by_itself(self) -> None:
+    def _end_by_itself(self, *, has_begun: bool) -> None:
         self._end()
         if self._error is None:
+            end = f"has ended at {s_from_ns(self._world.now_ns):.1f} s, and is whole up to there"
             self._error = ParameterError(
                 f"a recording must leave some of its disk free, but that of {str(self.path)!r} is almost full: the "
-                f"recording has ended at {s_from_ns(self._world.now_ns):.1f} s, and is whole up to there. Free some "
-                "space, or choose another place."
+                f"recording {end if has_begun else 'cannot begin'}. Free some space, or choose another place."
             )
-        if not self.gives_way:
+        if not self.gives_way and (has_begun or self._file.is_in_place):
             _log.warning("%s", self._error)
 
-    def flush(self) -> None:
-        """Write all that has happened up to now, with the present state, so that a reader of the file finds it."""
+    def flush(self, *, is_asked: bool = True) -> None:
+        """Write all that has happened up to now, with the present state, so that a reader of the file finds it.
+
+        Args:
+            is_asked: Whether an earlier recording goes even if nothing has happened.
+        """
         with self._sim.lock, postponing_endings():
-            if not self._is_on:
-                return
-            self.note_changes()
-            self._note_check()
-            self._motion.look(self._world.state)
-            self._write_chunk()
+            if self._is_on:
+                self.note_changes()
+                self._note_check()
+                self._motion.look(self._world.state)
+                self._write_chunk()
+                if is_asked:
+                    self._file.take_place()
 
     # ---- from outside ----
 
@@ -271,11 +282,12 @@ class RunRecorder:
         self._entries.clear()
         blocks = [(LOG, self._chunk_ns, entries), (MOTION, self._chunk_ns, motion.encode(looks))]
         self._chunk_ns = self._world.now_ns
-        self._file.write(blocks + messages + foxglove.poses(looks))
+        has_begun = (self._world.now_ns, self._world.change_count) != self._began
+        self._file.write(blocks + messages + foxglove.poses(looks), keeps_earlier=not has_begun)
         self._waiting_bytes = 0
         self._chunk_at_s = time.monotonic() + CHUNK_S
         if self._file.has_failed or self._file.is_disk_full:
-            self._end_by_itself()
+            self._end_by_itself(has_begun=has_begun)
 
 
 class _OwnTurretRecorder:

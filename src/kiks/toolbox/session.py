@@ -319,7 +319,8 @@ class Session:
 
     def close(self) -> None:
         """End the world and all programs in it."""
-        self._end_recording()
+        if self._recorder is not None:
+            self._end_recording()
         if self._shown is not None:
             self._shown.close()
         elif self.desk is not None:

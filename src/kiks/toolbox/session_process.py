@@ -43,6 +43,7 @@ class SessionProcess:
 
     Attributes:
         address: Where other programs can join the session.
+        was_joined: Whether one has.
 
     Raises:
         LinkError: If this user's folder for sessions cannot be written.
@@ -57,6 +58,7 @@ class SessionProcess:
             self._file = SessionFile(self.address)
             self._pending = PendingConnections(listener, self.address.token, self._let_in)
             undo.pop_all()
+        self.was_joined = False
         self._exchanges: list[Exchange] = []
         self._count = 0
         self._lock = threading.Lock()
@@ -93,6 +95,7 @@ class SessionProcess:
     # ---- clients ----
 
     def _let_in(self, connection: socket.socket, said: bytes) -> None:
+        self.was_joined = True
         with contextlib.suppress(OSError):
             connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         number = connection.fileno()
@@ -134,11 +137,13 @@ class SessionProcess:
             self._is_over.set()
 
     def _check_clients(self) -> None:
-        """Resume a paused world when all clients have gone: it would keep them from leaving."""
+        """When all clients have gone, resume a paused world, which would keep them from leaving, or wait for none."""
         with self._lock:
             exchanges = self._exchanges[:]
         if all(exchange.has_left for exchange in exchanges):
             self._session.let_go()
+            if exchanges and self._session.desk is None:  # the engine is being compiled, for a minute or so
+                self._is_over.set()
 
 
 def join(address: SessionAddress, exchange: Exchange, source: int, sink: int) -> None:

@@ -110,11 +110,11 @@ class FilesPanel:
     @told
     async def _save(self) -> None:
         name = str(self._name.value or "")
-        may_replace = self._folder.has(name)
-        if may_replace and not await _agrees(f"{self._folder.full_name(name)} exists. Replace it?"):
+        question = self._folder.question(name)
+        if question and not await _agrees(question):
             return
         project = await self._desk.present_project()
-        saved = await asyncio.to_thread(self._folder.save, project, name, may_replace=may_replace)
+        saved = await asyncio.to_thread(self._folder.save, project, name, may_replace=bool(question))
         self._list()
         ui.notify(f"Saved as {saved}.", type="positive")
 

@@ -59,6 +59,7 @@ class ProgramsPanel:
         self._next_line = 0
         self._script: Script | None = None
         self._drafts: dict[Script | None, str] = {}
+        self._known: dict[Script | None, str] = {}  # the texts as they were read or saved last
         ui.add_css(CSS)
         with ui.column().classes("w-full q-pa-sm gap-2"):
             if desk.may_run_programs:
@@ -239,7 +240,8 @@ class ProgramsPanel:
         if script is None or script == self._script:
             return
         text = self._drafts.get(script)
-        text = read_script(self._desk.folder, script) if text is None else text
+        if text is None or text == self._known.get(script):
+            text = self._known[script] = read_script(self._desk.folder, script)
         self._script = script
         self._name.value = script.name
         self._editor.value = text
@@ -266,7 +268,8 @@ class ProgramsPanel:
         script, folder = self._script, self._desk.folder
         if script is not None and script.is_example and text == read_script(folder, script):
             return script
-        saved = save_script(folder, self._name.value or "", text, may_replace=self._script)
+        saved = save_script(folder, self._name.value or "", text, may_replace=script, known=self._known.get(script))
+        self._known[saved] = text
         self._drafts.pop(self._script, None)
         self._script = saved
         self._name.value = saved.name

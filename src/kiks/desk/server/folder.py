@@ -41,6 +41,7 @@ class Folder:
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
+        self._known = {name: self._version(name) for name in self.names()}
 
     def names(self) -> list[str]:
         """Return the names of the files that can be opened, including subfolders, in alphabetical order."""
@@ -69,7 +70,10 @@ class Folder:
             ParameterError: If the name leads out of the folder.
             ArenaError: If the file is missing, damaged, or of another kind.
         """
-        return Project.load(self._path(name, OPENED))
+        path, version = self._path(name, OPENED), self._version(name)
+        project = Project.load(path)
+        self._known[name] = version
+        return project
 
     def save(self, project: Project, name: str, *, may_replace: bool = False) -> str:
         """Write a project, or its arena alone if the name ends in .kad; return the name with its ending.
@@ -77,27 +81,41 @@ class Folder:
         Args:
             project: The project.
             name: Name of the file, .kiks if it has no ending.
-            may_replace: Whether to replace an existing file.
+            may_replace: Whether to replace an existing file as it was when it was opened, saved or asked about here.
 
         Raises:
-            ParameterError: If the name leads out of the folder, is not valid or is taken, or the file cannot be
-                written.
+            ParameterError: If the name leads out of the folder, is not valid or is taken, or the file has changed
+                or cannot be written.
             ArenaError: If the arena does not fit into the file.
         """
         full = self.full_name(name)
         path = self._path(full, SAVED)
-        if path.exists() and not may_replace:
+        if path.exists() and not (may_replace and self._known.get(full) == self._version(full)):
             raise ParameterError(f"The name must be new, but {full!r} exists. Choose another one, or replace it.")
         replace_file(path, encode(project, full), "a project")
+        self._known[full] = self._version(full)
         return full
 
-    def has(self, name: str) -> bool:
-        """Return whether saving under a name would replace a file.
+    def question(self, name: str) -> str:
+        """Return what a person is to be asked before a file is saved under a name; nothing if it would be a new one.
 
         Raises:
             ParameterError: If the name leads out of the folder or is not valid.
         """
-        return self._path(self.full_name(name), SAVED).exists()
+        full = self.full_name(name)
+        if not self._path(full, SAVED).exists():
+            return ""
+        known, self._known[full] = self._known.get(full), self._version(full)
+        fact = "exists" if known == self._known[full] else "was changed elsewhere since you opened or saved it here"
+        return f"{full} {fact}. Replace it?"
+
+    def _version(self, name: str) -> object:
+        """Return what is another after a file was written; None without one."""
+        try:
+            found = (self.path / name).stat()
+        except OSError:
+            return None
+        return found.st_ino, found.st_size, found.st_mtime_ns
 
     def full_name(self, name: str) -> str:
         """Add the default ending to a name without a known ending."""

@@ -86,7 +86,9 @@ def read_script(folder: Path, script: Script) -> str:
         raise ParameterError(f"a program must be readable text, but {shown(script.name)} is not: {error}.") from None
 
 
-def save_script(folder: Path, name: str, text: str, *, may_replace: Script | None = None) -> Script:
+def save_script(
+    folder: Path, name: str, text: str, *, may_replace: Script | None = None, known: str | None = None
+) -> Script:
     """Write a program into a folder.
 
     Args:
@@ -94,9 +96,11 @@ def save_script(folder: Path, name: str, text: str, *, may_replace: Script | Non
         name: Its file name; .py is appended if it is missing.
         text: The program.
         may_replace: The script that it was read from; no other file is replaced.
+        known: The text that was read or saved last; another one is not replaced. Any if left out.
 
     Raises:
-        ParameterError: If the name leads out of the folder or is taken, the text is too long, or it cannot be written.
+        ParameterError: If the name leads out of the folder or is taken, the script was changed meanwhile, the text is
+            too long, or it cannot be written.
     """
     name = name.strip()
     name = name if name.endswith(".py") else f"{name}.py"
@@ -113,6 +117,11 @@ def save_script(folder: Path, name: str, text: str, *, may_replace: Script | Non
         raise ParameterError(
             f"a program must have a name that is free, but there is a {shown(name)} already. Take another name, or "
             "open that one and change it."
+        )
+    if known is not None and path.exists() and read_script(folder, script) != known:
+        raise ParameterError(
+            f"a program must be saved as it was opened, but {shown(name)} has changed meanwhile, in another editor. "
+            "Save this one under another name, and then open that one again."
         )
     replace_file(path, data, "a program")
     return script

@@ -308,6 +308,7 @@ class Timeline:
             self._bytes_max(self._folder.path)  # an error if there is no room for it
             self._count += 1
             recorder = RunRecorder(sim, self._folder.path / f"{self._count}.mcap", gives_way=True)
+        recorder.flush()  # so that it has its place
         self.parts = (*self.parts, Part(recorder.path, run, recorder))
 
     def close(self) -> None:

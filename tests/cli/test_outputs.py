@@ -1,0 +1,246 @@
+"""No command writes over what it reads or over a file of another kind, and none ignores an option."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import typer
+from tests.cli.test_cli import RESULTS, WANDER
+
+from kiks import drawing
+from kiks.cli import app
+from kiks.cli.outputs import BEGINNINGS, PICTURES
+from kiks.errors import ParameterError
+from kiks.model.arena import Arena
+from kiks.model.arena_file import save_arena
+
+LIKE = {
+    "": b"12345\n",
+    ".csv": b"time_s,robot\n",
+    ".mp4": b"\0\0\0\x20ftypisom",
+    ".svg": b"<svg ",
+    ".webp": b"RIFF\x01\x02\x03\x04WEBP",
+}
+"""How files of a kind begin whose `BEGINNINGS` are no plain bytes."""
+
+
+def told(*words: object) -> dict[str, Any]:
+    """Return what a command would begin with."""
+    command: Any = typer.main.get_command(app)
+    names = list(map(str, words))
+    while hasattr(command, "commands"):
+        command = command.commands[names.pop(0)]
+    found: dict[str, Any] = command.make_context(command.name, names).params
+    return found
+
+
+def outputs() -> Iterator[tuple[tuple[str, str], str]]:
+    """Yield all outputs of all commands, with each of their endings."""
+    group: Any = typer.main.get_command(app)
+    commands = {**group.commands, **group.commands["arena"].commands}
+    for name, command in commands.items():
+        for param, (endings, _, _, is_new) in getattr(command, "_outputs", ()):
+            for ending in () if is_new else endings or ("",):
+                yield (name, str(param.name)), ending
+
+
+OUTPUTS = list(outputs())
+
+
+def words_for(output: tuple[str, str], path: Path) -> list[str]:
+    return [str(path) if word == "PLACE" else str(word) for word in RESULTS[output]]
+
+
+def test_pictures_are_those_that_can_be_drawn() -> None:
+    assert set(PICTURES) == set(drawing.PICTURES)
+
+
+def test_all_outputs_are_known() -> None:
+    unchecked = {("monitor", "csv"), ("evolve", "out")}  # a new file; a folder
+    assert {output for output, _ in OUTPUTS} == set(RESULTS) - unchecked
+
+
+@pytest.mark.parametrize(("output", "ending"), OUTPUTS)
+def test_only_its_like_is_replaced_without_force(output: tuple[str, str], ending: str, tmp_path: Path) -> None:
+    path = tmp_path / f"place{ending}"
+    words = words_for(output, path)
+    assert told(*words)[output[1]] == path
+    path.write_bytes(b"")  # nothing is lost with it
+    told(*words)
+    beginning = BEGINNINGS.get(ending)
+    if beginning is not None:
+        path.write_bytes(LIKE.get(ending) or beginning.replace(b"\\x89", b"\x89").replace(b"\\xff\\xd8", b"\xff\xd8"))
+        told(*words)
+    path.write_bytes(b"precious")
+    with pytest.raises(ParameterError, match=r"must be new.*exists\. Choose another name or add --force"):
+        told(*words)
+    forced = [words[0], *words[1 : 1 + (words[0] == "arena")], "--force", *words[1 + (words[0] == "arena") :]]
+    assert told(*forced)[output[1]] == path
+    assert path.read_bytes() == b"precious"
+
+
+@pytest.mark.parametrize("output", sorted({output for output, ending in OUTPUTS if ending}))
+@pytest.mark.parametrize("name", ["student.py", "other", "folder.html"])
+def test_an_output_has_one_of_its_endings_and_is_no_folder(output: tuple[str, str], name: str, tmp_path: Path) -> None:
+    path = tmp_path / name
+    if name.startswith("folder"):
+        path.mkdir()
+    with pytest.raises(ParameterError, match="it is a folder" if path.is_dir() else "must end in "):
+        told(*words_for(output, path))
+
+
+SAME: dict[str, Callable[[Path, Path], object]] = {
+    "itself": lambda path, file: path,
+    "another spelling": lambda path, file: path.parent / "folder" / ".." / path.name,
+    "a link": lambda path, file: file.symlink_to(path),
+    "a hard link": lambda path, file: file.hardlink_to(path),
+}
+
+
+@pytest.mark.parametrize("how", SAME)
+@pytest.mark.parametrize("is_forced", [False, True])
+@pytest.mark.parametrize(
+    ("words", "name"),
+    [
+        (("page", "INPUT", "PLACE"), "page.html"),
+        (("table", "INPUT", "PLACE"), "table.csv"),
+        (("plot", "other.mcap", "INPUT", "--out", "PLACE"), "plot.png"),
+        (("run", "--record", "PLACE", "program.py", "INPUT"), "run.mcap"),
+        (("run", "--thinking", "replay:INPUT", "--csv", "PLACE", WANDER), "thoughts.csv"),
+        (("fit", "INPUT=12.5", "--robot", "PLACE"), "post.toml"),
+        (("serve", "--arena", "INPUT", "--record", "PLACE"), "arena.mcap"),
+        (("calibrate", "--port", "kiks://1", "--base", "INPUT", "--out", "PLACE"), "robot.toml"),
+        (("evolve", "INPUT", "--record", "PLACE"), "task.mcap"),
+        (("demo", "INPUT", "--picture", "PLACE"), "champion.png"),
+    ],
+)
+def test_no_output_is_an_input(
+    words: tuple[str, ...], name: str, how: str, is_forced: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "folder").mkdir()
+    given, file = tmp_path / name, tmp_path / f"link{Path(name).suffix}"
+    given.touch()
+    place = SAME[how](given, file) or file
+    command = [word.replace("INPUT", str(given)).replace("PLACE", str(place)) for word in words]
+    command[1:1] = ["--force"] * is_forced
+    with pytest.raises(ParameterError, match="must be a file that the command does not need besides"):
+        told(*command)
+
+
+@pytest.mark.parametrize("how", ["a link", "a hard link"])
+def test_two_outputs_are_two_files(how: str, tmp_path: Path) -> None:
+    (tmp_path / "run.csv").touch()
+    SAME[how](tmp_path / "run.csv", tmp_path / "run.mcap")
+    with pytest.raises(ParameterError, match="must be a file that the command does not need besides"):
+        told("run", "--csv", tmp_path / "run.csv", "--record", tmp_path / "run.mcap", WANDER)
+
+
+def test_an_arena_is_replaced_with_force(tmp_path: Path) -> None:
+    for words in ((), ("--force",)):
+        app(["arena", "maze", str(tmp_path / "maze.toml"), *words], standalone_mode=False)
+    with pytest.raises(ParameterError, match="must be new, but"):
+        told("arena", "maze", tmp_path / "maze.toml")
+
+
+def test_what_an_arena_or_a_project_names_is_an_input(tmp_path: Path) -> None:
+    for name, text in (("maze.toml", 'picture = "maze.png"\n'), ("task.kiks", "program = 'sub/maze.png'\n")):
+        (tmp_path / name).write_text(text)
+        for place in ("maze.png", "sub/maze.png"):
+            (tmp_path / place).parent.mkdir(exist_ok=True)
+            with pytest.raises(ParameterError, match=re.escape(name)):
+                told("run", "--arena", tmp_path / name, "--picture", tmp_path / place, WANDER)
+        told("run", "--arena", tmp_path / name, "--picture", tmp_path / "amaze.png", WANDER)
+
+
+def test_the_place_of_an_output_that_is_left_out_is_checked_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for words, name in (
+        (("page", "run.mcap"), "run.html"),
+        (("plot", "run.mcap"), "kiks-plot.png"),
+        (("compare", "one", "two"), "kiks-compare.png"),
+        (("demo", "follow"), "kiks-follow.png"),
+        (("arena", "maze", "x.toml"), "x.png"),
+    ):
+        told(*words)
+        Path(name).write_text("precious")
+        with pytest.raises(ParameterError, match=f"must be new.*{name}' exists"):
+            told(*words)
+    os.link("run.html", "run.mcap")
+    with pytest.raises(ParameterError, match=r"'run.html' belongs to 'run.mcap'"):
+        told("page", "run.mcap", "--force")
+
+
+@pytest.mark.parametrize(
+    ("words", "option"),
+    [
+        (("run", "--seed", "1", "--seed", "2", WANDER), "--seed"),
+        (("run", "exercise.kiks", "--seed", "1", "--csv", "a.csv", "--seed", "1"), "--seed"),
+        (("demo", "--picture", "a.png", "--picture", "b.png"), "--picture"),
+        (("page", "run.mcap", "--title", "A", "--title", "B"), "--title"),
+        (("serve", "--pty", "--no-pty"), "--pty"),
+        (("arena", "maze", "maze.toml", "--rows", "4", "--rows", "5"), "--rows"),
+    ],
+)
+def test_an_option_that_has_one_value_is_given_once(words: tuple[str, ...], option: str) -> None:
+    with pytest.raises(ParameterError, match=f"{option} must be given once, but it was given 2 times"):
+        told(*words)
+    assert told("run", "--robot", "khepera", "--robot", "khepera_ii", WANDER)["robot"] == ["khepera", "khepera_ii"]
+
+
+IDLE = [
+    (
+        ("run", "--seconds", "5", WANDER),
+        "--seconds must be left out with a program, which ends by itself, but it was 5.0",
+    ),
+    (("run", "--no-wait", WANDER), "--no-wait must be left out without --desk"),
+    (("run", "--when-silent", "drop", WANDER), "--when-silent must be left out with one program"),
+    (("run", "--patience", "2", WANDER), "--patience must be left out with one program"),
+    (("run", "--save-thinking", "times", WANDER), "--save-thinking must be left out with --thinking none"),
+    (("run", "--robots", "1", WANDER, WANDER), "--robots must be at least 2"),
+    (("run", "--map", "never-opened=4", WANDER), "robot must be the number of an existing robot, but it was 4"),
+    (("run", "champion.toml", "--thinking", "none"), "--thinking must be left out of a champion"),
+    (("run", "champion.toml", "--map", "a=1"), "--map must be left out of a champion"),
+    (("run", "champion.toml", "--robot", "khepera"), "--robot must be left out of a champion"),
+    (("run", "champion.toml", "--save-thinking", "t"), "--save-thinking must be left out of a champion"),
+    (("run", "champion.toml", "--patience", "1"), "--patience must be left out of a champion"),
+    (("run", "champion.toml", "--when-silent", "drop"), "--when-silent must be left out of a champion"),
+    (("run", WANDER, "exercise.kiks"), "a project must come first, but 'exercise.kiks' stands among the programs"),
+    (("desk", WANDER, "exercise.kiks"), "a project must come first, but 'exercise.kiks' stands among the programs"),
+    (("desk", "--arena", "box.toml", "exercise.kiks"), "a project must come first"),
+    (("demo", "--no-wait"), "--no-wait must be left out without --desk"),
+    (("demo", "--left", WANDER), "--left must be left out with avoid"),
+    (("demo", "soccer", "--baud", "9600"), "--baud must be left out with soccer"),
+    (("demo", "--rank", "1"), "--rank must be left out without --generation"),
+    (("demo", ".", "--generation", "2", "--at", "1,2"), "--at must be left out with --generation"),
+    (("evolve", "--list", "--seed", "0"), "--seed must be left out with --list"),
+    (("evolve", "pursuit", "--seeds", "2"), "--seeds must be left out with pursuit"),
+    (("replay", "run.mcap", "--check", "--start", "1"), "--start must be left out with --check"),
+    (("replay", "run.mcap", "--check", "--speed", "1"), "--speed must be left out with --check"),
+    (("film", "run.mcap", "run.mp4", "--plain", "--robot", "1"), "--robot must be left out with --plain"),
+    (("serve", "--programs", "1"), "--programs must be left out with --thinking live"),
+    (("serve", "--patience", "1"), "--patience must be left out with --thinking live"),
+    (("serve", "--when-silent", "drop"), "--when-silent must be left out with --thinking live"),
+    (("serve", "--thinking", "none", "--speed", "2"), "--speed must be left out with --thinking none"),
+    (("serve", "--no-pty", "--link", "x"), "--link must be left out with --no-pty"),
+]
+"""Options that would have no effect, or be taken for something else, and what is told of them."""
+
+
+@pytest.mark.parametrize(("words", "message"), IDLE)
+def test_no_option_is_ignored(
+    words: tuple[str, ...], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("exercise.kiks", "champion.toml"):
+        Path(name).touch()
+    save_arena(Arena.box(300, 300), "box.toml")
+    with pytest.raises(ParameterError, match=re.escape(message)):
+        app(list(words), standalone_mode=False)
