@@ -19,6 +19,7 @@ from websockets.sync.client import ClientConnection, connect
 
 import kiks
 from kiks.desk.server.gateway import IN_FLIGHT, Viewer
+from kiks.desk.server.server import SERVER
 from kiks.desk.server.show import Shown, show
 from kiks.desk.server.token import COOKIE
 from kiks.errors import ParameterError
@@ -75,9 +76,9 @@ class Browser:
 @contextmanager
 def browsing(shown: Shown, **options: Any) -> Iterator[Browser]:
     url = urlsplit(shown.url)
-    cookie = {"Cookie": f"{COOKIE}_{url.port}={url.query.removeprefix('token=')}"}
+    cookie = {"Cookie": f"{COOKIE}={SERVER.key.token}"}
     options = {"additional_headers": cookie, **options}
-    with connect(f"ws://{url.netloc}{url.path}/feed", compression=None, open_timeout=GUARD_S, **options) as socket:
+    with connect(f"ws://{url.netloc}{SERVER.key.place}{url.path}/feed", compression=None, open_timeout=GUARD_S, **options) as socket:
         yield Browser(socket)
 
 

@@ -58,7 +58,7 @@ class Page:
         self._desk = desk
         self._editing = editing
         self._told, self._logged = desk.news.count, desk.log.count
-        feed = f"/desk/{number}/feed"
+        feed = f"{number}/feed"
         ui.colors(primary=PRIMARY, accent=ACCENT, positive=POSITIVE)
         ui.add_head_html(MEMORY)
         ui.add_css(STYLE)

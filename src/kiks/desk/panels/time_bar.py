@@ -45,7 +45,7 @@ class TimeSlider(Element, component=_WEB / "time_bar.js", esm={"kiks-desk": str(
     """The slider of the time bar.
 
     Args:
-        feed: Path of the WebSocket that frames come from; all components of a page share one.
+        feed: Address of the WebSocket that frames come from, seen from the page; all its components share one.
     """
 
     def __init__(self, feed: str = "/desk/feed") -> None:
@@ -59,7 +59,7 @@ class TimeBar:
 
     Args:
         desk: The desk.
-        feed: Path of the WebSocket that frames come from.
+        feed: Address of the WebSocket that frames come from, seen from the page.
     """
 
     def __init__(self, desk: Desk, feed: str) -> None:

@@ -18,7 +18,7 @@ class ClockView(Element, component=_WEB / "clock_view.js", esm={"kiks-desk": str
     """The simulated clock and its speed.
 
     Args:
-        feed: Path of the WebSocket that frames come from; all components of a page share one.
+        feed: Address of the WebSocket that frames come from, seen from the page; all its components share one.
     """
 
     def __init__(self, feed: str = "/desk/feed") -> None:
@@ -61,7 +61,7 @@ class TimePanel:
 
     Args:
         desk: The desk.
-        feed: Path of the WebSocket that frames come from.
+        feed: Address of the WebSocket that frames come from, seen from the page.
     """
 
     def __init__(self, desk: Desk, feed: str) -> None:
