@@ -158,7 +158,9 @@ def test_an_unauthenticated_connection_times_out(shown: Shown, monkeypatch: pyte
 def test_an_authenticated_connection_does_not_time_out(shown: Shown, monkeypatch: pytest.MonkeyPatch) -> None:
     host, port, cookie = address_and_cookie(shown)
     path = urlsplit(shown.url).path
-    with connect(f"ws://{host}:{port}{inside(path)}/feed", additional_headers={"Cookie": cookie}, open_timeout=GUARD_S) as feed:
+    with connect(
+        f"ws://{host}:{port}{inside(path)}/feed", additional_headers={"Cookie": cookie}, open_timeout=GUARD_S
+    ) as feed:
         idle = [
             socket.create_connection((host, port), timeout=GUARD_S)
             for _ in range(2 * connection_limit.UNAUTHENTICATED_MAX)
@@ -197,7 +199,9 @@ def test_malformed_websocket_frames_close_the_socket(shown: Shown, said: list[st
     host, port, cookie = address_and_cookie(shown)
     path = f"{urlsplit(shown.url).path}/feed"
     path = path if which == "feed" else "/_nicegui_ws/socket.io/?EIO=4&transport=websocket"
-    with connect(f"ws://{host}:{port}{inside(path)}", additional_headers={"Cookie": cookie}, open_timeout=GUARD_S) as client:
+    with connect(
+        f"ws://{host}:{port}{inside(path)}", additional_headers={"Cookie": cookie}, open_timeout=GUARD_S
+    ) as client:
         client.socket.sendall(frames)
         # Below the library: it would object itself.
         with suppress(OSError):
@@ -244,7 +248,9 @@ def test_malformed_websocket_frames_close_the_socket(shown: Shown, said: list[st
 def test_malformed_events_are_ignored(shown: Shown, caplog: pytest.LogCaptureFixture, message: str, said: Any) -> None:
     host, port, cookie = address_and_cookie(shown)
     path = "/_nicegui_ws/socket.io/?EIO=4&transport=websocket"
-    with connect(f"ws://{host}:{port}{inside(path)}", additional_headers={"Cookie": cookie}, open_timeout=GUARD_S) as client:
+    with connect(
+        f"ws://{host}:{port}{inside(path)}", additional_headers={"Cookie": cookie}, open_timeout=GUARD_S
+    ) as client:
         client.send("40")
         client.recv(GUARD_S)
         client.send(message)
@@ -321,7 +327,9 @@ def test_json_of_the_gateway_never_raises(shown: Shown, said: list[str]) -> None
     ]
     names = ["kind", "what", "index", "x_mm", "y_mm", "heading_rad", "count", ""]
     path = urlsplit(shown.url).path
-    with connect(f"ws://{host}:{port}{inside(path)}/feed", additional_headers={"Cookie": cookie}, open_timeout=GUARD_S) as feed:
+    with connect(
+        f"ws://{host}:{port}{inside(path)}/feed", additional_headers={"Cookie": cookie}, open_timeout=GUARD_S
+    ) as feed:
         for _ in range(1000):
             message = {name: chance.choice(values) for name in chance.sample(names, chance.randrange(len(names)))}
             message["kind"] = chance.choice(["grab", "move", "turn", "drop", "ack"])

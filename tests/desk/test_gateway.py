@@ -78,7 +78,9 @@ def browsing(shown: Shown, **options: Any) -> Iterator[Browser]:
     url = urlsplit(shown.url)
     cookie = {"Cookie": f"{COOKIE}={SERVER.key.token}"}
     options = {"additional_headers": cookie, **options}
-    with connect(f"ws://{url.netloc}{SERVER.key.place}{url.path}/feed", compression=None, open_timeout=GUARD_S, **options) as socket:
+    with connect(
+        f"ws://{url.netloc}{SERVER.key.place}{url.path}/feed", compression=None, open_timeout=GUARD_S, **options
+    ) as socket:
         yield Browser(socket)
 
 

@@ -72,7 +72,7 @@ export class Feed {
     socket.onopen = () => (this._owed = 0);
     socket.onmessage = (event) => (typeof event.data === "string" ? this._hear(event.data) : this._see(event.data));
     socket.onclose = () => {
-      window.socket?.io.reconnection(false);
+      window.socket?.disconnect();
       this._lost_ms ??= performance.now();
       if (this.connection === "gone") return;
       if (performance.now() - this._lost_ms > LONGEST_LOSS_MS) return this._leave();
@@ -113,10 +113,7 @@ export class Feed {
     }
     this._pause_ms = FIRST_PAUSE_MS;
     this._lost_ms = null;
-    if (this.connection === "lost" && window.socket) {
-      window.socket.io.reconnection(true);
-      window.socket.connect();
-    }
+    if (this.connection === "lost") window.socket?.connect();
     this._say("open");
     return true;
   }
@@ -125,7 +122,6 @@ export class Feed {
   _leave() {
     this._say("gone");
     this._socket.close();
-    window.socket?.disconnect();
     document.getElementById("popup")?.style.setProperty("display", "none"); // it says that NiceGUI tries again
   }
 
