@@ -7,11 +7,13 @@ import logging
 import os
 import re
 import socket
+from contextlib import nullcontext
 from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.stranger import STRANGER, as_stranger, needs_root
 
 from kiks.desk.server.access import BODY_LIMIT, AccessControl
 from kiks.desk.server.token import Token, user_of
@@ -307,6 +309,20 @@ def test_a_ticket_is_valid_once_and_for_this_user_only(ends: Any, monkeypatch: p
     assert headers[b"set-cookie"].startswith(b"kiks_token=a-secret;")
     assert status(come(path=path, query=query, key=key, ends=ends)) == 403
     assert status(come(path=page, key=key, ends=ends, cookie=COOKIE)) == 200
+
+
+@needs_root
+def test_a_ticket_is_nothing_to_another_user() -> None:
+    key = Token(TOKEN)
+    query = f"ticket={key.new_ticket()}".encode()
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        for user in (STRANGER, 0):
+            with as_stranger() if user else nullcontext():
+                client = socket.create_connection(listener.getsockname())
+            ends = client.getsockname(), listener.getsockname()
+            with client, listener.accept()[0]:
+                assert user_of(*ends) == user
+                assert status(come(path="/desk/1", query=query, key=key, ends=ends)) == (403 if user else 303)
 
 
 def test_a_connection_that_was_closed_belongs_to_nobody() -> None:

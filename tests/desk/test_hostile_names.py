@@ -15,7 +15,7 @@ from tests.desk.visits import NewPage
 import kiks.desk
 from kiks.ports.program_process import Command
 
-HOSTILE = "\" nasty=1 href=\"javascript:window.ran=1\" ' <img src=x onerror=window.ran=1>{{window.ran=1}}"
+HOSTILE = '" nasty=1 href="javascript:window.ran=1" \' <img src=x onerror=window.ran=1>{{window.ran=1}}'
 """A name of a file that would be markup, if anything read it as such."""
 
 FILE = "' nasty=1 {{window.ran=1}}.kiks"
