@@ -26,7 +26,7 @@ from pathlib import Path
 
 from kiks.errors import LinkError
 from kiks.ports.endpoint import READ_SIZE, Channel, Endpoint
-from kiks.ports.file_descriptors import opening
+from kiks.ports.file_descriptors import SHORTAGES, opening
 
 TCGETS2 = 0x802C542A
 """Linux request for terminal settings with any speed, as a number (asm-generic/ioctls.h)."""
@@ -209,22 +209,21 @@ def _lock_of(path: str) -> str:
 def _claim(path: str) -> int:
     """Reserve a link's name until this process ends, by a lock on a file beside it; only who may write there can."""
     name = _lock_of(path)
-    claim = -1
     try:
         claim = os.open(name, os.O_CREAT | os.O_RDWR | os.O_NOFOLLOW | os.O_NONBLOCK, 0o600)
+    except OSError as error:
+        if error.errno in SHORTAGES:
+            raise
+        raise _unwritable(path, error) from None
+    with suppress(OSError):
         fcntl.flock(claim, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        # Who had it may have removed it since it was opened, and another have a new one.
         if os.path.samestat(os.fstat(claim), os.lstat(name)):
             return claim
-        # The one who had it has removed it since it was opened: another may have a new one.
-        raise BlockingIOError
-    except OSError as error:
-        if claim >= 0:
-            os.close(claim)
-        if isinstance(error, BlockingIOError):
-            raise LinkError(
-                f"link {path!r} must be free, but a KiKS that is running has it. Stop that one, or give another link."
-            ) from None
-        raise _unwritable(path, error) from None
+    os.close(claim)
+    raise LinkError(
+        f"link {path!r} must be free, but a KiKS that is running has it. Stop that one, or give another link."
+    )
 
 
 def _unwritable(path: str, error: OSError) -> LinkError:
