@@ -31,6 +31,7 @@ from urllib.parse import urlsplit
 import kiks
 from calibration import report
 from kiks.demos.follow import Follow
+from kiks.desk.server import server
 from kiks.desk.server.show import show
 from kiks.desk.server.token import COOKIE
 
@@ -136,7 +137,7 @@ def follow_s(robot_count: int, *, is_shown: bool, seconds: float) -> float:
     listener = None
     if shown is not None:
         url = urlsplit(shown.url)
-        words = [f"ws://{url.netloc}{url.path}/feed", f"{COOKIE}_{url.port}={url.query.removeprefix('token=')}"]
+        words = [f"ws://{url.netloc}{server.SERVER.key.place}{url.path}/feed", f"{COOKIE}={server.SERVER.key.token}"]
         listener = subprocess.Popen([sys.executable, "-c", LISTENER, *words], stdout=subprocess.PIPE)
         assert listener.stdout is not None
         listener.stdout.readline()

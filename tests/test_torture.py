@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 from tests.at_length import at_length
 from tests.matlab.octave import needs_octave
+from tests.stranger import needs_root
 
 pytestmark = pytest.mark.slow
 
@@ -93,6 +94,8 @@ def test_what_is_refused_breaks_nothing() -> None:
     [
         "--only wire --cases 2 --seed 11",
         "--only compiled --cases 4 --seed 17",
+        "--only names --cases 4 --seed 17",
+        pytest.param("--only users --cases 1 --seed 18", marks=needs_root),
         "--only files --only calls --only messages --cases 3 --seed 12",
         "--only faults.kill_writer --only faults.fill_disk --only faults.no_descriptors --cases 4 --seed 13",
         *(f"--only faults.kill_{scene} --cases 1 --seed 14" for scene in ("server", "desk")),

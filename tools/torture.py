@@ -33,7 +33,10 @@ from tools.campaigns.runner import (
     verdicts,
 )
 
-GROUPS = ("files", "calls", "messages", "wire", "faults", "octave", "crowd", "soak", "compiled", "tests", "planted")
+GROUPS = (
+    *("files", "calls", "messages", "compiled", "names", "wire", "faults", "octave", "crowd", "users", "soak", "tests"),
+    "planted",
+)
 """Groups of campaigns: modules of `tools.campaigns`."""
 
 PEAK_MAX_MB = 2000

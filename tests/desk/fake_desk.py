@@ -52,12 +52,13 @@ class World:
 
     def __init__(self, robot_count: int) -> None:
         self.scene, self.time_s, self.cells = 1, 0.0, arena()
+        self.secret, self.is_closed = 0, False
         self.held: dict[int, tuple[str, int]] = {}
         self.reset(robot_count)
 
     def reset(self, robot_count: int) -> None:
         """Put everything where it begins, and let it stand."""
-        self.is_driving = False
+        self.is_driving = self.is_closed = False
         columns = max(2, math.ceil(math.sqrt(1.5 * robot_count)))
         places = [(150 + 600 * (k % columns) / (columns - 1), 90 + 95 * (k // columns)) for k in range(robot_count)]
         self.robots = [[x, y, 0.7 * k] for k, (x, y) in enumerate(places)]
@@ -114,6 +115,7 @@ class World:
             {
                 "kind": "scene",
                 "scene": self.scene,
+                "secret": self.secret,
                 "arena": {"name": "Test", **sizes},
                 "robots": robots,
                 "bodies": bodies,
@@ -169,7 +171,9 @@ def make_app(robot_count: int) -> FastAPI:
             world.is_driving = True
         elif what == "reset":
             world.reset(len(world.robots))
-        elif what == "cut":
+        elif what in ("cut", "close", "replace"):
+            world.is_closed = what == "close"
+            world.secret += what == "replace"
             for socket in list(sockets):
                 await socket.close()
         elif what == "scene":
@@ -192,6 +196,8 @@ def make_app(robot_count: int) -> FastAPI:
     @app.websocket("/desk/feed")
     async def feed(socket: WebSocket) -> None:
         await socket.accept()
+        if world.is_closed:
+            return await socket.close()
         await socket.send_text(world.scene_message())
         sockets[socket] = 0
         sender = asyncio.create_task(send_frames(socket))

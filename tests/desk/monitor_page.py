@@ -45,7 +45,7 @@ def main() -> None:
     @ui.page("/monitor")
     def page(dark: bool = False) -> None:
         ui.dark_mode(dark)
-        panels.append(MonitorPanel(shown.desk, "/desk/1/feed"))
+        panels.append(MonitorPanel(shown.desk, "desk/1/feed"))
 
     @app.get("/world")
     def world() -> dict[str, Any]:

@@ -7,16 +7,20 @@ import logging
 import os
 import re
 import socket
+from contextlib import nullcontext
 from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.stranger import STRANGER, as_stranger, needs_root
 
 from kiks.desk.server.access import BODY_LIMIT, AccessControl
 from kiks.desk.server.token import Token, user_of
 
 TOKEN = "a-secret"
+KEY = Token(TOKEN)
+PAGE = f"{KEY.place}/desk/1"
 COOKIE = "kiks_token=a-secret"
 
 
@@ -36,12 +40,12 @@ def come(
     *,
     kind: str = "http",
     method: str = "GET",
-    path: str = "/desk/1",
+    path: str = PAGE,
     query: bytes = b"",
     body: list[bytes] | None = None,
     is_local: bool = True,
     application: Any = app,
-    key: Token | None = None,
+    key: Token = KEY,
     ends: tuple[Any, Any] | None = None,
     headers: list[tuple[bytes, bytes]] | None = None,
     **named: str,
@@ -69,7 +73,7 @@ def come(
     }
     if ends is not None:
         scope["client"], scope["server"] = ends
-    asyncio.run(AccessControl(application, key or Token(TOKEN), is_local=is_local)(scope, receive, send))
+    asyncio.run(AccessControl(application, key, is_local=is_local)(scope, receive, send))
     return sent
 
 
@@ -124,6 +128,7 @@ def test_a_page_of_another_site_is_refused_even_with_the_token(kind: str, header
 )
 def test_requests_without_the_token_are_refused(kind: str, cookie: str, is_local: bool) -> None:
     headers = {"cookie": cookie} if cookie else {}
+    assert status(come(kind=kind, path="/desk/1", is_local=is_local, cookie=COOKIE)) == 403
     for query in (b"", b"token=", b"token=wrong", b"token=%E2%82%AC", b"ticket=", b"ticket=a-secret"):
         answers = come(kind=kind, query=query, is_local=is_local, **headers)
         assert status(answers) == 403
@@ -139,11 +144,13 @@ def test_refusal_tells_how_to_open_the_desk() -> None:
 
 
 def test_token_becomes_a_cookie_and_leaves_the_address() -> None:
-    answers = come(query=b"token=a-secret&x=1", host="robots.example:8123", is_local=False)
-    headers = dict(answers[0]["headers"])
-    assert answers[0]["status"] == 303
-    assert headers[b"location"] == b"/desk/1?x=1"
-    assert headers[b"set-cookie"] == b"kiks_token=a-secret; Path=/; HttpOnly; SameSite=Strict"
+    for path in ("/desk/1", PAGE):
+        answers = come(path=path, query=b"token=a-secret&x=1", host="robots.example:8123", is_local=False)
+        headers = dict(answers[0]["headers"])
+        assert answers[0]["status"] == 303
+        assert headers[b"location"].decode() == f"{PAGE}?x=1"
+        cookie = headers[b"set-cookie"].decode()
+        assert cookie == f"kiks_token=a-secret; Path={KEY.place}; HttpOnly; SameSite=Strict"
     assert status(come(host="robots.example:8123", cookie="a=b; kiks_token=a-secret", is_local=False)) == 200
 
 
@@ -160,7 +167,8 @@ def test_redirect_with_the_cookie_leads_to_the_desk(path: str, query: bytes) -> 
     answers = come(path=path, query=b"token=a-secret&" + query)
     if status(answers) == 303:
         location = dict(answers[0]["headers"])[b"location"]
-        assert re.fullmatch(rb"/([!-.0-~][!-~]*)?", location)
+        assert re.fullmatch(rb"/[!-.0-~][!-~]*", location)
+        assert location.startswith(KEY.place.encode() + b"/")
         assert TOKEN.encode() not in location or b"token" in query or "secret" in path
     else:
         assert status(answers) in (400, 403)
@@ -260,8 +268,8 @@ def test_a_client_that_has_left_gets_no_answer(caplog: pytest.LogCaptureFixture)
         raise AssertionError(message)
 
     headers = [(b"host", b"localhost"), (b"cookie", COOKIE.encode())]
-    scope = {"type": "http", "method": "GET", "path": "/", "headers": headers}
-    asyncio.run(AccessControl(fails, Token(TOKEN))(scope, receive, send))
+    scope = {"type": "http", "method": "GET", "path": PAGE, "headers": headers}
+    asyncio.run(AccessControl(fails, KEY)(scope, receive, send))
     assert not caplog.records
 
 
@@ -276,29 +284,61 @@ def ends(request: pytest.FixtureRequest) -> Any:
         listener = socket.create_server((request.param, 0), family=family)
     except OSError:
         pytest.skip(f"this computer has no {request.param}")
-    with listener, socket.create_connection(listener.getsockname()[:2]) as client:
+    with listener, socket.create_connection(listener.getsockname()[:2]) as client, listener.accept()[0]:
         yield client.getsockname()[:2], listener.getsockname()[:2]
 
 
 def test_a_ticket_is_valid_once_and_for_this_user_only(ends: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     key = Token(TOKEN)
+    path = "/desk/1"
     ticket = key.new_ticket()
     query = f"ticket={ticket}".encode()
     nowhere = (ends[0][0], 1), ends[1]
-    assert status(come(query=query, key=key)) == 403
-    assert status(come(query=query, key=key, ends=nowhere)) == 403
+    assert status(come(path=path, query=query, key=key)) == 403
+    assert status(come(path=path, query=query, key=key, ends=nowhere)) == 403
     mine = os.getuid()
     monkeypatch.setattr(os, "getuid", lambda: mine + 1)
     monkeypatch.setattr("kiks.desk.server.token.user_of", lambda client, server: mine + 2)
-    assert status(come(query=query, key=key, ends=ends)) == 403
+    assert status(come(path=path, query=query, key=key, ends=ends)) == 403
     monkeypatch.undo()
-    answers = come(query=query, key=key, ends=ends)
+    answers = come(path=path, query=query, key=key, ends=ends)
     assert status(answers) == 303
     headers = dict(answers[0]["headers"])
-    assert headers[b"location"] == b"/desk/1"
-    assert headers[b"set-cookie"].startswith(f"kiks_token_{ends[1][1]}=a-secret;".encode())
-    assert status(come(query=query, key=key, ends=ends)) == 403
-    assert status(come(key=key, ends=ends, cookie=f"kiks_token_{ends[1][1]}=a-secret")) == 200
+    page = f"{key.place}/desk/1"
+    assert headers[b"location"].decode() == page
+    assert headers[b"set-cookie"].startswith(b"kiks_token=a-secret;")
+    assert status(come(path=path, query=query, key=key, ends=ends)) == 403
+    assert status(come(path=page, key=key, ends=ends, cookie=COOKIE)) == 200
+
+
+@needs_root
+def test_a_ticket_is_nothing_to_another_user() -> None:
+    key = Token(TOKEN)
+    query = f"ticket={key.new_ticket()}".encode()
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        for user in (STRANGER, 0):
+            with as_stranger() if user else nullcontext():
+                client = socket.create_connection(listener.getsockname())
+            ends = client.getsockname(), listener.getsockname()
+            with client, listener.accept()[0]:
+                assert user_of(*ends) == user
+                assert status(come(path="/desk/1", query=query, key=key, ends=ends)) == (403 if user else 303)
+
+
+def test_a_connection_that_was_closed_belongs_to_nobody() -> None:
+    key = Token(TOKEN)
+    query = f"ticket={key.new_ticket()}".encode()
+    with socket.create_server(("127.0.0.1", 0)) as listener:
+        for is_open in (False, True):
+            client = socket.create_connection(listener.getsockname())
+            ends = client.getsockname(), listener.getsockname()
+            with listener.accept()[0]:
+                if not is_open:
+                    client.close()
+                # The system lists what is left of it as the superuser's, who may open every desk.
+                assert user_of(*ends) == (os.getuid() if is_open else None)
+                assert status(come(path="/desk/1", query=query, key=key, ends=ends)) == (303 if is_open else 403)
+            client.close()
 
 
 def test_user_of_finds_the_owner_of_a_connection(ends: Any) -> None:

@@ -279,6 +279,21 @@ def test_a_lost_connection_is_restored(visit: Callable[..., Visit]) -> None:
     assert here.page.locator("[data-testid=arena-notice]").is_hidden()
 
 
+@pytest.mark.parametrize("end", ["close", "replace"])
+def test_a_page_leaves_a_desk_that_has_ended(visit: Callable[..., Visit], end: str) -> None:
+    here = visit()
+    here.page.evaluate("import('kiks-desk').then(({ pageFeed }) => { window.feed = pageFeed(); })")
+    here.wait("() => window.socket.connected")
+    here.ask(end)
+    if end == "close":
+        here.wait("() => window.feed.connection === 'lost'")
+        here.page.evaluate("{ const now = performance.now.bind(performance); performance.now = () => now() + 61_000; }")
+    # Who listens at its port now is not that desk, whatever it says: nothing is asked of it any more.
+    here.wait("() => window.feed.connection === 'gone' && window.feed._socket.readyState === WebSocket.CLOSED")
+    assert here.page.evaluate("[window.feed._timer, window.socket.active]") == [None, False]
+    assert "has ended" in here.page.locator("[data-testid=arena-notice]").inner_text()
+
+
 def test_a_hidden_page_gets_no_frames(visit: Callable[..., Visit]) -> None:
     here = visit()
     hide = """(isHidden) => {

@@ -15,7 +15,7 @@ from urllib.parse import urlsplit
 import pytest
 from tests.guard import GUARD_S
 from websockets.exceptions import ConnectionClosed
-from websockets.sync.client import connect
+from websockets.sync.client import ClientConnection, connect
 
 import kiks
 from kiks.desk.server import connection_limit
@@ -47,7 +47,18 @@ def address_and_cookie(shown: Shown) -> tuple[str, int, str]:
     url = urlsplit(shown.url)
     assert url.hostname is not None
     assert url.port is not None
-    return url.hostname, url.port, f"{COOKIE}_{url.port}={SERVER.key.token}"
+    return url.hostname, url.port, f"{COOKIE}={SERVER.key.token}"
+
+
+def inside(path: str) -> str:
+    """Return a path of the desk as it is for browsers with the token."""
+    return f"{SERVER.key.place}{path}"
+
+
+def open_socket(shown: Shown, path: str) -> ClientConnection:
+    """Open a WebSocket as a browser with the token."""
+    host, port, cookie = address_and_cookie(shown)
+    return connect(f"ws://{host}:{port}{inside(path)}", additional_headers={"Cookie": cookie}, open_timeout=GUARD_S)
 
 
 def knock(shown: Shown, data: bytes) -> bytes:
@@ -68,7 +79,7 @@ def ask(shown: Shown, method: str, path: str, body: bytes | None = None, **heade
     """Return the answer to a browser with the token: the status and the page."""
     host, port, cookie = address_and_cookie(shown)
     asking = http.client.HTTPConnection(host, port, timeout=GUARD_S)
-    asking.request(method, path, body, {"Cookie": cookie, **headers})
+    asking.request(method, inside(path), body, {"Cookie": cookie, **headers})
     answer = asking.getresponse()
     page = answer.read()
     asking.close()
@@ -151,9 +162,9 @@ def test_an_unauthenticated_connection_times_out(shown: Shown, monkeypatch: pyte
 
 
 def test_an_authenticated_connection_does_not_time_out(shown: Shown, monkeypatch: pytest.MonkeyPatch) -> None:
-    host, port, cookie = address_and_cookie(shown)
+    host, port, _ = address_and_cookie(shown)
     path = urlsplit(shown.url).path
-    with connect(f"ws://{host}:{port}{path}/feed", additional_headers={"Cookie": cookie}, open_timeout=GUARD_S) as feed:
+    with open_socket(shown, f"{path}/feed") as feed:
         idle = [
             socket.create_connection((host, port), timeout=GUARD_S)
             for _ in range(2 * connection_limit.UNAUTHENTICATED_MAX)
@@ -189,10 +200,9 @@ def test_an_authenticated_connection_does_not_time_out(shown: Shown, monkeypatch
 )
 @pytest.mark.parametrize("which", ["feed", "socket.io"])
 def test_malformed_websocket_frames_close_the_socket(shown: Shown, said: list[str], which: str, frames: bytes) -> None:
-    host, port, cookie = address_and_cookie(shown)
     path = f"{urlsplit(shown.url).path}/feed"
     path = path if which == "feed" else "/_nicegui_ws/socket.io/?EIO=4&transport=websocket"
-    with connect(f"ws://{host}:{port}{path}", additional_headers={"Cookie": cookie}, open_timeout=GUARD_S) as client:
+    with open_socket(shown, path) as client:
         client.socket.sendall(frames)
         # Below the library: it would object itself.
         with suppress(OSError):
@@ -237,9 +247,8 @@ def test_malformed_websocket_frames_close_the_socket(shown: Shown, said: list[st
     ids=lambda text: text[:40],
 )
 def test_malformed_events_are_ignored(shown: Shown, caplog: pytest.LogCaptureFixture, message: str, said: Any) -> None:
-    host, port, cookie = address_and_cookie(shown)
     path = "/_nicegui_ws/socket.io/?EIO=4&transport=websocket"
-    with connect(f"ws://{host}:{port}{path}", additional_headers={"Cookie": cookie}, open_timeout=GUARD_S) as client:
+    with open_socket(shown, path) as client:
         client.send("40")
         client.recv(GUARD_S)
         client.send(message)
@@ -285,7 +294,7 @@ def test_a_too_large_body_is_not_stored(shown: Shown, said: list[str]) -> None:
         }
         lines = "".join(f"{name}: {value}\r\n" for name, value in head.items())
         with socket.create_connection((host, port), timeout=GUARD_S) as client:
-            client.sendall(f"POST /desk/1 HTTP/1.1\r\n{lines}\r\n".encode())
+            client.sendall(f"POST {inside('/desk/1')} HTTP/1.1\r\n{lines}\r\n".encode())
             with suppress(OSError):
                 for _ in range(BODY_LIMIT // 0x100000 + 2):
                     if body:
@@ -296,7 +305,6 @@ def test_a_too_large_body_is_not_stored(shown: Shown, said: list[str]) -> None:
 
 
 def test_json_of_the_gateway_never_raises(shown: Shown, said: list[str]) -> None:
-    host, port, cookie = address_and_cookie(shown)
     chance = random.Random(2)
     values: list[Any] = [
         None,
@@ -316,7 +324,7 @@ def test_json_of_the_gateway_never_raises(shown: Shown, said: list[str]) -> None
     ]
     names = ["kind", "what", "index", "x_mm", "y_mm", "heading_rad", "count", ""]
     path = urlsplit(shown.url).path
-    with connect(f"ws://{host}:{port}{path}/feed", additional_headers={"Cookie": cookie}, open_timeout=GUARD_S) as feed:
+    with open_socket(shown, f"{path}/feed") as feed:
         for _ in range(1000):
             message = {name: chance.choice(values) for name in chance.sample(names, chance.randrange(len(names)))}
             message["kind"] = chance.choice(["grab", "move", "turn", "drop", "ack"])

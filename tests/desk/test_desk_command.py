@@ -106,8 +106,8 @@ def show_page(url: str) -> None:
     from websockets.sync.client import connect
 
     cookies = HTTPCookieProcessor()
-    build_opener(cookies).open(url, timeout=GUARD_S).close()
-    parts = urlsplit(url)
+    with build_opener(cookies).open(url, timeout=GUARD_S) as page:
+        parts = urlsplit(page.url)
     feed = f"ws://{parts.netloc}{parts.path.rstrip('/')}/feed"
     cookie = "; ".join(f"{each.name}={each.value}" for each in cookies.cookiejar)
     with connect(feed, compression=None, additional_headers={"Cookie": cookie}, open_timeout=GUARD_S) as socket:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import gc
 import json
 import struct
@@ -18,7 +19,9 @@ from websockets.exceptions import InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
 import kiks
-from kiks.desk.server.gateway import IN_FLIGHT, Viewer
+from kiks.desk.server.desk import Desk
+from kiks.desk.server.gateway import IN_FLIGHT, Gateway, Viewer
+from kiks.desk.server.server import SERVER
 from kiks.desk.server.show import Shown, show
 from kiks.desk.server.token import COOKIE
 from kiks.errors import ParameterError
@@ -75,9 +78,11 @@ class Browser:
 @contextmanager
 def browsing(shown: Shown, **options: Any) -> Iterator[Browser]:
     url = urlsplit(shown.url)
-    cookie = {"Cookie": f"{COOKIE}_{url.port}={url.query.removeprefix('token=')}"}
+    cookie = {"Cookie": f"{COOKIE}={SERVER.key.token}"}
     options = {"additional_headers": cookie, **options}
-    with connect(f"ws://{url.netloc}{url.path}/feed", compression=None, open_timeout=GUARD_S, **options) as socket:
+    with connect(
+        f"ws://{url.netloc}{SERVER.key.place}{url.path}/feed", compression=None, open_timeout=GUARD_S, **options
+    ) as socket:
         yield Browser(socket)
 
 
@@ -120,8 +125,6 @@ def test_a_browser_that_does_not_read_is_disconnected() -> None:
         await viewer.send_all(None)  # type: ignore[arg-type]
         return viewer
 
-    import asyncio
-
     asyncio.run(far_behind())
 
 
@@ -154,6 +157,28 @@ def test_two_browsers_may_drag_at_once(shown: Shown) -> None:
         one.wait_for(lambda frame: pose(frame, 1)[1] == 300 and pose(frame)[1] == 300)
     while not shown.desk.hands.are_empty:
         pass
+
+
+def test_of_the_moves_of_a_page_only_the_newest_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    sim = kiks.Simulation(kiks.Arena.box(600, 400), seed=1)
+    desk = Desk(sim, speed=None)
+    gateway, viewer = Gateway(desk, 1), Viewer("somebody")
+    moves: list[float] = []
+    move = desk.hands.move
+    monkeypatch.setattr(desk.hands, "move", lambda owner, x, y: (moves.append(x), move(owner, x, y)))
+
+    async def drag() -> None:
+        await gateway._obey(viewer, '{"kind": "grab", "what": "robot", "index": 0}')
+        for x_mm in range(100, 300):
+            await gateway._obey(viewer, json.dumps({"kind": "move", "x_mm": x_mm, "y_mm": 200}))
+        await gateway._obey(viewer, '{"kind": "turn", "heading_rad": 1.0}')
+        assert moves == [], "it moves with the next frame, or when it is dropped"
+        await gateway._obey(viewer, '{"kind": "drop"}')
+
+    asyncio.run(drag())
+    assert moves == [299]
+    assert sim.pose(1) == pytest.approx((299, 200, 1.0))
+    desk.close()
 
 
 @pytest.mark.slow

@@ -27,8 +27,7 @@ class Visit:
     """A page with the monitor, and what the simulation says."""
 
     def __init__(self, page: Page, address: str, query: str) -> None:
-        self.page, self.address = page, address.split("/desk/")[0]
-        page.request.get(address)
+        self.page, self.address = page, page.request.get(address).url.split("/desk/")[0]
         page.request.get(f"{self.address}/ask/reset")
         page.goto(f"{self.address}/monitor?{query}")
         page.wait_for_function("() => window.kiksMonitor?.drawn() > 3")

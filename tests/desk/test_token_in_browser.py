@@ -20,13 +20,22 @@ from kiks.desk.server.show import Shown
 pytestmark = pytest.mark.slow
 
 
-def test_the_token_moves_from_the_address_to_a_cookie(visitor: Visitor) -> None:
+def test_the_token_moves_from_the_address_to_a_cookie(visitor: Visitor, shown: Shown) -> None:
     assert "token" not in visitor.page.url
     assert SERVER.key.token not in visitor.page.content()
     assert visitor.answer("document.cookie") == ""
+    assert visitor.page.url.startswith(shown.url.split("/desk/")[0] + SERVER.key.place)
     visitor.page.reload()
     visitor.page.wait_for_function(FIRST_PICTURE)
     visitor.picture("with_the_token")
+
+
+def test_other_servers_of_this_computer_never_get_the_token(visitor: Visitor, notebook: Notebook) -> None:
+    host = f"http://127.0.0.1:{notebook.server_port}"
+    for path in ("/desk/1", "/desk/1/feed", "/_nicegui_ws/socket.io/", ""):
+        visitor.page.goto(f"{host}{path}")
+    assert len(notebook.cookies) >= 4
+    assert not any(notebook.cookies)
 
 
 def test_a_ticket_opens_the_desk_once(new_page: NewPage, browser: Browser, shown: Shown) -> None:
@@ -53,12 +62,26 @@ def test_without_the_token_a_page_tells_how_to_open_the_desk(browser: Browser, s
         page.close()
 
 
-@pytest.fixture
-def notebook(shown: Shown) -> Iterator[int]:
-    """A server of pages that show the desk within theirs, as a notebook does; its port."""
+class Notebook(ThreadingHTTPServer):
+    """A server of pages that show the desk within theirs, as a notebook does.
 
-    class Notebook(BaseHTTPRequestHandler):
+    Attributes:
+        cookies: The cookies that came with each request.
+    """
+
+    def __init__(self, answer: type[BaseHTTPRequestHandler]) -> None:
+        self.cookies: list[str] = []
+        super().__init__(("127.0.0.1", 0), answer)
+
+
+@pytest.fixture
+def notebook(shown: Shown) -> Iterator[Notebook]:
+
+    class Answer(BaseHTTPRequestHandler):
+        server: Notebook
+
         def do_GET(self) -> None:
+            self.server.cookies.append(self.headers.get("cookie", ""))
             body = shown._repr_html_().encode() if self.path == "/" else b""
             self.send_response(200)
             self.send_header("content-type", "text/html")
@@ -68,21 +91,21 @@ def notebook(shown: Shown) -> Iterator[int]:
         def log_message(self, *_words: object) -> None:
             pass
 
-    server = ThreadingHTTPServer(("127.0.0.1", 0), Notebook)
+    server = Notebook(Answer)
     threading.Thread(target=server.serve_forever, daemon=True).start()
-    yield server.server_port
+    yield server
     server.shutdown()
     server.server_close()
 
 
 @at_length
 @pytest.mark.parametrize("host", ["localhost", "127.0.0.1"])
-def test_a_notebook_shows_the_desk(browser: Browser, shown: Shown, notebook: int, host: str) -> None:
+def test_a_notebook_shows_the_desk(browser: Browser, shown: Shown, notebook: Notebook, host: str) -> None:
     page = browser.new_page()
     page.set_default_timeout(1000 * GUARD_S)
     faults: list[str] = []
     page.on("pageerror", lambda error: faults.append(str(error)))
-    page.goto(f"http://{host}:{notebook}/")
+    page.goto(f"http://{host}:{notebook.server_port}/")
     frame = next(each for each in page.frames if each.parent_frame is not None)
     frame.wait_for_function(FIRST_PICTURE)
     assert urlsplit(frame.url).query == ""

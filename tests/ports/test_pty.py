@@ -4,12 +4,14 @@ import errno
 import os
 import shutil
 import subprocess
+import tempfile
 import termios
 from pathlib import Path
 
 import pytest
 import serial
 from tests.served import GUARD_S, PROGRAMS, ask, fresh, open_plain, read_line, run_python, served
+from tests.stranger import as_stranger, needs_root
 
 from kiks.errors import LinkError
 from kiks.ports.pty import PtyEndpoint, default_folder
@@ -143,7 +145,20 @@ def test_command_of_a_client_that_closes_at_once_acts(link: str) -> None:
 def test_link_exists_while_the_server_runs(link: str) -> None:
     with served([PtyEndpoint(link)]):
         assert os.readlink(link).startswith("/dev/pts/")
-    assert not os.path.lexists(link)
+    assert os.listdir(os.path.dirname(link)) == []
+
+
+@needs_root
+def test_no_other_user_can_keep_a_link_from_its_owner() -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        os.chmod(folder, 0o755)
+        endpoint = PtyEndpoint(f"{folder}/robot")
+        (lock,) = {*os.listdir(folder)} - {"robot"}
+        with as_stranger():
+            for name in (lock, ".other.lock"):
+                with pytest.raises(PermissionError):
+                    os.open(f"{folder}/{name}", os.O_RDONLY | os.O_CREAT)
+        endpoint.close()
 
 
 def test_default_folder_belongs_to_the_user(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

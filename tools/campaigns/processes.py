@@ -175,8 +175,8 @@ class Looker:
         self.opener: OpenerDirector = build_opener(jar)
         with self.opener.open(url, timeout=GUARD_S) as answer:
             self.page: bytes = answer.read()
+            parts = urlsplit(answer.url)
         self.cookies = "; ".join(f"{cookie.name}={cookie.value}" for cookie in jar.cookiejar)
-        parts = urlsplit(url)
         self.feed = urlunsplit(("ws", parts.netloc, f"{parts.path.rstrip('/')}/feed", "", ""))
 
     def look(self, frames: int, *, hold: threading.Event | None = None) -> int:

@@ -15,19 +15,18 @@ and writes nothing, such as `stty`, is no client: its settings stay, as on a rea
 from __future__ import annotations
 
 import fcntl
-import hashlib
 import os
 import select
-import socket
 import stat
 import struct
 import tempfile
 import termios
+from contextlib import suppress
 from pathlib import Path
 
 from kiks.errors import LinkError
 from kiks.ports.endpoint import READ_SIZE, Channel, Endpoint
-from kiks.ports.file_descriptors import opening
+from kiks.ports.file_descriptors import SHORTAGES, opening
 
 TCGETS2 = 0x802C542A
 """Linux request for terminal settings with any speed, as a number (asm-generic/ioctls.h)."""
@@ -58,7 +57,7 @@ class PtyEndpoint(Endpoint):
             self._master, self._slave_name, self._held = -1, "", -1
             self._create()
         except BaseException:
-            self._claim.close()
+            self._leave()
             raise
 
     def _create(self) -> None:
@@ -117,7 +116,13 @@ class PtyEndpoint(Endpoint):
             os.unlink(self.name)
         os.close(self._held)
         os.close(self._master)
-        self._claim.close()
+        self._leave()
+
+    def _leave(self) -> None:
+        """Give the link's name up."""
+        with suppress(OSError):  # its folder may have gone
+            os.unlink(_lock_of(self.name))
+        os.close(self._claim)
 
 
 class PtyChannel(Channel):
@@ -196,20 +201,35 @@ def _is_own(folder: Path) -> bool:
     )
 
 
-def _claim(path: str) -> socket.socket:
-    """Reserve a link's name until this process ends: an abstract socket leaves no file behind, even after a crash."""
+def _lock_of(path: str) -> str:
     folder, name = os.path.split(path)
-    # An abstract name holds 107 bytes; a path may be longer.
-    digest = hashlib.sha256(os.fsencode(os.path.join(os.path.realpath(folder), name))).hexdigest()
-    claim = socket.socket(socket.AF_UNIX)
+    return os.path.join(folder, f".{name}.lock")
+
+
+def _claim(path: str) -> int:
+    """Reserve a link's name until this process ends, by a lock on a file beside it; only who may write there can."""
+    name = _lock_of(path)
     try:
-        claim.bind(f"\0kiks-link-{digest}")
-    except OSError:
-        claim.close()
-        raise LinkError(
-            f"link {path!r} must be free, but a KiKS that is running has it. Stop that one, or give another link."
-        ) from None
-    return claim
+        claim = os.open(name, os.O_CREAT | os.O_RDWR | os.O_NOFOLLOW | os.O_NONBLOCK, 0o600)
+    except OSError as error:
+        if error.errno in SHORTAGES:
+            raise
+        raise _unwritable(path, error) from None
+    with suppress(OSError):
+        fcntl.flock(claim, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        # Who had it may have removed it since it was opened, and another have a new one.
+        if os.path.samestat(os.fstat(claim), os.lstat(name)):
+            return claim
+    os.close(claim)
+    raise LinkError(
+        f"link {path!r} must be free, but a KiKS that is running has it. Stop that one, or give another link."
+    )
+
+
+def _unwritable(path: str, error: OSError) -> LinkError:
+    return LinkError(
+        f"link {path!r} must be in a folder that you can write to, but it is not ({error.strerror}). Take another."
+    )
 
 
 def _point(path: str, target: str) -> None:
@@ -223,6 +243,4 @@ def _point(path: str, target: str) -> None:
         os.symlink(target, fresh)
         os.replace(fresh, path)
     except OSError as error:
-        raise LinkError(
-            f"link {path!r} must be in a folder that you can write to, but it is not ({error.strerror}). Take another."
-        ) from None
+        raise _unwritable(path, error) from None

@@ -95,7 +95,7 @@ class ArenaView(
     """The arena from above, in 3-D, or both; it fills its parent element.
 
     Args:
-        feed: Path of the WebSocket that frames come from; all components of a page share one.
+        feed: Address of the WebSocket that frames come from, seen from the page; all its components share one.
         view: The first view.
         on_pick: Called with each click that is not a drag.
         on_draw: Called with each stroke of a tool.

@@ -12,7 +12,7 @@ from nicegui.events import KeyEventArguments
 from kiks.desk.panels.arena_view import ArenaView, Stroke, Tool
 from kiks.desk.panels.files import FilesPanel
 from kiks.desk.panels.new_arena import ask_for_box, ask_for_maze
-from kiks.desk.panels.widgets import text_button, told
+from kiks.desk.panels.widgets import text_button, told, with_props
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.live_editing import Editing
 from kiks.errors import ParameterError
@@ -83,10 +83,8 @@ class EditorPanel:
         with ui.row().classes("w-full gap-1"):
             for name, tool in TOOLS.items():
                 button = ui.button(icon=tool.icon, on_click=lambda name=name: self._choose(name))
-                button.props(f'dense padding="6px" aria-label="{tool.word}" data-testid=tool-{name}').mark(
-                    f"tool-{name}"
-                )
-                with button:
+                button.props('dense padding="6px"').mark(f"tool-{name}")
+                with with_props(button, aria_label=tool.word, data_testid=f"tool-{name}"):
                     ui.tooltip(f"{tool.word}: {tool.hint}")
                 self._buttons[name] = button
         self._hint = ui.label().classes("text-caption").props("data-testid=tool-hint aria-live=polite")
@@ -138,7 +136,7 @@ class EditorPanel:
         self._tool = name
         for each, button in self._buttons.items():
             is_chosen = each == name
-            button.props(f"{'color=accent' if is_chosen else 'color=primary'} aria-pressed={str(is_chosen).lower()}")
+            with_props(button, color="accent" if is_chosen else "primary", aria_pressed=str(is_chosen).lower())
         self._hint.text = TOOLS[name].hint + "."
         self._apply_tool()
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from nicegui import ui
 
-from kiks.desk.panels.widgets import told
+from kiks.desk.panels.widgets import told, with_props
 from kiks.desk.server.desk import Desk
 from kiks.errors import ParameterError, library
 from kiks.films.film import FPS, save_film
@@ -120,5 +120,5 @@ class FilmDialog:
 
 
 def _number(label: str, name: str, value: float | None = None) -> ui.number:
-    number = ui.number(label, value=value, min=0.0).props(f"dense data-testid={name}")
-    return number.classes("w-28")
+    number = ui.number(label, value=value, min=0.0).props("dense").classes("w-28")
+    return with_props(number, data_testid=name)

@@ -76,7 +76,7 @@ class MonitorPanel:
 
     Args:
         desk: The desk.
-        feed: Path of the WebSocket that frames come from.
+        feed: Address of the WebSocket that frames come from, seen from the page.
     """
 
     def __init__(self, desk: Desk, feed: str = "/desk/feed") -> None:

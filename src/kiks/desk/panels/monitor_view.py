@@ -34,7 +34,7 @@ class MonitorView(Element, component=_WEB / "monitor_view.js", esm={"kiks-desk":
     """One robot from above with its readings at their sensors, curves of the last seconds, numbers, and its camera.
 
     Args:
-        feed: Path of the WebSocket that frames come from; all components of a page share one.
+        feed: Address of the WebSocket that frames come from, seen from the page; all its components share one.
         on_explain: Called with a reading that was clicked.
         on_seen: Called with whether the element is visible.
     """

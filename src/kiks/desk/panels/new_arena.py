@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 from nicegui import ui
 
+from kiks.desk.panels.widgets import with_props
 from kiks.errors import KiksError
 from kiks.model.arena import Arena
 from kiks.model.materials import REFLECTANCES
@@ -54,7 +55,7 @@ async def ask_for_maze() -> Arena | None:
 def _number(label: str, value: int, name: str, low: int, high: int) -> Callable[[], int]:
     """Build a field for a whole number and return its getter, which returns -1 for an empty field."""
     field = ui.number(label, value=value, min=low, max=high, precision=0).classes("w-full")
-    field.props(f"dense data-testid={name}").mark(name)
+    with_props(field, data_testid=name).props("dense").mark(name)
     return lambda: int(field.value) if is_number(field.value) else -1
 
 

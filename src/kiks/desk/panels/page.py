@@ -16,7 +16,7 @@ from kiks.desk.panels.settings import SettingsPanel
 from kiks.desk.panels.time_bar import TimeBar
 from kiks.desk.panels.time_controls import TimePanel
 from kiks.desk.panels.view import ViewPanel
-from kiks.desk.panels.widgets import told
+from kiks.desk.panels.widgets import told, with_props
 from kiks.desk.panels.wire import WirePanel
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.live_editing import Editing
@@ -58,7 +58,7 @@ class Page:
         self._desk = desk
         self._editing = editing
         self._told, self._logged = desk.news.count, desk.log.count
-        feed = f"/desk/{number}/feed"
+        feed = f"{number}/feed"
         ui.colors(primary=PRIMARY, accent=ACCENT, positive=POSITIVE)
         ui.add_head_html(MEMORY)
         ui.add_css(STYLE)
@@ -99,7 +99,7 @@ class Page:
             ui.tabs().props("dense no-caps align=justify active-color=accent").classes("w-full desk-tabs") as self._tabs
         ):
             for name, word, _ in tabs:
-                ui.tab(name, word).props(f"data-testid=tab-{name}")
+                with_props(ui.tab(name, word), data_testid=f"tab-{name}")
         self._panels = ui.tab_panels(self._tabs, animated=False).classes("desk-panels w-full")
         self._places: dict[str, ui.tab_panel] = {}
         with self._panels:

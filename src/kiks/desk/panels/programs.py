@@ -6,7 +6,7 @@ import asyncio
 
 from nicegui import ui
 
-from kiks.desk.panels.widgets import icon_button, offer_robots, told
+from kiks.desk.panels.widgets import icon_button, offer_robots, told, with_props
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.scripts import (
     NEW,
@@ -107,11 +107,10 @@ class ProgramsPanel:
             is_shown = handle is self._shown
             with ui.row().classes("w-full items-center no-wrap gap-1"):
                 icon = ICONS.get(handle.state, "error_outline" if handle.code else "check_circle")
-                with (
-                    ui.button(on_click=lambda handle=handle: self._choose(handle))
-                    .props(f'flat no-caps align=left dense aria-pressed="{str(is_shown).lower()}"')
-                    .classes("col text-weight-bold" if is_shown else "col")
-                    .mark(f"program-{handle.number}")
+                button = ui.button(on_click=lambda handle=handle: self._choose(handle))
+                button.props("flat no-caps align=left dense").mark(f"program-{handle.number}")
+                with with_props(button, aria_pressed=str(is_shown).lower()).classes(
+                    "col text-weight-bold" if is_shown else "col"
                 ):
                     ui.icon(icon).classes("q-mr-sm").props("aria-hidden=true")
                     ui.label(f"{handle.command.program.name} on robot {handle.robot}: {handle.state}")

@@ -7,7 +7,7 @@ from typing import Any
 
 from nicegui import ui
 
-from kiks.desk.panels.widgets import told
+from kiks.desk.panels.widgets import told, with_props
 from kiks.desk.server.desk import Desk
 from kiks.errors import ParameterError
 from kiks.model.project import TURRETS, ProjectRobot
@@ -100,7 +100,7 @@ class SettingsPanel:
             if self._policy.value == "fixed"
             else ("CPU factor", "1: this computer; 2: a computer half as fast.")
         )
-        self._amount.props(f'label="{label}" hint="{hint}"')
+        with_props(self._amount, label=label, hint=hint)
 
     def _show(self) -> None:
         """Show the settings of the present world."""
@@ -195,12 +195,10 @@ class _RobotRow:
 
 
 def _number(label: str, hint: str, name: str, *, minimum: float) -> ui.number:
-    return ui.number(label, min=minimum).props(f'dense outlined hint="{hint}" data-testid={name}').classes("w-full")
+    number = ui.number(label, min=minimum).props("dense outlined").classes("w-full")
+    return with_props(number, hint=hint, data_testid=name)
 
 
 def _choice(label: str, choices: Any, hint: str, name: str) -> ui.select:
-    return (
-        ui.select(choices, label=label)
-        .props(f'dense outlined options-dense hint="{hint}" data-testid={name}')
-        .classes("w-full")
-    )
+    choice = ui.select(choices, label=label).props("dense outlined options-dense").classes("w-full")
+    return with_props(choice, hint=hint, data_testid=name)

@@ -9,7 +9,7 @@ from nicegui import ui
 from nicegui.element import Element
 from nicegui.events import KeyEventArguments
 
-from kiks.desk.panels.widgets import icon_button, told
+from kiks.desk.panels.widgets import icon_button, told, with_props
 from kiks.desk.server.desk import Desk
 from kiks.units import clock_text
 
@@ -45,7 +45,7 @@ class TimeSlider(Element, component=_WEB / "time_bar.js", esm={"kiks-desk": str(
     """The slider of the time bar.
 
     Args:
-        feed: Path of the WebSocket that frames come from; all components of a page share one.
+        feed: Address of the WebSocket that frames come from, seen from the page; all its components share one.
     """
 
     def __init__(self, feed: str = "/desk/feed") -> None:
@@ -59,7 +59,7 @@ class TimeBar:
 
     Args:
         desk: The desk.
-        feed: Path of the WebSocket that frames come from.
+        feed: Address of the WebSocket that frames come from, seen from the page.
     """
 
     def __init__(self, desk: Desk, feed: str) -> None:
@@ -124,7 +124,7 @@ class TimeBar:
         ):
             word = "Pause" if goes else word
             if button.props.get("aria-label") != word:
-                button.props(f'icon={"pause" if goes else "play_arrow"} aria-label="{word}"')
+                with_props(button, icon="pause" if goes else "play_arrow", aria_label=word)
         for button in self._onwards:
             button.set_enabled(past is not None)
         self._now.set_visibility(past is not None and has_present)
@@ -219,5 +219,5 @@ class TimeBar:
 
 def _long_button(text: str, icon: str, name: str, act: Callable[[], Awaitable[None]]) -> ui.button:
     """Build a button whose text goes where there is no room for it."""
-    button = ui.button(text, icon=icon, on_click=act).props(f'dense no-caps padding="3px 10px" data-testid={name}')
-    return button.props(f'aria-label="{text}"').classes("desk-bar-long").mark(name)
+    button = ui.button(text, icon=icon, on_click=act).props('dense no-caps padding="3px 10px"')
+    return with_props(button, aria_label=text, data_testid=name).classes("desk-bar-long").mark(name)

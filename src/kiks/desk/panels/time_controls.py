@@ -8,7 +8,7 @@ from nicegui import ui
 from nicegui.element import Element
 from nicegui.events import KeyEventArguments
 
-from kiks.desk.panels.widgets import BAR, icon_button, told
+from kiks.desk.panels.widgets import BAR, icon_button, told, with_props
 from kiks.desk.server.desk import Desk
 
 _WEB = Path(__file__).parents[1] / "web"
@@ -18,7 +18,7 @@ class ClockView(Element, component=_WEB / "clock_view.js", esm={"kiks-desk": str
     """The simulated clock and its speed.
 
     Args:
-        feed: Path of the WebSocket that frames come from; all components of a page share one.
+        feed: Address of the WebSocket that frames come from, seen from the page; all its components share one.
     """
 
     def __init__(self, feed: str = "/desk/feed") -> None:
@@ -61,7 +61,7 @@ class TimePanel:
 
     Args:
         desk: The desk.
-        feed: Path of the WebSocket that frames come from.
+        feed: Address of the WebSocket that frames come from, seen from the page.
     """
 
     def __init__(self, desk: Desk, feed: str) -> None:
@@ -97,7 +97,7 @@ class TimePanel:
         desk = self._desk
         word, icon = ("Run", "play_arrow") if desk.is_paused else ("Pause", "pause")
         if self._run.props.get("aria-label") != word:
-            self._run.props(f'icon={icon} aria-label="{word}"')
+            with_props(self._run, icon=icon, aria_label=word)
             self._run_tip.text = f"{word} (space)"
         if self._speed.value != self._shown_speed():
             self._speed.value = self._shown_speed()
@@ -149,9 +149,5 @@ class TimePanel:
 
 
 def _select(choices: dict[float, str], value: float, word: str, name: str, width: str) -> ui.select:
-    return (
-        ui.select(choices, value=value)
-        .props(f'dense dark borderless options-dense aria-label="{word}" data-testid={name}')
-        .style(f"min-width: {width}")
-        .on("keydown", js_handler=LEAVE)
-    )
+    choice = ui.select(choices, value=value).props("dense dark borderless options-dense").style(f"min-width: {width}")
+    return with_props(choice, aria_label=word, data_testid=name).on("keydown", js_handler=LEAVE)

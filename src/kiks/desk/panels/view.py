@@ -5,7 +5,7 @@ from __future__ import annotations
 from nicegui import ui
 
 from kiks.desk.panels.arena_view import SHOWN, ArenaView
-from kiks.desk.panels.widgets import BAR, icon_button
+from kiks.desk.panels.widgets import BAR, icon_button, with_props
 from kiks.desk.server.desk import Desk
 
 LAYERS = {
@@ -54,9 +54,10 @@ class ViewPanel:
         toggle.tooltip("View from above, or in 3-D: there drag to orbit, turn the wheel to zoom")
         with _button("layers", "Layers", "layers"), ui.menu(), ui.column().classes("q-pa-sm gap-0"):
             for name, text in LAYERS.items():
-                ui.checkbox(
+                box = ui.checkbox(
                     text, value=SHOWN[name], on_change=lambda event, name=name: view.set_show({name: event.value})
-                ).props(f"dense data-testid=show-{name}").classes("q-py-xs")
+                )
+                with_props(box, data_testid=f"show-{name}").props("dense").classes("q-py-xs")
             ui.button("Clear trails", icon="auto_fix_normal", on_click=view.clear_trails).props("flat dense no-caps")
         with _button("my_location", "Follow a robot", "follow"), ui.menu() as self._robots:
             pass

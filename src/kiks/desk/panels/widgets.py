@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Awaitable, Callable
-from typing import Any, ParamSpec
+from typing import Any, ParamSpec, TypeVar
 
 from nicegui import ui
 
 from kiks.errors import KiksError
 
 Given = ParamSpec("Given")
+Some = TypeVar("Some", bound=ui.element)
 
 BAR = "flat round dense color=white"
 """Look of an icon button in the bar above the arena."""
@@ -29,11 +30,22 @@ def told(act: Callable[Given, Awaitable[None]]) -> Callable[Given, Awaitable[Non
     return acted
 
 
+def with_props(element: Some, **texts: str) -> Some:
+    """Set properties to texts as they are; their names have `-` for `_`.
+
+    `element.props(...)` reads properties from a text, so a quote in a name could add others, such as `href`.
+    """
+    for name, text in texts.items():
+        element.props[name.replace("_", "-")] = text
+    return element
+
+
 def icon_button(
     icon: str, label: str, name: str, act: Callable[..., Any] | None = None, *, look: str = "flat round dense"
 ) -> ui.button:
     """Build a button with an icon alone; `label` is its accessible name."""
-    return ui.button(icon=icon, on_click=act).props(f'{look} aria-label="{label}" data-testid="{name}"').mark(name)
+    button = ui.button(icon=icon, on_click=act).props(look)
+    return with_props(button, aria_label=label, data_testid=name).mark(name)
 
 
 def offer_robots(choice: ui.select, count: int) -> None:
@@ -46,4 +58,4 @@ def offer_robots(choice: ui.select, count: int) -> None:
 def text_button(text: str, icon: str, name: str, tip: str, act: Callable[..., Any]) -> ui.button:
     """Build a button with an icon, a text (possibly empty) and a tooltip."""
     button = ui.button(text, icon=icon, on_click=act).props('dense no-caps outline padding="4px 10px"')
-    return button.props(f'aria-label="{text or tip}" data-testid="{name}"').mark(name).tooltip(tip)
+    return with_props(button, aria_label=text or tip, data_testid=name).mark(name).tooltip(tip)

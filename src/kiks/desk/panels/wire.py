@@ -5,7 +5,7 @@ from __future__ import annotations
 from nicegui import ui
 
 from kiks.desk.panels.console import ConsolePanel
-from kiks.desk.panels.widgets import icon_button, offer_robots
+from kiks.desk.panels.widgets import icon_button, offer_robots, with_props
 from kiks.desk.server.desk import Desk
 from kiks.sim.wire import Wire
 from kiks.sim.wire_log import Piece, TimeShares, WireLog
@@ -116,7 +116,7 @@ class WirePanel:
             for name, (word, meaning) in PARTS.items():
                 with ui.row().classes("items-center gap-1 no-wrap"):
                     ui.element("span").classes(f"wire-part wire-{name}").props("aria-hidden=true")
-                    labels[name] = ui.label(word).mark(f"share-{name}").props(f'data-testid="share-{name}"')
+                    labels[name] = with_props(ui.label(word).mark(f"share-{name}"), data_testid=f"share-{name}")
                     ui.tooltip(meaning)
         for name in PARTS:
             self._parts[name] = *bars[name], labels[name]
@@ -199,7 +199,7 @@ class WirePanel:
     def _toggle_hold(self) -> None:
         self._is_held = not self._is_held
         icon, word = ("play_arrow", "Resume the list") if self._is_held else ("pause", "Hold the list")
-        self._hold.props(f'icon={icon} aria-label="{word}"')
+        with_props(self._hold, icon=icon, aria_label=word)
         self._hold_tip.text = word
         if not self._is_held:
             self._show_again()

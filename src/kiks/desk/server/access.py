@@ -12,7 +12,7 @@ from urllib.parse import parse_qsl, quote, urlencode, urlsplit
 
 from kiks.desk.server.connection_limit import CONNECTION_KEY
 from kiks.desk.server.server_log import note
-from kiks.desk.server.token import Token
+from kiks.desk.server.token import COOKIE, Token
 
 Message = MutableMapping[str, Any]
 Receive = Callable[[], Awaitable[Message]]
@@ -55,7 +55,8 @@ class Refusal(NamedTuple):
 class AccessControl:
     """ASGI middleware that checks each request before it reaches the application.
 
-    * Each request needs the token in a cookie; `?token=...` or `?ticket=...` in an address sets the cookie.
+    * Each request needs the token in a cookie, and a path in the token's place; `?token=...` or `?ticket=...` in an
+      address sets the cookie and leads there.
     * A request with an `Origin` header must come from the desk's own page.
     * Only pages of this computer may embed the page.
     * A desk for this computer alone accepts only host names of this computer, against DNS rebinding.
@@ -80,10 +81,11 @@ class AccessControl:
             return
         headers = {name.decode("latin-1").lower(): value.decode("latin-1") for name, value in scope["headers"]}
         refusal = self._refusal(scope, headers)
-        if refusal is None and not self._knows_token(scope, headers):
+        if refusal is None and not self._knows_token(scope["path"], headers):
             query = dict(parse_qsl(scope.get("query_string", b"").decode("latin-1")))
             if scope["type"] == "http" and self._opens(scope, query.pop("token", ""), query.pop("ticket", "")):
-                await _redirect(send, scope["path"], query, self._cookie(scope, headers))
+                path = scope["path"].removeprefix(self._key.place).lstrip("/")
+                await _redirect(send, f"{self._key.place}/{quote(path)}", query, self._cookie(headers))
                 return
             refusal = Refusal(403, NO_TOKEN)
         if refusal is not None:
@@ -92,7 +94,7 @@ class AccessControl:
         connection = scope.get("state", {}).get(CONNECTION_KEY)
         if connection is not None:
             connection.note_token()
-        await self._pass_on(scope, receive, send)
+        await self._pass_on({**scope, "root_path": self._key.place}, receive, send)
 
     def _refusal(self, scope: Message, headers: dict[str, str]) -> Refusal | None:
         """Return a refusal if a request is not from the desk's own page or is too large, else None."""
@@ -114,17 +116,18 @@ class AccessControl:
             return Refusal(413, f"{TOO_LARGE}, but this one has more")
         return None
 
-    def _knows_token(self, scope: Message, headers: dict[str, str]) -> bool:
-        name = self._key.cookie_name(scope.get("server"))
+    def _knows_token(self, path: str, headers: dict[str, str]) -> bool:
+        if not path.startswith(f"{self._key.place}/"):
+            return False
         # The library's parser stops at the first cookie that it cannot parse, and other programs set such cookies.
         pairs = (pair.strip().partition("=") for pair in headers.get("cookie", "").split(";"))
-        return any(each == name and self._key.fits(value) for each, _, value in pairs)
+        return any(each == COOKIE and self._key.fits(value) for each, _, value in pairs)
 
     def _opens(self, scope: Message, token: str, ticket: str) -> bool:
         return self._key.fits(token) or self._key.take(ticket, scope.get("client"), scope.get("server"))
 
-    def _cookie(self, scope: Message, headers: dict[str, str]) -> str:
-        """Return the cookie with the token; pages of other sites never send it.
+    def _cookie(self, headers: dict[str, str]) -> str:
+        """Return the cookie with the token; pages of other sites never send it, and other servers never get it.
 
         A notebook is another site: there the cookie is bound to the page of the notebook.
         """
@@ -133,7 +136,7 @@ class AccessControl:
             "frame",
         )
         rule = "SameSite=None; Secure; Partitioned" if is_within else "SameSite=Strict"
-        return f"{self._key.cookie_name(scope.get('server'))}={self._key.token}; Path=/; HttpOnly; {rule}"
+        return f"{COOKIE}={self._key.token}; Path={self._key.place}; HttpOnly; {rule}"
 
     async def _pass_on(self, scope: Message, receive: Receive, send: Send) -> None:
         """Call the application; after any failure the client gets an answer, and the log one line."""
@@ -143,7 +146,7 @@ class AccessControl:
         except Exception as error:
             # A failure after the client has left, or its request was cut off, is no fault of the application.
             if not limited.has_left and not limited.is_too_large:
-                note(f"It could not answer {_short(scope['path'])}", error)
+                note(f"It could not answer {_short(scope['path'].removeprefix(self._key.place))}", error)
         if limited.is_too_large and not answer.has_begun:
             await _refuse(scope, send, Refusal(413, TOO_LARGE))
         elif not answer.has_begun and not limited.has_left:
@@ -203,9 +206,8 @@ def _short(text: str | None) -> str:
 
 
 async def _redirect(send: Send, path: str, query: dict[str, str], cookie: str) -> None:
-    """Redirect a browser to the same page without the token in its address, and set the cookie."""
-    # Two slashes would begin the name of another computer.
-    location = "/" + quote(path.lstrip("/")) + (f"?{urlencode(query)}" if query else "")
+    """Redirect a browser to a page without the token in its address, and set the cookie."""
+    location = path + (f"?{urlencode(query)}" if query else "")
     headers = [(b"location", location.encode()), (b"set-cookie", cookie.encode()), (b"cache-control", b"no-store")]
     await send({"type": "http.response.start", "status": 303, "headers": [*headers, *HEADERS]})
     await send({"type": "http.response.body", "body": b""})

@@ -9,6 +9,8 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import secrets
+from collections.abc import Callable
 from typing import Any
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
@@ -53,6 +55,7 @@ class Viewer:
         shapes: The last shapes sent.
         bar: The last description of the time bar sent.
         newest: The next frame to send.
+        pulls: The newest message of each kind that moves what the browser holds, to be done before the next frame.
         texts: Messages to send before that frame.
     """
 
@@ -63,6 +66,7 @@ class Viewer:
         self.shapes: dict[str, Any] = {}
         self.bar: dict[str, Any] = {}
         self.newest: bytes | None = None
+        self.pulls: dict[str, Callable[[Simulation], None]] = {}
         self.texts: list[str] = []
         self._wake = asyncio.Event()
 
@@ -110,6 +114,7 @@ class Gateway:
         self._count = 0
         self._wake = asyncio.Event()
         self._has_moved = False
+        self._secret = secrets.token_urlsafe()
         self._seen: tuple[Any, ...] = ()
         self._seeking: set[asyncio.Task[None]] = set()
         self._scene: dict[str, Any] = {}
@@ -136,6 +141,7 @@ class Gateway:
                 await asyncio.sleep(DRAG_FRAME_S)
             self._has_moved = False
             self._wake.clear()
+            await asyncio.gather(*(self._pull(viewer) for viewer in self._viewers))
             if any(viewer.is_ready for viewer in self._viewers):
                 self._show(await self._desk.do(self._look))
         tending.cancel()
@@ -152,8 +158,9 @@ class Gateway:
         if (seen := (desk.scene, *scene_key(sim))) != self._seen:
             self._seen = seen
             self._scene = describe_scene(sim, self._scene.get("scene", 0) + 1, desk.names())
+            self._scene["secret"] = self._secret
             self._scene["has_old_coordinates"] = desk.has_old_coordinates
-            self._scene["arena"]["picture"] = f"/desk/{self._number}/arena/{self._scene['scene']}.png"
+            self._scene["arena"]["picture"] = f"{self._number}/arena/{self._scene['scene']}.png"
             if self._picture[0] is not sim.arena:
                 self._picture = sim.arena, arena_picture(sim.arena)
             self._shapes = describe_shapes(sim)
@@ -262,14 +269,16 @@ class Gateway:
             self._seek(viewer, ns_from_s(_number(message, "time_s", SECONDS_MAX)))
             return
         if kind == "grab":
+            await self._pull(viewer)
             await desk.grab(name, message.get("what", ""), message.get("index", -1))
         elif kind == "move":
             x_mm, y_mm = _number(message, "x_mm"), _number(message, "y_mm")
-            await desk.do(lambda sim: desk.hands.move(name, x_mm, y_mm))
+            viewer.pulls[kind] = lambda _: desk.hands.move(name, x_mm, y_mm)
         elif kind == "turn":
             heading_rad = _number(message, "heading_rad")
-            await desk.do(lambda sim: desk.hands.turn(name, heading_rad))
+            viewer.pulls[kind] = lambda _: desk.hands.turn(name, heading_rad)
         elif kind == "drop":
+            await self._pull(viewer)
             await desk.drop(name)
         else:
             raise ParameterError(
@@ -278,6 +287,15 @@ class Gateway:
             )
         self._has_moved = True
         self._wake.set()
+
+    async def _pull(self, viewer: Viewer) -> None:
+        """Move what a browser holds to where its newest messages say."""
+        pulls, viewer.pulls = viewer.pulls, {}
+        for pull in pulls.values():
+            try:
+                await self._desk.do(pull)
+            except KiksError as error:
+                viewer.tell({"kind": "error", "text": str(error)})
 
     def _seek(self, viewer: Viewer, time_ns: int) -> None:
         """Show the past at a time [ns], while the browser's next messages are received: the last time counts."""

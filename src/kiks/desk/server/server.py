@@ -189,7 +189,7 @@ class DeskServer:
             number = max(self.desks, default=None)
             if number is None:
                 return Response(CLOSED, media_type="text/plain")
-            return RedirectResponse(f"/desk/{number}")
+            return RedirectResponse(f"desk/{number}")
 
         @app.get("/desk/{number}/arena/{scene}.png")
         def picture(number: int, scene: int) -> Response:

@@ -4,6 +4,10 @@ Other users of this computer can reach the desk's port, and a program started th
 command line of every process, including the URL that a browser is started with. So each process makes a random token,
 which the terminal prints in a URL, and which a browser keeps in a cookie. A browser that KiKS starts gets a ticket
 instead, which is valid once, and only for a connection of the same user.
+
+Browsers share cookies among all ports of a computer, and any user may listen at a port, such as that of a desk that has
+ended. But they send a cookie only to its path. So all addresses behind the token begin with a random path, the place of
+the process, and nothing but its own pages asks for it.
 """
 
 from __future__ import annotations
@@ -19,6 +23,9 @@ TOKEN_BYTES = 24
 
 COOKIE = "kiks_token"
 
+ESTABLISHED = "01"
+"""State of an open connection in the system's list (include/net/tcp_states.h)."""
+
 _CONNECTIONS = {socket.AF_INET: Path("/proc/net/tcp"), socket.AF_INET6: Path("/proc/net/tcp6")}
 """Where Linux lists connections and their owners (man 5 proc)."""
 
@@ -33,10 +40,12 @@ class Token:
 
     Attributes:
         token: The text of the token.
+        place: Begin of the path of all pages that need it.
     """
 
     def __init__(self, token: str | None = None) -> None:
         self.token = secrets.token_urlsafe(TOKEN_BYTES) if token is None else token
+        self.place = f"/{secrets.token_urlsafe(TOKEN_BYTES)}"
         self._tickets: set[str] = set()
 
     def fits(self, given: str) -> bool:
@@ -64,19 +73,18 @@ class Token:
         self._tickets.discard(ticket)
         return True
 
-    def cookie_name(self, server: Address | None) -> str:
-        """Return the name of the cookie, with the port, as browsers share cookies among all ports of a computer."""
-        return COOKIE if server is None else f"{COOKIE}_{server[1]}"
-
 
 def user_of(client: Address, server: Address) -> int | None:
-    """Return the user number of a connection's other end; None if it is not on this computer."""
+    """Return the user number of a connection's other end; None if it is not on this computer, or closed.
+
+    The system lists a closed end as user 0, so only an end that is open and belongs to a process counts.
+    """
     try:
         family = socket.AF_INET6 if ":" in client[0] else socket.AF_INET
-        ends = [_end(family, *client), _end(family, *server)]
+        ends = [_end(family, *client), _end(family, *server), ESTABLISHED]
         for line in _CONNECTIONS[family].read_text(encoding="ascii").splitlines()[1:]:
             words = line.split()
-            if words[1:3] == ends:
+            if words[1:4] == ends and words[9] != "0":
                 return int(words[7])
     except (OSError, ValueError, IndexError):
         pass

@@ -7,13 +7,18 @@
    feed.scene       the newest scene message (arena, robots, bodies) or null
    feed.frame       the newest frame (see frame.js) or null; it always belongs to feed.scene
    feed.bar         the newest description of the time bar (see time_bar.js) or null
-   feed.connection  "connecting", "open", "lost" (it reconnects by itself) or "gone" (the desk is closed)
+   feed.connection  "connecting", "open", "lost" (it reconnects by itself) or "gone" (the desk is closed, or lost for
+                    a minute: nothing reconnects)
    feed.on(what, callback) subscribes to "scene", "shapes", "bar", "frame", "connection" or "error" (a message of the
                     server) and returns a function that unsubscribes.
    feed.send(object) sends a message and returns whether there was a connection.
 
    A hidden page does not acknowledge frames: the server pauses, and sends the newest frame when the page is visible
-   again. */
+   again.
+
+   When a desk has ended, any user of its computer may listen at its port. So only a server that knows the desk's secret,
+   which comes with each scene and is never sent back, is the desk. NiceGUI's connection waits for that, because it loads
+   the page again when its server asks for it. */
 
 import { Frame } from "./frame.js";
 
@@ -22,6 +27,8 @@ const HAPPENINGS = ["scene", "shapes", "bar", "frame", "connection", "error"];
 const ACKNOWLEDGED_TOGETHER = 2;
 const FIRST_PAUSE_MS = 250;
 const LONGEST_PAUSE_MS = 5000;
+/** How long the page tries to find its desk again. */
+const LONGEST_LOSS_MS = 60_000;
 /** Longest period between two frames that is interpolated; beyond it, things would seem to lag. */
 const LONGEST_INTERVAL_MS = 120;
 
@@ -36,6 +43,8 @@ export class Feed {
     this.bytes_received = 0;
     this._listeners = Object.fromEntries(HAPPENINGS.map((what) => [what, new Set()]));
     this._pause_ms = FIRST_PAUSE_MS;
+    this._secret = null;
+    this._lost_ms = null;
     this._owed = 0;
     document.addEventListener("visibilitychange", () => this._wake());
     addEventListener("online", () => this._wake());
@@ -55,17 +64,19 @@ export class Feed {
 
   _connect() {
     this._timer = null;
-    const socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}${this.path}`);
+    const address = new URL(this.path, location.href);
+    address.protocol = address.protocol.replace("http", "ws");
+    const socket = new WebSocket(address);
     socket.binaryType = "arraybuffer";
     this._socket = socket;
-    socket.onopen = () => {
-      this._pause_ms = FIRST_PAUSE_MS;
-      this._owed = 0;
-      this._say("open");
-    };
+    socket.onopen = () => (this._owed = 0);
     socket.onmessage = (event) => (typeof event.data === "string" ? this._hear(event.data) : this._see(event.data));
     socket.onclose = () => {
-      if (this.connection !== "gone") this._say("lost");
+      window.socket?.disconnect();
+      this._lost_ms ??= performance.now();
+      if (this.connection === "gone") return;
+      if (performance.now() - this._lost_ms > LONGEST_LOSS_MS) return this._leave();
+      this._say("lost");
       this._timer = setTimeout(() => this._connect(), this._pause_ms);
       this._pause_ms = Math.min(2 * this._pause_ms, LONGEST_PAUSE_MS);
     };
@@ -74,6 +85,7 @@ export class Feed {
   _hear(text) {
     const message = JSON.parse(text);
     if (message.kind === "scene") {
+      if (this.connection !== "open" && !this._welcome(message.secret)) return;
       this.scene = message;
       // If no thing has appeared or disappeared, keep the last frame, to avoid flicker.
       const { robot_count, body_count } = this.frame ?? {};
@@ -88,8 +100,29 @@ export class Feed {
     } else if (message.kind === "error") {
       this._tell("error", message.text);
     } else if (message.kind === "gone") {
-      this._say("gone");
+      this._leave();
     }
+  }
+
+  /** Go on with the server if it is the desk that this page came from, and return whether it is. */
+  _welcome(secret) {
+    this._secret ??= secret;
+    if (secret !== this._secret) {
+      this._leave();
+      return false;
+    }
+    this._pause_ms = FIRST_PAUSE_MS;
+    this._lost_ms = null;
+    if (this.connection === "lost") window.socket?.connect();
+    this._say("open");
+    return true;
+  }
+
+  /** Ask for nothing any more. */
+  _leave() {
+    this._say("gone");
+    this._socket.close();
+    document.getElementById("popup")?.style.setProperty("display", "none"); // it says that NiceGUI tries again
   }
 
   _see(buffer) {

@@ -15,7 +15,7 @@ const OBJECTION_MS = 5000;
 const SAY = {
   connecting: "Connecting to KiKS …",
   lost: "No connection to KiKS. Trying again …",
-  gone: "KiKS has ended. This page reconnects when you start it again.",
+  gone: "KiKS has ended, or this page has lost it. Open the address that KiKS prints when you start it.",
 };
 
 export class Stage {

@@ -1,0 +1,82 @@
+"""Names from outside are text on the desk, whatever they look like: in a real browser, in every panel."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import expect
+from tests.desk.visitor import INSIDE, Visitor, make_project, open_desk
+from tests.desk.visits import NewPage
+
+import kiks.desk
+from kiks.ports.program_process import Command
+
+HOSTILE = '" nasty=1 href="javascript:window.ran=1" \' <img src=x onerror=window.ran=1>{{window.ran=1}}'
+"""A name of a file that would be markup, if anything read it as such."""
+
+FILE = "' nasty=1 {{window.ran=1}}.kiks"
+"""The worst name of a file that the desk offers: it suits any computer."""
+
+MARKUP = """() => [...document.querySelectorAll('*')].flatMap((each) => [...each.attributes]
+    .filter(({ name, value }) => /^(nasty|on.*)$/.test(name) || /^javascript:/.test(value) || value === 'x')
+    .map(({ name }) => `${each.tagName} ${name}`)).concat('ran' in window ? ['ran'] : [])"""
+"""What of a hostile name has become an element or an attribute, or has run."""
+
+READERS = {"props", "html", "markdown", "run_javascript", "add_head_html", "add_body_html"}
+"""Functions of NiceGUI that read markup, a program or properties in a text."""
+
+
+@pytest.fixture
+def visitor(tmp_path: Path, new_page: NewPage) -> Iterator[Visitor]:
+    """Of a desk on which everything that has a name has a hostile one."""
+    folder = tmp_path / HOSTILE
+    folder.mkdir()
+    program = folder / f"{HOSTILE}.py"
+    program.write_text(f"print({HOSTILE!r})\n")
+    project = make_project()
+    robots = tuple(replace(robot, name=HOSTILE) for robot in project.robots)
+    project = replace(project, arena=replace(project.arena, name=HOSTILE), robots=robots)
+    project.save(folder / FILE)
+    shown = open_desk(folder, project, [Command(program)])
+    page = new_page()
+    yield Visitor(page, shown)
+    page.close()
+    shown.close()
+
+
+@pytest.mark.slow
+def test_a_hostile_name_is_a_text_in_every_panel(visitor: Visitor) -> None:
+    desk, page = visitor.desk, visitor.page
+    desk.say(HOSTILE)
+    for tab in INSIDE:
+        visitor.tab(tab)
+        assert not visitor.answer(MARKUP), tab
+    visitor.told(HOSTILE)
+    visitor.tab("programs")
+    expect(visitor.at("programs")).to_contain_text(f"{HOSTILE}.py on robot 1: ended")
+    expect(visitor.at("start-again")).to_have_attribute("aria-label", f"Start again: {HOSTILE}.py")
+    expect(visitor.at("output")).to_contain_text(HOSTILE)
+    visitor.choose("script", f"{HOSTILE}.py")
+    visitor.tab("arena")
+    visitor.choose("open-name", FILE)
+    visitor.at("open").click()
+    visitor.told(f"Opened {HOSTILE}")
+    page.get_by_test_id("follow").click()
+    expect(page.locator(".q-menu")).to_contain_text(HOSTILE)
+    page.keyboard.press("Escape")
+    visitor.answer("(name) => import('kiks-desk').then(({ pageFeed }) => pageFeed().send({ kind: name }))", HOSTILE)
+    expect(visitor.at("arena-notice")).to_contain_text("nasty=1")
+    assert not visitor.answer(MARKUP)
+
+
+@pytest.mark.parametrize("path", sorted(Path(kiks.desk.__file__).parent.rglob("*.py")), ids=lambda path: path.name)
+def test_no_text_is_read_that_may_come_from_outside(path: Path) -> None:
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr in READERS:
+            # A name stands for a text of the program itself.
+            made = [each for each in node.args if not isinstance(each, ast.Constant | ast.Name)]
+            assert not made, f"{path}, line {node.lineno}: {node.func.attr} reads a text that is put together"
