@@ -6,7 +6,8 @@ A recording has a column, so that several stand side by side.
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -41,6 +42,15 @@ PANELS = {"paths": 0.0, "places": 0.0, "readings": 2.6, "speeds": 2.6, "time": 1
 """The rows, and how high each is where it stands alone [inches]; 0 for as high as the arena makes it."""
 
 
+@contextmanager
+def plain_texts() -> Iterator[None]:
+    """Draw figures meanwhile in which no text is a formula: names come from files of others, and may have a $."""
+    from matplotlib import rc_context
+
+    with rc_context({"text.parse_math": False, "text.usetex": False}):
+        yield
+
+
 def save_plot(recordings: Sequence[Recording], path: str | Path, *, robot: int = 1) -> None:
     """Draw recordings side by side: paths, where robots were, readings, speeds, and where the time went.
 
@@ -58,6 +68,7 @@ def save_plot(recordings: Sequence[Recording], path: str | Path, *, robot: int =
     replace_file(path, _file_of(figure_of(recordings, robot=robot), kind[1:]), "a plot")
 
 
+@plain_texts()
 def panels_of(recording: Recording, *, robot: int = 1) -> dict[str, bytes]:
     """Return what `save_plot` draws of one recording as single pictures, by the names of `PANELS`, in SVG.
 
@@ -97,6 +108,7 @@ def _file_of(figure: Any, kind: str) -> bytes:
     return buffer.getvalue()
 
 
+@plain_texts()
 def figure_of(recordings: Sequence[Recording], *, robot: int = 1) -> Any:
     """Return the figure of `save_plot`, a `matplotlib.figure.Figure`.
 

@@ -192,11 +192,11 @@ def test_a_link_of_another_user_leads_to_no_code(
 # ---- a program's time limit ----
 
 
-class Late(Exception):
+class LateError(Exception):
     pass
 
 
-@pytest.mark.parametrize("error", [TimeoutError("time is up"), ValueError("late"), Late()], ids=repr)
+@pytest.mark.parametrize("error", [TimeoutError("time is up"), ValueError("late"), LateError()], ids=repr)
 @pytest.mark.parametrize(
     ("owner", "name"),
     [(os, "fstat"), (code_cache, "_digest"), (pickle, "loads"), (code_cache._Result, "_rebuild"), (os, "fsync")],

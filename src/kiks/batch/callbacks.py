@@ -13,6 +13,9 @@ from collections.abc import Sequence
 from itertools import groupby
 from typing import Any
 
+from kiks.engine.compiling import callable_kernel
+
+# isort: split
 import numpy as np
 from numba import types
 from numba.core.errors import NumbaError
@@ -22,7 +25,6 @@ from numpy.typing import NDArray
 from kiks.control.compiled_function import address_of, caller_of
 from kiks.control.controller import Controller
 from kiks.control.measure import Measure, Moment
-from kiks.engine.compiling import callable_kernel
 from kiks.engine.state import BODY
 
 _types: Any = types

@@ -6,10 +6,12 @@ import inspect
 from collections.abc import Callable
 from typing import Any
 
+from kiks.engine.compiling import callable_kernel
+
+# isort: split
 from numba import extending, types
 from numba.core import errors
 
-from kiks.engine.compiling import callable_kernel
 from kiks.errors import ParameterError, shown
 
 # Numba annotates these in part, and not as they are used.

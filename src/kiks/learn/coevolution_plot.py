@@ -10,11 +10,13 @@ import numpy as np
 
 from kiks.learn.coevolution import Coevolution, Tournament
 from kiks.model.atomic_files import replace_file
+from kiks.plots import plain_texts
 
 COLOURS = ("tab:red", "tab:blue")
 """Colours of the sides."""
 
 
+@plain_texts()
 def save_fitness_plot(coevolution: Coevolution, path: str | Path) -> None:
     """Draw best, quartiles and median of each generation for both sides.
 
@@ -39,6 +41,7 @@ def save_fitness_plot(coevolution: Coevolution, path: str | Path) -> None:
     _save(figure, path)
 
 
+@plain_texts()
 def save_tournament_plot(tournament: Tournament, path: str | Path) -> None:
     """Draw the fitness of the first side in all pairs of champions as grey squares, and both sides' means.
 

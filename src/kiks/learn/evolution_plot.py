@@ -14,6 +14,7 @@ from kiks.learn.champion import Champion
 from kiks.learn.evolution import Evolution
 from kiks.learn.task import Axis
 from kiks.model.atomic_files import replace_file
+from kiks.plots import plain_texts
 
 CHAMPION_MARK: dict[str, Any] = {
     "marker": "*",
@@ -25,6 +26,7 @@ CHAMPION_MARK: dict[str, Any] = {
 """How the champion is drawn."""
 
 
+@plain_texts()
 def save_plot(evolution: Evolution, path: str | Path, baselines: Baselines | None = None) -> None:
     """Draw best, quartiles and median of each generation, and the champion; and the archive, if the task has axes.
 

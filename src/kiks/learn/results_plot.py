@@ -14,10 +14,12 @@ from kiks.learn.evolution_plot import draw_baselines
 from kiks.learn.exam import PASS_SHARE
 from kiks.learn.results import Result, curves, passed_count
 from kiks.model.atomic_files import replace_file
+from kiks.plots import plain_texts
 
 COLOURS = ("tab:blue", "tab:orange")
 
 
+@plain_texts()
 def save_results_plot(groups: Mapping[str, Sequence[Result]], path: str | Path) -> None:
     """Draw one or two groups of evolutions of a task.
 
