@@ -6,13 +6,13 @@ import os
 import signal
 import subprocess
 import sys
-from importlib.metadata import packages_distributions
 from pathlib import Path
 
 import pytest
 from tests.at_length import at_length, cases
 from tests.guard import GUARD_S
 from tests.served import PROGRAMS
+from tools.campaigns.processes import hand_in
 
 import kiks
 
@@ -20,10 +20,6 @@ pytestmark = pytest.mark.slow
 
 KIKS = str(Path(sys.executable).with_name("kiks"))
 WANDER = str(PROGRAMS / "wander.py")
-
-MODULES = sorted({*sys.stdlib_module_names, *packages_distributions(), "sitecustomize", "usercustomize"})
-
-SETTINGS = {".numba_config.yaml": "disable_jit: 1\n", "matplotlibrc": "lines.linewidth: 99\ntext.usetex: True\n"}
 
 COMMANDS = {
     "run": ("run", "--record", "OUT/run.mcap", WANDER, WANDER),
@@ -46,14 +42,7 @@ COMMANDS = {
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    """A folder with a file for each module that Python or a library of KiKS has; each leaves a trace when it is run."""
-    folder = tmp_path / "hand-in"
-    folder.mkdir()
-    for name in MODULES:
-        (folder / f"{name}.py").write_text(f"open({str(tmp_path / 'ran')!r}, 'a').write(__file__ + '\\n')\n")
-    for name, text in SETTINGS.items():
-        (folder / name).write_text(text)
-    return folder
+    return hand_in(tmp_path)
 
 
 def ran(folder: Path) -> str:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from kiks.engine.physics.gripper import ARM_MAX, JAWS_MAX
-from kiks.engine.state import BODY, MEMORY_COUNT, ROBOT
+from kiks.engine.state import BALL, BODY, CYLINDER, MEMORY_COUNT, ROBOT
 from kiks.errors import ParameterError, shown
 from kiks.firmware.k213 import PERIODS_NS
 from kiks.firmware.radio import ATTEMPTS, DATA_LIMIT
@@ -445,6 +445,7 @@ _LIMITS: dict[str, tuple[float, float] | None] = {
     "arm_target": (-1, ARM_MAX + 1),
     "jaws": (-1, JAWS_MAX + 10),
     "brightness": (0, 255),
+    "what": (BALL, CYLINDER),
     "radius_mm": (1e-3, 1e4),
     "velocity_x": (-1e6, 1e6),
     "velocity_y": (-1e6, 1e6),
