@@ -236,7 +236,9 @@ def _motion(rng: random.Random, parts: Parts) -> Parts:
 def _seen(rng: random.Random, parts: Parts) -> Parts:
     """Return parts with a number in the motion set to another."""
     kind: Any = motion_block._KEPT if rng.random() < 0.6 else BODY
-    return parts.with_motion(rng.choice(kind.names), float(rng.choice([n for n in NUMBERS if not abs(n) > 1e308])))
+    return parts.with_motion(
+        rng.choice(kind.names), float(rng.choice([n for n in NUMBERS if not isinstance(n, int) or abs(n) < 2**1000]))
+    )
 
 
 def _program(rng: random.Random, parts: Parts) -> Parts:

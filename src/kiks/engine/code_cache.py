@@ -81,18 +81,12 @@ class CodeCache:
         for path in _files(self._name):
             try:
                 payload = _payload(path, key)
-            except (_ForeignError, _DamagedError) as error:
-                if path.parent.parent == SHIPPED:
-                    continue
-                if isinstance(error, _ForeignError):
-                    _tell(
-                        f"The compiled engine must be in files that you alone can write, but others can write those in "
-                        f"{str(path.parent)!r}. It is compiled again; set NUMBA_CACHE_DIR to a folder of yours."
-                    )
-                    continue
-                _tell(f"Damaged files in {str(path.parent)!r} are thrown away; what they held is compiled again.")
-                with _if_allowed():
-                    path.unlink()
+            except _UnusableError as error:
+                if path.parent.parent != SHIPPED:
+                    _tell(error.text)
+                    if error.is_damaged:
+                        with _IfAllowed():
+                            path.unlink()
                 continue
             if payload is not None:
                 return _Result._rebuild(context, *payload)
@@ -116,8 +110,8 @@ class CodeCache:
                 replace_file(folder / name, data, rights=0o644)
             except (OSError, ParameterError) as error:
                 cause = error.__cause__ or error
-                if not isinstance(cause, ParameterError) and not _is_refusal(cause):
-                    raise cause from None
+                if not (isinstance(cause, ParameterError) or getattr(cause, "strerror", None)):
+                    raise cause from None  # of the handler of a signal
                 troubles.append(f"{str(folder)!r} ({getattr(cause, 'strerror', cause)})")
             else:
                 result = f"it is in {str(folder)!r}"
@@ -146,7 +140,7 @@ def cache_folders() -> Iterator[Path]:
         # A user may have none, or one that leads nowhere.
         with contextlib.suppress(RuntimeError):
             yield Path.home().absolute() / ".cache" / "kiks" / _version()
-    with _if_allowed():
+    with _IfAllowed():
         yield Path(tempfile.gettempdir(), f"kiks-code-{_user()}-{_version()}")
 
 
@@ -177,55 +171,51 @@ def _files(name: str) -> Iterator[Path]:
     shipped = SHIPPED / _version()
     for folder in (shipped, *cache_folders()) if _is_believed(shipped) else cache_folders():
         found: list[Path] = []
-        with _if_allowed():
+        with _IfAllowed():
             found = sorted(folder.glob(f"{name}-*{_ENDING}"))
         yield from found
 
 
-class _ForeignError(Exception):
-    """A file that another user may have written."""
+class _UnusableError(Exception):
+    """A file that another user may have written, or one that is not as it was written."""
 
-
-class _DamagedError(Exception):
-    """A file that is not as it was written."""
+    def __init__(self, text: str, *, is_damaged: bool) -> None:
+        self.text, self.is_damaged = text, is_damaged
 
 
 def _payload(path: Path, key: object) -> Any:
     """Return what a file holds, None if it is of another key or cannot be read.
 
     Raises:
-        _ForeignError: If another user may have written it.
-        _DamagedError: If it is damaged.
+        _UnusableError: If another user may have written it, or it is damaged.
     """
-    data = None
-    with _if_allowed(), open(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOFOLLOW), "rb") as file:
+    folder = str(path.parent)
+    with _IfAllowed(), open(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOFOLLOW), "rb") as file:
         if not (_is_safe(os.fstat(file.fileno())) and _is_believed(path.parent)):
-            raise _ForeignError
-        data = file.read()
-    if data is None:
-        return None
-    line, _, rest = data.partition(b"\n")
-    head = _HEAD.fullmatch(line)
-    own_key, payload = (rest[: int(head[1])], rest[int(head[1]) :]) if head else (b"", b"")
-    if head is None or (_digest(own_key), _digest(payload)) != head.groups()[1:]:
-        raise _DamagedError
-    # Only now it is sure that these are pickles of ours.
-    return pickle.loads(payload) if pickle.loads(own_key) == key else None
+            raise _UnusableError(
+                f"The compiled engine must be in files that you alone can write, but others can write those in "
+                f"{folder!r}. It is compiled again; set NUMBA_CACHE_DIR to a folder of yours.",
+                is_damaged=False,
+            )
+        line, _, rest = file.read().partition(b"\n")
+        head = _HEAD.fullmatch(line)
+        own_key, payload = (rest[: int(head[1])], rest[int(head[1]) :]) if head else (b"", b"")
+        if head is None or (_digest(own_key), _digest(payload)) != head.groups()[1:]:
+            text = f"Damaged files in {folder!r} are thrown away; what they held is compiled again."
+            raise _UnusableError(text, is_damaged=True)
+        # Only now it is sure that these are pickles of ours.
+        return pickle.loads(payload) if pickle.loads(own_key) == key else None
+    return None
 
 
-@contextlib.contextmanager
-def _if_allowed() -> Iterator[None]:
-    """Do something as far as the system allows it. What the handler of a signal raises goes on."""
-    try:
-        yield
-    except OSError as error:
-        if not _is_refusal(error):
-            raise
+class _IfAllowed:
+    """Lets something be done as far as the system allows it. A TimeoutError of the handler of a signal goes on."""
 
+    def __enter__(self) -> None:
+        pass
 
-def _is_refusal(error: BaseException) -> bool:
-    """Return whether the system refuses something; a time limit of a program may raise a TimeoutError, too."""
-    return isinstance(error, OSError) and error.strerror is not None
+    def __exit__(self, kind: object, error: object, trace: object) -> bool:
+        return isinstance(error, OSError) and error.strerror is not None
 
 
 def _is_safe(about: os.stat_result) -> bool:
@@ -235,7 +225,7 @@ def _is_safe(about: os.stat_result) -> bool:
 
 def _is_believed(folder: Path) -> bool:
     """Return whether there is a folder whose files no other user but the superuser can replace."""
-    with _if_allowed():
+    with _IfAllowed():
         # A link of another user could lead to a folder of ours that holds files of theirs.
         return all(each.lstat().st_uid in (0, _user()) and _is_safe(each.stat()) for each in _made(folder))
     return False

@@ -312,10 +312,10 @@ class McapReader:
             data = self._expanded(record) if isinstance(record, Chunk) else b""
             begin = 0
             while begin < len(data):
-                head = data[begin : begin + _MESSAGE.size]
-                opcode, length = _HEAD.unpack_from(head) if len(head) == _MESSAGE.size else (0, 0)
+                least = begin + _MESSAGE.size
+                opcode, length = _HEAD.unpack_from(data, begin) if least <= len(data) else (0, 0)
                 end = begin + _HEAD.size + length
-                if opcode not in _IN_CHUNKS or not begin + _MESSAGE.size <= end <= len(data):
+                if opcode not in _IN_CHUNKS or not least <= end <= len(data):
                     raise self._damaged()
                 yield data[begin:end]
                 begin = end

@@ -482,8 +482,6 @@ def check_records(robots: NDArray[Any], bodies: NDArray[Any], size_mm: tuple[flo
         "holder": (0, robots.shape[1]),
     }
     for records, beyond_mm in ((robots, 0.0), (bodies, _BEYOND_MM)):
-        if not records.size:
-            continue
         for name in records.dtype.names or ():
             limit = limits.get(name, (-_NUMBER_MAX, _NUMBER_MAX))
             if limit is not None:
