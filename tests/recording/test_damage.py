@@ -26,6 +26,7 @@ from kiks.films.film import save_film
 from kiks.recording import motion
 from kiks.recording.check import check_recording
 from kiks.recording.entries import Entry
+from kiks.recording.mcap_file import McapReader
 from kiks.recording.recorder import CHECK_NS
 from kiks.sim.run_log import Kind
 
@@ -334,14 +335,17 @@ def test_a_loop_that_prints_and_changes_things_is_within_those_limits(file: Path
     assert recording.table("poses").size == 0
 
 
-@pytest.mark.parametrize("record", [bytes([Opcode.MESSAGE]) + bytes(8), b"\x77\x1e" + bytes(7 + 30)])
-def test_a_chunk_has_whole_messages_alone(record: bytes, file: Path) -> None:
-    data = sound()
-    end = data.rindex(bytes([Opcode.DATA_END, 4]) + bytes(7))
-    packed = lz4.frame.compress(record)
-    words = np.array([0, 0, len(record)], "<u8").tobytes() + bytes(4)
+@pytest.mark.parametrize("more", [bytes([0x77]) + bytes(8), bytes([Opcode.METADATA, 30]) + bytes(7 + 30)])
+def test_a_chunk_has_messages_and_what_they_need_alone(more: bytes, file: Path) -> None:
+    file.write_bytes(sound())
+    reader = McapReader(file)
+    last = reader.chunks[-1]
+    inside = more + b"".join(reader._inside(last))
+    packed = lz4.frame.compress(inside)
+    words = np.array([last.begin_ns, last.begin_ns, len(inside)], "<u8").tobytes() + bytes(4)
     body = words + b"\x03\0\0\0lz4" + len(packed).to_bytes(8, "little") + packed
-    file.write_bytes(data[:end] + bytes([Opcode.CHUNK]) + len(body).to_bytes(8, "little") + body + data[end:])
+    chunk = bytes([Opcode.CHUNK]) + len(body).to_bytes(8, "little") + body
+    file.write_bytes(sound()[: last.offset] + chunk + sound()[last.offset + last.length :])
     assert "whole records" in refused(file)
 
 
