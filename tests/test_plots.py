@@ -14,6 +14,7 @@ import kiks
 from kiks import Arena, Khepera, ParameterError, Recording
 from kiks.plots import NO_ROBOT, PANELS, ROWS, figure_of, panels_of, save_plot
 from kiks.recording.analysis import odometry, time_shares
+from kiks.recording.recorder import RunRecorder
 from kiks.sim.simulation import Simulation
 
 
@@ -86,6 +87,20 @@ def test_panels_are_the_rows_of_the_figure(recording: Recording) -> None:
     assert panels == panels_of(recording)
     with pytest.raises(ParameterError, match="robot must be a whole number from 1 to 1"):
         panels_of(recording, robot=2)
+
+
+DOLLARS = "cash$_$"
+
+
+def test_a_dollar_in_a_name_is_a_dollar(recording: Recording, tmp_path: Path) -> None:
+    sim = Simulation(Arena.box(300, 260), seed=3)
+    with RunRecorder(sim, tmp_path / "run.mcap", programs={f"1-{DOLLARS}.py": ""}):
+        sim.run(0.1)
+    figure = Recording(tmp_path / "run.mcap").plot()
+    assert DOLLARS in figure.axes[0].get_title()
+    # It is drawn where the figure is shown, after all settings for drawing it.
+    figure.savefig(tmp_path / "figure.png")
+    save_plot([Recording(tmp_path / "run.mcap")], tmp_path / "figure.svg")
 
 
 def test_a_run_without_a_robot_has_the_arena_and_says_so(recording: Recording, tmp_path: Path) -> None:

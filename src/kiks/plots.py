@@ -58,6 +58,24 @@ def save_plot(recordings: Sequence[Recording], path: str | Path, *, robot: int =
     replace_file(path, _file_of(figure_of(recordings, robot=robot), kind[1:]), "a plot")
 
 
+def save_figure(figure: Any, path: str | Path) -> None:
+    """Write a figure, whose texts become plain, as a PNG.
+
+    Raises:
+        ParameterError: If the file cannot be written.
+    """
+    replace_file(path, _file_of(_with_plain_texts(figure), "png", 110), "the picture")
+
+
+def _with_plain_texts(figure: Any) -> Any:
+    """Return a figure in which no text is a formula: names come from files of others, and may have a $."""
+    from matplotlib.text import Text
+
+    for text in figure.findobj(Text):
+        text.set(parse_math=False, usetex=False)
+    return figure
+
+
 def panels_of(recording: Recording, *, robot: int = 1) -> dict[str, bytes]:
     """Return what `save_plot` draws of one recording as single pictures, by the names of `PANELS`, in SVG.
 
@@ -77,7 +95,7 @@ def panels_of(recording: Recording, *, robot: int = 1) -> dict[str, bytes]:
             legend = axes.get_legend()
             if legend is not None:
                 legend.set_in_layout(True)  # no other axes need the same width
-        pictures[name] = _file_of(figure, "svg")
+        pictures[name] = _file_of(_with_plain_texts(figure), "svg")
     return pictures
 
 
@@ -86,14 +104,14 @@ def recording_for_notebook(recording: Recording) -> tuple[bytes, dict[str, int]]
     return _file_of(figure_of([recording]), "png"), {"width": round(COLUMN_INCHES * 96)}
 
 
-def _file_of(figure: Any, kind: str) -> bytes:
+def _file_of(figure: Any, kind: str, dots_per_inch: int = DOTS_PER_INCH) -> bytes:
     """Return the file of a figure. Without dates and random names, the same recording gives the same file."""
     from matplotlib import rc_context
 
     dated = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind)
     buffer = io.BytesIO()
     with rc_context({"svg.hashsalt": "kiks"}):
-        figure.savefig(buffer, format=kind, dpi=DOTS_PER_INCH, metadata=dated)
+        figure.savefig(buffer, format=kind, dpi=dots_per_inch, metadata=dated)
     return buffer.getvalue()
 
 
@@ -115,7 +133,7 @@ def figure_of(recordings: Sequence[Recording], *, robot: int = 1) -> Any:
         column[0].set_title(recording.title, fontsize="medium")
         for axes_of_row, name in zip(column, PANELS, strict=True):
             draw.get(name, _draw_nothing)(axes_of_row)
-    return figure
+    return _with_plain_texts(figure)
 
 
 def figure_of_run(sim: Simulation, *, robot: int = 1) -> Any:

@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable
 from html.parser import HTMLParser
 from pathlib import Path
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +14,7 @@ import pytest
 from tests.at_length import at_length
 
 from kiks import Arena, Khepera, ParameterError, Recording, Simulation
+from kiks.desk.run_page import contents
 from kiks.desk.run_page.bundle import bundle
 from kiks.desk.run_page.page_file import WEB, save_page
 from kiks.desk.run_page.run_frames import RunFrames
@@ -162,6 +164,24 @@ def test_long_texts_are_cut(tmp_path: Path) -> None:
     assert page.stat().st_size < 3_000_000
     assert "The text is longer: the recording holds all of it." in Tags(page).text
     assert "word word …" in Tags(page).text
+
+
+@pytest.mark.parametrize("text", [" \n" * 90_000, "x = 1\n" + "\r \x0c" * 60_000 + "y"], ids=["blanks", "other ends"])
+def test_a_program_of_blank_lines_is_not_coloured_for_minutes(text: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[str] = []
+    monkeypatch.setattr(contents, "highlight", lambda code, *_: seen.append(code) or "")
+    contents._programs(SimpleNamespace(programs={"1-a.py": text}))  # type: ignore[arg-type]
+    (code,) = seen
+    assert not any(line and line.isspace() for line in code.split("\n"))
+
+
+def test_programs_have_colours_up_to_a_limit(monkeypatch: pytest.MonkeyPatch) -> None:
+    texts = {"1-a.py": "if x: pass\n" * 2000, "2-b.py": "if y: pass\n" * 4000, "3-c.txt": "if z: pass\n"}
+    first, second, third = contents._programs(SimpleNamespace(programs=texts))  # type: ignore[arg-type]
+    assert "<span" in first.text
+    assert "<span" not in second.text
+    assert "<span" not in third.text
+    assert second.text.unescape().startswith("if y: pass\nif y")
 
 
 def test_the_numbers_are_those_of_the_run(rich: Path, rich_page: Path) -> None:

@@ -7,9 +7,11 @@ import pickle
 import random
 import resource
 import shutil
+import signal
 import stat
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -125,6 +127,107 @@ def test_code_in_files_that_others_can_write_is_not_run(
     assert not (tmp_path / "bombed").exists()
     assert "files that you alone can write" in caplog.text
     monkeypatch.undo()
+
+
+NOBODY, OTHER = 65534, 4321
+
+
+@contextmanager
+def acting_as(user: int) -> Iterator[None]:
+    os.seteuid(user)
+    try:
+        yield
+    finally:
+        os.seteuid(0)
+
+
+@pytest.fixture
+def open_folder(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A folder to which all may write, as /tmp is, and the place of temporary files."""
+    with tempfile.TemporaryDirectory(dir="/tmp") as name:
+        Path(name).chmod(0o1777)
+        monkeypatch.setattr(tempfile, "tempdir", name)
+        yield Path(name)
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only the superuser can act as several users")
+@pytest.mark.parametrize("user", [0, NOBODY])
+@pytest.mark.parametrize(("cache", "level"), [("/proc/none", 0), ("named", 0), ("named", 1)])
+def test_code_in_a_folder_of_another_user_is_not_run(
+    user: int,
+    cache: str,
+    level: int,
+    open_folder: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(open_folder / cache))
+    with acting_as(user):
+        assert [call(), call()] == [False, True]
+    (file,) = files(open_folder)
+    assert file.stat().st_uid == user
+    caplog.clear()
+    file.parents[level].chmod(0o755)
+    os.chown(file.parents[level], OTHER, -1)
+    with acting_as(user):
+        assert not call()
+    assert "files that you alone can write" in caplog.text
+    assert file.exists()
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only the superuser can act as several users")
+def test_a_link_of_another_user_leads_to_no_code(
+    open_folder: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(open_folder / "own"))
+    assert [call(), call()] == [False, True]
+    (open_folder / "kiks").symlink_to("own/kiks")
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(open_folder))
+    assert call()  # a link of one's own
+    os.chown(open_folder / "kiks", OTHER, -1, follow_symlinks=False)
+    assert not call()
+    assert "files that you alone can write" in caplog.text
+
+
+# ---- a program's time limit ----
+
+
+class LateError(Exception):
+    pass
+
+
+@pytest.mark.parametrize("error", [TimeoutError("time is up"), ValueError("late"), LateError()], ids=repr)
+@pytest.mark.parametrize(
+    ("owner", "name"),
+    [(os, "fstat"), (code_cache, "_digest"), (pickle, "loads"), (code_cache._Result, "_rebuild"), (os, "fsync")],
+)
+def test_what_a_signal_raises_while_code_is_loaded_or_kept_goes_on(
+    owner: Any, name: str, error: Exception, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: Any
+) -> None:
+    is_loaded = name != "fsync"
+    if is_loaded:
+        call()
+    real = getattr(owner, name)
+
+    def reach(*args: Any, **words: Any) -> Any:
+        signal.raise_signal(signal.SIGALRM)
+        return real(*args, **words)
+
+    def end(*_: object) -> None:
+        raise error
+
+    before = signal.signal(signal.SIGALRM, end)
+    try:
+        with monkeypatch.context() as context:
+            context.setattr(owner, name, reach)
+            with pytest.raises(type(error)) as caught:
+                call()
+    finally:
+        signal.signal(signal.SIGALRM, before)
+    assert caught.value is error
+    assert not caplog.records
+    assert len(files(tmp_path)) == is_loaded
+    assert call() == is_loaded
 
 
 def test_concurrent_writes_of_programs_are_all_kept() -> None:

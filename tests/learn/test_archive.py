@@ -309,5 +309,5 @@ def test_the_picture_shows_the_archive_of_every_algorithm(tmp_path: Path) -> Non
 
     one = (kiks.Axis("path_mm", 0, 1500),)
     for changes in ({}, {"axes": one}, {"axes": (*small().axes, kiks.Axis("contacts", 0, 5))}, {"axes": ()}):
-        save_plot(run("cma", **changes), tmp_path / "fitness.png")
+        save_plot(run("cma", name="a$_$", **changes), tmp_path / "fitness.png")
         assert (tmp_path / "fitness.png").read_bytes().startswith(b"\x89PNG")

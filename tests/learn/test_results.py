@@ -198,6 +198,7 @@ def test_pictures_are_png_files(tmp_path: Path) -> None:
     for number, groups in enumerate(({"a": RESULTS}, {"a": RESULTS, "b": RESULTS[:1]}, {"a": without})):
         save_results_plot(groups, tmp_path / f"{number}.png")
         assert (tmp_path / f"{number}.png").read_bytes().startswith(b"\x89PNG")
+    save_results_plot({"$_$": [replace(each, task="$^$") for each in RESULTS]}, tmp_path / "dollars.png")
 
 
 @pytest.mark.slow

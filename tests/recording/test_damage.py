@@ -17,14 +17,16 @@ import numpy as np
 import pytest
 from mcap.opcode import Opcode
 from tests.at_length import share
-from tools.campaigns.recordings import Parts, sound, sound_parts, use
+from tools.campaigns.recordings import Parts, many_entries, many_parts, sound, sound_parts, use
 
 import kiks
 from kiks.engine.state import ROBOT
 from kiks.errors import KiksError, ParameterError
+from kiks.films.film import save_film
 from kiks.recording import motion
 from kiks.recording.check import check_recording
 from kiks.recording.entries import Entry
+from kiks.recording.mcap_file import McapReader
 from kiks.recording.recorder import CHECK_NS
 from kiks.sim.run_log import Kind
 
@@ -283,6 +285,68 @@ def test_motion_that_is_none_is_refused(block: bytes, file: Path) -> None:
     parts = sound_parts()
     replace(parts, blocks=[(entries, block) for entries, _ in parts.blocks]).save(file)
     assert "blocks of motion" in refused(file)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("x_mm", np.nan),
+        ("y_mm", -1.0e6),
+        ("heading_rad", np.inf),
+        ("trail", 1e300),
+        ("contact_count", -(2**63)),
+        ("radius_mm", -5.0),
+        ("radius_mm", 0.0),
+        ("brightness", 256),
+        ("what", 2**31 - 1),
+    ],
+)
+def test_no_number_in_motion_is_out_of_range(name: str, value: float, file: Path) -> None:
+    sound_parts().with_motion(name, value).save(file)
+    recording = kiks.Recording(file)
+    for make in (
+        lambda: recording.table("poses"),
+        lambda: recording.plot(),
+        lambda: save_film(recording, file.with_suffix(".gif"), size=(160, 120), fps=4),
+    ):
+        with pytest.raises(ParameterError, match=f"{name} of Recording"):
+            make()
+
+
+def test_a_file_has_no_more_in_it_than_its_size_allows(file: Path) -> None:
+    many_parts(sound_parts()).save(file)
+    assert file.stat().st_size < 500_000
+    assert "blocks of motion" in refused(file)
+    many_entries(sound_parts()).save(file)
+    assert file.stat().st_size < 500_000
+    assert "1000000 entries" in refused(file)
+
+
+def test_a_loop_that_prints_and_changes_things_is_within_those_limits(file: Path) -> None:
+    sim = kiks.Simulation(kiks.Arena.box(300, 300), robots=0, seed=1)
+    with sim.record(file) as recorder:
+        for _ in range(60):
+            sim.remove_body(sim.add_ball(100, 100))
+            for _ in range(300):
+                recorder.say(0, "")
+            sim.run(0.01)
+    recording = kiks.Recording(file)
+    assert len(recording.table("events")) > 60 * 300
+    assert recording.table("poses").size == 0
+
+
+@pytest.mark.parametrize("more", [bytes([0x77]) + bytes(8), bytes([Opcode.METADATA, 30]) + bytes(7 + 30)])
+def test_a_chunk_has_messages_and_what_they_need_alone(more: bytes, file: Path) -> None:
+    file.write_bytes(sound())
+    reader = McapReader(file)
+    last = reader.chunks[-1]
+    inside = more + b"".join(reader._inside(last))
+    packed = lz4.frame.compress(inside)
+    words = np.array([last.begin_ns, last.begin_ns, len(inside)], "<u8").tobytes() + bytes(4)
+    body = words + b"\x03\0\0\0lz4" + len(packed).to_bytes(8, "little") + packed
+    chunk = bytes([Opcode.CHUNK]) + len(body).to_bytes(8, "little") + body
+    file.write_bytes(sound()[: last.offset] + chunk + sound()[last.offset + last.length :])
+    assert "whole records" in refused(file)
 
 
 def test_records_may_lack_fields(file: Path) -> None:

@@ -18,6 +18,7 @@ from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
+from tools.campaigns import recordings
 from tools.campaigns.processes import (
     GUARD_S,
     Looker,
@@ -26,7 +27,9 @@ from tools.campaigns.processes import (
     compile_engine,
     connect,
     desk,
+    hand_in,
     python,
+    quiet,
     serving,
     started,
 )
@@ -461,6 +464,28 @@ def _interrupt(rng: random.Random) -> None:
             command.end(by=signal.SIGINT)
 
 
+_HAND_IN = (
+    ("run", "--record", "../own.mcap", "../drive.py", "../drive.py"), ("replay", "--check", "../run.mcap"),
+    ("plot", "../run.mcap", "--out", "../plot.png"), ("page", "../run.mcap", "../page.html"),
+    ("film", "../run.mcap", "../film.gif"), ("table", "../run.mcap", "../table.csv"), ("warmup",),
+    ("demo", "clean", "--seconds", "1", "--picture", "../clean.png"), ("arena", "maze", "../maze.toml"),
+    ("evolve", "--generations", "1", "--population", "4", "--out", "../evolved"),
+)  # fmt: skip
+
+
+def _current_folder(rng: random.Random) -> None:
+    """Give a command in a folder full of files with the names of modules: it runs none of them."""
+    with tempfile.TemporaryDirectory(prefix="kiks-torture-") as name:
+        folder = Path(name)
+        (folder / "run.mcap").write_bytes(recordings.sound())
+        (folder / "drive.py").write_text(_ENDLESS.replace("while True", "for _ in range(9)"), encoding="ascii")
+        words = [str(Path(sys.executable).with_name("kiks")), *rng.choice(_HAND_IN)]
+        done = subprocess.run(words, cwd=hand_in(folder), env=quiet(folder), capture_output=True, check=False)
+        if (folder / "ran").exists() or done.returncode:
+            ran = (folder / "ran").read_text() if (folder / "ran").exists() else done.stderr.decode()
+            raise Broken("foreign", ran[-300:], f"current folder: {words[1]}")
+
+
 # ---- all of them ----
 
 SCENES: dict[str, tuple[Callable[[random.Random], None], int, float]] = {
@@ -477,6 +502,7 @@ SCENES: dict[str, tuple[Callable[[random.Random], None], int, float]] = {
     "interrupt": (_interrupt, 120, 100.0),
     "damage_cache": (_damage_cache, 8, 200.0),
     "no_home": (_no_home, 2, 200.0),
+    "current_folder": (_current_folder, 40, 100.0),
 }
 """What happens, how often, and how long it may take [s]."""
 

@@ -14,6 +14,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
+from importlib.metadata import packages_distributions
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit, urlunsplit
@@ -107,6 +108,20 @@ def started(*words: str, folder: Path, environment: dict[str, str] | None = None
 def quiet(folder: Path) -> dict[str, str]:
     """Return an environment without a screen, whose sessions and ports are a folder's own."""
     return {**os.environ, "PYTHONUNBUFFERED": "1", "DISPLAY": "", "WAYLAND_DISPLAY": "", "XDG_RUNTIME_DIR": str(folder)}
+
+
+def hand_in(folder: Path) -> Path:
+    """Return a new folder with a file for each module that Python and the libraries of KiKS have, and hostile settings.
+
+    Each file that is run writes its name into the file `ran` beside the folder.
+    """
+    inside = folder / "hand-in"
+    inside.mkdir()
+    for name in {*sys.stdlib_module_names, *packages_distributions(), "sitecustomize", "usercustomize"}:
+        (inside / f"{name}.py").write_text(f"open({str(folder / 'ran')!r}, 'a').write(__file__ + '\\n')\n")
+    (inside / ".numba_config.yaml").write_text("disable_jit: 1\n")
+    (inside / "matplotlibrc").write_text("text.usetex: True\n")
+    return inside
 
 
 @cache

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import random
 import tempfile
+import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cache
@@ -16,12 +17,16 @@ import numpy as np
 from tools.campaigns.hostile import NUMBERS, mutated, mutated_text
 
 import kiks
+from kiks.desk.run_page.page_file import save_page
 from kiks.engine.state import BODY, ROBOT
+from kiks.films.film import save_film
+from kiks.plots import save_plot
+from kiks.recording import motion as motion_block
 from kiks.recording.check import check_recording
 from kiks.recording.entries import Columns, Entry, block_of
 from kiks.recording.log import HASH_LENGTH
 from kiks.recording.mcap_file import McapFile, McapReader
-from kiks.recording.recorder import LOG, MOTION
+from kiks.recording.recorder import LOG, MOTION, PROGRAMS, RunRecorder
 from kiks.recording.tables import TABLES
 from kiks.sim.run_log import Kind
 
@@ -38,7 +43,7 @@ class Parts:
 
     attachments: dict[str, bytes]
     told: dict[str, str]
-    blocks: list[tuple[list[Entry], bytes]] = field(default_factory=list)
+    blocks: list[tuple[list[Entry] | bytes, bytes]] = field(default_factory=list)
 
     @classmethod
     def of(cls, path: Path) -> Parts:
@@ -57,16 +62,21 @@ class Parts:
             file.attach(name, data, "application/json")
         file.describe("run", self.told)
         for entries, motion in self.blocks:
-            time_ns = min(max(entries[0].time_ns, 0), 2**63) if entries else 0
-            file.write(
-                [(LOG, time_ns, block_of([value for entry in entries for value in entry])), (MOTION, time_ns, motion)]
-            )
+            time_ns, log = 0, entries
+            if not isinstance(entries, bytes):
+                time_ns = min(max(entries[0].time_ns, 0), 2**63) if entries else 0
+                log = block_of([value for entry in entries for value in entry])
+            file.write([(LOG, time_ns, log), (MOTION, time_ns, motion)])
         file.close()
 
     def with_entry(self, is_meant: Callable[[Entry], bool], change: Callable[[Entry], Entry]) -> Parts:
         """Return these parts with the entries changed that are meant."""
         blocks = [([change(each) if is_meant(each) else each for each in rows], motion) for rows, motion in self.blocks]
         return replace(self, blocks=blocks)
+
+    def with_motion(self, name: str, value: float) -> Parts:
+        """Return these parts with a field of all robots' or all bodies' records in the motion set to a number."""
+        return replace(self, blocks=[(entries, _seen_with(motion, name, value)) for entries, motion in self.blocks])
 
     def with_records(self, name: str, value: float) -> Parts:
         """Return these parts with a field of all robots' or all bodies' records in all states set to a number."""
@@ -90,6 +100,23 @@ def _set(entry: Entry, name: str, value: float) -> Entry:
     return entry._replace(data=entry.data[:end] + bytes(records))
 
 
+def _seen_with(motion: bytes, name: str, value: float) -> bytes:
+    """Return a block of motion with a field of its records set to a number."""
+    data, offset = bytearray(motion), 0
+    while offset + motion_block._HEAD.size <= len(data):
+        looks, robots, _, bodies = motion_block._HEAD.unpack_from(data, offset)
+        offset += motion_block._HEAD.size + looks * 8
+        for kind, count in ((motion_block._KEPT, looks * robots), (BODY, looks * bodies)):
+            if offset + count * kind.itemsize > len(data):
+                return motion
+            records: Any = np.frombuffer(data, kind, count, offset)
+            if name in records.dtype.names:
+                with np.errstate(invalid="ignore"):
+                    records[name] = np.float64(value).astype(records.dtype[name].base)
+            offset += count * kind.itemsize
+    return bytes(data)
+
+
 @cache
 def sound() -> bytes:
     """Return a recording in which much happens."""
@@ -100,7 +127,8 @@ def sound() -> bytes:
             sim.fit(1, turret)
         sim.add_ball(150, 200, radius_mm=15)
         # Each checkpoint makes a chunk, however fast this computer is.
-        with patch("kiks.recording.recorder.CHUNK_S", 0.0), sim.record(file) as recorder:
+        programs = {"1-cash$_$.py": "import serial\n"}
+        with patch("kiks.recording.recorder.CHUNK_S", 0.0), RunRecorder(sim, file, programs=programs) as recorder:
             port = sim.port(1)
             port.write(b"D,9,-7\nN\nT,1,D,1\nT,2,N\n")
             sim.run(1.2)
@@ -126,9 +154,11 @@ def strange_recording(rng: random.Random) -> bytes:
     """Return a recording with a few hostile parts, whose checksums are right."""
     parts = sound_parts()
     for _ in range(rng.choice((1, 1, 1, 2, 3))):
-        parts = rng.choice((_attachment, _state_text, _state_bytes, _field, _numbers, _numbers, _rows, _motion))(
-            rng, parts
-        )
+        parts = rng.choice(
+            (_attachment, _state_text, _state_bytes, _field, _numbers, _numbers, _rows, _motion, _seen, _seen, _program)
+        )(rng, parts)
+    if rng.random() < 0.03:
+        parts = rng.choice((many_parts, many_entries))(parts)
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "strange.mcap"
         parts.save(file)
@@ -203,6 +233,36 @@ def _motion(rng: random.Random, parts: Parts) -> Parts:
     return replace(parts, blocks=[(entries, mutated(rng, motion)) for entries, motion in parts.blocks])
 
 
+def _seen(rng: random.Random, parts: Parts) -> Parts:
+    """Return parts with a number in the motion set to another."""
+    kind: Any = motion_block._KEPT if rng.random() < 0.6 else BODY
+    return parts.with_motion(
+        rng.choice(kind.names), float(rng.choice([n for n in NUMBERS if not isinstance(n, int) or abs(n) < 2**1000]))
+    )
+
+
+def _program(rng: random.Random, parts: Parts) -> Parts:
+    """Return parts with another program."""
+    name = rng.choice(("a.py", "$x^$.py", "<b>.py", "\\$.txt", "\0.py", "n" * 5000))
+    text = rng.choice((b" \n" * 90_000, b"\r \x0c" * 60_000, b"(" * 100_000, b'f"{' * 40_000, b"\xff\0</script>"))
+    return replace(parts, attachments={**parts.attachments, f"{PROGRAMS}1-{name}": text})
+
+
+def many_parts(parts: Parts) -> Parts:
+    """Return parts with a motion of millions of empty looks, which a few kilobytes hold."""
+    empty = np.array([1, 0, motion_block.KEPT_BYTES, 0], "<u4").tobytes() + bytes(8)
+    return replace(parts, blocks=[*parts.blocks[:-1], (parts.blocks[-1][0], empty * 2_000_000)])
+
+
+def many_entries(parts: Parts) -> Parts:
+    """Return parts with a million empty lines of output."""
+    columns = np.zeros((6, 1_000_000), "<i8")
+    columns[0] = Kind.TEXT
+    columns[1] = max((each.time_ns for each in parts.blocks[-1][0] if isinstance(each, Entry)), default=0)
+    block = np.uint32(columns.shape[1]).tobytes() + columns.tobytes()
+    return replace(parts, blocks=[*parts.blocks, (block, b"")])
+
+
 def use(path: Path) -> None:
     """Do with a recording all that can be done; what is refused in one part may be done in others.
 
@@ -223,6 +283,13 @@ def use(path: Path) -> None:
     attempt(lambda: check_recording(recording.log))
     attempt(lambda: _go_on(recording))
     attempt(lambda: repr(recording) and recording.programs and recording.project.to_bytes())
+    # The same file is always shown in the same way: each takes as long as all the rest.
+    shows = (
+        lambda: save_plot([recording], path.with_suffix(".svg")),
+        lambda: save_page(recording, path.with_suffix(".html")),
+        lambda: save_film(recording, path.with_suffix(".gif"), size=(160, 120), fps=4),
+    )
+    attempt(shows[zlib.crc32(path.read_bytes()) % len(shows)])
     if errors:
         raise errors[0]
 

@@ -13,6 +13,9 @@ from collections.abc import Sequence
 from itertools import groupby
 from typing import Any
 
+from kiks.engine.compiling import callable_kernel
+
+# isort: split
 import numpy as np
 from numba import extending, types
 from numba.core import cgutils
@@ -23,7 +26,6 @@ from numpy.typing import NDArray
 from kiks.control.compiled_function import address_of, caller_of, compiled_for
 from kiks.control.controller import ARGUMENTS, Controller
 from kiks.control.measure import Measure, Moment
-from kiks.engine.compiling import callable_kernel
 from kiks.engine.state import BODY
 
 # Numba annotates these in part, and not as they are used here.

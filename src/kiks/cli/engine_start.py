@@ -98,6 +98,8 @@ def _compile_together(numbers: Sequence[int]) -> None:
     Args:
         numbers: Indices of the pieces.
     """
+    from kiks.ports.program_process import python_line
+
     left = deque(numbers)
 
     def feed(helper: subprocess.Popen[bytes]) -> None:
@@ -110,12 +112,12 @@ def _compile_together(numbers: Sequence[int]) -> None:
                 if not helper.stdout.readline():
                     break
 
-    program = "from kiks.cli.engine_start import help_to_compile; help_to_compile()"
+    line = python_line("-c", "from kiks.cli.engine_start import help_to_compile; help_to_compile()")
     streams: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
     with contextlib.ExitStack() as stack:
         feeders = []
         for _ in range(min(len(os.sched_getaffinity(0)), _MOST_PROCESSES) - 1):
-            helper = stack.enter_context(subprocess.Popen([sys.executable, "-c", program], **streams))
+            helper = stack.enter_context(subprocess.Popen(line, **streams))
             stack.callback(helper.kill)
             feeders.append(threading.Thread(target=feed, args=(helper,), daemon=True))
             feeders[-1].start()

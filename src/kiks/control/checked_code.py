@@ -12,10 +12,11 @@ from collections.abc import Callable
 from types import ModuleType
 from typing import Any
 
+from kiks.engine.compiling import callable_kernel
+
+# isort: split
 from numba.core import callconv, compiler, compiler_machinery, cpu, dispatcher, ir, lowering, typed_passes
 from numba.core.untyped_passes import TranslateByteCode
-
-from kiks.engine.compiling import callable_kernel
 
 # Numba annotates these in part, and not as they are used here.
 _callconv: Any = callconv

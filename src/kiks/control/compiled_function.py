@@ -11,9 +11,11 @@ from pathlib import Path
 from traceback import FrameSummary
 from typing import Any
 
+from kiks.control.checked_code import checked, is_trusted
+
+# isort: split
 from numba import extending, types
 
-from kiks.control.checked_code import checked, is_trusted
 from kiks.errors import KiksError, ParameterError, counted, shown
 
 # Numba annotates these in part, and not as they are used.

@@ -2,8 +2,9 @@
 
 Need: Numba keeps machine code as pickles. A damaged one raises anything in the middle of a call, or ends the process,
 and one that another user has written runs that user's code.
-Method: each file holds one function for one signature, and the digests of what is in it. It is read only if it belongs
-to this user or the superuser and others cannot write it. A damaged file is deleted and its function compiled again.
+Method: each file holds one function for one signature, and the digests of what is in it. It is read only if it and its
+folder belong to this user or the superuser and others cannot write there. A damaged file is deleted and its function
+compiled again; damaged is what has not its digests, and nothing else.
 The name of the folder is a digest of all that the code depends on, so files of another version are never read. Neither
 paths nor times are part of it: the files fit the same sources on another computer. A wheel can bring some.
 """
@@ -16,6 +17,7 @@ import hashlib
 import logging
 import os
 import pickle
+import re
 import stat
 import sys
 import tempfile
@@ -44,6 +46,7 @@ _numba: Any = serialize
 _Result: Any = CompileResult
 
 _FORMAT = b"kiks-code-1"
+_HEAD = re.compile(_FORMAT + rb" ([0-9]{1,12}) ([0-9a-f]{64}) ([0-9a-f]{64})")
 _ENDING = ".code"
 
 _ANNOTATION = 6
@@ -76,26 +79,17 @@ class CodeCache:
         context.refresh()
         key = _key(signature, context.codegen())
         for path in _files(self._name):
-            is_shipped = path.parent.parent == SHIPPED
             try:
                 payload = _payload(path, key)
-                if payload is not None:
-                    return _Result._rebuild(context, *payload)
-            except OSError:
+            except _UnusableError as error:
+                if path.parent.parent != SHIPPED:
+                    _tell(error.text)
+                    if error.is_damaged:
+                        with _IfAllowed():
+                            path.unlink()
                 continue
-            except _ForeignError:
-                if is_shipped:
-                    continue
-                _tell(
-                    f"The compiled engine must be in files that you alone can write, but others can write those in "
-                    f"{str(path.parent)!r}. It is compiled again; set NUMBA_CACHE_DIR to a folder of yours."
-                )
-            except Exception:  # what unpickling raises has no common base
-                if is_shipped:
-                    continue
-                _tell(f"Damaged files in {str(path.parent)!r} are thrown away; what they held is compiled again.")
-                with contextlib.suppress(OSError):
-                    path.unlink()
+            if payload is not None:
+                return _Result._rebuild(context, *payload)
         return None
 
     def save_overload(self, signature: Any, compiled: Any) -> None:
@@ -116,6 +110,8 @@ class CodeCache:
                 replace_file(folder / name, data, rights=0o644)
             except (OSError, ParameterError) as error:
                 cause = error.__cause__ or error
+                if not (isinstance(cause, ParameterError) or getattr(cause, "strerror", None)):
+                    raise cause from None  # of the handler of a signal
                 troubles.append(f"{str(folder)!r} ({getattr(cause, 'strerror', cause)})")
             else:
                 result = f"it is in {str(folder)!r}"
@@ -144,7 +140,7 @@ def cache_folders() -> Iterator[Path]:
         # A user may have none, or one that leads nowhere.
         with contextlib.suppress(RuntimeError):
             yield Path.home().absolute() / ".cache" / "kiks" / _version()
-    with contextlib.suppress(OSError):
+    with _IfAllowed():
         yield Path(tempfile.gettempdir(), f"kiks-code-{_user()}-{_version()}")
 
 
@@ -174,33 +170,52 @@ def _files(name: str) -> Iterator[Path]:
     """Yield the files of a function."""
     shipped = SHIPPED / _version()
     for folder in (shipped, *cache_folders()) if _is_believed(shipped) else cache_folders():
-        with contextlib.suppress(OSError):
-            yield from sorted(folder.glob(f"{name}-*{_ENDING}"))
+        found: list[Path] = []
+        with _IfAllowed():
+            found = sorted(folder.glob(f"{name}-*{_ENDING}"))
+        yield from found
 
 
-class _ForeignError(Exception):
-    """A file that another user may have written."""
+class _UnusableError(Exception):
+    """A file that another user may have written, or one that is not as it was written."""
+
+    def __init__(self, text: str, *, is_damaged: bool) -> None:
+        self.text, self.is_damaged = text, is_damaged
 
 
 def _payload(path: Path, key: object) -> Any:
-    """Return what a file holds, None if it is of another key.
+    """Return what a file holds, None if it is of another key or cannot be read.
 
     Raises:
-        OSError: If it cannot be read.
-        _ForeignError: If another user may have written it.
-        Exception: If it is damaged.
+        _UnusableError: If another user may have written it, or it is damaged.
     """
-    with open(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOFOLLOW), "rb") as file:
-        about = os.fstat(file.fileno())
-        if not _is_safe(about):
-            raise _ForeignError
-        head, _, rest = file.read().partition(b"\n")
-    form, size, key_digest, payload_digest = head.split(b" ")
-    own_key, payload = rest[: int(size)], rest[int(size) :]
-    if form != _FORMAT or _digest(own_key) != key_digest or _digest(payload) != payload_digest:
-        raise ValueError("damaged")
-    # Only now it is sure that these are pickles of ours.
-    return pickle.loads(payload) if pickle.loads(own_key) == key else None
+    folder = str(path.parent)
+    with _IfAllowed(), open(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOFOLLOW), "rb") as file:
+        if not (_is_safe(os.fstat(file.fileno())) and _is_believed(path.parent)):
+            raise _UnusableError(
+                f"The compiled engine must be in files that you alone can write, but others can write those in "
+                f"{folder!r}. It is compiled again; set NUMBA_CACHE_DIR to a folder of yours.",
+                is_damaged=False,
+            )
+        line, _, rest = file.read().partition(b"\n")
+        head = _HEAD.fullmatch(line)
+        own_key, payload = (rest[: int(head[1])], rest[int(head[1]) :]) if head else (b"", b"")
+        if head is None or (_digest(own_key), _digest(payload)) != head.groups()[1:]:
+            text = f"Damaged files in {folder!r} are thrown away; what they held is compiled again."
+            raise _UnusableError(text, is_damaged=True)
+        # Only now it is sure that these are pickles of ours.
+        return pickle.loads(payload) if pickle.loads(own_key) == key else None
+    return None
+
+
+class _IfAllowed:
+    """Lets something be done as far as the system allows it. A TimeoutError of the handler of a signal goes on."""
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, kind: object, error: object, trace: object) -> bool:
+        return isinstance(error, OSError) and error.strerror is not None
 
 
 def _is_safe(about: os.stat_result) -> bool:
@@ -210,11 +225,10 @@ def _is_safe(about: os.stat_result) -> bool:
 
 def _is_believed(folder: Path) -> bool:
     """Return whether there is a folder whose files no other user but the superuser can replace."""
-    try:
-        about = folder.lstat()
-    except OSError:
-        return False
-    return stat.S_ISDIR(about.st_mode) and _is_safe(about)
+    with _IfAllowed():
+        # A link of another user could lead to a folder of ours that holds files of theirs.
+        return all(each.lstat().st_uid in (0, _user()) and _is_safe(each.stat()) for each in _made(folder))
+    return False
 
 
 def _make_own(folder: Path) -> None:
@@ -223,12 +237,17 @@ def _make_own(folder: Path) -> None:
     Raises:
         OSError: If the folder cannot be made.
     """
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    is_shared = str(folder.parent) != tempfile.gettempdir()
-    folder.mkdir(mode=0o755 if is_shared else 0o700, exist_ok=True)
-    about = folder.lstat()
-    if not stat.S_ISDIR(about.st_mode) or about.st_uid != _user() or about.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+    made = _made(folder)
+    made[0].parent.mkdir(parents=True, exist_ok=True)
+    for each in made:
+        each.mkdir(mode=0o755 if len(made) > 1 else 0o700, exist_ok=True)
+    if not _is_believed(folder):
         raise PermissionError(None, "others may write there")
+
+
+def _made(folder: Path) -> list[Path]:
+    """Return which folders KiKS makes for a folder of code: one among temporary files, else two."""
+    return [folder] if str(folder.parent) == tempfile.gettempdir() else [folder.parent, folder]
 
 
 def _user() -> int:

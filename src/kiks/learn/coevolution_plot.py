@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import io
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from kiks.learn.coevolution import Coevolution, Tournament
-from kiks.model.atomic_files import replace_file
+from kiks.plots import save_figure
 
 COLOURS = ("tab:red", "tab:blue")
 """Colours of the sides."""
@@ -36,7 +34,7 @@ def save_fitness_plot(coevolution: Coevolution, path: str | Path) -> None:
         axes.set_title(f"{coevolution.contest.side_names[side]}: {coevolution.name}, seed {coevolution.seed}")
         axes.grid(alpha=0.3)
         axes.legend(loc="best", fontsize="small")
-    _save(figure, path)
+    save_figure(figure, path)
 
 
 def save_tournament_plot(tournament: Tournament, path: str | Path) -> None:
@@ -67,10 +65,4 @@ def save_tournament_plot(tournament: Tournament, path: str | Path) -> None:
     curves.set_ylabel("mean fitness against all champions")
     curves.grid(alpha=0.3)
     curves.legend(loc="best", fontsize="small")
-    _save(figure, path)
-
-
-def _save(figure: Any, path: str | Path) -> None:
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=110)
-    replace_file(path, buffer.getvalue(), "the picture")
+    save_figure(figure, path)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +12,7 @@ from kiks.learn.baselines import Baselines
 from kiks.learn.champion import Champion
 from kiks.learn.evolution import Evolution
 from kiks.learn.task import Axis
-from kiks.model.atomic_files import replace_file
+from kiks.plots import save_figure
 
 CHAMPION_MARK: dict[str, Any] = {
     "marker": "*",
@@ -44,9 +43,7 @@ def save_plot(evolution: Evolution, path: str | Path, baselines: Baselines | Non
     _draw_fitness(axes[0], evolution, baselines)
     if archive is not None:
         _draw_archive(figure, axes[1], archive, evolution.champion)
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=110)
-    replace_file(path, buffer.getvalue(), "the picture")
+    save_figure(figure, path)
 
 
 def _draw_fitness(axes: Any, evolution: Evolution, baselines: Baselines | None) -> None:

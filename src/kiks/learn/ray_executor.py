@@ -18,6 +18,7 @@ import os
 import pickle
 import signal
 import socket
+import sys
 import threading
 from collections import deque
 from concurrent.futures import Future
@@ -314,7 +315,8 @@ class RayPool:
             if self._address is None:
                 core_count = len(os.sched_getaffinity(0))
                 # Ray gives up by itself when what it starts does not answer.
-                ray.init("local", num_cpus=core_count, include_dashboard=False, _node_ip_address=LOOPBACK)
+                local = {"num_cpus": core_count, "include_dashboard": False, "_node_ip_address": LOOPBACK}
+                ray.init("local", job_config=_job_config(ray), **local)
             else:
                 _check_listens(self._address)
                 _connect_to(ray, self._address)
@@ -432,6 +434,14 @@ def _unpickled(pickled: bytes) -> Evaluation:
     return work  # type: ignore[no-any-return]
 
 
+def _job_config(ray: Any) -> Any:
+    """Return settings for a connection: workers import from the current folder only where this process does.
+
+    Ray would always put that folder before all others. It does not for jobs of its clients.
+    """
+    return ray.job_config.JobConfig(_client_job=os.getcwd() not in map(os.path.abspath, sys.path))
+
+
 def _connect_to(ray: Any, address: str) -> None:
     """Connect, in a thread: Ray asks a port that does not answer for minutes, and has no way to stop that.
 
@@ -447,7 +457,7 @@ def _connect_to(ray: Any, address: str) -> None:
     def connect() -> None:
         failure: Exception | None = None
         try:
-            ray.init(address, logging_level=logging.ERROR)
+            ray.init(address, logging_level=logging.ERROR, job_config=_job_config(ray))
         except Exception as error:
             failure = error
         if done.set_running_or_notify_cancel():

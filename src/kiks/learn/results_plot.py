@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -13,7 +12,7 @@ from kiks.learn.baselines import Baselines
 from kiks.learn.evolution_plot import draw_baselines
 from kiks.learn.exam import PASS_SHARE
 from kiks.learn.results import Result, curves, passed_count
-from kiks.model.atomic_files import replace_file
+from kiks.plots import save_figure
 
 COLOURS = ("tab:blue", "tab:orange")
 
@@ -48,9 +47,7 @@ def save_results_plot(groups: Mapping[str, Sequence[Result]], path: str | Path) 
     axes[0].legend(loc="best", fontsize="small")
     if has_exam:
         _draw_exams(axes[1], groups)
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=110)
-    replace_file(path, buffer.getvalue(), "the picture")
+    save_figure(figure, path)
 
 
 def _draw_curves(axes: Any, name: str, results: Sequence[Result], colour: str) -> None:

@@ -43,6 +43,14 @@ _STREAMS = {False: 1, True: 2}
 _COLOURS = (36, 33, 35, 32, 34, 31)
 
 
+def python_line(*words: str) -> list[str]:
+    """Return the command line of a process of this Python, which imports nothing from the current folder (-P).
+
+    -I would leave out what users have set, too, such as PYTHONPATH.
+    """
+    return [sys.executable, "-P", *words]
+
+
 @dataclass(frozen=True)
 class Command:
     """A program and its arguments in `sys.argv`."""
@@ -122,9 +130,8 @@ class Process:
         self._is_over = threading.Event()
         has_started = threading.Event()
         failures: list[OSError] = []
-        # -P: the program must not import from the folder in which KiKS was started.
-        line = [sys.executable, "-P", "-m", "kiks.script.child_main", str(connection.fileno()), *arguments]
-        line += [str(command.program), *command.arguments]
+        words = ["-m", "kiks.script.child_main", str(connection.fileno()), *arguments]
+        line = python_line(*words, str(command.program), *command.arguments)
 
         def run() -> None:
             try:

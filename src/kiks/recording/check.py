@@ -87,7 +87,7 @@ def _first_tick(log: RecordedLog, begin_ns: int, end_ns: int) -> int | None:
     replay.sim.world.watch(watcher)
     while replay.sim.now_ns < end_ns and replay.advance():
         pass
-    found = _by_tick(decode(encode(watcher.take()), Layout(), "replay"))
+    found = _by_tick(decode(encode(looks := watcher.take()), Layout(), "replay", len(looks)))
     recorded = _by_tick(log.motion())
     ticks = sorted(tick for tick in found.keys() & recorded.keys() if tick > begin_tick)
     return next((tick for tick in ticks if not np.array_equal(found[tick], recorded[tick])), None)

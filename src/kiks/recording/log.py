@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from kiks.errors import ParameterError
 from kiks.recording.entries import Columns, Entry
-from kiks.recording.mcap_file import McapReader
+from kiks.recording.mcap_file import McapReader, Topic
 from kiks.recording.motion import Motion
 from kiks.recording.motion import decode as decode_motion
 from kiks.recording.recorder import LOG, MOTION
@@ -22,6 +22,10 @@ from kiks.units import s_from_ns
 
 HASH_LENGTH = 16
 """Characters of a hash, before the state of a checkpoint."""
+
+ENTRY_BYTES, PART_BYTES = 1, 64
+"""Fewest bytes of a chunk, packed as it is, for each entry, and for each time that things come or go: a recording of
+KiKS has four times as many, and work is in proportion to the size of a file."""
 
 BLOCKS_KEPT = 4
 """Blocks of the log that are kept when they were read."""
@@ -82,9 +86,8 @@ class RecordedLog:
 
     def motion_of(self, block: int) -> Iterator[Motion]:
         """Yield those records of a block."""
-        for topic, _, data in self.reader.messages(self.reader.chunks[block]):
-            if topic == MOTION.name:
-                yield from decode_motion(data, self.layout, self.reader.what)
+        data, parts_max = self._part(block, MOTION), self._most(block, PART_BYTES)
+        yield from decode_motion(data, self.layout, self.reader.what, parts_max)
 
     def entries(self) -> Iterator[Entry]:
         """Yield all entries of the log."""
@@ -156,14 +159,22 @@ class RecordedLog:
     def _block(self, number: int) -> Columns:
         """Return a block of the log."""
         if number not in self._blocks:
-            found = (data for topic, _, data in self.reader.messages(self.reader.chunks[number]) if topic == LOG.name)
-            columns = Columns.of_block(next(found, b""), self.reader.what)
-            if not len(columns.kind):
-                raise self.damaged("a part has no entries")
+            columns = Columns.of_block(self._part(number, LOG), self.reader.what)
+            if not 0 < len(columns.kind) <= self._most(number, ENTRY_BYTES):
+                raise self.damaged(f"a part has {len(columns.kind)} entries")
             self._blocks[number] = columns
             if len(self._blocks) > BLOCKS_KEPT:
                 self._blocks.popitem(last=False)
         return self._blocks[number]
+
+    def _most(self, number: int, bytes_each: int) -> int:
+        """Return how many things there may be in a chunk."""
+        return 16 + self.reader.chunks[number].length // bytes_each
+
+    def _part(self, number: int, topic: Topic) -> bytes:
+        """Return the part of a chunk that belongs to a topic; nothing if it has none."""
+        messages = self.reader.messages(self.reader.chunks[number])
+        return next((data for name, _, data in messages if name == topic.name), b"")
 
     def damaged(self, why: str) -> ParameterError:
         """Return the error that says why it is not whole."""

@@ -15,12 +15,12 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import BinaryIO, NamedTuple
+from typing import Any, BinaryIO, NamedTuple
 
 import lz4.frame
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, Chunk, Message, Metadata
+from mcap.records import Attachment, Chunk, Metadata
 from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 
@@ -36,6 +36,8 @@ _MAGIC = b"\x89MCAP0\r\n"
 _HEAD = struct.Struct("<BQ")
 _CHUNK_HEAD = struct.Struct("<QQQ")
 _CRC = struct.Struct("<I")
+_MESSAGE = struct.Struct("<BQHIQQ")
+_IN_CHUNKS = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
 
 RECORD_BYTES_MAX = 64 << 20
 """Most bytes of a record that is read, and of a chunk when it is expanded."""
@@ -306,21 +308,34 @@ class McapReader:
         """
         if not self._topics:
             # The first chunk says which channels there are.
-            self._topics.update(
-                (each.id, each.topic) for each in self._inside(self.chunks[0]) if isinstance(each, Channel)
-            )
-        for each in self._inside(chunk):
-            if isinstance(each, Message):
-                yield self._topics.get(each.channel_id, ""), each.log_time, each.data
+            for record in self._inside(self.chunks[0]):
+                if record[0] == Opcode.CHANNEL:
+                    self._topics.update((each.id, each.topic) for each in self._records(record))
+        for record in self._inside(chunk):
+            if record[0] == Opcode.MESSAGE:
+                _, _, channel, _, time_ns, _ = _MESSAGE.unpack_from(record)
+                yield self._topics.get(channel, ""), time_ns, record[_MESSAGE.size :]
 
-    def _inside(self, chunk: FoundChunk) -> Iterator[object]:
-        """Yield the records in a chunk."""
+    def _inside(self, chunk: FoundChunk) -> Iterator[bytes]:
+        """Yield the records in a chunk, each with its head. None is smaller than an empty message.
+
+        Raises:
+            ParameterError: If one is damaged.
+        """
         with self._open() as stream:
             stream.seek(chunk.offset)
-            data = stream.read(chunk.length)
-        for record in self._records(data):
-            if isinstance(record, Chunk):
-                yield from self._records(self._expanded(record))
+            packed = stream.read(chunk.length)
+        for record in self._records(packed):
+            data = self._expanded(record) if isinstance(record, Chunk) else b""
+            begin = 0
+            while begin < len(data):
+                least = begin + _MESSAGE.size
+                opcode, length = _HEAD.unpack_from(data, begin) if least <= len(data) else (0, 0)
+                end = begin + _HEAD.size + length
+                if opcode not in _IN_CHUNKS or not least <= end <= len(data):
+                    raise self._damaged()
+                yield data[begin:end]
+                begin = end
 
     def _expanded(self, chunk: Chunk) -> bytes:
         """Return what a chunk holds, no more than it says."""
@@ -337,7 +352,7 @@ class McapReader:
             raise ParameterError(f"{self.what} must have whole chunks, but one is damaged. Take another copy of it.")
         return data
 
-    def _records(self, data: bytes) -> Iterator[object]:
+    def _records(self, data: bytes) -> Iterator[Any]:
         """Yield the MCAP records in bytes.
 
         Raises:
@@ -352,7 +367,7 @@ class McapReader:
             except StopIteration:
                 return
             except (McapError, EOFError, ValueError, struct.error, OverflowError, MemoryError) as error:
-                raise ParameterError(
-                    f"{self.what} must have whole records, but one is damaged ({error or type(error).__name__}). Take "
-                    "another copy of it."
-                ) from None
+                raise self._damaged(f" ({error or type(error).__name__})") from None
+
+    def _damaged(self, why: str = "") -> ParameterError:
+        return ParameterError(f"{self.what} must have whole records, but one is damaged{why}. Take another copy of it.")

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 from kiks.engine.state import BODY, ROBOT, TRAIL_LENGTH, State
 from kiks.errors import ParameterError
+from kiks.model.arena import MAX_CELLS, SIZE_MIN_MM
 from kiks.model.checks import CLOCK_END_NS
-from kiks.sim.saved_state import Layout, converted
+from kiks.sim.saved_state import Layout, check_records, converted
 from kiks.units import TICK_NS
 
 KEPT_BYTES = next(field[1] for name, field in (ROBOT.fields or {}).items() if name == "bus")
@@ -109,6 +110,9 @@ TICKS_MAX = CLOCK_END_NS // TICK_NS
 MOTION_BYTES_MAX = 256 << 20
 """Most bytes of a block's records."""
 
+_SIDE_MAX_MM = MAX_CELLS / SIZE_MIN_MM
+"""Longest side of an arena [mm]."""
+
 _HEAD = struct.Struct("<IIII")  # looks, robots, bytes of a robot, bodies
 
 
@@ -122,36 +126,40 @@ def encode(looks: Sequence[Looks]) -> bytes:
     return b"".join(parts)
 
 
-def decode(block: bytes, layout: Layout, what: str) -> Iterator[Motion]:
+def decode(block: bytes, layout: Layout, what: str, parts_max: int) -> Iterator[Motion]:
     """Yield what was seen, as long as nothing came or went at once.
 
     Args:
         block: Of `encode`.
         layout: That of the records.
         what: What messages call the block.
+        parts_max: How often things may have come or gone.
 
     Raises:
-        ParameterError: If it is none.
+        ParameterError: If it is none, or a number in it is out of range.
     """
-    offset = 0
+    offset = count = 0
     while offset < len(block):
+        count += 1
         begin = offset + _HEAD.size
         looks, robots, robot_bytes, bodies = _HEAD.unpack_from(block, offset) if begin <= len(block) else (0, 0, 0, 0)
         middle = begin + looks * 8
         end = middle + looks * robots * robot_bytes
         offset = end + looks * bodies * layout.body.itemsize
-        is_whole = looks and 0 < robot_bytes <= layout.robot.itemsize and offset <= len(block)
+        is_whole = looks and 0 < robot_bytes <= layout.robot.itemsize and offset <= len(block) and count <= parts_max
         # Records may be larger in this version than in the file.
         is_small = looks * (robots * KEPT_BYTES + bodies * BODY.itemsize) <= MOTION_BYTES_MAX
         ticks = np.frombuffer(block, "<i8", looks if is_whole else 0, begin if is_whole else 0)
         if not (is_whole and is_small and ticks[0] >= 0 and ticks[-1] <= TICKS_MAX and (np.diff(ticks) >= 0).all()):
             raise ParameterError(f"{what} must have blocks of motion, but one is damaged. Take another copy of it.")
         of_robots = np.frombuffer(block, _first_fields(layout.robot, robot_bytes), looks * robots, middle)
-        yield Motion(
+        motion = Motion(
             ticks,
             converted(of_robots, _KEPT).reshape(looks, robots),
             layout.bodies(block[end:offset]).reshape(looks, bodies),
         )
+        check_records(motion.robots, motion.bodies, (_SIDE_MAX_MM, _SIDE_MAX_MM), what)
+        yield motion
 
 
 def _first_fields(kind: np.dtype[np.void], size: int) -> Any:

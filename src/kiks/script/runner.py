@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import runpy
 import sys
 import threading
@@ -116,6 +117,8 @@ def run_program(
         ends.run()
         return code
 
+    if os.environ.get("PYTHONSAFEPATH") == "kiks":
+        del os.environ["PYTHONSAFEPATH"]  # what the program starts is as it is without KiKS
     argv_before, path_before, hook_before = sys.argv, sys.path[:], sys.excepthook
     sys.argv = [str(program), *arguments]
     sys.path.insert(0, str(program.resolve().parent))

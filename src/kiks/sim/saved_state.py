@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from kiks.engine.physics.gripper import ARM_MAX, JAWS_MAX
-from kiks.engine.state import BODY, MEMORY_COUNT, ROBOT
+from kiks.engine.state import BALL, BODY, CYLINDER, MEMORY_COUNT, ROBOT
 from kiks.errors import ParameterError, shown
 from kiks.firmware.k213 import PERIODS_NS
 from kiks.firmware.radio import ATTEMPTS, DATA_LIMIT
@@ -281,7 +281,10 @@ class SavedState:
             head.body_count,
             tuple(SavedWire(**vars(each)) for each in head.wires),
         )
-        _check_records(saved, setup.arena, what)
+        check_records(saved.robots, saved.bodies, (setup.arena.width_mm, setup.arena.height_mm), what)
+        ticks = -(-saved.now_ns // TICK_NS)
+        _check_range(np.array(saved.tick_count), ticks, ticks, f"tick_count of {what}")
+        _check_range(np.nan_to_num(saved.lamps), -_NUMBER_MAX, _NUMBER_MAX, f"lamps of {what}")
         return saved
 
 
@@ -442,6 +445,7 @@ _LIMITS: dict[str, tuple[float, float] | None] = {
     "arm_target": (-1, ARM_MAX + 1),
     "jaws": (-1, JAWS_MAX + 10),
     "brightness": (0, 255),
+    "what": (BALL, CYLINDER),
     "radius_mm": (1e-3, 1e4),
     "velocity_x": (-1e6, 1e6),
     "velocity_y": (-1e6, 1e6),
@@ -459,8 +463,14 @@ _BEYOND_MM = 1000.0
 _TIMES = ("camera_taken_ns", "radio_starts_ns", "radio_ends_ns", "radio_ended_ns", "battle_ns")
 
 
-def _check_records(saved: SavedState, arena: Arena, what: str) -> None:
-    """Check what kernels trust, as a file may hold anything.
+def check_records(robots: NDArray[Any], bodies: NDArray[Any], size_mm: tuple[float, float], what: str) -> None:
+    """Check what kernels and pictures trust, as a file may hold anything.
+
+    Args:
+        robots: Records of robots, or their first fields, shape [instant, robot].
+        bodies: Records of bodies, shape [instant, body].
+        size_mm: Width and height of the arena [mm], at most.
+        what: What messages call them.
 
     Raises:
         ParameterError: If a value is out of range.
@@ -468,20 +478,17 @@ def _check_records(saved: SavedState, arena: Arena, what: str) -> None:
     limits: dict[str, tuple[float, float] | None] = {
         **_LIMITS,
         **dict.fromkeys(_TIMES, (-1, CLOCK_END_NS)),
-        "held_row": (0, saved.bodies.shape[1]),
-        "holder": (0, saved.robots.shape[1]),
+        "held_row": (0, bodies.shape[1]),
+        "holder": (0, robots.shape[1]),
     }
-    ticks = -(-saved.now_ns // TICK_NS)
-    _check_range(np.array(saved.tick_count), ticks, ticks, f"tick_count of {what}")
-    for records, beyond_mm in ((saved.robots, 0.0), (saved.bodies, _BEYOND_MM)):
+    for records, beyond_mm in ((robots, 0.0), (bodies, _BEYOND_MM)):
         for name in records.dtype.names or ():
             limit = limits.get(name, (-_NUMBER_MAX, _NUMBER_MAX))
             if limit is not None:
                 _check_range(records[name], *limit, f"{name} of {what}")
         for x, y in ((records["x_mm"], records["y_mm"]), (records["trail"][..., 0], records["trail"][..., 1])):
-            _check_range(x, -beyond_mm, arena.width_mm + beyond_mm, f"x_mm of {what}")
-            _check_range(y, -beyond_mm, arena.height_mm + beyond_mm, f"y_mm of {what}")
-    _check_range(np.nan_to_num(saved.lamps), -_NUMBER_MAX, _NUMBER_MAX, f"lamps of {what}")
+            _check_range(x, -beyond_mm, size_mm[0] + beyond_mm, f"x_mm of {what}")
+            _check_range(y, -beyond_mm, size_mm[1] + beyond_mm, f"y_mm of {what}")
 
 
 def _check_range(values: NDArray[Any], low: float, high: float, name: str) -> None:

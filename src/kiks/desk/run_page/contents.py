@@ -30,6 +30,9 @@ MARKS_MAX = 20_000
 PROGRAM_CHARACTERS_MAX = 100_000
 """Most characters of a program's text on the page."""
 
+COLOURED_CHARACTERS_MAX = 50_000
+"""Most characters of all programs in colours; the rest is plain text."""
+
 LINE_CHARACTERS_MAX = 500
 """Most characters of an event, and of a line of the wire."""
 
@@ -178,16 +181,16 @@ def _programs(recording: Recording) -> list[Program]:
     for numbered, text in recording.programs.items():
         number, _, name = numbered.partition("-")
         drivers.setdefault((name, text), []).append(number)
-    return [
-        Program(name, ", ".join(numbers), _in_colours(name, text), len(text) > PROGRAM_CHARACTERS_MAX)
-        for (name, text), numbers in drivers.items()
-    ]
-
-
-def _in_colours(name: str, text: str) -> Markup:
-    """Return a program's text as HTML, in which Pygments has escaped it."""
-    lexer: Any = (PythonLexer if name.endswith(".py") else TextLexer)(stripnl=False, ensurenl=False)
-    return Markup(highlight(text[:PROGRAM_CHARACTERS_MAX], lexer, HtmlFormatter(nowrap=True)))
+    programs, character_count = [], 0
+    for (name, text), numbers in drivers.items():
+        # Lines of blanks take Pygments time that grows with the square of their number.
+        clean = "\n".join(line.rstrip() for line in text[:PROGRAM_CHARACTERS_MAX].splitlines())
+        character_count += len(clean)
+        is_coloured = name.endswith(".py") and character_count <= COLOURED_CHARACTERS_MAX
+        lexer: Any = (PythonLexer if is_coloured else TextLexer)(stripnl=False, ensurenl=False)
+        markup = Markup(highlight(clean, lexer, HtmlFormatter(nowrap=True)))  # it has escaped the text
+        programs.append(Program(name, ", ".join(numbers), markup, len(text) > PROGRAM_CHARACTERS_MAX))
+    return programs
 
 
 def _wire(wire: Table) -> list[tuple[float, bool, str] | None]:
