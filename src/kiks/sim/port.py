@@ -105,6 +105,8 @@ class Closed:
     """Stands in for what was closed: any use but another `close` raises an error that says so."""
 
     def __getattr__(self, name: str) -> Any:
+        if name.startswith("__"):  # Python asks each object for such names
+            raise AttributeError(name)
         raise LinkError("a port must be open to be used, but this one is closed. Open it again, or close it later.")
 
     def close(self) -> None:
