@@ -102,13 +102,13 @@ _KINDS: dict[type, str] = {str: "a text", bytes: "bytes", bool: "True or False"}
 def check_heading(name: str, heading_rad: object) -> float:
     """Return a heading [rad], wrapped to one turn if it is beyond `HEADING_KEPT_RAD`.
 
-    A multiple of 15 beyond one turn is a slip: a heading in degrees. A program that counts turns never meets one.
+    A multiple of 0.5 beyond one turn is a slip: a heading in degrees. A program that counts turns never meets one.
 
     Raises:
         ParameterError: If it is no finite number, or one in degrees.
     """
     value = check_number(name, heading_rad)
-    if math.tau < abs(value) <= HEADING_KEPT_RAD and value % 15 == 0:
+    if math.tau < abs(value) <= HEADING_KEPT_RAD and value % 0.5 == 0:
         raise ParameterError(
             f"{name} must be in radians, but it was {shown(heading_rad)}: {value:g} degrees are "
             f"math.radians({value:g}). For radians beyond one turn write {value:g} % math.tau."

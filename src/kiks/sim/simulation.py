@@ -301,7 +301,7 @@ class Simulation:
             robot: Number of the robot, from 1.
             x_mm: From the arena's lower left corner to the right.
             y_mm: From the arena's lower left corner upwards.
-            heading_rad: Counter-clockwise from the x axis; wrapped to one turn beyond a million. A multiple of 15
+            heading_rad: Counter-clockwise from the x axis; wrapped to one turn beyond a million. A multiple of 0.5
                 beyond one turn is an error: it is a heading in degrees.
 
         Raises:
