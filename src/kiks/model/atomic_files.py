@@ -5,7 +5,7 @@ from __future__ import annotations
 import fcntl
 import os
 import stat
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import ExitStack, closing, contextmanager, suppress
 from pathlib import Path, PurePosixPath
 from typing import IO, BinaryIO, cast
@@ -329,6 +329,23 @@ def path_of(path: object, what: str = "path") -> Path:
     raise ParameterError(
         f"{what} must be the name of a file, of at most {NAME_BYTES_MAX} bytes, but it was {shown(path)}."
     )
+
+
+def ending_of(path: object, what: str, endings: Iterable[str]) -> str:
+    """Return the ending of a file's name, in small letters.
+
+    Args:
+        path: The file.
+        what: What messages call it.
+        endings: Those that it may have.
+
+    Raises:
+        ParameterError: If it has another one.
+    """
+    ending = path_of(path, what).suffix.lower()
+    if ending not in endings:
+        raise ParameterError(f"{what} must end in {' or '.join(endings)}, but it was {shown(str(path))}.")
+    return ending
 
 
 def check_relative(text: object, what: str) -> None:

@@ -25,7 +25,7 @@ from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 
 from kiks.errors import ParameterError
-from kiks.model.atomic_files import FileBeside, path_of, target_of, unwritable
+from kiks.model.atomic_files import FileBeside, ending_of, path_of, target_of, unwritable
 from kiks.version import __version__
 
 ENDING = ".mcap"
@@ -108,8 +108,7 @@ class McapFile:
 
     def __init__(self, path: str | Path, topics: Iterable[Topic]) -> None:
         self._path = path_of(path, "a recording's file")
-        if self._path.suffix.lower() != ENDING:
-            raise ParameterError(f"A recording's file must end in '{ENDING}', but it was {str(self._path)!r}.")
+        ending_of(path, "a recording's file", (ENDING,))
         self._error: OSError | None = None
         try:
             target = target_of(self._path)
