@@ -118,7 +118,8 @@ def leave_out(context: typer.Context, when: str, *names: str) -> None:
         source = context.get_parameter_source(param.name or "")
         if source and source.name == "COMMANDLINE" and param.name in names:
             given = context.params.get(param.name or "")
-            raise ParameterError(f"{_name(param)} must be left out {when}, but it was {shown(given)}.")
+            value = shown(str(given) if isinstance(given, Path) else given)
+            raise ParameterError(f"{_name(param)} must be left out {when}, but it was {value}.")
 
 
 def _name(param: Any) -> str:
