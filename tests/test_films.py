@@ -236,12 +236,12 @@ def test_a_link_stays_and_a_folder_is_refused(recording: Recording, tmp_path: Pa
     assert len(pictures(file)) > 1
     folder.mkdir()
     for path in (folder, Path("/dev/null")):
-        with pytest.raises(ParameterError, match="a film must go to a file that"):
+        with pytest.raises(ParameterError, match=r"a film must (go to a file|end in)"):
             save_film(recording, path, size=(64, 64))
 
 
 def mistakes() -> Iterator[tuple[str, dict[str, object], str]]:
-    yield "film.avi", {}, r"a film must go to a file that ends in .mp4, .gif, .webp, but it was"
+    yield "film.avi", {}, r"a film must end in .mp4 or .gif or .webp, but it was"
     yield "no/film.mp4", {}, "a film must go to a file that can be written"
     yield "film.mp4", {"size": (63, 64)}, "the width of size must be a whole number from 64 to 4096, but it was 63"
     yield "film.mp4", {"size": (64, 5000)}, "the height of size must be"

@@ -139,6 +139,6 @@ def test_the_same_recording_gives_the_same_picture(ending: str, recording: Recor
 def test_mistakes_get_a_clear_error(recording: Recording, tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match="robot must be a whole number from 1 to 1"):
         save_plot([recording], tmp_path / "plot.png", robot=2)
-    with pytest.raises(ParameterError, match=r"ends in .png, .svg, .pdf"):
+    with pytest.raises(ParameterError, match=r"must end in .png or .svg or .pdf"):
         save_plot([recording], tmp_path / "plot.gif")
     assert kiks.Recording(recording.log.reader.path).title == recording.title

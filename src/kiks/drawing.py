@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.engine.state import BALL, BODY, CYLINDER
-from kiks.errors import ParameterError
 from kiks.model.arena import Arena, Ball
-from kiks.model.atomic_files import check_writable, replace_file
+from kiks.model.atomic_files import check_writable, ending_of, replace_file
 from kiks.model.robot import RobotSpec
 from kiks.model.robot_parts import Body
 from kiks.sheet import FINER, Colour, Place, Sheet, path_colour, path_mm, robot_colour, tint, wall_picture
@@ -201,13 +200,7 @@ def check_picture(path: str | Path) -> None:
 
 
 def _picture_type(path: str | Path) -> str:
-    kind = PICTURES.get(Path(path).suffix.lower())
-    if kind is None:
-        raise ParameterError(
-            f"a picture must go to a file like 'run.png', but {str(path)!r} ends like no picture that can be written. "
-            f"Let it end in {', '.join(PICTURES)}."
-        )
-    return kind
+    return PICTURES[ending_of(path, "a picture", PICTURES)]
 
 
 def _colours(index: int, robot_count: int, count: int) -> Iterable[Colour]:

@@ -14,7 +14,7 @@ import numpy as np
 
 from kiks.errors import ParameterError
 from kiks.model.arena import Arena
-from kiks.model.atomic_files import replace_file
+from kiks.model.atomic_files import ending_of, replace_file
 from kiks.recording.analysis import odometry, time_shares
 from kiks.recording.recorder import RunRecorder
 from kiks.recording.recording import Recording
@@ -52,10 +52,8 @@ def save_plot(recordings: Sequence[Recording], path: str | Path, *, robot: int =
     Raises:
         ParameterError: If the file cannot be written, or a run with robots has no such robot.
     """
-    kind = Path(path).suffix.lower()
-    if kind not in TYPES:
-        raise ParameterError(f"a plot must go to a file that ends in {', '.join(TYPES)}, but it was {str(path)!r}.")
-    replace_file(path, _file_of(figure_of(recordings, robot=robot), kind[1:]), "a plot")
+    kind = ending_of(path, "a plot", TYPES)[1:]
+    replace_file(path, _file_of(figure_of(recordings, robot=robot), kind), "a plot")
 
 
 def save_figure(figure: Any, path: str | Path) -> None:

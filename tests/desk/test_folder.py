@@ -149,7 +149,7 @@ def test_uploads_become_projects():
     ("name", "data", "words"),
     [
         ("a.exe", b"", "end in"),
-        ("", b"", "end in"),
+        ("", b"", "name of a file"),
         ("a.png", b"none", "picture"),
         ("a.kad", b"none", "level 5"),
         ("a.toml", b'picture = "/etc/passwd.png"', "comes alone"),

@@ -159,7 +159,7 @@ def test_a_check_leaves_nothing_and_changes_nothing(tmp_path: Path) -> None:
     check_writable(tmp_path / "old", "--out")
     with pytest.raises(ParameterError, match=r"--out must name a new file, but .*old' exists"):
         check_writable(tmp_path / "old", "--out", is_new=True)
-    with pytest.raises(ParameterError, match="ends like no picture"):
+    with pytest.raises(ParameterError, match=r"a picture must end in .png or .svg or .pdf or .jpg, but it was"):
         check_picture(tmp_path / "x.nothing")
     with pytest.raises(ParameterError, match=r"--out must go to a folder that can be written, but .* \(File exists\)"):
         make_folder(tmp_path / "old", "--out")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import enum
 import importlib
 import sys
 from pathlib import Path
@@ -27,27 +26,16 @@ REPORT_S = 2.0
 """Simulated time between two updates of the display [s]: more updates would cost more than the simulation."""
 
 
-class Behaviour(enum.StrEnum):
-    """The demonstrations."""
-
-    AVOID = "avoid"
-    FOLLOW = "follow"
-    CLEAN = "clean"
-    MAZE = "maze"
-    CAMERA = "camera"
-    RACE = "race"
-    SWARM = "swarm"
-    SOCCER = "soccer"
+DEMOS = ("avoid", "follow", "clean", "maze", "camera", "race", "swarm", "soccer")
+"""The demonstrations."""
 
 
 def demo(
     context: typer.Context,
     behaviour: Annotated[
         str,
-        typer.Argument(
-            help=f"The demo: {', '.join(Behaviour)}, or a champion's file or folder.", metavar="[BEHAVIOUR]"
-        ),
-    ] = Behaviour.AVOID,
+        typer.Argument(help=f"The demo: {', '.join(DEMOS)}, or a champion's file or folder.", metavar="[BEHAVIOUR]"),
+    ] = DEMOS[0],
     seconds: Annotated[
         float | None, typer.Option(help="Simulated time [s]; each demonstration's own if left out.", min=1, max=86400)
     ] = None,
@@ -101,13 +89,12 @@ def demo(
 
     Example: kiks demo follow --arena examples/arenas/office.toml --seconds 300
     """
-    if behaviour not in list(Behaviour) and not Path(behaviour).exists():
+    if behaviour not in DEMOS and not Path(behaviour).exists():
         raise ParameterError(
-            f"BEHAVIOUR must be one of {', '.join(Behaviour)}, or a champion's file or folder, but it was "
-            f"{shown(behaviour)}."
-            f"{nearest(behaviour, [each.value for each in Behaviour])}"
+            f"BEHAVIOUR must be one of {', '.join(DEMOS)}, or a champion's file or folder, but it was "
+            f"{shown(behaviour)}.{nearest(behaviour, DEMOS)}"
         )
-    is_soccer = behaviour == Behaviour.SOCCER
+    is_soccer = behaviour == "soccer"
     leave_out(context, f"with {behaviour}", *(("arena", "baud") if is_soccer else ("left", "right")))
     if not desk:
         leave_out(context, "without --desk", "no_wait")
@@ -118,7 +105,7 @@ def demo(
     else:
         leave_out(context, "with --generation", "arena", "seed", "baud", "at")
     for option, value in (("--generation", generation), ("--at", at)):
-        if value is not None and (behaviour in list(Behaviour) or is_contest or not Path(behaviour).is_dir()):
+        if value is not None and (behaviour in DEMOS or is_contest or not Path(behaviour).is_dir()):
             raise ParameterError(
                 f"{option} must come with the folder of an evolution of one controller, but with it came "
                 f"{shown(behaviour)}."
@@ -133,7 +120,7 @@ def demo(
         )
         return
     given, default_s = None if arena is None else load_arena(arena), None
-    if behaviour in list(Behaviour):
+    if behaviour in DEMOS:
         from kiks.demos.scenes import SCENES
 
         scene = SCENES[behaviour](given, seed=seed or 0, baud=baud)
@@ -165,7 +152,7 @@ def demo(
 
 
 def _name_of(behaviour: str) -> str:
-    return behaviour if behaviour in list(Behaviour) else Path(behaviour).resolve().stem
+    return behaviour if behaviour in DEMOS else Path(behaviour).resolve().stem
 
 
 def _individual(folder: str, generation: int, rank: int, world: int, task: str | None) -> tuple[Champion, float]:

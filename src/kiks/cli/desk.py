@@ -12,11 +12,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from kiks.cli.engine_start import ready_engine
-from kiks.cli.options import is_project, parse_turret, parse_words, with_robots
+from kiks.cli.options import RobotKinds, Robots, SeedOrOwn, Turrets, is_project, parse_turret, parse_words, with_robots
 from kiks.cli.record import RecordFile, recorded
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import HaltError, ParameterError
-from kiks.model.checks import ROBOTS_MAX
 
 if TYPE_CHECKING:
     from kiks.desk.server.desk import Desk
@@ -39,16 +38,10 @@ def desk(
         str | None,
         typer.Option(help="Project (.kiks), arena file (.toml, .kad) or picture; the classic box if left out."),
     ] = None,
-    robots: Annotated[int | None, typer.Option(help="Robots in the arena.", min=1, max=ROBOTS_MAX)] = None,
-    robot: Annotated[
-        list[str] | None,
-        typer.Option("--robot", help="Kind of robot: khepera, khepera_ii, or a file; once for all, or once for each."),
-    ] = None,
-    turret: Annotated[
-        list[str] | None,
-        typer.Option("--turret", help="k213, gripper, radio, io or battle, for all robots; gripper=2 for that one."),
-    ] = None,
-    seed: Annotated[int | None, typer.Option(help="Seed: the same seed, the same run.", min=0)] = None,
+    robots: Robots = None,
+    robot: RobotKinds = None,
+    turret: Turrets = None,
+    seed: SeedOrOwn = None,
     thinking: Annotated[
         str | None, typer.Option(help="Thinking time of programs: none, fixed:MS, live, live:FACTOR.")
     ] = None,

@@ -16,7 +16,6 @@ from kiks.cli.outputs import leave_out
 from kiks.cli.record import RecordFile, recorded
 from kiks.control.controller_kinds import ControllerKind
 from kiks.ending import end_as_with_ctrl_c
-from kiks.errors import ParameterError
 from kiks.learn.algorithm_name import AlgorithmName
 
 if TYPE_CHECKING:
@@ -93,11 +92,8 @@ def evolve(
             where="threads" if ray is None else _ray(ray),
         )
         return
-    if record is not None and seeds is not None:
-        raise ParameterError(
-            f"--record must be of one evolution, but there are {seeds}. Record a champion later: kiks run "
-            "FOLDER/champion.toml --record FILE."
-        )
+    if seeds is not None:
+        leave_out(context, "with --seeds", "record")
     chosen = tasks.load(task)
     if controller is not None:
         chosen = tasks.load(task, _controller(controller, chosen))

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from kiks.cli.options import progress_bar
 from kiks.cli.outputs import output
 from kiks.cli.replay import RecordingFile
 from kiks.errors import ParameterError, counted, shown
@@ -46,7 +45,7 @@ def film(
 
     if plain and robot is not None:
         raise ParameterError(f"--robot must be left out with --plain, but it was {robot}.")
-    with _progress_bar(out.name) as show:
+    with progress_bar(out.name) as show:
         count = save_film(
             Recording(file),
             out,
@@ -92,16 +91,3 @@ def _parse_size(size: str) -> tuple[int, int]:
     if words is None:
         raise ParameterError(f"--size must be a width and a height like 1280x720, but it was {shown(size)}.")
     return int(words[1]), int(words[2])
-
-
-@contextmanager
-def _progress_bar(name: str) -> Iterator[Callable[[int, int], None]]:
-    """Return a function that shows on a terminal how many of all pictures are done."""
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    console = Console()
-    columns = (TextColumn(name), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
-        bar = progress.add_task("", total=None)
-        yield lambda done, count: progress.update(bar, completed=done, total=count)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import logging
 import shlex
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -125,6 +127,18 @@ def with_robots(project: Project, count: int | None, least: int) -> Project:
 def say(text: str) -> None:
     """Print a message for the user on the error output, apart from the results."""
     typer.echo(f"kiks: {text}", err=True)
+
+
+@contextmanager
+def progress_bar(work: str) -> Iterator[Callable[..., None]]:
+    """Yield a function that shows on a terminal how much is done, as a share or of a number."""
+    from rich.console import Console
+    from rich.progress import Progress
+
+    console = Console(stderr=True)
+    with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
+        bar = progress.add_task(work, total=None)
+        yield lambda done, count=1: progress.update(bar, completed=done, total=count)
 
 
 def say_without_world(champion: Champion, arena: Arena | None) -> None:

@@ -17,7 +17,7 @@ import typer
 from typer.core import TyperCommand
 
 from kiks.errors import ParameterError, shown
-from kiks.model.atomic_files import check_writable
+from kiks.model.atomic_files import check_writable, ending_of
 
 PICTURES = (".png", ".svg", ".pdf", ".jpg")
 
@@ -87,9 +87,7 @@ class Command(TyperCommand):
             if value is None:
                 continue
             check_writable(value, what := _name(param), is_new=is_new)
-            if endings and value.suffix.lower() not in endings:
-                raise ParameterError(f"{what} must end in {' or '.join(endings)}, but it was {str(value)!r}.")
-            beginning = BEGINNINGS.get(value.suffix.lower() if endings else "")
+            beginning = BEGINNINGS.get(ending_of(value, what, endings) if endings else "")
             own = (value, value.with_suffix(beside)) if beside else (value,)
             for path in own:
                 if found := next((each for each in others if _is_same(path, each)), None):
@@ -120,7 +118,8 @@ def leave_out(context: typer.Context, when: str, *names: str) -> None:
         source = context.get_parameter_source(param.name or "")
         if source and source.name == "COMMANDLINE" and param.name in names:
             given = context.params.get(param.name or "")
-            raise ParameterError(f"{_name(param)} must be left out {when}, but it was {shown(given)}.")
+            value = shown(str(given) if isinstance(given, Path) else given)
+            raise ParameterError(f"{_name(param)} must be left out {when}, but it was {value}.")
 
 
 def _name(param: Any) -> str:

@@ -14,6 +14,7 @@ import typer
 
 from kiks.cli.options import say
 from kiks.cli.outputs import PICTURES, output
+from kiks.errors import counted
 from kiks.model.atomic_files import GrowingFile
 
 if TYPE_CHECKING:
@@ -182,10 +183,7 @@ def tell_run(sim: Simulation, doubt: str = "") -> None:
         doubt: Why it might not be repeatable; nothing if it is.
     """
     for number in range(1, sim.robot_count + 1):
-        contacts = sim.contacts(number)
-        say(
-            f"robot {number}: {sim.travelled_mm(number) / 1000:.2f} m driven, {contacts} "
-            f"contact{'' if contacts == 1 else 's'}, {sim.time_s:.3f} s"
-        )
+        contacts = counted(sim.contacts(number), "contact")
+        say(f"robot {number}: {sim.travelled_mm(number) / 1000:.2f} m driven, {contacts}, {sim.time_s:.3f} s")
     repeatable = f"not repeatable: {doubt}" if doubt else f"state {sim.state_hash()}"
     say(f"{sim.time_s:.3f} s simulated, seed {sim.seed}, {repeatable}")

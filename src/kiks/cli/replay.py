@@ -9,7 +9,7 @@ import typer
 
 from kiks.cli.desk import NoWait, open_desk
 from kiks.cli.engine_start import ready_engine
-from kiks.cli.options import say
+from kiks.cli.options import progress_bar, say
 from kiks.cli.outputs import leave_out, output
 from kiks.errors import ParameterError, counted
 from kiks.units import TICK_NS, s_from_ns
@@ -125,20 +125,13 @@ def page(
     Example: kiks page run.mcap --title "Exercise 3, Ada Lovelace"
     """
     ready_engine()
-    from rich.console import Console
-    from rich.progress import Progress
-
     from kiks.desk.run_page.page_file import save_page
     from kiks.recording.recording import Recording
 
     recording = Recording(file)
     path = out or file.with_suffix(".html")
-    console = Console(stderr=True)
-    with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
-        task = progress.add_task("making the run again", total=1.0)
-        save_page(
-            recording, path, title=title, robot=robot, on_progress=lambda share: progress.update(task, completed=share)
-        )
+    with progress_bar("making the run again") as show:
+        save_page(recording, path, title=title, robot=robot, on_progress=show)
     typer.echo(f"Page: {path}, {path.stat().st_size / 1e6:.1f} MB")
 
 

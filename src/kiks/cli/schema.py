@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import enum
 import json
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -12,13 +11,8 @@ if TYPE_CHECKING:
     from pydantic.json_schema import JsonSchemaValue
 
 
-class FileKind(enum.StrEnum):
-    """Files that users write."""
-
-    ROBOT = "robot"
-    ARENA = "arena"
-    PROJECT = "project"
-    TASK = "task"
+FileKind = Literal["robot", "arena", "project", "task"]
+"""Files that users write."""
 
 
 def schema(kind: Annotated[FileKind, typer.Argument(help="The kind of file.")]) -> None:
@@ -58,11 +52,6 @@ def schema_of(kind: FileKind) -> JsonSchemaValue:
                 made["properties"][name]["description"] = text
             return made
 
-    models: dict[FileKind, Any] = {
-        FileKind.ROBOT: RobotSpec,
-        FileKind.ARENA: ArenaFile,
-        FileKind.PROJECT: ProjectFile,
-        FileKind.TASK: TaskFile,
-    }
+    models = {"robot": RobotSpec, "arena": ArenaFile, "project": ProjectFile, "task": TaskFile}
     made = adapter(models[kind]).json_schema(schema_generator=Generator)
     return {"$schema": Generator.schema_dialect} | made | {"title": f"KiKS {kind} file"}

@@ -32,7 +32,6 @@ from kiks.errors import LinkError
 if TYPE_CHECKING:
     from kiks.desk.server.show import Shown
     from kiks.ports.endpoint import Endpoint
-    from kiks.ports.server import Server
     from kiks.sim.simulation import Simulation
 
 TCP_PORT = 10020
@@ -132,7 +131,9 @@ def serve(
             new_patience=Patience if gate is None else gate.patience,
         )
         if shown is not None:
-            _let_halt(shown, server)
+            from kiks.desk.server.outside_programs import PlainPrograms
+
+            shown.desk.outside = PlainPrograms(server.drop_clients)
         say(_repeatability(thinking, speed, sim.robot_count if programs is None else programs))
         with recorded(sim, record=record):
             server.serve()
@@ -229,13 +230,6 @@ def _show_desk(sim: Simulation, speed: float) -> Shown:
     typer.echo(f"The desk: {shown.url}")
     shown.browse()
     return shown
-
-
-def _let_halt(shown: Shown, server: Server) -> None:
-    """Let the desk halt the clients of a server."""
-    from kiks.desk.server.outside_programs import PlainPrograms
-
-    shown.desk.outside = PlainPrograms(server.drop_clients)
 
 
 def _repeatability(thinking: str, speed: float, programs: int) -> str:

@@ -47,11 +47,11 @@ def session(
     if where is None and listen is None:
         # Octave waits for the greeting, and handles Ctrl-C when a frame has arrived: the first one comes at once.
         write_all(sink, BUSY)
+    from kiks.toolbox.session_files import find_session
+
     exchange = Exchange(0, sink, close=lambda: _close(0, sink), parent=os.getppid())
     try:
         if where is not None:
-            from kiks.toolbox.session_files import find_session
-
             os.write(sink, find_session(where).line().encode())
         elif listen is not None:
             _serve(Heartbeat(), window, listen=listen)
@@ -61,7 +61,6 @@ def session(
             if join is None:
                 _serve(heartbeat, window, exchange=exchange)
             else:
-                from kiks.toolbox.session_files import find_session
                 from kiks.toolbox.session_process import join as take_part
 
                 take_part(find_session(join), exchange, 0, sink)

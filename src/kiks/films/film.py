@@ -12,7 +12,7 @@ from kiks.films.panel import Panel
 from kiks.films.solid_stage import SolidStage
 from kiks.films.stage import Pixels, Stage
 from kiks.films.video_file import ENDINGS, GIF, MP4, VideoFile
-from kiks.model.atomic_files import file_beside, path_of
+from kiks.model.atomic_files import ending_of, file_beside
 from kiks.model.checks import check_count, check_number
 from kiks.recording.moments import moments
 from kiks.recording.recording import Recording
@@ -131,13 +131,8 @@ def check_film(path: str | Path) -> str:
     Raises:
         ParameterError: If it is none of a film, or the library that writes films is not installed.
     """
-    ending = path_of(path, "a film's file").suffix.lower()
-    if ending not in ENDINGS:
-        raise ParameterError(
-            f"a film must go to a file that ends in {', '.join(ENDINGS)}, but it was {shown(str(path))}."
-        )
     library("av", "film")
-    return ending
+    return ending_of(path, "a film", ENDINGS)
 
 
 def checked_size(size: object) -> tuple[int, int]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import fcntl
 import os
 import stat
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack, closing, contextmanager, suppress
 from pathlib import Path, PurePosixPath
 from typing import IO, BinaryIO, cast
@@ -41,20 +41,17 @@ def replace_files(files: Mapping[Path, bytes | str], what: str = "The file", *, 
     Raises:
         ParameterError: If one of them cannot be written; the earlier ones are then as they were.
     """
-    path = Path()
-    try:
-        with ExitStack() as stack:
-            fresh = []
-            for path, data in files.items():
-                target = target_of(path)
-                content = data.encode() if isinstance(data, str) else data
-                fresh.append(stack.enter_context(closing(FileBeside(target, 0o666 if rights is None else rights))))
-                fresh[-1].file.write(content)
-                fresh[-1].settle()
-            for beside in fresh:
+    with ExitStack() as stack:
+        fresh = []
+        for path, data in files.items():
+            with writing(what, path):
+                beside = FileBeside(target_of(path), 0o666 if rights is None else rights)
+                fresh.append(stack.enter_context(closing(beside)))
+                beside.file.write(data.encode() if isinstance(data, str) else data)
+                beside.settle()
+        for path, beside in zip(files, fresh, strict=True):
+            with writing(what, path):
                 beside.take_place(keeps_rights=rights is None)
-    except (OSError, ValueError) as error:
-        raise unwritable(what, "file", path, error) from error
 
 
 class FileBeside:
@@ -81,23 +78,37 @@ class FileBeside:
     def __init__(self, target: Path, mode: int = 0o666, *, is_only: bool = False) -> None:
         for path in target.parent.glob(_PREFIX + "[0-9a-f]" * 16):
             with suppress(OSError), open(os.open(path, os.O_RDWR | os.O_NOFOLLOW | os.O_NONBLOCK), "rb") as file:
-                if _lock(file, path):
+                if lock(file.fileno(), path):
                     path.unlink()
         self._target = target
+        self._error: OSError | None = None
         self.has_earlier, self._claim = False, None
         self.is_in_place = target.exists() and not target.is_file()
         if self.is_in_place:
             self.path, self.file = target, cast(BinaryIO, target.open("wb"))
             return
         # While the target is locked, only the owner of that lock replaces it.
-        self._claim = _opened(target, os.O_CREAT, 0o666) if is_only else None
+        self._claim = locked_file(target, os.O_CREAT, 0o666) if is_only else None
         try:
             self.has_earlier = self._claim is not None and os.fstat(self._claim.fileno()).st_size > 0
             self.path = target.with_name(f"{_PREFIX}{os.urandom(8).hex()}")
-            self.file = _opened(self.path, os.O_CREAT | os.O_EXCL, mode)
+            self.file = locked_file(self.path, os.O_CREAT | os.O_EXCL, mode)
         except OSError:
             self._end_claim()
             raise
+
+    @property
+    def has_failed(self) -> bool:
+        """Whether an attempt has failed; then no other is made."""
+        return self._error is not None
+
+    def attempt(self, write: Callable[[], object]) -> None:
+        """Write something; an error is raised by `close`."""
+        if self._error is None:
+            try:
+                write()
+            except OSError as error:
+                self._error = error
 
     def settle(self) -> None:
         """See that all of it is on the disk."""
@@ -118,12 +129,18 @@ class FileBeside:
         _settle(self._target.parent)
 
     def close(self) -> None:
-        """End it; unless it has taken the place, it is removed."""
+        """End it; unless it has taken the place, it is removed.
+
+        Raises:
+            OSError: If an attempt has failed.
+        """
         if not self.is_in_place:
             with suppress(OSError):
                 self.path.unlink()
         _release(self.file)
         self._end_claim()
+        if self._error is not None:
+            raise self._error
 
     def _end_claim(self) -> None:
         if self._claim is not None:
@@ -134,7 +151,7 @@ class FileBeside:
             self._claim = None
 
 
-def _opened(path: Path, flags: int, mode: int) -> BinaryIO:
+def locked_file(path: Path, flags: int, mode: int) -> BinaryIO:
     """Open a file to be written, and lock it.
 
     Raises:
@@ -145,7 +162,7 @@ def _opened(path: Path, flags: int, mode: int) -> BinaryIO:
         file = open(os.open(path, os.O_RDWR | flags, mode), "wb")  # noqa: SIM115
         try:
             # Who takes a new file for an abandoned one locks it for a moment, and removes it.
-            if _lock(file, path, waits=is_new):
+            if lock(file.fileno(), path, waits=is_new):
                 return file
         except BlockingIOError:
             file.close()
@@ -155,8 +172,8 @@ def _opened(path: Path, flags: int, mode: int) -> BinaryIO:
         file.close()
 
 
-def _lock(file: IO[bytes], path: Path, *, waits: bool = False) -> bool:
-    """Lock an open file, and return whether it still has its name.
+def lock(file: int, path: Path, *, waits: bool = False) -> bool:
+    """Lock an open file or folder by its descriptor, and return whether it still has its name.
 
     Raises:
         BlockingIOError: If it is locked already.
@@ -164,7 +181,7 @@ def _lock(file: IO[bytes], path: Path, *, waits: bool = False) -> bool:
     """
     fcntl.flock(file, fcntl.LOCK_EX | (0 if waits else fcntl.LOCK_NB))
     with suppress(FileNotFoundError):
-        return os.path.samestat(os.fstat(file.fileno()), os.lstat(path))
+        return os.path.samestat(os.fstat(file), os.lstat(path))
     return False
 
 
@@ -189,19 +206,12 @@ class GrowingFile:
 
     def __init__(self, path: str | Path, what: str = "The file") -> None:
         self._path, self._what = path, what
-        self._error: Exception | None = None
-        try:
+        with writing(what, path):
             self._beside = FileBeside(target_of(path_of(path, what)))
-        except OSError as error:
-            raise unwritable(what, "file", path, error) from error
 
     def write(self, text: str) -> None:
         """Append text."""
-        if self._error is None:
-            try:
-                self._beside.file.write(text.encode())
-            except OSError as error:
-                self._error = error
+        self._beside.attempt(lambda: self._beside.file.write(text.encode()))
 
     def close(self) -> None:
         """Replace the old file.
@@ -209,13 +219,8 @@ class GrowingFile:
         Raises:
             ParameterError: If it could not be written; an earlier file is then as it was.
         """
-        try:
-            with closing(self._beside):
-                if self._error is not None:
-                    raise self._error
-                self._beside.take_place()
-        except OSError as error:
-            raise unwritable(self._what, "file", self._path, error) from error
+        with writing(self._what, self._path), closing(self._beside):
+            self._beside.attempt(self._beside.take_place)
 
 
 @contextmanager
@@ -229,17 +234,13 @@ def file_beside(path: str | Path, what: str) -> Iterator[Path]:
     Raises:
         ParameterError: If it cannot be written; an earlier file is then as it was.
     """
-    try:
+    with writing(what, path):
         target = target_of(path_of(path, what))
         if target.exists() and not target.is_file():
             raise OSError(None, "it is no file")
         with closing(FileBeside(target)) as beside:
             yield beside.path
             beside.take_place()
-    except KiksError:  # one may be an OSError, too
-        raise
-    except OSError as error:
-        raise unwritable(what, "file", path, error) from error
 
 
 def check_writable(path: str | Path, what: str, *, is_new: bool = False) -> None:
@@ -257,12 +258,10 @@ def check_writable(path: str | Path, what: str, *, is_new: bool = False) -> None
     """
     if is_new and os.path.lexists(path):
         raise ParameterError(f"{what} must name a new file, but {str(path)!r} exists. Choose another name.")
-    try:
+    with writing(what, path):
         target = target_of(path_of(path, what))
         if not target.exists() or target.is_file():
             FileBeside(target, 0o600).close()
-    except OSError as error:
-        raise unwritable(what, "file", path, error) from error
 
 
 def make_folder(path: str | Path, what: str) -> None:
@@ -271,11 +270,9 @@ def make_folder(path: str | Path, what: str) -> None:
     Raises:
         ParameterError: If it cannot be one.
     """
-    try:
-        Path(path).mkdir(parents=True, exist_ok=True)
+    with writing(what, path, "folder"):
+        path_of(path, what).mkdir(parents=True, exist_ok=True)
         FileBeside(Path(path, "file"), 0o600).close()
-    except (OSError, ValueError) as error:
-        raise unwritable(what, "folder", path, error) from error
 
 
 def target_of(path: str | Path) -> Path:
@@ -283,7 +280,6 @@ def target_of(path: str | Path) -> Path:
 
     Raises:
         OSError: If it is a folder, or a file that is protected from being written.
-        ValueError: If it has characters that paths cannot have.
     """
     target = Path(os.path.realpath(path))
     if target.is_dir():
@@ -303,12 +299,22 @@ def _settle(folder: Path) -> None:
             os.close(descriptor)
 
 
-def unwritable(what: str, kind: str, path: str | Path, error: Exception) -> ParameterError:
-    """Return what is told of a file or folder that cannot be written."""
-    why = error.strerror if isinstance(error, OSError) else error
-    return ParameterError(
-        f"{what} must go to a {kind} that can be written, but {str(path)!r} cannot ({why}). Choose another place."
-    )
+@contextmanager
+def writing(what: str, path: str | Path, kind: str = "file") -> Iterator[None]:
+    """Tell of a file or folder that cannot be written.
+
+    Raises:
+        ParameterError: If an error says so.
+    """
+    try:
+        yield
+    except KiksError:  # one may be an OSError, too
+        raise
+    except (OSError, UnicodeEncodeError) as error:
+        why = error.strerror if isinstance(error, OSError) else error
+        raise ParameterError(
+            f"{what} must go to a {kind} that can be written, but {str(path)!r} cannot ({why}). Choose another place."
+        ) from error
 
 
 def path_of(path: object, what: str = "path") -> Path:
@@ -329,6 +335,23 @@ def path_of(path: object, what: str = "path") -> Path:
     raise ParameterError(
         f"{what} must be the name of a file, of at most {NAME_BYTES_MAX} bytes, but it was {shown(path)}."
     )
+
+
+def ending_of(path: object, what: str, endings: Iterable[str]) -> str:
+    """Return the ending of a file's name, in small letters.
+
+    Args:
+        path: The file.
+        what: What messages call it.
+        endings: Those that it may have.
+
+    Raises:
+        ParameterError: If it has another one.
+    """
+    ending = path_of(path, what).suffix.lower()
+    if ending not in endings:
+        raise ParameterError(f"{what} must end in {' or '.join(endings)}, but it was {shown(str(path))}.")
+    return ending
 
 
 def check_relative(text: object, what: str) -> None:

@@ -186,14 +186,8 @@ def parse_toml(data: bytes, what: str, *, error: type[KiksError] = ParameterErro
     Raises:
         KiksError: If the bytes are no TOML in UTF-8. It is an `error`.
     """
-    try:
-        text = data.decode("utf-8")
-        _check_keys_are_short(text)
-        return tomllib.loads(text)
-    except (ValueError, RecursionError, OverflowError) as failure:
-        raise error(
-            f"{what} must be TOML in UTF-8, but: {one_line(failure)}. Correct the file at that place."
-        ) from None
+    table: dict[str, Any] = _parsed(data, "TOML", _load_toml, what, error)
+    return table
 
 
 def parse_json(data: bytes, what: str, *, error: type[KiksError] = ParameterError) -> Any:
@@ -202,15 +196,18 @@ def parse_json(data: bytes, what: str, *, error: type[KiksError] = ParameterErro
     Raises:
         KiksError: If the bytes are no JSON in UTF-8. It is an `error`.
     """
+    return _parsed(data, "JSON", json.loads, what, error)
+
+
+def _parsed(data: bytes, kind: str, load: Callable[[str], Any], what: str, error: type[KiksError]) -> Any:
     try:
-        return json.loads(data.decode("utf-8"))
+        return load(data.decode("utf-8"))
     except (ValueError, RecursionError, OverflowError) as failure:
         raise error(
-            f"{what} must be JSON in UTF-8, but: {one_line(failure)}. Correct the file at that place."
+            f"{what} must be {kind} in UTF-8, but: {one_line(failure)}. Correct the file at that place."
         ) from None
 
 
-_CORRECT = "Correct the file at that place."
 _STRINGS_AND_COMMENTS = re.compile(
     r"""
     \"{3}(?:[^\\"]|\\.|"(?!""))*+\"{3} | '{3}(?:[^']|'(?!''))*+'{3}
@@ -221,10 +218,11 @@ _STRINGS_AND_COMMENTS = re.compile(
 _LONG_KEY = re.compile(rf"(?<![\w-])(?:[\w-]*+\.){{{KEY_PARTS_MAX}}}")
 
 
-def _check_keys_are_short(text: str) -> None:
+def _load_toml(text: str) -> dict[str, Any]:
     bare = re.sub(r"[ \t]++", "", _STRINGS_AND_COMMENTS.sub("", text))
     if _LONG_KEY.search(bare):
         raise ValueError(f"a key has more than {KEY_PARTS_MAX} parts")
+    return tomllib.loads(text)
 
 
 def one_line(failure: BaseException) -> str:

@@ -25,7 +25,7 @@ from kiks.model.arena_file import (
     quoted,
 )
 from kiks.model.arena_objects import THINGS_MAX
-from kiks.model.atomic_files import check_relative, path_of, replace_file
+from kiks.model.atomic_files import check_relative, ending_of, path_of, replace_file
 from kiks.model.checks import ROBOTS_MAX
 from kiks.model.data_file import (
     Number,
@@ -193,9 +193,7 @@ class Project:
         Raises:
             ParameterError: If its name does not end in .kiks, or it cannot be written.
         """
-        path = path_of(path)
-        if path.suffix.lower() != ".kiks":
-            raise ParameterError(f"A project's file must end in '.kiks', but it was {str(path)!r}.")
+        ending_of(path, "a project's file", (".kiks",))
         replace_file(path, self.to_bytes(), "a project")
 
     @classmethod

@@ -21,8 +21,6 @@ from kiks.model.atomic_files import program_in
 from kiks.model.project import Project
 from kiks.sim.ring_buffer import RingBuffer
 
-"""Argument of a program's process: whether it starts after the world has begun, or before."""
-
 OUTPUT_LIMIT = 1000
 """Number of lines of a program's output that a handle keeps."""
 

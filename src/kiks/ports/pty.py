@@ -23,8 +23,10 @@ import tempfile
 import termios
 from contextlib import suppress
 from pathlib import Path
+from typing import BinaryIO
 
 from kiks.errors import LinkError
+from kiks.model.atomic_files import locked_file
 from kiks.ports.endpoint import READ_SIZE, Channel, Endpoint
 from kiks.ports.file_descriptors import SHORTAGES, opening
 
@@ -122,7 +124,7 @@ class PtyEndpoint(Endpoint):
         """Give the link's name up."""
         with suppress(OSError):  # its folder may have gone
             os.unlink(_lock_of(self.name))
-        os.close(self._claim)
+        self._claim.close()
 
 
 class PtyChannel(Channel):
@@ -201,29 +203,22 @@ def _is_own(folder: Path) -> bool:
     )
 
 
-def _lock_of(path: str) -> str:
-    folder, name = os.path.split(path)
-    return os.path.join(folder, f".{name}.lock")
+def _lock_of(path: str) -> Path:
+    return Path(path).with_name(f".{Path(path).name}.lock")
 
 
-def _claim(path: str) -> int:
+def _claim(path: str) -> BinaryIO:
     """Reserve a link's name until this process ends, by a lock on a file beside it; only who may write there can."""
-    name = _lock_of(path)
     try:
-        claim = os.open(name, os.O_CREAT | os.O_RDWR | os.O_NOFOLLOW | os.O_NONBLOCK, 0o600)
+        return locked_file(_lock_of(path), os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK, 0o600)
+    except BlockingIOError:
+        raise LinkError(
+            f"link {path!r} must be free, but a KiKS that is running has it. Stop that one, or give another link."
+        ) from None
     except OSError as error:
         if error.errno in SHORTAGES:
             raise
         raise _unwritable(path, error) from None
-    with suppress(OSError):
-        fcntl.flock(claim, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        # Who had it may have removed it since it was opened, and another have a new one.
-        if os.path.samestat(os.fstat(claim), os.lstat(name)):
-            return claim
-    os.close(claim)
-    raise LinkError(
-        f"link {path!r} must be free, but a KiKS that is running has it. Stop that one, or give another link."
-    )
 
 
 def _unwritable(path: str, error: OSError) -> LinkError:

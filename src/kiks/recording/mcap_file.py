@@ -11,7 +11,7 @@ import os
 import shutil
 import struct
 import zlib
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,7 +25,7 @@ from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 
 from kiks.errors import ParameterError
-from kiks.model.atomic_files import FileBeside, path_of, target_of, unwritable
+from kiks.model.atomic_files import FileBeside, ending_of, path_of, target_of, writing
 from kiks.version import __version__
 
 ENDING = ".mcap"
@@ -107,22 +107,19 @@ class McapFile:
     """
 
     def __init__(self, path: str | Path, topics: Iterable[Topic]) -> None:
-        self._path = path_of(path, "a recording's file")
-        if self._path.suffix.lower() != ENDING:
-            raise ParameterError(f"A recording's file must end in '{ENDING}', but it was {str(self._path)!r}.")
-        self._error: OSError | None = None
-        try:
-            target = target_of(self._path)
+        ending_of(path, "a recording's file", (ENDING,))
+        self._path = path
+        with writing("a recording", path):
+            target = target_of(path)
             self._folder = target.parent
             if (room := room_of(self._folder)).is_too_small:
                 raise ParameterError(
                     f"a recording must leave {room.reserve_bytes / 2**20:.3g} MiB of its disk free, but that of "
-                    f"{str(self._path)!r} has {room.free_bytes / 2**20:.3g} MiB. Free some space, or choose another "
+                    f"{str(path)!r} has {room.free_bytes / 2**20:.3g} MiB. Free some space, or choose another "
                     "place."
                 )
             self._beside = FileBeside(target, is_only=True)
-        except OSError as error:
-            raise self._unwritable(error) from None
+        self._do = self._beside.attempt
         self._writer = Writer(self._beside.file, chunk_size=RECORD_BYTES_MAX, compression=CompressionType.LZ4)
         self._do(lambda: self._writer.start(profile=PROFILE, library=f"kiks {__version__}"))
         self._channels = {topic: self._channel(topic) for topic in topics}
@@ -130,7 +127,7 @@ class McapFile:
     @property
     def has_failed(self) -> bool:
         """Whether something could not be written; then nothing more is."""
-        return self._error is not None
+        return self._beside.has_failed
 
     @property
     def is_disk_full(self) -> bool:
@@ -188,19 +185,8 @@ class McapFile:
         """
         self._do(self._writer.finish)
         self._do(self._beside.file.flush)
-        self._beside.close()
-        if self._error is not None:
-            raise self._unwritable(self._error)
-
-    def _do(self, write: Callable[[], object]) -> None:
-        if self._error is None:
-            try:
-                write()
-            except OSError as error:
-                self._error = error
-
-    def _unwritable(self, error: OSError) -> ParameterError:
-        return unwritable("a recording", "file", self._path, error)
+        with writing("a recording", self._path):
+            self._beside.close()
 
 
 @dataclass(frozen=True)
@@ -291,9 +277,7 @@ class McapReader:
                 if isinstance(record, Attachment):
                     # The checksum at the end is of all of the record before it.
                     if _CRC.unpack(data[-_CRC.size :])[0] not in (0, zlib.crc32(data[_HEAD.size : -_CRC.size])):
-                        raise ParameterError(
-                            f"{self.what} must have whole attachments, but one is damaged. Take another copy of it."
-                        )
+                        raise self._damaged("attachments")
                     self.attachments[record.name] = record.data
                 elif isinstance(record, Metadata):
                     self.told |= record.metadata
@@ -349,7 +333,7 @@ class McapReader:
             with suppress(RuntimeError, EOFError):
                 data = lz4.frame.LZ4FrameDecompressor().decompress(chunk.data, max_length=size + 1)
         if len(data) != size or chunk.uncompressed_crc not in (0, zlib.crc32(data)):
-            raise ParameterError(f"{self.what} must have whole chunks, but one is damaged. Take another copy of it.")
+            raise self._damaged("chunks")
         return data
 
     def _records(self, data: bytes) -> Iterator[Any]:
@@ -367,7 +351,7 @@ class McapReader:
             except StopIteration:
                 return
             except (McapError, EOFError, ValueError, struct.error, OverflowError, MemoryError) as error:
-                raise self._damaged(f" ({error or type(error).__name__})") from None
+                raise self._damaged(why=f" ({error or type(error).__name__})") from None
 
-    def _damaged(self, why: str = "") -> ParameterError:
-        return ParameterError(f"{self.what} must have whole records, but one is damaged{why}. Take another copy of it.")
+    def _damaged(self, parts: str = "records", why: str = "") -> ParameterError:
+        return ParameterError(f"{self.what} must have whole {parts}, but one is damaged{why}. Take another copy of it.")

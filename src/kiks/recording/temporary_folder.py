@@ -7,12 +7,13 @@ folder. Programs that clean up temporary files leave a locked folder alone, too.
 
 from __future__ import annotations
 
-import fcntl
 import os
 import shutil
 import tempfile
 from contextlib import suppress
 from pathlib import Path
+
+from kiks.model.atomic_files import lock
 
 PREFIX = "kiks-recording-"
 
@@ -30,15 +31,15 @@ class TemporaryFolder:
     def __init__(self) -> None:
         for path in Path(tempfile.gettempdir()).glob(f"{PREFIX}*"):
             with suppress(OSError):
-                lock = _lock(path)
+                folder = _locked(path)
                 shutil.rmtree(path, ignore_errors=True)
-                os.close(lock)
+                os.close(folder)
         self._lock: int | None = None
         while True:
             self._folder = tempfile.TemporaryDirectory(prefix=PREFIX, ignore_cleanup_errors=True)
             self.path = Path(self._folder.name)
             try:
-                self._lock = _lock(self.path)
+                self._lock = _locked(self.path)
             except (BlockingIOError, FileNotFoundError):
                 # Another process takes it for an abandoned one, and deletes it.
                 self._folder.cleanup()
@@ -55,7 +56,7 @@ class TemporaryFolder:
             self._lock = None
 
 
-def _lock(path: Path) -> int:
+def _locked(path: Path) -> int:
     """Lock a folder of this user, and return its descriptor.
 
     Raises:
@@ -65,11 +66,9 @@ def _lock(path: Path) -> int:
     """
     folder = os.open(path, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
     try:
-        found = os.fstat(folder)
-        if found.st_uid != os.geteuid():
+        if os.fstat(folder).st_uid != os.geteuid():
             raise PermissionError
-        fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        if not os.path.samestat(found, os.lstat(path)):
+        if not lock(folder, path):
             raise FileNotFoundError
     except OSError:
         os.close(folder)

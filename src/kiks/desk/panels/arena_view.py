@@ -11,10 +11,9 @@ from pathlib import Path
 from typing import Any, Literal
 
 import nicegui
-from nicegui import ui
-from nicegui.element import Element
 from nicegui.events import GenericEventArguments
 
+from kiks.desk.panels.widgets import FeedElement
 from kiks.errors import ParameterError, shown
 
 __all__ = ["SHOWN", "ArenaView", "Pick", "Stroke", "Tool"]
@@ -88,7 +87,7 @@ class Tool:
 
 
 class ArenaView(
-    Element,
+    FeedElement,
     component=_WEB / "arena_view.js",
     esm={"kiks-desk": str(_WEB), "nicegui-scene": str(_THREE)},
 ):
@@ -114,9 +113,7 @@ class ArenaView(
         on_draw: Callable[[Stroke], Any] | None = None,
         on_remove: Callable[[float, float], Any] | None = None,
     ) -> None:
-        super().__init__()
-        ui.add_css(_WEB / "arena_view.css")
-        self._props["feed"] = feed
+        super().__init__(feed, _WEB / "arena_view.css")
         self._props["show"] = dict(SHOWN)
         self.set_view(view)
         self.set_tool(Tool())

@@ -7,7 +7,7 @@ from typing import Any
 
 from nicegui import events, ui
 
-from kiks.desk.panels.widgets import icon_button, told, with_props
+from kiks.desk.panels.widgets import icon_button, named, told
 from kiks.errors import KiksError
 
 HISTORY_LIMIT = 100
@@ -89,13 +89,12 @@ class CommandLine:
                 ui.input(label, placeholder=example, on_change=lambda: on_change())
                 .classes("col")
                 .props("dense autocomplete=off autocapitalize=off spellcheck=false")
-                .mark(name)
                 .on("keydown.enter", self._take_enter, js_handler=TAKE)
                 .on("keydown.up.prevent", self._back)
                 .on("keydown.down.prevent", self._forth)
                 .tooltip(f"{tip}; the arrow keys recall earlier ones")
             )
-            with_props(self._input, data_testid=name)
+            named(self._input, name)
             icon_button("send", verb, f"{name}-send", self._take_click).tooltip(verb_tip)
 
     @property

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from nicegui import ui
 
 from kiks.desk.panels.command_line import CommandLine
+from kiks.desk.panels.widgets import log_box, named
 from kiks.desk.server.desk import Desk
 from kiks.firmware.commands import COMMANDS
 from kiks.firmware.commands import Command as RobotCommand
@@ -32,13 +33,7 @@ class ConsolePanel:
         self._of_robot = robot
         self._waiting: list[Typed] = []
         ui.label("Commands to the robot").classes("text-subtitle2")
-        self._rows = (
-            ui.log(max_lines=ROWS)
-            .classes("w-full text-caption")
-            .style("height: 7rem")
-            .props('data-testid="console-log" aria-label="What you typed, and the replies"')
-            .mark("console-log")
-        )
+        self._rows = log_box(ROWS, "7rem", "console-log", "What you typed, and the replies")
         self._line = CommandLine(
             self._send,
             label="Command",
@@ -49,7 +44,7 @@ class ConsolePanel:
             name="console",
             on_change=self._suggest,
         )
-        self._hints = ui.column().classes("w-full gap-0").mark("hints").props('data-testid="hints"')
+        self._hints = named(ui.column().classes("w-full gap-0"), "hints")
         self._suggest()
 
     def refresh(self) -> None:
@@ -73,11 +68,8 @@ class ConsolePanel:
         self._hints.clear()
         with self._hints:
             for command in suggested(self._line.text)[:SUGGESTIONS]:
-                with (
-                    ui.button(on_click=lambda command=command: self._take(command))
-                    .props("flat dense no-caps align=left")
-                    .classes("w-full text-caption")
-                ):
+                button = ui.button(on_click=lambda command=command: self._take(command))
+                with button.props("flat dense no-caps align=left").classes("w-full text-caption"):
                     ui.label(help_of(command)).classes("text-left")
 
     def _take(self, command: RobotCommand) -> None:

@@ -12,7 +12,7 @@ from nicegui.events import KeyEventArguments
 from kiks.desk.panels.arena_view import ArenaView, Stroke, Tool
 from kiks.desk.panels.files import FilesPanel
 from kiks.desk.panels.new_arena import ask_for_box, ask_for_maze
-from kiks.desk.panels.widgets import text_button, told, with_props
+from kiks.desk.panels.widgets import named, text_button, told, with_props
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.live_editing import Editing
 from kiks.errors import ParameterError
@@ -83,8 +83,8 @@ class EditorPanel:
         with ui.row().classes("w-full gap-1"):
             for name, tool in TOOLS.items():
                 button = ui.button(icon=tool.icon, on_click=lambda name=name: self._choose(name))
-                button.props('dense padding="6px"').mark(f"tool-{name}")
-                with with_props(button, aria_label=tool.word, data_testid=f"tool-{name}"):
+                button.props('dense padding="6px"')
+                with named(with_props(button, aria_label=tool.word), f"tool-{name}"):
                     ui.tooltip(f"{tool.word}: {tool.hint}")
                 self._buttons[name] = button
         self._hint = ui.label().classes("text-caption").props("data-testid=tool-hint aria-live=polite")

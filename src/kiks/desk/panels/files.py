@@ -9,7 +9,7 @@ from nicegui import ui
 from nicegui.events import UploadEventArguments
 
 from kiks.desk.panels.film import FilmDialog
-from kiks.desk.panels.widgets import text_button, told, with_props
+from kiks.desk.panels.widgets import named, text_button, told, with_props
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.example_worlds import EXAMPLES
 from kiks.desk.server.folder import OPENED, PICTURES, UPLOAD_BYTES_MAX, Folder, decode, encode
@@ -73,8 +73,8 @@ class FilesPanel:
                     type="negative",
                 ),
             )
-            self._upload.props("flat bordered data-testid=upload").classes("col kiks-upload").mark("upload")
-            with_props(self._upload, accept=",".join(OPENED))
+            self._upload.props("flat bordered").classes("col kiks-upload")
+            with_props(named(self._upload, "upload"), accept=",".join(OPENED))
             self._mm_per_pixel = ui.number("mm per pixel", value=1.0, min=0.1, max=100, step=0.1)
             self._mm_per_pixel.props("dense data-testid=mm-per-pixel").classes("w-28")
             self._mm_per_pixel.tooltip("Size of a pixel of an uploaded picture")

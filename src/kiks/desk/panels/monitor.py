@@ -10,7 +10,7 @@ from nicegui import ui
 
 from kiks.desk.panels.explanation_drawing import draw_rays
 from kiks.desk.panels.monitor_view import MonitorView, Reading
-from kiks.desk.panels.widgets import icon_button, told
+from kiks.desk.panels.widgets import icon_button, named, told
 from kiks.desk.server.desk import Desk
 from kiks.firmware.battle import Battle
 from kiks.firmware.general_io import GeneralIO
@@ -85,18 +85,9 @@ class MonitorPanel:
         self._reading: Reading | None = None
         self._is_seen = False
         with ui.column().classes("w-full gap-2 q-pa-sm"):
-            self._choice = (
-                ui.select(
-                    self._names(),
-                    value=0 if desk.sim.robot_count else None,
-                    label="Robot",
-                    on_change=lambda event: self._choose(event.value),
-                )
-                .classes("w-full")
-                .props('dense outlined data-testid="monitor-robot"')
-                .mark("monitor-robot")
-                .tooltip("The robot shown here")
-            )
+            self._choice = ui.select(self._names(), value=0 if desk.sim.robot_count else None, label="Robot")
+            self._choice.on_value_change(lambda event: self._choose(event.value)).classes("w-full")
+            named(self._choice, "monitor-robot").props("dense outlined").tooltip("The robot shown here")
             with MonitorView(feed, on_explain=self._explain, on_seen=self._see).classes("w-full") as self._view:
                 self._build_answer()
             self._turrets = ui.label().style("white-space: pre-line").props('data-testid="turret-words"')
@@ -111,18 +102,10 @@ class MonitorPanel:
                 icon_button("close", tip, "close-explanation", self._forget).tooltip(tip)
             self._drawing = ui.html(sanitize=False).classes("w-full").props('data-testid="explanation-drawing"')
             self._words = ui.label().style("white-space: pre-line").props('data-testid="explanation-text"')
-            self._keeps = (
-                ui.switch("Keep looking")
-                .props('dense data-testid="keep-looking"')
-                .mark("keep-looking")
-                .tooltip("Update the explanation twice a second")
-            )
-            self._table = (
-                ui.table(rows=[], columns=[], row_key="0")
-                .classes("w-full")
-                .props('dense flat bordered hide-pagination :rows-per-page-options="[0]"')
-                .props('data-testid="explanation-table"')
-            )
+            self._keeps = named(ui.switch("Keep looking"), "keep-looking").props("dense")
+            self._keeps.tooltip("Update the explanation twice a second")
+            self._table = named(ui.table(rows=[], columns=[], row_key="0"), "explanation-table").classes("w-full")
+            self._table.props('dense flat bordered hide-pagination :rows-per-page-options="[0]"')
             self._note = ui.label().classes("text-caption")
         self._answer.set_visibility(False)
 

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
-from nicegui import ui
-from nicegui.element import Element
 from nicegui.events import GenericEventArguments
+
+from kiks.desk.panels.widgets import FeedElement
 
 _WEB = Path(__file__).parents[1] / "web"
 
@@ -30,7 +30,7 @@ class Reading:
     kind: Literal["proximity", "ambient"]
 
 
-class MonitorView(Element, component=_WEB / "monitor_view.js", esm={"kiks-desk": str(_WEB)}):
+class MonitorView(FeedElement, component=_WEB / "monitor_view.js", esm={"kiks-desk": str(_WEB)}):
     """One robot from above with its readings at their sensors, curves of the last seconds, numbers, and its camera.
 
     Args:
@@ -46,9 +46,7 @@ class MonitorView(Element, component=_WEB / "monitor_view.js", esm={"kiks-desk":
         on_explain: Callable[[Reading], Any] | None = None,
         on_seen: Callable[[bool], Any] | None = None,
     ) -> None:
-        super().__init__()
-        ui.add_css(_WEB / "monitor_view.css")
-        self._props["feed"] = feed
+        super().__init__(feed, _WEB / "monitor_view.css")
         self.set_robot(0)
         if on_explain is not None:
             self.on("explain", lambda event: on_explain(_reading(event)))

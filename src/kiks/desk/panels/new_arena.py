@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from nicegui import ui
 
-from kiks.desk.panels.widgets import with_props
+from kiks.desk.panels.widgets import named
 from kiks.errors import KiksError
 from kiks.model.arena import Arena
 from kiks.model.materials import REFLECTANCES
@@ -55,7 +55,7 @@ async def ask_for_maze() -> Arena | None:
 def _number(label: str, value: int, name: str, low: int, high: int) -> Callable[[], int]:
     """Build a field for a whole number and return its getter, which returns -1 for an empty field."""
     field = ui.number(label, value=value, min=low, max=high, precision=0).classes("w-full")
-    with_props(field, data_testid=name).props("dense").mark(name)
+    named(field, name).props("dense")
     return lambda: int(field.value) if is_number(field.value) else -1
 
 

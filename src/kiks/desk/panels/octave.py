@@ -5,6 +5,7 @@ from __future__ import annotations
 from nicegui import ui
 
 from kiks.desk.panels.command_line import CommandLine
+from kiks.desk.panels.widgets import log_box
 from kiks.desk.server.desk import Desk
 
 ROWS_MAX = 10_000
@@ -33,12 +34,7 @@ class OctavePanel:
         ui.add_css(".kiks-log * { white-space: pre-wrap; overflow-wrap: anywhere }")
         with ui.column().classes("w-full q-pa-sm gap-2"):
             ui.label("Log").classes("text-subtitle2")
-            self._rows = (
-                ui.log(max_lines=ROWS_MAX)
-                .classes("w-full text-caption kiks-log")
-                .style("height: 55vh")
-                .props('data-testid="log" aria-label="Log of the session"')
-            )
+            self._rows = log_box(ROWS_MAX, "55vh", "log", "Log of the session").classes("kiks-log")
             programs = desk.outside.interpreters()
             self._choice = ui.select(programs, value=min(programs), label="Commands for").classes("w-full")
             self._choice.props('dense options-dense data-testid="interpreter"')

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+from typing import Any
 
 from nicegui import ui
 
-from kiks.desk.panels.widgets import icon_button, offer_robots, told, with_props
+from kiks.desk.panels.widgets import icon_button, log_box, named, offer_robots, told, with_props
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.scripts import (
     NEW,
@@ -65,16 +66,10 @@ class ProgramsPanel:
             if desk.may_run_programs:
                 self._build_editor()
             else:
-                ui.label(MAY_NOT).classes("text-body2").mark("may-not").props('data-testid="may-not"')
-            self._list = ui.column().classes("w-full gap-1").mark("programs").props('data-testid="programs"')
+                named(ui.label(MAY_NOT).classes("text-body2"), "may-not")
+            self._list = named(ui.column().classes("w-full gap-1"), "programs")
             with ui.expansion("Output", value=True).classes("w-full").props("dense") as self._output_box:
-                self._log = (
-                    ui.log(max_lines=SHOWN_LINES)
-                    .classes("w-full text-caption")
-                    .style("height: 12rem")
-                    .mark("output")
-                    .props('data-testid="output" aria-label="What the program has printed"')
-                )
+                self._log = log_box(SHOWN_LINES, "12rem", "output", "What the program has printed")
         self._timer = ui.timer(REFRESH_S, self.refresh)
         self.refresh()
 
@@ -164,50 +159,32 @@ class ProgramsPanel:
 
     def _build_editor(self) -> None:
         with ui.row().classes("w-full items-end no-wrap gap-2"):
-            self._choice = (
-                ui.select({}, label="Program", on_change=self._open)
-                .classes("col")
-                .props('dense options-dense data-testid="script"')
-                .mark("script")
-                .tooltip("Your programs in the desk's folder, and examples that come with KiKS")
-            )
+            self._choice = named(ui.select({}, label="Program", on_change=self._open), "script")
+            self._choice.classes("col").props("dense options-dense")
+            self._choice.tooltip("Your programs in the desk's folder, and examples that come with KiKS")
             icon_button("note_add", "New program", "new-program", self._new).tooltip("Write a new program")
         with ui.row().classes("w-full items-end no-wrap gap-2"):
-            self._robot = ui.select({1: "robot 1"}, value=1, label="Runs on").props('dense data-testid="robot"')
-            self._robot.mark("robot").tooltip("The robot that answers on every port that the program opens")
-            self._arguments = ui.input("Arguments").classes("col").props('dense data-testid="arguments"')
-            self._arguments.mark("arguments").tooltip("Command-line arguments of the program; usually none")
-            run = ui.button("Run", icon="play_arrow", on_click=self._run).mark("run-program")
-            run.props('unelevated no-caps color=primary data-testid="run-program"')
+            self._robot = named(ui.select({1: "robot 1"}, value=1, label="Runs on"), "robot")
+            self._robot.props("dense").tooltip("The robot that answers on every port that the program opens")
+            self._arguments = named(ui.input("Arguments"), "arguments")
+            self._arguments.classes("col").props("dense").tooltip("Command-line arguments of the program; usually none")
+            run = named(ui.button("Run", icon="play_arrow", on_click=self._run), "run-program")
+            run.props("unelevated no-caps color=primary")
             run.tooltip("Save and run this program (Ctrl-Enter); first stops a program that runs on this robot")
         # Here, the page's shortcut keys (space, .) are text.
         with ui.element("div").classes("w-full").on("keydown", js_handler="(event) => event.stopPropagation()"):
-            self._editor = (
-                ui.codemirror(
-                    NEW,
-                    language="Python",
-                    theme="basicLight",
-                    on_change=self._note_draft,
-                    keymap={"Ctrl-Enter": self._run, "Cmd-Enter": self._run},
-                )
-                .classes("w-full")
-                .style("height: 38vh; border: 1px solid currentcolor")
-                .props('data-testid="editor"')
-                .mark("editor")
-            )
-        self._mistake = (
-            ui.label().classes("program-error text-body2").props('role="alert" data-testid="mistake"').mark("mistake")
-        )
+            keys: dict[str, Any] = {"Ctrl-Enter": self._run, "Cmd-Enter": self._run}
+            self._editor = ui.codemirror(NEW, language="Python", theme="basicLight", keymap=keys)
+            named(self._editor, "editor").on_value_change(self._note_draft)
+            self._editor.classes("w-full").style("height: 38vh; border: 1px solid currentcolor")
+        self._mistake = named(ui.label().classes("program-error text-body2").props("role=alert"), "mistake")
         with ui.row().classes("w-full items-end no-wrap gap-2"):
-            self._name = ui.input("Saved as", value="mine.py").classes("col").props('dense data-testid="name"')
-            self._name.mark("name").tooltip(
-                "The file in the desk's folder in which the program is saved before it runs"
-            )
-            save = ui.button("Save", on_click=self._save).props('flat no-caps data-testid="save-program"')
-            save.mark("save-program").tooltip("Save the program in the desk's folder")
+            self._name = named(ui.input("Saved as", value="mine.py"), "name").classes("col").props("dense")
+            self._name.tooltip("The file in the desk's folder in which the program is saved before it runs")
+            save = named(ui.button("Save", on_click=self._save), "save-program").props("flat no-caps")
+            save.tooltip("Save the program in the desk's folder")
         self._offer()
-        example = next(script for script in offered(self._desk.folder) if script.is_example)
-        self._choice.value = next((s for s in self._choice.options if s.name == "first_steps.py"), example)
+        self._choice.value = next(script for script in self._choice.options if script.name == "first_steps.py")
         ui.timer(0, self._dress_editor, once=True)
         ui.on("desk-dark", lambda event: self._set_theme(bool(event.args)))
 

@@ -6,10 +6,9 @@ from collections.abc import Awaitable, Callable
 from pathlib import Path
 
 from nicegui import ui
-from nicegui.element import Element
 from nicegui.events import KeyEventArguments
 
-from kiks.desk.panels.widgets import icon_button, told, with_props
+from kiks.desk.panels.widgets import FeedElement, icon_button, named, told, with_props
 from kiks.desk.server.desk import Desk
 from kiks.units import clock_text
 
@@ -41,17 +40,8 @@ BY_PROGRAMS = (
 )
 
 
-class TimeSlider(Element, component=_WEB / "time_bar.js", esm={"kiks-desk": str(_WEB)}):
-    """The slider of the time bar.
-
-    Args:
-        feed: Address of the WebSocket that frames come from, seen from the page; all its components share one.
-    """
-
-    def __init__(self, feed: str = "/desk/feed") -> None:
-        super().__init__()
-        ui.add_css(_WEB / "time_bar.css")
-        self._props["feed"] = feed
+class TimeSlider(FeedElement, component=_WEB / "time_bar.js", esm={"kiks-desk": str(_WEB)}):
+    """The slider of the time bar."""
 
 
 class TimeBar:
@@ -67,7 +57,7 @@ class TimeBar:
         looking = desk.looking
         self._keys: dict[str, Callable[[], Awaitable[None]]] = {}
         with ui.element("div").classes("desk-bar").props('role="group" aria-label="Time bar"') as self._bar:
-            TimeSlider(feed)
+            TimeSlider(feed, _WEB / "time_bar.css")
             with ui.row().classes("desk-bar-buttons items-center no-wrap gap-1"):
                 self._add("first_page", "Event before", "event-before", "u", lambda: self._jump(is_before=True))
                 self._add("keyboard_double_arrow_left", "1 s back", "back-long", "J", lambda: looking.move_by(-LONG_S))
@@ -82,11 +72,8 @@ class TimeBar:
                     self._add("last_page", "Event after", "event-after", "o", lambda: self._jump(is_before=False)),
                 ]
                 self._state = ui.label().classes("desk-bar-state q-ml-sm").props("data-testid=bar-state")
-                self._event = (
-                    ui.label()
-                    .classes("desk-bar-event col ellipsis text-caption")
-                    .props('aria-live=polite data-testid="bar-event"')
-                )
+                self._event = ui.label().classes("desk-bar-event col ellipsis text-caption")
+                named(self._event, "bar-event").props("aria-live=polite")
                 self._now = _long_button("Back to now", "update", "back-to-now", self._back_to_now)
                 self._now.tooltip("Show the present world again; it goes on as if nothing had been")
                 self._branch = _long_button("Go on from here", "call_split", "go-on-from-here", self._ask)
@@ -220,4 +207,4 @@ class TimeBar:
 def _long_button(text: str, icon: str, name: str, act: Callable[[], Awaitable[None]]) -> ui.button:
     """Build a button whose text goes where there is no room for it."""
     button = ui.button(text, icon=icon, on_click=act).props('dense no-caps padding="3px 10px"')
-    return with_props(button, aria_label=text, data_testid=name).classes("desk-bar-long").mark(name)
+    return named(with_props(button, aria_label=text), name).classes("desk-bar-long")

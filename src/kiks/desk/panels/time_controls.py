@@ -5,26 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 
 from nicegui import ui
-from nicegui.element import Element
 from nicegui.events import KeyEventArguments
 
-from kiks.desk.panels.widgets import BAR, icon_button, told, with_props
+from kiks.desk.panels.widgets import BAR, FeedElement, icon_button, told, with_props
 from kiks.desk.server.desk import Desk
 
 _WEB = Path(__file__).parents[1] / "web"
 
 
-class ClockView(Element, component=_WEB / "clock_view.js", esm={"kiks-desk": str(_WEB)}):
-    """The simulated clock and its speed.
-
-    Args:
-        feed: Address of the WebSocket that frames come from, seen from the page; all its components share one.
-    """
-
-    def __init__(self, feed: str = "/desk/feed") -> None:
-        super().__init__()
-        ui.add_css(_WEB / "clock_view.css")
-        self._props["feed"] = feed
+class ClockView(FeedElement, component=_WEB / "clock_view.js", esm={"kiks-desk": str(_WEB)}):
+    """The simulated clock and its speed."""
 
 
 SPEEDS: dict[float, str] = {
@@ -77,7 +67,7 @@ class TimePanel:
         self._speed = _select(SPEEDS, self._shown_speed(), "Speed of time", "speed", "8.5rem")
         self._speed.on_value_change(self._set_speed)
         self._speed.tooltip("Simulated time per real time; it never changes what robots do")
-        ClockView(feed)
+        ClockView(feed, _WEB / "clock_view.css")
         icon_button("bookmark_add", "Checkpoint", "mark", self._mark, look=BAR).tooltip(
             "Checkpoint: remember where everything stands"
         )

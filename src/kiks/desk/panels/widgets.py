@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Awaitable, Callable
+from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
 from nicegui import ui
+from nicegui.element import Element
 
 from kiks.errors import KiksError
 
@@ -40,12 +42,37 @@ def with_props(element: Some, **texts: str) -> Some:
     return element
 
 
+def named(element: Some, name: str) -> Some:
+    """Give an element its name for tests, in a browser and without one."""
+    return with_props(element, data_testid=name).mark(name)
+
+
+def log_box(lines_max: int, height: str, name: str, label: str) -> ui.log:
+    """Build a box of lines; `label` is its accessible name."""
+    box = ui.log(max_lines=lines_max).classes("w-full text-caption").style(f"height: {height}")
+    return named(with_props(box, aria_label=label), name)
+
+
+class FeedElement(Element):
+    """An element that is drawn from frames.
+
+    Args:
+        feed: Address of the WebSocket that frames come from, seen from the page; all elements of a page share one.
+        style: Its style sheet.
+    """
+
+    def __init__(self, feed: str, style: Path) -> None:
+        super().__init__()
+        ui.add_css(style)
+        self._props["feed"] = feed
+
+
 def icon_button(
     icon: str, label: str, name: str, act: Callable[..., Any] | None = None, *, look: str = "flat round dense"
 ) -> ui.button:
     """Build a button with an icon alone; `label` is its accessible name."""
     button = ui.button(icon=icon, on_click=act).props(look)
-    return with_props(button, aria_label=label, data_testid=name).mark(name)
+    return named(with_props(button, aria_label=label), name)
 
 
 def offer_robots(choice: ui.select, count: int) -> None:
@@ -58,4 +85,4 @@ def offer_robots(choice: ui.select, count: int) -> None:
 def text_button(text: str, icon: str, name: str, tip: str, act: Callable[..., Any]) -> ui.button:
     """Build a button with an icon, a text (possibly empty) and a tooltip."""
     button = ui.button(text, icon=icon, on_click=act).props('dense no-caps outline padding="4px 10px"')
-    return with_props(button, aria_label=text or tip, data_testid=name).mark(name).tooltip(tip)
+    return named(with_props(button, aria_label=text or tip), name).tooltip(tip)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from nicegui import ui
 
 from kiks.desk.panels.console import ConsolePanel
-from kiks.desk.panels.widgets import icon_button, offer_robots, with_props
+from kiks.desk.panels.widgets import icon_button, log_box, named, offer_robots, with_props
 from kiks.desk.server.desk import Desk
 from kiks.sim.wire import Wire
 from kiks.sim.wire_log import Piece, TimeShares, WireLog
@@ -60,33 +60,19 @@ class WirePanel:
         ui.add_css(CSS)
         with ui.column().classes("w-full q-pa-sm gap-2"):
             with ui.row().classes("w-full items-end no-wrap gap-2"):
-                self._robot = (
-                    ui.select({1: "robot 1"}, value=1, label="Line of", on_change=self.refresh)
-                    .classes("col")
-                    .props('dense options-dense data-testid="wire-robot"')
-                    .mark("wire-robot")
-                    .tooltip("The robot whose line is shown, and that gets your commands")
-                )
-                self._filter = (
-                    ui.input("Only with", on_change=self._show_again)
-                    .classes("col")
-                    .props('dense clearable debounce=300 data-testid="wire-filter"')
-                    .mark("wire-filter")
-                    .tooltip("Show only rows that contain this text, such as N or z,")
-                )
+                self._robot = ui.select({1: "robot 1"}, value=1, label="Line of", on_change=self.refresh)
+                named(self._robot, "wire-robot").classes("col").props("dense options-dense")
+                self._robot.tooltip("The robot whose line is shown, and that gets your commands")
+                self._filter = named(ui.input("Only with", on_change=self._show_again), "wire-filter")
+                self._filter.classes("col").props("dense clearable debounce=300")
+                self._filter.tooltip("Show only rows that contain this text, such as N or z,")
                 self._hold = icon_button("pause", "Hold the list", "wire-hold", self._toggle_hold)
                 with self._hold:
                     self._hold_tip = ui.tooltip("Hold the list to read it; nothing is lost")
                 icon_button("delete_sweep", "Clear the list", "wire-clear", self._clear).tooltip(
                     "Clear the list; this does not affect the robot or the program"
                 )
-            self._rows = (
-                ui.log(max_lines=ROWS)
-                .classes("w-full text-caption")
-                .style("height: 16rem")
-                .props('data-testid="wire" aria-label="Traffic on the line"')
-                .mark("wire")
-            )
+            self._rows = log_box(ROWS, "16rem", "wire", "Traffic on the line")
             self._build_bar()
             self._console = ConsolePanel(desk, lambda: self._robot.value or 1)
         self._timer = ui.timer(REFRESH_S, self.refresh)
@@ -95,20 +81,14 @@ class WirePanel:
     def _build_bar(self) -> None:
         with ui.row().classes("w-full items-center no-wrap"):
             ui.label("Where the milliseconds went in").classes("text-subtitle2")
-            self._window = (
-                ui.select(WINDOWS, value=1)
-                .props('dense options-dense borderless aria-label="Window of time" data-testid="wire-window"')
-                .tooltip("How far back the bar looks, in simulated time")
-            )
+            self._window = named(ui.select(WINDOWS, value=1), "wire-window")
+            self._window.props('dense options-dense borderless aria-label="Window of time"')
+            self._window.tooltip("How far back the bar looks, in simulated time")
         self._parts: dict[str, tuple[ui.element, ui.label, ui.label]] = {}
         bars: dict[str, tuple[ui.element, ui.label]] = {}
         labels: dict[str, ui.label] = {}
-        with (
-            ui.row()
-            .classes("w-full no-wrap gap-0 wire-bar text-caption")
-            .props('role="img" data-testid="wire-bar"')
-            .mark("wire-bar") as self._bar
-        ):
+        self._bar = named(ui.row().classes("w-full no-wrap gap-0 wire-bar text-caption").props("role=img"), "wire-bar")
+        with self._bar:
             for name in PARTS:
                 with ui.element("div").classes(f"wire-{name}").style("width: 0") as bar:
                     bars[name] = bar, ui.label()
@@ -116,7 +96,7 @@ class WirePanel:
             for name, (word, meaning) in PARTS.items():
                 with ui.row().classes("items-center gap-1 no-wrap"):
                     ui.element("span").classes(f"wire-part wire-{name}").props("aria-hidden=true")
-                    labels[name] = with_props(ui.label(word).mark(f"share-{name}"), data_testid=f"share-{name}")
+                    labels[name] = named(ui.label(word), f"share-{name}")
                     ui.tooltip(meaning)
         for name in PARTS:
             self._parts[name] = *bars[name], labels[name]

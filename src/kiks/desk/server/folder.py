@@ -7,7 +7,7 @@ from pathlib import Path, PurePosixPath
 from kiks.errors import ArenaError, ParameterError
 from kiks.model.arena import Arena
 from kiks.model.arena_file import decode_arena
-from kiks.model.atomic_files import check_relative, inside, replace_file
+from kiks.model.atomic_files import check_relative, ending_of, inside, replace_file
 from kiks.model.kad import decode_kad, encode_kad
 from kiks.model.picture import decode_picture
 from kiks.model.project import Project
@@ -156,8 +156,7 @@ def check_name(name: str, endings: tuple[str, ...]) -> None:
                 f"The name must begin with a letter or digit, have at most {_NAME_MAX} characters and not be that of a "
                 f"device, but it was {name!r}. Choose another one."
             )
-    if PurePosixPath(name).suffix.lower() not in endings:
-        raise ParameterError(f"The name must end in one of {', '.join(endings)}, but it was {name!r}.")
+    ending_of(name, "The name", endings)
 
 
 def encode(project: Project, name: str) -> bytes:
@@ -181,9 +180,7 @@ def decode(name: str, data: bytes) -> Project:
         ArenaError: If the file is too large, damaged, or of another kind.
     """
     path = PurePosixPath(name.replace("\\", "/"))
-    ending, stem = path.suffix.lower(), path.stem[:_NAME_MAX] or "arena"
-    if ending not in OPENED:
-        raise ParameterError(f"A file must end in one of {', '.join(OPENED)}, but it was {path.name[:_NAME_MAX]!r}.")
+    ending, stem = ending_of(path.name[-_NAME_MAX:], "A file", OPENED), path.stem[:_NAME_MAX] or "arena"
     if len(data) > UPLOAD_BYTES_MAX:
         raise ArenaError(
             f"A file must have at most {UPLOAD_BYTES_MAX >> 20} MiB, but it has {len(data) / 2**20:.1f}. "
