@@ -220,8 +220,8 @@ def test_arenas_must_hold_as_many_bodies() -> None:
         ({"parameters": [[1.0, np.nan]]}, "must be finite"),
         ({"parameters": np.zeros((3, 2))}, r"parameters must be \[parameter\]"),
         ({"seconds": -1}, "seconds must be"),
-        ({"controller": 5}, "controller must be one that"),
-        ({"measures": [5]}, "measures must be made by"),
+        ({"controller": 5}, "controller must be a kiks.Controller"),
+        ({"measures": [5]}, "each of measures must be a kiks.Measure"),
     ],
 )
 def test_a_run_rejects_wrong_arguments(arguments: dict[str, Any], words: str) -> None:
@@ -239,7 +239,7 @@ def light_only(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
     ("controllers", "parameters", "words"),
     [
         ([vehicle], [[1.0, 0.0]], "or a list of 2, one for each robot of a world, but it was a list of 1"),
-        ([vehicle, 5], [[1.0, 0.0]] * 2, "controller must be one that"),
+        ([vehicle, 5], [[1.0, 0.0]] * 2, "controller must be a kiks.Controller"),
         ([vehicle, light_only], [[1.0, 0.0], []], "'light_only' senses ambient where another senses proximity"),
         ([vehicle, vehicle], [1.0, 0.0, 2.0], "a list with those of each of the 2 controllers"),
         ([vehicle, vehicle], [[1.0, 0.0], [1.0]], "must be given 2 parameters"),

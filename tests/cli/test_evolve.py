@@ -54,7 +54,7 @@ def test_a_run_leaves_its_files_and_goes_on(folder: Path) -> None:
     again = kiks(*words).output
     assert "Finals" not in again
     assert again.splitlines()[-5:] == said.splitlines()[-6:-1]
-    with pytest.raises(KiksError, match="must hold the same evolution, but its seed is 1, not 2"):
+    with pytest.raises(KiksError, match="must have the same seed, but they have 1 and 2"):
         kiks("evolve", task, "--seed", 2, "--population", 8, "--generations", 4, "--out", folder)
 
 

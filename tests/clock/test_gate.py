@@ -225,7 +225,7 @@ def test_several_drags_of_all_kinds() -> None:
         drags.grab("b", "body", 0)
     assert not drags.holds("lamp", 0)
     for what, index in (("robot", 2), ("robot", -1), ("floor", 0), ("lamp", True + 1)):
-        with pytest.raises(ParameterError, match="a hand must take one of"):
+        with pytest.raises(ParameterError, match="a hand "):
             drags.grab("a", what, index)
     assert drags.are_empty
 

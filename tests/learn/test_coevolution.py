@@ -19,7 +19,7 @@ from tests.at_length import at_length
 import kiks
 from kiks import ParameterError
 from kiks.client.drive import Driver
-from kiks.learn.candidate_worlds import starts_of
+from kiks.learn.candidate_worlds import spread_starts
 from kiks.learn.coevolution import _SQUARE_SEED, TOURNAMENT_SEED, Tournament, latin_square
 from kiks.learn.fingerprint import differing
 from kiks.learn.generation_loop import seed_for
@@ -116,7 +116,7 @@ def test_starts_are_apart_and_the_same_for_the_same_seed() -> None:
 def test_a_contest_on_the_wire_equals_that_of_the_batch() -> None:
     contest, seed = small(seconds=5.0), 7
     pair = pairs_of(contest, 1)
-    starts = starts_of(np.array([seed]), contest.arenas, 1, radius_mm=27.5, robots=2, apart_mm=contest.apart_mm)
+    starts = spread_starts(contest.arenas, 1, seed=seed, radius_mm=27.5, robots=2, apart_mm=contest.apart_mm)
     batch = kiks.Batch(contest.arenas[0], 1, robots=2, seed=seed, starts=starts, timing=contest.timing)
     batch.run(contest.controllers, contest.parameters_of(pair), seconds=5.0)
     room = replace(contest.arenas[0], starts=tuple(Pose(*pose) for pose in starts[0].tolist()))
@@ -255,8 +255,8 @@ def test_a_killed_coevolution_loses_at_most_the_current_generation(tmp_path: Pat
 def test_a_folder_of_another_coevolution_is_an_error(tmp_path: Path) -> None:
     run(tmp_path)
     for given, message in (
-        ({"seed": 4}, "its seed is 3, not 4"),
-        ({"opponents": 4}, "its algorithm is 'ga, 3 opponents', not 'ga, 4 opponents'"),
+        ({"seed": 4}, "the same seed, but they have 3 and 4"),
+        ({"opponents": 4}, "they have 'ga, 3 opponents' and 'ga, 4 opponents'"),
         ({"contest": small(seconds=3.0)}, "but these differ: seconds"),
     ):
         options: dict[str, Any] = {"contest": small(), "seed": 3, "population": 6, "opponents": 3} | given

@@ -115,7 +115,7 @@ def test_the_log_has_a_row_for_each_evaluation(tmp_path: Path) -> None:
 
 def test_a_folder_of_another_evolution_is_an_error(tmp_path: Path) -> None:
     run("cma", tmp_path)
-    with pytest.raises(ParameterError, match="must hold the same evolution, but its seed is 3, not 4"):
+    with pytest.raises(ParameterError, match="must have the same seed, but they have 3 and 4"):
         kiks.Evolution(small(), "cma", population=8, seed=4, folder=tmp_path)
     with pytest.raises(ParameterError, match="but these differ: seconds"):
         kiks.Evolution(small(seconds=2.0), "cma", population=8, seed=3, folder=tmp_path)
@@ -226,7 +226,7 @@ def test_an_object_with_ask_and_tell_is_an_algorithm(tmp_path: Path) -> None:
     best = evolution.generations[0].candidates[evolution.generations[0].fitness.argmax()]
     assert (evolution.generations[1].candidates[8:] == best).all()
     assert candidates_of(kiks.Evolution(small(), Own(), folder=tmp_path)) == candidates_of(evolution)
-    with pytest.raises(ParameterError, match="algorithm is 'Own', not 'OwnWithFavourite'"):
+    with pytest.raises(ParameterError, match="algorithm, but they have 'Own' and 'OwnWithFavourite'"):
         kiks.Evolution(small(), OwnWithFavourite(), folder=tmp_path)
     edited = type("Own", (Own,), {"tell": lambda self, fitness, behaviours: None})
     with pytest.raises(ParameterError, match="but these differ: algorithm"):

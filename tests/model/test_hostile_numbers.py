@@ -410,5 +410,5 @@ def test_a_checkpoint_cannot_be_written_to() -> None:
     with pytest.raises(ValueError, match="read-only"):
         saved.bodies["holder"] = 99
     sim.reset(saved)
-    with pytest.raises(KiksError, match=r"checkpoint must be what checkpoint\(\) has returned, but it was 3"):
+    with pytest.raises(KiksError, match=r"checkpoint must be a kiks.Checkpoint, but it was 3"):
         sim.reset(3)  # type: ignore[arg-type]

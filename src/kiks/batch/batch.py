@@ -31,7 +31,7 @@ from kiks.engine.state import State
 from kiks.errors import ParameterError, counted, shown
 from kiks.model.arena import Arena
 from kiks.model.array_checks import array_of, check_numbers
-from kiks.model.checks import SECONDS_MAX, check_count, check_number
+from kiks.model.checks import SECONDS_MAX, check_count, check_kind, check_number
 from kiks.model.robot import RobotSpec
 from kiks.units import NS_PER_S, ns_from_s
 
@@ -119,9 +119,7 @@ class Batch:
         threads: int | None = None,
     ) -> None:
         self._lock = threading.RLock()
-        self.timing = Timing() if timing is None else timing
-        if not isinstance(self.timing, Timing):
-            raise ParameterError(f"timing must be a kiks.Timing, but it was {shown(timing)}.")
+        self.timing = Timing() if timing is None else check_kind("timing", timing, Timing)
         self._initial_state = initial = InitialState(arena, worlds, robot, robots, response)
         self.arenas, self.arena_indices = initial.arenas, initial.arena_indices
         self.specs, self.networks = initial.specs, initial.networks
@@ -129,7 +127,7 @@ class Batch:
         self.threads = check_count("threads", (os.cpu_count() or 1) if threads is None else threads, 1, 4096)
         self.senses = check_senses(senses)
         self.state = initial.state
-        self._lamps = initial.lamps.copy()
+        self._lamps = initial.lamps[self.arena_indices]
         self.seeds = initial.seeds_of(seed)
         self._starts = initial.starts_of(self.seeds, starts)
         scene = Scene(self.state, initial.kinds, self.arenas, self.networks, self._lamps, self.seeds)
@@ -200,6 +198,12 @@ class Batch:
         return Rollouts(watching.values(worlds.notes), worlds.steps.copy(), names)
 
     # ---- step by step ----
+
+    @_alone
+    def take_arenas(self, worlds: NDArray[np.int64], arenas: Sequence[int]) -> None:
+        """Give worlds other arenas of the batch, by their indices, with the lamps of these; `reset` begins there."""
+        self.arena_indices[worlds] = arenas
+        self._lamps[worlds] = self._initial_state.lamps[arenas]
 
     @_alone
     def reset(

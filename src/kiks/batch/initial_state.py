@@ -16,9 +16,9 @@ from kiks.engine.state import State
 from kiks.errors import ParameterError, shown
 from kiks.model.arena import AnArena, Arena
 from kiks.model.array_checks import check_numbers
-from kiks.model.checks import HEADING_KEPT_RAD, ROBOTS_MAX, check_count, wrapped
+from kiks.model.checks import ROBOTS_MAX, check_count
 from kiks.model.data_file import OneOf
-from kiks.model.robot import RobotSpec
+from kiks.model.robot import RobotSpec, specs_of
 from kiks.sim.simulation import Simulation, check_kinds
 
 ARENAS_LIMIT = 10_000
@@ -61,7 +61,7 @@ class InitialState:
         kinds: Their constants, records of `PARAMETERS`, shape [kind].
         networks: The tables for their responses (`kiks.engine.sensing.thesis_networks`).
         state: A state with room for all worlds.
-        lamps: The lamps, float64 [world, lamp, 4]; arenas with fewer lamps are padded with lamps that are off.
+        lamps: The lamps of each arena, float64 [arena, lamp, 4]; where there are fewer, the others are off.
 
     Raises:
         ParameterError: If an argument is out of range.
@@ -99,9 +99,9 @@ class InitialState:
         self.state = State.empty(world_count=worlds, robot_count=robots, body_count=body_counts.pop())
         self._kind_numbers = np.array([[numbers[spec] for spec in row] for row in named], np.int64)
         lamp_count = max(len(model.lamps) for model in self._models)
-        self.lamps = np.zeros((worlds, lamp_count, 4))
-        for index, model in enumerate(self._models):
-            self.lamps[self.arena_indices == index, : len(model.lamps)] = model.lamps
+        self.lamps = np.zeros((len(self.arenas), lamp_count, 4))
+        for lamps, model in zip(self.lamps, self._models, strict=True):
+            lamps[: len(model.lamps)] = model.lamps
 
     def _check_firmware(self) -> None:
         """Raise a ParameterError unless all kinds take the same time on the line."""
@@ -191,9 +191,6 @@ class InitialState:
             state.bodies[here] = model.world.state.bodies[0]
         robots: Any = state.robots[worlds]
         robots["kind"] = self._kind_numbers[np.minimum(worlds, len(self._kind_numbers) - 1)]
-        if (np.abs(starts[:, :, 2]) > HEADING_KEPT_RAD).any():
-            starts = starts.copy()
-            starts[:, :, 2] = np.vectorize(wrapped, [float])(starts[:, :, 2])
         for axis, name in enumerate(("x_mm", "y_mm", "heading_rad")):
             robots[name] = starts[:, :, axis]
         robots["start_x_mm"], robots["start_y_mm"] = starts[:, :, 0], starts[:, :, 1]
@@ -210,27 +207,15 @@ def _kinds_of(
         ParameterError: If one is no kind, or their number is not that of the worlds or robots.
     """
 
-    def spec_of(kind: Any) -> RobotSpec:
-        check_kinds(kind, response)
-        spec = kind if isinstance(kind, RobotSpec) else RobotSpec.load(kind)
-        return spec if response is None else spec.with_changes(proximity__response=response)
-
     def row_of(row: Any) -> tuple[RobotSpec, ...]:
-        if isinstance(row, str | RobotSpec):
-            return (spec_of(row),) * robots
-        if not isinstance(row, Sequence):
-            raise ParameterError(f"robot must name the robots of each world, but one of its entries was {shown(row)}.")
-        if len(row) != robots:
-            raise ParameterError(f"robot must name {robots} robots for a world, but it named {len(row)}.")
-        return tuple(spec_of(each) for each in row)
+        check_kinds(row, response)
+        return tuple(specs_of(row, robots, response))
 
     if isinstance(robot, str | RobotSpec):
         return [row_of(robot)]
-    if not isinstance(robot, Sequence):
-        raise ParameterError(f"robot must name one kind for all, or one for each world, but it was {shown(robot)}.")
-    if len(robot) != worlds:
+    if not isinstance(robot, Sequence) or len(robot) != worlds:
         raise ParameterError(
-            f"robot must name one kind for all, or one for each of {worlds} worlds, but it named {len(robot)}."
+            f"robot must name one kind for all, or one for each of {worlds} worlds, but it was {shown(robot)}."
         )
     return [row_of(row) for row in robot]
 

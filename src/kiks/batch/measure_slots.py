@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from kiks.batch.callbacks import watchers_of
 from kiks.control.measure import Measure
 from kiks.errors import ParameterError, shown
+from kiks.model.checks import check_kind
 
 
 class MeasureSlots:
@@ -35,11 +36,7 @@ class MeasureSlots:
             raise ParameterError(f"measures must be a list of measures, but they were {shown(measures)}.")
         self.measures = tuple(measures)
         for each in self.measures:
-            if not isinstance(each, Measure):
-                raise ParameterError(
-                    "measures must be made by @kiks.measure or be some of kiks.measures, but "
-                    f"{shown(each)} was among them."
-                )
+            check_kind("each of measures", each, Measure, "Take some of kiks.measures, or make one with @kiks.measure.")
             if tuple(senses[: len(each.senses)]) != each.senses:
                 raise ParameterError(
                     f"the measure {shown(each.name)} must find {' and '.join(each.senses)} first among what is "

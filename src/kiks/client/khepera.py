@@ -118,7 +118,7 @@ class Khepera:
 
     def set_encoders(self, left: int = 0, right: int = 0) -> None:
         """Set the position counters [pulses] (G). Numbers are rounded."""
-        self._command(_request("G", left, right))
+        self._command(b"G,%d,%d\n" % _whole(-(2**31), 2**31 - 1, left=left, right=right))
 
     def move_to(self, left: int, right: int, *, wait: bool = False, poll_s: float = 0.02) -> None:
         """Move the wheels to counter readings [pulses] along a trapezoid of speed (C). They are rounded.
@@ -135,7 +135,7 @@ class Khepera:
         """
         check_kind("wait", wait, bool)
         check_number("poll_s", poll_s, 0, SECONDS_MAX)
-        self._command(_request("C", left, right))
+        self._command(b"C,%d,%d\n" % _whole(-8388606, 8388606, left=left, right=right))
         end_s = self.time_s + ARRIVAL_MAX_S
         while wait and not all(motor.on_target for motor in self.status()):
             if self.time_s > end_s:
@@ -146,19 +146,20 @@ class Khepera:
 
     def set_profile(self, speed: int = 20, acceleration: int = 64) -> None:
         """Set the trapezoid of both wheels (J): speed [pulses/10 ms], acceleration [pulses/256 per (10 ms)^2]."""
-        self._command(_request("J", speed, acceleration, speed, acceleration))
+        profile = _whole(1, 127, speed=speed) + _whole(1, 255, acceleration=acceleration)
+        self._command(b"J,%d,%d,%d,%d\n" % (profile * 2))
 
     def set_pwm(self, left: int, right: int) -> None:
         """Set the PWM of the motors, -255 to 255, without a controller (P)."""
-        self._command(_request("P", left, right))
+        self._command(b"P,%d,%d\n" % _whole(-255, 255, left=left, right=right))
 
     def set_speed_gains(self, kp: int = 3800, ki: int = 800, kd: int = 100) -> None:
         """Set the gains of the speed controllers (A)."""
-        self._command(_request("A", kp, ki, kd))
+        self._command(b"A,%d,%d,%d\n" % _whole(0, 32767, kp=kp, ki=ki, kd=kd))
 
     def set_position_gains(self, kp: int = 3000, ki: int = 20, kd: int = 4000) -> None:
         """Set the gains of the position controllers (F)."""
-        self._command(_request("F", kp, ki, kd))
+        self._command(b"F,%d,%d,%d\n" % _whole(0, 32767, kp=kp, ki=ki, kd=kd))
 
     def status(self) -> tuple[Status, Status]:
         """Return the reports of the two controllers, left and right (K)."""
@@ -177,13 +178,16 @@ class Khepera:
 
     def analog(self, channel: int) -> int:
         """Return an analogue input [4 mV], channel 0 to 6 (I)."""
-        return self._query(_request("I", channel), 1)[0]
+        channel = check_count("channel", channel, 0, 6, "Channels 3 to 5 are inputs of the General I/O turret.")
+        return self._query(b"I,%d\n" % channel, 1)[0]
 
     # ---- other commands ----
 
     def led(self, led: int, action: int) -> None:
         """Switch an LED (L): 0 lateral, 1 frontal; 0 off, 1 on, 2 toggle."""
-        self._command(_request("L", led, action))
+        led = check_count("led", led, 0, 1, "0 is the lateral one, 1 the frontal one.")
+        action = check_count("action", action, 0, 2, "0 is off, 1 on, 2 toggle.")
+        self._command(b"L,%d,%d\n" % (led, action))
 
     def version(self) -> tuple[str, str]:
         """Return the versions of BIOS and protocol (B)."""
@@ -194,11 +198,12 @@ class Khepera:
 
     def read_bus(self, address: int) -> int:
         """Return a byte of the extension bus (R)."""
-        return self._query(_request("R", address), 1)[0]
+        return self._query(b"R,%d\n" % _address(address), 1)[0]
 
     def write_bus(self, data: int, address: int) -> None:
         """Write a byte to the extension bus (W)."""
-        self._command(_request("W", data, address))
+        data = check_count("data", data, 0, 255, "It is a byte.")
+        self._command(b"W,%d,%d\n" % (data, _address(address)))
 
     def turret(self, number: int, order: str) -> list[int]:
         """Pass an order such as 'N' or 'D,1' to a turret (T); return the values of its reply."""
@@ -302,44 +307,15 @@ class Khepera:
         )
 
 
-_GAINS = tuple((name, 0, 32767, "Usual gains are of some thousands.") for name in ("kp", "ki", "kd"))
-_PROFILE = (
-    ("speed", 1, 127, "Usual: 20 pulses/10 ms."),
-    ("acceleration", 1, 255, "Usual: 64 pulses/256 per (10 ms)^2."),
-)
-_ADDRESS = ("address", 0, 63, "The extension bus has 64 addresses.")
-
-
-def _wheels(least: int, most: int, advice: str) -> tuple[tuple[str, int, int, str], ...]:
-    return tuple((name, least, most, advice) for name in ("left", "right"))
-
-
-_ARGUMENTS: dict[str, tuple[tuple[str, int, int, str], ...]] = {
-    "A": _GAINS,
-    "C": _wheels(-8388606, 8388606, "A pulse is 0.08 mm."),
-    "F": _GAINS,
-    "G": _wheels(-(2**31), 2**31 - 1, "The counters have 32 bits."),
-    "I": (("channel", 0, 6, "Channels 3 to 5 are inputs of the General I/O turret."),),
-    "J": _PROFILE * 2,
-    "L": (
-        ("led", 0, 1, "0 is the lateral one, 1 the frontal one."),
-        ("action", 0, 2, "0 is off, 1 on, 2 toggle."),
-    ),
-    "P": _wheels(-255, 255, "255 is full power."),
-    "R": (_ADDRESS,),
-    "W": (("data", 0, 255, "It is a byte."), _ADDRESS),
-}
-"""The arguments of commands, with their ranges and advice. A robot cuts what is outside, or does not say what is."""
-
-
-def _request(letter: str, *numbers: float) -> bytes:
-    """Return the line of a command; all but numbers of things are rounded.
+def _whole(least: int, most: int, **numbers: float) -> tuple[int, ...]:
+    """Return numbers for a command, rounded. A robot cuts what is out of range, or does not say what is.
 
     Raises:
-        ParameterError: If a number is out of its range.
+        ParameterError: If one is out of range.
     """
-    check = check_count if letter in "ILRW" else check_number
-    words = [letter]
-    for number, (name, least, most, advice) in zip(numbers, _ARGUMENTS[letter], strict=True):
-        words.append(str(round(check(name, number, least, most, advice))))
-    return f"{','.join(words)}\n".encode()
+    return tuple(round(check_number(name, number, least, most)) for name, number in numbers.items())
+
+
+def _address(address: int) -> int:
+    """Return an address of the extension bus, checked."""
+    return check_count("address", address, 0, 63, "The extension bus has 64 addresses.")

@@ -10,6 +10,7 @@ from typing import NamedTuple, TextIO
 
 from kiks.client.khepera import Khepera, Status
 from kiks.errors import ParameterError, shown
+from kiks.model.checks import SECONDS_MAX, check_number
 from kiks.model.robot import SENSOR_COUNT
 
 RATE_MIN_HZ, RATE_MAX_HZ = 0.01, 100.0
@@ -71,15 +72,9 @@ def samples(robot: Khepera, *, rate_hz: float = 10.0, seconds: float | None = No
         ParameterError: If a number is out of range.
         LinkError: If the robot does not answer.
     """
-    if not (isinstance(rate_hz, int | float) and RATE_MIN_HZ <= rate_hz <= RATE_MAX_HZ):
-        raise ParameterError(
-            f"rate_hz must be between {RATE_MIN_HZ:g} and {RATE_MAX_HZ:g}, but it was {shown(rate_hz)}. "
-            "At 9600 baud about 6 are possible."
-        )
-    if seconds is not None and not (math.isfinite(seconds) and seconds > 0):
-        raise ParameterError(
-            f"seconds must be positive and finite, but it was {shown(seconds)}. Leave it out for no end."
-        )
+    rate_hz = check_number("rate_hz", rate_hz, RATE_MIN_HZ, RATE_MAX_HZ, "At 9600 baud about 6 are possible.")
+    if seconds is not None:
+        check_number("seconds", seconds, 1e-3, SECONDS_MAX, "Leave it out for no end.")
     return _samples(robot, 1.0 / rate_hz, math.inf if seconds is None else seconds)
 
 

@@ -115,16 +115,13 @@ class Compiled:
     def _code(self) -> Any:
         return self.function.__code__
 
-    def is_at(self, place: FrameSummary) -> bool:
-        """Return whether an error was raised in its own source."""
-        return (place.filename, place.name) == (self._code.co_filename, self.name)
-
 
 def explained(error: Exception, functions: Iterable[Compiled]) -> Exception:
     """Return the message for an error that one of some functions has raised; the error itself if none has."""
     place = traceback.extract_tb(error.__traceback__)[-1]
     users = [each for each in functions if not is_trusted(each.function)]
-    found = [each for each in users if each.is_at(place)] or users
+    own = [each for each in users if (each._code.co_filename, each.name) == (place.filename, place.name)]
+    found = own or users
     if not found or isinstance(error, KiksError):
         return error
     return found[0].refused(error) if type(error).__module__.startswith("numba.") else found[0].failed(error, place)

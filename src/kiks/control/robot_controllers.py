@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from kiks.control.controller import Controller
 from kiks.errors import ParameterError, shown
+from kiks.model.checks import check_kind
 
 
 class RobotControllers(NamedTuple):
@@ -93,11 +94,7 @@ def robot_controllers(given: Any, parameters: Any, world_count: int, robot_count
 
 
 def _check_controller(given: object) -> None:
-    if not isinstance(given, Controller):
-        raise ParameterError(
-            f"controller must be one that @kiks.controller has made, but it was {shown(given)}. "
-            "Write @kiks.controller over the function."
-        )
+    check_kind("controller", given, Controller, "Write @kiks.controller over the function.")
 
 
 def _parameters_of_all(

@@ -68,27 +68,14 @@ class CodeCache:
     def enable(self) -> None:
         """Do nothing; Numba asks for it."""
 
-    def disable(self) -> None:
-        """Do nothing; Numba asks for it."""
-
-    def flush(self) -> None:
-        """Do nothing; Numba asks for it."""
+    disable = flush = enable
 
     def load_overload(self, signature: Any, context: Any) -> Any:
         """Return what was compiled for a signature; None if it has to be compiled."""
         context.refresh()
         key = _key(signature, context.codegen())
         for path in _files(self._name):
-            try:
-                payload = _payload(path, key)
-            except _UnusableError as error:
-                if path.parent.parent != SHIPPED:
-                    _tell(error.text)
-                    if error.is_damaged:
-                        with _IfAllowed():
-                            path.unlink()
-                continue
-            if payload is not None:
+            if (payload := _payload(path, key)) is not None:
                 return _Result._rebuild(context, *payload)
         return None
 
@@ -168,43 +155,36 @@ def _key(signature: Any, codegen: Any) -> tuple[Any, ...]:
 
 def _files(name: str) -> Iterator[Path]:
     """Yield the files of a function."""
-    shipped = SHIPPED / _version()
-    for folder in (shipped, *cache_folders()) if _is_believed(shipped) else cache_folders():
+    for folder in (SHIPPED / _version(), *cache_folders()):
         found: list[Path] = []
         with _IfAllowed():
             found = sorted(folder.glob(f"{name}-*{_ENDING}"))
         yield from found
 
 
-class _UnusableError(Exception):
-    """A file that another user may have written, or one that is not as it was written."""
-
-    def __init__(self, text: str, *, is_damaged: bool) -> None:
-        self.text, self.is_damaged = text, is_damaged
-
-
 def _payload(path: Path, key: object) -> Any:
-    """Return what a file holds, None if it is of another key or cannot be read.
+    """Return what a file holds; None if it is of another key, cannot be read, or is not believed.
 
-    Raises:
-        _UnusableError: If another user may have written it, or it is damaged.
+    A damaged file is deleted, unless it came with KiKS.
     """
-    folder = str(path.parent)
+    folder, is_own = str(path.parent), path.parent.parent != SHIPPED
     with _IfAllowed(), open(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOFOLLOW), "rb") as file:
         if not (_is_safe(os.fstat(file.fileno())) and _is_believed(path.parent)):
-            raise _UnusableError(
-                f"The compiled engine must be in files that you alone can write, but others can write those in "
-                f"{folder!r}. It is compiled again; set NUMBA_CACHE_DIR to a folder of yours.",
-                is_damaged=False,
-            )
+            if is_own:
+                _tell(
+                    "The compiled engine must be in files that you alone can write, but others can write those in "
+                    f"{folder!r}. It is compiled again; set NUMBA_CACHE_DIR to a folder of yours."
+                )
+            return None
         line, _, rest = file.read().partition(b"\n")
         head = _HEAD.fullmatch(line)
         own_key, payload = (rest[: int(head[1])], rest[int(head[1]) :]) if head else (b"", b"")
-        if head is None or (_digest(own_key), _digest(payload)) != head.groups()[1:]:
-            text = f"Damaged files in {folder!r} are thrown away; what they held is compiled again."
-            raise _UnusableError(text, is_damaged=True)
-        # Only now it is sure that these are pickles of ours.
-        return pickle.loads(payload) if pickle.loads(own_key) == key else None
+        if head is not None and (_digest(own_key), _digest(payload)) == head.groups()[1:]:
+            # Only now it is sure that these are pickles of ours.
+            return pickle.loads(payload) if pickle.loads(own_key) == key else None
+        if is_own:
+            _tell(f"Damaged files in {folder!r} are thrown away; what they held is compiled again.")
+            path.unlink()
     return None
 
 

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import pickle
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import fields
-from typing import Any
+from dataclasses import fields, replace
+from typing import Any, Self
 
 import numpy as np
 
 from kiks.batch.initial_state import random_starts
 from kiks.errors import ParameterError, shown
-from kiks.learn.evaluation import Floats, Integers
+from kiks.learn.evaluation import Floats, Integers, check_candidates
 from kiks.learn.fingerprint import fingerprints
 from kiks.model.arena import Arena
+from kiks.model.checks import check_number
 
 Fitness = Callable[[Mapping[str, Floats]], Floats]
 
@@ -23,19 +24,88 @@ _UNCOUNTED = {"name", "about", "file", "algorithm", "population", "generations"}
 BATCH_WORLDS_MAX = 20_000
 """Largest number of worlds in a batch: more need more memory and run no faster."""
 
+SECONDS_MIN, SECONDS_MAX = 1e-3, 1e6
+"""Shortest and longest time for which candidates drive [s]."""
+
 CLEAR_MM = 8.0
 """Smallest gap between a random start and anything else [mm]."""
 
 
-def reduced_by_value(entry: Any) -> tuple[Any, ...]:
-    """Return what `__reduce__` returns of a record whose functions are pickled by value.
+class InWorlds:
+    """The common base of tasks and contests: records of which candidates are evaluated in batches of worlds."""
 
-    A worker on another computer does not have the user's file.
-    """
-    from numba import cloudpickle
+    apart_mm = CLEAR_MM
+    """Least distance between the edges of two robots at a random start [mm]."""
 
-    dumps: Any = cloudpickle.dumps
-    return _unpickled, (type(entry), dumps({each.name: getattr(entry, each.name) for each in fields(entry)}))
+    def __reduce__(self: Any) -> tuple[Any, ...]:
+        # Functions are pickled by value: a worker on another computer does not have the user's file.
+        from numba import cloudpickle
+
+        dumps: Any = cloudpickle.dumps
+        return _unpickled, (type(self), dumps({each.name: getattr(self, each.name) for each in fields(self)}))
+
+    def with_changes(self, **changes: Any) -> Self:
+        """Return a copy with some arguments changed.
+
+        Raises:
+            ParameterError: If an argument is out of range.
+        """
+        changed: Any = self
+        return replace(changed, **changes)  # type: ignore[no-any-return]
+
+    @property
+    def measure_names(self: Any) -> tuple[str, ...]:
+        """Names of the measures."""
+        return tuple(each.name for each in self.measures)
+
+    @property
+    def driven_s(self: Any) -> float:
+        """Total time for which the robots of a candidate drive [s]."""
+        return float(self.worlds * self.robots * self.seconds)
+
+    # ---- evaluation ----
+
+    def start_poses(self: Any, seeds: Integers) -> Floats | None:
+        """Return the starts of candidates with such seeds, float64 [candidate and world, robot, 3].
+
+        They are the same for the same seed; None for those of the arena.
+
+        Raises:
+            ParameterError: If an arena has too few free places.
+        """
+        if self.starts == "arena":
+            return None
+        given = {"radius_mm": max(spec.body.radius_mm for spec in self.specs), "apart_mm": self.apart_mm}
+        seen = dict.fromkeys(seeds.tolist())
+        poses = {seed: spread_starts(self.arenas, self.worlds, seed=seed, robots=self.robots, **given) for seed in seen}
+        return np.concatenate([poses[seed] for seed in seeds.tolist()])
+
+    def prepare(self: Any) -> None:
+        """Compile what users have written."""
+        self.evaluate(np.zeros((1, self.parameter_count)), np.zeros(1, np.int64), 1, seconds=SECONDS_MIN)
+
+    def evaluate(self: Any, candidates: Floats, seeds: Integers, threads: int, seconds: float | None = None) -> Floats:
+        """Return the values of candidates; a candidate of a contest is a pair.
+
+        Args:
+            candidates: Parameters [candidate, parameter].
+            seeds: A seed for each [candidate]: of its worlds and its starts.
+            threads: Number of threads.
+            seconds: Time for which they drive [s], if not that of the task.
+
+        Returns:
+            The values that `value_names` lists, the measures averaged over worlds, float64 [candidate, value].
+
+        Raises:
+            ParameterError: If candidates, seeds or a fitness have the wrong shape, or a measure or a fitness is not
+                finite.
+        """
+        candidates, seeds = check_candidates(candidates, seeds)
+        seconds = self.seconds if seconds is None else check_number("seconds", seconds, SECONDS_MIN, SECONDS_MAX)
+        size = max(1, BATCH_WORLDS_MAX // self.worlds)
+        parts = [slice(first, first + size) for first in range(0, len(candidates), size)]
+        values = [self._evaluate(candidates[part], seeds[part], threads, seconds) for part in parts]
+        return np.concatenate([np.empty((0, len(self.value_names))), *values])
 
 
 def _unpickled(kind: type[Any], pickled: bytes) -> Any:
@@ -64,12 +134,6 @@ def check_even(name: str, count: int, arenas: Sequence[Arena]) -> None:
         raise ParameterError(f"{name} must be a multiple of the number of arenas, {len(arenas)}, but it was {count}.")
 
 
-def batches_of(count: int, worlds: int) -> list[slice]:
-    """Return the candidates of each batch, of so many worlds each."""
-    size = max(1, BATCH_WORLDS_MAX // worlds)
-    return [slice(first, first + size) for first in range(0, count, size)]
-
-
 def spread_starts(
     arenas: Sequence[Arena], count: int, *, seed: int, radius_mm: float, robots: int = 1, apart_mm: float = CLEAR_MM
 ) -> Floats:
@@ -89,33 +153,6 @@ def spread_starts(
     given: dict[str, Any] = {"robots": robots, "radius_mm": radius_mm, "clear_mm": CLEAR_MM, "apart_mm": apart_mm}
     poses = [random_starts(arena, count // len(arenas), seed=seed, **given) for arena in arenas]
     return np.stack(poses, axis=1).reshape(count, robots, 3)
-
-
-def starts_of(
-    seeds: Integers,
-    arenas: Sequence[Arena],
-    worlds: int,
-    *,
-    radius_mm: float,
-    robots: int,
-    apart_mm: float = CLEAR_MM,
-) -> Floats:
-    """Return random start poses for candidates, float64 [candidate and world, robot, 3]: the same for the same seed.
-
-    Args:
-        seeds: A seed for each [candidate].
-        arenas: The arenas.
-        worlds: Number of worlds of a candidate.
-        radius_mm: Radius of a robot [mm].
-        robots: Number of robots in each world.
-        apart_mm: Least distance between the edges of two robots [mm].
-
-    Raises:
-        ParameterError: If an arena has too few free places.
-    """
-    given: dict[str, Any] = {"robots": robots, "radius_mm": radius_mm, "apart_mm": apart_mm}
-    poses = {seed: spread_starts(arenas, worlds, seed=seed, **given) for seed in dict.fromkeys(seeds.tolist())}
-    return np.concatenate([poses[seed] for seed in seeds.tolist()])
 
 
 def fitness_of(fitness: Fitness | None, measure_names: Sequence[str], values: Floats) -> Floats:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import field, replace
-from typing import Annotated, Any
+from dataclasses import field
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field
@@ -16,18 +16,16 @@ from kiks.control.measure import Measure
 from kiks.errors import ParameterError, shown
 from kiks.learn.candidate_worlds import (
     Fitness,
-    batches_of,
+    InWorlds,
     check_even,
     digest_of,
     fitness_of,
-    reduced_by_value,
-    starts_of,
 )
-from kiks.learn.evaluation import Floats, Integers, check_candidates
+from kiks.learn.evaluation import Floats, Integers
 from kiks.learn.task import MEASURES_MAX, SPREAD, WORLDS_MAX, Seconds
-from kiks.model.checks import ROBOTS_MAX, check_number
+from kiks.model.checks import ROBOTS_MAX
 from kiks.model.data_file import Number, Rule, Text, Whole, record
-from kiks.model.robot import RobotSpec
+from kiks.model.robot import RobotSpec, specs_of
 
 POPULATION, GENERATIONS = 100, 100
 """Default number of candidates of a side, and of generations: those of Floreano and Nolfi (1997)."""
@@ -73,7 +71,7 @@ class Side:
 
 
 @record
-class Contest:
+class Contest(InWorlds):
     """A contest of two sides: a `kiks.learn.evaluation.Evaluation` of pairs.
 
     A candidate of the evaluation is a pair: the parameters of the first side's controller, then those of the second
@@ -134,27 +132,11 @@ class Contest:
             if len(set(names)) != len(names):
                 raise ParameterError(f"{what} must have different names, but they were {shown(names)}.")
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        return reduced_by_value(self)
-
-    def with_changes(self, **changes: Any) -> Contest:
-        """Return a copy with some arguments changed.
-
-        Raises:
-            ParameterError: If an argument is out of range.
-        """
-        return replace(self, **changes)
-
     @property
     def side_names(self) -> tuple[str, str]:
         """Names of the sides."""
         first, second = self.sides
         return first.name, second.name
-
-    @property
-    def measure_names(self) -> tuple[str, ...]:
-        """Names of the measures."""
-        return tuple(each.name for each in self.measures)
 
     @property
     def value_names(self) -> tuple[str, ...]:
@@ -172,9 +154,19 @@ class Contest:
         return [side.robot for side in self.sides for _ in range(side.robots)]
 
     @property
-    def driven_s(self) -> float:
-        """Total time for which the robots of a pair drive [s]."""
-        return self.worlds * len(self.controllers) * self.seconds
+    def specs(self) -> list[RobotSpec]:
+        """What each robot of a world is."""
+        return specs_of(self.robot_kinds, None, None)
+
+    @property
+    def robots(self) -> int:
+        """Number of robots in a world."""
+        return len(self.robot_kinds)
+
+    @property
+    def parameter_count(self) -> int:
+        """Number of parameters of a pair."""
+        return sum(side.parameter_count for side in self.sides)
 
     def parameters_of(self, pairs: Floats) -> list[Floats]:
         """Return the parameters of each robot of a world, float64 [..., parameter] of pairs [..., parameter]."""
@@ -186,63 +178,18 @@ class Contest:
         """Return the fingerprint of each argument on which values depend, by its name, as `Task.digest` does."""
         return digest_of(self, sides=[vars(side) | {"robot": RobotSpec.load(side.robot)} for side in self.sides])
 
-    # ---- evaluation ----
-
-    def prepare(self) -> None:
-        """Compile the controllers and the measures."""
-        parameter_count = sum(side.parameter_count for side in self.sides)
-        self.evaluate(np.zeros((1, parameter_count)), np.zeros(1, np.int64), 1, seconds=self.timing.period_s)
-
-    def start_poses(self, seeds: Integers) -> Floats | None:
-        """Return the starts of pairs with such seeds, float64 [pair and world, robot, 3]; None for those of the arena.
-
-        Raises:
-            ParameterError: If an arena has too few free places.
-        """
-        if self.starts == "arena":
-            return None
-        kinds = self.robot_kinds
-        radius_mm = max(RobotSpec.load(kind).body.radius_mm for kind in kinds)
-        return starts_of(
-            seeds, self.arenas, self.worlds, radius_mm=radius_mm, robots=len(kinds), apart_mm=self.apart_mm
-        )
-
-    def evaluate(self, candidates: Floats, seeds: Integers, threads: int, seconds: float | None = None) -> Floats:
-        """Return the values of pairs.
-
-        Args:
-            candidates: Parameters of pairs [pair, parameter].
-            seeds: A seed for each [pair]: of its worlds and its starts.
-            threads: Number of threads.
-            seconds: Time for which they drive [s], if not that of the contest.
-
-        Returns:
-            The values that `value_names` lists, the measures averaged over worlds, float64 [pair, value].
-
-        Raises:
-            ParameterError: If pairs, seeds or a fitness have the wrong shape, or a measure or a fitness is not finite.
-        """
-        candidates, seeds = check_candidates(candidates, seeds)
-        parameter_count = sum(side.parameter_count for side in self.sides)
-        if candidates.shape[1] != parameter_count:
+    def _evaluate(self, pairs: Floats, seeds: Integers, threads: int, seconds: float) -> Floats:
+        if pairs.shape[1] != self.parameter_count:
             counts = " and ".join(f"{side.parameter_count} of the {side.name}" for side in self.sides)
             raise ParameterError(
-                f"a pair must have {parameter_count} parameters ({counts}), but their number was {candidates.shape[1]}."
+                f"a pair must have {self.parameter_count} parameters ({counts}), but their number was {pairs.shape[1]}."
             )
-        if not len(candidates):
-            return np.empty((0, len(self.value_names)))
-        seconds = self.seconds if seconds is None else check_number("seconds", seconds, 1e-3, 1e6)
-        parts = batches_of(len(candidates), self.worlds)
-        return np.concatenate([self._evaluate(candidates[part], seeds[part], threads, seconds) for part in parts])
-
-    def _evaluate(self, pairs: Floats, seeds: Integers, threads: int, seconds: float) -> Floats:
-        count, kinds = len(pairs), self.robot_kinds
-        specs = [RobotSpec.load(kind) for kind in kinds] if len(set(kinds)) > 1 else []
+        count, specs = len(pairs), self.specs
         batch = Batch(
             self.arenas,
             count * self.worlds,
-            robot=[specs] * (count * self.worlds) if specs else kinds[0],
-            robots=len(kinds),
+            robot=[specs] * (count * self.worlds) if len(set(specs)) > 1 else specs[0],
+            robots=self.robots,
             seed=(seeds[:, None] + np.arange(self.worlds)).ravel(),
             starts=self.start_poses(seeds),
             timing=self.timing,
@@ -250,7 +197,7 @@ class Contest:
         )
         given = self.parameters_of(np.repeat(pairs, self.worlds, axis=0))
         values = batch.run(self.controllers, given, seconds=seconds, measures=self.measures).values
-        values = values.reshape(count, self.worlds, len(kinds), len(self.measures))
+        values = values.reshape(count, self.worlds, self.robots, len(self.measures))
         parts = np.split(values, [self.sides[0].robots], axis=2)
         of_sides = [part.mean(axis=2) for part in parts]
         scores = [

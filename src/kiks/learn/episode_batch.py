@@ -74,9 +74,6 @@ class Episodes:
         self._goal_note = spec.reward.note_count + 2 if goals else None
         self._body = self.batch.specs[0].body
         self._places = [self._free_places(arena) for arena in self.batch.arenas] if spec.starts == "random" else []
-        self._lamps = np.zeros((len(self.batch.arenas), *self.batch.lamps.shape[1:]))
-        for lamps, arena in zip(self._lamps, self.batch.arenas, strict=True):
-            lamps[: len(arena.lamps)] = np.array(arena.lamps).reshape(-1, 4)
         self._sensors = np.zeros((worlds, robots, spec.sensor_count))
         self._most = np.concatenate([np.full(SENSES[name].size, SENSES[name].most) for name in spec.senses])
         self._scores = np.zeros((worlds, robots))
@@ -94,10 +91,9 @@ class Episodes:
             rngs: A random generator for each world; its arena, if there are several, its seed and its start are drawn
                 from it.
         """
-        chosen, arenas = np.asarray(worlds, np.int64), self.batch.arena_indices
-        if len(self.batch.arenas) > 1:
-            arenas[chosen] = [rng.integers(len(self.batch.arenas)) for rng in rngs]
-            self.batch.lamps[chosen] = self._lamps[arenas[chosen]]
+        chosen, arena_count = np.asarray(worlds, np.int64), len(self.batch.arenas)
+        if arena_count > 1:
+            self.batch.take_arenas(chosen, [int(rng.integers(arena_count)) for rng in rngs])
         seeds = np.array([rng.integers(SEED_LIMIT) for rng in rngs], np.int64)
         starts = None
         if self._places:

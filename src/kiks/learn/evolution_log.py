@@ -84,6 +84,23 @@ class Generation:
         return self.values[: self.population, 0]
 
 
+def check_alike(
+    one: Any, other: Any, names: Collection[str], whose: str, advice: str, free: Collection[str] = ()
+) -> None:
+    """Check that identities or results have the same attributes, and tasks that are the same but for some arguments.
+
+    Raises:
+        ParameterError: If they differ.
+    """
+    for name in names:
+        if (known := getattr(one, name)) != (value := getattr(other, name)):
+            raise ParameterError(
+                f"{whose} must have the same {name}, but they have {shown(known)} and {shown(value)}. {advice}"
+            )
+    if found := differing(one.task_digest, other.task_digest, free):
+        raise ParameterError(f"{whose} must have the same task, but these differ: {found}. {advice}")
+
+
 class Folder:
     """The folder of an evolution.
 
@@ -129,19 +146,9 @@ class Folder:
             replace_file(file, json.dumps(asdict(identity), indent=1) + "\n", "an evolution")
             tell_unseen(identity.task_digest, f"The evolution in {str(self.path)!r} continues")
             return
-        found = self.identity()
-        for name, value in asdict(identity).items():
-            if (known := getattr(found, name)) != value and name not in ("task_digest", "task_file"):
-                raise ParameterError(
-                    f"the folder {str(self.path)!r} must hold the same evolution, but its {name} is "
-                    f"{shown(known)}, not {shown(value)}. Take a new folder, or "
-                    "the arguments of the evolution that it holds."
-                )
-        if names := differing(found.task_digest, identity.task_digest):
-            raise ParameterError(
-                f"the folder {str(self.path)!r} must hold the same evolution, but these differ: {names}. "
-                "Take a new folder, or change them back."
-            )
+        names = ("task", "algorithm", "seed", "population", "controller", "kiks")
+        advice = "Take a new folder, or go back to the arguments of the evolution that it holds."
+        check_alike(self.identity(), identity, names, f"the evolution in {str(self.path)!r} and yours", advice)
 
     def generation(
         self, number: int, candidate_counts: Collection[int], parameter_count: int, value_count: int
@@ -206,10 +213,8 @@ class Folder:
         Raises:
             ParameterError: If it cannot be written.
         """
-        buffer = io.BytesIO()
-        seconds = np.float64(generation.seconds)
-        np.savez(buffer, candidates=generation.candidates, values=generation.values, seconds=seconds)
-        replace_file(self._file(number), buffer.getvalue(), "a generation")
+        arrays = {"candidates": generation.candidates, "values": generation.values}
+        _save_arrays(self._file(number), arrays, generation.seconds, "a generation")
 
     def saved_finals(self, number: int, finals: Finals) -> tuple[Floats, float] | None:
         """Return the values of saved finals, float64 [evaluation, value], and their seconds; None if there are none.
@@ -249,9 +254,7 @@ class Folder:
         """
         numbers, seeds, values = finals.evaluated
         arrays: dict[str, Any] = {"finalists": finals.candidates, "finalist": numbers, "seed": seeds, "values": values}
-        buffer = io.BytesIO()
-        np.savez(buffer, **arrays, seconds=np.float64(finals.seconds))
-        replace_file(self._finals_file(number), buffer.getvalue(), "finals")
+        _save_arrays(self._finals_file(number), arrays, finals.seconds, "finals")
 
     def save_log(self, generations: Sequence[Generation], value_names: Sequence[str]) -> None:
         """Write the log of all generations, a row for each evaluation: the population, then the trials of a rival.
@@ -284,6 +287,12 @@ class Folder:
 
     def _finals_file(self, number: int) -> Path:
         return self.path / GENERATIONS / f"{number + 1:06}_finals.npz"
+
+
+def _save_arrays(file: Path, arrays: Mapping[str, Any], seconds: float, what: str) -> None:
+    buffer = io.BytesIO()
+    np.savez(buffer, **arrays, seconds=np.float64(seconds))
+    replace_file(file, buffer.getvalue(), what)
 
 
 def write_table(columns: Mapping[str, NDArray[Any]], path: str | Path, what: str) -> None:

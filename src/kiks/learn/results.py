@@ -16,12 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from kiks.errors import ParameterError, shown
+from kiks.errors import ParameterError
 from kiks.learn.baselines import baselines_of
 from kiks.learn.evolution import Evolution
-from kiks.learn.evolution_log import IDENTITY, Digest, Folder
+from kiks.learn.evolution_log import IDENTITY, Digest, Folder, check_alike
 from kiks.learn.exam import PASS_SHARE, imperfect_robots
-from kiks.learn.fingerprint import differing, tell_unseen
+from kiks.learn.fingerprint import tell_unseen
 from kiks.model.atomic_files import path_of, replace_file
 from kiks.model.data_file import TEXT_MAX, Number, Text, Whole, check, parse_json, read_file, record
 from kiks.version import __version__
@@ -222,7 +222,8 @@ def load_results(folder: str | Path) -> list[Result]:
         results.append(result)
     results.sort(key=lambda each: each.seed)
     names = ("task", "kiks", "algorithm", "controller", "population")
-    _check_alike(results, names, set(), f"the evolutions in {str(path)!r}", "Name a folder for each kind.")
+    for each in results:
+        check_alike(results[0], each, names, f"the evolutions in {str(path)!r}", "Name a folder for each kind.")
     return results
 
 
@@ -232,26 +233,13 @@ def comparable(first: Sequence[Result], second: Sequence[Result]) -> list[list[R
     Raises:
         ParameterError: If anything differs on which fitness depends.
     """
-    pair = first[0], second[0]
-    _check_alike(pair, ("task", "kiks"), _FREE, "evolutions that are compared", "Compare two of one task.")
-    tell_unseen(pair[0].task_digest, "Fitness is compared")
-    is_alike = pair[0].task_digest.get("exam") == pair[1].task_digest.get("exam")
+    one, other = first[0], second[0]
+    check_alike(one, other, ("task", "kiks"), "evolutions that are compared", "Compare two of one task.", _FREE)
+    tell_unseen(one.task_digest, "Fitness is compared")
+    is_alike = one.task_digest.get("exam") == other.task_digest.get("exam")
     if not is_alike:
         logging.getLogger("kiks.learn").warning("The exams differ, so they are left out.")
     return [[each if is_alike else replace(each, exam=None) for each in group] for group in (first, second)]
-
-
-def _check_alike(results: Sequence[Result], names: Sequence[str], free: set[str], whose: str, advice: str) -> None:
-    """Check that results have the same attributes, and tasks that are the same but for some arguments."""
-    first = results[0]
-    for each in results:
-        for name in names:
-            if (value := getattr(each, name)) != (known := getattr(first, name)):
-                raise ParameterError(
-                    f"{whose} must have the same {name}, but they have {shown(known)} and {shown(value)}. {advice}"
-                )
-        if found := differing(first.task_digest, each.task_digest, free):
-            raise ParameterError(f"{whose} must have the same task, but these differ: {found}. {advice}")
 
 
 def save_summary(results: Sequence[Result], folder: Path) -> None:

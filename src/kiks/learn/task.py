@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import field, replace
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field
@@ -16,19 +16,19 @@ from kiks.control.measure import Measure
 from kiks.errors import ParameterError, shown
 from kiks.learn.algorithm_name import AlgorithmName
 from kiks.learn.candidate_worlds import (
+    SECONDS_MAX,
+    SECONDS_MIN,
     Fitness,
-    batches_of,
+    InWorlds,
     check_even,
     digest_of,
     fitness_of,
-    reduced_by_value,
-    starts_of,
 )
 from kiks.learn.champion import Champion
-from kiks.learn.evaluation import Floats, Integers, check_candidates
+from kiks.learn.evaluation import Floats, Integers
 from kiks.learn.exam import Exam, world_of
 from kiks.model.arena import Pose
-from kiks.model.checks import ROBOTS_MAX, check_count, check_number
+from kiks.model.checks import ROBOTS_MAX, check_count
 from kiks.model.data_file import Number, OneOf, Rule, Text, Whole, record
 from kiks.model.project import Project, ProjectRobot
 from kiks.model.robot import RobotSpec, specs_of
@@ -43,7 +43,7 @@ the first candidates react sharply."""
 WORLDS_MAX, MEASURES_MAX = 100_000, 100
 """Largest number of worlds of a candidate, and of measures."""
 
-Seconds = Annotated[Number, Field(ge=1e-3, le=1e6)]
+Seconds = Annotated[Number, Field(ge=SECONDS_MIN, le=SECONDS_MAX)]
 
 Kind = Text | RobotSpec
 Kinds = Annotated[
@@ -80,7 +80,7 @@ class Axis:
 
 
 @record
-class Task:
+class Task(InWorlds):
     """A task for which controllers are evolved: a `kiks.learn.evaluation.Evaluation`.
 
     A candidate is the parameters of a controller. It drives in `worlds` worlds, which the arenas share evenly. The
@@ -164,22 +164,6 @@ class Task:
                     f"an axis must name one of {', '.join(names)}, but it named {shown(axis.measure)}."
                 )
 
-    def __reduce__(self) -> tuple[Any, ...]:
-        return reduced_by_value(self)
-
-    def with_changes(self, **changes: Any) -> Task:
-        """Return a copy with some arguments changed.
-
-        Raises:
-            ParameterError: If an argument is out of range.
-        """
-        return replace(self, **changes)
-
-    @property
-    def measure_names(self) -> tuple[str, ...]:
-        """Names of the measures."""
-        return tuple(each.name for each in self.measures)
-
     @property
     def value_names(self) -> tuple[str, ...]:
         """Names of the values of a candidate: fitness, then the measures."""
@@ -196,14 +180,14 @@ class Task:
         return self.timing if isinstance(self.timing, tuple) else (self.timing,)
 
     @property
+    def specs(self) -> tuple[RobotSpec, ...]:
+        """What the robots are that worlds take in turn."""
+        return tuple(specs_of(self.kinds, None, None))
+
+    @property
     def parameter_count(self) -> int:
         """Number of parameters of a candidate."""
         return self.controller.parameter_count or 0
-
-    @property
-    def driven_s(self) -> float:
-        """Total time for which the robots of a candidate drive [s]."""
-        return self.worlds * self.robots * self.seconds
 
     def world(self) -> Project:
         """Return the world in which its champions are shown: that of their exam, or of training if there is none.
@@ -213,7 +197,7 @@ class Task:
         """
         if self.exam is not None:
             return self.exam.world(self.kinds[0], self.robots)
-        poses = self._starts(np.zeros(1, np.int64)) if self.starts == "random" else None
+        poses = self.start_poses(np.zeros(1, np.int64))
         return world_of(
             self.arenas[0], None if poses is None else poses[:: len(self.arenas)].reshape(-1, 3), self.robots, 0
         )
@@ -234,13 +218,13 @@ class Task:
         world, seeds = check_count("world", world, 0, self.worlds - 1), np.array([seed])
         kinds, timings = self._turns(seeds)
         arena = self.arenas[world % len(self.arenas)]
-        if self.starts == "random":
-            arena = replace(arena, starts=tuple(Pose(*each) for each in self._starts(seeds)[world].tolist()))
+        if (starts := self.start_poses(seeds)) is not None:
+            arena = replace(arena, starts=tuple(Pose(*each) for each in starts[world].tolist()))
         return Champion(
             controller=self.controller,
             parameters=tuple(parameters.tolist()),
             task=self.name,
-            robot=self._specs()[kinds[world]],
+            robot=self.specs[kinds[world]],
             timing=self.timings[timings[world]],
             world=Project(arena, robots=(ProjectRobot(),) * self.robots, seed=seed + world),
         )
@@ -250,42 +234,15 @@ class Task:
 
         They are the same in each process, in each folder and on each computer (`kiks.learn.fingerprint`).
         """
-        return digest_of(self, robot=self._specs(), timing=self.timings)
+        return digest_of(self, robot=self.specs, timing=self.timings)
 
     # ---- evaluation ----
-
-    def prepare(self) -> None:
-        """Compile the controller and the measures."""
-        self.evaluate(np.zeros((1, self.parameter_count)), np.zeros(1, np.int64), 1, seconds=self.timings[0].period_s)
-
-    def evaluate(self, candidates: Floats, seeds: Integers, threads: int, seconds: float | None = None) -> Floats:
-        """Return the values of candidates.
-
-        Args:
-            candidates: Parameters [candidate, parameter].
-            seeds: A seed for each [candidate]: of its worlds and its starts.
-            threads: Number of threads.
-            seconds: Time for which they drive [s], if not that of the task.
-
-        Returns:
-            Fitness, then the mean of each measure, float64 [candidate, 1 + measure].
-
-        Raises:
-            ParameterError: If candidates, seeds or fitness have the wrong shape, or a measure or the fitness is not
-                finite.
-        """
-        candidates, seeds = check_candidates(candidates, seeds)
-        if not len(candidates):
-            return np.empty((0, len(self.value_names)))
-        seconds = self.seconds if seconds is None else check_number("seconds", seconds, 1e-3, 1e6)
-        parts = batches_of(len(candidates), self.worlds)
-        return np.concatenate([self._evaluate(candidates[part], seeds[part], threads, seconds) for part in parts])
 
     def _evaluate(self, candidates: Floats, seeds: Integers, threads: int, seconds: float) -> Floats:
         count = len(candidates)
         world_seeds = (seeds[:, None] + np.arange(self.worlds)).ravel()
-        starts = self._starts(seeds) if self.starts == "random" else None
-        specs, (kinds, timings) = self._specs(), self._turns(seeds)
+        starts = self.start_poses(seeds)
+        specs, (kinds, timings) = self.specs, self._turns(seeds)
         given = np.repeat(candidates, self.worlds, axis=0)
         means = np.zeros((count * self.worlds, len(self.measures)))
         for number in np.unique(timings).tolist():
@@ -308,10 +265,6 @@ class Task:
         fitness = fitness_of(self.fitness, self.measure_names, values)
         return np.column_stack([fitness, values.mean(axis=1)])
 
-    def _specs(self) -> tuple[RobotSpec, ...]:
-        """Return the robots that worlds take in turn."""
-        return tuple(specs_of(self.kinds, None, None))
-
     def _turns(self, seeds: Integers) -> tuple[Integers, Integers]:
         """Return the number of each world's robot and of its timing, int64 [world].
 
@@ -322,8 +275,3 @@ class Task:
         turn = (seeds[:, None] % 2**32 + world // len(self.arenas)).ravel()
         kinds = (turn + np.tile(world % len(self.arenas), len(seeds))) % len(self.kinds)
         return kinds, turn // len(self.kinds) % len(self.timings)
-
-    def _starts(self, seeds: Integers) -> Floats:
-        """Return random start poses, float64 [world, robot, 3]: the same for the same seed."""
-        radius_mm = max(spec.body.radius_mm for spec in self._specs())
-        return starts_of(seeds, self.arenas, self.worlds, radius_mm=radius_mm, robots=self.robots)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from kiks.errors import ParameterError, shown
-from kiks.model.checks import check_heading, check_number
+from kiks.model.checks import check_count, check_heading, check_number
 from kiks.sim.simulation import Simulation
 
 STEP_MM = 0.5
@@ -82,12 +82,9 @@ class Drags:
         """
         self.drop(owner)
         counts = self._counts()
-        is_kind = isinstance(what, str) and what in KINDS
-        if not is_kind or isinstance(index, bool) or not isinstance(index, int) or not 0 <= index < counts[what]:
-            raise ParameterError(
-                f"a hand must take one of {counts} by its kind and index, but it was to take {shown(what)} "
-                f"{shown(index)}."
-            )
+        if not isinstance(what, str) or what not in KINDS:
+            raise ParameterError(f"a hand must take one of {counts} by its kind, but it was to take {shown(what)}.")
+        check_count(f"index of the {what} that a hand takes", index, 0, counts[what] - 1)
         if self.holds(what, index):
             raise ParameterError(f"one hand must let go before another takes {what} {index + 1}, but it holds it.")
         self._held[owner] = self._found(what, index)

@@ -69,7 +69,7 @@ class FreeSpace:
         """Check that robots could stand at these poses while bodies are where they are.
 
         Args:
-            poses: x_mm, y_mm, heading_rad, float64 [robot, 3], finite.
+            poses: x_mm, y_mm, heading_rad, float64 [robot, 3], finite; headings are wrapped in place (`check_heading`).
             whose: Whose poses they are, for the message.
 
         Raises:
@@ -78,7 +78,7 @@ class FreeSpace:
         discs = self.discs()
         discs[: self._robot_count, :2] = poses[:, :2]
         for index, (x_mm, y_mm, heading_rad) in enumerate(poses.tolist()):
-            check_heading("heading_rad", heading_rad)
+            poses[index, 2] = check_heading("heading_rad", heading_rad)
             obstacle = self.obstacle(x_mm, y_mm, self._specs[index].body.radius_mm, discs, index, PRESSED_MM)
             if obstacle is not None:
                 raise ParameterError(

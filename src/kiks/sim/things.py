@@ -14,7 +14,7 @@ from kiks.engine.state import BALL, BODY, CYLINDER
 from kiks.errors import ArenaError, KiksError, ParameterError, shown
 from kiks.model.arena import Arena, Ball, Cylinder, Lamp
 from kiks.model.array_checks import check_numbers
-from kiks.model.checks import check_count, check_heading, check_number
+from kiks.model.checks import check_count, check_heading, check_kind, check_number
 from kiks.model.free_disc import OVERLAP_MM
 from kiks.sim.free_space import PRESSED_MM
 from kiks.sim.world import World
@@ -181,10 +181,7 @@ class Things:
             ParameterError: If it is no checkpoint, or one of a simulation with another number of robots.
         """
         world = self._world
-        if not isinstance(checkpoint, Checkpoint):
-            raise ParameterError(
-                f"checkpoint must be what checkpoint() has returned, but it was {shown(checkpoint)}. Call that before."
-            )
+        check_kind("checkpoint", checkpoint, Checkpoint, "checkpoint() returns one.")
         if len(checkpoint.poses) != world.robot_count:
             raise ParameterError(
                 f"checkpoint must be of {world.robot_count} robots, but it was of {len(checkpoint.poses)}. "

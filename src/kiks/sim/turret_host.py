@@ -18,7 +18,7 @@ from kiks.firmware.k213 import K213
 from kiks.firmware.khepera import Firmware
 from kiks.firmware.radio import Radio, deliver
 from kiks.firmware.turret import AnyTurret, Met, Turret
-from kiks.model.checks import check_heading
+from kiks.model.checks import check_count, check_heading
 from kiks.model.robot import RobotSpec
 from kiks.sim.cameras import Cameras
 from kiks.sim.world import World
@@ -235,11 +235,7 @@ def name_of(turret: Turret) -> str | None:
 
 def _check(turret: Turret) -> None:
     number, name = getattr(turret, "number", None), getattr(turret, "name", None)
-    if not isinstance(number, int) or not 0 <= number <= 99:
-        raise ParameterError(
-            f"number of a turret must be a whole number from 0 to 99, but it was {shown(number)}. 24 to 31 are for "
-            "users."
-        )
+    check_count("number of a turret", number, 0, 99, "24 to 31 are for users.")
     if not isinstance(name, str) or not name.isascii() or not name.isprintable() or not name:
         raise ParameterError(
             f"name of a turret must be a line of ASCII, but it was {shown(name)}. Tool 'net' prints it."
@@ -270,10 +266,6 @@ def first_memory(turret: Turret, fitted: list[Turret]) -> int:
         ParameterError: If there is no room for them.
     """
     first = sum(each.memory_count for each in fitted)
-    if not isinstance(turret.memory_count, int) or not 0 <= turret.memory_count <= MEMORY_COUNT - first:
-        raise ParameterError(
-            f"memory_count of a turret must be at most {MEMORY_COUNT - first}, but it was "
-            f"{shown(turret.memory_count)}. "
-            f"All turrets of a robot share {MEMORY_COUNT} numbers."
-        )
+    advice = f"All turrets of a robot share {MEMORY_COUNT} numbers."
+    check_count("memory_count of a turret", turret.memory_count, 0, MEMORY_COUNT - first, advice)
     return first
