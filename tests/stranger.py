@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import encodings.idna  # noqa: F401  (sockets need it, and another user may not be able to read it)
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager

@@ -90,7 +90,7 @@ def test_mistakes_get_a_clear_error(recording: Recording, tmp_path: Path, monkey
     ):
         with pytest.raises(ParameterError, match=words):
             save_photo(recording, tmp_path / "photo.png", **values)
-    with pytest.raises(ParameterError, match="a picture must go to a file"):
+    with pytest.raises(ParameterError, match="a picture must end in"):
         save_photo(recording, tmp_path / "photo.mp4")
     monkeypatch.setitem(sys.modules, "mitsuba", None)
     with pytest.raises(ParameterError, match=r"This needs mitsuba, but it cannot be imported .*\[render\]"):

@@ -148,7 +148,7 @@ def test_a_folder_is_its_champion_or_one_of_a_generation(folder: Path, tmp_path:
     ):
         with pytest.raises(KiksError, match=message):
             kiks(*words, *more)
-    with pytest.raises(KiksError, match="--rank must come with --generation"):
+    with pytest.raises(KiksError, match="--rank must be left out without --generation"):
         kiks("demo", folder, "--rank", 2)
     with pytest.raises(KiksError, match="--generation must come with the folder of an evolution"):
         kiks("demo", "avoid", "--generation", 2)

@@ -19,7 +19,7 @@ from kiks.engine.scalar_math import sin_cos
 from kiks.errors import SHOWN_MAX, KiksError
 from kiks.model.arena import Arena
 from kiks.model.array_checks import check_numbers
-from kiks.model.checks import HEADING_KEPT_RAD, check_count, check_heading, check_number, wrapped
+from kiks.model.checks import DEGREES_FROM, HEADING_KEPT_RAD, check_count, check_heading, check_number, wrapped
 from kiks.sim.drag import Drags
 from kiks.sim.simulation import Simulation
 
@@ -300,7 +300,7 @@ def test_headings_are_wrapped_at_every_door(heading_rad: float) -> None:
     assert (batch.reset([1], starts=(250, 250, heading_rad)) >= 0).all()
 
 
-@pytest.mark.parametrize("degrees", [90, 90.0, -45, 180, 270, np.int64(360), np.float32(30)])
+@pytest.mark.parametrize("degrees", [90, 90.0, -45, 100, 22.5, 180, 270, np.int64(360), np.float32(30)])
 def test_a_heading_in_degrees_is_refused_at_every_door(degrees: float) -> None:
     sim = Simulation(ARENA, seed=1)
     ball = sim.add_ball(100, 100)
@@ -322,7 +322,7 @@ def test_a_heading_in_degrees_is_refused_at_every_door(degrees: float) -> None:
 @given(st.floats(-30, 30), st.integers(-4, 4))
 def test_a_heading_that_counts_turns_is_kept(heading_rad: float, turns: int) -> None:
     turned = heading_rad + turns * math.tau
-    if abs(turned) <= math.tau or turned % 15:
+    if abs(turned) < DEGREES_FROM or turned % 0.5:
         assert check_heading("it", turned) == turned
 
 
@@ -372,7 +372,7 @@ def test_a_number_that_passes_is_finite_and_in_range(number: Any) -> None:
 
 @given(
     st.floats(allow_nan=False, allow_infinity=False).filter(
-        lambda heading_rad: heading_rad % 15 or abs(heading_rad) > 1e6
+        lambda heading_rad: heading_rad % 0.5 or not DEGREES_FROM <= abs(heading_rad) <= 1e6
     )
 )
 def test_a_heading_is_always_one_whose_sine_is_exact(heading_rad: float) -> None:

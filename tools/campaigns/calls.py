@@ -48,6 +48,7 @@ INTERNAL = (
     "with_traceback",
     "add_note",
     "prepare",
+    "start_poses",
 )
 """Public names that programs have no use for, or that open a browser."""
 

@@ -30,10 +30,11 @@ from pathlib import Path
 from types import CodeType, FunctionType, GetSetDescriptorType, MemberDescriptorType, ModuleType
 from typing import Any
 
-from numba.core.dispatcher import Dispatcher
-
 from kiks.control.compiled_function import Compiled
 from kiks.model.arena import Arena
+
+# isort: split
+from numba.core.dispatcher import Dispatcher
 
 _ROOTS = Path(os.__file__).parent, Path(__file__).parents[1]
 """The folders of Python's own library and of KiKS."""

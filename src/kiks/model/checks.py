@@ -99,16 +99,20 @@ def check_kind(name: str, value: object, kind: type[_Kind], advice: str = "") ->
 _KINDS: dict[type, str] = {str: "a text", bytes: "bytes", bool: "True or False"}
 
 
+DEGREES_FROM = 10
+"""From here on a heading without other digits than .5 is taken for one in degrees."""
+
+
 def check_heading(name: str, heading_rad: object) -> float:
     """Return a heading [rad], wrapped to one turn if it is beyond `HEADING_KEPT_RAD`.
 
-    A multiple of 0.5 beyond one turn is a slip: a heading in degrees. A program that counts turns never meets one.
+    A multiple of 0.5 from 10 on is a slip: a heading in degrees. A program that counts turns never meets one.
 
     Raises:
         ParameterError: If it is no finite number, or one in degrees.
     """
     value = check_number(name, heading_rad)
-    if math.tau < abs(value) <= HEADING_KEPT_RAD and value % 0.5 == 0:
+    if DEGREES_FROM <= abs(value) <= HEADING_KEPT_RAD and value % 0.5 == 0:
         raise ParameterError(
             f"{name} must be in radians, but it was {shown(heading_rad)}: {value:g} degrees are "
             f"math.radians({value:g}). For radians beyond one turn write {value:g} % math.tau."

@@ -302,7 +302,7 @@ class Simulation:
             x_mm: From the arena's lower left corner to the right.
             y_mm: From the arena's lower left corner upwards.
             heading_rad: Counter-clockwise from the x axis; wrapped to one turn beyond a million. A multiple of 0.5
-                beyond one turn is an error: it is a heading in degrees.
+                from 10 on is an error: it is a heading in degrees.
 
         Raises:
             ParameterError: If there is no such robot, a number is no such number, or something is in the way.
