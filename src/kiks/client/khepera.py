@@ -30,6 +30,10 @@ class Status(NamedTuple):
     error: int
 
 
+PLAIN = (float, int)
+"""Classes of numbers that are checked here, without the call of a function for each command."""
+
+
 class Khepera:
     """A robot at the end of a serial line.
 
@@ -99,8 +103,10 @@ class Khepera:
 
     def set_speed(self, left: float, right: float) -> None:
         """Set the wheel speeds (D) [pulses/10 ms]: rounded, and cut to ±127 as controllers' are; 1 is 8 mm/s."""
-        speeds = check_number("left", left), check_number("right", right)
-        self._command(b"D,%d,%d\n" % tuple(round(min(max(-127.0, speed), 127.0)) for speed in speeds))
+        # Infinity and what is no number do not differ from themselves by 0.
+        if left.__class__ not in PLAIN or right.__class__ not in PLAIN or not left - left == right - right == 0:
+            left, right = check_number("left", left), check_number("right", right)
+        self._command(b"D,%d,%d\n" % (round(min(max(-127, left), 127)), round(min(max(-127, right), 127))))
 
     def stop(self) -> None:
         """Set both speeds to 0."""
