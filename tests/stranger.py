@@ -10,7 +10,7 @@ from contextlib import contextmanager
 import pytest
 
 STRANGER = 65534
-"""The user number of `nobody`."""
+"""User ID of the account `nobody`."""
 
 needs_root = pytest.mark.skipif(os.getuid() != 0, reason="only the superuser can act as another user")
 

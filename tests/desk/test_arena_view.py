@@ -288,7 +288,7 @@ def test_a_page_leaves_a_desk_that_has_ended(visit: Callable[..., Visit], end: s
     if end == "close":
         here.wait("() => window.feed.connection === 'lost'")
         here.page.evaluate("{ const now = performance.now.bind(performance); performance.now = () => now() + 61_000; }")
-    # Who listens at its port now is not that desk, whatever it says: nothing is asked of it any more.
+    # Another server may have the port now. The page recognises that and stops sending requests.
     here.wait("() => window.feed.connection === 'gone' && window.feed._socket.readyState === WebSocket.CLOSED")
     assert here.page.evaluate("[window.feed._timer, window.socket.active]") == [None, False]
     assert "has ended" in here.page.locator("[data-testid=arena-notice]").inner_text()

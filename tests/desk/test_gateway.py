@@ -162,7 +162,7 @@ def test_two_browsers_may_drag_at_once(shown: Shown) -> None:
 def test_of_the_moves_of_a_page_only_the_newest_counts(monkeypatch: pytest.MonkeyPatch) -> None:
     sim = kiks.Simulation(kiks.Arena.box(600, 400), seed=1)
     desk = Desk(sim, speed=None)
-    gateway, viewer = Gateway(desk, 1), Viewer("somebody")
+    gateway, viewer = Gateway(desk, 1), Viewer("viewer 1")
     moves: list[float] = []
     move = desk.hands.move
     monkeypatch.setattr(desk.hands, "move", lambda owner, x, y: (moves.append(x), move(owner, x, y)))

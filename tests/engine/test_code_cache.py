@@ -11,12 +11,13 @@ import signal
 import stat
 import tempfile
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import Any
 
 import numba
 import pytest
+from tests.stranger import STRANGER, as_stranger, needs_root
 
 from kiks.engine import code_cache
 from kiks.engine.code_cache import is_compiled
@@ -129,16 +130,12 @@ def test_code_in_files_that_others_can_write_is_not_run(
     monkeypatch.undo()
 
 
-NOBODY, OTHER = 65534, 4321
+OTHER = 4321
+"""A user who is neither root nor the one who acts."""
 
 
-@contextmanager
-def acting_as(user: int) -> Iterator[None]:
-    os.seteuid(user)
-    try:
-        yield
-    finally:
-        os.seteuid(0)
+def acting_as(user: int) -> AbstractContextManager[None]:
+    return as_stranger() if user else nullcontext()
 
 
 @pytest.fixture
@@ -150,8 +147,8 @@ def open_folder(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
         yield Path(name)
 
 
-@pytest.mark.skipif(os.geteuid() != 0, reason="only the superuser can act as several users")
-@pytest.mark.parametrize("user", [0, NOBODY])
+@needs_root
+@pytest.mark.parametrize("user", [0, STRANGER])
 @pytest.mark.parametrize(("cache", "level"), [("/proc/none", 0), ("named", 0), ("named", 1)])
 def test_code_in_a_folder_of_another_user_is_not_run(
     user: int,
@@ -175,7 +172,7 @@ def test_code_in_a_folder_of_another_user_is_not_run(
     assert file.exists()
 
 
-@pytest.mark.skipif(os.geteuid() != 0, reason="only the superuser can act as several users")
+@needs_root
 def test_a_link_of_another_user_leads_to_no_code(
     open_folder: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:

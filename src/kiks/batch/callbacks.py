@@ -59,7 +59,7 @@ call_decider, call_measure = caller_of(DECIDER), caller_of(MEASURE)
 
 @_intrinsic
 def begin_of(typing: Any, row: Any, count: Any) -> Any:
-    """Return the first numbers of a row that has so many; of a constant length most checks of indices cost nothing."""
+    """Return the first `count` numbers of a row; since that is a constant, the compiler removes most index checks."""
     if not isinstance(count, types.IntegerLiteral):
         return None
 

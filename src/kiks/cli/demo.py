@@ -111,7 +111,7 @@ def demo(
                 f"{shown(behaviour)}."
             )
     name = _name_of(behaviour)
-    picture = picture or Path(f"kiks-{name}.png")
+    assert picture is not None  # `output` has filled it in
     ready_engine(as_needed=not (is_soccer or desk))
     if is_soccer:
         sys.path.append(str(shipped_folder("examples/soccer", "player.py")))

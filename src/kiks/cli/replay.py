@@ -129,10 +129,10 @@ def page(
     from kiks.recording.recording import Recording
 
     recording = Recording(file)
-    path = out or file.with_suffix(".html")
+    assert out is not None  # `output` has filled it in
     with progress_bar("making the run again") as show:
-        save_page(recording, path, title=title, robot=robot, on_progress=show)
-    typer.echo(f"Page: {path}, {path.stat().st_size / 1e6:.1f} MB")
+        save_page(recording, out, title=title, robot=robot, on_progress=show)
+    typer.echo(f"Page: {out}, {out.stat().st_size / 1e6:.1f} MB")
 
 
 def table(

@@ -161,7 +161,7 @@ def locked_file(path: Path, flags: int, mode: int) -> BinaryIO:
     while True:
         file = open(os.open(path, os.O_RDWR | flags, mode), "wb")  # noqa: SIM115
         try:
-            # Who takes a new file for an abandoned one locks it for a moment, and removes it.
+            # Another process may take the new file for an abandoned one: it locks the file briefly and removes it.
             if lock(file.fileno(), path, waits=is_new):
                 return file
         except BlockingIOError:
