@@ -21,7 +21,14 @@ DIE_WITH_PARENT = 1
 
 
 def main(
-    descriptor: int, is_late: bool, thinking: str, record: str, offered: list[str], program: Path, arguments: list[str]
+    descriptor: int,
+    is_late: bool,
+    thinking: str,
+    record: str,
+    offered: list[str],
+    seed: str,
+    program: Path,
+    arguments: list[str],
 ) -> int:
     """Run the program to its end; return its exit code.
 
@@ -31,6 +38,7 @@ def main(
         thinking: The thinking policy.
         record: File for the measured thinking times; empty for none.
         offered: The port names that the program finds when it lists ports.
+        seed: What all its random numbers follow from.
         program: The Python file.
         arguments: What it finds in `sys.argv` after its name.
     """
@@ -53,6 +61,7 @@ def main(
             lambda name: connection.ask(Kind.FIND, data=name.encode()).number,
             policy,
             offered,
+            seed,
         )
     except KeyboardInterrupt:
         return 130
@@ -70,5 +79,5 @@ def _save(measured_ns: list[int], record: str) -> None:
 
 
 if __name__ == "__main__":
-    descriptor, lateness, thinking, record, offered, program, *arguments = sys.argv[1:]
-    sys.exit(main(int(descriptor), lateness == LATE, thinking, record, offered.split(), Path(program), arguments))
+    descriptor, lateness, thinking, record, offered, seed, program, *arguments = sys.argv[1:]
+    sys.exit(main(int(descriptor), lateness == LATE, thinking, record, offered.split(), seed, Path(program), arguments))

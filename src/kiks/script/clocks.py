@@ -1,17 +1,26 @@
-"""The clocks of a program: `time` and `datetime` tell simulated time, and sleeping takes no real time."""
+"""The clocks of a program: `time`, `datetime` and the others tell simulated time, and sleeping takes no real time."""
 
 from __future__ import annotations
 
 import datetime
-import sched
+import os
+import resource
+import sys
 import time
+import warnings
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any
 
-from kiks.clock.program_clock import EPOCH_S
+from kiks.clock.program_clock import EPOCH_S, calendar_ns
+from kiks.script.cpython import unchanged
+from kiks.script.patching import Reading, for_program
 from kiks.script.thread_scheduler import Scheduler
 from kiks.sim.port import VirtualPort
 from kiks.units import NS_PER_S
+
+with suppress(ImportError):
+    import _uuid  # noqa: F401  (only what has been imported can be replaced)
 
 CALENDARS = frozenset(getattr(time, name) for name in ("CLOCK_REALTIME", "CLOCK_TAI") if hasattr(time, name))
 """Clocks of `time.clock_gettime` that tell the date; the others tell the time since the program's start."""
@@ -19,129 +28,122 @@ CALENDARS = frozenset(getattr(time, name) for name in ("CLOCK_REALTIME", "CLOCK_
 SHORTEST_S = 1e-9
 """Shortest sleep [s]: rounding may leave less of a wait, and time must pass nevertheless."""
 
+UUID_EPOCH = 0x01B21DD213814000
+"""Time of 1970 in UUIDs [100 ns since 15 October 1582] (RFC 9562, section 5.1)."""
+
+NODE = b"\x02KiKS\x01"
+"""Address of the simulated network card in UUIDs, a locally administered one (RFC 9562, section 6.10)."""
+
+_real = {name: unchanged(getattr(time, name)) for name in ("localtime", "gmtime", "ctime", "asctime", "strftime")}
+_real_usage = unchanged(resource.getrusage)
+_real_now, _real_utcnow = (vars(datetime.datetime)[name] for name in ("now", "utcnow"))
+
 
 def replacements(scheduler: Scheduler, clock: VirtualPort) -> dict[str, dict[str, Any]]:
-    """Return the replacements for names of `time` and `datetime`, by module.
+    """Return the replacements for names of modules that tell a time, by module.
 
     Args:
         scheduler: The program's threads.
         clock: A port of the program's world.
     """
-    now_ns = clock.ask_ns
 
-    def calendar_ns() -> int:
-        return EPOCH_S * NS_PER_S + now_ns()
+    def reading(convert: Callable[..., Any]) -> Reading:
+        """Return what stands in for a clock; `convert` takes the time [ns], and what the clock was given."""
+
+        def waited(*given: Any) -> Any:
+            scheduler.poll()
+            return convert(scheduler.world.now_ns, *given)
+
+        return Reading(lambda *given: convert(clock.ask_ns(), *given), waited)
 
     def sleep(seconds: float, /) -> None:
         if seconds < 0:
             raise ValueError("sleep length must be non-negative")
         if seconds == 0:
             scheduler.give_way()
-            now_ns()
+            clock.ask_ns()
         else:
             clock.sleep(max(seconds, SHORTEST_S))
 
-    def clock_gettime_ns(clock_id: int, /) -> int:
-        return calendar_ns() if clock_id in CALENDARS else now_ns()
+    def clock_gettime_ns(now_ns: int, clock_id: int) -> int:
+        return calendar_ns(now_ns) if clock_id in CALENDARS else now_ns
 
     def of_now(name: str) -> Callable[..., Any]:
         """Return a function of `time` that takes a time, or the present one."""
-        original = getattr(time, name)
         is_of_struct = name in ("asctime", "strftime")
 
         def converted(*given: Any) -> Any:
             if name == "strftime" and len(given) == 1:
-                given = (given[0], local(calendar_ns() / NS_PER_S))
+                given = (given[0], _real["localtime"](calendar_ns(clock.ask_ns()) / NS_PER_S))
             elif name != "strftime" and (not given or given[0] is None):
-                seconds = calendar_ns() / NS_PER_S
-                given = (local(seconds),) if is_of_struct else (seconds,)
-            return original(*given)
+                seconds = calendar_ns(clock.ask_ns()) / NS_PER_S
+                given = (_real["localtime"](seconds),) if is_of_struct else (seconds,)
+            return _real[name](*given)
 
         return converted
 
-    local = time.localtime
-    functions: dict[str, Callable[..., Any]] = {
+    functions: dict[str, Any] = {
         "sleep": sleep,
-        "time": lambda: calendar_ns() / NS_PER_S,
-        "time_ns": calendar_ns,
-        "clock_gettime": lambda clock_id, /: clock_gettime_ns(clock_id) / NS_PER_S,
-        "clock_gettime_ns": clock_gettime_ns,
+        "time": reading(lambda now_ns: calendar_ns(now_ns) / NS_PER_S),
+        "time_ns": reading(calendar_ns),
+        "clock_gettime": reading(lambda now_ns, clock_id: clock_gettime_ns(now_ns, clock_id) / NS_PER_S),
+        "clock_gettime_ns": reading(clock_gettime_ns),
     }
     for name in ("monotonic", "perf_counter", "process_time", "thread_time"):
-        functions[name] = lambda: now_ns() / NS_PER_S
-        functions[f"{name}_ns"] = now_ns
-    for name in ("localtime", "gmtime", "ctime", "asctime", "strftime"):
-        functions[name] = of_now(name)
+        functions[name] = reading(lambda now_ns: now_ns / NS_PER_S)
+        functions[f"{name}_ns"] = reading(lambda now_ns: now_ns)
+    functions |= {name: of_now(name) for name in _real}
 
-    def deadline_time(*_: object) -> float:
-        """Return the time [s] to a library that waits with a timeout; the program does not poll the time here."""
-        scheduler.poll()
-        return scheduler.world.now_ns / NS_PER_S
+    def usage(who: int, /) -> resource.struct_rusage:
+        real = _real_usage(who)
+        return type(real)((clock.ask_ns() / NS_PER_S, 0.0, *real[2:])) if who == resource.RUSAGE_SELF else real
 
-    dates = _dates(calendar_ns)
-    simulated = {name: _here(scheduler, function, getattr(time, name)) for name, function in functions.items()}
+    def times() -> os.times_result:
+        now_s = clock.ask_ns() / NS_PER_S
+        return os.times_result((now_s, 0.0, 0.0, 0.0, now_s))
 
-    def begin(
-        plan: sched.scheduler, timefunc: Any = simulated["monotonic"], delayfunc: Any = simulated["sleep"]
-    ) -> None:
-        real_begin(plan, timefunc, delayfunc)
+    last_time = 0
 
-    real_begin = sched.scheduler.__init__
+    def new_time_uuid() -> tuple[bytes, int]:
+        nonlocal last_time
+        last_time = max(calendar_ns(clock.ask_ns()) // 100 + UUID_EPOCH, last_time + 1)
+        low, middle, high = last_time & 0xFFFFFFFF, last_time >> 32 & 0xFFFF, last_time >> 48
+        return b"".join(
+            (low.to_bytes(4, "big"), middle.to_bytes(2, "big"), (high | 0x1000).to_bytes(2, "big"), b"\x80\0", NODE)
+        ), 0
+
     return {
-        "time": simulated,
-        "sched.scheduler": {"__init__": begin},
-        "queue": {"time": deadline_time},
+        "time": functions,
+        "datetime.datetime": _dates(scheduler, clock),
+        "posix": {"times": times},
+        "resource": {"getrusage": usage},
+        "_uuid": {"generate_time_safe": new_time_uuid},
         # Start of `relativeCreated` of log records.
-        "logging": {"_startTime": float(EPOCH_S)},
-        "threading": {"_time": deadline_time},
-        "asyncio.base_events.BaseEventLoop": {"time": deadline_time},
-        "datetime": dates,
-        "_datetime": dates,
+        "logging": {"_startTime": EPOCH_S * NS_PER_S if sys.version_info >= (3, 13) else float(EPOCH_S)},
     }
 
 
-def _here(scheduler: Scheduler, function: Callable[..., Any], original: Callable[..., Any]) -> Callable[..., Any]:
-    """Return a function for the program's threads; other threads of this process get the original."""
+def _dates(scheduler: Scheduler, clock: VirtualPort) -> dict[str, Any]:
+    """Return the methods of `datetime.datetime` that tell the present; its other ones ask `time`."""
 
-    def choose(*given: Any) -> Any:
-        return (function if scheduler.is_here else original)(*given)
+    def now(cls: type[datetime.datetime], tz: datetime.tzinfo | None = None) -> datetime.datetime:
+        seconds, rest_ns = divmod(calendar_ns(clock.ask_ns()), NS_PER_S)
+        return cls.fromtimestamp(seconds, tz).replace(microsecond=rest_ns // 1000)
 
-    choose.__name__ = choose.__qualname__ = original.__name__
-    return choose
+    def utcnow(cls: type[datetime.datetime]) -> datetime.datetime:
+        if sys.version_info >= (3, 12):
+            warnings.warn(
+                "datetime.datetime.utcnow() is deprecated and scheduled for removal in a future version. Use "
+                "timezone-aware objects to represent datetimes in UTC: datetime.datetime.now(datetime.UTC).",
+                DeprecationWarning,
+                stacklevel=3,
+            )
+        return now(cls, datetime.UTC).replace(tzinfo=None)
 
+    def real(method: Any) -> Callable[..., Any]:
+        return lambda cls, *args, **kwargs: method.__get__(None, cls)(*args, **kwargs)
 
-def _dates(calendar_ns: Callable[[], int]) -> dict[str, type]:
-    """Return `datetime` and `date` whose present is simulated; older objects count as instances of them."""
-
-    class Kind(type):
-        """Metaclass of a class that has the same instances as the class that it replaces."""
-
-        def __instancecheck__(cls, instance: object) -> bool:
-            return isinstance(instance, cls.__bases__[0])
-
-        def __subclasscheck__(cls, other: type) -> bool:
-            return issubclass(other, cls.__bases__[0])
-
-    class SimulatedDatetime(datetime.datetime, metaclass=Kind):
-        @classmethod
-        def now(cls, tz: datetime.tzinfo | None = None) -> SimulatedDatetime:
-            seconds, rest_ns = divmod(calendar_ns(), NS_PER_S)
-            return cls.fromtimestamp(seconds, tz).replace(microsecond=rest_ns // 1000)
-
-        @classmethod
-        def today(cls) -> SimulatedDatetime:
-            return cls.now()
-
-        @classmethod
-        def utcnow(cls) -> SimulatedDatetime:
-            return cls.now(datetime.UTC).replace(tzinfo=None)
-
-    class SimulatedDate(datetime.date, metaclass=Kind):
-        @classmethod
-        def today(cls) -> SimulatedDate:
-            return cls.fromtimestamp(calendar_ns() / NS_PER_S)
-
-    for simulated in (SimulatedDatetime, SimulatedDate):
-        simulated.__name__ = simulated.__qualname__ = simulated.__bases__[0].__name__
-        simulated.__module__ = "datetime"
-    return {"datetime": SimulatedDatetime, "date": SimulatedDate}
+    return {
+        "now": classmethod(for_program(scheduler, now, real(_real_now))),
+        "utcnow": classmethod(for_program(scheduler, utcnow, real(_real_utcnow))),
+    }

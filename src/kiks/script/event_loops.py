@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import weakref
 from _threading_local import local
 from collections.abc import Iterator
 from itertools import count
@@ -27,27 +28,18 @@ def replacements(scheduler: Scheduler) -> dict[str, dict[str, Any]]:
 
     # `wait` and `as_completed` iterate over sets, whose order must not depend on memory addresses of futures.
     numbers: Iterator[int] = count()
-
-    class Task(asyncio.Task):  # type: ignore[type-arg]
-        def __init__(self, *args: Any, **kwargs: Any) -> None:
-            self._number = next(numbers)
-            super().__init__(*args, **kwargs)
-
-        def __hash__(self) -> int:
-            return self._number
+    known: dict[int, tuple[int, Any]] = {}
 
     def hash_by_number(future: Any) -> int:
-        number = future.__dict__.get("_number")
-        if number is None:
-            number = future._number = next(numbers)
-        return int(number)
+        key = id(future)
+        if key not in known:
+            known[key] = next(numbers), weakref.ref(future, lambda _: known.pop(key))
+        return known[key][0]
 
-    Task.__name__ = Task.__qualname__ = "Task"
-    Task.__module__ = "asyncio"
     return {
         "asyncio.events.BaseDefaultEventLoopPolicy": {"_Local": Local},
         "asyncio.events": {"_event_loop_policy": None},
-        "asyncio": {"Task": Task},
-        "asyncio.tasks": {"Task": Task},
+        "asyncio.Future": {"__hash__": hash_by_number},
+        "asyncio.Task": {"__hash__": hash_by_number},
         "concurrent.futures._base.Future": {"__hash__": hash_by_number},
     }

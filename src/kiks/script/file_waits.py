@@ -1,255 +1,357 @@
-"""Waiting for several files at once, simulated ports among them: `select`, `selectors`, and so asyncio's event loops.
+"""Waiting for files, simulated ports among them: `select`, `poll`, `epoll`, pipes and sockets, and so all event loops.
 
-A port is readable when a character has arrived, and always writable. Real files, such as a pipe between two threads,
-are polled in real time, and simulated time passes only while none of them is ready.
+A port's descriptor is a real one, the end of a terminal. Before anybody looks at it, as many characters are put into it
+as have arrived at the port, so that whatever Python or the operating system can do with a descriptor is right. A call
+that would wait is made again and again with no wait, and simulated time passes in between.
 """
 
 from __future__ import annotations
 
+import _io
+import errno
+import fcntl
 import math
 import os
 import select
-import selectors
-from collections.abc import Iterable, Mapping
-from typing import Any
+import struct
+import termios
+import tty
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from typing import Any, TypeVar
 
+from kiks.script.cpython import unchanged
+from kiks.script.file_system import FileSystem
+from kiks.script.patching import for_program
 from kiks.script.shared_line import SharedLine
 from kiks.script.thread_scheduler import Scheduler, timeout_ns
 from kiks.sim.read_completion import NEVER_NS, Read
 
-BLOCK_MS = 50
-"""Longest wait in real time between two checks for signals [ms]."""
+TERMINAL_CHARACTERS = 4000
+"""Most characters in a port's descriptor; the operating system takes a few more."""
 
-READ, WRITE = select.POLLIN, select.POLLOUT
+PIPE_CHARACTERS = 1 << 16
+"""Most characters that are read from a pipe at once."""
 
-_real_poll, _real_read, _real_write = select.poll, os.read, os.write
+SETTLED_MS = 100
+"""Longest time that the operating system may need to carry characters through a terminal [ms of real time]."""
 
+_real_read, _real_write, _real_pipe = unchanged(os.read), unchanged(os.write), unchanged(os.pipe)
+_real_ioctl, _real_select, _new_poll = unchanged(fcntl.ioctl), unchanged(select.select), unchanged(select.poll)
+_real_drain, _real_flush = unchanged(termios.tcdrain), unchanged(termios.tcflush)
+_Poll = type(select.poll())
+_file_methods = dict(vars(_io.FileIO))
+_real_poll, _real_epoll = _Poll.poll, select.epoll.poll
 
-class RealFiles:
-    """The real files that threads wait for."""
-
-    def ready(self, wanted: Mapping[int, int], *, block: bool) -> set[int]:
-        """Return the descriptors with an event; see `thread_scheduler.Files`."""
-        return set(poll_files(wanted, None if block else 0))
-
-
-def poll_files(wanted: Mapping[int, int], timeout_ms: int | None) -> dict[int, int]:
-    """Return the events of real files by descriptor; wait in real time up to a timeout [ms]."""
-    poll = _real_poll()
-    for descriptor, events in wanted.items():
-        poll.register(descriptor, events)
-    while True:
-        found = poll.poll(BLOCK_MS if timeout_ms is None else timeout_ms)
-        if found or timeout_ms is not None:
-            return dict(found)
+Found = TypeVar("Found")
 
 
-class OpenPorts:
-    """The simulated ports that have a file descriptor.
+def is_readable(descriptor: int, timeout_ms: int) -> bool:
+    """Wait in real time until a file can be read; return whether it can."""
+    poll = _new_poll()
+    poll.register(descriptor, select.POLLIN)
+    return bool(_real_poll(poll, timeout_ms))
+
+
+class _PortFile:
+    """The descriptor of a port: the end of a terminal, whose other end has sent what has arrived at the port.
+
+    Args:
+        line: The port's line.
+        port: The port of `serial`.
+    """
+
+    def __init__(self, line: SharedLine, port: Any) -> None:
+        self.line = line
+        self.port = port
+        self._other, self.descriptor = os.openpty()
+        tty.setraw(self.descriptor)
+        for end in (self._other, self.descriptor):
+            os.set_blocking(end, False)
+
+    def close(self) -> None:
+        self.line.cancel_read()
+        os.close(self.descriptor)
+        os.close(self._other)
+
+    def fill(self) -> int:
+        """Put as many characters into the terminal as have arrived at the port; return their number."""
+        arrived = self.line.arrived_count()
+        wanted, there = min(arrived, TERMINAL_CHARACTERS), self._count()
+        if wanted < there:
+            _real_read(self.descriptor, there - wanted)
+        elif wanted > there:
+            _real_write(self._other, bytes(wanted - there))
+            while self._count() < wanted and is_readable(self.descriptor, SETTLED_MS):
+                pass
+        return arrived
+
+    def _count(self) -> int:
+        return int(struct.unpack("i", _real_ioctl(self.descriptor, termios.FIONREAD, bytes(4)))[0])
+
+    def read(self, length: int) -> bytes:
+        """Read what has arrived, as a terminal would: wait as its settings say unless it does not block.
+
+        Raises:
+            BlockingIOError: If nothing has arrived, and the descriptor does not block.
+        """
+        timeout_s: float | None = 0.0
+        least = 1
+        if is_blocking := os.get_blocking(self.descriptor):
+            characters = termios.tcgetattr(self.descriptor)[-1]
+            least, tenths = characters[termios.VMIN], characters[termios.VTIME]
+            timeout_s = None if least else tenths / 10
+        port = self.port
+        before, port.timeout = port.timeout, timeout_s
+        try:
+            data: bytes = port.read(min(max(least, 1), length))
+            if data:
+                port.timeout = 0
+                data += port.read(length - len(data))
+        finally:
+            port.timeout = before
+        if not data and not is_blocking:
+            raise BlockingIOError(errno.EAGAIN, os.strerror(errno.EAGAIN))
+        return data
+
+
+class _Wait:
+    """A wait for files; see `thread_scheduler.FileWait`."""
+
+    def __init__(self, files: Files, look: Callable[[int], Any], descriptors: Iterable[int] | None) -> None:
+        self._files = files
+        self._look = look
+        self._descriptors = descriptors
+
+    @property
+    def is_inside(self) -> bool:
+        return self._descriptors is not None and self._files.are_inside(self._descriptors)
+
+    def is_over(self, block_ms: int) -> bool:
+        return bool(self._look(block_ms))
+
+
+class Files:
+    """The files of a program that its threads wait for.
 
     Args:
         scheduler: The program's threads.
+        system: The file system, which is told what the program writes.
     """
 
-    def __init__(self, scheduler: Scheduler) -> None:
+    def __init__(self, scheduler: Scheduler, system: FileSystem) -> None:
         self._scheduler = scheduler
-        # By descriptor: the line, and its port of `serial`.
-        self._ports: dict[int, tuple[SharedLine, Any]] = {}
+        self._system = system
+        self._ports: dict[int, _PortFile] = {}
+        # What the program has opened to talk to itself, by device and inode.
+        self._inside: set[tuple[int, int]] = set()
+
+    # ---- ports ----
 
     def add(self, line: SharedLine, port: Any) -> int:
-        """Return a file descriptor for a port: the end of a terminal, which answers all requests to one."""
-        other, descriptor = os.openpty()
-        os.close(other)
-        self._ports[descriptor] = line, port
-        return descriptor
+        """Return a file descriptor for a port."""
+        file = _PortFile(line, port)
+        self._ports[file.descriptor] = file
+        return file.descriptor
 
     def remove(self, descriptor: int) -> None:
         """Close a descriptor; threads that wait for it go on."""
-        line, _ = self._ports.pop(descriptor)
-        line.cancel_read()
-        os.close(descriptor)
+        self._ports.pop(descriptor).close()
 
-    def wait(self, wanted: Mapping[int, int], timeout_s: float | None) -> dict[int, int]:
-        """Return events by descriptor; wait for one.
+    # ---- what ends only by the program itself ----
+
+    def note_inside(self, *descriptors: int) -> None:
+        """Note descriptors whose other ends the program has."""
+        for each in descriptors:
+            state = os.fstat(each)
+            self._inside.add((state.st_dev, state.st_ino))
+
+    def are_inside(self, descriptors: Iterable[int]) -> bool:
+        """Return whether only the program can do something at the other ends of descriptors."""
+        with suppress(ChildProcessError):
+            os.waitid(os.P_ALL, 0, os.WEXITED | os.WNOHANG | os.WNOWAIT)
+            return False  # a child may have got the other end
+        for each in descriptors:
+            if each not in self._ports:
+                state = _status(each)
+                if state is not None and (state.st_dev, state.st_ino) not in self._inside:
+                    return False
+        return True
+
+    # ---- waiting ----
+
+    def wait(
+        self, look: Callable[[int], Found], timeout_s: float | None, descriptors: Iterable[int] | None = None
+    ) -> Found:
+        """Return what is ready; wait for it.
 
         Args:
-            wanted: The events of interest, as in `select.poll`, by descriptor.
-            timeout_s: Timeout [s]; None for ever.
+            look: Waits for some real time [ms], and returns what is ready; what is false if nothing is.
+            timeout_s: Longest wait [s]; None for ever.
+            descriptors: What is looked at; None if that is not known.
         """
         scheduler = self._scheduler
+        ports = [each for each in self._ports.values() if descriptors is None or each.descriptor in descriptors]
         deadline_ns = NEVER_NS if timeout_s is None else scheduler.world.now_ns + timeout_ns(timeout_s)
-        found = self._look(wanted)
-        if not found and timeout_s is not None and timeout_s <= 0:
-            scheduler.poll()
-            return self._look(wanted)
-        while not found and scheduler.world.now_ns < deadline_ns:
-            reads = [
-                Read(self._ports[descriptor][0].robot, 1)
-                for descriptor, events in wanted.items()
-                if descriptor in self._ports and events & READ
-            ]
-            files = {descriptor: events for descriptor, events in wanted.items() if descriptor not in self._ports}
+        if timeout_s is not None and timeout_s <= 0:
+            _fill(ports)
+            if not (found := look(0)):
+                scheduler.poll()
+                _fill(ports)
+                found = look(0)
+            return found
+        files = _Wait(self, look, descriptors)
+        while True:
+            ports = [each for each in ports if each.descriptor in self._ports]
+            arrived = _fill(ports)
+            found = look(0)
+            if found or scheduler.world.now_ns >= deadline_ns:
+                return found
+            # One more character at any of the ports can end the wait.
+            reads = [Read(each.line.robot, count + 1) for each, count in zip(ports, arrived, strict=True)]
             scheduler.wait("files", until_ns=deadline_ns, reads=reads, files=files)
             scheduler.program.waiting.act()
-            wanted = {descriptor: events for descriptor, events in wanted.items() if _is_open(descriptor)}
-            found = self._look(wanted)
-        return found
 
-    def _look(self, wanted: Mapping[int, int]) -> dict[int, int]:
-        found = {}
-        files = {}
-        for descriptor, events in wanted.items():
-            if descriptor not in self._ports:
-                files[descriptor] = events
-                continue
-            line = self._ports[descriptor][0]
-            happened = events & WRITE | (READ if events & READ and line.arrived_count() else 0)
-            if happened:
-                found[descriptor] = happened
-        if files:
-            found |= poll_files(files, 0)
-        return found
+    def wait_for(self, descriptor: int, events: int, timeout_s: float | None = None) -> bool:
+        """Wait until a file is ready; return whether it is."""
+        poll = _new_poll()
+        poll.register(descriptor, events)
+        return bool(self.wait(lambda block_ms: _real_poll(poll, block_ms), timeout_s, (descriptor,)))
 
-    # ---- replacements for names of `select`, `selectors` and `os` ----
+    # ---- replacements for names of `select`, `os` and others ----
 
     def replacements(self) -> dict[str, dict[str, Any]]:
         """Return the replacements, by module."""
-        ports = self
-
-        class Poll:
-            """See `select.poll`."""
-
-            def __init__(self) -> None:
-                self._wanted: dict[int, int] = {}
-
-            def register(self, file: Any, eventmask: int = READ | WRITE | select.POLLPRI, /) -> None:
-                self._wanted[_descriptor(file)] = eventmask
-
-            def modify(self, file: Any, eventmask: int, /) -> None:
-                if _descriptor(file) not in self._wanted:
-                    raise FileNotFoundError(2, "No such file or directory")
-                self._wanted[_descriptor(file)] = eventmask
-
-            def unregister(self, file: Any, /) -> None:
-                del self._wanted[_descriptor(file)]
-
-            def poll(self, timeout: float | None = None, /) -> list[tuple[int, int]]:
-                timeout_s = None if timeout is None or timeout < 0 else timeout / 1000
-                return list(ports.wait(self._wanted, timeout_s).items())
-
-        class Epoll(Poll):
-            """See `select.epoll`: the same numbers stand for the same events."""
-
-            closed = False
-
-            def __init__(self, sizehint: int = -1, flags: int = 0) -> None:
-                super().__init__()
-
-            def poll(self, timeout: float | None = None, maxevents: int = -1) -> list[tuple[int, int]]:
-                found = list(ports.wait(self._wanted, None if timeout is None or timeout < 0 else timeout).items())
-                return found if maxevents < 0 else found[:maxevents]
-
-            def close(self) -> None:
-                self.closed = True
-
-            def __enter__(self) -> Epoll:
-                return self
-
-            def __exit__(self, *_: object) -> None:
-                self.close()
-
-        class Selector(selectors._BaseSelectorImpl):
-            """See `selectors.DefaultSelector`."""
-
-            def select(self, timeout: float | None = None) -> list[tuple[selectors.SelectorKey, int]]:
-                wanted = {
-                    key.fd: (READ if key.events & selectors.EVENT_READ else 0)
-                    | (WRITE if key.events & selectors.EVENT_WRITE else 0)
-                    for key in self.get_map().values()
-                }
-                ready = []
-                for descriptor, happened in ports.wait(wanted, timeout).items():
-                    key = self.get_map().get(descriptor)
-                    if key is not None:
-                        events = (selectors.EVENT_READ if happened & ~WRITE else 0) | (
-                            selectors.EVENT_WRITE if happened & ~READ else 0
-                        )
-                        if events & key.events:
-                            ready.append((key, events & key.events))
-                return ready
+        ports, scheduler = self._ports, self._scheduler
 
         def simulated_select(
             rlist: Iterable[Any], wlist: Iterable[Any], xlist: Iterable[Any], timeout: float | None = None, /
         ) -> tuple[list[Any], list[Any], list[Any]]:
-            if timeout is not None and (timeout < 0 or math.isnan(timeout)):
+            lists = [list(each) for each in (rlist, wlist, xlist)]
+            if timeout is not None and timeout < 0:
                 raise ValueError("timeout must be non-negative")
-            reading, writing, special = (
-                [(each, _descriptor(each)) for each in files] for files in (rlist, wlist, xlist)
-            )
-            wanted: dict[int, int] = {}
-            for files, events in ((reading, READ), (writing, WRITE), (special, select.POLLPRI)):
-                for _, descriptor in files:
-                    wanted[descriptor] = wanted.get(descriptor, 0) | events
-            found = ports.wait(wanted, timeout)
-            return (
-                [each for each, descriptor in reading if found.get(descriptor, 0) & ~(WRITE | select.POLLPRI)],
-                [each for each, descriptor in writing if found.get(descriptor, 0) & ~(READ | select.POLLPRI)],
-                [each for each, descriptor in special if found.get(descriptor, 0) & select.POLLPRI],
-            )
+            wanted = {each if isinstance(each, int) else each.fileno() for each in (*lists[0], *lists[1], *lists[2])}
+            empty: tuple[list[Any], list[Any], list[Any]] = [], [], []
+            _real_select(*lists, 0)  # says what is wrong with the arguments
+
+            def look(block_ms: int) -> Any:
+                found = _real_select(*lists, block_ms / 1000)
+                return found if any(found) else None
+
+            return self.wait(look, timeout, wanted) or empty
+
+        def poll(poll: Any, timeout: float | None = None, /) -> list[tuple[int, int]]:
+            timeout_s = None if timeout is None or timeout < 0 else math.ceil(timeout) / 1000
+            return self.wait(lambda block_ms: _real_poll(poll, block_ms), timeout_s)
+
+        def epoll(epoll: Any, timeout: float | None = None, maxevents: int = -1) -> list[tuple[int, int]]:
+            timeout_s = None if timeout is None or timeout < 0 else timeout
+            return self.wait(lambda block_ms: _real_epoll(epoll, block_ms / 1000, maxevents), timeout_s)
 
         def read(descriptor: int, length: int, /) -> bytes:
-            port = ports._ports.get(descriptor)
-            if port is not None:
-                return _read_port(port[1], length)
-            if ports._scheduler.is_here and ports._scheduler.tasks and os.get_blocking(descriptor):
-                # Another thread of the program may write there.
-                ports.wait({descriptor: READ}, None)
+            if descriptor in ports:
+                return ports[descriptor].read(length)
+            self.wait_for_pipe(descriptor, select.POLLIN)
             return _real_read(descriptor, length)
 
-        def write(descriptor: int, data: bytes, /) -> int:
-            port = ports._ports.get(descriptor)
-            return _real_write(descriptor, data) if port is None else port[1].write(data)
+        def write(descriptor: int, data: Any, /) -> int:
+            if descriptor in ports:
+                return int(ports[descriptor].port.write(data))
+            self.wait_for_pipe(descriptor, select.POLLOUT)
+            count: int = _real_write(descriptor, data)
+            self._system.note_write(descriptor)
+            return count
+
+        def pipe() -> tuple[int, int]:
+            ends: tuple[int, int] = _real_pipe()
+            self.note_inside(*ends)
+            return ends
+
+        def ioctl(fd: Any, request: int, *rest: Any) -> Any:
+            file = ports.get(fd if isinstance(fd, int) else fd.fileno())
+            if file is not None:
+                file.fill()
+                if request == termios.TIOCOUTQ and rest and isinstance(rest[0], bytes):
+                    return struct.pack("i", file.port.out_waiting)
+            return _real_ioctl(fd, request, *rest)
+
+        def drain(fd: Any, /) -> None:
+            file = ports.get(fd if isinstance(fd, int) else fd.fileno())
+            _real_drain(fd) if file is None else file.port.flush()
+
+        def flush(fd: Any, queue: int, /) -> None:
+            file = ports.get(fd if isinstance(fd, int) else fd.fileno())
+            _real_flush(fd, queue)
+            if file is not None and queue in (termios.TCIFLUSH, termios.TCIOFLUSH):
+                file.port.reset_input_buffer()
+            if file is not None and queue in (termios.TCOFLUSH, termios.TCIOFLUSH):
+                file.port.reset_output_buffer()
+
+        def reading(name: str) -> Any:
+            """Return a method of files that waits before it reads."""
+            real = _file_methods[name]
+
+            def call(file: Any, *args: Any) -> Any:
+                if not file.closed:
+                    self.wait_for_pipe(file.fileno(), select.POLLIN)
+                return real(file, *args)
+
+            return for_program(scheduler, call, real)
+
+        def write_file(file: Any, data: Any, /) -> Any:
+            if file.closed:
+                return _file_methods["write"](file, data)
+            self.wait_for_pipe(file.fileno(), select.POLLOUT)
+            count = _file_methods["write"](file, data)
+            self._system.note_write(file.fileno())
+            return count
+
+        def read_all(file: Any) -> Any:
+            if file.closed or not self._is_pipe(file.fileno()):
+                return _file_methods["readall"](file)
+            return b"".join(iter(lambda: file.read(PIPE_CHARACTERS), b""))
+
+        def close_file(file: Any) -> None:
+            if not file.closed and file.writable():
+                self._system.note_close(file.fileno())
+            _file_methods["close"](file)
 
         return {
-            "select": {"select": simulated_select, "poll": Poll, "epoll": Epoll},
-            "selectors": {
-                name: Selector
-                for name in ("DefaultSelector", "EpollSelector", "PollSelector", "SelectSelector")
-                if hasattr(selectors, name)
+            "_io.FileIO": {
+                "read": reading("read"),
+                "readinto": reading("readinto"),
+                "readall": for_program(scheduler, read_all, _file_methods["readall"]),
+                "write": for_program(scheduler, write_file, _file_methods["write"]),
+                "close": for_program(scheduler, close_file, _file_methods["close"]),
             },
-            "os": {"read": read, "write": write},
+            "select": {"select": simulated_select},
+            f"{__name__}._Poll": {"poll": for_program(scheduler, poll, _real_poll)},
+            "select.epoll": {"poll": for_program(scheduler, epoll, _real_epoll)},
+            "posix": {"read": read, "write": write, "pipe": pipe},
+            "fcntl": {"ioctl": ioctl},
+            "termios": {"tcdrain": drain, "tcflush": flush},
         }
 
+    def _is_pipe(self, descriptor: int) -> bool:
+        """Return whether a descriptor leads to the program itself, and reading it waits."""
+        state = _status(descriptor) if self._inside else None
+        return state is not None and (state.st_dev, state.st_ino) in self._inside and os.get_blocking(descriptor)
 
-def _read_port(port: Any, length: int) -> bytes:
-    """Read like a descriptor of a terminal: wait for at least one character, and return all that have arrived."""
-    timeout, port.timeout = port.timeout, None
+    def wait_for_pipe(self, descriptor: int, event: int) -> None:
+        """Wait until a pipe or socket to which other threads of the program have the other end can be used."""
+        if self._is_pipe(descriptor):
+            self.wait_for(descriptor, event)
+
+
+def _fill(ports: Iterable[_PortFile]) -> list[int]:
+    return [each.fill() for each in ports]
+
+
+def _status(descriptor: int) -> os.stat_result | None:
+    """Return the status of a descriptor; None if it is closed."""
     try:
-        first: bytes = port.read(1)
-        rest: bytes = port.read(min(length - 1, port.in_waiting))
-        return first + rest
-    finally:
-        port.timeout = timeout
-
-
-def _descriptor(file: Any) -> int:
-    """Return a file's descriptor, like `select`.
-
-    Raises:
-        ValueError: If it is negative.
-        TypeError: If the object is no file.
-    """
-    descriptor = file if isinstance(file, int) else getattr(file, "fileno", lambda: None)()
-    if not isinstance(descriptor, int):
-        raise TypeError("argument must be an int, or have a fileno() method.")
-    if descriptor < 0:
-        raise ValueError(f"file descriptor cannot be a negative integer ({descriptor})")
-    return descriptor
-
-
-def _is_open(descriptor: int) -> bool:
-    try:
-        os.fstat(descriptor)
+        return os.fstat(descriptor)
     except OSError:
-        return False
-    return True
+        return None
+
+

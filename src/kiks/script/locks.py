@@ -1,217 +1,314 @@
-"""Locks and threads like those of `_thread`, for the threads of one program; `threading` builds on them."""
+"""Locks, queues and threads of `_thread` and `_queue` for the threads of one program; `threading` builds on them.
+
+The objects are Python's own, and code in C may use them. Where a thread of the program would wait in C, it waits in the
+scheduler instead. Threads get what they wait for in the order in which they began to wait: `release` hands it over.
+"""
 
 from __future__ import annotations
 
+import _queue
 import _thread
 import concurrent.futures.thread
 import itertools
 import queue
 import threading
-import time
 import weakref
 from _threading_local import local
 from collections import deque
 from collections.abc import Callable
 from typing import Any
 
+from kiks.script.patching import for_program
 from kiks.script.thread_scheduler import SIGNALLED, Scheduler, Task, timeout_ns
 from kiks.sim.read_completion import NEVER_NS
-
-REAL_LOCK = _thread.allocate_lock
-REAL_SLEEP = time.sleep
-
-
-ELSEWHERE_S = 0.001
-"""Period with which a thread that is not the program's polls a lock [s]."""
-
 
 LOCKS_IN_A_ROW = 1000
 """Free locks that a thread may take before each costs as much as a poll."""
 
+_lock, _rlock = _thread.LockType, _thread.RLock
+_real_acquire, _real_release, _real_locked = _lock.acquire, _lock.release, _lock.locked
+_real_get, _real_put = _queue.SimpleQueue.get, _queue.SimpleQueue.put
 
-class Lock:
-    """A lock; see `_thread.lock`. Threads get it in the order in which they began to wait: `release` hands it over."""
 
-    scheduler: Scheduler
-    """The scheduler; each program has a subclass with its own."""
+class WaitingRoom:
+    """The threads that wait for objects.
 
-    __slots__ = ("__weakref__", "_is_locked", "_waiters")
+    Args:
+        scheduler: The program's threads.
+    """
 
-    def __init__(self) -> None:
-        self._is_locked = False
-        self._waiters: deque[Task] | None = None
+    def __init__(self, scheduler: Scheduler) -> None:
+        self._scheduler = scheduler
+        # By the identity of an object, which its waiters keep alive.
+        self._waiters: dict[int, deque[Task]] = {}
 
-    def acquire(self, blocking: bool = True, timeout: float = -1) -> bool:
-        """Acquire the lock; return whether it was acquired."""
-        if not self._is_locked:
-            if blocking and timeout != -1:
-                _check_timeout(timeout)
-            self._is_locked = True
-            self.scheduler.lock_count += 1
-            if self.scheduler.lock_count > LOCKS_IN_A_ROW:
-                self._spin()
-            return True
-        if not blocking:
-            if timeout != -1:
-                raise ValueError("can't specify a timeout for a non-blocking call")
-            if self.scheduler.is_here:
-                self.scheduler.poll()
-            return False
-        until_ns = NEVER_NS
-        if timeout != -1:
-            _check_timeout(timeout)
-            until_ns = self.scheduler.world.now_ns + timeout_ns(timeout)
-        return self._wait(until_ns)
+    def wait(
+        self, key: object, what: str, until_ns: int, take: Callable[[], bool], give_back: Callable[[], object]
+    ) -> bool:
+        """Wait for an object until a time [ns]; return whether this thread has got it.
 
-    def release(self) -> None:
-        """Release the lock, or hand it to the thread that has waited longest."""
-        if not self._is_locked:
-            raise RuntimeError("release unlocked lock")
-        waiters = self._waiters
-        while waiters:
-            if self.scheduler.wake(waiters.popleft(), self):
-                return
-        self._is_locked = False
-
-    def locked(self) -> bool:
-        """Return whether a thread holds it."""
-        if self.scheduler.is_here:
-            self.scheduler.poll()
-        return self._is_locked
-
-    acquire_lock = acquire
-    release_lock = release
-    locked_lock = locked
-
-    def __enter__(self) -> bool:
-        return self.acquire()
-
-    def __exit__(self, *_: object) -> None:
-        if self._waiters or not self._is_locked:
-            self.release()
-        else:
-            self._is_locked = False
-
-    def _is_owned(self) -> bool:
-        """Return whether a thread holds it; without this method `threading.Condition` would try to acquire it."""
-        return self._is_locked
-
-    def _at_fork_reinit(self) -> None:
-        self.__init__()  # type: ignore[misc]
-
-    def __repr__(self) -> str:
-        return f"<{'locked' if self._is_locked else 'unlocked'} lock object at {id(self):#x}>"
-
-    def _spin(self) -> None:
-        """Let other threads go on: a thread that checks a value behind a lock in a loop waits for them."""
-        if self.scheduler.is_here:
-            self.scheduler.lock_count = 0
-            self.scheduler.ask()
-
-    def _wait(self, until_ns: int) -> bool:
-        scheduler = self.scheduler
-        if not scheduler.is_here:
-            return self._wait_elsewhere(until_ns)
-        if self._waiters is None:
-            self._waiters = deque()
-        task, cause = scheduler.current, SIGNALLED
-        while cause is SIGNALLED:
-            if not self._is_locked:
-                self._is_locked = True
-                return True
-            self._waiters.append(task)
+        Args:
+            key: The object.
+            what: Its name in messages.
+            until_ns: When the wait ends at the latest [ns].
+            take: Takes the object if it is free; called after a signal, whose handler may have freed it.
+            give_back: Called if this thread has got it, but an exception comes up in its wait.
+        """
+        scheduler, task = self._scheduler, self._scheduler.current
+        while True:
+            waiters = self._waiters.setdefault(id(key), deque())
+            waiters.append(task)
             try:
-                cause = scheduler.wait("a lock", until_ns=until_ns)
+                cause = scheduler.wait(what, until_ns=until_ns)
             except BaseException:
-                if task.cause is self:
-                    self.release()
+                if task.cause is key:
+                    give_back()
                 raise
             finally:
-                if task in self._waiters:
-                    self._waiters.remove(task)
-        scheduler.program.waiting.act()
-        return cause is self
-
-    def _wait_elsewhere(self, until_ns: int) -> bool:
-        """Wait in a thread of this process that is not the program's, such as one of a library in C."""
-        while self.scheduler.world.now_ns < until_ns:
-            if not self._is_locked:
-                self._is_locked = True
+                if task in waiters:
+                    waiters.remove(task)
+                if not waiters and self._waiters.get(id(key)) is waiters:
+                    del self._waiters[id(key)]
+            if cause is not SIGNALLED:
+                scheduler.program.waiting.act()
+                return cause is key
+            if take():
                 return True
-            REAL_SLEEP(ELSEWHERE_S)
-        return False
+
+    def hand_over(self, key: object) -> Task | None:
+        """Let the thread go on that has waited longest for an object; return it, or None if there is none."""
+        waiters = self._waiters.get(id(key))
+        while waiters:
+            task = waiters.popleft()
+            if self._scheduler.wake(task, key):
+                return task
+        return None
 
 
-def _check_timeout(timeout: float) -> None:
+def _deadline_ns(scheduler: Scheduler, blocking: bool, timeout: float) -> int:
+    """Return when a wait for a lock ends [ns].
+
+    Raises:
+        ValueError: If the timeout is out of range, as `_thread` says it.
+        OverflowError: If it is too long.
+    """
+    if timeout == -1:
+        return NEVER_NS
+    if not blocking:
+        raise ValueError("can't specify a timeout for a non-blocking call")
     if timeout < 0:
         raise ValueError("timeout value must be a non-negative number")
     if timeout > threading.TIMEOUT_MAX:
         raise OverflowError("timeout value is too large")
+    return scheduler.world.now_ns + timeout_ns(timeout)
+
+
+def _plain_locks(scheduler: Scheduler, room: WaitingRoom) -> dict[str, Any]:
+    """Return the methods of `_thread.lock`."""
+    # Locks that threads of the program hold, by identity. Another thread of this process may hold one, too.
+    held: set[int] = set()
+
+    def acquire(lock: Any, blocking: bool = True, timeout: float = -1) -> bool:
+        is_here = scheduler.is_here
+        until_ns = NEVER_NS if timeout == -1 or not is_here else _deadline_ns(scheduler, blocking, timeout)
+        if _real_acquire(lock, False):
+            if is_here:
+                held.add(id(lock))
+                scheduler.lock_count += 1
+                if scheduler.lock_count > LOCKS_IN_A_ROW:
+                    # A thread that checks a value behind a lock in a loop waits for others.
+                    scheduler.lock_count = 0
+                    scheduler.ask()
+            return True
+        if not is_here:
+            return _real_acquire(lock, blocking, timeout)
+        if not blocking:
+            scheduler.poll()
+            return False
+        if id(lock) not in held:
+            # Another thread of this process holds it, in real time.
+            if is_acquired := _real_acquire(lock, blocking, timeout):
+                held.add(id(lock))
+            return is_acquired
+        return room.wait(lock, "a lock", until_ns, lambda: _real_acquire(lock, False), lambda: release(lock))
+
+    def release(lock: Any) -> None:
+        if room.hand_over(lock) is None:
+            held.discard(id(lock))
+            _real_release(lock)
+
+    def locked(lock: Any) -> bool:
+        if scheduler.is_here:
+            scheduler.poll()
+        return _real_locked(lock)
+
+    return {
+        **dict.fromkeys(("acquire", "acquire_lock", "__enter__"), acquire),
+        **dict.fromkeys(("release", "release_lock"), release),
+        **dict.fromkeys(("locked", "locked_lock"), locked),
+        "__exit__": lambda lock, *_: release(lock),
+    }
+
+
+class _Owner:
+    """The thread of the program that holds an `RLock`, and how often."""
+
+    __slots__ = ("count", "lock", "task")
+
+    def __init__(self, lock: Any, task: Task) -> None:
+        self.lock = lock
+        self.task = task
+        self.count = 1
+
+
+def _reentrant_locks(scheduler: Scheduler, room: WaitingRoom) -> dict[str, Any]:
+    """Return the methods of `_thread.RLock`: all threads of the program are one to it, and hold it together.
+
+    So does KiKS, whose own locks stay held while another thread of the program goes on.
+    """
+    owners: dict[int, _Owner] = {}
+
+    def acquire(lock: Any, blocking: bool = True, timeout: float = -1) -> bool:
+        owner, task = owners.get(id(lock)), scheduler.current
+        if owner is None:
+            if not real["acquire"](lock, blocking, timeout):
+                return False
+            owners[id(lock)] = _Owner(lock, task)
+            return True
+        if owner.task is task:
+            owner.count += 1
+            return True
+        until_ns = _deadline_ns(scheduler, blocking, timeout)
+        if not blocking:
+            scheduler.poll()
+            return False
+        return room.wait(lock, "a lock", until_ns, lambda: acquire(lock, False), lambda: release(lock))
+
+    def release(lock: Any) -> None:
+        owner = owners.get(id(lock))
+        if owner is None:
+            real["release"](lock)
+            return
+        if owner.task is not scheduler.current:
+            raise RuntimeError("cannot release un-acquired lock")
+        owner.count -= 1
+        if not owner.count:
+            leave(lock, owner)
+
+    def leave(lock: Any, owner: _Owner) -> None:
+        task = room.hand_over(lock)
+        if task is None:
+            del owners[id(lock)]
+            real["release"](lock)
+        else:
+            owner.task, owner.count = task, 1
+
+    def save(lock: Any) -> Any:
+        owner = owners.get(id(lock))
+        if owner is None or owner.task is not scheduler.current:
+            return real["_release_save"](lock)
+        state = owner.count, owner.task
+        leave(lock, owner)
+        return state
+
+    def restore(lock: Any, state: Any) -> None:
+        if not isinstance(state[1], Task):
+            real["_acquire_restore"](lock, state)
+            return
+        acquire(lock)
+        owners[id(lock)].count = state[0]
+
+    def is_owned(lock: Any) -> bool:
+        owner = owners.get(id(lock))
+        return bool(real["_is_owned"](lock)) if owner is None else owner.task is scheduler.current
+
+    def recursion_count(lock: Any) -> int:
+        return owners[id(lock)].count if is_owned(lock) else 0
+
+    methods: dict[str, Callable[..., Any]] = {
+        **dict.fromkeys(("acquire", "__enter__"), acquire),
+        "release": release,
+        "__exit__": lambda lock, *_: release(lock),
+        "_release_save": save,
+        "_acquire_restore": restore,
+        "_is_owned": is_owned,
+        "_recursion_count": recursion_count,
+        "locked": lambda lock: id(lock) in owners,
+    }
+    real = dict(vars(_rlock))
+    return {name: for_program(scheduler, method, real[name]) for name, method in methods.items() if name in real}
+
+
+def _queues(scheduler: Scheduler, room: WaitingRoom) -> dict[str, Any]:
+    """Return the methods of `_queue.SimpleQueue`."""
+
+    def get(simple_queue: Any, block: bool = True, timeout: float | None = None) -> Any:
+        if not scheduler.is_here:
+            return _real_get(simple_queue, block, timeout)
+        if timeout is not None and timeout < 0 and block:
+            raise ValueError("'timeout' must be a non-negative number")
+        found: list[Any] = []
+
+        def take() -> bool:
+            try:
+                found.append(_real_get(simple_queue, False))
+            except queue.Empty:
+                return False
+            return True
+
+        until_ns = NEVER_NS if timeout is None else scheduler.world.now_ns + timeout_ns(timeout)
+        while not take():
+            if not block:
+                scheduler.poll()
+                raise queue.Empty
+            if not room.wait(simple_queue, "a queue", until_ns, take, lambda: room.hand_over(simple_queue)):
+                raise queue.Empty
+            if found:
+                break
+        return found[0]
+
+    def put(simple_queue: Any, item: Any, block: bool = True, timeout: float | None = None) -> None:
+        _real_put(simple_queue, item)
+        room.hand_over(simple_queue)
+
+    return {
+        "get": get,
+        "get_nowait": lambda simple_queue: get(simple_queue, False),
+        "put": put,
+        "put_nowait": put,
+    }
 
 
 def replacements(scheduler: Scheduler) -> dict[str, dict[str, Any]]:
     """Return the replacements for names of `_thread`, `threading` and `queue`, by module."""
-    own_lock = type("lock", (Lock,), {"scheduler": scheduler, "__slots__": (), "__module__": "_thread"})
-    real_ident = _thread.get_ident
-
-    def allocate_lock() -> Any:
-        return own_lock() if scheduler.is_here else REAL_LOCK()
-
-    def get_ident() -> int:
-        return scheduler.current.ident if scheduler.is_here else real_ident()
-
-    def start_new_thread(
-        function: Callable[..., object], args: tuple[Any, ...], kwargs: dict[str, Any] | None = None, /
-    ) -> int:
-        if not scheduler.is_here:
-            return real_start(function, args, kwargs or {})
-        if not callable(function):
-            raise TypeError("first arg must be callable")
-        return scheduler.start(function, tuple(args), kwargs or {})
-
-    def set_sentinel() -> Any:
-        if not scheduler.is_here:
-            return real_sentinel()
-        scheduler.current.sentinel = allocate_lock()
-        return scheduler.current.sentinel
-
-    def rlock(*args: Any, **kwargs: Any) -> Any:
-        return python_rlock(*args, **kwargs) if scheduler.is_here else real_rlock(*args, **kwargs)
+    room = WaitingRoom(scheduler)
 
     def is_set(event: threading.Event) -> bool:
         if not event._flag and scheduler.is_here:  # type: ignore[attr-defined]
             scheduler.poll()
         return real_is_set(event)
 
-    real_start, real_sentinel = _thread.start_new_thread, _thread._set_sentinel  # type: ignore[attr-defined]
-    real_rlock, python_rlock = threading.RLock, threading._PyRLock  # type: ignore[attr-defined]
-    real_is_set = threading.Event.is_set
+    def is_owned(condition: Any) -> bool:
+        # Python tries to acquire the lock, which would be a poll.
+        lock = condition._lock
+        return _real_locked(lock) if type(lock) is _lock else real_is_owned(condition)
+
+    def get_ident() -> int:
+        return scheduler.current.ident
+
+    real_is_set, real_is_owned = threading.Event.is_set, threading.Condition._is_owned  # type: ignore[attr-defined]
     return {
-        "_thread": {
-            "allocate_lock": allocate_lock,
-            "allocate": allocate_lock,
-            "get_ident": get_ident,
-            "start_new_thread": start_new_thread,
-            "start_new": start_new_thread,
-            "_set_sentinel": set_sentinel,
-            "RLock": rlock,
-            "_local": local,
-        },
+        "_thread": {"get_ident": get_ident, "_local": local},
+        "_thread.LockType": _plain_locks(scheduler, room),
+        "_thread.RLock": _reentrant_locks(scheduler, room),
+        "_queue.SimpleQueue": _queues(scheduler, room),
         "threading": {
-            "Lock": allocate_lock,
-            "RLock": rlock,
-            "_CRLock": None,
-            "_allocate_lock": allocate_lock,
-            "_start_new_thread": start_new_thread,
-            "_set_sentinel": set_sentinel,
-            "get_ident": get_ident,
             "local": local,
             # The first thread of a program is Thread-1, even if other threads ran in this process before.
             "_counter": itertools.count(1).__next__,
         },
         "threading.Event": {"is_set": is_set},
+        "threading.Condition": {"_is_owned": is_owned},
         # Running executors: those of this process are not the program's.
         concurrent.futures.thread.__name__: {"_shutdown": False, "_threads_queues": weakref.WeakKeyDictionary()},
-        "queue": {"SimpleQueue": queue._PySimpleQueue},  # type: ignore[attr-defined]
-        "_queue": {"SimpleQueue": queue._PySimpleQueue},  # type: ignore[attr-defined]
     }

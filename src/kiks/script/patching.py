@@ -1,74 +1,84 @@
-"""Replaces names of modules while a program runs."""
+"""Puts what is simulated inside the functions and classes of Python while a program runs."""
 
 from __future__ import annotations
 
-import _thread
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from types import BuiltinFunctionType
 from typing import Any
+
+from kiks.script.callers import Caller, caller
+from kiks.script.cpython import Undo, change_class, change_function, unchanged
+from kiks.script.thread_scheduler import Scheduler
+
+Replacements = Mapping[str, Mapping[str, Any]]
+"""What stands in, by module, or module and class, and name."""
 
 _MISSING = object()
 
-_SWEPT = sys.stdlib_module_names | {"serial"}
+
+class Reading:
+    """What stands in for a clock.
+
+    Args:
+        asked: Returns the time to a program that asks for it, which costs it some.
+        waited: Returns it to a library that waits with a timeout.
+    """
+
+    def __init__(self, asked: Callable[..., Any], waited: Callable[..., Any]) -> None:
+        self.asked = asked
+        self.waited = waited
 
 
 @contextmanager
-def replaced(
-    replacements: Mapping[str, Mapping[str, Any]], new_lock: Callable[[], object] | None = None
-) -> Iterator[None]:
-    """Replace names, also where modules of Python and pyserial have imported them from others.
+def replaced(replacements: Replacements, scheduler: Scheduler) -> Iterator[None]:
+    """Let names of modules and classes mean something else, for the threads of a program.
 
-    Other modules that KiKS has imported keep the originals, because they live in real time.
+    A function in C stays the same object and gets another body, which the program and its libraries reach. KiKS, and
+    other threads of this process, still get the function as it was. Anything else in a module gets another value.
+    A class stays the same object and gets another attribute; its methods decide themselves whom they serve.
 
     Args:
-        replacements: The new values, by module, or module and class, and name.
-        new_lock: Makes locks that replace those which modules have created at their import; None to keep them.
+        replacements: What stands in; a module that has not been imported, or has no such name, is left alone.
+        scheduler: The threads of the program.
     """
-    undo: list[tuple[Any, str, Any]] = []
-
-    def put(owner: Any, name: str, value: Any) -> None:
-        undo.append((owner, name, vars(owner).get(name, _MISSING)))
-        setattr(owner, name, value)
-
-    # References to the originals, so that no other object gets the same id.
-    named: list[tuple[Any, str, Any]] = []
-    stands_for: dict[int, tuple[Any, Any]] = {}
-    for path, names in replacements.items():
-        owner: Any = sys.modules.get(path)
-        if owner is None and path.rpartition(".")[0] in sys.modules:
-            parent, _, attribute = path.rpartition(".")
-            owner = getattr(sys.modules[parent], attribute, None)
-        if owner is None:
-            continue
-        for name, value in names.items():
-            original = vars(owner).get(name)
-            # A name that a module has imported is replaced only in its own module.
-            if callable(original) and getattr(original, "__module__", None) == path:
-                stands_for[id(original)] = (original, value)
-            named.append((owner, name, value))
-    for name, module in list(sys.modules.items()):
-        if name.partition(".")[0] not in _SWEPT or not hasattr(module, "__dict__"):
-            continue
-        for attribute, value in list(vars(module).items()):
-            if id(value) in stands_for and value is stands_for[id(value)][0]:
-                put(module, attribute, stands_for[id(value)][1])
-            elif new_lock is not None and type(value) is _thread.LockType and not value.locked():
-                put(module, attribute, new_lock())
-    for owner, name, value in named:
-        put(owner, name, value)
-    before = set(sys.modules)
+    undo = Undo()
     try:
+        for path, names in replacements.items():
+            owner = _find(path)
+            for name, value in names.items():
+                before = vars(owner).get(name, _MISSING) if owner is not None else _MISSING
+                if before is _MISSING:
+                    continue
+                if isinstance(owner, type):
+                    change_class(owner, name, value, undo)
+                elif isinstance(before, BuiltinFunctionType) and (callable(value) or isinstance(value, Reading)):
+                    change_function(before, for_program(scheduler, value, unchanged(before)), undo)
+                else:
+                    setattr(owner, name, value)
+                    undo.add(lambda owner=owner, name=name, before=before: setattr(owner, name, before))
         yield
     finally:
-        # Modules imported meanwhile have imported replacements.
-        originals = {id(value): original for original, value in stands_for.values()}
-        for name in sys.modules.keys() - before:
-            for attribute, value in list(vars(sys.modules[name]).items()):
-                if id(value) in originals:
-                    setattr(sys.modules[name], attribute, originals[id(value)])
-        for owner, name, value in reversed(undo):
-            if value is _MISSING:
-                delattr(owner, name)
-            else:
-                setattr(owner, name, value)
+        undo()
+
+
+def for_program(
+    scheduler: Scheduler, simulated: Callable[..., Any] | Reading, real: Callable[..., Any]
+) -> Callable[..., Any]:
+    """Return a function that does one thing for a program and its libraries, another for what lives in real time."""
+    frame = sys._getframe
+    asked, waited = (simulated.asked, simulated.waited) if isinstance(simulated, Reading) else (simulated, simulated)
+    bodies = {Caller.PROGRAM: asked, Caller.WAITS: waited, Caller.REAL: real}
+
+    def call(*args: Any, **kwargs: Any) -> Any:
+        return (bodies[caller(frame(1))] if scheduler.is_here else real)(*args, **kwargs)
+
+    return call
+
+
+def _find(path: str) -> Any:
+    if path in sys.modules:
+        return sys.modules[path]
+    parent, _, name = path.rpartition(".")
+    return getattr(sys.modules.get(parent), name, None)

@@ -14,8 +14,10 @@ from typing import TYPE_CHECKING, Any
 
 from kiks.clock.program_clock import ProgramClock
 from kiks.errors import KiksError
-from kiks.script import clocks, event_loops, locks, serial_ports, unsupported
-from kiks.script.file_waits import OpenPorts, RealFiles
+from kiks.script import clocks, cpython, event_loops, locks, serial_ports, socket_waits, unsupported
+from kiks.script.chance import Chance
+from kiks.script.file_system import FileSystem
+from kiks.script.file_waits import Files
 from kiks.script.libraries.adapters import adapted
 from kiks.script.libraries.host import Host, keyboard
 from kiks.script.patching import replaced
@@ -56,7 +58,20 @@ def run_here(sim: Simulation, program: Path, arguments: list[str], told: dict[st
         port = find_port(name)
         return port.robot if port.sim is sim else port
 
-    return run_program(program, arguments, lambda robot: LocalLine(sim.loop, robot), find, sim.program, names.offered())
+    return run_program(
+        program,
+        arguments,
+        lambda robot: LocalLine(sim.loop, robot),
+        find,
+        sim.program,
+        names.offered(),
+        chance_seed(sim.seed, 1),
+    )
+
+
+def chance_seed(world_seed: int, robot: int) -> str:
+    """Return what all chance in the program of a robot follows from."""
+    return f"{world_seed} {robot}"
 
 
 def run_program(
@@ -66,6 +81,7 @@ def run_program(
     find: Callable[[str], int | VirtualPort],
     policy: ProgramClock,
     offered: list[str],
+    seed: str,
 ) -> int:
     """Run a program to its end with simulated ports and simulated time; return its exit code.
 
@@ -76,9 +92,14 @@ def run_program(
         find: Returns the robot behind a port's name, or a port of another world.
         policy: The cost of the program's thinking and polling.
         offered: The port names that it finds when it lists ports.
+        seed: What all its random numbers follow from; see `chance_seed`.
+
+    Raises:
+        KiksError: If it cannot run under this interpreter.
     """
+    cpython.check_interpreter()
     world = line_of(1)
-    scheduler = Scheduler(world, policy, RealFiles())
+    scheduler = Scheduler(world, policy)
     lines: dict[int, SharedLine] = {}
 
     def open_port(name: str) -> VirtualPort:
@@ -90,7 +111,8 @@ def run_program(
         return VirtualPort(lines[found], policy)
 
     clock = VirtualPort(SharedLine(world, 1, scheduler), policy)
-    host, ports = Host(scheduler, clock), OpenPorts(scheduler)
+    chance, system = Chance(scheduler, seed), FileSystem(scheduler, offered)
+    host, files = Host(scheduler, clock, chance), Files(scheduler, system)
     ends, signals = _AtExit(), Signals(scheduler)
 
     def end_at_once(code: int) -> None:
@@ -98,16 +120,20 @@ def run_program(
         scheduler.end(code)
 
     replacements = _merged(
+        cpython.thread_starts(scheduler),
         locks.replacements(scheduler),
         clocks.replacements(scheduler, clock),
-        ports.replacements(),
-        serial_ports.replacements(open_port, ports, offered),
+        system.replacements(),
+        files.replacements(),
+        socket_waits.replacements(scheduler, files),
+        chance.replacements(),
+        serial_ports.replacements(open_port, files, offered),
         event_loops.replacements(scheduler),
         signals.replacements(),
         unsupported.replacements(scheduler),
         ends.replacements(),
         keyboard(host),
-        {"os": {"_exit": end_at_once}},
+        {"posix": {"_exit": end_at_once}},
         {"threading": {"excepthook": _print_thread_trace, "__excepthook__": _print_thread_trace}},
     )
 
@@ -127,9 +153,10 @@ def run_program(
         with (
             watched(scheduler),
             signals.taken(),
-            replaced(replacements, replacements["threading"]["Lock"]),
+            chance.taken(),
+            replaced(replacements, scheduler),
             adapted(host),
-            unsupported.watched(scheduler),
+            unsupported.watched(scheduler, system),
         ):
             return scheduler.run(main)
     except EndedError as end:
@@ -137,7 +164,7 @@ def run_program(
             _complain(f"kiks: {end.message}")
         return end.code
     finally:
-        _forget_threads(scheduler)
+        cpython.forget_threads(scheduler.tasks)
         sys.argv, sys.excepthook = argv_before, hook_before
         sys.path[:] = path_before
 
@@ -201,15 +228,6 @@ def _wait_for_threads(scheduler: Scheduler) -> None:
     while left := [each for each in threading.enumerate() if each.ident in scheduler.tasks and not each.daemon]:
         for thread in left:
             thread.join()
-
-
-def _forget_threads(scheduler: Scheduler) -> None:
-    """Make Python forget threads that have not ended, because they never go on."""
-    for ident, task in scheduler.tasks.items():
-        thread = threading._active.pop(ident, None)  # type: ignore[attr-defined]
-        threading._shutdown_locks.discard(task.sentinel)  # type: ignore[attr-defined]
-        if thread is not None:
-            thread._is_stopped, thread._tstate_lock = True, None
 
 
 def _complain(text: str) -> int:

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import errno
-import fnmatch
-import glob
-import os
 from collections.abc import Callable, Sequence
 from typing import Any
 
 from kiks.ports import url as urls
-from kiks.script.file_waits import OpenPorts
+from kiks.script.file_waits import Files
 from kiks.script.shared_line import SharedLine
 from kiks.sim.port import VirtualPort
 
@@ -19,7 +16,7 @@ USB_ADAPTER = (0x0403, 0x6001)
 
 
 def replacements(
-    open_port: Callable[[str], VirtualPort], ports: OpenPorts, names: Sequence[str]
+    open_port: Callable[[str], VirtualPort], ports: Files, names: Sequence[str]
 ) -> dict[str, dict[str, Any]]:
     """Return what stands in for names of `serial`, `glob` and `os`, by module.
 
@@ -116,26 +113,9 @@ def replacements(
             found.append(info)
         return found
 
-    def simulated_glob(pathname: Any, **options: Any) -> list[Any]:
-        more = fnmatch.filter(names, pathname) if isinstance(pathname, str) else []
-        return sorted({*real_iglob(pathname, **options), *more})
-
-    def stat(path: Any, *args: Any, **options: Any) -> os.stat_result:
-        # `os.path` and `pathlib` find a port, which is a device like any terminal.
-        return real_stat(os.devnull if is_offered(path) else path, *args, **options)
-
-    def access(path: Any, *args: Any, **options: Any) -> bool:
-        return is_offered(path) or real_access(path, *args, **options)
-
-    def is_offered(path: Any) -> bool:
-        return isinstance(path, str | os.PathLike) and os.fspath(path) in names
-
-    real_iglob, real_stat, real_access = glob.iglob, os.stat, os.access
     return {
         "serial": {"Serial": Serial, "serial_for_url": serial_for_url},
         "serial.tools.list_ports": {"comports": comports},
-        "glob": {"glob": simulated_glob, "iglob": lambda *args, **options: iter(simulated_glob(*args, **options))},
-        "os": {"stat": stat, "access": access},
         # `kiks.Khepera` and `kiks.kopen` find their ports by this function.
         urls.__name__: {"find_port": open_port},
     }

@@ -6,13 +6,16 @@ import contextlib
 import os
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from types import FrameType
 from typing import Any
 
+import _signal
+
 import kiks
+from kiks.script.cpython import unchanged
 from kiks.script.thread_scheduler import SIGNALLED, Scheduler, timeout_ns
 from kiks.sim.read_completion import NEVER_NS
 from kiks.units import s_from_ns
@@ -23,7 +26,12 @@ EXIT_OF_SIGNAL = 128
 _HERE = os.path.dirname(kiks.__file__)
 _ROOT = Scheduler.start.__code__.co_filename
 
-_real_signal, _real_getsignal, _real_wakeup = signal.signal, signal.getsignal, signal.set_wakeup_fd
+_real_signal, _real_getsignal, _real_wakeup = (
+    unchanged(each) for each in (_signal.signal, _signal.getsignal, _signal.set_wakeup_fd)
+)
+_real_mask, _real_pending, _real_wait = (
+    unchanged(each) for each in (_signal.pthread_sigmask, _signal.sigpending, _signal.sigtimedwait)
+)
 
 
 class Signals:
@@ -39,6 +47,8 @@ class Signals:
         # The handlers from before the program.
         self._before: dict[int, Any] = {}
         self._wakeup = -1
+        # Simulated signals that the program has blocked, and not yet waited for.
+        self._pending: set[int] = set()
         # Number of the present alarm, its time [ns], and its interval [ns].
         self._alarm = (0, NEVER_NS, 0)
 
@@ -64,7 +74,7 @@ class Signals:
     def replacements(self) -> dict[str, dict[str, Any]]:
         """Return the replacements for names of `signal`."""
         return {
-            "signal": {
+            "_signal": {
                 "signal": self._set,
                 "getsignal": self._get,
                 "set_wakeup_fd": self._set_wakeup,
@@ -72,6 +82,11 @@ class Signals:
                 "setitimer": self._set_timer,
                 "getitimer": self._get_timer,
                 "pause": self._pause,
+                "pthread_sigmask": self._set_mask,
+                "sigpending": lambda: self._pending | _real_pending(),
+                "sigwait": lambda signals, /: self._wait_for(signals, NEVER_NS),
+                "sigwaitinfo": lambda signals, /: _told(self._wait_for(signals, NEVER_NS)),
+                "sigtimedwait": self._wait_until,
             }
         }
 
@@ -80,8 +95,7 @@ class Signals:
     def _set(self, number: int, handler: Any, /) -> Any:
         before = self._get(number)
         self._before.setdefault(number, _real_getsignal(number))
-        is_called = callable(handler) and not isinstance(handler, signal.Handlers)
-        _real_signal(number, self._come if is_called else handler)
+        _real_signal(number, self._come if callable(handler) else handler)
         self._handlers[number] = handler
         return before
 
@@ -109,6 +123,34 @@ class Signals:
                 "a timer of signals must be ITIMER_REAL, but the program has set one that counts the processor's time. "
                 "Use ITIMER_REAL, or run the program on kiks serve.",
             )
+
+    def _set_mask(self, how: int, mask: Iterable[int], /) -> set[int]:
+        before: set[int] = _real_mask(how, mask)
+        for number in sorted(self._pending - _real_mask(signal.SIG_BLOCK, ())):
+            self._pending.remove(number)
+            self._raise(number)
+        return before
+
+    def _wait_for(self, signals: Iterable[int], until_ns: int) -> int:
+        """Wait for one of several signals until a time [ns]; return its number, or 0."""
+        wanted = {int(each) for each in signals}
+        wait = _SignalWait(wanted)
+        while True:
+            if found := wanted & self._pending:
+                number = min(found)
+                self._pending.remove(number)
+                return number
+            if wait.number or wait.is_over(0):
+                return wait.number
+            if self._scheduler.world.now_ns >= until_ns:
+                return 0
+            self._scheduler.wait("a signal", until_ns=until_ns, files=wait)
+
+    def _wait_until(self, signals: Iterable[int], timeout: float, /) -> Any:
+        if timeout < 0:
+            raise ValueError("timeout must be non-negative")
+        number = self._wait_for(signals, self._scheduler.world.now_ns + timeout_ns(timeout))
+        return _told(number) if number else None
 
     def _pause(self) -> None:
         while self._scheduler.wait("a signal") is not SIGNALLED:
@@ -140,19 +182,45 @@ class Signals:
 
     def _raise(self, number: int) -> None:
         """Deliver a simulated signal."""
+        if number in _real_mask(signal.SIG_BLOCK, ()):
+            self._pending.add(number)
+            for task in self._scheduler.waiting_for("a signal"):
+                self._scheduler.wake(task, None)
+            return
         handler = self._get(number)
         if self._wakeup >= 0:
             with contextlib.suppress(OSError):
                 os.write(self._wakeup, bytes([number]))
-        if handler is signal.SIG_DFL:
+        if handler == signal.SIG_DFL:
             self._scheduler.end(EXIT_OF_SIGNAL + number, f"the program was ended by signal {number}.")
-        elif callable(handler) and not isinstance(handler, signal.Handlers):
+        elif callable(handler):
             self._scheduler.interrupt(partial(handler, number, None), at_once=False)
 
     def _come(self, number: int, frame: FrameType | None) -> None:
         """Handle a signal of the operating system, in the running thread."""
         handler = self._handlers.get(number, signal.default_int_handler)
         self._scheduler.interrupt(partial(handler, number, frame), at_once=_is_in_program(frame))
+
+
+class _SignalWait:
+    """A wait for real signals; see `thread_scheduler.FileWait`."""
+
+    is_inside = False
+
+    def __init__(self, wanted: set[int]) -> None:
+        self._wanted = wanted
+        self.number = 0
+
+    def is_over(self, block_ms: int) -> bool:
+        """Return whether one has come."""
+        found = _real_wait(self._wanted, block_ms / 1000)
+        self.number = found.si_signo if found is not None else 0
+        return bool(self.number)
+
+
+def _told(number: int) -> signal.struct_siginfo:
+    """Return what `sigwaitinfo` tells of a signal."""
+    return signal.struct_siginfo((number, 0, 0, os.getpid(), os.getuid(), 0, 0))
 
 
 def _is_in_program(frame: FrameType | None) -> bool:

@@ -12,11 +12,9 @@ from __future__ import annotations
 import heapq
 import threading
 import traceback
-
-# Bound here once: a program lives with a `_thread` that is simulated.
-from _thread import get_ident
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from itertools import count
 from typing import Any, NoReturn, Protocol
 
@@ -24,6 +22,7 @@ import greenlet
 
 from kiks.clock.program_clock import PollCost, ProgramClock
 from kiks.model.checks import SECONDS_MAX
+from kiks.script.cpython import unchanged
 from kiks.sim.port import Line
 from kiks.sim.read_completion import NEVER_NS, Read
 from kiks.units import wait_ns
@@ -36,20 +35,23 @@ SIGNALLED, COMPLETE, ALONE, STUCK = object(), object(), object(), object()
 """Reasons for which a thread goes on: a signal; a complete read; no other thread can go on before its read is complete;
 no thread can go on at all."""
 
+BLOCK_MS = 50
+"""Longest wait for files between two checks for signals [ms of real time]."""
+
+get_ident = unchanged(threading.get_ident)
+
 _KEPT: list[Scheduler] = []
 """Schedulers with threads that never end: a waiting thread without a reference would be collected and run `finally`."""
 
 
-class Files(Protocol):
-    """The real files that threads wait for: pipes, sockets, the keyboard."""
+class FileWait(Protocol):
+    """What a thread waits for at real files: pipes, sockets, the keyboard."""
 
-    def ready(self, wanted: Mapping[int, int], *, block: bool) -> set[int]:
-        """Return the descriptors with an event; with `block`, wait for one in real time.
+    is_inside: bool
+    """Whether threads of the program alone can end the wait."""
 
-        Args:
-            wanted: The events of interest, as in `select.poll`, by descriptor.
-            block: Whether to wait.
-        """
+    def is_over(self, block_ms: int) -> bool:
+        """Return whether a file is ready, after at most this real time [ms]."""
 
 
 class Task:
@@ -88,7 +90,6 @@ class Scheduler:
     Args:
         world: A line of the program's world, for its time.
         program: The cost of thinking and polling.
-        files: The real files that threads wait for.
 
     Attributes:
         current: The running thread.
@@ -97,11 +98,10 @@ class Scheduler:
         carried: Functions that save and restore values that libraries keep per thread of the operating system.
     """
 
-    def __init__(self, world: Line, program: ProgramClock, files: Files) -> None:
+    def __init__(self, world: Line, program: ProgramClock) -> None:
         self.world = world
         self.program = program
         self.carried: list[tuple[Callable[[], object], Callable[[Any], object]]] = []
-        self._files = files
         self._os_thread = get_ident()
         self._hub = greenlet.getcurrent()
         self._end: EndedError | None = None
@@ -114,7 +114,7 @@ class Scheduler:
         # Deadlines of waits [ns], with their numbers and threads; waits that have ended before stay in the heap.
         self._deadlines: list[tuple[int, int, Task]] = []
         self._readers: dict[Task, Sequence[Read]] = {}
-        self._watchers: dict[Task, Mapping[int, int]] = {}
+        self._watchers: dict[Task, FileWait] = {}
         self._patient: list[Task] = []
         self.lock_count = 0
         self.tasks: dict[int, Task] = {}
@@ -156,8 +156,8 @@ class Scheduler:
         self._hub.switch()
         raise self._end  # never reached: no greenlet switches back
 
-    def start(self, function: Callable[..., object], arguments: tuple[Any, ...], keywords: dict[str, Any]) -> int:
-        """Start a thread, which goes on when this one waits; return its ident."""
+    def start(self, function: Callable[..., object], arguments: tuple[Any, ...], keywords: dict[str, Any]) -> Task:
+        """Start a thread, which goes on when this one waits."""
 
         def run() -> None:
             try:
@@ -178,7 +178,7 @@ class Scheduler:
         task = Task(next(self._idents), run, self._hub)
         self.tasks[task.ident] = task
         self._ready.append(task)
-        return task.ident
+        return task
 
     # ---- queries ----
 
@@ -186,6 +186,15 @@ class Scheduler:
     def is_here(self) -> bool:
         """Whether the caller is a thread of the program, not another thread of this process, such as a server's."""
         return get_ident() == self._os_thread
+
+    @contextmanager
+    def real_time(self) -> Iterator[None]:
+        """Let the running thread live in real time meanwhile, alone."""
+        thread, self._os_thread = self._os_thread, 0
+        try:
+            yield
+        finally:
+            self._os_thread = thread
 
     @property
     def is_alone(self) -> bool:
@@ -234,7 +243,7 @@ class Scheduler:
         *,
         until_ns: int = NEVER_NS,
         reads: Sequence[Read] = (),
-        files: Mapping[int, int] | None = None,
+        files: FileWait | None = None,
         may_go_alone: bool = False,
         when_stuck: bool = False,
     ) -> object:
@@ -244,7 +253,7 @@ class Scheduler:
             what: The reason of the wait, for messages.
             until_ns: The deadline [ns].
             reads: Reads that end the wait.
-            files: Events that end it, by descriptor.
+            files: The real files that end it.
             may_go_alone: Whether it also ends when no other thread can go on before a read is complete or the deadline
                 is over: the thread then waits for that itself, at less cost.
             when_stuck: Whether it ends when all threads would wait for ever; a person may still act.
@@ -284,6 +293,11 @@ class Scheduler:
         task.cause = cause
         self._ready.append(task)
         return True
+
+    def waiting_for(self, what: str) -> list[Task]:
+        """Return the threads that wait for something, in the order in which they began."""
+        waiting = [task for task in (self._main, *self.tasks.values()) if task.waits_for == what]
+        return sorted(waiting, key=lambda task: task.number)
 
     def interrupt(self, call: Callable[[], object], *, at_once: bool) -> None:
         """Let the main thread call a function: at once if it runs, otherwise where it waits.
@@ -371,18 +385,15 @@ class Scheduler:
             if self._patient:
                 self.wake(self._patient[0], STUCK)
                 return
-            if not self._watchers:
+            if all(files.is_inside for files in self._watchers.values()):
                 self.end_stuck()
             # Only a real file can wake a thread; simulated time stands still meanwhile.
             self._look_at_files(block=True)
 
     def _look_at_files(self, *, block: bool) -> bool:
-        wanted: dict[int, int] = {}
-        for files in self._watchers.values():
-            for descriptor, events in files.items():
-                wanted[descriptor] = wanted.get(descriptor, 0) | events
-        ready = self._files.ready(wanted, block=block)
-        woken = [task for task, files in self._watchers.items() if not ready.isdisjoint(files)]
+        """Wake the threads whose files are ready; with `block`, wait some real time for that."""
+        block_ms = BLOCK_MS // len(self._watchers) if block else 0
+        woken = [task for task, files in self._watchers.items() if files.is_over(block_ms)]
         for task in sorted(woken, key=lambda task: task.number):
             self.wake(task, None)
         return bool(woken)

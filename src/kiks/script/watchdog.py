@@ -22,7 +22,7 @@ from pathlib import Path
 from types import FrameType
 
 from kiks.script.thread_scheduler import Scheduler
-from kiks.script.unsupported import ADVICE, where
+from kiks.script.refusals import ADVICE, where
 
 SAMPLE_S = 0.05
 """Period of the samples [s of real time]."""

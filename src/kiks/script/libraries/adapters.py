@@ -24,7 +24,14 @@ def _adapters() -> dict[str, Adapter]:
         "pygame.time": pygame_time.adapt,
         "pygame.event": pygame_time.adapt_events,
         "curses": curses_keys.adapt,
+        "numpy.random": _adapt_numpy,
     }
+
+
+def _adapt_numpy(module: ModuleType, host: Host) -> dict[Any, dict[str, Any]]:
+    """Seed the generator that NumPy's functions share."""
+    host.chance.seed_numpy(module)
+    return {}
 
 
 @contextmanager

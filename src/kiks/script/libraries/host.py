@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import builtins
-import select
 import sys
 from typing import Any, NamedTuple
 
-from kiks.script.file_waits import poll_files
+from kiks.script.cpython import unchanged
+from kiks.script.chance import Chance
+from kiks.script.file_waits import is_readable
 from kiks.script.thread_scheduler import Scheduler
-from kiks.script.unsupported import refuse
+from kiks.script.refusals import refuse
 from kiks.sim.port import VirtualPort
 
 BLINK_S = 0.02
@@ -17,18 +18,19 @@ BLINK_S = 0.02
 
 
 class Host(NamedTuple):
-    """The parts that an adapter works with: the program's threads, and a port of its world for the time."""
+    """The parts that an adapter works with: the program's threads, a port of its world for the time, and chance."""
 
     scheduler: Scheduler
     clock: VirtualPort
+    chance: Chance
 
 
 def keyboard(host: Host) -> dict[str, dict[str, Any]]:
     """Return what stands in for `input`."""
-    real_input = builtins.input
+    real_input = unchanged(builtins.input)
 
     def read_line(prompt: object = "", /) -> str:
-        if sys.stdin is not None and sys.stdin.isatty() and not poll_files({sys.stdin.fileno(): select.POLLIN}, 0):
+        if sys.stdin is not None and sys.stdin.isatty() and not is_readable(sys.stdin.fileno(), 0):
             refuse_keyboard(host.scheduler)
         return real_input(prompt)
 

@@ -1,0 +1,64 @@
+"""Chance in a program: what is random on a computer follows from the world's seed, so that a run can be repeated."""
+
+from __future__ import annotations
+
+import random
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import ModuleType
+from typing import Any
+
+import _random
+
+from kiks.script.patching import for_program
+from kiks.script.thread_scheduler import Scheduler
+
+_real_seed = _random.Random.seed
+
+
+class Chance:
+    """The source of all randomness of one program.
+
+    Args:
+        scheduler: The program's threads.
+        seed: What it follows from: the world's seed, and the program's number.
+    """
+
+    def __init__(self, scheduler: Scheduler, seed: str) -> None:
+        self._scheduler = scheduler
+        self._seed = seed
+        self._source = random.Random(seed)
+
+    @contextmanager
+    def taken(self) -> Iterator[None]:
+        """Give the generators that are there already seeds of the program, and their own ones back."""
+        numpy_random = sys.modules.get("numpy.random")
+        before = random.getstate(), None if numpy_random is None else numpy_random.get_state()
+        random.seed(f"{self._seed} random")
+        try:
+            yield
+        finally:
+            random.setstate(before[0])
+            if numpy_random is not None:
+                numpy_random.set_state(before[1])
+
+    def seed_numpy(self, module: ModuleType) -> None:
+        """Seed the generator that NumPy's functions share, which it seeds when it is imported."""
+        module.seed(random.Random(f"{self._seed} numpy").getrandbits(32))
+
+    def replacements(self) -> dict[str, dict[str, Any]]:
+        """Return the replacements for names of `os` and `random`."""
+
+        def seed(generator: Any, value: Any = None, /) -> None:
+            _real_seed(generator, self._source.getrandbits(256) if value is None else value)
+
+        def read(size: int, flags: int = 0, /) -> bytes:
+            return self._source.randbytes(size)
+
+        return {
+            "posix": {"urandom": read, "getrandom": read},
+            "_random.Random": {"seed": for_program(self._scheduler, seed, _real_seed)},
+        }
+
+

@@ -1,0 +1,52 @@
+"""One line for a program that cannot run in simulated time: what it must do, what it did, and where."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+from types import FrameType
+
+from kiks.script.thread_scheduler import Scheduler
+
+ADVICE = "run it on kiks serve, where time is real."
+"""Advice for a program that cannot run in simulated time."""
+
+OURS = (str(Path(__file__).parent.parent), os.path.dirname(os.__file__))
+"""Folders of foreign code: KiKS, and Python's own library."""
+
+INSTALLED = ("site-packages", "dist-packages")
+"""Folders in which libraries are installed."""
+
+
+def refuse(scheduler: Scheduler, must: str, given: str, way: str = "") -> None:
+    """End the program with one line: what it must do, what it did, and what to do instead."""
+    advice = way + ADVICE
+    scheduler.end(
+        1,
+        f"a program in simulated time must {must}, but {given}{where(sys._getframe())}. "
+        f"{advice[0].upper()}{advice[1:]}",
+    )
+
+
+def refuse_network(scheduler: Scheduler, given: str) -> None:
+    """End a program that talks to others than its robots."""
+    refuse(scheduler, "talk to its robots alone", given)
+
+
+def where(frame: FrameType | None) -> str:
+    """Say where in the program a frame is.
+
+    Returns:
+        The innermost line of the program's own files; that of an installed library if there is none; or nothing.
+    """
+    found = ""
+    while frame is not None:
+        name = frame.f_code.co_filename
+        is_installed = any(folder in name for folder in INSTALLED)
+        if is_installed or not name.startswith(("<", *OURS)):
+            found = found if is_installed and found else f" ({os.path.basename(name)}, line {frame.f_lineno})"
+            if not is_installed:
+                break
+        frame = frame.f_back
+    return found

@@ -1,0 +1,129 @@
+"""Sockets with both ends in the program: reading and writing them waits in simulated time. Others are refused.
+
+What comes from the outside comes in real time, and would make a run that cannot be repeated.
+"""
+
+from __future__ import annotations
+
+import ipaddress
+import select
+import socket
+import weakref
+from typing import Any
+
+import _socket
+
+from kiks.script.cpython import unchanged
+from kiks.script.file_waits import Files
+from kiks.script.patching import for_program
+from kiks.script.thread_scheduler import Scheduler
+from kiks.script.refusals import refuse_network
+
+EVENTS = frozenset(
+    f"socket.{name}" for name in ("bind", "connect", "sendto", "sendmsg", "getaddrinfo", "gethostbyname")
+)
+"""Audit events of calls that may reach the outside (docs.python.org/3/library/audit_events.html)."""
+
+_READS = ("recv", "recv_into", "recvfrom", "recvfrom_into", "recvmsg", "recvmsg_into", "_accept")
+_WRITES = ("send", "sendto", "sendmsg")
+_methods = dict(vars(_socket.socket))
+_new_pair = unchanged(_socket.socketpair)
+
+# Sockets of the program that have an address of their own.
+_own: weakref.WeakSet[Any] = weakref.WeakSet()
+
+
+def is_inside(event: str, arguments: tuple[Any, ...]) -> bool:
+    """Return whether a call, told by an audit event, reaches the program itself alone."""
+    if event in ("socket.getaddrinfo", "socket.gethostbyname"):
+        return _is_here(arguments[0])
+    where, address = arguments[0], arguments[1]
+    if event in ("socket.bind", "socket.connect"):
+        _own.add(where)
+    return event == "socket.bind" or address is None or _owner_of(address) is not None
+
+
+def _is_here(host: Any) -> bool:
+    """Return whether the address of a host is known without asking anybody."""
+    name = host.decode(errors="replace") if isinstance(host, bytes) else host
+    if name in (None, "", "localhost", socket.gethostname()):
+        return True
+    try:
+        ipaddress.ip_address(name)
+    except ValueError:
+        return False
+    return True
+
+
+def _owner_of(address: Any) -> Any:
+    """Return the program's socket with an address; None if there is none."""
+    for each in _own:
+        try:
+            own = each.getsockname()
+        except OSError:
+            continue
+        if not own:
+            continue
+        if own == address:
+            return each
+        if isinstance(own, tuple) and isinstance(address, tuple) and own[1] == address[1]:
+            # The program may name this computer in several ways.
+            host = "127.0.0.1" if address[0] == "localhost" else address[0]
+            if own[0] in (host, "0.0.0.0", "::") and _is_here(host) and ipaddress.ip_address(host).is_loopback:
+                return each
+    return None
+
+
+def replacements(scheduler: Scheduler, files: Files) -> dict[str, dict[str, Any]]:
+    """Return the replacements for methods of sockets."""
+
+    def wait(sock: Any, event: int) -> None:
+        timeout_s = sock.gettimeout()
+        if timeout_s != 0 and not files.wait_for(sock.fileno(), event, timeout_s):
+            raise TimeoutError("timed out")
+
+    def waiting(name: str, event: int) -> Any:
+        real = _methods[name]
+
+        def call(sock: Any, *args: Any, **kwargs: Any) -> Any:
+            wait(sock, event)
+            return real(sock, *args, **kwargs)
+
+        return for_program(scheduler, call, real)
+
+    def sendall(sock: Any, data: Any, flags: int = 0, /) -> None:
+        left = memoryview(data).cast("B")
+        while left:
+            wait(sock, select.POLLOUT)
+            left = left[_methods["send"](sock, left, flags | socket.MSG_DONTWAIT) :]
+
+    def connect(sock: Any, address: Any, /) -> None:
+        _methods["connect"](sock, address)
+        files.note_inside(sock.fileno())
+
+    def accept(sock: Any) -> Any:
+        wait(sock, select.POLLIN)
+        descriptor, address = _methods["_accept"](sock)
+        if address and _owner_of(address) is None:
+            refuse_network(scheduler, "another program has connected to it")
+        files.note_inside(descriptor)
+        return descriptor, address
+
+    def bind(sock: Any, address: Any, /) -> None:
+        _methods["bind"](sock, address)
+        files.note_inside(sock.fileno())
+
+    def socketpair(*args: Any) -> Any:
+        pair = _new_pair(*args)
+        files.note_inside(*(each.fileno() for each in pair))
+        return pair
+
+    own = {"sendall": sendall, "connect": connect, "bind": bind, "_accept": accept}
+    return {
+        "_socket": {"socketpair": socketpair},
+        "_socket.socket": {
+            **{name: waiting(name, select.POLLIN) for name in _READS},
+            **{name: waiting(name, select.POLLOUT) for name in _WRITES},
+            **{name: for_program(scheduler, method, _methods[name]) for name, method in own.items()},
+        },
+    }
