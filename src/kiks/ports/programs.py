@@ -385,7 +385,13 @@ class Programs:
         with there:
             try:
                 handle.process = Process(
-                    [lateness, self._policy(number), record, " ".join(self._names.offered()), f"{self.sim.seed} {robot}"],
+                    [
+                        lateness,
+                        self._policy(number),
+                        record,
+                        " ".join(self._names.offered()),
+                        f"{self.sim.seed} {robot}",
+                    ],
                     command,
                     there,
                     keeps_output=self._keeps_output,

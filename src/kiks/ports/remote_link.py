@@ -9,12 +9,12 @@ from __future__ import annotations
 import os
 import socket
 import sys
-import threading
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from typing import Any
 
+from kiks.clock.own_lock import OwnLock
 from kiks.clock.serial_timing import BACKLOG_LIMIT
 from kiks.errors import LinkError
 from kiks.ports.messages import RECEIVE_SIZE, WINDOW, Answer, Kind, Request, pack_reads, take_answer
@@ -33,7 +33,7 @@ class Connection(ABC):
     """
 
     def __init__(self, *, is_late: bool = False) -> None:
-        self.lock = threading.RLock()
+        self.lock = OwnLock()
         self._now_ns = 0
         self._needs_time = is_late
         self._told_ns = 0

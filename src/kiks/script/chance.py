@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
+import _random
 import random
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import ModuleType
 from typing import Any
-
-import _random
 
 from kiks.script.patching import for_program
 from kiks.script.thread_scheduler import Scheduler
@@ -60,5 +59,3 @@ class Chance:
             "posix": {"urandom": read, "getrandom": read},
             "_random.Random": {"seed": for_program(self._scheduler, seed, _real_seed)},
         }
-
-

@@ -353,5 +353,3 @@ def _status(descriptor: int) -> os.stat_result | None:
         return os.fstat(descriptor)
     except OSError:
         return None
-
-

@@ -19,7 +19,7 @@ from collections.abc import Callable
 from typing import Any
 
 from kiks.script.patching import for_program
-from kiks.script.thread_scheduler import SIGNALLED, Scheduler, Task, timeout_ns
+from kiks.script.thread_scheduler import SIGNALLED, Scheduler, Task, get_ident, timeout_ns
 from kiks.sim.read_completion import NEVER_NS
 
 LOCKS_IN_A_ROW = 1000
@@ -35,12 +35,14 @@ class WaitingRoom:
 
     Args:
         scheduler: The program's threads.
+
+    Attributes:
+        waiters: The threads, by the identity of an object, which they keep alive.
     """
 
     def __init__(self, scheduler: Scheduler) -> None:
         self._scheduler = scheduler
-        # By the identity of an object, which its waiters keep alive.
-        self._waiters: dict[int, deque[Task]] = {}
+        self.waiters: dict[int, deque[Task]] = {}
 
     def wait(
         self, key: object, what: str, until_ns: int, take: Callable[[], bool], give_back: Callable[[], object]
@@ -56,7 +58,7 @@ class WaitingRoom:
         """
         scheduler, task = self._scheduler, self._scheduler.current
         while True:
-            waiters = self._waiters.setdefault(id(key), deque())
+            waiters = self.waiters.setdefault(id(key), deque())
             waiters.append(task)
             try:
                 cause = scheduler.wait(what, until_ns=until_ns)
@@ -67,8 +69,8 @@ class WaitingRoom:
             finally:
                 if task in waiters:
                     waiters.remove(task)
-                if not waiters and self._waiters.get(id(key)) is waiters:
-                    del self._waiters[id(key)]
+                if not waiters and self.waiters.get(id(key)) is waiters:
+                    del self.waiters[id(key)]
             if cause is not SIGNALLED:
                 scheduler.program.waiting.act()
                 return cause is key
@@ -77,7 +79,7 @@ class WaitingRoom:
 
     def hand_over(self, key: object) -> Task | None:
         """Let the thread go on that has waited longest for an object; return it, or None if there is none."""
-        waiters = self._waiters.get(id(key))
+        waiters = self.waiters.get(id(key))
         while waiters:
             task = waiters.popleft()
             if self._scheduler.wake(task, key):
@@ -105,36 +107,40 @@ def _deadline_ns(scheduler: Scheduler, blocking: bool, timeout: float) -> int:
 
 def _plain_locks(scheduler: Scheduler, room: WaitingRoom) -> dict[str, Any]:
     """Return the methods of `_thread.lock`."""
-    # Locks that threads of the program hold, by identity. Another thread of this process may hold one, too.
-    held: set[int] = set()
+    # Locks that other threads of this process hold, by identity, as long as they exist.
+    foreign: dict[int, Any] = {}
+    waiters, thread = room.waiters, scheduler.os_thread
+
+    # This runs some times for each item of a queue, so that it calls as little as possible.
 
     def acquire(lock: Any, blocking: bool = True, timeout: float = -1) -> bool:
-        is_here = scheduler.is_here
-        until_ns = NEVER_NS if timeout == -1 or not is_here else _deadline_ns(scheduler, blocking, timeout)
-        if _real_acquire(lock, False):
-            if is_here:
-                held.add(id(lock))
-                scheduler.lock_count += 1
-                if scheduler.lock_count > LOCKS_IN_A_ROW:
-                    # A thread that checks a value behind a lock in a loop waits for others.
-                    scheduler.lock_count = 0
-                    scheduler.ask()
+        if get_ident() != thread:
+            if is_acquired := _real_acquire(lock, blocking, timeout):
+                key = id(lock)
+                foreign[key] = weakref.ref(lock, lambda _: foreign.pop(key, None))
+            return is_acquired
+        if timeout == -1 and _real_acquire(lock, False):
+            scheduler.lock_count += 1
+            if scheduler.lock_count > LOCKS_IN_A_ROW:
+                # A thread that checks a value behind a lock in a loop waits for others.
+                scheduler.lock_count = 0
+                scheduler.ask()
             return True
-        if not is_here:
-            return _real_acquire(lock, blocking, timeout)
+        until_ns = NEVER_NS if timeout == -1 else _deadline_ns(scheduler, blocking, timeout)
+        if _real_acquire(lock, False):
+            return True
         if not blocking:
             scheduler.poll()
             return False
-        if id(lock) not in held:
-            # Another thread of this process holds it, in real time.
-            if is_acquired := _real_acquire(lock, blocking, timeout):
-                held.add(id(lock))
-            return is_acquired
+        if id(lock) in foreign:
+            # It is held in real time.
+            return _real_acquire(lock, blocking, timeout)
         return room.wait(lock, "a lock", until_ns, lambda: _real_acquire(lock, False), lambda: release(lock))
 
-    def release(lock: Any) -> None:
-        if room.hand_over(lock) is None:
-            held.discard(id(lock))
+    def release(lock: Any, *_: object) -> None:
+        if foreign:
+            foreign.pop(id(lock), None)
+        if not (waiters and id(lock) in waiters and room.hand_over(lock)):
             _real_release(lock)
 
     def locked(lock: Any) -> bool:
@@ -144,9 +150,8 @@ def _plain_locks(scheduler: Scheduler, room: WaitingRoom) -> dict[str, Any]:
 
     return {
         **dict.fromkeys(("acquire", "acquire_lock", "__enter__"), acquire),
-        **dict.fromkeys(("release", "release_lock"), release),
+        **dict.fromkeys(("release", "release_lock", "__exit__"), release),
         **dict.fromkeys(("locked", "locked_lock"), locked),
-        "__exit__": lambda lock, *_: release(lock),
     }
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import _signal
 import contextlib
 import os
 import signal
@@ -11,8 +12,6 @@ from contextlib import contextmanager
 from functools import partial
 from types import FrameType
 from typing import Any
-
-import _signal
 
 import kiks
 from kiks.script.cpython import unchanged

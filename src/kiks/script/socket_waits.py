@@ -5,19 +5,18 @@ What comes from the outside comes in real time, and would make a run that cannot
 
 from __future__ import annotations
 
+import _socket
 import ipaddress
 import select
 import socket
 import weakref
 from typing import Any
 
-import _socket
-
 from kiks.script.cpython import unchanged
 from kiks.script.file_waits import Files
 from kiks.script.patching import for_program
-from kiks.script.thread_scheduler import Scheduler
 from kiks.script.refusals import refuse_network
+from kiks.script.thread_scheduler import Scheduler
 
 EVENTS = frozenset(
     f"socket.{name}" for name in ("bind", "connect", "sendto", "sendmsg", "getaddrinfo", "gethostbyname")

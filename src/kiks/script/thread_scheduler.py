@@ -95,6 +95,7 @@ class Scheduler:
         current: The running thread.
         tasks: Started threads that have not ended, by ident.
         lock_count: Number of free locks that the running thread has taken since it went on.
+        os_thread: The thread of the operating system that runs the program; 0 when none does.
         carried: Functions that save and restore values that libraries keep per thread of the operating system.
     """
 
@@ -102,7 +103,7 @@ class Scheduler:
         self.world = world
         self.program = program
         self.carried: list[tuple[Callable[[], object], Callable[[Any], object]]] = []
-        self._os_thread = get_ident()
+        self.os_thread = get_ident()
         self._hub = greenlet.getcurrent()
         self._end: EndedError | None = None
         self._idents = count(TASK_IDENT)
@@ -142,6 +143,8 @@ class Scheduler:
         self._main.greenlet = greenlet.greenlet(run_main, self._hub)
         self.program.waiting = self._main.waiting
         self._main.greenlet.switch()
+        # What libraries in C keep of this program must not take later callers for it.
+        self.os_thread = 0
         if self.tasks or not self._main.greenlet.dead:
             _KEPT.append(self)
         if self._end is not None:
@@ -185,16 +188,16 @@ class Scheduler:
     @property
     def is_here(self) -> bool:
         """Whether the caller is a thread of the program, not another thread of this process, such as a server's."""
-        return get_ident() == self._os_thread
+        return get_ident() == self.os_thread
 
     @contextmanager
     def real_time(self) -> Iterator[None]:
         """Let the running thread live in real time meanwhile, alone."""
-        thread, self._os_thread = self._os_thread, 0
+        thread, self.os_thread = self.os_thread, 0
         try:
             yield
         finally:
-            self._os_thread = thread
+            self.os_thread = thread
 
     @property
     def is_alone(self) -> bool:

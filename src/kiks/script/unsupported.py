@@ -33,6 +33,7 @@ _watching: list[tuple[Scheduler, FileSystem]] = []
 
 def replacements(scheduler: Scheduler) -> dict[str, dict[str, Any]]:
     """Return the replacements for names of `subprocess` and `multiprocessing`, by module."""
+
     def start(process: Any) -> None:
         refuse(scheduler, "start no process of Python by itself", "it did, by multiprocessing", "Use threads, or ")
 
@@ -76,7 +77,9 @@ class _Hook:
             sys.addaudithook(self._hear)
 
     def _hear(self, event: str, arguments: tuple[Any, ...]) -> None:
-        if _watching and (event in ("open", "import") or event in socket_waits.EVENTS or event in _FORKS or event in _STARTS):
+        if _watching and (
+            event in ("open", "import") or event in socket_waits.EVENTS or event in _FORKS or event in _STARTS
+        ):
             scheduler, system = _watching[-1]
             if scheduler.is_here:
                 _judge(scheduler, system, event, arguments)

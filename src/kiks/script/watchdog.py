@@ -21,8 +21,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
 
-from kiks.script.thread_scheduler import Scheduler
 from kiks.script.refusals import ADVICE, where
+from kiks.script.thread_scheduler import Scheduler
 
 SAMPLE_S = 0.05
 """Period of the samples [s of real time]."""

@@ -5,13 +5,13 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from kiks.clock.own_lock import OwnLock
 from kiks.engine import step
 from kiks.engine.parameters import PARAMETERS, pack
 from kiks.engine.scene import Scene, enter_all_worlds
@@ -64,7 +64,7 @@ class World:
     def __init__(
         self, arena: Arena, specs: Sequence[RobotSpec], seed: int, poses: NDArray[np.float64] | None = None
     ) -> None:
-        self.lock = threading.RLock()
+        self.lock = OwnLock()
         self.now_ns = 0
         self.seed = seed
         self.specs = list(specs)

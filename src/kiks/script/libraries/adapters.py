@@ -11,7 +11,7 @@ from importlib.machinery import ModuleSpec
 from types import ModuleType
 from typing import Any
 
-from kiks.script.libraries import curses_keys, pygame_time, tk_loop
+from kiks.script.libraries import c_clocks, curses_keys, pygame_time, tk_loop
 from kiks.script.libraries.host import Host
 
 Adapter = Callable[[ModuleType, Host], dict[Any, dict[str, Any]]]
@@ -24,11 +24,13 @@ def _adapters() -> dict[str, Adapter]:
         "pygame.time": pygame_time.adapt,
         "pygame.event": pygame_time.adapt_events,
         "curses": curses_keys.adapt,
-        "numpy.random": _adapt_numpy,
+        "numpy": c_clocks.adapt_numpy,
+        "numpy.random": _seed_numpy,
+        "sqlite3": c_clocks.adapt_sqlite,
     }
 
 
-def _adapt_numpy(module: ModuleType, host: Host) -> dict[Any, dict[str, Any]]:
+def _seed_numpy(module: ModuleType, host: Host) -> dict[Any, dict[str, Any]]:
     """Seed the generator that NumPy's functions share."""
     host.chance.seed_numpy(module)
     return {}

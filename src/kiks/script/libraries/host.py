@@ -6,11 +6,11 @@ import builtins
 import sys
 from typing import Any, NamedTuple
 
-from kiks.script.cpython import unchanged
 from kiks.script.chance import Chance
+from kiks.script.cpython import unchanged
 from kiks.script.file_waits import is_readable
-from kiks.script.thread_scheduler import Scheduler
 from kiks.script.refusals import refuse
+from kiks.script.thread_scheduler import Scheduler
 from kiks.sim.port import VirtualPort
 
 BLINK_S = 0.02
