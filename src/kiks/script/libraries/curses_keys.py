@@ -13,7 +13,7 @@ _real_sleep = time.sleep
 
 def adapt(curses: ModuleType, host: Host) -> dict[Any, dict[str, Any]]:
     """Return what stands in for names of `curses`."""
-    scheduler, clock = host
+    scheduler, clock = host.scheduler, host.clock
     # What `halfdelay` says for windows that say nothing themselves [ms]; None: wait.
     shared: dict[str, int | None] = {"delay_ms": None}
 

@@ -21,7 +21,7 @@ _waiting: list[Task] = []
 
 def adapt(module: ModuleType, host: Host) -> dict[Any, dict[str, Any]]:
     """Return what stands in for names of `pygame.time`."""
-    scheduler, clock = host
+    scheduler, clock = host.scheduler, host.clock
     start_ns = scheduler.world.now_ns
     timers: dict[int, int] = {}
 
