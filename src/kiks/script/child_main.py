@@ -21,7 +21,14 @@ DIE_WITH_PARENT = 1
 
 
 def main(
-    descriptor: int, is_late: bool, thinking: str, record: str, offered: list[str], program: Path, arguments: list[str]
+    descriptor: int,
+    is_late: bool,
+    thinking: str,
+    record: str,
+    offered: list[str],
+    module: str,
+    program: Path,
+    arguments: list[str],
 ) -> int:
     """Run the program to its end; return its exit code.
 
@@ -31,7 +38,8 @@ def main(
         thinking: The thinking policy.
         record: File for the measured thinking times; empty for none.
         offered: The port names that the program finds when it lists ports.
-        program: The Python file.
+        module: Name of a module to run in place of the file, as `python -m` does; empty for none.
+        program: Its file, or a folder or an archive with a `__main__.py`.
         arguments: What it finds in `sys.argv` after its name.
     """
     if sys.platform == "linux":
@@ -53,6 +61,7 @@ def main(
             lambda name: connection.ask(Kind.FIND, data=name.encode()).number,
             policy,
             offered,
+            module=module,
         )
     except KeyboardInterrupt:
         return 130
@@ -70,5 +79,6 @@ def _save(measured_ns: list[int], record: str) -> None:
 
 
 if __name__ == "__main__":
-    descriptor, lateness, thinking, record, offered, program, *arguments = sys.argv[1:]
-    sys.exit(main(int(descriptor), lateness == LATE, thinking, record, offered.split(), Path(program), arguments))
+    descriptor, lateness, thinking, record, offered, module, program, *arguments = sys.argv[1:]
+    is_late = lateness == LATE
+    sys.exit(main(int(descriptor), is_late, thinking, record, offered.split(), module, Path(program), arguments))
