@@ -65,7 +65,7 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "package/slip.py": "x = (1\n",
         "space/inner/show.py": PROGRAM,  # a namespace package
         "space/inner/__main__.py": PROGRAM,
-        "fails.py": "import package.helper as other\n\n\nclass A:\n    def b(self):\n        other.fail()\n\n\nA().b()\n",
+        "fails.py": "import package.helper as other\n\n\nclass A:\n    def b(self):\n        other.fail()\n\nA().b()\n",
         "slip.py": "print(1)\nx = (1\n",
     }
     for name, text in texts.items():

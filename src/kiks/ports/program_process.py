@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from importlib.machinery import ModuleSpec, PathFinder
 from pathlib import Path
-from typing import IO, NamedTuple, Protocol
+from typing import IO, Any, NamedTuple, Protocol
 
 from kiks.errors import KiksError, ParameterError, shown
 from kiks.model.atomic_files import program_in
@@ -123,7 +123,8 @@ def module_command(module: str, arguments: Sequence[str]) -> Command:
 
 def _find_spec(name: str, path: Sequence[str]) -> ModuleSpec | None:
     # Other finders, such as those of packages that are installed editable, do not heed the path: they come last.
-    return next(filter(None, (finder.find_spec(name, path) for finder in (PathFinder, *sys.meta_path))), None)
+    finders: list[Any] = [PathFinder, *sys.meta_path]
+    return next(filter(None, (finder.find_spec(name, path) for finder in finders)), None)
 
 
 class OutputLine(NamedTuple):
