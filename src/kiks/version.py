@@ -9,7 +9,5 @@ PYTHONS = (3, 11), (3, 15)
 
 if not PYTHONS[0] <= sys.version_info[:2] <= PYTHONS[1]:
     # A traceback would say less, for instance that Numba is not there.
-    sys.exit(
-        "kiks: Python must be %d.%d to %d.%d, but this is %d.%d. Install KiKS for another one."
-        % (*PYTHONS[0], *PYTHONS[1], *sys.version_info[:2])
-    )
+    oldest, newest, here = (f"{major}.{minor}" for major, minor in (*PYTHONS, sys.version_info[:2]))
+    sys.exit(f"kiks: Python must be {oldest} to {newest}, but this is {here}. Install KiKS for another one.")
