@@ -101,7 +101,7 @@ def test_a_program_starts_as_under_python(home: Path, words: list[str]) -> None:
 
 @pytest.mark.slow
 def test_programs_that_share_a_world_start_as_under_python(home: Path) -> None:
-    kiks = run(home, "-m", "kiks", "run", "-m", "package", "1", "show.py", "-m", "x", "-m space.inner 'a b'")
+    kiks = run(home, "-m", "kiks", "run", "-m package 1", "show.py", "-m", "x", "-m space.inner 'a b'")
     assert kiks.returncode == 0, kiks.stderr
     alone = [["-m", "package", "1"], ["show.py", "-m", "x"], ["-m", "space.inner", "a b"]]
     labels = ["1 package     | ", "2 show.py     | ", "3 space.inner | "]

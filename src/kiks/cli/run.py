@@ -58,7 +58,7 @@ class RunCommand(CheckedCommand):
 
     def _split(self, ctx: Any, args: list[str]) -> tuple[list[str], list[str]]:
         """Return the options at the beginning, and the words after them."""
-        end = args.index("-m") if "-m" in args else len(args)
+        end = next((place for place, word in enumerate(args) if word.split(" ", 1)[0] == "-m"), len(args))
         found, _, _ = self.make_parser(ctx).parse_args(args[:end])
         begin = end - int(found.get("program") is not None) - len(found.get("arguments") or ())
         return args[:begin], args[begin:]
