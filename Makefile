@@ -11,7 +11,7 @@ PYTEST = $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
 # The tests start hundreds of Python processes: Python keeps the bytecode of the modules, whatever the environment says.
 export PYTHONDONTWRITEBYTECODE =
 
-.PHONY: demo test test-all quick checked user setup system lint types docs benchmarks wheel octave-package clean
+.PHONY: demo test test-all quick checked interpreters user setup system lint types docs benchmarks wheel octave-package clean
 
 demo: user
 	$(BIN)/kiks demo follow --arena examples/arenas/office.toml --seconds 300 --picture kiks-demo.png
@@ -30,6 +30,10 @@ quick: setup system
 # The tests of the kernels in code that checks every index. It takes some minutes, as it compiles everything again.
 checked: setup
 	NUMBA_BOUNDSCHECK=1 $(PYTEST) -m "not slow" tests/engine tests/batch
+
+# The tests of what depends on the interpreter, under the other versions of Python that are here (noxfile.py).
+interpreters: setup
+	PATH="$(BIN):$$PATH" $(BIN)/nox
 
 user: $(VENV)/.user
 setup: $(VENV)/.developer
@@ -81,4 +85,4 @@ octave-package: setup
 	$(BIN)/python tools/octave_package.py dist
 
 clean:
-	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) .nox build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis

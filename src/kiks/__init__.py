@@ -13,10 +13,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from kiks.version import __version__  # before all others, because it says which Python it must be
+
+# isort: split
+
 import serial  # noqa: TID253  (pyserial has to be told where our plug-in is)
 
 from kiks import upwards
-from kiks.version import __version__
 
 if TYPE_CHECKING:
     from kiks.batch.batch import Batch

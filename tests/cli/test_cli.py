@@ -6,6 +6,7 @@ import os
 import re
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 from typing import get_args, get_type_hints
 
@@ -15,6 +16,7 @@ from tests.at_length import at_length, cases
 
 from kiks.cli import app
 from kiks.errors import ParameterError
+from kiks.version import PYTHONS
 
 pytestmark = pytest.mark.slow
 
@@ -245,3 +247,20 @@ def test_a_result_s_place_is_checked_before_the_run(words: tuple[str, ...], monk
     for place in ("/proc/none/x.png", "/dev/null/x.png"):
         with pytest.raises(ParameterError, match=r"must go to a (file|folder) that can be written"):
             app([place if word == "PLACE" else word for word in words], standalone_mode=False)
+
+
+@pytest.mark.parametrize("version", ["3.10", "3.16"])
+def test_a_python_that_is_not_known_gets_one_line(version: str) -> None:
+    changed = f"import sys; sys.version_info = (*map(int, {version!r}.split('.')), 0, 'final', 0); import kiks"
+    done = subprocess.run([sys.executable, "-c", changed], capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert done.stderr == (f"kiks: Python must be 3.11 to 3.15, but this is {version}. Install KiKS for another one.\n")
+
+
+def test_the_package_names_the_same_pythons_as_kiks() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    (_, oldest), (_, newest) = PYTHONS
+    assert project["requires-python"] == f">=3.{oldest},<3.{newest + 1}"
+    tried = [each.rpartition(" ")[2] for each in project["classifiers"] if " :: Python :: 3." in each]
+    readme = (ROOT / "README.md").read_text()
+    assert f"CPython {', '.join(tried[:-1])} or {tried[-1]}" in readme

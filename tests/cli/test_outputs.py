@@ -229,6 +229,7 @@ IDLE = [
     (("serve", "--patience", "1"), "--patience must be left out with --thinking live"),
     (("serve", "--when-silent", "drop"), "--when-silent must be left out with --thinking live"),
     (("serve", "--thinking", "none", "--speed", "2"), "--speed must be left out with --thinking none"),
+    (("serve", "--thinking", "none", "--by-character"), "--by-character must be left out with --thinking none"),
     (("serve", "--no-pty", "--link", "x"), "--link must be left out with --no-pty"),
 ]
 """Options that would have no effect, or be taken for something else, and what is told of them."""

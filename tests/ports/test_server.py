@@ -247,3 +247,22 @@ def test_serve_command(tmp_path: Path, ending: signal.Signals) -> None:
         assert process.stdout.readline().startswith("Stopped after ")
         assert process.wait(GUARD_S) == 0
     assert not os.path.lexists(link)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("option", [[], ["--by-character"]])
+def test_serve_command_says_how_replies_come_over_tcp(option: list[str]) -> None:
+    # So slowly that the rest of a reply that comes by character is a minute away.
+    speed = "0.01" if option else "100"
+    command = [sys.executable, "-m", "kiks", "serve", "--no-pty", "--tcp", "0", "--speed", speed, *option]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "Robot 1\n"
+        port = int(process.stdout.readline().rpartition(":")[2])
+        with socket.create_connection(("127.0.0.1", port), timeout=GUARD_S) as client:
+            client.sendall(b"help\n")
+            reply = client.recv(4096)
+        process.send_signal(signal.SIGINT)
+        assert process.wait(GUARD_S) == 0
+    assert reply.startswith(b"h")
+    assert reply.endswith(b"starting them\r\n") == (not option)

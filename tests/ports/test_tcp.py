@@ -1,16 +1,20 @@
 from __future__ import annotations
 
+import re
 import socket
 
 import pytest
 import serial
-from tests.ports.helpers import ask_socket, connect, warnings
+from tests.ports.helpers import WallClock, ask_socket, connect, warnings
 from tests.ports.test_pty import course_in_memory
-from tests.served import GUARD_S, PROGRAMS, run_python, served
+from tests.served import GUARD_S, PROGRAMS, fresh, run_python, served
 
+from kiks.clock.pace import Pace
 from kiks.clock.serial_timing import OUTPUT_LIMIT
 from kiks.errors import LinkError, ParameterError
+from kiks.ports.rfc2217 import Rfc2217Endpoint
 from kiks.ports.tcp import TcpChannel, TcpEndpoint
+from kiks.units import character_ns
 
 
 def test_socket_url_gives_the_same_run_as_a_port_in_memory() -> None:
@@ -19,6 +23,81 @@ def test_socket_url_gives_the_same_run_as_a_port_in_memory() -> None:
     with served([endpoint]) as run:
         assert run_python(PROGRAMS / "course.py", f"socket://{endpoint.name}").strip() == counts.strip()
         assert run.sim.state_hash() == memory.state_hash()
+
+
+def test_live_replies_come_whole_for_a_client_that_takes_one_recv_for_each() -> None:
+    endpoint = TcpEndpoint(0)
+    with served([endpoint], thinking="live", speed=10) as _, connect(endpoint) as client:
+        # A short one, longer ones, one of several lines, one of a turret that is not there, and one to no command.
+        for command in (b"H\n", b"N\n", b"list\n", b"T,2,N\n", b"x\n"):
+            client.sendall(command)
+            assert shape(client.recv(4096)) == shape(reply_in_memory(command))
+
+
+def reply_in_memory(command: bytes) -> bytes:
+    port = fresh().port(1)
+    port.timeout = 1
+    port.write(command)
+    return port.read(4096)
+
+
+def shape(reply: bytes) -> bytes:
+    """Return a reply without its numbers, for the noise of the sensors depends on the time."""
+    return re.sub(rb"\d+", b"0", reply)
+
+
+def test_live_reply_comes_with_its_last_character_and_those_of_several_commands_one_by_one() -> None:
+    wall, endpoint = WallClock(), TcpEndpoint(0)
+    with served([endpoint], thinking="live", pace=Pace(wall_ns=wall)) as run, connect(endpoint) as client:
+        client.sendall(b"H\nE\n")
+        run.wait_for(lambda: run.sim.wires[0].pending)
+        # Two characters, 1 ms in the robot, and seven characters of each reply.
+        wall.pass_ns(9 * character_ns(9600) + 1_000_000 - 1)
+        run.wait_rounds(3)
+        client.setblocking(False)
+        for reply in (b"h,0,0\r\n", b"e,0,0\r\n"):
+            with pytest.raises(BlockingIOError):
+                client.recv(4096)
+            wall.pass_ns(1)
+            run.wait_for(lambda: run.sim.wires[0].line.reply_end_ns != run.sim.now_ns)
+            client.settimeout(GUARD_S)
+            assert client.recv(4096) == reply
+            client.setblocking(False)
+            wall.pass_ns(7 * character_ns(9600) - 1)
+            run.wait_rounds(3)
+
+
+@pytest.mark.parametrize("kind", ["by character", "RFC 2217"])
+def test_live_characters_come_one_by_one_where_a_client_expects_a_serial_line(kind: str) -> None:
+    wall = WallClock()
+    endpoint = Rfc2217Endpoint(0) if kind == "RFC 2217" else TcpEndpoint(0, by_character=True)
+    with served([endpoint], thinking="live", pace=Pace(wall_ns=wall)) as run, connect(endpoint) as client:
+        client.sendall(b"H\n")
+        run.wait_for(lambda: run.sim.wires[0].pending)
+        wall.pass_ns(6 * character_ns(9600) + 1_000_000)
+        received = b""
+        while not received.endswith(b"h,0,"):
+            received += client.recv(1)
+        run.wait_rounds(3)
+        client.setblocking(False)
+        with pytest.raises(BlockingIOError):
+            client.recv(1)
+
+
+def test_live_reply_of_a_client_that_hangs_up_in_its_middle_reaches_no_other_client() -> None:
+    wall, endpoint = WallClock(), TcpEndpoint(0)
+    with served([endpoint], thinking="live", pace=Pace(wall_ns=wall)) as run:
+        with connect(endpoint) as client:
+            client.sendall(b"N\n")
+            run.wait_for(lambda: run.sim.wires[0].pending)
+            wall.pass_ns(6 * character_ns(9600) + 1_000_000)
+            run.wait_rounds(3)
+        run.wait_free()
+        with connect(endpoint) as client:
+            client.sendall(b"H\n")
+            run.wait_for(lambda: run.sim.wires[0].pending)
+            wall.pass_s(1)
+            assert client.recv(4096) == b"h,0,0\r\n"
 
 
 def test_second_client_is_rejected_with_a_warning(caplog: pytest.LogCaptureFixture) -> None:

@@ -105,7 +105,7 @@ def desk(
         is_held=not no_wait,
     )
     # A new start makes another world: the recording ends with the first one.
-    with recorded(sim, record=record, programs=[each.program for each in commands if each is not None]):
+    with recorded(sim, record=record, programs=[each.file for each in commands if each is not None]):
         open_desk(shown, host=host, port=port, browser=browser, waits=not no_wait)
 
 

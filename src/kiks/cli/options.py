@@ -201,28 +201,37 @@ def parse_words(words: list[str]) -> list[Command]:
     """Return the programs that a command line names, each with its arguments.
 
     A word that names a .py file begins a program. A word with blanks that is no file is split like in a shell; if it
-    begins with a .py file, it is a program with all its arguments, which may be .py files themselves.
+    begins with a .py file or -m, it is a program with all its arguments, which may be .py files themselves. The first
+    program may also be -m and a module's name in words of their own, another file, or a folder with a `__main__.py`.
 
     Raises:
-        ParameterError: If the first word is no file, or one names a project.
+        ParameterError: If the first word is no program, or one names a project.
     """
-    from kiks.ports.program_process import Command
+    from kiks.ports.program_process import Command, module_command
 
     commands: list[Command] = []
+    if words[:1] == ["-m"]:
+        commands.append(module_command("".join(words[1:2]), []))
+        words = words[2:]
     for word in words:
         parts = _split(word)
         if is_project(word):
             raise ParameterError(
                 f"a project must come first, but {shown(word)} stands among the programs. Put it before them."
             )
-        if Path(word).is_file() and (word.endswith(".py") or not commands):
+        if Command(Path(word)).file.is_file() and (word.endswith(".py") or not commands):
             commands.append(Command(Path(word)))
+        elif len(parts) > 1 and parts[0] == "-m":
+            commands.append(module_command(parts[1], parts[2:]))
         elif len(parts) > 1 and parts[0].endswith(".py") and Path(parts[0]).is_file():
             commands.append(Command(Path(parts[0]), parts[1:]))
         elif commands:
             commands[-1].arguments.append(word)
         else:
-            found = f"{shown(word)} is a folder" if Path(word).is_dir() else f"there is no file {shown(word)}"
+            is_folder = Path(word).is_dir()
+            found = (
+                f"{shown(word)} is a folder without a __main__.py" if is_folder else f"there is no file {shown(word)}"
+            )
             raise ParameterError(f"PROGRAM must be a Python file, but {found}. Give its path before its own arguments.")
     return commands
 

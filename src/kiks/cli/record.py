@@ -136,11 +136,12 @@ def _noting(stream: Any, note: Callable[[str], None]) -> Iterator[None]:
 
 
 def _text_of(program: Path) -> str:
-    """Return the text of a program; nothing if it cannot be read, which its start will tell."""
+    """Return the text of a program; nothing if it is no text, or cannot be read, which its start will tell."""
     try:
-        return program.read_text("utf-8", "replace")[:PROGRAM_CHARACTERS_MAX]
+        text = program.read_text("utf-8", "replace")
     except OSError:
         return ""
+    return "" if "\0" in text else text[:PROGRAM_CHARACTERS_MAX]
 
 
 def _command_line() -> str:

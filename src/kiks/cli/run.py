@@ -45,21 +45,23 @@ if TYPE_CHECKING:
 class RunCommand(CheckedCommand):
     """Also takes options after a project or a champion, which have no arguments of their own, unlike programs."""
 
-    allow_interspersed_args = False  # all words after a program's name belong to the program
+    allow_interspersed_args = False  # all words after a program's name or -m belong to the program
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Move options after such a file before it."""
-        before, words = self._split(ctx, args)
+        """Move options after such a file before it, and mark where the words of programs begin."""
+        options, words = self._split(ctx, args)
         if words and words[0].lower().endswith((".kiks", ".toml")):
             behind, others = self._split(ctx, words[1:])
-            args = [word for word in before + behind if word != "--"] + [words[0], *others]
-        return super().parse_args(ctx, args)
+            options, words = options + behind, [words[0], *others]
+        options = [word for word in options if word != "--"]
+        return super().parse_args(ctx, [*options, "--", *words] if words else options)
 
     def _split(self, ctx: Any, args: list[str]) -> tuple[list[str], list[str]]:
         """Return the options at the beginning, and the words after them."""
-        found, _, _ = self.make_parser(ctx).parse_args(list(args))
-        count = int(found.get("program") is not None) + len(found.get("arguments") or ())
-        return args[: len(args) - count], args[len(args) - count :]
+        end = next((place for place, word in enumerate(args) if word.split(" ", 1)[0] == "-m"), len(args))
+        found, _, _ = self.make_parser(ctx).parse_args(args[:end])
+        begin = end - int(found.get("program") is not None) - len(found.get("arguments") or ())
+        return args[:begin], args[begin:]
 
 
 def run(
@@ -67,12 +69,13 @@ def run(
     program: Annotated[
         Path,
         typer.Argument(
-            help="A Python program that talks to a Khepera through pyserial, a project (.kiks) or a champion's file."
+            help="A Python program that talks to a Khepera through pyserial, a project (.kiks) or a champion's file. A "
+            "program is a file, a folder with a __main__.py, or -m and the name of a module."
         ),
     ],
     arguments: Annotated[
         list[str] | None,
-        typer.Argument(help="The program's arguments; each .py file among them begins another program."),
+        typer.Argument(help="The program's arguments; each .py file, and each quoted '-m MODULE', begins another."),
     ] = None,
     arena: ArenaFile = None,
     robots: Robots = None,
@@ -168,7 +171,7 @@ def run(
     for number in mapping.values():
         sim.world.index_of(number)
     fit_turrets(sim, turret)
-    names = [each.program.name for each in commands if each is not None]
+    names = [each.name for each in commands if each is not None]
     labels = Labels(names) if len(names) > 1 else None
     host = partial(
         Programs,
@@ -180,7 +183,7 @@ def run(
         say=say if labels is None else labels.say,
         labels=labels,
     )
-    files = (picture, csv, record, [each.program for each in commands if each is not None])
+    files = (picture, csv, record, [each.file for each in commands if each is not None])
     if desk:
         with recorded(sim, *files):
             # If the command line has changed the robots, the desk derives the project from the simulation.
@@ -243,7 +246,7 @@ def _run_one(sim: Simulation, command: Command, told: dict[str, int], record: Pa
 
     try:
         with noting_output(sim):
-            return run_here(sim, command.program, command.arguments, told)
+            return run_here(sim, command.program, command.arguments, told, module=command.module)
     finally:
         if record is not None:
             from kiks.clock.thinking import save_thinking

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -73,6 +74,13 @@ def serve(
     rfc2217: Annotated[
         int | None, typer.Option(help="The same for ports that speak RFC 2217; none if left out.")
     ] = None,
+    by_character: Annotated[
+        bool,
+        typer.Option(
+            "--by-character",
+            help="Send replies over TCP as a serial line does, character by character, instead of whole (live only).",
+        ),
+    ] = False,
     host: Annotated[
         str, typer.Option(help="Address that the TCP ports listen at; this computer's own only.")
     ] = "127.0.0.1",
@@ -98,6 +106,8 @@ def serve(
         leave_out(context, "with --thinking live", "programs", "when_silent", "patience")
     elif not desk:
         leave_out(context, f"with --thinking {thinking}", "speed")
+    if thinking != "live":
+        leave_out(context, f"with --thinking {thinking}, where replies come whole", "by_character")
     if not pty:
         leave_out(context, "with --no-pty", "link")
     show_log(is_quiet=quiet)
@@ -112,7 +122,7 @@ def serve(
     if not quiet:
         ready_engine()
     compile_everything()  # or load it, so that the first program does not wait for it
-    ports = _Ports(sim, pty, link, tcp, rfc2217, host, say)
+    ports = _Ports(sim, pty, link, tcp, rfc2217, host, by_character, say)
     server = None
     shown = _show_desk(sim, speed) if desk else None
     gate = None if shown is None else shown.desk.present.gate
@@ -157,6 +167,7 @@ class _Ports:
         tcp: TCP port of robot 1, 0 for free ones; None for the default.
         rfc2217: The same for RFC 2217; None for no such ports.
         host: Address at which the TCP ports listen.
+        by_character: Whether replies come over TCP character by character.
         say: Prints a line.
 
     Attributes:
@@ -169,6 +180,7 @@ class _Ports:
     tcp: int | None
     rfc2217: int | None
     host: str
+    by_character: bool
     say: Callable[[str], None]
     endpoints: dict[int, list[Endpoint]] = field(default_factory=dict)
 
@@ -205,13 +217,14 @@ class _Ports:
     def _open_tcp(self, number: int) -> Endpoint:
         from kiks.ports.tcp import TcpEndpoint
 
+        open_at = partial(TcpEndpoint, host=self.host, by_character=self.by_character)
         if self.tcp is not None:
-            return TcpEndpoint(_tcp_port_of(self.tcp, number), host=self.host)
+            return open_at(_tcp_port_of(self.tcp, number))
         try:
-            return TcpEndpoint(_tcp_port_of(TCP_PORT, number), host=self.host)
+            return open_at(_tcp_port_of(TCP_PORT, number))
         except LinkError:
             # The user did not ask for this number, so a free one will do. An invalid host fails again.
-            endpoint = TcpEndpoint(0, host=self.host)
+            endpoint = open_at(0)
             self.say(f"  TCP port {_tcp_port_of(TCP_PORT, number)} is busy; a free one takes its place.")
             return endpoint
 

@@ -32,7 +32,7 @@ class SerialTiming:
         self.lost_count = 0
         self._answering_until_ns = 0
         self.waiting = bytearray()
-        # Pieces of `waiting`, oldest first: start of the first character [ns], time of one [ns], their count.
+        # The replies in `waiting`, oldest first: start of the first character [ns], time of one [ns], their count.
         self._pieces: deque[list[int]] = deque()
 
     def set_baud(self, baud: int) -> None:
@@ -79,14 +79,19 @@ class SerialTiming:
         self._pieces.append([start_ns, self.character_ns, len(data)])
         return start_ns
 
-    def arrived_count(self, now_ns: int) -> int:
-        """Return the number of waiting characters that have arrived."""
+    @property
+    def reply_end_ns(self) -> int | None:
+        """When the last character of the oldest waiting reply arrives [ns]; None if none waits."""
+        return self.arrival_ns(self._pieces[0][2]) if self._pieces else None
+
+    def arrived_count(self, now_ns: int, *, in_whole_replies: bool = False) -> int:
+        """Return the number of waiting characters that have arrived, or of those in replies that have arrived whole."""
         count = 0
         for start_ns, step_ns, length in self._pieces:
             if start_ns + length * step_ns <= now_ns:
                 count += length
                 continue
-            return count + max((now_ns - start_ns) // step_ns, 0)
+            return count if in_whole_replies else count + max((now_ns - start_ns) // step_ns, 0)
         return count
 
     def arrival_ns(self, count: int) -> int | None:

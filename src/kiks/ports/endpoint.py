@@ -22,9 +22,11 @@ class Channel(ABC):
     Attributes:
         name: Name of its endpoint.
         baud: The speed to which the client has set its port [bit/s]; None if the connection does not carry it.
+        by_character: Whether characters come to the client one by one, as on a serial line, instead of whole replies.
     """
 
     baud: int | None = None
+    by_character = True
 
     def __init__(self, name: str) -> None:
         self.name = name

@@ -147,10 +147,10 @@ class Live:
             if link.channel is None:
                 continue
             if line.waiting:
-                link.channel.write(line.take(line.arrived_count(sim.now_ns)))
-                last_ns = line.arrival_ns(len(line.waiting)) if line.waiting else None
-                if last_ns is not None:
-                    wait_s = min(wait_s, COALESCE_S, pace.wall_wait_s(last_ns))
+                by_character = link.channel.by_character
+                link.channel.write(line.take(line.arrived_count(sim.now_ns, in_whole_replies=not by_character)))
+                if (end_ns := line.reply_end_ns) is not None:
+                    wait_s = min(wait_s, pace.wall_wait_s(end_ns), COALESCE_S if by_character else IDLE_S)
             if self.is_full(link):
                 wait_s = min(wait_s, pace.wall_wait_s(line.room_ns))
         return 0.0 if self._is_behind else wait_s

@@ -13,10 +13,11 @@ import sys
 import threading
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from importlib.machinery import ModuleSpec, PathFinder
 from pathlib import Path
-from typing import IO, NamedTuple, Protocol
+from typing import IO, Any, NamedTuple, Protocol
 
-from kiks.errors import KiksError, ParameterError
+from kiks.errors import KiksError, ParameterError, shown
 from kiks.model.atomic_files import program_in
 from kiks.model.project import Project
 from kiks.sim.ring_buffer import RingBuffer
@@ -49,12 +50,34 @@ def python_line(*words: str) -> list[str]:
     return [sys.executable, "-P", *words]
 
 
+def chance_seed(world_seed: int, robot: int) -> str:
+    """Return what all chance in the program of a robot follows from."""
+    return f"{world_seed} {robot}"
+
+
 @dataclass(frozen=True)
 class Command:
-    """A program and its arguments in `sys.argv`."""
+    """A program and its arguments in `sys.argv`.
+
+    Attributes:
+        program: Its file, or a folder or an archive with a `__main__.py`.
+        arguments: The arguments.
+        module: Name of the module or package whose file that is, to be run as `python -m` does; empty for none.
+    """
 
     program: Path
     arguments: list[str] = field(default_factory=list)
+    module: str = ""
+
+    @property
+    def name(self) -> str:
+        """Its name for people."""
+        return self.module or self.program.name
+
+    @property
+    def file(self) -> Path:
+        """The file that Python reads first."""
+        return self.program / "__main__.py" if self.program.is_dir() else self.program
 
     def check_file(self) -> None:
         """Check that the program's file exists.
@@ -62,7 +85,7 @@ class Command:
         Raises:
             ParameterError: If it does not.
         """
-        if not self.program.is_file():
+        if not self.file.is_file():
             raise ParameterError(
                 f"a program must be a Python file, but there is none at {str(self.program)!r}. Save it first."
             )
@@ -78,6 +101,35 @@ def commands_of(project: Project, folder: Path) -> list[Command | None]:
         None if robot.program is None else Command(program_in(folder, robot.program), list(robot.arguments))
         for robot in project.robots
     ]
+
+
+def module_command(module: str, arguments: Sequence[str]) -> Command:
+    """Return the program that `python -m` would run; nothing is imported to find its file.
+
+    Raises:
+        ParameterError: If there is no such module, or it is a package without a `__main__.py`.
+    """
+    path: Sequence[str] | None = [os.getcwd(), *sys.path]
+    for part in module.split("."):
+        spec = None if path is None else _find_spec(part, path)
+        if spec is None:
+            raise ParameterError(
+                f"a program after -m must be a module that Python finds from {os.getcwd()}, but there is no "
+                f"{shown(module)}. Give its name without .py, such as package.program."
+            )
+        path = spec.submodule_search_locations
+    main = spec if path is None else _find_spec("__main__", path)
+    if main is None or main.origin is None:
+        raise ParameterError(
+            f"a package after -m must have a file __main__.py, but {shown(module)} has none. Name a module in it."
+        )
+    return Command(Path(main.origin), list(arguments), module)
+
+
+def _find_spec(name: str, path: Sequence[str]) -> ModuleSpec | None:
+    # Other finders, such as those of packages that are installed editable, do not heed the path: they come last.
+    finders: list[Any] = [PathFinder, *sys.meta_path]
+    return next(filter(None, (finder.find_spec(name, path) for finder in finders)), None)
 
 
 class OutputLine(NamedTuple):
@@ -129,7 +181,7 @@ class Process:
         has_started = threading.Event()
         failures: list[OSError] = []
         words = ["-m", "kiks.script.child_main", str(connection.fileno()), *arguments]
-        line = python_line(*words, str(command.program), *command.arguments)
+        line = python_line(*words, command.module, str(command.program), *command.arguments)
 
         def run() -> None:
             try:
@@ -142,11 +194,11 @@ class Process:
                 has_started.set()
             self._wait_for_end(self._popen)
 
-        threading.Thread(target=run, name=f"kiks: {command.program.name}", daemon=True).start()
+        threading.Thread(target=run, name=f"kiks: {command.name}", daemon=True).start()
         has_started.wait()
         if failures:
             raise KiksError(
-                f"a program must be able to start, but {command.program} was not: {failures[0]}. End other programs."
+                f"a program must be able to start, but {command.name} was not: {failures[0]}. End other programs."
             )
 
     @property
@@ -388,7 +440,7 @@ class Permission:
         """
         if command in self._granted:
             return
-        name = command.program.name[:80]
+        name = command.name[:80]
         if not self.may_start_others:
             raise ParameterError(
                 f"{name!r} must be started at the terminal of this desk, but a page or a file asked for it. kiks desk "

@@ -18,7 +18,7 @@ from kiks.ports.file_descriptors import opening
 from kiks.ports.messages import LATE, PUNCTUAL
 from kiks.ports.participant import LocalParticipant, RemoteParticipant
 from kiks.ports.port_names import PortNames
-from kiks.ports.program_process import AnyProgram, Command, Labels, OutputLine, Permission, Process
+from kiks.ports.program_process import AnyProgram, Command, Labels, OutputLine, Permission, Process, chance_seed
 from kiks.ports.program_scheduler import PATIENCE_S, START_PATIENCE_S, VISIT_PATIENCE_S, ProgramScheduler
 from kiks.sim.ring_buffer import RingBuffer
 from kiks.sim.simulation import Simulation
@@ -214,7 +214,7 @@ class Programs:
         """
         command.check_file()
         with self.sim.lock:
-            self._check_open(command.program.name)
+            self._check_open(command.name)
             self.sim.index_of(robot)
             for handle in [each for each in self.handles if each.robot == robot]:
                 if handle.is_running:
@@ -376,7 +376,7 @@ class Programs:
         """Start a program's process, if it may start, and add the program."""
         self.permission.check(command)
         number = self._count + 1
-        name = f"program {number} ({command.program.name})"
+        name = f"program {number} ({command.name})"
         here, there = socket.socketpair()
         participant = RemoteParticipant(here, name, number, robot, self.sim, self._scheduler, self._names)
         handle = Handle(command, participant)
@@ -390,12 +390,12 @@ class Programs:
                         self._policy(number),
                         record,
                         " ".join(self._names.offered()),
-                        f"{self.sim.seed} {robot}",
+                        chance_seed(self.sim.seed, robot),
                     ],
                     command,
                     there,
                     keeps_output=self._keeps_output,
-                    writer=None if self._labels is None else self._labels.writer(number, command.program.name),
+                    writer=None if self._labels is None else self._labels.writer(number, command.name),
                     on_end=lambda: self._end(handle),
                     hear=lambda line: self._record_line(robot, line),
                 )

@@ -19,7 +19,13 @@ _log = logging.getLogger("kiks.serve")
 
 
 class Rfc2217Endpoint(TcpEndpoint):
-    """A TCP port of this computer that speaks RFC 2217; arguments and errors are those of `TcpEndpoint`."""
+    """A TCP port of this computer that speaks RFC 2217; arguments and errors are those of `TcpEndpoint`.
+
+    Its clients take it for a serial port, so characters come one by one.
+    """
+
+    def __init__(self, port: int, *, host: str = "127.0.0.1") -> None:
+        super().__init__(port, host=host, by_character=True)
 
     def accept(self) -> Rfc2217Channel | None:
         """Accept the client and begin to negotiate."""

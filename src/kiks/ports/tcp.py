@@ -27,13 +27,15 @@ class TcpEndpoint(Endpoint):
     Args:
         port: Number of the port; 0 takes a free one.
         host: A loopback address of this computer.
+        by_character: Whether characters come to clients one by one, as on a serial line. Clients that were written for
+            robots behind TCP often take one `recv` for one reply, so each reply comes whole if this is left out.
 
     Raises:
         ParameterError: If the number is out of range.
         LinkError: If the port is busy, or other computers could reach the host.
     """
 
-    def __init__(self, port: int, *, host: str = "127.0.0.1") -> None:
+    def __init__(self, port: int, *, host: str = "127.0.0.1", by_character: bool = False) -> None:
         if not isinstance(port, int) or not 0 <= port <= 65535:
             raise ParameterError(
                 f"port must be a whole number from 0 to 65535, but it was {shown(port)}. 0 takes a free one."
@@ -58,6 +60,7 @@ class TcpEndpoint(Endpoint):
         self._listener.setblocking(False)
         RESERVE.hold()
         self._has_refused_http = False
+        self.by_character = by_character
         self.port = int(self._listener.getsockname()[1])
         self.name = f"[{host}]:{self.port}" if ":" in host else f"{host}:{self.port}"
 
@@ -138,11 +141,12 @@ class TcpChannel(Channel):
 
     Args:
         connection: The connection.
-        endpoint: The endpoint, which logs that a client is a browser.
+        endpoint: The endpoint, which says how replies come, and logs that a client is a browser.
     """
 
     def __init__(self, connection: socket.socket, endpoint: TcpEndpoint) -> None:
         super().__init__(endpoint.name)
+        self.by_character = endpoint.by_character
         self._connection = connection
         self._endpoint = endpoint
         self._first_line = FirstLine()

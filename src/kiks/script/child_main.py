@@ -27,6 +27,7 @@ def main(
     record: str,
     offered: list[str],
     seed: str,
+    module: str,
     program: Path,
     arguments: list[str],
 ) -> int:
@@ -39,7 +40,8 @@ def main(
         record: File for the measured thinking times; empty for none.
         offered: The port names that the program finds when it lists ports.
         seed: What all its random numbers follow from.
-        program: The Python file.
+        module: Name of a module to run in place of the file, as `python -m` does; empty for none.
+        program: Its file, or a folder or an archive with a `__main__.py`.
         arguments: What it finds in `sys.argv` after its name.
     """
     if sys.platform == "linux":
@@ -62,6 +64,7 @@ def main(
             policy,
             offered,
             seed,
+            module=module,
         )
     except KeyboardInterrupt:
         return 130
@@ -79,5 +82,6 @@ def _save(measured_ns: list[int], record: str) -> None:
 
 
 if __name__ == "__main__":
-    descriptor, lateness, thinking, record, offered, seed, program, *arguments = sys.argv[1:]
-    sys.exit(main(int(descriptor), lateness == LATE, thinking, record, offered.split(), seed, Path(program), arguments))
+    descriptor, lateness, thinking, record, offered, seed, module, program, *arguments = sys.argv[1:]
+    is_late = lateness == LATE
+    sys.exit(main(int(descriptor), is_late, thinking, record, offered.split(), seed, module, Path(program), arguments))

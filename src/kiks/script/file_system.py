@@ -1,7 +1,8 @@
-"""The file system as the program finds it: with the serial ports of its robots, and with times on its own calendar.
+"""The file system as a program finds it: with the serial ports of its robots, and with times on its own calendar.
 
-What the program has written just now is as old as its clock says. The operating system stamps files in real time. A file from before the program keeps its age at the program's start.
-Later stamps get the simulated time at which the program has written the file.
+What the program has written just now is as old as its clock says. The operating system stamps files in real time. A
+file from before the program keeps its age at the program's start. Later stamps get the simulated time at which the
+program has written the file.
 """
 
 from __future__ import annotations

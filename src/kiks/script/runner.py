@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import runpy
 import sys
 import threading
 import traceback
@@ -20,6 +19,7 @@ from kiks.script.file_system import FileSystem
 from kiks.script.file_waits import Files
 from kiks.script.libraries.adapters import adapted
 from kiks.script.libraries.host import Host, keyboard
+from kiks.script.main_module import main_module
 from kiks.script.patching import replaced
 from kiks.script.shared_line import SharedLine
 from kiks.script.signals import Signals
@@ -34,19 +34,21 @@ _NOT_OF_THE_PROGRAM = ("kiks", "runpy")
 """Modules whose frames an error of the program does not show."""
 
 
-def run_here(sim: Simulation, program: Path, arguments: list[str], told: dict[str, int]) -> int:
+def run_here(sim: Simulation, program: Path, arguments: list[str], told: dict[str, int], *, module: str = "") -> int:
     """Run a program in this process to its end; return its exit code.
 
     Args:
         sim: The simulation behind its ports.
-        program: The Python file.
+        program: Its file, or a folder or an archive with a `__main__.py`.
         arguments: Its arguments in `sys.argv`.
         told: Robots by port name.
+        module: Name of a module to run in place of the file, as `python -m` does.
 
     Raises:
         ParameterError: If `told` names a robot that does not exist.
     """
     from kiks.ports.port_names import PortNames
+    from kiks.ports.program_process import chance_seed
     from kiks.ports.url import find_port
     from kiks.sim.local_line import LocalLine
 
@@ -66,12 +68,8 @@ def run_here(sim: Simulation, program: Path, arguments: list[str], told: dict[st
         sim.program,
         names.offered(),
         chance_seed(sim.seed, 1),
+        module=module,
     )
-
-
-def chance_seed(world_seed: int, robot: int) -> str:
-    """Return what all chance in the program of a robot follows from."""
-    return f"{world_seed} {robot}"
 
 
 def run_program(
@@ -82,17 +80,20 @@ def run_program(
     policy: ProgramClock,
     offered: list[str],
     seed: str,
+    *,
+    module: str = "",
 ) -> int:
     """Run a program to its end with simulated ports and simulated time; return its exit code.
 
     Args:
-        program: The Python file.
+        program: Its file, or a folder or an archive with a `__main__.py`.
         arguments: Its arguments in `sys.argv`.
         line_of: Returns the line of a robot, from 1; that of robot 1 tells the time.
         find: Returns the robot behind a port's name, or a port of another world.
         policy: The cost of the program's thinking and polling.
         offered: The port names that it finds when it lists ports.
         seed: What all its random numbers follow from; see `chance_seed`.
+        module: Name of a module to run in place of the file, as `python -m` does.
 
     Raises:
         KiksError: If it cannot run under this interpreter.
@@ -138,19 +139,18 @@ def run_program(
     )
 
     def main() -> int:
-        code = _run_file(program)
+        code = _run_main_thread(start)
         _wait_for_threads(scheduler)
         ends.run()
         return code
 
     if os.environ.get("PYTHONSAFEPATH") == "kiks":
         del os.environ["PYTHONSAFEPATH"]  # what the program starts is as it is without KiKS
-    argv_before, path_before, hook_before = sys.argv, sys.path[:], sys.excepthook
-    sys.argv = [str(program), *arguments]
-    sys.path.insert(0, str(program.resolve().parent))
+    hook_before = sys.excepthook
     sys.excepthook = lambda _kind, error, _trace: _print_program_trace(error)
     try:
         with (
+            main_module(program, arguments, module) as start,
             watched(scheduler),
             signals.taken(),
             chance.taken(),
@@ -165,8 +165,7 @@ def run_program(
         return end.code
     finally:
         cpython.forget_threads(scheduler.tasks)
-        sys.argv, sys.excepthook = argv_before, hook_before
-        sys.path[:] = path_before
+        sys.excepthook = hook_before
 
 
 def _merged(*parts: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
@@ -205,10 +204,10 @@ class _AtExit:
         self._calls = [each for each in self._calls if each[0] != call]
 
 
-def _run_file(program: Path) -> int:
+def _run_main_thread(start: Callable[[], None]) -> int:
     """Run the main thread; return the exit code."""
     try:
-        runpy.run_path(str(program), run_name="__main__")
+        start()
     except SystemExit as leaving:
         if leaving.code is None or isinstance(leaving.code, int):
             return leaving.code or 0

@@ -108,13 +108,13 @@ class ProgramsPanel:
                     "col text-weight-bold" if is_shown else "col"
                 ):
                     ui.icon(icon).classes("q-mr-sm").props("aria-hidden=true")
-                    ui.label(f"{handle.command.program.name} on robot {handle.robot}: {handle.state}")
+                    ui.label(f"{handle.command.name} on robot {handle.robot}: {handle.state}")
                     ui.tooltip("Show what this program prints")
                 self._draw_act(handle)
 
     def _draw_act(self, handle: Handle) -> None:
         """Add the button that stops a program or starts it again."""
-        program = handle.command.program.name
+        program = handle.command.name
         if handle.is_running:
             button = icon_button("stop", f"Stop: {program}", "stop", lambda: self._stop(handle))
             button.mark(f"stop-{handle.number}")

@@ -186,7 +186,7 @@ class TimeBar:
         if reason or run is None:
             self._again_words.text = f"Not here: {reason}."
         else:
-            names = ", ".join(command.program.name for command in run.commands if command is not None)
+            names = ", ".join(command.name for command in run.commands if command is not None)
             self._again_words.text = BY_PROGRAMS.format(programs=names)
         self._dialog.open()
 

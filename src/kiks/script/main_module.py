@@ -1,0 +1,59 @@
+"""Starts a program as Python does: it has the `__main__`, `sys.argv` and `sys.path` that it has without KiKS."""
+
+from __future__ import annotations
+
+import builtins
+import os
+import runpy
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
+from importlib.machinery import SourceFileLoader, SourcelessFileLoader
+from pathlib import Path
+from pkgutil import get_importer
+from types import ModuleType
+
+
+@contextmanager
+def main_module(program: Path, arguments: list[str], module: str) -> Iterator[Callable[[], None]]:
+    """Yield a function that runs a program in a new `__main__`; the names of before come back at the end.
+
+    Args:
+        program: Its file, or a folder or an archive with a `__main__.py`.
+        arguments: Its arguments in `sys.argv`.
+        module: Name of a module or package to run in place of the file, as `python -m` does; empty for none.
+    """
+    before = sys.argv, sys.path[:], sys.modules["__main__"]
+    main = sys.modules["__main__"] = ModuleType("__main__")
+    vars(main).update(__builtins__=builtins, __annotations__={})
+    path = os.path.join(os.getcwd(), program)
+    sys.argv = [str(program), *arguments]
+    # Python itself starts modules, folders and archives by this function of runpy (Modules/main.c).
+    as_main: Callable[..., None] = runpy._run_module_as_main  # type: ignore[attr-defined]
+    if module:
+        sys.path.insert(0, os.getcwd())
+        run = partial(as_main, module)
+    elif get_importer(path) is not None:
+        sys.path.insert(0, path)
+        run = partial(as_main, "__main__", alter_argv=False)
+    else:
+        sys.path.insert(0, os.path.dirname(os.path.realpath(path)))
+        run = partial(_run_file, path, main)
+    try:
+        yield run
+    finally:
+        sys.argv, sys.path[:], sys.modules["__main__"] = before
+
+
+def _run_file(path: str, main: ModuleType) -> None:
+    """Run a file as Python runs the file that its command line names (Python/pythonrun.c)."""
+    if path.endswith(".pyc"):
+        loader: SourceFileLoader | SourcelessFileLoader = SourcelessFileLoader("__main__", path)
+        code = loader.get_code("__main__")
+    else:
+        loader = SourceFileLoader("__main__", path)
+        code = compile(loader.get_data(path), path, "exec", dont_inherit=True)
+    assert code is not None
+    vars(main).update(__file__=path, __cached__=None, __loader__=loader)
+    exec(code, vars(main))

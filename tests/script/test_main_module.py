@@ -1,0 +1,142 @@
+"""A program sees the same names and paths under `kiks run` as under Python."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+from tests.served import GUARD_S
+
+PROGRAM = """
+import dataclasses, inspect, multiprocessing, os, pickle, runpy, sys, typing
+import __main__
+
+@dataclasses.dataclass
+class Pose:
+    x: "int"
+    after: "Pose | None" = None
+
+def report():
+    print(sys.argv, sys.path[0], os.getcwd())
+    print(__name__, __package__, __file__, __cached__, __spec__ and (__spec__.name, __spec__.origin))
+    print(type(__loader__), sorted(globals()), __builtins__ is sys.modules["builtins"])
+    print(__main__ is sys.modules["__main__"], vars(__main__) is globals(), Pose.__module__)
+    print(report.__code__.co_filename)
+    print(pickle.dumps(Pose(1, Pose(2))), pickle.loads(pickle.dumps(Pose(3))))
+    print(typing.get_type_hints(Pose), inspect.getsource(Pose), multiprocessing.current_process().name)
+    if os.path.exists(__file__):
+        print(len(open(__file__).read()))
+
+if __name__ == "__main__":
+    report()
+"""
+
+RELATIVE = "from .helper import fail\nfrom . import helper\nprint(__package__, helper.__name__)\nfail()\n"
+
+WAYS = [
+    ["show.py", "1", "--seed", "-m", "x"],
+    ["link.py"],
+    ["sub/../show.py"],
+    ["folder", "--arena"],
+    ["archive.zip", "1"],
+    ["-m", "show", "-m", "other"],
+    ["-m", "package", "--seed", "2"],
+    ["-m", "space.inner.show"],
+    ["-m", "space.inner"],
+]
+
+
+@pytest.fixture(scope="module")
+def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    home = tmp_path_factory.mktemp("home")
+    texts = {
+        "show.py": PROGRAM,
+        "sub/real.py": PROGRAM,
+        "folder/__main__.py": PROGRAM,
+        "package/__init__.py": "print('imported', __name__)\n",
+        "package/__main__.py": PROGRAM,
+        "package/relative.py": RELATIVE,
+        "package/helper.py": "def fail():\n    raise ValueError('on purpose')\n",
+        "package/slip.py": "x = (1\n",
+        "space/inner/show.py": PROGRAM,  # a namespace package
+        "space/inner/__main__.py": PROGRAM,
+        "fails.py": "import package.helper as other\n\n\nclass A:\n    def b(self):\n        other.fail()\n\nA().b()\n",
+        "slip.py": "print(1)\nx = (1\n",
+    }
+    for name, text in texts.items():
+        (home / name).parent.mkdir(parents=True, exist_ok=True)
+        (home / name).write_text(text)
+    (home / "link.py").symlink_to("sub/real.py")
+    with zipfile.ZipFile(home / "archive.zip", "w") as archive:
+        archive.writestr("__main__.py", PROGRAM)
+    return home
+
+
+def run(home: Path, *words: str) -> subprocess.CompletedProcess[str]:
+    environment = {**os.environ, "PYTHONDONTWRITEBYTECODE": "1"}
+    return subprocess.run(
+        [sys.executable, *words],
+        cwd=home,
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=GUARD_S,
+        check=False,
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("words", WAYS, ids=" ".join)
+def test_a_program_starts_as_under_python(home: Path, words: list[str]) -> None:
+    python, kiks = run(home, *words), run(home, "-m", "kiks", "run", "--seed", "3", *words)
+    assert python.returncode == kiks.returncode == 0, kiks.stderr
+    assert kiks.stdout == python.stdout
+    assert "seed 3" in kiks.stderr
+
+
+@pytest.mark.slow
+def test_programs_that_share_a_world_start_as_under_python(home: Path) -> None:
+    kiks = run(home, "-m", "kiks", "run", "-m package 1", "show.py", "-m", "x", "-m space.inner 'a b'")
+    assert kiks.returncode == 0, kiks.stderr
+    alone = [["-m", "package", "1"], ["show.py", "-m", "x"], ["-m", "space.inner", "a b"]]
+    labels = ["1 package     | ", "2 show.py     | ", "3 space.inner | "]
+    for words, label in zip(alone, labels, strict=True):
+        lines = [line.removeprefix(label) for line in kiks.stdout.splitlines() if line.startswith(label)]
+        assert lines == run(home, *words).stdout.splitlines()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "words", [["fails.py"], ["slip.py"], ["-m", "package.relative"], ["-m", "package.slip"]], ids=" ".join
+)
+def test_an_error_has_the_trace_that_python_prints(home: Path, words: list[str]) -> None:
+    python, kiks = run(home, *words), run(home, "-m", "kiks", "run", *words)
+    assert python.returncode == kiks.returncode == 1
+    assert kiks.stdout == python.stdout
+    assert re.sub("(?m)^kiks: .*\n", "", kiks.stderr) == re.sub('(?m)^  File "<frozen runpy>".*\n', "", python.stderr)
+
+
+@pytest.mark.parametrize(
+    ("module", "message"),
+    [
+        ("nothing", "there is no 'nothing'. Give its name without .py"),
+        ("package.nothing", "there is no 'package.nothing'"),
+        ("show.py", "there is no 'show.py'"),
+        ("sub", "must have a file __main__.py, but 'sub' has none"),
+    ],
+)
+def test_a_module_that_does_not_start_is_one_line(
+    home: Path, module: str, message: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from kiks.cli.options import parse_words
+    from kiks.errors import ParameterError
+
+    monkeypatch.chdir(home)
+    with pytest.raises(ParameterError, match=re.escape(message)):
+        parse_words(["-m", module])
+    assert "package" not in sys.modules
