@@ -64,9 +64,8 @@ class OpenPorts:
         return descriptor
 
     def remove(self, descriptor: int) -> None:
-        """Close a descriptor; threads that wait for it go on."""
-        line, _ = self._ports.pop(descriptor)
-        line.cancel_read()
+        """Close a descriptor."""
+        del self._ports[descriptor]
         os.close(descriptor)
 
     def wait(self, wanted: Mapping[int, int], timeout_s: float | None) -> dict[int, int]:
