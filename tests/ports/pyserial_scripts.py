@@ -14,7 +14,7 @@ BAUD = 110
 
 CHARACTER_S = 0.1
 
-THREADS, DESCRIPTOR = "threads", "descriptor"
+THREADS, DESCRIPTOR, SETTINGS = "threads", "descriptor", "settings"
 """What some programs need of their port besides pyserial's methods."""
 
 
@@ -36,7 +36,7 @@ ASK = "port.write(b'H\\n'); "
 """Asks for the counters: the reply, `h,0,0` and a line end, comes between 0.3 and 0.9 s."""
 
 SLOW = "port.write(b'H\\nG,' + b'0' * 11 + b'1,2\\n'); "
-"""Asks, and then sends a command of 18 characters: its reply, `g` and a line end, comes between 2.1 and 2.3 s."""
+"""Asks, and then sends a command of 17 characters: its reply, `g` and a line end, comes between 2.0 and 2.2 s."""
 
 SCRIPTS = [
     # ---- reads: one timeout for the whole ----
@@ -50,7 +50,7 @@ SCRIPTS = [
     Script(ASK + "data = bytearray(5); said = port.readinto(data), data", 0.7),
     Script(ASK + "import array; data = array.array('B', bytes(5)); said = port.readinto(data), data.tobytes()", 0.7),
     Script(ASK + "sleep(0.55); said = port.read_all(), port.in_waiting", 0.55),
-    Script(ASK + "port.timeout = 0.45; said = port.readall()", 1.35),
+    Script(ASK + "port.timeout = 0.55; said = port.readall()", 1.65),
     Script("port.read(None)"),
     Script("port.read('3')"),
     # ---- lines: each character has the timeout anew ----
@@ -61,9 +61,9 @@ SCRIPTS = [
     Script(ASK + "sleep(0.55); port.timeout = 0.05; said = port.readline(), port.readline()", 0.65),
     Script(ASK + "sleep(1.05); port.timeout = 0; said = port.readline(), port.readline()", 1.05),
     Script(SLOW + "port.timeout = 0.35; said = port.readlines()", 1.25),
-    Script(SLOW + "port.timeout = 1.35; said = port.readlines()", 3.65),
+    Script(SLOW + "port.timeout = 1.35; said = port.readlines()", 3.55),
     Script(SLOW + "port.timeout = 1.35; said = port.readlines(3)", 0.9),
-    Script(SLOW + "port.timeout = 1.35; said = [line for line in port]", 3.65),
+    Script(SLOW + "port.timeout = 1.35; said = [line for line in port]", 3.55),
     Script(SLOW + "port.timeout = 0.35; said = next(port), iter(port) is port", 0.9),
     Script("port.timeout = 0.25; next(port)", 0.25),
     Script("port.readline(2.5)"),
@@ -73,9 +73,9 @@ SCRIPTS = [
     Script(ASK + "port.timeout = 0.25; said = port.read_until()", 0.25),
     Script(ASK + "port.timeout = 0.95; said = port.read_until(b'x')", 1.85),
     Script(ASK + "port.timeout = 2; said = port.read_until(b',0'), port.read_until(b'x', 2), port.read_until(size=0)", 0.8),
-    Script(ASK + "sleep(0.65); port.timeout = 0.45; said = port.read_until(b'x')", 1.2),
+    Script(ASK + "sleep(0.65); port.timeout = 0.45; said = port.read_until(b'x')", 1.35),
     Script(ASK + "sleep(1.05); port.timeout = 0; said = port.read_until(), port.read_until()", 1.05),
-    Script(SLOW + "port.timeout = 1.35; said = list(port.iread_until())", 3.65),
+    Script(SLOW + "port.timeout = 1.35; said = list(port.iread_until())", 3.55),
     Script("port.read_until(None)"),
     # ---- what has arrived ----
     Script(ASK + "sleep(0.55); said = port.in_waiting", 0.55),
@@ -90,8 +90,9 @@ SCRIPTS = [
     Script("port.write([300])"),
     Script("port.write(b'H\\n' * 5); said = port.out_waiting; sleep(0.25); said = said, port.out_waiting", 0.25),
     Script("port.write(b'H\\n' * 5); port.flush(); said = port.out_waiting, port.in_waiting", 1.0),
-    Script("port.write(b'\\n' * 4096); said = port.write(b'\\n' * 3), port.out_waiting", 0.3),
-    Script("port.write(b'\\n' * 4090); port.write_timeout = 0.35; said = port.write(b'\\n' * 9), port.out_waiting", 0.3),
+    # (pyserial waits until the driver would take one more.)
+    Script("port.write(b'\\n' * 4093); said = port.write(b'\\n' * 5), port.out_waiting", 0.3),
+    Script("port.write(b'\\n' * 4090); port.write_timeout = 0.35; said = port.write(b'\\n' * 8), port.out_waiting", 0.3),
     Script("port.write(b'\\n' * 4090); port.write_timeout = 0.35; port.write(b'\\n' * 20)", 0.35),
     Script("port.write_timeout = 0; said = port.write(b'\\n' * 5000), port.write(b'\\n' * 5), port.write_timeout", 0.1),
     Script("port.writeTimeout = 0.35; said = port.writeTimeout, port.write_timeout"),
@@ -123,7 +124,7 @@ SCRIPTS = [
     Script("port.baudrate = -1"),
     Script("port.baudrate = None"),
     Script("port.baudrate = 'x'"),
-    Script("port.baudrate = '300'; said = port.baudrate; port.baudrate = 9600.5; said = said, port.baudrate"),
+    Script("port.baudrate = '300'; said = port.baudrate; port.baudrate = 9600.5; said = said, port.baudrate", 0, SETTINGS),
     Script("import serial.rs485; port.rs485_mode = serial.rs485.RS485Settings()"),
     Script("port.rs485_mode = None; said = port.rs485_mode"),
     Script("port.port = 3"),
@@ -196,8 +197,11 @@ CLOSED = [
 ]
 """What is asked of a port that is closed, and of one that has never been open."""
 
-SCRIPTS += [Script(f"port.close(); said = port.{what}") for what in CLOSED]
-SCRIPTS += [Script(f"port.close(); port = serial.Serial(); said = port.{what}") for what in CLOSED]
+SCRIPTS += [
+    Script(f"port.close(); {port}said = port.{what}", 0, SETTINGS if what in ("fd", "__setattr__('baudrate', 300)") else "")
+    for port in ("", "port = serial.Serial(); ")
+    for what in CLOSED
+]
 
 
 def perform(script: str, now_s: Callable[[], float], names: dict[str, Any]) -> tuple[object, float]:
@@ -207,5 +211,5 @@ def perform(script: str, now_s: Callable[[], float], names: dict[str, Any]) -> t
         exec(script, names)
         said = names.get("said")
     except Exception as error:
-        said = f"{type(error).__name__}: {error}"
+        said = f"{type(error).__name__}: {error}".replace(getattr(names["port"], "port", None) or "PORT", "PORT")
     return said, now_s() - begin_s

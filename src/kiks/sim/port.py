@@ -7,9 +7,10 @@ polling and waiting cost a program; the line lets that time pass and carries the
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager
 from enum import Enum
+from io import DEFAULT_BUFFER_SIZE
 from operator import index
 from types import TracebackType
 from typing import Any, Protocol, Self
@@ -125,6 +126,9 @@ class Closed:
     def close(self) -> None:
         """Do nothing."""
 
+    def wake(self) -> None:
+        """Do nothing."""
+
 
 CLOSED: Any = Closed()
 
@@ -224,7 +228,8 @@ class VirtualPort:
                 self._think(is_command=self._has_read)
             self._has_read = False
             count = len(data)
-            if line.room_ns(count) <= line.now_ns and not self._is_write_cancelled:
+            # Like pyserial, which goes on when the driver would take one more.
+            if line.room_ns(count + 1) <= line.now_ns and not self._is_write_cancelled:
                 line.send(data)
             else:
                 count = self._write_in_pieces(data)
@@ -261,7 +266,9 @@ class VirtualPort:
         Raises:
             LinkError: If there is no timeout and no reply can come any more.
         """
-        return self._read(None if size is None or (count := index(size)) < 0 else count, b"\n", Span.EACH)
+        if not isinstance(size, int | None):
+            raise TypeError(f"argument should be integer or None, not {type(size).__name__!r}")
+        return self._read(None if size is None or size < 0 else size, b"\n", Span.EACH)
 
     def readlines(self, hint: int | None = -1) -> list[bytes]:
         """Return lines, until one is empty or, with a hint from 1, they have so many characters."""
@@ -291,11 +298,20 @@ class VirtualPort:
         """Return the characters that have arrived."""
         return self.read(self.in_waiting)
 
+    def readall(self) -> bytes:
+        """Return all that comes, until nothing does within a timeout."""
+        return b"".join(iter(lambda: self.read(DEFAULT_BUFFER_SIZE), b""))
+
     def readinto(self, buffer: Any, /) -> int:
         """Read as many characters as a buffer holds, fewer after the timeout; return how many."""
         data = self.read(len(buffer))
         buffer[: len(data)] = data
         return len(data)
+
+    def writelines(self, lines: Iterable[bytes]) -> None:
+        """Send what each item holds."""
+        for line in lines:
+            self.write(line)
 
     @property
     def in_waiting(self) -> int:
@@ -474,7 +490,7 @@ class VirtualPort:
                 self._is_write_cancelled = False
                 return sent
             sent += room
-            if sent == len(data) or (limit_ns == 0 and sent):
+            if (sent == len(data) and line.room_ns(1) <= now_ns) or (limit_ns == 0 and (sent or not data)):
                 return sent
             if now_ns >= deadline_ns and limit_ns:
                 raise WriteTimeoutError(
@@ -482,7 +498,7 @@ class VirtualPort:
                     f"it took {sent} of {len(data)}. Wait with flush(), or allow more time."
                 )
             # A write without a wait pauses until there is room for one character, as pyserial's does.
-            wanted = 1 if limit_ns == 0 else min(len(data) - sent, BACKLOG_LIMIT // 2)
+            wanted = 1 if limit_ns == 0 else min(len(data) - sent + 1, BACKLOG_LIMIT // 2)
             room_ns = line.room_ns(wanted)
             line.wait_for_room(room_ns if limit_ns == 0 else min(room_ns, deadline_ns))
 
@@ -517,4 +533,4 @@ def _timeout_ns(name: str, timeout_s: Any) -> int | None:
 
 def _count(size: Any) -> int:
     """Return the number of characters to read; as in pyserial, anything but a whole number is a TypeError."""
-    return max(index(size), 0)
+    return index(size) if 0 < size else 0
