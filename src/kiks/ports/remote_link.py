@@ -167,10 +167,13 @@ class RemoteLine:
         """Let the program's thinking time pass [ns]."""
         self._connection.think(time_ns)
 
-    def send(self, data: bytes) -> None:
-        """Put characters on the line, which has room for them."""
+    def send(self, data: bytes, spare: int) -> bool:
+        """Put characters on the line, if it has room for them and some more; see `Line.send`."""
+        if self.room_ns(len(data) + spare) > self.now_ns:
+            return False
         self._connection.tell(Kind.SEND, self._robot, data=data)
         self._ahead_count += len(data)
+        return True
 
     def read(self, size: int | None, terminator: bytes | None, timeout_ns: int | None, poll_ns: int) -> bytes:
         """Wait for `size` characters or a terminator; see `Line.read`.

@@ -47,9 +47,13 @@ class LocalLine:
             if wire is self._wire or wire.holder is not None:
                 wire.think(from_ns, from_ns + time_ns)
 
-    def send(self, data: bytes) -> None:
-        """Put characters on the line, which has room for them."""
-        self._wire.send(data, self._world.now_ns)
+    def send(self, data: bytes, spare: int) -> bool:
+        """Put characters on the line, if it has room for them and some more; see `Line.send`."""
+        wire, now_ns = self._wire, self._world.now_ns
+        if wire.line.room_ns(len(data) + spare) > now_ns:
+            return False
+        wire.send(data, now_ns)
+        return True
 
     def read(self, size: int | None, terminator: bytes | None, timeout_ns: int | None, poll_ns: int) -> bytes:
         """Wait for `size` characters or a terminator; see `Line.read`.

@@ -50,8 +50,8 @@ class Line(Protocol):
     def think(self, time_ns: int) -> None:
         """Let the time pass that the program has thought [ns]."""
 
-    def send(self, data: bytes) -> None:
-        """Put characters on the line, which has room for them."""
+    def send(self, data: bytes, spare: int) -> bool:
+        """Put characters on the line and return True, if it has room for them and some more; else return False."""
 
     def read(self, size: int | None, terminator: bytes | None, timeout_ns: int | None, poll_ns: int) -> bytes:
         """Wait for `size` characters or a terminator, whichever comes first, until the timeout.
@@ -229,9 +229,7 @@ class VirtualPort:
             self._has_read = False
             count = len(data)
             # Like pyserial, which goes on when the driver would take one more.
-            if line.room_ns(count + 1) <= line.now_ns and not self._is_write_cancelled:
-                line.send(data)
-            else:
+            if self._is_write_cancelled or not line.send(data, 1):
                 count = self._write_in_pieces(data)
             program.leave(has_acted=True)
         return count
@@ -438,7 +436,7 @@ class VirtualPort:
                 data = self._read_on(b"", size, terminator, begin_ns, span)
             else:
                 data = line.read(size, terminator, timeout_ns, poll_ns)
-                if len(data) != size and (terminator is None or not data.endswith(terminator)):
+                if (terminator is None or not data.endswith(terminator)) and len(data) != size:
                     data = self._read_on(data, size, terminator, begin_ns, span)
             program.leave(has_acted=bool(data))
         return data
@@ -485,7 +483,8 @@ class VirtualPort:
             now_ns, piece = line.now_ns, data[sent : sent + BACKLOG_LIMIT]
             late_ns = max(line.room_ns(len(piece)) - now_ns, 0)
             room = max(len(piece) - -(-late_ns // character_ns(line.baud)), 0)
-            line.send(piece[:room])
+            if room:
+                line.send(piece[:room], 0)
             if self._is_write_cancelled and limit_ns != 0:
                 self._is_write_cancelled = False
                 return sent
