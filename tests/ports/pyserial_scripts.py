@@ -72,7 +72,9 @@ SCRIPTS = [
     Script(ASK + "port.timeout = 0.85; said = port.read_until(b'\\r')", 0.8),
     Script(ASK + "port.timeout = 0.25; said = port.read_until()", 0.25),
     Script(ASK + "port.timeout = 0.95; said = port.read_until(b'x')", 1.85),
-    Script(ASK + "port.timeout = 2; said = port.read_until(b',0'), port.read_until(b'x', 2), port.read_until(size=0)", 0.8),
+    Script(
+        ASK + "port.timeout = 2; said = port.read_until(b',0'), port.read_until(b'x', 2), port.read_until(size=0)", 0.8
+    ),
     Script(ASK + "sleep(0.65); port.timeout = 0.45; said = port.read_until(b'x')", 1.35),
     Script(ASK + "sleep(1.05); port.timeout = 0; said = port.read_until(), port.read_until()", 1.05),
     Script(SLOW + "port.timeout = 1.35; said = list(port.iread_until())", 3.55),
@@ -83,7 +85,9 @@ SCRIPTS = [
     Script(ASK + "sleep(0.55); port.flushInput(); said = port.inWaiting(), port.read(4)", 0.9),
     Script(ASK + "sleep(1.05); port.close(); port.open(); port.timeout = 0; said = port.read(7)", 1.05),
     # ---- writes ----
-    Script("said = port.write(b'H\\n'), port.write(bytearray(b'H\\n')), port.write(memoryview(b'H\\n')), port.write([72])"),
+    Script(
+        "said = port.write(b'H\\n'), port.write(bytearray(b'H\\n')), port.write(memoryview(b'H\\n')), port.write([72])"
+    ),
     Script("said = port.writelines([b'H', b'\\n']), port.read(7)", 0.9),
     Script("port.write('H\\n')"),
     Script("port.write(None)"),
@@ -92,7 +96,9 @@ SCRIPTS = [
     Script("port.write(b'H\\n' * 5); port.flush(); said = port.out_waiting, port.in_waiting", 1.0),
     # (pyserial waits until the driver would take one more.)
     Script("port.write(b'\\n' * 4093); said = port.write(b'\\n' * 5), port.out_waiting", 0.3),
-    Script("port.write(b'\\n' * 4090); port.write_timeout = 0.35; said = port.write(b'\\n' * 8), port.out_waiting", 0.3),
+    Script(
+        "port.write(b'\\n' * 4090); port.write_timeout = 0.35; said = port.write(b'\\n' * 8), port.out_waiting", 0.3
+    ),
     Script("port.write(b'\\n' * 4090); port.write_timeout = 0.35; port.write(b'\\n' * 20)", 0.35),
     Script("port.write_timeout = 0; said = port.write(b'\\n' * 5000), port.write(b'\\n' * 5), port.write_timeout", 0.1),
     Script("port.writeTimeout = 0.35; said = port.writeTimeout, port.write_timeout"),
@@ -101,7 +107,11 @@ SCRIPTS = [
     Script(ASK + "sleep(1.05); port.cancel_read(); port.cancel_read(); said = port.readline(), port.readline()", 1.05),
     Script(ASK + "port.cancel_read(); said = port.read(0), port.read_until(), port.read_until()", 0.9),
     Script(ASK + "later(0.55, port.cancel_read); said = port.read(7), port.read(4)", 0.9, THREADS),
-    Script(ASK + "port.timeout = 0.75; later(0.55, port.cancel_read); said = port.readline(), port.readline()", 0.9, THREADS),
+    Script(
+        ASK + "port.timeout = 0.75; later(0.55, port.cancel_read); said = port.readline(), port.readline()",
+        0.9,
+        THREADS,
+    ),
     Script("later(0.55, port.cancel_read); port.timeout = None; said = port.read(7)", 0.55, THREADS),
     Script("port.cancel_write(); said = port.write(b'H\\n'), port.write(b'H\\n'), port.read(14)", 1.6),
     Script("later(0.25, port.cancel_write); said = port.write(b'\\n' * 5000) // 100", 0.25, THREADS),
@@ -113,7 +123,7 @@ SCRIPTS = [
     Script("said = port.BAUDRATES, port.BAUDRATE_CONSTANTS, port.BYTESIZES, port.PARITIES, port.STOPBITS"),
     Script("port.bytesize, port.parity, port.stopbits = 7, 'E', 2; said = port.bytesize, port.parity, port.stopbits"),
     Script("port.xonxoff = port.rtscts = port.dsrdtr = True; said = port.xonxoff, port.rtscts, port.dsrdtr"),
-    Script("port.inter_byte_timeout = 0.1; port.interCharTimeout = 0.2; said = port.inter_byte_timeout, port.interCharTimeout"),
+    Script("port.inter_byte_timeout = 0.1; said = port.interCharTimeout"),
     Script("port.inter_byte_timeout = 26"),
     Script("port.timeout = -1"),
     Script("port.timeout = 'x'"),
@@ -124,7 +134,9 @@ SCRIPTS = [
     Script("port.baudrate = -1"),
     Script("port.baudrate = None"),
     Script("port.baudrate = 'x'"),
-    Script("port.baudrate = '300'; said = port.baudrate; port.baudrate = 9600.5; said = said, port.baudrate", 0, SETTINGS),
+    Script(
+        "port.baudrate = '300'; said = port.baudrate; port.baudrate = 9600.5; said = said, port.baudrate", 0, SETTINGS
+    ),
     Script("import serial.rs485; port.rs485_mode = serial.rs485.RS485Settings()"),
     Script("port.rs485_mode = None; said = port.rs485_mode"),
     Script("port.port = 3"),
@@ -136,12 +148,17 @@ SCRIPTS = [
     # ---- lines besides the two for characters ----
     Script("said = port.cts, port.dsr, port.ri, port.cd"),
     Script("said = port.getCTS(), port.getDSR(), port.getRI(), port.getCD()"),
-    Script("port.rts = port.dtr = False; said = port.rts, port.dtr; port.setRTS(); port.setDTR(); said = said, port.rts, port.dtr"),
+    Script(
+        "port.rts = port.dtr = False; said = port.rts, port.dtr\nport.setRTS(); port.setDTR(); said = said, port.rts"
+    ),
     Script("port.break_condition = True; said = port.break_condition; port.break_condition = False"),
     Script("said = port.send_break()", 0.1),
     Script("said = port.sendBreak(0.1)", 0.25),
     Script("said = port.set_low_latency_mode(True), port.set_input_flow_control(False), port.set_input_flow_control()"),
-    Script("port.set_output_flow_control(False); port.set_output_flow_control(); port.write(b'H\\n'); said = port.read(7)", 0.9),
+    Script(
+        "port.set_output_flow_control(False); port.set_output_flow_control(); port.write(b'H\\n'); said = port.read(7)",
+        0.9,
+    ),
     # ---- the object ----
     Script("said = port.name == port.port == port.portstr, port.is_open, port.isOpen(), port.closed"),
     Script("said = port.readable(), port.writable(), port.seekable(), port.isatty()"),
@@ -198,7 +215,9 @@ CLOSED = [
 """What is asked of a port that is closed, and of one that has never been open."""
 
 SCRIPTS += [
-    Script(f"port.close(); {port}said = port.{what}", 0, SETTINGS if what in ("fd", "__setattr__('baudrate', 300)") else "")
+    Script(
+        f"port.close(); {port}said = port.{what}", 0, SETTINGS if what in ("fd", "__setattr__('baudrate', 300)") else ""
+    )
     for port in ("", "port = serial.Serial(); ")
     for what in CLOSED
 ]

@@ -35,7 +35,10 @@ NOISE_S = 0.04
 ERROR = re.compile(r"[A-Z]\w+: ")
 """What a program says that ends with an exception."""
 
-NOT_IN_MEMORY = set("""
+NOT_IN_MEMORY = set(
+    re.findall(
+        r"\w+",
+        """
     BAUDRATES BAUDRATE_CONSTANTS BYTESIZES PARITIES STOPBITS
     applySettingsDict apply_settings getSettingsDict get_settings bytesize parity stopbits xonxoff rtscts dsrdtr
     exclusive interCharTimeout inter_byte_timeout rs485_mode writeTimeout port setPort open
@@ -43,7 +46,9 @@ NOT_IN_MEMORY = set("""
     set_input_flow_control set_low_latency_mode set_output_flow_control
     fileno isatty nonblocking flushInput flushOutput inWaiting isOpen
     closed readable seek seekable tell truncate writable
-""".split())
+    """,
+    )
+)
 """What the port in memory does not have: settings that change nothing, old names, and what concerns files."""
 
 Answer = tuple[object, float]

@@ -139,18 +139,14 @@ class SocketConnection(Connection):
 
 
 class RemoteLine:
-    """A robot's line in a shared world; see `Line`.
-
-    Attributes:
-        taken_ns: When the last character arrived that was read [ns].
-    """
+    """A robot's line in a shared world; see `Line`."""
 
     def __init__(self, connection: Connection, robot: int) -> None:
         self.lock: AbstractContextManager[Any] = connection.lock
         self._connection = connection
         self._robot = robot
         self._is_claimed = False
-        self.taken_ns = 0
+        self._taken_ns = 0
         # Upper bound of the characters on the way to the robot.
         self._ahead_count = 0
 
@@ -188,8 +184,13 @@ class RemoteLine:
             third=poll_ns,
             data=terminator or b"",
         )
-        self.taken_ns = answer.number
+        self._taken_ns = answer.number
         return answer.data
+
+    @property
+    def taken_ns(self) -> int:
+        """When the last character arrived that was read [ns]."""
+        return self._taken_ns
 
     def arrived_count(self) -> int:
         """Return the number of characters that have arrived and were not read."""
@@ -205,7 +206,7 @@ class RemoteLine:
 
     def wait_for_room(self, until_ns: int) -> None:
         """Let time pass up to a time [ns]."""
-        self._connection.pass_to(until_ns)
+        self.pass_to(until_ns)
 
     def wake(self) -> None:
         """Do nothing: no other thread of the program goes on while one waits."""

@@ -1,7 +1,8 @@
 """What a program finds in `serial`: every port is a simulated robot's, whatever name it is given.
 
 pyserial's own classes stay, and get other methods while the program runs. So `loop://` is pyserial's, and `spy://`,
-`alt://` and `hwgrep://` are pyserial's around a robot's port."""
+`alt://` and `hwgrep://` are pyserial's around a robot's port.
+"""
 
 from __future__ import annotations
 
@@ -91,7 +92,7 @@ def replacements(
         def _reconfigure_port(self, force_update: bool = True) -> None:
             Port._reconfigure_port(self)
             is_endless = self._timeout is None or self._inter_byte_timeout is not None
-            tenths = 0 if is_endless else int(self._timeout * 10)
+            tenths = 0 if is_endless else int((self._timeout or 0) * 10)
             if tenths > VTIME_MAX:
                 raise ValueError(f"Invalid vtime: {tenths!r}")
             self.sim_port.timeout = None if is_endless else tenths / 10

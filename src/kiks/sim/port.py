@@ -532,4 +532,5 @@ def _timeout_ns(name: str, timeout_s: Any) -> int | None:
 
 def _count(size: Any) -> int:
     """Return the number of characters to read; as in pyserial, anything but a whole number is a TypeError."""
-    return index(size) if 0 < size else 0
+    # In this order Python says the same as of pyserial's comparison.
+    return index(size) if 0 < size else 0  # noqa: SIM300

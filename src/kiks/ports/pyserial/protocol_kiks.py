@@ -5,11 +5,12 @@ from __future__ import annotations
 import io
 import warnings
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 # pyserial imports this module when a program opens such a name, so pyserial is loaded already.
 import serial  # noqa: TID253
 from serial import PortNotOpenError, SerialBase, SerialException, SerialTimeoutException  # noqa: TID253
+from serial.serialutil import to_bytes  # type: ignore[attr-defined, unused-ignore]  # noqa: TID253
 
 from kiks.errors import KiksError, shown
 from kiks.ports import url
@@ -33,7 +34,7 @@ class RobotPort:
 
     # Of pyserial's base class.
     is_open: bool
-    fd: int | None
+    fd: Any
     _port: str | None
     _baudrate: int
     _timeout: float | None
@@ -42,7 +43,7 @@ class RobotPort:
     _rs485_mode: Any
     _exclusive: bool | None
 
-    sim_port: VirtualPort | None = None
+    sim_port: Any = None
 
     def open(self) -> None:
         """Open the port.
@@ -126,18 +127,18 @@ class RobotPort:
     def readline(self, size: int | None = -1, /) -> bytes:
         """Read up to the end of a line, or to a character that does not come within the timeout."""
         if getattr(self.read, "__func__", None) is not RobotPort.read:
-            return io.RawIOBase.readline(self, size)
+            return io.RawIOBase.readline(cast(Any, self), size)
         return self._ask(lambda port: port.readline(size))
 
     def read_until(self, expected: bytes = b"\n", size: int | None = None) -> bytes:
         """Read up to a terminator, or to the first character after the timeout."""
         if getattr(self.read, "__func__", None) is not RobotPort.read or not isinstance(expected, bytes | bytearray):
-            return SerialBase.read_until(self, expected, size)
+            return SerialBase.read_until(cast(Any, self), expected, size)
         return self._ask(lambda port: port.read_until(expected, size))
 
     def write(self, data: Any, /) -> int:
         """Write bytes; text must be encoded first, as for any serial port."""
-        return self._ask(lambda port: port.write(serial.to_bytes(data)))
+        return self._ask(lambda port: port.write(to_bytes(data)))
 
     def flush(self) -> None:
         """Wait until all characters have been sent."""
@@ -192,7 +193,7 @@ class RobotPort:
 
     def fileno(self) -> int:
         """Return the descriptor, which a port has under `kiks run`."""
-        return self._ask(lambda _: io.RawIOBase.fileno(self))
+        return self._ask(lambda _: io.RawIOBase.fileno(cast(Any, self)))
 
     def nonblocking(self) -> None:
         """Warn as pyserial does: reads do not block after `select`."""
