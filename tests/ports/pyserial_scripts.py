@@ -115,8 +115,6 @@ SCRIPTS = [
     Script("later(0.55, port.cancel_read); port.timeout = None; said = port.read(7)", 0.55, THREADS),
     Script("port.cancel_write(); said = port.write(b'H\\n'), port.write(b'H\\n'), port.read(14)", 1.6),
     Script("later(0.25, port.cancel_write); said = port.write(b'\\n' * 5000) // 100", 0.25, THREADS),
-    Script("later(0.25, port.close); port.timeout = 1; port.read(7)", 0.25, THREADS),
-    Script("later(0.25, port.close); port.timeout = None; port.readline()", 0.25, THREADS),
     # ---- settings ----
     Script("said = port.get_settings(); port.apply_settings({'timeout': 0.25}); said = said, port.getSettingsDict()"),
     Script("port.applySettingsDict({'timeout': 0.25}); said = port.read(), port.timeout", 0.25),

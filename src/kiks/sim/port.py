@@ -347,7 +347,12 @@ class VirtualPort:
         self.line.wake()
 
     def reset_output_buffer(self) -> None:
-        """Do nothing: what was written is on the line already."""
+        """Drop nothing: what was written is on its way to the robot.
+
+        Raises:
+            LinkError: If the port is closed.
+        """
+        _ = self.line.lock
 
     def claim(self, holder: str) -> None:
         """Reserve the line for this port, as opening it by name does; `close` releases it.

@@ -149,7 +149,7 @@ class RobotPort:
         self._ask(lambda port: port.reset_input_buffer())
 
     def reset_output_buffer(self) -> None:
-        """Do nothing: written characters are on the line."""
+        """Drop nothing: what was written is on its way to the robot."""
         self._ask(lambda port: port.reset_output_buffer())
 
     def cancel_read(self) -> None:
