@@ -51,6 +51,12 @@ SCRIPTS = [
     Script(ASK + "import array; data = array.array('B', bytes(5)); said = port.readinto(data), data.tobytes()", 0.7),
     Script(ASK + "sleep(0.55); said = port.read_all(), port.in_waiting", 0.55),
     Script(ASK + "port.timeout = 0.55; said = port.readall()", 1.65),
+    Script(ASK + "port.timeout = 1.35; port.inter_byte_timeout = 0.2; said = port.read(20)", 1.35),
+    Script(
+        ASK + "import io; port.timeout = 1.05; said = io.BufferedRWPair(port, port).read(7), port.is_open",
+        1.05,
+        SETTINGS,
+    ),
     Script("port.read(None)"),
     Script("port.read('3')"),
     # ---- lines: each character has the timeout anew ----
@@ -66,6 +72,12 @@ SCRIPTS = [
     Script(SLOW + "port.timeout = 1.35; said = [line for line in port]", 3.55),
     Script(SLOW + "port.timeout = 0.35; said = next(port), iter(port) is port", 0.9),
     Script("port.timeout = 0.25; next(port)", 0.25),
+    Script(
+        ASK + "read, sizes = port.read, []; port.read = lambda size=1: sizes.append(size) or read(size)\n"
+        "said = port.readline(), sizes, port.write(b'H\\n'), port.read_until(b','), sizes",
+        1.3,
+        SETTINGS,
+    ),
     Script("port.readline(2.5)"),
     # ---- terminators: pyserial looks at one timeout after each character ----
     Script(ASK + "port.timeout = 0.55; said = port.read_until(b'\\r')", 0.6),
@@ -89,6 +101,7 @@ SCRIPTS = [
         "said = port.write(b'H\\n'), port.write(bytearray(b'H\\n')), port.write(memoryview(b'H\\n')), port.write([72])"
     ),
     Script("said = port.writelines([b'H', b'\\n']), port.read(7)", 0.9),
+    Script("said = port.write(b''), port.out_waiting"),
     Script("port.write('H\\n')"),
     Script("port.write(None)"),
     Script("port.write([300])"),

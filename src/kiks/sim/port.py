@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager
-from enum import Enum
 from io import DEFAULT_BUFFER_SIZE
 from operator import index
 from types import TracebackType
@@ -137,15 +136,9 @@ class WriteTimeoutError(LinkError):
     """The line has not taken all characters within the timeout."""
 
 
-class Span(Enum):
-    """What the timeout of a read is for, as in pyserial."""
-
-    WHOLE = 1
-    """All characters."""
-    EACH = 2
-    """Each character."""
-    LAST = 3
-    """All characters; the last one that comes in time may be followed by one more, with a timeout of its own."""
+WHOLE, EACH, LAST = object(), object(), object()
+"""What the timeout of a read is for, as in pyserial: all characters; each character; all, but the last one that comes
+in time may be followed by one more, with a timeout of its own."""
 
 
 class VirtualPort:
@@ -229,7 +222,7 @@ class VirtualPort:
             self._has_read = False
             count = len(data)
             # Like pyserial, which goes on when the driver would take one more.
-            if self._is_write_cancelled or not line.send(data, 1):
+            if count and (self._is_write_cancelled or not line.send(data, 1)):
                 count = self._write_in_pieces(data)
             program.leave(has_acted=True)
         return count
@@ -240,11 +233,11 @@ class VirtualPort:
         Raises:
             LinkError: If there is no timeout and no reply can come any more.
         """
-        return self._read(_count(size), None, Span.WHOLE)
+        return self._read(_count(size), None, WHOLE)
 
     def read_in_pieces(self, size: int) -> bytes:
         """Return `size` characters, or those up to one that is late: each one has the timeout anew."""
-        return self._read(_count(size), None, Span.EACH)
+        return self._read(_count(size), None, EACH)
 
     def read_until(self, expected: bytes = b"\n", size: int | None = None) -> bytes:
         """Return everything up to and including a terminator, less after the timeout, which is for the whole.
@@ -255,8 +248,8 @@ class VirtualPort:
         if expected.__class__ is not bytes:
             expected = _characters(expected)
         if self._timeout_ns == 0:
-            return self._read(1, None, Span.WHOLE)  # pyserial looks at its timeout after each character
-        return self._read(None if size is None else max(index(size), 1), expected or None, Span.LAST)
+            return self._read(1, None, WHOLE)  # pyserial looks at its timeout after each character
+        return self._read(None if size is None else max(index(size), 1), expected or None, LAST)
 
     def readline(self, size: int | None = -1) -> bytes:
         """Return a line with its end, or the part of it up to a character that is late: each one has the timeout anew.
@@ -264,9 +257,11 @@ class VirtualPort:
         Raises:
             LinkError: If there is no timeout and no reply can come any more.
         """
-        if not isinstance(size, int | None):
-            raise TypeError(f"argument should be integer or None, not {type(size).__name__!r}")
-        return self._read(None if size is None or size < 0 else size, b"\n", Span.EACH)
+        try:
+            count = -1 if size is None else index(size)
+        except TypeError:
+            raise TypeError(f"argument should be integer or None, not {type(size).__name__!r}") from None
+        return self._read(None if count < 0 else count, b"\n", EACH)
 
     def readlines(self, hint: int | None = -1) -> list[bytes]:
         """Return lines, until one is empty or, with a hint from 1, they have so many characters."""
@@ -428,7 +423,7 @@ class VirtualPort:
             self.line.pass_to(self.line.now_ns + cost_ns)
         self._program.leave(has_acted=False)
 
-    def _read(self, size: int | None, terminator: bytes | None, span: Span) -> bytes:
+    def _read(self, size: int | None, terminator: bytes | None, span: object) -> bytes:
         line, program, timeout_ns = self.line, self._program, self._timeout_ns
         with line.lock:
             if program.thinks:
@@ -441,12 +436,12 @@ class VirtualPort:
                 data = self._read_on(b"", size, terminator, begin_ns, span)
             else:
                 data = line.read(size, terminator, timeout_ns, poll_ns)
-                if (terminator is None or not data.endswith(terminator)) and len(data) != size:
+                if len(data) != size and not (terminator and data.endswith(terminator)):
                     data = self._read_on(data, size, terminator, begin_ns, span)
             program.leave(has_acted=bool(data))
         return data
 
-    def _read_on(self, data: bytes, size: int | None, terminator: bytes | None, begin_ns: int, span: Span) -> bytes:
+    def _read_on(self, data: bytes, size: int | None, terminator: bytes | None, begin_ns: int, span: object) -> bytes:
         """Go on with a read that is not complete: its timeout may not be over, and another thread may have ended it.
 
         Args:
@@ -457,7 +452,7 @@ class VirtualPort:
             span: What the timeout is for.
         """
         timeout_ns = self._timeout_ns
-        while len(data) != size and (terminator is None or not data.endswith(terminator)):
+        while len(data) != size and not (terminator and data.endswith(terminator)):
             if self._is_read_cancelled:
                 self._is_read_cancelled = False
                 break
@@ -466,9 +461,9 @@ class VirtualPort:
             if timeout_ns is not None:
                 left_ns = begin_ns + timeout_ns - line.now_ns
                 last_ns = max(begin_ns, line.taken_ns) if data and timeout_ns else begin_ns
-                if span is Span.EACH or (span is Span.LAST and left_ns <= 0 and last_ns < begin_ns + timeout_ns):
+                if span is EACH or (span is LAST and left_ns <= 0 and last_ns < begin_ns + timeout_ns):
                     left_ns += last_ns - begin_ns
-                    if span is Span.LAST:
+                    if span is LAST:
                         size, left_size, terminator = len(data) + 1, 1, None
                 if left_ns <= 0:
                     break

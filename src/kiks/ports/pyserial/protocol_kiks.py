@@ -44,6 +44,7 @@ class RobotPort:
     _exclusive: bool | None
 
     sim_port: Any = None
+    _line_baudrate: int | None = None
 
     def open(self) -> None:
         """Open the port.
@@ -60,14 +61,13 @@ class RobotPort:
             port.claim(f"the program that opened {shown(self._port)}")
         except KiksError as error:
             raise SerialException(str(error)) from None
-        self.sim_port = port
+        self.sim_port, self._line_baudrate = port, None
         # The descriptor that pyserial's own `close` finds if the program leaves the port open.
         vars(self)["fd"] = None
         try:
             self._reconfigure_port()
         except Exception:
-            port.close()
-            self.sim_port = None
+            self.close()
             raise
         port.reset_input_buffer()
         self.is_open = True
@@ -91,8 +91,8 @@ class RobotPort:
             raise ValueError("Failed to set RS485 mode: [Errno 25] Inappropriate ioctl for device")
         try:
             port.timeout, port.write_timeout = self._timeout, self._write_timeout
-            if port.baudrate != self._baudrate:
-                port.baudrate = self._baudrate
+            if self._baudrate != self._line_baudrate:
+                port.baudrate = self._line_baudrate = self._baudrate
         except KiksError as error:
             raise ValueError(str(error)) from None
 
