@@ -35,6 +35,14 @@ def pytest_configure(config: pytest.Config) -> None:
             forked.address()  # started here, it is shared by all workers
 
 
+@pytest.fixture(autouse=True)
+def hypothesis_in_real_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let Hypothesis, which measures the collection of garbage, ask the real clock in a program that runs here."""
+    from kiks.script import callers
+
+    monkeypatch.setattr(callers, "_REAL", callers._REAL | {"hypothesis"})
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     if not AT_LENGTH:
         config.hook.pytest_deselected(items=[item for item in items if item.get_closest_marker("at_length")])

@@ -57,7 +57,7 @@ def test_locks_of_the_library_are_there_for_modules_that_are_imported_later(
 def test_nothing_is_written_as_pyserial_refuses_it(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
     program = "import serial\ntry: serial.Serial('COM1').write(None)\nexcept TypeError as error: print(error)\n"
     assert run(program) == 0
-    assert capsys.readouterr().out == "data must be bytes, or numbers from 0 to 255, but it was None.\n"
+    assert capsys.readouterr().out == "cannot convert 'NoneType' object to bytearray\n"
 
 
 def test_only_threads_of_the_program_count(run: Run, capsys: pytest.CaptureFixture[str]) -> None:

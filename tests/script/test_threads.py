@@ -13,7 +13,6 @@ from tests.script import seen
 from tests.script.oracle import Oracle, Trace
 
 from kiks.model.arena import Arena
-from kiks.script import callers
 from kiks.script.runner import run_here
 from kiks.sim.simulation import Simulation
 
@@ -35,13 +34,6 @@ ANY = st.recursive(
 PROGRAMS = st.lists(st.lists(ANY, max_size=8), min_size=1, max_size=5)
 
 
-@pytest.fixture(autouse=True)
-def hypothesis_in_real_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let Hypothesis, which measures the collection of garbage, ask the real clock."""
-    monkeypatch.setattr(callers, "_REAL", callers._REAL | {"hypothesis"})
-    callers._kinds.clear()
-
-
 def world() -> Simulation:
     """Return a small world of two robots that is always the same."""
     return Simulation(BOX, robots=2, seed=7)
@@ -56,7 +48,7 @@ def run_threads(program: list[Any]) -> tuple[Trace, str]:
 
 @pytest.mark.slow
 @given(PROGRAMS)
-@settings(max_examples=share(60, 200), derandomize=True, suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture])
+@settings(max_examples=share(60, 200), derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 def test_threads_do_what_a_plain_simulation_says(program: list[Any]) -> None:
     oracle = Oracle(world(), program)
     assert run_threads(program) == (oracle.trace, oracle.sim.state_hash())

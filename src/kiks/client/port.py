@@ -58,8 +58,6 @@ def open_port(name: str, baud: int = 9600, timeout_s: float | None = TIMEOUT_S) 
         return sim_port
     import serial
 
-    from kiks.ports.pyserial import protocol_kiks
-
     try:
         port: Any = serial.serial_for_url(name, baudrate=baud, timeout=timeout_s, stopbits=2)
     except (serial.SerialException, ValueError, OSError) as error:
@@ -68,7 +66,7 @@ def open_port(name: str, baud: int = 9600, timeout_s: float | None = TIMEOUT_S) 
             f"port {shown(name)} must be one that can be opened, but: {why}. A simulated robot is 'kiks://1'."
         ) from None
     # A simulated port, as under `kiks run`, reads lines quickly by itself.
-    return port if isinstance(port, protocol_kiks.Serial) else FastPort(port)
+    return port if hasattr(port, "sim_port") else FastPort(port)
 
 
 class FastPort:

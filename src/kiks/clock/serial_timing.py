@@ -22,6 +22,7 @@ class SerialTiming:
     Attributes:
         waiting: Unread characters for the host, arrived or not.
         sending_until_ns: When the last character for the robot will have arrived [ns].
+        taken_ns: When the last character arrived that the host has read [ns].
         lost_count: Characters that were dropped because the host did not read.
     """
 
@@ -29,6 +30,7 @@ class SerialTiming:
         self.baud = baud
         self.character_ns = character_ns(baud)
         self.sending_until_ns = 0
+        self.taken_ns = 0
         self.lost_count = 0
         self._answering_until_ns = 0
         self.waiting = bytearray()
@@ -50,10 +52,9 @@ class SerialTiming:
         self.sending_until_ns, self._answering_until_ns = sending_until_ns, answering_until_ns
         self.forget()
 
-    @property
-    def room_ns(self) -> int:
-        """When a waiting sender may go on [ns]."""
-        return self.sending_until_ns - BACKLOG_LIMIT * self.character_ns
+    def room_ns(self, count: int = 0) -> int:
+        """Return when the buffer of the sender has room for some characters [ns]; it holds `BACKLOG_LIMIT`."""
+        return self.sending_until_ns - (BACKLOG_LIMIT - count) * self.character_ns
 
     def send(self, count: int, at_ns: int) -> int:
         """Send characters to the robot; return the start of the first one [ns]."""
@@ -105,6 +106,9 @@ class SerialTiming:
     def take(self, count: int) -> bytes:
         """Remove and return the first `count` waiting characters."""
         if count == len(self.waiting):
+            if count:
+                start_ns, step_ns, length = self._pieces[-1]
+                self.taken_ns = start_ns + length * step_ns
             taken = bytes(self.waiting)
             self.forget()
             return taken
@@ -113,13 +117,13 @@ class SerialTiming:
         left = len(taken)
         while left:
             piece = self._pieces[0]
-            if piece[2] <= left:
-                left -= piece[2]
+            gone = min(left, piece[2])
+            piece[0] += gone * piece[1]
+            piece[2] -= gone
+            left -= gone
+            self.taken_ns = piece[0]
+            if not piece[2]:
                 self._pieces.popleft()
-            else:
-                piece[0] += left * piece[1]
-                piece[2] -= left
-                break
         return taken
 
     def cut_short(self, until_ns: int, now_ns: int) -> None:

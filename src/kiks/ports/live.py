@@ -152,7 +152,7 @@ class Live:
                 if (end_ns := line.reply_end_ns) is not None:
                     wait_s = min(wait_s, pace.wall_wait_s(end_ns), COALESCE_S if by_character else IDLE_S)
             if self.is_full(link):
-                wait_s = min(wait_s, pace.wall_wait_s(line.room_ns))
+                wait_s = min(wait_s, pace.wall_wait_s(line.room_ns()))
         return 0.0 if self._is_behind else wait_s
 
     def receive(self, link: Link, data: bytes) -> None:
@@ -161,4 +161,4 @@ class Live:
 
     def is_full(self, link: Link) -> bool:
         """Return whether the line is as full as the buffer of a serial driver."""
-        return link.wire.line.room_ns > self._sim.now_ns
+        return link.wire.line.room_ns() > self._sim.now_ns

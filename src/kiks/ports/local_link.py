@@ -12,6 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol, TypeVar, TypeVarTuple
 
+from kiks.clock.serial_timing import BACKLOG_LIMIT
 from kiks.errors import LinkError
 from kiks.ports.messages import Answer, Kind, Request
 from kiks.ports.programs import Programs
@@ -222,9 +223,18 @@ class SharedLine(RemoteLine):
             self._connection.yield_world()
         self._act(self._local_line.pass_to, super().pass_to, time_ns)
 
-    def send(self, data: bytes) -> None:
-        """Put characters on the line; wait while it is full."""
-        self._act(self._local_line.send, super().send, data)
+    def send(self, data: bytes, spare: int) -> bool:
+        """Put characters on the line, if it has room for them and some more; see `Line.send`."""
+        return self._act(self._local_line.send, super().send, data, spare)
+
+    def room_ns(self, count: int) -> int:
+        """Return when the line has room for some characters [ns]; a time that is over: it has."""
+        return self._act(self._local_line.room_ns, super().room_ns, count)
+
+    @property
+    def taken_ns(self) -> int:
+        """When the last character arrived that was read [ns]."""
+        return self._local_line.taken_ns
 
     def read(self, size: int | None, terminator: bytes | None, timeout_ns: int | None, poll_ns: int) -> bytes:
         """Wait for `size` characters or a terminator; see `Line.read`.
@@ -244,5 +254,6 @@ class SharedLine(RemoteLine):
         if not self._connection.is_alone:
             return shared(*args)
         result = alone(*args)
+        self._ahead_count = BACKLOG_LIMIT  # to be asked for, should another program join
         self._connection.set_time(self._sim.now_ns)
         return result

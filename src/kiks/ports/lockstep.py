@@ -199,7 +199,7 @@ class Client(Participant):
     def _go_on(self, time_ns: int) -> None:
         """Think, from a time [ns] on, or from when there is room on the line."""
         line = self._link.wire.line
-        self._free_ns = max(time_ns, line.room_ns)
+        self._free_ns = max(time_ns, line.room_ns())
         self.acts_from_ns = self._free_ns + self._thinking_ns
         self._update_has_left()
 

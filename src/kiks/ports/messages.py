@@ -43,8 +43,8 @@ class Kind(IntEnum):
     """Releases a line, if `first` is 1, and drops unread characters."""
     SEND = 6
     """Sends the characters in `data`."""
-    SEND_AND_MEET = 7
-    """Sends the characters in `data`, and asks for an answer when the line has taken them."""
+    ROOM = 7
+    """Asks when the line has room for `first` characters [ns]."""
     READ = 8
     """Asks for `first` characters (-1: any number) or up to the terminator in `data`; `second`: timeout [ns], -1 for
     none; `third`: cost of a read without result [ns]."""
@@ -58,11 +58,9 @@ class Kind(IntEnum):
     """Sets the speed to `first`."""
     BAUD = 13
     """Asks for the speed."""
-    ROOM = 14
-    """Asks when the line has room [ns]."""
-    WAIT = 15
+    WAIT = 14
     """Asks for an answer when one of the reads in `data` is complete, or at `second` [ns]; -1: without a limit."""
-    END = 16
+    END = 15
     """Represents the end of the connection; never sent."""
 
 

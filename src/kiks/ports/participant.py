@@ -56,7 +56,6 @@ class ProgramParticipant(Participant):
         self._robots: set[int] = set()
         self._used: set[int] = set()
         self._ticket = 0
-        self._has_waited_for_room = False
         self._has_been_warned = False
 
     @abstractmethod
@@ -131,14 +130,10 @@ class ProgramParticipant(Participant):
     def _do(self, at_ns: int) -> None:
         """Do its next request at a time [ns]."""
         request = self._requests[0]
-        if not self._has_waited_for_room:
-            self._note_thinking(request)
+        self._note_thinking(request)
         self.acts_from_ns = at_ns
-        if request.kind in (Kind.SEND, Kind.SEND_AND_MEET) and not self._has_room(request.robot):
-            return
         self._requests.popleft()
         self._ticket = request.ticket
-        self._has_waited_for_room = False
         try:
             self._execute(request)
         except KiksError as error:
@@ -170,7 +165,8 @@ class ProgramParticipant(Participant):
             self._answer(self.acts_from_ns, is_good=False, data=str(never_ends(request.robot)).encode())
         else:
             end_ns = max(end_ns, self.acts_from_ns)
-            self._answer(end_ns, robot=request.robot, data=wire.line.take(count))
+            data = wire.line.take(count)
+            self._answer(end_ns, robot=request.robot, number=wire.line.taken_ns, data=data)
 
     def _check_wait_for_all(self, request: Request) -> None:
         wires, reads = self._wires, unpack_reads(request.data)
@@ -181,16 +177,6 @@ class ProgramParticipant(Participant):
         self.waits = False
         now_ns = self.acts_from_ns if end_ns == NEVER_NS else max(end_ns, self.acts_from_ns)
         self._answer(now_ns, data=bytes(is_complete(wires[read.robot - 1], read, now_ns) for read in reads))
-
-    def _has_room(self, robot: int) -> bool:
-        """Return whether the line has room; if not, the program acts again when it has."""
-        room_ns = self._wires[robot - 1].line.room_ns
-        if room_ns <= self.acts_from_ns or self._has_waited_for_room:
-            return True
-        self.acts_from_ns = room_ns
-        self._has_waited_for_room = True
-        self._warn_of_backlog(robot)
-        return False
 
     def _warn_of_backlog(self, robot: int) -> None:
         """Log that the program sends faster than the line carries, once."""
@@ -231,10 +217,8 @@ class ProgramParticipant(Participant):
         """Execute a request that concerns a robot's line."""
         wire, kind = self._wires[robot - 1], request.kind
         line = wire.line
-        if kind is Kind.SEND or kind is Kind.SEND_AND_MEET:
+        if kind is Kind.SEND:
             wire.send(request.data, at_ns)
-            if kind is Kind.SEND_AND_MEET:
-                self._answer(at_ns, robot=robot)
         elif kind is Kind.READ:
             self._pending_read = request
             self.waits = True
@@ -246,9 +230,10 @@ class ProgramParticipant(Participant):
         elif kind is Kind.SENT:
             self._answer(at_ns, robot=robot, number=max(at_ns, line.sending_until_ns))
         elif kind is Kind.ROOM:
-            if line.room_ns > at_ns:
+            room_ns = line.room_ns(request.first)
+            if room_ns > at_ns:
                 self._warn_of_backlog(robot)
-            self._answer(at_ns, robot=robot, number=max(at_ns, line.room_ns))
+            self._answer(at_ns, robot=robot, number=room_ns)
         elif kind is Kind.SET_BAUD:
             wire.set_baud(request.first)
         elif kind is Kind.BAUD:

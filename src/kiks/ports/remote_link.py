@@ -146,6 +146,7 @@ class RemoteLine:
         self._connection = connection
         self._robot = robot
         self._is_claimed = False
+        self._taken_ns = 0
         # Upper bound of the characters on the way to the robot.
         self._ahead_count = 0
 
@@ -162,15 +163,13 @@ class RemoteLine:
         """Let the program's thinking time pass [ns]."""
         self._connection.think(time_ns)
 
-    def send(self, data: bytes) -> None:
-        """Put characters on the line; wait while it is full."""
-        while data:
-            piece, data = data[:BACKLOG_LIMIT], data[BACKLOG_LIMIT:]
-            if self._ahead_count <= BACKLOG_LIMIT:
-                self._connection.tell(Kind.SEND, self._robot, data=piece)
-                self._ahead_count += len(piece)
-            else:
-                self._ask(Kind.SEND_AND_MEET, data=piece)
+    def send(self, data: bytes, spare: int) -> bool:
+        """Put characters on the line, if it has room for them and some more; see `Line.send`."""
+        if self.room_ns(len(data) + spare) > self.now_ns:
+            return False
+        self._connection.tell(Kind.SEND, self._robot, data=data)
+        self._ahead_count += len(data)
+        return True
 
     def read(self, size: int | None, terminator: bytes | None, timeout_ns: int | None, poll_ns: int) -> bytes:
         """Wait for `size` characters or a terminator; see `Line.read`.
@@ -178,13 +177,20 @@ class RemoteLine:
         Raises:
             LinkError: If it could wait for ever.
         """
-        return self._ask(
+        answer = self._ask(
             Kind.READ,
             first=-1 if size is None else size,
             second=-1 if timeout_ns is None else timeout_ns,
             third=poll_ns,
             data=terminator or b"",
-        ).data
+        )
+        self._taken_ns = answer.number
+        return answer.data
+
+    @property
+    def taken_ns(self) -> int:
+        """When the last character arrived that was read [ns]."""
+        return self._taken_ns
 
     def arrived_count(self) -> int:
         """Return the number of characters that have arrived and were not read."""
@@ -194,9 +200,16 @@ class RemoteLine:
         """Return the time at which all characters will have been sent [ns]."""
         return self._ask(Kind.SENT).number
 
-    def room_ns(self) -> int:
-        """Return the time at which the line takes more characters [ns]."""
-        return self.now_ns if self._ahead_count <= BACKLOG_LIMIT else self._ask(Kind.ROOM).number
+    def room_ns(self, count: int) -> int:
+        """Return when the line has room for some characters [ns]; a time that is over: it has."""
+        return 0 if self._ahead_count + count <= BACKLOG_LIMIT else self._ask(Kind.ROOM, first=count).number
+
+    def wait_for_room(self, until_ns: int) -> None:
+        """Let time pass up to a time [ns]."""
+        self.pass_to(until_ns)
+
+    def wake(self) -> None:
+        """Do nothing: no other thread of the program goes on while one waits."""
 
     def wait_for(self, reads: Sequence[Read], until_ns: int) -> list[bool]:
         """Let time pass until one of several reads is complete; see `Line.wait_for`."""

@@ -70,7 +70,6 @@ class _PortFile:
             os.set_blocking(end, False)
 
     def close(self) -> None:
-        self.line.cancel_read()
         os.close(self.descriptor)
         os.close(self._other)
 
@@ -155,7 +154,7 @@ class Files:
         return file.descriptor
 
     def remove(self, descriptor: int) -> None:
-        """Close a descriptor; threads that wait for it go on."""
+        """Close a descriptor."""
         self._ports.pop(descriptor).close()
 
     # ---- what ends only by the program itself ----

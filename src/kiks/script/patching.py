@@ -37,10 +37,10 @@ def replaced(replacements: Replacements, scheduler: Scheduler) -> Iterator[None]
 
     A function in C stays the same object and gets another body, which the program and its libraries reach. KiKS, and
     other threads of this process, still get the function as it was. Anything else in a module gets another value.
-    A class stays the same object and gets another attribute; its methods decide themselves whom they serve.
+    A class stays the same object and gets another attribute, or one more; its methods decide themselves whom they serve.
 
     Args:
-        replacements: What stands in; a module that has not been imported, or has no such name, is left alone.
+        replacements: What stands in. A module that has not been imported, or has no such name, is left alone.
         scheduler: The threads of the program.
     """
     undo = Undo()
@@ -49,10 +49,10 @@ def replaced(replacements: Replacements, scheduler: Scheduler) -> Iterator[None]
             owner = _find(path)
             for name, value in names.items():
                 before = vars(owner).get(name, _MISSING) if owner is not None else _MISSING
-                if before is _MISSING:
-                    continue
                 if isinstance(owner, type):
                     change_class(owner, name, value, undo)
+                elif before is _MISSING:
+                    continue
                 elif isinstance(before, BuiltinFunctionType) and (callable(value) or isinstance(value, Reading)):
                     change_function(before, for_program(scheduler, value, unchanged(before)), undo)
                 else:

@@ -1,4 +1,8 @@
-"""What a program finds in `serial`: every port is a simulated robot's, whatever name it is given."""
+"""What a program finds in `serial`: every port is a simulated robot's, whatever name it is given.
+
+pyserial's own classes stay, and get other methods while the program runs. So `loop://` is pyserial's, and `spy://`,
+`alt://` and `hwgrep://` are pyserial's around a robot's port.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +13,15 @@ from typing import Any
 from kiks.ports import url as urls
 from kiks.script.file_waits import Files
 from kiks.script.shared_line import SharedLine
-from kiks.sim.port import VirtualPort
+from kiks.sim.port import Line, VirtualPort
+
+ROBOT_CLASSES = (
+    "serial.Serial",
+    "serial.rfc2217.Serial",
+    "serial.urlhandler.protocol_socket.Serial",
+    "kiks.ports.pyserial.protocol_kiks.Serial",
+)
+"""The classes of pyserial whose ports are robots."""
 
 USB_ADAPTER = (0x0403, 0x6001)
 """Vendor and product of the most common adapter from USB to a serial line, FTDI's FT232: programs look for it."""
@@ -26,80 +38,71 @@ def replacements(
         names: Port names that a program finds when it looks for ports, one a robot.
     """
     import serial
+    import serial.rfc2217
     import serial.tools.list_ports
+    import serial.urlhandler.protocol_socket
     from serial.tools import list_ports_common
 
-    from kiks.ports.pyserial import protocol_kiks
+    from kiks.ports.pyserial.protocol_kiks import VTIME_MAX, RobotPort
 
-    # The ports that the program has open, by line.
-    holders: dict[int, list[Serial]] = {}
-
-    class Serial(protocol_kiks.Serial):
-        """The port that a program gets when it opens a serial port."""
+    class Port(RobotPort):
+        """The methods of a port in a program: besides the robot's, those that need the program's descriptors."""
 
         _descriptor: int | None = None
 
-        def find(self, name: str) -> VirtualPort:
-            return open_port(name)
-
-        def _take(self, port: VirtualPort) -> None:
-            others = holders.setdefault(id(port.line), [])
-            if self.exclusive and any(other.exclusive for other in others):
-                raise serial.SerialException(
-                    errno.EWOULDBLOCK, f"Could not exclusively lock port {self.port}: it is open already"
-                )
-            # As with a real port, a program may open a port twice; the first read gets the characters.
-            if not others:
-                super()._take(port)
-            others.append(self)
-
-        def _give_back(self, port: VirtualPort) -> None:
-            others = holders[id(port.line)]
-            others.remove(self)
-            if not others:
-                super()._give_back(port)
-
-        def _ask(self, question: Any) -> bytes:
-            answer = super()._ask(question)
-            if not self.is_open:  # another thread has closed it meanwhile
-                raise serial.PortNotOpenError
-            return answer
-
-        def fileno(self) -> int:
-            if self._descriptor is None:
-                line = self._open_port.line
-                if not isinstance(line, SharedLine):
-                    return super().fileno()
-                self._descriptor = ports.add(line, self)
-            return self._descriptor
-
-        @property
-        def fd(self) -> int | None:
-            return self.fileno() if self.is_open else None
+        def _reconfigure_port(self, force_update: bool = False) -> None:
+            if self._exclusive:
+                line = self.sim_port.line
+                if lock_holders.setdefault(line, self) is not self:
+                    why = os.strerror(errno.EAGAIN)
+                    raise serial.SerialException(
+                        errno.EAGAIN, f"Could not exclusively lock port {self._port}: [Errno {errno.EAGAIN}] {why}"
+                    )
+            elif self._exclusive is not None:
+                unlock(self)
+            RobotPort._reconfigure_port(self)
 
         def close(self) -> None:
             if self._descriptor is not None:
                 ports.remove(self._descriptor)
                 self._descriptor = None
-            super().close()
+            unlock(self)
+            RobotPort.close(self)
 
-        def cancel_read(self) -> None:
-            line = self._open_port.line
-            if isinstance(line, SharedLine):
-                line.cancel_read()
+        def fileno(self) -> int:
+            if self._descriptor is None:
+                line = self._ask(lambda port: port.line)
+                if not isinstance(line, SharedLine):
+                    return RobotPort.fileno(self)
+                self._descriptor = ports.add(line, self)
+            return self._descriptor
 
-        def cancel_write(self) -> None:
-            """Do nothing: written characters are on the line."""
+        @property
+        def fd(self) -> int | None:
+            if self.sim_port is None and "fd" not in vars(self):
+                raise AttributeError(f"{type(self).__name__!r} object has no attribute 'fd'")
+            return None if self.sim_port is None else self.fileno()
 
-        def nonblocking(self) -> None:
-            """Do nothing: reads do not block after `select`."""
+    class PortInPieces(Port):
+        """The methods of `VTIMESerial`: the driver's timeout, in tenths of a second, begins anew with each piece."""
 
-    def serial_for_url(url: str, *args: Any, do_not_open: bool = False, **settings: Any) -> Serial:
-        port = Serial(None, *args, **settings)
-        port.port = url
-        if not do_not_open:
-            port.open()
-        return port
+        def _reconfigure_port(self, force_update: bool = True) -> None:
+            Port._reconfigure_port(self)
+            is_endless = self._timeout is None or self._inter_byte_timeout is not None
+            tenths = 0 if is_endless else int((self._timeout or 0) * 10)
+            if tenths > VTIME_MAX:
+                raise ValueError(f"Invalid vtime: {tenths!r}")
+            self.sim_port.timeout = None if is_endless else tenths / 10
+
+        def read(self, size: int = 1) -> bytes:
+            return self._ask(lambda port: port.read_in_pieces(size))
+
+    # Who has locked a line with `exclusive`.
+    lock_holders: dict[Line, Port] = {}
+
+    def unlock(port: Port) -> None:
+        for line in [line for line, holder in lock_holders.items() if holder is port]:
+            del lock_holders[line]
 
     def comports(include_links: bool = False, _hide_subsystems: Any = None) -> list[Any]:
         found = []
@@ -113,8 +116,13 @@ def replacements(
             found.append(info)
         return found
 
+    def methods_of(cls: type) -> dict[str, Any]:
+        return {name: value for name, value in vars(cls).items() if not name.startswith(("__", "_abc"))}
+
     return {
-        "serial": {"Serial": Serial, "serial_for_url": serial_for_url},
+        **dict.fromkeys(ROBOT_CLASSES, methods_of(RobotPort) | methods_of(Port)),
+        "serial.VTIMESerial": methods_of(PortInPieces),
+        "serial.PosixPollSerial": {"read": RobotPort.read},
         "serial.tools.list_ports": {"comports": comports},
         # `kiks.Khepera` and `kiks.kopen` find their ports by this function.
         urls.__name__: {"find_port": open_port},

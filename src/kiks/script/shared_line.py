@@ -5,7 +5,6 @@ from __future__ import annotations
 from contextlib import AbstractContextManager
 from typing import Any
 
-from kiks.clock.serial_timing import BACKLOG_LIMIT
 from kiks.errors import LinkError
 from kiks.script.thread_scheduler import ALONE, COMPLETE, SIGNALLED, Scheduler, Task
 from kiks.sim.port import Line
@@ -26,16 +25,17 @@ class SharedLine:
         self.robot = robot
         self._line = line
         self._scheduler = scheduler
-        self._readers: list[Task] = []
+        self._waiting: list[Task] = []
+        self._claim_count = 0
         self._what = f"robot {robot}"
         # Methods of the line without a wait.
         self.think = line.think
+        self.send = line.send
         self.arrived_count = line.arrived_count
         self.sent_ns = line.sent_ns
         self.room_ns = line.room_ns
         self.drop_arrived = line.drop_arrived
         self.set_baud = line.set_baud
-        self.claim = line.claim
         self.wait_for = line.wait_for
 
     @property
@@ -52,13 +52,19 @@ class SharedLine:
         """Let time pass up to a time [ns]; other threads go on meanwhile."""
         self._scheduler.sleep_until(time_ns)
 
-    def send(self, data: bytes) -> None:
-        """Put characters on the line; wait while it is full."""
-        while data:
-            while (room_ns := self._line.room_ns()) > self._line.now_ns:
-                self._scheduler.sleep_until(room_ns)
-            self._line.send(data[:BACKLOG_LIMIT])
-            data = data[BACKLOG_LIMIT:]
+    @property
+    def taken_ns(self) -> int:
+        """When the last character arrived that was read [ns]."""
+        return self._line.taken_ns
+
+    def wait_for_room(self, until_ns: int) -> None:
+        """Let time pass up to a time [ns], or until `wake`; other threads go on meanwhile."""
+        task = self._scheduler.current
+        self._waiting.append(task)
+        try:
+            self._scheduler.wait(f"room on the line to {self._what}", until_ns=until_ns)
+        finally:
+            self._waiting.remove(task)
 
     def read(self, size: int | None, terminator: bytes | None, timeout_ns: int | None, poll_ns: int) -> bytes:
         """Wait for `size` characters or a terminator; see `Line.read`.
@@ -81,7 +87,7 @@ class SharedLine:
     def _wait(self, size: int | None, terminator: bytes | None, deadline_ns: int) -> bytes:
         """Let other threads go on until a read is complete, or up to a time [ns]; return the characters."""
         line, scheduler, task = self._line, self._scheduler, self._scheduler.current
-        self._readers.append(task)
+        self._waiting.append(task)
         try:
             data = b""
             while True:
@@ -100,14 +106,26 @@ class SharedLine:
                 if cause is not COMPLETE or len(data) == size or (terminator is not None and data.endswith(terminator)):
                     return data
         finally:
-            self._readers.remove(task)
+            self._waiting.remove(task)
 
-    def cancel_read(self) -> None:
-        """Wake the threads that wait for characters; they get those that have arrived."""
-        for task in self._readers:
+    def wake(self) -> None:
+        """Let threads that read or wait for room see whether they still must; they return what has arrived."""
+        for task in self._waiting:
             self._scheduler.wake(task, self)
 
+    def claim(self, holder: str) -> None:
+        """Reserve the line for this program, which may open it several times, as on a real computer.
+
+        Raises:
+            LinkError: If another program holds it.
+        """
+        if not self._claim_count:
+            self._line.claim(holder)
+        self._claim_count += 1
+
     def hang_up(self) -> None:
-        """Release the line and drop unread characters."""
-        self.cancel_read()
-        self._line.hang_up()
+        """Release the line and drop unread characters, if nobody else in the program has it open."""
+        self._claim_count = max(self._claim_count - 1, 0)
+        if not self._claim_count:
+            self._line.hang_up()
+        self.wake()

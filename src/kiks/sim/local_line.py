@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from kiks.clock.serial_timing import BACKLOG_LIMIT
 from kiks.errors import SHOWN_MAX, LinkError, shown
 from kiks.model.checks import check_kind
 from kiks.sim.event_loop import EventLoop
@@ -48,15 +47,13 @@ class LocalLine:
             if wire is self._wire or wire.holder is not None:
                 wire.think(from_ns, from_ns + time_ns)
 
-    def send(self, data: bytes) -> None:
-        """Put characters on the line; wait while it is full."""
-        world, advance_to, wire = self._world, self._loop.advance_to, self._wire
-        while data:
-            room_ns = wire.line.room_ns
-            if room_ns > world.now_ns:
-                advance_to(room_ns)
-            wire.send(data[:BACKLOG_LIMIT], world.now_ns)
-            data = data[BACKLOG_LIMIT:]
+    def send(self, data: bytes, spare: int) -> bool:
+        """Put characters on the line, if it has room for them and some more; see `Line.send`."""
+        wire, now_ns = self._wire, self._world.now_ns
+        if wire.line.room_ns(len(data) + spare) > now_ns:
+            return False
+        wire.send(data, now_ns)
+        return True
 
     def read(self, size: int | None, terminator: bytes | None, timeout_ns: int | None, poll_ns: int) -> bytes:
         """Wait for `size` characters or a terminator; see `Line.read`.
@@ -83,9 +80,21 @@ class LocalLine:
         """Return when everything will have been sent [ns]."""
         return max(self._wire.line.sending_until_ns, self._world.now_ns)
 
-    def room_ns(self) -> int:
-        """Return when the line takes more characters [ns]."""
-        return max(self._wire.line.room_ns, self._world.now_ns)
+    @property
+    def taken_ns(self) -> int:
+        """When the last character arrived that was read [ns]."""
+        return self._wire.line.taken_ns
+
+    def room_ns(self, count: int) -> int:
+        """Return when the line has room for some characters [ns]; a time that is over: it has."""
+        return self._wire.line.room_ns(count)
+
+    def wait_for_room(self, until_ns: int) -> None:
+        """Let time pass up to a time [ns]."""
+        self._loop.advance_to(until_ns)
+
+    def wake(self) -> None:
+        """Do nothing: no other thread of the program goes on while one waits."""
 
     def wait_for(self, reads: Sequence[Read], until_ns: int) -> list[bool]:
         """Let time pass until one of several reads is complete; see `Line.wait_for`."""
