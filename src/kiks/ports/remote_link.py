@@ -56,6 +56,11 @@ class Connection(ABC):
             self.ask(Kind.MEET)
         return self._now_ns
 
+    @property
+    def known_ns(self) -> int:
+        """The same, or 0 as long as the program has not needed its time [ns]."""
+        return self._now_ns
+
     def pass_to(self, time_ns: int) -> None:
         """Let time pass up to a time [ns]."""
         self._now_ns = max(self.now_ns, time_ns)
@@ -154,6 +159,11 @@ class RemoteLine:
     def now_ns(self) -> int:
         """The program's time [ns]."""
         return self._connection.now_ns
+
+    @property
+    def known_ns(self) -> int:
+        """The same as far as it is known [ns]; see `Line`."""
+        return self._connection.known_ns
 
     def pass_to(self, time_ns: int) -> None:
         """Let time pass up to a time [ns]."""

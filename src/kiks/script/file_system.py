@@ -8,8 +8,10 @@ program has written the file.
 from __future__ import annotations
 
 import os
+import stat
 import time
 from collections.abc import Iterator, Sequence
+from functools import cached_property
 from types import TracebackType
 from typing import Any
 
@@ -100,14 +102,19 @@ class FileSystem:
         self._scheduler = scheduler
         self._ports = ports
         self._start_ns = time.time_ns()
-        self._shift_ns = self._start_ns - calendar_ns(scheduler.world.now_ns)
         # By device, inode and field: the stamp of the operating system, and what it is to the program.
         self._known: dict[tuple[int, int, str], tuple[int, int]] = {}
         # When the program has opened files to write them anew, by path.
         self._opened: dict[str, int] = {}
 
     def _now_ns(self) -> int:
-        return calendar_ns(self._scheduler.world.now_ns)
+        # A file needs no world: a program that only looks at one must not wait for a world that has been stopped.
+        return calendar_ns(self._scheduler.world.known_ns)
+
+    @cached_property
+    def _shift_ns(self) -> int:
+        """Difference between the two calendars [ns]."""
+        return time.time_ns() - self._now_ns()
 
     def note_open(self, path: str | bytes) -> None:
         """Note that the program opens a file now to write it anew."""
@@ -115,11 +122,15 @@ class FileSystem:
 
     def note_write(self, descriptor: int) -> None:
         """Note that the program has written into a file now."""
-        self._note(_real_fstat(descriptor), self._now_ns())
+        real = _real_fstat(descriptor)
+        if stat.S_ISREG(real.st_mode):
+            self._note(real, self._now_ns())
 
     def note_close(self, descriptor: int) -> None:
         """Note the last change of a file that is closed now, by code in C."""
-        self.translated(_real_fstat(descriptor))
+        real = _real_fstat(descriptor)
+        if stat.S_ISREG(real.st_mode):
+            self.translated(real)
 
     def _note(self, real: os.stat_result, now_ns: int) -> None:
         for field in ("mtime", "ctime"):

@@ -7,6 +7,7 @@ pyserial's own classes stay, and get other methods while the program runs. So `l
 from __future__ import annotations
 
 import errno
+import os
 from collections.abc import Callable, Sequence
 from typing import Any
 

@@ -35,6 +35,8 @@ class LocalLine:
         """The simulated time [ns]."""
         return self._world.now_ns
 
+    known_ns = now_ns
+
     def pass_to(self, time_ns: int) -> None:
         """Let time pass up to a time [ns]."""
         self._loop.advance_to(time_ns)

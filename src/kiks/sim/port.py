@@ -43,6 +43,10 @@ class Line(Protocol):
     def now_ns(self) -> int:
         """The program's time [ns]."""
 
+    @property
+    def known_ns(self) -> int:
+        """The same as far as it is known without joining the world, which may have begun before the program [ns]."""
+
     def pass_to(self, time_ns: int) -> None:
         """Let time pass up to a time [ns]."""
 
