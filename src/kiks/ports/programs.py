@@ -82,9 +82,16 @@ IDLE_S = 0.05
 """Longest wait of a round [s of real time]: KiKS notices a second Ctrl-C within it."""
 
 GRACE_S = 1.0
-"""Time that a program has to end after Ctrl-C [s of real time]."""
+"""Time that a program has to end after a person has stopped it [s of real time]."""
+
+CTRL_C_GRACE_S = 0.6
+"""Time that all programs and the world have to end after Ctrl-C [s of real time]: a second with what follows."""
 
 _log = logging.getLogger("kiks.run")
+
+
+class _OverError(Exception):
+    """`run` is to end in the middle of a round."""
 
 
 class Programs:
@@ -298,15 +305,19 @@ class Programs:
             KiksError: If the operating system does not start one.
         """
         self.begin()
+        loop = self.sim.loop
         try:
-            self._grace = Patience(GRACE_S)
+            self._grace = Patience(CTRL_C_GRACE_S)
             # The programs get the signal, too, and may still stop their robots.
             with noting_endings(lambda _number: self._note_signal()):
+                loop.on_slice = self._check_signals
                 while any(not handle.has_been_reported for handle in self.handles) or self._scheduler.participants:
-                    if self._signals and (self._signals > 1 or self._grace.left_s() == 0):
-                        return INTERRUPTED
+                    self._check_signals()
                     self.round(IDLE_S)
+        except _OverError:
+            pass
         finally:
+            loop.on_slice = lambda: None
             self.close()
         return INTERRUPTED if self._signals else next((each.code for each in self.handles if each.code), 0)
 
@@ -485,3 +496,8 @@ class Programs:
 
     def _note_signal(self) -> None:
         self._signals += 1
+
+    def _check_signals(self) -> None:
+        """End `run` after Ctrl-C, when programs and world have had their time, or at the second Ctrl-C."""
+        if self._signals and (self._signals > 1 or self._grace.left_s() == 0):
+            raise _OverError
