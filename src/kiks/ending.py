@@ -36,18 +36,18 @@ LIMIT_GRACE_S = 2.0
 """Time that what runs has to end after its time is over [s]."""
 
 _AGAIN_S = 0.01
-_LIMIT, _HEARD = (signal.SIGRTMAX - 2, signal.SIGRTMAX - 3) if sys.platform == "linux" else (0, 0)
+_LIMIT, _HEARD = signal.SIGRTMAX - 2, signal.SIGRTMAX - 3
 _ENDINGS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _CODE = "code that did not return, such as a controller without an end: there is no summary"
 _STUCK = f"stopped in the middle of {_CODE}."
-_exit, _read, _write, _pthread_kill = os._exit, os.read, os.write, getattr(signal, "pthread_kill", None)
+_exit, _read, _write = os._exit, os.read, os.write
+_set_handler, _handler_of, _raise, _kill_thread = signal.signal, signal.getsignal, signal.raise_signal, signal.pthread_kill
 
 
 def end_at_once() -> None:
     """Let Ctrl-C, SIGTERM and SIGHUP end the process where it stands, with one line; for the start of a process."""
     _handle(lambda _number, _frame: leave(INTERRUPTED, "stopped."))
-    if sys.platform == "linux":
-        _Guard().start()
+    _Guard().start()
 
 
 def leave_threads() -> None:
@@ -62,9 +62,14 @@ def leave_threads() -> None:
 
 def leave(code: int, line: str) -> NoReturn:
     """End the process at once, from any thread, with a line that says why."""
-    with suppress(OSError):
-        _write(2, f"kiks: {line}\n".encode())
+    tell(line)
     _exit(code)
+
+
+def tell(line: str) -> None:
+    """Print a line of KiKS on the error output, from any thread, whatever the program has made of `sys.stderr`."""
+    with suppress(OSError):
+        _write(2, f"kiks: {line}\n".encode(errors="replace"))
 
 
 def end_as_with_ctrl_c() -> None:
@@ -73,28 +78,28 @@ def end_as_with_ctrl_c() -> None:
 
 
 @contextmanager
-def noting_endings(note: Callable[[int], object]) -> Iterator[None]:
-    """Call something with the signal at Ctrl-C, SIGTERM and SIGHUP meanwhile, and go on; only in the main thread."""
-    before = {name: signal.getsignal(name) for name in _endings()}
-    _handle(lambda number, _frame: note(number))
+def noting_endings(note: Callable[[int], object], *others: int) -> Iterator[None]:
+    """Call something with the signal at Ctrl-C, SIGTERM, SIGHUP and others meanwhile, and go on; in the main thread."""
+    before = {name: _handler_of(name) for name in (*_endings(), *others)}
+    _handle(lambda number, _frame: note(number), *others)
     try:
         yield
     finally:
         with suppress(ValueError):
             for name, handler in before.items():
-                signal.signal(name, handler)
+                _set_handler(name, handler)
 
 
 @contextmanager
 def postponing_endings() -> Iterator[None]:
-    """Let Ctrl-C, SIGTERM and SIGHUP act after this instead of in its middle; in other threads they never do."""
+    """Let what ends the process act after this instead of in its middle; in other threads it never does."""
     noted: list[int] = []
     try:
-        with noting_endings(noted.append):
+        with noting_endings(noted.append, _LIMIT):
             yield
     finally:
         for number in noted:
-            signal.raise_signal(number)
+            _raise(number)
 
 
 def send_again_what_is_dropped() -> None:
@@ -121,18 +126,18 @@ def send_again_what_is_dropped() -> None:
     sys.unraisablehook = note
 
 
-def _handle(handler: Callable[[int, FrameType | None], Any]) -> None:
+def _handle(handler: Callable[[int, FrameType | None], Any], *others: int) -> None:
     # Only the main thread may; where a command runs in another one, signals are none of its business.
     with suppress(ValueError):
-        for name in _endings():
-            signal.signal(name, handler)
+        for name in (*_endings(), *others):
+            _set_handler(name, handler)
 
 
 def _endings() -> Iterator[signal.Signals]:
     """Yield the signals that end a process, but those that it was started to ignore."""
     for name in ("SIGINT", "SIGTERM", "SIGHUP"):
         number = getattr(signal, name, None)
-        if number is not None and signal.getsignal(number) is not signal.SIG_IGN:
+        if number is not None and _handler_of(number) is not signal.SIG_IGN:
             yield number
 
 
@@ -145,7 +150,7 @@ class _Guard:
 
     def start(self) -> None:
         """Start to listen, in a thread that `threading` does not know: a program may count those."""
-        signal.signal(_HEARD, self._hear)
+        _set_handler(_HEARD, self._hear)
         self._receiver, sender = os.pipe()
         os.set_blocking(sender, False)
         signal.set_wakeup_fd(sender, warn_on_full_buffer=False)
@@ -170,8 +175,7 @@ class _Guard:
                 continue
             if not is_ctrl_c:
                 leave(INTERRUPTED, _STUCK)
-            with suppress(OSError):
-                _write(2, b"kiks: compiled code that runs has not returned yet. Ctrl-C once more ends it at once.\n")
+            tell("compiled code that runs has not returned yet. Ctrl-C once more ends it at once.")
 
 
 @contextmanager
@@ -190,17 +194,17 @@ def ended_after(seconds: float | None, end: Callable[[], object]) -> Iterator[No
     def watch() -> None:
         if is_over.acquire(timeout=seconds):
             return
-        _pthread_kill(main, _LIMIT)
+        _kill_thread(main, _LIMIT)
         if not is_over.acquire(timeout=LIMIT_GRACE_S):
             leave(OUT_OF_TIME, f"stopped after {seconds:g} s of real time, in the middle of {_CODE}.")
 
-    before = signal.signal(_LIMIT, lambda _number, _frame: end())
+    before = _set_handler(_LIMIT, lambda _number, _frame: end())
     start_new_thread(watch, ())
     try:
         yield
     finally:
         is_over.release()
-        signal.signal(_LIMIT, before)
+        _set_handler(_LIMIT, before)
 
 
 def _interrupt() -> None:
@@ -208,6 +212,6 @@ def _interrupt() -> None:
     import threading
 
     for name in (signal.SIGINT, signal.SIGTERM):
-        if signal.getsignal(name) is signal.default_int_handler:
-            signal.pthread_kill(threading.main_thread().ident or 0, name)
+        if _handler_of(name) is signal.default_int_handler:
+            _kill_thread(threading.main_thread().ident or 0, name)
             return

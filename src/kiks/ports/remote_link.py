@@ -6,13 +6,15 @@ round trip.
 
 from __future__ import annotations
 
-import os
 import socket
 import sys
 import threading
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
+
+# Bound here once: a program lives with an `os` that is simulated.
+from os import _exit
 from typing import Any
 
 from kiks.clock.serial_timing import BACKLOG_LIMIT
@@ -239,4 +241,4 @@ class RemoteLine:
 def _end() -> None:
     """Exit at once: without the world the program cannot do anything useful."""
     sys.stdout.flush()
-    os._exit(1)
+    _exit(1)

@@ -8,9 +8,10 @@ import sys
 import threading
 import traceback
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from kiks.clock.program_clock import ProgramClock
 from kiks.errors import KiksError
@@ -32,7 +33,14 @@ _NOT_OF_THE_PROGRAM = ("kiks", "runpy")
 """Modules whose frames an error of the program does not show."""
 
 
-def run_here(sim: Simulation, program: Path, arguments: list[str], told: dict[str, int]) -> int:
+def run_here(
+    sim: Simulation,
+    program: Path,
+    arguments: list[str],
+    told: dict[str, int],
+    *,
+    limited: Callable[[Callable[[int, str], NoReturn]], AbstractContextManager[object]] = nullcontext,
+) -> int:
     """Run a program in this process to its end; return its exit code.
 
     Args:
@@ -40,6 +48,7 @@ def run_here(sim: Simulation, program: Path, arguments: list[str], told: dict[st
         program: The Python file.
         arguments: Its arguments in `sys.argv`.
         told: Robots by port name.
+        limited: Limits the time of the program: it gets a function that ends it with an exit code and a message.
 
     Raises:
         ParameterError: If `told` names a robot that does not exist.
@@ -56,7 +65,15 @@ def run_here(sim: Simulation, program: Path, arguments: list[str], told: dict[st
         port = find_port(name)
         return port.robot if port.sim is sim else port
 
-    return run_program(program, arguments, lambda robot: LocalLine(sim.loop, robot), find, sim.program, names.offered())
+    return run_program(
+        program,
+        arguments,
+        lambda robot: LocalLine(sim.loop, robot),
+        find,
+        sim.program,
+        names.offered(),
+        limited=limited,
+    )
 
 
 def run_program(
@@ -66,6 +83,8 @@ def run_program(
     find: Callable[[str], int | VirtualPort],
     policy: ProgramClock,
     offered: list[str],
+    *,
+    limited: Callable[[Callable[[int, str], NoReturn]], AbstractContextManager[object]] = nullcontext,
 ) -> int:
     """Run a program to its end with simulated ports and simulated time; return its exit code.
 
@@ -76,6 +95,7 @@ def run_program(
         find: Returns the robot behind a port's name, or a port of another world.
         policy: The cost of the program's thinking and polling.
         offered: The port names that it finds when it lists ports.
+        limited: See `run_here`.
     """
     world = line_of(1)
     scheduler = Scheduler(world, policy, RealFiles())
@@ -126,6 +146,7 @@ def run_program(
     try:
         with (
             watched(scheduler),
+            limited(scheduler.end),
             signals.taken(),
             replaced(replacements, replacements["threading"]["Lock"]),
             adapted(host),

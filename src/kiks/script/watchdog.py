@@ -1,13 +1,14 @@
 """The watchdog: checks from outside whether the thread that runs a program is stuck or waits in real time.
 
 Code in C may wait by itself, and a loop may never call into the simulation. Neither lets other threads go on, and
-simulated time stands still meanwhile. The watchdog samples the thread some times per second, and ends the program with
-one line that names the place. It never changes a run that ends normally.
+simulated time stands still meanwhile. The watchdog samples the thread some times per second. It tells of a loop that
+asks for nothing, which may well be right, and ends a program that waits by itself with one line that names the place.
+It never changes a run that ends normally.
 """
 
 from __future__ import annotations
 
-import os
+import dis
 import signal
 import subprocess
 import sys
@@ -21,8 +22,10 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
 
+from kiks.ending import leave, tell
+from kiks.script import thread_scheduler
 from kiks.script.thread_scheduler import Scheduler
-from kiks.script.unsupported import ADVICE, where
+from kiks.script.unsupported import ADVICE, OURS, where
 
 SAMPLE_S = 0.05
 """Period of the samples [s of real time]."""
@@ -37,13 +40,20 @@ SPINNING_S = 30.0
 """Longest computation of a thread while others wait for a time or a robot [s of processor time]."""
 
 WARNING_SHARE = 0.2
-"""Share of that time after which a warning is printed."""
+"""Share of that time after which a line tells of the computation, whatever others do."""
 
 GRACE_S = 5.0
 """Time after which the process of a program that stays in code in C is killed [s of real time]."""
 
-_MAY_WAIT = ("<", str(Path(__file__).parent.parent), subprocess.__file__)
+_KIKS = str(Path(__file__).parent.parent)
+_ROOTS = (thread_scheduler.__file__, str(Path(__file__).with_name("runner.py")))
+"""Files of KiKS that call the program: the others work for it."""
+
+_MAY_WAIT = ("<", _KIKS, subprocess.__file__)
 """Code that may wait in real time: imports, KiKS, and waits for other programs."""
+
+_READS_ONLY = ("LOAD_", "COMPARE_", "CONTAINS_", "IS_", "UNARY_", "TO_BOOL", "POP_JUMP_", "JUMP_", "NOP", "EXTENDED_ARG")
+"""Instructions of Python that change nothing."""
 
 _SIGNAL = signal.SIGRTMAX - 1
 
@@ -121,18 +131,25 @@ class _Watch:
             if waits >= WAITING_SAMPLES:
                 self._tell(f"it waited by itself{self._where()}")
                 return
-            spun_s = cpu_s - active_cpu_s
-            if spun_s < WARNING_SHARE * SPINNING_S or not self._scheduler.tasks:
+            frame = _computing(self._frame())
+            if frame is None:
+                active_cpu_s = cpu_s
                 continue
-            what = f"asked for neither time nor bytes for {spun_s:.0f} s while its other threads waited{self._where()}"
-            if spun_s > SPINNING_S and self._scheduler.has_timed:
-                self._tell(f"it {what}", "If it waits for a variable there, put time.sleep(0.001) into the loop, or ")
+            spun_s, has_others = cpu_s - active_cpu_s, bool(self._scheduler.tasks)
+            if spun_s > SPINNING_S and (self._scheduler.has_timed or (has_others and _only_reads(frame))):
+                self._tell(
+                    f"it asked for neither time nor bytes for {spun_s:.0f} s while its other threads waited"
+                    f"{where(frame)}",
+                    "If it waits for a variable there, put time.sleep(0.001) into the loop, or ",
+                )
                 return
-            if not has_warned:
+            if spun_s > WARNING_SHARE * SPINNING_S and not has_warned:
                 has_warned = True
-                # Not by `logging`, which would add this thread to those that a program may count.
-                print(
-                    f"kiks: the program has {what}. If it computes, that is right; else press Ctrl-C.", file=sys.stderr
+                tell(
+                    f"line {frame.f_lineno} of {Path(frame.f_code.co_filename).name} has computed for {spun_s:.0f} s "
+                    f"without waiting for a time or a robot{', while its other threads waited' if has_others else ''}. "
+                    "If it computes, that is right; if it waits for something, end it (Ctrl-C, or Stop on the desk) "
+                    "and put time.sleep(0.01) into the loop."
                 )
 
     def _waits_for(self) -> str:
@@ -151,12 +168,15 @@ class _Watch:
             kind = "time"
         else:
             return ""
-        frame = sys._current_frames().get(self._watched)
+        frame = self._frame()
         name = frame.f_code.co_filename if frame is not None else "<"
         return "" if name.startswith(_MAY_WAIT) else kind
 
+    def _frame(self) -> FrameType | None:
+        return sys._current_frames().get(self._watched)
+
     def _where(self) -> str:
-        return where(sys._current_frames().get(self._watched))
+        return where(self._frame())
 
     def _tell(self, what: str, way: str = "") -> None:
         advice = way + ADVICE
@@ -169,5 +189,29 @@ class _Watch:
         if not self._is_over.wait(GRACE_S):
             # Code in C does not return to Python.
             sys.stdout.flush()
-            print(f"kiks: {self._message}", file=sys.stderr, flush=True)
-            os._exit(1)
+            leave(1, self._message)
+
+
+def _computing(frame: FrameType | None) -> FrameType | None:
+    """Return where a program computes: its innermost frame, or that of a library; None while KiKS works for it."""
+    found = None
+    while frame is not None:
+        name = frame.f_code.co_filename
+        if name.startswith(_KIKS):
+            return found if name in _ROOTS else None
+        if "site-packages" in name:
+            found = found or frame
+        elif not name.startswith(("<", *OURS)):
+            return found or frame
+        frame = frame.f_back
+    return found
+
+
+def _only_reads(frame: FrameType) -> bool:
+    """Return whether a frame is at the end of a loop that changes nothing, so that only another thread could end it."""
+    code = list(dis.get_instructions(frame.f_code))
+    jump = next(each for each in code if each.offset == frame.f_lasti)
+    if "JUMP" not in jump.opname or not isinstance(jump.argval, int) or jump.argval > jump.offset:
+        return False
+    loop = [each.opname for each in code if jump.argval <= each.offset <= jump.offset]
+    return all(name.startswith(_READS_ONLY) for name in loop)
