@@ -199,9 +199,7 @@ with ended_after(limit_s, lambda: print("told", flush=True)):
     never(1.0, runs)
 """
 
-STUCK = (
-    "stopped in the middle of code that did not return, such as a controller without an end: there is no summary."
-)
+STUCK = "stopped in the middle of code that did not return, such as a controller without an end: there is no summary."
 
 
 def never_returning(limit_s: float, *signals: signal.Signals) -> tuple[int, list[str], list[str]]:

@@ -1,6 +1,7 @@
-"""Send Ctrl-C to commands of KiKS at random moments: each must end within a second, with its summary, and leave no process.
+"""Send Ctrl-C to commands of KiKS at random moments: each must end within a second and leave no process.
 
-It is timed, so it needs a computer with nothing else to do, and is no test. Exit code 1: something was amiss.
+It also says what it has done. This is timed, so it needs a computer with nothing else to do, and is no test. Exit code
+1: something was amiss.
 
     python tools/ctrl_c.py
     python tools/ctrl_c.py --moments 24 --only several

@@ -36,12 +36,18 @@ LIMIT_GRACE_S = 2.0
 """Time that what runs has to end after its time is over [s]."""
 
 _AGAIN_S = 0.01
-_LIMIT, _HEARD = signal.SIGRTMAX - 2, signal.SIGRTMAX - 3
+_LIMIT = signal.SIGRTMAX - 2
+_HEARD: Any = signal.SIGRTMAX - 3
 _ENDINGS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _CODE = "code that did not return, such as a controller without an end: there is no summary"
 _STUCK = f"stopped in the middle of {_CODE}."
 _exit, _read, _write = os._exit, os.read, os.write
-_set_handler, _handler_of, _raise, _kill_thread = signal.signal, signal.getsignal, signal.raise_signal, signal.pthread_kill
+_set_handler, _handler_of, _raise, _kill_thread = (
+    signal.signal,
+    signal.getsignal,
+    signal.raise_signal,
+    signal.pthread_kill,
+)
 
 
 def end_at_once() -> None:

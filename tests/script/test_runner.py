@@ -465,7 +465,8 @@ def test_loop_that_asks_for_nothing_is_told(tmp_path: Path) -> None:
     code, said = spun("import sys; sys.exit(run_here(Simulation(), Path('endless.py'), [], {}))", tmp_path, "5.")
     assert code == -signal.SIGTERM
     assert re.fullmatch(
-        rf"kiks: line [67] of endless.py has computed for \d s without waiting for a time or a robot. {re.escape(ADVICE)} "
+        r"kiks: line [67] of endless.py has computed for \d s without waiting for a time or a robot. "
+        rf"{re.escape(ADVICE)} "
         r"time.sleep\(0.01\) into the loop.\n",
         said,
     )
@@ -477,7 +478,9 @@ def spun(script: str, folder: Path, spinning_s: str) -> tuple[int, str]:
         "from pathlib import Path\nfrom kiks.script import watchdog\nfrom kiks.script.runner import run_here\n"
         f"from kiks.sim.simulation import Simulation\nwatchdog.SPINNING_S = {spinning_s}\n"
     )
-    with subprocess.Popen([sys.executable, "-c", head + script], stderr=subprocess.PIPE, text=True, cwd=folder) as process:
+    with subprocess.Popen(
+        [sys.executable, "-c", head + script], stderr=subprocess.PIPE, text=True, cwd=folder
+    ) as process:
         assert process.stderr is not None
         said = process.stderr.readline()
         process.terminate()

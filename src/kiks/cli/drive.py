@@ -47,10 +47,6 @@ def run_champion(
 ) -> None:
     """Let a champion drive all robots of a simulation, and print the result; `files` are those of `recorded`.
 
-    Args:
-        seconds: How long it drives [s].
-        limits: What else may end it.
-
     Raises:
         ParameterError: If the file is no champion's, or a result cannot be written.
     """

@@ -27,7 +27,7 @@ MaxWall = Annotated[
 ]
 
 
-class LimitReached(BaseException):  # noqa: N818 - nothing went wrong
+class LimitReached(BaseException):
     """A limit is reached; no `except Exception` on the way may stop it, as with Ctrl-C."""
 
     def __init__(self, code: int, message: str) -> None:

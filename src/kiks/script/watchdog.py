@@ -52,7 +52,18 @@ _ROOTS = (thread_scheduler.__file__, str(Path(__file__).with_name("runner.py")))
 _MAY_WAIT = ("<", _KIKS, subprocess.__file__)
 """Code that may wait in real time: imports, KiKS, and waits for other programs."""
 
-_READS_ONLY = ("LOAD_", "COMPARE_", "CONTAINS_", "IS_", "UNARY_", "TO_BOOL", "POP_JUMP_", "JUMP_", "NOP", "EXTENDED_ARG")
+_READS_ONLY = (
+    "LOAD_",
+    "COMPARE_",
+    "CONTAINS_",
+    "IS_",
+    "UNARY_",
+    "TO_BOOL",
+    "POP_JUMP_",
+    "JUMP_",
+    "NOP",
+    "EXTENDED_ARG",
+)
 """Instructions of Python that change nothing."""
 
 _SIGNAL = signal.SIGRTMAX - 1

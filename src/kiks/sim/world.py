@@ -153,7 +153,7 @@ class World:
     def rebuild_scene(self) -> None:
         """Arrange the state for the engine again: needed when its arrays were replaced."""
         lamps, seeds = self._lamps[None], [self.seed]
-        things = self.state.robots.shape[1] + self.state.bodies.shape[1]
+        things: int = self.state.robots.shape[1] + self.state.bodies.shape[1]
         self._slice_ticks = min(max(SLICE_MOVES // max(things, 1), SLICE_TICKS[0]), SLICE_TICKS[1])
         self._scene = Scene(self.state, self.kinds, [self.arena], self._networks, lamps, seeds)
         self.scene = self._scene.record
