@@ -197,6 +197,14 @@ def test_seconds_end_programs_at_that_simulated_time_and_the_same_each_time(word
     assert results[0].stdout == results[1].stdout == ""
 
 
+def test_nothing_is_printed_after_the_end(endless: Path) -> None:
+    (endless / "tells.py").write_text("import time\nwhile True:\n    print(time.monotonic())\n    time.sleep(0.5)\n")
+    result = forked.run("run", "--seconds", "20.5", "tells.py", cwd=endless)
+    assert result.stdout.splitlines() == [str(k / 2) for k in range(42)]
+    both = forked.run("run", "--seconds", "20.5", "tells.py", "talks.py", cwd=endless)
+    assert both.stdout.splitlines() == [f"1 tells.py | {k / 2}" for k in range(42)]
+
+
 def test_seconds_change_nothing_before_and_nothing_for_a_program_that_ends_before(endless: Path) -> None:
     plain = forked.run("run", DRIVE, "COM1", "40", "7", "6")
     bounded = forked.run("run", "--seconds", "1000", DRIVE, "COM1", "40", "7", "6")

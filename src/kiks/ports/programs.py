@@ -321,7 +321,7 @@ class Programs:
                     self.round(IDLE_S)
         except _OverError:
             for handle in self.handles:
-                handle.participant.is_stopped = handle.is_running
+                handle.participant.is_stopped = handle.is_running and not handle.participant.has_hung_up
         finally:
             loop.on_slice = lambda: None
             self.close()
@@ -423,7 +423,7 @@ class Programs:
         with there:
             try:
                 handle.process = Process(
-                    [lateness, self._policy(number), record, " ".join(self._names.offered())],
+                    [lateness, str(self.sim.loop.end_ns), self._policy(number), record, " ".join(self._names.offered())],
                     command,
                     there,
                     keeps_output=self._keeps_output,

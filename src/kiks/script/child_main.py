@@ -21,13 +21,14 @@ DIE_WITH_PARENT = 1
 
 
 def main(
-    descriptor: int, is_late: bool, thinking: str, record: str, offered: list[str], program: Path, arguments: list[str]
+    descriptor: int, is_late: bool, end_ns: int, thinking: str, record: str, offered: list[str], program: Path, arguments: list[str]
 ) -> int:
     """Run the program to its end; return its exit code.
 
     Args:
         descriptor: The socket at whose other end the world is.
         is_late: Whether the world may have begun already.
+        end_ns: Where its time ends [ns].
         thinking: The thinking policy.
         record: File for the measured thinking times; empty for none.
         offered: The port names that the program finds when it lists ports.
@@ -42,7 +43,7 @@ def main(
         signal.signal(signal.SIGINT, signal.default_int_handler)
     # Processes that the program starts must not inherit the socket.
     os.set_inheritable(descriptor, False)
-    connection = SocketConnection(socket.socket(fileno=descriptor), is_late=is_late)
+    connection = SocketConnection(socket.socket(fileno=descriptor), is_late=is_late, end_ns=end_ns)
     policy = ProgramClock(thinking)
 
     try:
@@ -70,5 +71,16 @@ def _save(measured_ns: list[int], record: str) -> None:
 
 
 if __name__ == "__main__":
-    descriptor, lateness, thinking, record, offered, program, *arguments = sys.argv[1:]
-    sys.exit(main(int(descriptor), lateness == LATE, thinking, record, offered.split(), Path(program), arguments))
+    descriptor, lateness, end_ns, thinking, record, offered, program, *arguments = sys.argv[1:]
+    sys.exit(
+        main(
+            int(descriptor),
+            lateness == LATE,
+            int(end_ns),
+            thinking,
+            record,
+            offered.split(),
+            Path(program),
+            arguments,
+        )
+    )

@@ -77,6 +77,7 @@ class EventLoop:
         wires: The robots' serial lines.
         gate: Decides how far time may go while it is watched; None while nothing watches it.
         supervisor: Acts in the world at certain instants, such as a referee; None without one.
+        end_ns: Where time ends [ns]; see `end_at`.
         on_slice: Called after each slice of a long time; may raise to stop there.
     """
 
@@ -90,7 +91,7 @@ class EventLoop:
         # From when on the recorder must be asked: one comparison for each piece of time.
         self._record_ns = NEVER_NS
         self.on_slice: Callable[[], None] = lambda: None
-        self._end_ns = CLOCK_END_NS
+        self.end_ns = CLOCK_END_NS
         self._end: Callable[[], object] = lambda: None
         # Up to when time may pass in one piece: one comparison, too.
         self._near_ns = -1
@@ -115,13 +116,13 @@ class EventLoop:
 
     def end_at(self, time_ns: int, end: Callable[[], NoReturn]) -> None:
         """Let time end at an instant [ns]: when it would pass beyond, it stops there and `end` is called to raise."""
-        self._end_ns, self._end = time_ns, end
+        self.end_ns, self._end = time_ns, end
         self._near_ns = -1
 
     def check_end(self, time_ns: int) -> None:
         """End the run if all that is still to come is at an instant [ns] beyond the end of time."""
-        if NEVER_NS > time_ns > self._end_ns:
-            self.advance_to(self._end_ns + 1)
+        if NEVER_NS > time_ns > self.end_ns:
+            self.advance_to(self.end_ns + 1)
 
     def add_wire(self, firmware: Firmware) -> None:
         """Add the serial line of one more robot."""
@@ -151,10 +152,10 @@ class EventLoop:
         time_ns = check_count("time_ns", time_ns, -CLOCK_END_NS, CLOCK_END_NS)
         world = self.world
         while True:
-            self._near_ns = min(world.state.tick_count * TICK_NS + world.slice_ns, self._end_ns)
+            self._near_ns = min(world.state.tick_count * TICK_NS + world.slice_ns, self.end_ns)
             if time_ns <= self._near_ns:
                 return time_ns
-            if world.now_ns >= self._end_ns:
+            if world.now_ns >= self.end_ns:
                 self._end()
             self.advance_to(self._near_ns)
             self._sync()
