@@ -265,6 +265,28 @@ def test_who_hears_each_signal_may_have_any_number_of_them() -> None:
     assert process.returncode == 0
 
 
+NOTES = """
+import signal, sys
+from kiks.ending import end_at_once
+end_at_once()
+signal.signal(signal.SIGTERM, lambda number, frame: print("noted", flush=True))
+print("ready", flush=True)
+print(sys.stdin.read())
+"""
+
+
+def test_who_notes_a_signal_and_waits_on_has_heard_it() -> None:
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+    with subprocess.Popen([sys.executable, "-c", NOTES], text=True, **pipes) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "ready\n"
+        for _ in range(3):
+            process.terminate()
+            assert process.stdout.readline() == "noted\n"
+        assert process.communicate("ended", timeout=GUARD_S)[0] == "ended\n"
+    assert process.returncode == 0
+
+
 HELPER_IS_STUCK = """
 import threading
 import kiks.cli

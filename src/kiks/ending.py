@@ -14,7 +14,7 @@ import signal
 import sys
 
 # Bound here once, as all that the threads of this file call: a program lives with modules that are simulated.
-from _thread import allocate_lock, get_ident, interrupt_main, start_new_thread
+from _thread import allocate_lock, get_ident, start_new_thread
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
@@ -37,7 +37,7 @@ LIMIT_GRACE_S = 2.0
 
 _AGAIN_S = 0.01
 _LIMIT = signal.SIGRTMAX - 2
-_HEARD: Any = signal.SIGRTMAX - 3
+_HEARD = signal.SIGRTMAX - 3
 _ENDINGS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _CODE = "code that did not return, such as a controller without an end: there is no summary"
 _STUCK = f"stopped in the middle of {_CODE}."
@@ -58,9 +58,11 @@ def end_at_once() -> None:
 
 def leave_threads() -> None:
     """End an interrupted process without a wait for threads of it that are in code that does not return."""
+    import atexit
     import threading
 
     if any(not thread.daemon and thread is not threading.current_thread() for thread in threading.enumerate()):
+        atexit._run_exitfuncs()
         for stream in (sys.stdout, sys.stderr):
             stream.flush()
         _exit(INTERRUPTED)
@@ -153,6 +155,7 @@ class _Guard:
     def __init__(self) -> None:
         self._is_unheard = False
         self._heard = allocate_lock()
+        self._main = get_ident()
 
     def start(self) -> None:
         """Start to listen, in a thread that `threading` does not know: a program may count those."""
@@ -176,7 +179,8 @@ class _Guard:
                 leave(INTERRUPTED, _STUCK)
             self._is_unheard, is_ctrl_c = True, numbers[0] == signal.SIGINT
             self._heard.acquire(blocking=False)
-            interrupt_main(_HEARD)
+            # A true signal: it also wakes a wait that has gone on after the first one was handled.
+            _kill_thread(self._main, _HEARD)
             if self._heard.acquire(timeout=UNHEARD_S if is_ctrl_c else TERMINATED_S):
                 continue
             if not is_ctrl_c:
@@ -204,13 +208,14 @@ def ended_after(seconds: float | None, end: Callable[[], object]) -> Iterator[No
         if not is_over.acquire(timeout=LIMIT_GRACE_S):
             leave(OUT_OF_TIME, f"stopped after {seconds:g} s of real time, in the middle of {_CODE}.")
 
-    before = _set_handler(_LIMIT, lambda _number, _frame: end())
+    _set_handler(_LIMIT, lambda _number, _frame: end())
     start_new_thread(watch, ())
     try:
         yield
     finally:
         is_over.release()
-        _set_handler(_LIMIT, before)
+        # It may be on its way.
+        _set_handler(_LIMIT, lambda _number, _frame: None)
 
 
 def _interrupt() -> None:

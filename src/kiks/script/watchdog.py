@@ -16,7 +16,7 @@ import threading
 import time
 
 # Bound here once: a program lives with a `_thread` that is simulated.
-from _thread import start_new_thread
+from _thread import allocate_lock, start_new_thread
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -97,37 +97,40 @@ class _Watch:
         self._message = ""
         self._watched = threading.get_ident()
         self._folder = Path(f"/proc/self/task/{threading.get_native_id()}")
-        self._is_over = threading.Event()
-        self._has_ended = threading.Event()
+        self._is_over = False
+        self._going_on, self._sampling = allocate_lock(), allocate_lock()
         # Bound here once: the program lives with clocks that are simulated.
         self._cpu_s, self._now_s = time.process_time, time.monotonic
 
     def start(self) -> None:
         """Start to sample."""
+        self._going_on.acquire()
+        self._sampling.acquire()
         # Unknown to `threading`: a program may count its threads, and wait until only one is left.
         start_new_thread(self._run, ())
 
     def stop(self) -> None:
         """Stop sampling."""
-        self._is_over.set()
-        self._has_ended.wait()
+        self._is_over = True
+        self._going_on.release()
+        self._sampling.acquire()
 
     def end(self, _number: int, _frame: FrameType | None) -> None:
         """End the program, in its own thread."""
-        if not self._is_over.is_set():
+        if not self._is_over:
             self._scheduler.end(1, self._message)
 
     def _run(self) -> None:
         try:
             self._sample()
         finally:
-            self._has_ended.set()
+            self._sampling.release()
 
     def _sample(self) -> None:
         waits, last, has_warned = 0, -1, False
         active_cpu_s = locked_cpu_s = self._cpu_s()
         locked_s = self._now_s()
-        while not self._is_over.wait(SAMPLE_S):
+        while not self._going_on.acquire(timeout=SAMPLE_S):
             count, cpu_s, now_s = self._scheduler.program.act_count, self._cpu_s(), self._now_s()
             if count != last:
                 last, active_cpu_s = count, cpu_s
@@ -197,7 +200,7 @@ class _Watch:
         )
         with suppress(OSError):
             signal.pthread_kill(self._watched, _SIGNAL)
-        if not self._is_over.wait(GRACE_S):
+        if not self._going_on.acquire(timeout=GRACE_S):
             # Code in C does not return to Python.
             sys.stdout.flush()
             leave(1, self._message)
