@@ -423,7 +423,13 @@ class Programs:
         with there:
             try:
                 handle.process = Process(
-                    [lateness, str(self.sim.loop.end_ns), self._policy(number), record, " ".join(self._names.offered())],
+                    [
+                        lateness,
+                        str(self.sim.loop.end_ns),
+                        self._policy(number),
+                        record,
+                        " ".join(self._names.offered()),
+                    ],
                     command,
                     there,
                     keeps_output=self._keeps_output,

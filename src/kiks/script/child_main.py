@@ -21,7 +21,14 @@ DIE_WITH_PARENT = 1
 
 
 def main(
-    descriptor: int, is_late: bool, end_ns: int, thinking: str, record: str, offered: list[str], program: Path, arguments: list[str]
+    descriptor: int,
+    is_late: bool,
+    end_ns: int,
+    thinking: str,
+    record: str,
+    offered: list[str],
+    program: Path,
+    arguments: list[str],
 ) -> int:
     """Run the program to its end; return its exit code.
 
@@ -47,6 +54,8 @@ def main(
     policy = ProgramClock(thinking)
 
     try:
+        # Blocked since the start of the process; what came meanwhile acts here.
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
         return run_program(
             program,
             arguments,
