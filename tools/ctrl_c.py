@@ -1,7 +1,7 @@
 """Send Ctrl-C to commands of KiKS at random moments: each must end within a second and leave no process.
 
-It also says what it has done. This is timed, so it needs a computer with nothing else to do, and is no test. Exit code
-1: something was amiss.
+It also says what it has done. This is timed, so it needs a computer with nothing else to do, and is no test. On a busy
+one, the processor time from Ctrl-C to the end tells what it would be. Exit code 1: something was amiss.
 
     python tools/ctrl_c.py
     python tools/ctrl_c.py --moments 24 --only several
@@ -13,6 +13,7 @@ import argparse
 import os
 import random
 import re
+import resource
 import signal
 import statistics
 import sys
@@ -108,26 +109,43 @@ def lives(pid: int) -> bool:
         return False
 
 
-def interrupt(kind: Kind, moment_s: float, folder: Path) -> tuple[float, str]:
-    """Interrupt a command after a time; return how long it took to end [s], and what was amiss.
+def cpu_s(pid: int) -> float:
+    """Return the processor time of a process and of the children that it has waited for [s]; 0 if it has ended."""
+    try:
+        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    except OSError:
+        return 0.0
+    return sum(map(int, fields[11:15])) / os.sysconf("SC_CLK_TCK")
+
+
+def cpu_of_children_s() -> float:
+    """Return the processor time of all that has been started here and has ended [s]."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
+def interrupt(kind: Kind, moment_s: float, folder: Path) -> tuple[float, float, str]:
+    """Interrupt a command after a time; return how long it took to end [s], at what processor time, and what was amiss.
 
     Raises:
         Broken: If it does not end, dies, shows a traceback, or has no summary.
     """
     with tempfile.TemporaryDirectory(dir=folder) as out:
+        before_s = cpu_of_children_s()
         words = [word.replace("OUT", out) for word in kind.words.split()]
         with started(*words, folder=folder, start_new_session=True) as command:
             time.sleep(moment_s)
             children = offspring(command.process.pid)
+            before_s += sum(map(cpu_s, {command.process.pid, *children}))
             begin_s = time.monotonic()
             os.killpg(command.process.pid, signal.SIGINT)
             command.end()
-            took_s = time.monotonic() - begin_s
+            took_s, worked_s = time.monotonic() - begin_s, cpu_of_children_s() - before_s
             left = [pid for pid in children if lives(pid)]
             command.find(f"({re.escape(kind.summary)}|kiks: stopped[.])")
     if left:
-        return took_s, f"processes are left: {left}"
-    return took_s, f"{took_s:.2f} s" if took_s > MOST_S else ""
+        return took_s, worked_s, f"processes are left: {left}"
+    return took_s, worked_s, f"{took_s:.2f} s, {worked_s:.2f} s of processor time" if took_s > MOST_S else ""
 
 
 def main() -> int:
@@ -139,7 +157,7 @@ def main() -> int:
     given = parser.parse_args()
     names, chance = given.only or list(KINDS), random.Random(given.seed)
     compile_engine()
-    took: dict[str, list[float]] = {name: [] for name in names}
+    took: dict[str, list[tuple[float, float]]] = {name: [] for name in names}
     amiss: list[str] = []
     with tempfile.TemporaryDirectory() as folder:
         home = Path(folder)
@@ -150,18 +168,18 @@ def main() -> int:
         for number in range(given.moments):
             name, moment_s = names[number % len(names)], chance.uniform(FIRST_S, LAST_S)
             try:
-                seconds, found = interrupt(KINDS[name], moment_s, home)
-                took[name].append(seconds)
+                took_s, worked_s, found = interrupt(KINDS[name], moment_s, home)
+                took[name].append((took_s, worked_s))
             except Broken as broken:
                 found = str(broken)
             if found:
                 amiss.append(f"{name} after {moment_s:.2f} s: {found}")
                 print(amiss[-1], file=sys.stderr, flush=True)
-    print(f"{'kind':<16}{'moments':>9}{'median s':>10}{'worst s':>9}")
-    for name, seconds_each in took.items():
-        if seconds_each:
-            middle, worst = statistics.median(seconds_each), max(seconds_each)
-            print(f"{name:<16}{len(seconds_each):>9}{middle:>10.2f}{worst:>9.2f}")
+    print(f"{'kind':<16}{'moments':>9}{'median s':>10}{'worst s':>9}{'processor s':>13}{'worst s':>9}")
+    for name, each in took.items():
+        if each:
+            cells = [figure(times) for times in zip(*each, strict=True) for figure in (statistics.median, max)]
+            print(f"{name:<16}{len(each):>9}{cells[0]:>10.2f}{cells[1]:>9.2f}{cells[2]:>13.2f}{cells[3]:>9.2f}")
     print(f"{given.moments} moments, {len(amiss)} amiss")
     return 1 if amiss else 0
 
