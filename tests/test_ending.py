@@ -166,3 +166,141 @@ def test_what_is_ignored_stays_ignored() -> None:
     )
     result = python(script)
     assert (result.returncode, result.stdout, result.stderr) == (130, "here\n", "kiks: stopped.\n")
+
+
+# Compiled code that hears no signal: it lets other threads run, as the kernels of KiKS do.
+NEVER_RETURNS = """
+import signal, sys
+from kiks.ending import end_as_with_ctrl_c, end_at_once, ended_after
+end_at_once()
+import threading, time
+import numba, numpy as np
+
+@numba.njit(nogil=True)
+def never(number, runs):
+    runs[0] = True
+    while number > 0:
+        number += 1.0
+        if number > 1e6:
+            number = 1.0
+    return number
+
+def tell():
+    while not runs[0]:
+        time.sleep(0.01)
+    print("ready", flush=True)
+
+never(-1.0, np.zeros(1, bool))
+runs = np.zeros(1, bool)
+end_as_with_ctrl_c()
+limit_s = float(sys.argv[1]) or None
+with ended_after(limit_s, lambda: print("told", flush=True)):
+    threading.Thread(target=tell, daemon=True).start()
+    never(1.0, runs)
+"""
+
+STUCK = "stopped in the middle of code that did not return, such as a controller without an end: there is no summary."
+
+
+def never_returning(limit_s: float, *signals: signal.Signals) -> tuple[int, list[str], list[str]]:
+    """Run code that never returns, and send signals, each when the last one has been told of."""
+    words = [sys.executable, "-c", NEVER_RETURNS, str(limit_s)]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout is not None
+            assert process.stderr is not None
+            said, errors = [process.stdout.readline()], []
+            for number in signals:
+                process.send_signal(number)
+                errors.append(process.stderr.readline())
+            out, error = process.communicate(timeout=GUARD_S)
+        finally:
+            process.kill()
+    return process.returncode, (("".join(said)) + out).splitlines(), ("".join(errors) + error).splitlines()
+
+
+def test_code_that_never_returns_ends_at_the_second_ctrl_c() -> None:
+    code, _, errors = never_returning(0, signal.SIGINT, signal.SIGINT)
+    assert code == 130
+    assert errors == [
+        "kiks: compiled code that runs has not returned yet. Ctrl-C once more ends it at once.",
+        f"kiks: {STUCK}",
+    ]
+
+
+@pytest.mark.parametrize("ending", [signal.SIGTERM, signal.SIGHUP])
+def test_code_that_never_returns_ends_by_one_signal_that_nobody_repeats(ending: signal.Signals) -> None:
+    assert never_returning(0, ending) == (130, ["ready"], [f"kiks: {STUCK}"])
+
+
+def test_code_that_never_returns_ends_when_its_real_time_is_over() -> None:
+    code, out, errors = never_returning(0.2)
+    assert (code, out) == (124, ["ready"])
+    assert errors == [f"kiks: stopped after 0.2 s of real time, in the middle of {STUCK.partition('of ')[2]}"]
+
+
+HEARS = """
+import signal, sys, time
+from kiks.ending import end_as_with_ctrl_c, end_at_once
+end_at_once()
+end_as_with_ctrl_c()
+for _ in range(3):
+    try:
+        print("ready", flush=True)
+        while True:
+            time.sleep(100)
+    except KeyboardInterrupt:
+        pass
+print("ended")
+"""
+
+
+def test_who_hears_each_signal_may_have_any_number_of_them() -> None:
+    with subprocess.Popen([sys.executable, "-c", HEARS], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        for number in (signal.SIGINT, signal.SIGINT, signal.SIGTERM):
+            assert process.stdout.readline() == "ready\n"
+            process.send_signal(number)
+        assert process.communicate(timeout=GUARD_S)[0] == "ended\n"
+    assert process.returncode == 0
+
+
+NOTES = """
+import signal, sys
+from kiks.ending import end_at_once
+end_at_once()
+signal.signal(signal.SIGTERM, lambda number, frame: print("noted", flush=True))
+print("ready", flush=True)
+print(sys.stdin.read())
+"""
+
+
+def test_who_notes_a_signal_and_waits_on_has_heard_it() -> None:
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+    with subprocess.Popen([sys.executable, "-c", NOTES], text=True, **pipes) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "ready\n"
+        for _ in range(3):
+            process.terminate()
+            assert process.stdout.readline() == "noted\n"
+        assert process.communicate("ended", timeout=GUARD_S)[0] == "ended\n"
+    assert process.returncode == 0
+
+
+HELPER_IS_STUCK = """
+import threading
+import kiks.cli
+
+def command():
+    threading.Thread(target=threading.Event().wait).start()
+    print("summary")
+    raise SystemExit(130)
+
+kiks.cli.app = command
+kiks.cli.main()
+"""
+
+
+def test_an_interrupted_command_waits_for_no_thread() -> None:
+    result = python(HELPER_IS_STUCK)
+    assert (result.returncode, result.stdout, result.stderr) == (130, "summary\n", "")

@@ -3,7 +3,8 @@
 Need: Ctrl-C always works. An exception that a signal raises may come up in a callback of a library, which drops it, or
 in an import, which makes another one of it.
 Method: while a command loads there is nothing to bring to an end, so that the signal's handler ends the process itself.
-Later an interruption that was dropped is sent again.
+Later an interruption that was dropped is sent again. Compiled code that never returns hears no signal: a thread of its
+own, which hears them as they come (`signal.set_wakeup_fd`), then ends the process.
 """
 
 from __future__ import annotations
@@ -11,20 +12,63 @@ from __future__ import annotations
 import os
 import signal
 import sys
+from _thread import allocate_lock, get_ident, start_new_thread
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
-from typing import Any
+from typing import Any, NoReturn
 
 INTERRUPTED = 130
 """Exit code of what Ctrl-C ended."""
 
+OUT_OF_TIME = 124
+"""Exit code of what ran for too long, as that of timeout(1)."""
+
+UNHEARD_S = 1.0
+"""Time after which a Ctrl-C that the main thread has not heard is told [s]."""
+
+TERMINATED_S = 4.0
+"""Time after which another signal that it has not heard ends the process [s]; compiled code may take a while."""
+
+LIMIT_GRACE_S = 2.0
+"""Time that what runs has to end after its time is over [s]."""
+
 _AGAIN_S = 0.01
+_LIMIT = signal.SIGRTMAX - 2
+_HEARD = signal.SIGRTMAX - 3
+_ENDINGS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+_CODE = "code that did not return, such as a controller without an end: there is no summary"
+_STUCK = f"stopped in the middle of {_CODE}."
 
 
 def end_at_once() -> None:
-    """Let Ctrl-C, SIGTERM and SIGHUP end the process where it stands, with one line."""
-    _handle(_leave)
+    """Let Ctrl-C, SIGTERM and SIGHUP end the process where it stands, with one line; for the start of a process."""
+    _handle(lambda _number, _frame: leave(INTERRUPTED, "stopped."))
+    _Guard().start()
+
+
+def leave_threads() -> None:
+    """End an interrupted process without a wait for threads of it that are in code that does not return."""
+    import atexit
+    import threading
+
+    if any(not thread.daemon and thread is not threading.current_thread() for thread in threading.enumerate()):
+        atexit._run_exitfuncs()
+        for stream in (sys.stdout, sys.stderr):
+            stream.flush()
+        os._exit(INTERRUPTED)
+
+
+def leave(code: int, line: str) -> NoReturn:
+    """End the process at once, from any thread, with a line that says why."""
+    tell(line)
+    os._exit(code)
+
+
+def tell(line: str) -> None:
+    """Print a line of KiKS on the error output, from any thread, whatever the program has made of `sys.stderr`."""
+    with suppress(OSError):
+        os.write(2, f"kiks: {line}\n".encode(errors="replace"))
 
 
 def end_as_with_ctrl_c() -> None:
@@ -33,10 +77,10 @@ def end_as_with_ctrl_c() -> None:
 
 
 @contextmanager
-def noting_endings(note: Callable[[int], object]) -> Iterator[None]:
-    """Call something with the signal at Ctrl-C, SIGTERM and SIGHUP meanwhile, and go on; only in the main thread."""
-    before = {name: signal.getsignal(name) for name in _endings()}
-    _handle(lambda number, _frame: note(number))
+def noting_endings(note: Callable[[int], object], *others: int) -> Iterator[None]:
+    """Call something with the signal at Ctrl-C, SIGTERM, SIGHUP and others meanwhile, and go on; in the main thread."""
+    before = {name: signal.getsignal(name) for name in (*_endings(), *others)}
+    _handle(lambda number, _frame: note(number), *others)
     try:
         yield
     finally:
@@ -47,10 +91,10 @@ def noting_endings(note: Callable[[int], object]) -> Iterator[None]:
 
 @contextmanager
 def postponing_endings() -> Iterator[None]:
-    """Let Ctrl-C, SIGTERM and SIGHUP act after this instead of in its middle; in other threads they never do."""
+    """Let what ends the process act after this instead of in its middle; in other threads it never does."""
     noted: list[int] = []
     try:
-        with noting_endings(noted.append):
+        with noting_endings(noted.append, _LIMIT):
             yield
     finally:
         for number in noted:
@@ -81,10 +125,10 @@ def send_again_what_is_dropped() -> None:
     sys.unraisablehook = note
 
 
-def _handle(handler: Callable[[int, FrameType | None], Any]) -> None:
+def _handle(handler: Callable[[int, FrameType | None], Any], *others: int) -> None:
     # Only the main thread may; where a command runs in another one, signals are none of its business.
     with suppress(ValueError):
-        for name in _endings():
+        for name in (*_endings(), *others):
             signal.signal(name, handler)
 
 
@@ -96,10 +140,73 @@ def _endings() -> Iterator[signal.Signals]:
             yield number
 
 
-def _leave(_number: int, _frame: FrameType | None) -> None:
-    with suppress(OSError):
-        os.write(2, b"kiks: stopped.\n")
-    os._exit(INTERRUPTED)
+class _Guard:
+    """Ends the process if the main thread is in compiled code that does not return, and so hears no signal."""
+
+    def __init__(self) -> None:
+        self._is_unheard = False
+        self._heard = allocate_lock()
+        self._main = get_ident()
+
+    def start(self) -> None:
+        """Start to listen, in a thread that `threading` does not know: a program may count those."""
+        signal.signal(_HEARD, self._hear)
+        self._receiver, sender = os.pipe()
+        os.set_blocking(sender, False)
+        signal.set_wakeup_fd(sender, warn_on_full_buffer=False)
+        start_new_thread(self._listen, ())
+
+    def _hear(self, _number: int, _frame: FrameType | None) -> None:
+        """Note, in the main thread, that it hears signals."""
+        self._is_unheard = False
+        if self._heard.locked():
+            self._heard.release()
+
+    def _listen(self) -> None:
+        while numbers := os.read(self._receiver, 1):
+            if numbers[0] not in _ENDINGS:
+                continue
+            if self._is_unheard:
+                leave(INTERRUPTED, _STUCK)
+            self._is_unheard, is_ctrl_c = True, numbers[0] == signal.SIGINT
+            self._heard.acquire(blocking=False)
+            # A true signal: it also wakes a wait that has gone on after the first one was handled.
+            signal.pthread_kill(self._main, _HEARD)
+            if self._heard.acquire(timeout=UNHEARD_S if is_ctrl_c else TERMINATED_S):
+                continue
+            if not is_ctrl_c:
+                leave(INTERRUPTED, _STUCK)
+            tell("compiled code that runs has not returned yet. Ctrl-C once more ends it at once.")
+
+
+@contextmanager
+def ended_after(seconds: float | None, end: Callable[[], object]) -> Iterator[None]:
+    """Call something in the main thread when this takes longer than some real time [s]; None for no limit.
+
+    Where it does not bring this to an end, the process ends.
+    """
+    if seconds is None:
+        yield
+        return
+    is_over = allocate_lock()
+    is_over.acquire()
+    main = get_ident()
+
+    def watch() -> None:
+        if is_over.acquire(timeout=seconds):
+            return
+        signal.pthread_kill(main, _LIMIT)
+        if not is_over.acquire(timeout=LIMIT_GRACE_S):
+            leave(OUT_OF_TIME, f"stopped after {seconds:g} s of real time, in the middle of {_CODE}.")
+
+    signal.signal(_LIMIT, lambda _number, _frame: end())
+    start_new_thread(watch, ())
+    try:
+        yield
+    finally:
+        is_over.release()
+        # It may be on its way.
+        signal.signal(_LIMIT, lambda _number, _frame: None)
 
 
 def _interrupt() -> None:

@@ -197,8 +197,12 @@ def test_an_option_that_has_one_value_is_given_once(words: tuple[str, ...], opti
 
 IDLE = [
     (
-        ("run", "--seconds", "5", WANDER),
-        "--seconds must be left out with a program, which ends by itself, but it was 5.0",
+        ("run", "--desk", "--seconds", "5", WANDER),
+        "--seconds must be left out with programs on the desk, where a person ends them, but it was 5.0",
+    ),
+    (
+        ("run", "--desk", "--max-wall", "5", WANDER),
+        "--max-wall must be left out with --desk, where a person ends the run, but it was 5.0",
     ),
     (("run", "--no-wait", WANDER), "--no-wait must be left out without --desk"),
     (("run", "--when-silent", "drop", WANDER), "--when-silent must be left out with one program"),

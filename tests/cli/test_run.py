@@ -145,6 +145,99 @@ def test_mistakes_end_in_one_clear_line(words: tuple[str, ...], message: str, fo
     assert "Traceback" not in result.stderr
 
 
+# ---- how long a run takes ----
+
+FOR_EVER = {
+    "sleeps": "import time\nwhile True: time.sleep(0.37)\n",
+    "long": "import time\ntime.sleep(1e8)\n",
+    "polls": "import serial\nport = serial.Serial('COM1', timeout=0)\nwhile not port.in_waiting: pass\n",
+    "reads": (
+        "import serial\nport = serial.Serial('COM1', timeout=1e8)\nport.write(b'D,4,5\\n')\n"
+        "while True:\n    try: port.readline()\n    except BaseException as error: print(error)\n"
+    ),
+    "talks": (
+        "import serial\nport = serial.Serial('COM1', timeout=1)\nwhile True:\n"
+        "    for order in (b'N\\n', b'D,6,5\\n'):\n        port.write(order)\n        port.readline()\n"
+    ),
+    "threads": (
+        "import serial, threading, time\nport = serial.Serial('COM1', timeout=1)\ndef talk():\n    while True:\n"
+        "        port.write(b'D,5,6\\n')\n        port.readline()\nthreading.Thread(target=talk).start()\n"
+        "while True: time.sleep(0.3)\n"
+    ),
+}
+"""Programs that have no end, each waiting in another way."""
+
+ENDED = "kiks: --seconds has ended the run at 20.5 s of simulated time."
+
+
+@pytest.fixture
+def endless(tmp_path: Path) -> Path:
+    for name, text in FOR_EVER.items():
+        (tmp_path / f"{name}.py").write_text(text)
+    (tmp_path / "spins.py").write_text("import time\ntime.sleep(3)\nwhile True: pass\n")
+    (tmp_path / "three.kiks").write_text(
+        "kiks = 1\n"
+        + "".join(f'[[robot]]\nprogram = "{name}.py"\n' for name in ("talks", "sleeps", "reads"))
+        + "[walls]\nsize_mm = [400, 300]\nwall_mm = 10\n"
+    )
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    "words",
+    [*((name + ".py",) for name in FOR_EVER), ("talks.py", "sleeps.py"), ("long.py", "reads.py"), ("three.kiks",)],
+)
+def test_seconds_end_programs_at_that_simulated_time_and_the_same_each_time(words: tuple[str], endless: Path) -> None:
+    results = [forked.run("run", "--seconds", "20.5", *words, cwd=endless) for _ in range(2)]
+    for result in results:
+        *_, said, last = [line for line in result.stderr.splitlines() if " driven, " not in line]
+        assert (result.returncode, said) == (0, ENDED)
+        assert last.startswith("kiks: 20.500 s simulated, seed 0, state ")
+    assert state_of(results[0].stderr) == state_of(results[1].stderr)
+    assert results[0].stdout == results[1].stdout == ""
+
+
+def test_nothing_is_printed_after_the_end(endless: Path) -> None:
+    (endless / "tells.py").write_text("import time\nwhile True:\n    print(time.monotonic())\n    time.sleep(0.5)\n")
+    result = forked.run("run", "--seconds", "20.5", "tells.py", cwd=endless)
+    assert result.stdout.splitlines() == [str(k / 2) for k in range(42)]
+    both = forked.run("run", "--seconds", "20.5", "tells.py", "talks.py", cwd=endless)
+    assert both.stdout.splitlines() == [f"1 tells.py | {k / 2}" for k in range(42)]
+
+
+def test_seconds_change_nothing_before_and_nothing_for_a_program_that_ends_before(endless: Path) -> None:
+    plain = forked.run("run", DRIVE, "COM1", "40", "7", "6")
+    bounded = forked.run("run", "--seconds", "1000", DRIVE, "COM1", "40", "7", "6")
+    assert bounded.stderr == plain.stderr
+    recorded_run = forked.run("run", "--seconds", "20.5", "--record", "run.mcap", "talks.py", cwd=endless)
+    again = forked.run("run", "--seconds", "20.5", "talks.py", cwd=endless)
+    assert state_of(recorded_run.stderr) == state_of(again.stderr)
+    assert forked.run("replay", "--check", "run.mcap", cwd=endless).returncode == 0
+
+
+def test_a_program_that_fails_before_the_end_fails(endless: Path) -> None:
+    (endless / "fails.py").write_text("raise SystemExit(3)")
+    assert forked.run("run", "--seconds", "20.5", "fails.py", "sleeps.py", cwd=endless).returncode == 3
+
+
+@pytest.mark.parametrize(
+    "words", [("spins.py",), ("spins.py", "sleeps.py"), ("talks.py",), ("talks.py", "long.py"), ("long.py",)]
+)
+def test_max_wall_ends_whatever_runs(words: tuple[str], endless: Path) -> None:
+    result = forked.run("run", "--max-wall", "0.5", *words, cwd=endless)
+    *_, said, last = [line for line in result.stderr.splitlines() if " driven, " not in line]
+    assert (result.returncode, said) == (124, "kiks: --max-wall has ended the run after 0.5 s of real time.")
+    assert last.endswith("s simulated, seed 0, not repeatable: --max-wall has ended it")
+
+
+@pytest.mark.parametrize(("option", "words"), [("--seconds", "20,5"), ("--seconds", "-1"), ("--max-wall", "nan")])
+def test_a_limit_is_a_time(option: str, words: str, endless: Path) -> None:
+    result = forked.run("run", option, words, "sleeps.py", cwd=endless)
+    assert result.returncode == 2
+    assert option in result.stderr
+    assert "Traceback" not in result.stderr
+
+
 # ---- what a run leaves ----
 
 

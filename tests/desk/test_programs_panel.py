@@ -62,6 +62,16 @@ def speeds(page: Page, address: str) -> list[list[int]]:
 
 
 @at_length
+def test_loop_that_asks_for_nothing_is_told_on_the_page_while_time_stands_still(page: Page) -> None:
+    write(page, "print('begun', flush=True)\nready = False\nwhile not ready:\n    pass\n")
+    at(page, "run-program").click()
+    expect(at(page, "output")).to_contain_text("begun")
+    expect(at(page, "output")).to_contain_text("has computed for 6 s without waiting for a time or a robot")
+    at(page, "stop").click()
+    expect(at(page, "programs")).to_contain_text("stopped")
+
+
+@at_length
 def test_example_runs_and_its_output_is_shown(page: Page) -> None:
     at(page, "run-program").click()
     expect(at(page, "output")).to_contain_text("What the eight sensors see")

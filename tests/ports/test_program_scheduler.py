@@ -45,6 +45,9 @@ class FakeWorld:
     def next_event_ns(self) -> int | None:
         return self._events[0][0] if self._events else None
 
+    def check_end(self, time_ns: int) -> None:
+        """Time has no end here."""
+
     def advance_to(self, time_ns: int) -> None:
         while self._events and self._events[0][0] <= time_ns:
             event_ns, rank = heapq.heappop(self._events)

@@ -260,6 +260,19 @@ def test_ctrl_c_ends_all_programs(tmp_path: Path) -> None:
     assert b"Traceback" not in told
 
 
+def test_ctrl_c_while_a_program_loads_ends_it_without_a_word(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "sitecustomize.py").write_text(
+        "import signal, sys\nif 'kiks.script.child_main' in sys.orig_argv:\n    signal.raise_signal(signal.SIGINT)\n"
+    )
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    prints = write(tmp_path, "prints.py", "print('here')\n")
+    with started(prints, prints) as (process, _, _):
+        out, told = process.communicate(timeout=GUARD_S)
+    assert (process.returncode, out) == (130, b"")
+    assert b"has ended with exit code 130" in told
+    assert b"Traceback" not in told
+
+
 def test_no_program_outlives_a_killed_kiks(tmp_path: Path) -> None:
     hangs = write(tmp_path, "hangs.py", "import os\nos.write(1, f'{os.getpid()}\\n'.encode())\n" + HANGS)
     with started(hangs, hangs) as (process, output, _):

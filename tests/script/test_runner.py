@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
+import subprocess
 import sys
 import textwrap
 import threading
@@ -11,6 +13,7 @@ import time
 from pathlib import Path
 
 import pytest
+from tests.guard import GUARD_S
 
 from kiks.model.arena import Arena
 from kiks.script import watchdog
@@ -452,11 +455,42 @@ def test_process_is_as_it_was_when_a_program_has_ended(run: Run) -> None:
     assert threading.enumerate() == threads
 
 
-def test_loop_that_asks_for_nothing_ends_with_one_line(
-    run: Run, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.setattr(watchdog, "SPINNING_S", 0.5)
-    code, _, _ = run("""
+SPINS = "is_done = False\nwhile not is_done:\n    pass\n"
+
+ADVICE = "If it computes, that is right; if it waits for something, end it (Ctrl-C, or Stop on the desk) and put"
+
+
+def test_loop_that_asks_for_nothing_is_told(tmp_path: Path) -> None:
+    (tmp_path / "endless.py").write_text(OPEN + "port.write(b'D,4,4\\n')\nport.readline()\n" + SPINS)
+    code, said = spun("import sys; sys.exit(run_here(Simulation(), Path('endless.py'), [], {}))", tmp_path, "5.")
+    assert code == -signal.SIGTERM
+    assert re.fullmatch(
+        r"kiks: line [67] of endless.py has computed for \d s without waiting for a time or a robot. "
+        rf"{re.escape(ADVICE)} "
+        r"time.sleep\(0.01\) into the loop.\n",
+        said,
+    )
+
+
+def spun(script: str, folder: Path, spinning_s: str) -> tuple[int, str]:
+    """Run a script with a shorter patience for loops; end it at its first line of error output, unless it ends."""
+    head = (
+        "from pathlib import Path\nfrom kiks.script import watchdog\nfrom kiks.script.runner import run_here\n"
+        f"from kiks.sim.simulation import Simulation\nwatchdog.SPINNING_S = {spinning_s}\n"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", head + script], stderr=subprocess.PIPE, text=True, cwd=folder
+    ) as process:
+        assert process.stderr is not None
+        said = process.stderr.readline()
+        process.terminate()
+        return process.wait(GUARD_S), said
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        """
         import threading, time
         is_done = False
         def work():
@@ -466,12 +500,73 @@ def test_loop_that_asks_for_nothing_ends_with_one_line(
         threading.Thread(target=work).start()
         while not is_done:
             pass
-    """)
-    said = capsys.readouterr().err
-    assert code == 1
-    assert "asked for neither time nor bytes for" in said
-    assert "put time.sleep(0.001) into the loop, or run it on kiks serve" in said
-    assert said.startswith("kiks: the program has asked for neither time nor bytes")
+        """,
+        """
+        import threading, time
+        def spin():
+            while True:
+                pass
+        threading.Thread(target=spin, daemon=True).start()
+        time.sleep(1)
+        """,
+    ],
+    ids=["others wait for a time", "others have not had their turn"],
+)
+def test_loop_that_keeps_others_from_going_on_ends_with_one_line(
+    text: str, run: Run, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(watchdog, "SPINNING_S", 0.5)
+    assert run(text)[0] == 1
+    told, end = capfd.readouterr().err.splitlines()
+    assert "of program.py has computed for" in told
+    assert "robot, while its other threads waited. If it computes" in told
+    assert "asked for neither time nor bytes for" in end
+    assert "put time.sleep(0.001) into the loop, or run it on kiks serve" in end
+
+
+def test_what_kiks_computes_is_not_told(
+    run: Run, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(watchdog, "SPINNING_S", 0.1)
+    text = """
+        import threading, time
+        threading.Thread(target=time.sleep, args=(3e6,), daemon=True).start()
+        time.sleep(2e5)
+    """
+    assert run(text)[0] == 0
+    assert capfd.readouterr().err == ""
+
+
+def test_a_wait_in_code_in_c_ends_the_process_that_it_never_leaves(tmp_path: Path) -> None:
+    (tmp_path / "waits.py").write_text(
+        "import signal\nsignal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGALRM])\n"
+        "signal.setitimer(signal.ITIMER_REAL, 0.5)\nsignal.sigwait([signal.SIGALRM])\n"
+    )
+    head = "from pathlib import Path\nfrom kiks.script import watchdog\nfrom kiks.script.runner import run_here\n"
+    script = (
+        "from kiks.sim.simulation import Simulation\nwatchdog.GRACE_S = 0.1\n"
+        "run_here(Simulation(), Path('waits.py'), [], {})\n"
+    )
+    words = [sys.executable, "-c", head + script]
+    done = subprocess.run(words, capture_output=True, text=True, cwd=tmp_path, timeout=GUARD_S, check=False)
+    assert done.returncode == 1
+    assert re.fullmatch(r"kiks: .*it waited by itself \(waits.py, line 4\)\. Run it on kiks serve.*\n", done.stderr)
+
+
+def test_thread_may_compute_from_its_first_moment_while_others_are_ready(
+    run: Run, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(watchdog, "SPINNING_S", 0.05)
+    text = """
+        import threading
+        def count():
+            number = 0
+            while number < 5_000_000:
+                number += 1
+        threading.Thread(target=count, daemon=True).start()
+        print("on")
+    """
+    assert run(text)[0] == 0
 
 
 def test_thread_may_compute_while_others_wait_for_it(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -25,6 +25,7 @@ from kiks.cli.schema import schema
 from kiks.cli.serve import serve
 from kiks.cli.session import session
 from kiks.cli.warmup import warmup
+from kiks.ending import INTERRUPTED, leave_threads
 from kiks.errors import KiksError
 from kiks.ports.file_descriptors import raise_limit
 from kiks.version import __version__
@@ -84,4 +85,8 @@ def main() -> None:
         typer.echo(f"kiks: {error}", err=True)
         sys.exit(2)
     except KeyboardInterrupt:
-        sys.exit(130)
+        sys.exit(INTERRUPTED)
+    except SystemExit as leaving:
+        if leaving.code == INTERRUPTED:
+            leave_threads()
+        raise

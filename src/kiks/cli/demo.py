@@ -214,12 +214,16 @@ def _run(scene: Scene, behaviour: str, total_s: float, picture: Path) -> None:
     with Progress(*columns, console=Console(), transient=True) as progress:
         task = progress.add_task(report(), total=total_s)
         start_s = perf_counter()
-        for _ in scene.slices(total_s):
-            working_s += perf_counter() - start_s
-            if sim.time_s - told_s >= REPORT_S:
-                told_s = sim.time_s
-                progress.update(task, completed=min(sim.time_s, total_s), description=report())
-            start_s = perf_counter()
+        try:
+            for _ in scene.slices(total_s):
+                working_s += perf_counter() - start_s
+                if sim.time_s - told_s >= REPORT_S:
+                    told_s = sim.time_s
+                    progress.update(task, completed=min(sim.time_s, total_s), description=report())
+                start_s = perf_counter()
+        except KeyboardInterrupt:
+            say(f"{behaviour}: {report().strip()}. It was interrupted.")
+            raise
     save_simulation(sim, picture, trace)
     typer.echo(f"{behaviour}: {report().strip()}")
     typer.echo(f"Picture: {picture}   Seed {sim.seed}, state {sim.state_hash()}: the same on every computer.")

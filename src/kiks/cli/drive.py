@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from kiks.cli.desk import open_desk
+from kiks.cli.limits import LimitReached, Limits
 from kiks.cli.options import fit_turrets, load_arena, say, say_without_world
 from kiks.cli.record import recorded, tell_run
 from kiks.ending import end_as_with_ctrl_c
@@ -38,6 +39,7 @@ def run_champion(
     turret: list[str] | None,
     seed: int | None,
     seconds: float,
+    limits: Limits,
     files: tuple[Path | None, Path | None, Path | None],
     *,
     on_desk: bool,
@@ -61,11 +63,15 @@ def run_champion(
         doubt = "it was interrupted"
         with recorded(sim, *files, programs=[file]):
             try:
-                loop_count = champion.drive(ports, seconds=seconds)
+                with limits.kept(sim, LimitReached.stop):
+                    loop_count = champion.drive(ports, seconds=seconds)
                 say(f"{loop_count} loops")
                 doubt = ""
+            except LimitReached as end:
+                say(end.message)
+                raise typer.Exit(end.code) from None
             finally:
-                tell_run(sim, doubt)
+                tell_run(sim, limits.doubt or doubt)
 
     if on_desk:
         from kiks.desk.server.desk import Desk

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import ExitStack
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
@@ -104,17 +105,20 @@ def evolve(
     from kiks.learn.results import seed_folder
 
     results: list[Result] = []
+    # Needed at the end in any case, and after Ctrl-C there is only a second.
+    import_module("matplotlib.backends.backend_agg")
     end_as_with_ctrl_c()
     with ExitStack() as stack:
         executor: Executor | None = None
         for number in [seed] if seeds is None else range(seed, seed + seeds):
             home = folder if seeds is None else seed_folder(folder, number)
-            evolution = Evolution(chosen, algorithm, seed=number, population=population, folder=home)
-            if seeds is not None:
-                typer.echo(f"Seed {number}:")
-            if evolution.generations:
-                typer.echo(f"Continuing after generation {len(evolution.generations)} in {home}.")
+            evolution: Evolution | None = None
             try:
+                evolution = Evolution(chosen, algorithm, seed=number, population=population, folder=home)
+                if seeds is not None:
+                    typer.echo(f"Seed {number}:")
+                if evolution.generations:
+                    typer.echo(f"Continuing after generation {len(evolution.generations)} in {home}.")
                 executor = executor or stack.enter_context(
                     executor_for("threads" if ray is None else _ray(ray), chosen)
                 )
@@ -166,11 +170,11 @@ def _record(evolution: Evolution, folder: Path, file: Path) -> None:
     typer.echo(f"Recording: {file}   See it: kiks replay {file}")
 
 
-def _stop(evolution: Evolution, folder: Path) -> NoReturn:
-    """Save the picture of an evolution that was interrupted, print how far it is, and exit."""
+def _stop(evolution: Evolution | None, folder: Path) -> NoReturn:
+    """Save the picture of an evolution that was interrupted, if it has begun, print how far it is, and exit."""
     from kiks.learn.evolution_plot import save_plot
 
-    if evolution.generations:
+    if evolution is not None and evolution.generations:
         save_plot(evolution, folder / "fitness.png")
         _tell_champion(evolution, folder)
         typer.echo(f"Stopped after generation {len(evolution.generations)}; the same command continues.")

@@ -12,6 +12,7 @@ import typer
 
 from kiks.cli.desk import NoWait, WithDesk, open_desk
 from kiks.cli.engine_start import ready_engine
+from kiks.cli.limits import Limits, MaxWall, Seconds
 from kiks.cli.options import (
     ArenaFile,
     PatienceS,
@@ -99,9 +100,8 @@ def run(
     ] = None,
     when_silent: WhenSilent = "ignore",
     patience: PatienceS = 2.0,
-    seconds: Annotated[
-        float, typer.Option(help="Time for which a champion drives [s]; programs end by themselves.")
-    ] = 60.0,
+    seconds: Seconds = None,
+    max_wall: MaxWall = None,
     picture: Picture = None,
     csv: Table = None,
     record: RecordFile = None,
@@ -122,6 +122,8 @@ def run(
     show_log()
     if not desk:
         leave_out(context, "without --desk", "no_wait")
+    else:
+        leave_out(context, "with --desk, where a person ends the run", "max_wall")
     if program.suffix == ".toml":
         from kiks.cli.drive import run_champion
 
@@ -130,11 +132,13 @@ def run(
                 f"a champion must drive all robots alone, but {shown(arguments[0])} follows it. Leave it out."
             )
         leave_out(context, "of a champion", "robot", "thinking", "map_", "save_thinking", "when_silent", "patience")
-        run_champion(
-            program, arena, robots, turret, seed, seconds, (picture, csv, record), on_desk=desk, waits=not no_wait
-        )
+        files = (picture, csv, record)
+        seconds, limits = 60.0 if seconds is None else seconds, Limits(None, max_wall)
+        run_champion(program, arena, robots, turret, seed, seconds, limits, files, on_desk=desk, waits=not no_wait)
         return
-    leave_out(context, "with a program, which ends by itself", "seconds")
+    if desk:
+        leave_out(context, "with programs on the desk, where a person ends them", "seconds")
+    limits = Limits(seconds, max_wall)
     kinds = robot or []
     from kiks.ports.program_process import Labels, commands_of
     from kiks.ports.program_scheduler import check_policy
@@ -183,9 +187,9 @@ def run(
         say=say if labels is None else labels.say,
         labels=labels,
     )
-    files = (picture, csv, record, [each.file for each in commands if each is not None])
+    texts = [each.file for each in commands if each is not None]
     if desk:
-        with recorded(sim, *files):
+        with recorded(sim, picture, csv, record, texts):
             # If the command line has changed the robots, the desk derives the project from the simulation.
             told = None if kinds or turret else project
             _run_on_desk(
@@ -194,14 +198,16 @@ def run(
         return
     end_as_with_ctrl_c()
     code, doubt = 1, ""
-    with recorded(sim, *files):
+    with recorded(sim, picture, csv, record, texts):
         try:
             if len(commands) == 1 and commands[0] is not None:
-                code = _run_one(sim, commands[0], mapping, thoughts)
+                code = _run_one(sim, commands[0], mapping, thoughts, limits)
+                doubt = limits.doubt
             else:
                 programs = host(sim, commands)
-                code = programs.run()
-                doubt = programs.doubt
+                with limits.kept(sim, programs.end, programs.end_soon):
+                    code = programs.run()
+                doubt = limits.doubt or programs.doubt
         except KeyboardInterrupt:
             doubt = "it was interrupted"
             raise
@@ -240,13 +246,20 @@ def _run_on_desk(
     open_desk(desk, waits=waits, programs_ended=end)
 
 
-def _run_one(sim: Simulation, command: Command, told: dict[str, int], record: Path | None) -> int:
+def _run_one(sim: Simulation, command: Command, told: dict[str, int], record: Path | None, limits: Limits) -> int:
     """Run a program in this process; return its exit code."""
     from kiks.script.runner import run_here
 
     try:
         with noting_output(sim):
-            return run_here(sim, command.program, command.arguments, told, module=command.module)
+            return run_here(
+                sim,
+                command.program,
+                command.arguments,
+                told,
+                module=command.module,
+                limited=partial(limits.kept, sim),
+            )
     finally:
         if record is not None:
             from kiks.clock.thinking import save_thinking

@@ -7,8 +7,6 @@ nanosecond, what an earlier `live` run measured.
 from __future__ import annotations
 
 from pathlib import Path
-
-# Bound here once: a program under `kiks run` lives with a `time` module that is simulated.
 from time import perf_counter_ns
 from typing import Protocol
 

@@ -184,6 +184,9 @@ class Process:
         line = python_line(*words, command.module, str(command.program), *command.arguments)
 
         def run() -> None:
+            # The process inherits it, and so hears Ctrl-C only when it has loaded (`child_main.py`): Python's own start
+            # would end in a traceback.
+            signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
             try:
                 self._popen = self._start(line, connection)
             except OSError as error:

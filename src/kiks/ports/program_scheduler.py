@@ -236,10 +236,12 @@ class ProgramScheduler:
             elif participant.is_waited_for and (participant.acts_from_ns, participant.rank) < horizon:
                 horizon = (participant.acts_from_ns, participant.rank)
         event_ns = loop.next_event_ns()
-        if event_ns is not None and (actor is not None or is_waited) and event_ns <= first[0]:
+        is_event = event_ns is not None and (actor is not None or is_waited) and event_ns <= first[0]
+        if event_ns is not None and is_event:
             # Before anything that a program does at the same instant.
             first, actor = (event_ns, -1), None
-        elif actor is None:
+        loop.check_end(min(first, horizon)[0])
+        if actor is None and not is_event:
             return True, []
         if first > horizon:
             return True, [

@@ -9,6 +9,7 @@ import socket
 import threading
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import NoReturn
 
 from kiks.clock.patience import Patience
 from kiks.clock.thinking import parse_thinking
@@ -82,9 +83,19 @@ IDLE_S = 0.05
 """Longest wait of a round [s of real time]: KiKS notices a second Ctrl-C within it."""
 
 GRACE_S = 1.0
-"""Time that a program has to end after Ctrl-C [s of real time]."""
+"""Time that a program has to end after a person has stopped it [s of real time]."""
+
+CTRL_C_GRACE_S = 0.6
+"""Time that all programs and the world have to end after Ctrl-C [s of real time]: a second with what follows."""
+
+WORLD_SHARE = 0.3
+"""Share of that time in which the world comes to where they have ended."""
 
 _log = logging.getLogger("kiks.run")
+
+
+class _OverError(Exception):
+    """`run` is to end in the middle of a round."""
 
 
 class Programs:
@@ -144,6 +155,7 @@ class Programs:
         self._moved = threading.Condition(sim.lock)
         self._say, self._thinking, self._record = say, thinking, record
         self._keeps_output, self._labels = keeps_output, labels
+        self._over: tuple[int, str] | None = None
         self._signals, self._count, self._was_touched, self._is_closed = 0, 0, False, False
         self._first_programs = [(robot, command) for robot, command in enumerate(commands, 1) if command is not None]
         self._are_numbered = len(self._first_programs) > 1
@@ -292,23 +304,49 @@ class Programs:
         grace.start()
 
     def run(self) -> int:
-        """Run until the last program has ended; return the first exit code that is not 0, else 0.
+        """Run until the last program has ended, or `end`; return the first exit code that is not 0, else 0.
 
         Raises:
             KiksError: If the operating system does not start one.
         """
         self.begin()
+        loop = self.sim.loop
         try:
-            self._grace = Patience(GRACE_S)
+            self._grace = Patience(CTRL_C_GRACE_S)
             # The programs get the signal, too, and may still stop their robots.
             with noting_endings(lambda _number: self._note_signal()):
+                loop.on_slice = self._check_signals
                 while any(not handle.has_been_reported for handle in self.handles) or self._scheduler.participants:
-                    if self._signals and (self._signals > 1 or self._grace.left_s() == 0):
-                        return INTERRUPTED
+                    self._check_signals()
                     self.round(IDLE_S)
+        except _OverError:
+            for handle in self.handles:
+                handle.participant.is_stopped = handle.is_running and not handle.participant.has_hung_up
         finally:
+            loop.on_slice = lambda: None
             self.close()
-        return INTERRUPTED if self._signals else next((each.code for each in self.handles if each.code), 0)
+        if self._signals:
+            return INTERRUPTED
+        own = next((each.code for each in self.handles if each.code and not each.participant.is_stopped), 0)
+        if self._over is None:
+            return own
+        code, message = self._over
+        self._say(message)
+        return code or own
+
+    def end(self, code: int, message: str) -> NoReturn:
+        """End `run` from inside a round: all programs are stopped.
+
+        Args:
+            code: What `run` returns; 0 for the first other exit code of a program.
+            message: Said at the end.
+        """
+        self.end_soon(code, message)
+        raise _OverError
+
+    def end_soon(self, code: int, message: str) -> None:
+        """End `run` so from elsewhere, such as the handler of a signal."""
+        self._over = self._over or (code, message)
 
     def round(self, wait_limit_s: float) -> None:
         """Advance the world, and take requests of the programs.
@@ -387,6 +425,7 @@ class Programs:
                 handle.process = Process(
                     [
                         lateness,
+                        str(self.sim.loop.end_ns),
                         self._policy(number),
                         record,
                         " ".join(self._names.offered()),
@@ -491,3 +530,9 @@ class Programs:
 
     def _note_signal(self) -> None:
         self._signals += 1
+
+    def _check_signals(self) -> None:
+        """End `run` after Ctrl-C, when programs and world have had their time, or at the second one, or as told."""
+        share = 1.0 if any(handle.is_running for handle in self.handles) else WORLD_SHARE
+        if self._over or self._signals > 1 or (self._signals and self._grace.left_s(share=share) == 0):
+            raise _OverError

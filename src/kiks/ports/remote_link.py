@@ -30,12 +30,14 @@ class Connection(ABC):
 
     Args:
         is_late: Whether the world may have begun already: then the program's time begins when it first needs it.
+        end_ns: Where the time of the world ends [ns], and with it the program.
     """
 
-    def __init__(self, *, is_late: bool = False) -> None:
+    def __init__(self, *, is_late: bool = False, end_ns: int = NEVER_NS) -> None:
         self.lock = OwnLock()
         self._now_ns = 0
         self._needs_time = is_late
+        self._end_ns = end_ns
         self._told_ns = 0
         self._thought_ns = 0
         self._unanswered_count = 0
@@ -64,7 +66,10 @@ class Connection(ABC):
     def pass_to(self, time_ns: int) -> None:
         """Let time pass up to a time [ns]."""
         self._now_ns = max(self.now_ns, time_ns)
-        if self._now_ns - self._told_ns >= TELL_NS:
+        if self._now_ns > self._end_ns:
+            # Never answered: the program does nothing more until the world ends.
+            self.ask(Kind.MEET)
+        elif self._now_ns - self._told_ns >= TELL_NS:
             self.tell(Kind.REACHED)
 
     def think(self, time_ns: int) -> None:
@@ -111,10 +116,11 @@ class SocketConnection(Connection):
     Args:
         connection: The socket to it.
         is_late: Whether the world may have begun already.
+        end_ns: Where its time ends [ns].
     """
 
-    def __init__(self, connection: socket.socket, *, is_late: bool = False) -> None:
-        super().__init__(is_late=is_late)
+    def __init__(self, connection: socket.socket, *, is_late: bool = False, end_ns: int = NEVER_NS) -> None:
+        super().__init__(is_late=is_late, end_ns=end_ns)
         self._socket = connection
         self._received = bytearray()
 

@@ -7,10 +7,10 @@ run is the same with it, to the bit.
 from __future__ import annotations
 
 import logging
-import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from time import monotonic
 from types import TracebackType
 from typing import Any
 
@@ -259,7 +259,7 @@ class RunRecorder:
         self._note_check()
         self.next_ns += CHECK_NS
         is_full = self._waiting_bytes > WAITING_BYTES_MAX or len(self._lines) > LINES_MAX // 2
-        if is_full or time.monotonic() >= self._chunk_at_s:
+        if is_full or monotonic() >= self._chunk_at_s:
             with postponing_endings():
                 self._write_chunk()
 
@@ -285,7 +285,7 @@ class RunRecorder:
         has_begun = (self._world.now_ns, self._world.change_count) != self._began
         self._file.write(blocks + messages + foxglove.poses(looks), keeps_earlier=not has_begun)
         self._waiting_bytes = 0
-        self._chunk_at_s = time.monotonic() + CHUNK_S
+        self._chunk_at_s = monotonic() + CHUNK_S
         if self._file.has_failed or self._file.is_disk_full:
             self._end_by_itself(has_begun=has_begun)
 

@@ -15,10 +15,13 @@ class Caller(Enum):
     """A module of Python that looks at the clock for a timeout: the program does not ask for the time there."""
     REAL = 2
     """What lives in real time: KiKS, compilers that measure themselves, and what loads modules."""
+    PASSES = 3
+    """A module that passes a call on to code in C: who calls it counts."""
 
 
 _WAITS = frozenset({"asyncio", "concurrent", "queue", "threading", "trio"})
 _REAL = frozenset({"importlib", "kiks", "llvmlite", "numba", "subprocess"})
+_PASSES = frozenset({"signal"})
 _CLIENT = "kiks.client"
 """The part of KiKS that programs use."""
 
@@ -27,6 +30,8 @@ class _Kinds(dict[str | None, Caller]):
     def __missing__(self, module: str | None) -> Caller:
         top = str(module).partition(".")[0]
         kind = Caller.WAITS if top in _WAITS else Caller.PROGRAM
+        if top in _PASSES:
+            kind = Caller.PASSES
         if top in _REAL and not str(module).startswith(_CLIENT):
             kind = Caller.REAL
         self[module] = kind
@@ -38,4 +43,5 @@ _kinds = _Kinds()
 
 def caller(frame: FrameType) -> Caller:
     """Return who runs in a frame."""
-    return _kinds[frame.f_globals.get("__name__")]
+    kind = _kinds[frame.f_globals.get("__name__")]
+    return caller(frame.f_back) if kind is Caller.PASSES and frame.f_back is not None else kind

@@ -23,6 +23,7 @@ DIE_WITH_PARENT = 1
 def main(
     descriptor: int,
     is_late: bool,
+    end_ns: int,
     thinking: str,
     record: str,
     offered: list[str],
@@ -36,6 +37,7 @@ def main(
     Args:
         descriptor: The socket at whose other end the world is.
         is_late: Whether the world may have begun already.
+        end_ns: Where its time ends [ns].
         thinking: The thinking policy.
         record: File for the measured thinking times; empty for none.
         offered: The port names that the program finds when it lists ports.
@@ -52,10 +54,12 @@ def main(
         signal.signal(signal.SIGINT, signal.default_int_handler)
     # Processes that the program starts must not inherit the socket.
     os.set_inheritable(descriptor, False)
-    connection = SocketConnection(socket.socket(fileno=descriptor), is_late=is_late)
+    connection = SocketConnection(socket.socket(fileno=descriptor), is_late=is_late, end_ns=end_ns)
     policy = ProgramClock(thinking)
 
     try:
+        # Blocked since the start of the process; what came meanwhile acts here.
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
         return run_program(
             program,
             arguments,
@@ -82,6 +86,18 @@ def _save(measured_ns: list[int], record: str) -> None:
 
 
 if __name__ == "__main__":
-    descriptor, lateness, thinking, record, offered, seed, module, program, *arguments = sys.argv[1:]
-    is_late = lateness == LATE
-    sys.exit(main(int(descriptor), is_late, thinking, record, offered.split(), seed, module, Path(program), arguments))
+    descriptor, lateness, end_ns, thinking, record, offered, seed, module, program, *arguments = sys.argv[1:]
+    sys.exit(
+        main(
+            int(descriptor),
+            lateness == LATE,
+            int(end_ns),
+            thinking,
+            record,
+            offered.split(),
+            seed,
+            module,
+            Path(program),
+            arguments,
+        )
+    )

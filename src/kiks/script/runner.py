@@ -7,9 +7,10 @@ import sys
 import threading
 import traceback
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from kiks.clock.program_clock import ProgramClock
 from kiks.errors import KiksError
@@ -34,7 +35,15 @@ _NOT_OF_THE_PROGRAM = ("kiks", "runpy")
 """Modules whose frames an error of the program does not show."""
 
 
-def run_here(sim: Simulation, program: Path, arguments: list[str], told: dict[str, int], *, module: str = "") -> int:
+def run_here(
+    sim: Simulation,
+    program: Path,
+    arguments: list[str],
+    told: dict[str, int],
+    *,
+    module: str = "",
+    limited: Callable[[Callable[[int, str], NoReturn]], AbstractContextManager[object]] = nullcontext,
+) -> int:
     """Run a program in this process to its end; return its exit code.
 
     Args:
@@ -43,6 +52,7 @@ def run_here(sim: Simulation, program: Path, arguments: list[str], told: dict[st
         arguments: Its arguments in `sys.argv`.
         told: Robots by port name.
         module: Name of a module to run in place of the file, as `python -m` does.
+        limited: Limits the time of the program: it gets a function that ends it with an exit code and a message.
 
     Raises:
         ParameterError: If `told` names a robot that does not exist.
@@ -69,6 +79,7 @@ def run_here(sim: Simulation, program: Path, arguments: list[str], told: dict[st
         names.offered(),
         chance_seed(sim.seed, 1),
         module=module,
+        limited=limited,
     )
 
 
@@ -82,6 +93,7 @@ def run_program(
     seed: str,
     *,
     module: str = "",
+    limited: Callable[[Callable[[int, str], NoReturn]], AbstractContextManager[object]] = nullcontext,
 ) -> int:
     """Run a program to its end with simulated ports and simulated time; return its exit code.
 
@@ -94,6 +106,7 @@ def run_program(
         offered: The port names that it finds when it lists ports.
         seed: What all its random numbers follow from; see `chance_seed`.
         module: Name of a module to run in place of the file, as `python -m` does.
+        limited: See `run_here`.
 
     Raises:
         KiksError: If it cannot run under this interpreter.
@@ -152,6 +165,7 @@ def run_program(
         with (
             main_module(program, arguments, module) as start,
             watched(scheduler),
+            limited(scheduler.end),
             signals.taken(),
             chance.taken(),
             replaced(replacements, scheduler),

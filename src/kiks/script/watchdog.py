@@ -1,27 +1,28 @@
 """The watchdog: checks from outside whether the thread that runs a program is stuck or waits in real time.
 
 Code in C may wait by itself, and a loop may never call into the simulation. Neither lets other threads go on, and
-simulated time stands still meanwhile. The watchdog samples the thread some times per second, and ends the program with
-one line that names the place. It never changes a run that ends normally.
+simulated time stands still meanwhile. The watchdog samples the thread some times per second. It tells of a loop that
+asks for nothing, which may well be right, and ends a program that waits by itself with one line that names the place.
+It never changes a run that ends normally.
 """
 
 from __future__ import annotations
 
-import os
+import dis
 import signal
 import subprocess
 import sys
 import threading
 import time
-
-# Bound here once: a program lives with a `_thread` that is simulated.
-from _thread import start_new_thread
+from _thread import allocate_lock, start_new_thread
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
 
-from kiks.script.refusals import ADVICE, where
+from kiks.ending import leave, tell
+from kiks.script import thread_scheduler
+from kiks.script.refusals import ADVICE, OURS, where
 from kiks.script.thread_scheduler import Scheduler
 
 SAMPLE_S = 0.05
@@ -37,13 +38,31 @@ SPINNING_S = 30.0
 """Longest computation of a thread while others wait for a time or a robot [s of processor time]."""
 
 WARNING_SHARE = 0.2
-"""Share of that time after which a warning is printed."""
+"""Share of that time after which a line tells of the computation, whatever others do."""
 
 GRACE_S = 5.0
 """Time after which the process of a program that stays in code in C is killed [s of real time]."""
 
-_MAY_WAIT = ("<", str(Path(__file__).parent.parent), subprocess.__file__)
+_KIKS = str(Path(__file__).parent.parent)
+_ROOTS = (thread_scheduler.__file__, str(Path(__file__).with_name("main_module.py")))
+"""Files of KiKS that call the program: the others work for it."""
+
+_MAY_WAIT = ("<", _KIKS, subprocess.__file__)
 """Code that may wait in real time: imports, KiKS, and waits for other programs."""
+
+_READS_ONLY = (
+    "LOAD_",
+    "COMPARE_",
+    "CONTAINS_",
+    "IS_",
+    "UNARY_",
+    "TO_BOOL",
+    "POP_JUMP_",
+    "JUMP_",
+    "NOP",
+    "EXTENDED_ARG",
+)
+"""Instructions of Python that change nothing."""
 
 _SIGNAL = signal.SIGRTMAX - 1
 
@@ -76,38 +95,39 @@ class _Watch:
         self._message = ""
         self._watched = threading.get_ident()
         self._folder = Path(f"/proc/self/task/{threading.get_native_id()}")
-        self._is_over = threading.Event()
-        self._has_ended = threading.Event()
-        # Bound here once: the program lives with clocks that are simulated.
-        self._cpu_s, self._now_s = time.process_time, time.monotonic
+        self._is_over = False
+        self._going_on, self._sampling = allocate_lock(), allocate_lock()
 
     def start(self) -> None:
         """Start to sample."""
+        self._going_on.acquire()
+        self._sampling.acquire()
         # Unknown to `threading`: a program may count its threads, and wait until only one is left.
         start_new_thread(self._run, ())
 
     def stop(self) -> None:
         """Stop sampling."""
-        self._is_over.set()
-        self._has_ended.wait()
+        self._is_over = True
+        self._going_on.release()
+        self._sampling.acquire()
 
     def end(self, _number: int, _frame: FrameType | None) -> None:
         """End the program, in its own thread."""
-        if not self._is_over.is_set():
+        if not self._is_over:
             self._scheduler.end(1, self._message)
 
     def _run(self) -> None:
         try:
             self._sample()
         finally:
-            self._has_ended.set()
+            self._sampling.release()
 
     def _sample(self) -> None:
         waits, last, has_warned = 0, -1, False
-        active_cpu_s = locked_cpu_s = self._cpu_s()
-        locked_s = self._now_s()
-        while not self._is_over.wait(SAMPLE_S):
-            count, cpu_s, now_s = self._scheduler.program.act_count, self._cpu_s(), self._now_s()
+        active_cpu_s = locked_cpu_s = time.process_time()
+        locked_s = time.monotonic()
+        while not self._going_on.acquire(timeout=SAMPLE_S):
+            count, cpu_s, now_s = self._scheduler.program.act_count, time.process_time(), time.monotonic()
             if count != last:
                 last, active_cpu_s = count, cpu_s
             what = self._waits_for()
@@ -121,18 +141,25 @@ class _Watch:
             if waits >= WAITING_SAMPLES:
                 self._tell(f"it waited by itself{self._where()}")
                 return
-            spun_s = cpu_s - active_cpu_s
-            if spun_s < WARNING_SHARE * SPINNING_S or not self._scheduler.tasks:
+            frame = _computing(self._frame())
+            if frame is None:
+                active_cpu_s = cpu_s
                 continue
-            what = f"asked for neither time nor bytes for {spun_s:.0f} s while its other threads waited{self._where()}"
-            if spun_s > SPINNING_S and self._scheduler.has_timed:
-                self._tell(f"it {what}", "If it waits for a variable there, put time.sleep(0.001) into the loop, or ")
+            spun_s, has_others = cpu_s - active_cpu_s, bool(self._scheduler.tasks)
+            if spun_s > SPINNING_S and (self._scheduler.has_timed or (has_others and _only_reads(frame))):
+                self._tell(
+                    f"it asked for neither time nor bytes for {spun_s:.0f} s while its other threads waited"
+                    f"{where(frame)}",
+                    "If it waits for a variable there, put time.sleep(0.001) into the loop, or ",
+                )
                 return
-            if not has_warned:
+            if spun_s > WARNING_SHARE * SPINNING_S and not has_warned:
                 has_warned = True
-                # Not by `logging`, which would add this thread to those that a program may count.
-                print(
-                    f"kiks: the program has {what}. If it computes, that is right; else press Ctrl-C.", file=sys.stderr
+                tell(
+                    f"line {frame.f_lineno} of {Path(frame.f_code.co_filename).name} has computed for {spun_s:.0f} s "
+                    f"without waiting for a time or a robot{', while its other threads waited' if has_others else ''}. "
+                    "If it computes, that is right; if it waits for something, end it (Ctrl-C, or Stop on the desk) "
+                    "and put time.sleep(0.01) into the loop."
                 )
 
     def _waits_for(self) -> str:
@@ -151,12 +178,15 @@ class _Watch:
             kind = "time"
         else:
             return ""
-        frame = sys._current_frames().get(self._watched)
+        frame = self._frame()
         name = frame.f_code.co_filename if frame is not None else "<"
         return "" if name.startswith(_MAY_WAIT) else kind
 
+    def _frame(self) -> FrameType | None:
+        return sys._current_frames().get(self._watched)
+
     def _where(self) -> str:
-        return where(sys._current_frames().get(self._watched))
+        return where(self._frame())
 
     def _tell(self, what: str, way: str = "") -> None:
         advice = way + ADVICE
@@ -166,8 +196,32 @@ class _Watch:
         )
         with suppress(OSError):
             signal.pthread_kill(self._watched, _SIGNAL)
-        if not self._is_over.wait(GRACE_S):
+        if not self._going_on.acquire(timeout=GRACE_S):
             # Code in C does not return to Python.
             sys.stdout.flush()
-            print(f"kiks: {self._message}", file=sys.stderr, flush=True)
-            os._exit(1)
+            leave(1, self._message)
+
+
+def _computing(frame: FrameType | None) -> FrameType | None:
+    """Return where a program computes: its innermost frame, or that of a library; None while KiKS works for it."""
+    found = None
+    while frame is not None:
+        name = frame.f_code.co_filename
+        if name.startswith(_KIKS):
+            return found if name in _ROOTS else None
+        if "site-packages" in name:
+            found = found or frame
+        elif not name.startswith(("<", *OURS)):
+            return found or frame
+        frame = frame.f_back
+    return found
+
+
+def _only_reads(frame: FrameType) -> bool:
+    """Return whether a frame is at the end of a loop that changes nothing, so that only another thread could end it."""
+    code = list(dis.get_instructions(frame.f_code))
+    jump = next(each for each in code if each.offset == frame.f_lasti)
+    if "JUMP" not in jump.opname or not isinstance(jump.argval, int) or jump.argval > jump.offset:
+        return False
+    loop = [each.opname for each in code if jump.argval <= each.offset <= jump.offset]
+    return all(name.startswith(_READS_ONLY) for name in loop)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from heapq import heappop, heappush
-from typing import Protocol
+from typing import NoReturn, Protocol
 
 from kiks.clock.gate import Gate
 from kiks.firmware.khepera import Firmware
@@ -13,6 +13,7 @@ from kiks.sim.read_completion import NEVER_NS
 from kiks.sim.run_log import WireRecorder
 from kiks.sim.wire import Wire
 from kiks.sim.world import World
+from kiks.units import TICK_NS
 
 
 class EventQueue:
@@ -76,6 +77,8 @@ class EventLoop:
         wires: The robots' serial lines.
         gate: Decides how far time may go while it is watched; None while nothing watches it.
         supervisor: Acts in the world at certain instants, such as a referee; None without one.
+        end_ns: Where time ends [ns]; see `end_at`.
+        on_slice: Called after each slice of a long time; may raise to stop there.
     """
 
     def __init__(self, world: World, sync: Callable[[], None]) -> None:
@@ -87,7 +90,12 @@ class EventLoop:
         self._recorder: Recorder | None = None
         # From when on the recorder must be asked: one comparison for each piece of time.
         self._record_ns = NEVER_NS
-        world.on_change = self._ask_recorder
+        self.on_slice: Callable[[], None] = lambda: None
+        self.end_ns = CLOCK_END_NS
+        self._end: Callable[[], object] = lambda: None
+        # Up to when time may pass in one piece: one comparison, too.
+        self._near_ns = -1
+        world.on_change = self._look_again
         self._sync = sync
         self._events = EventQueue()
 
@@ -99,11 +107,22 @@ class EventLoop:
     @recorder.setter
     def recorder(self, recorder: Recorder | None) -> None:
         self._recorder = recorder
-        self._ask_recorder()
+        self._look_again()
 
-    def _ask_recorder(self) -> None:
-        """Let the recorder look for changes before time passes."""
+    def _look_again(self) -> None:
+        """Let the recorder look for changes before time passes, and find out anew how far it may in one piece."""
         self._record_ns = NEVER_NS if self._recorder is None else -1
+        self._near_ns = -1
+
+    def end_at(self, time_ns: int, end: Callable[[], NoReturn]) -> None:
+        """Let time end at an instant [ns]: when it would pass beyond, it stops there and `end` is called to raise."""
+        self.end_ns, self._end = time_ns, end
+        self._near_ns = -1
+
+    def check_end(self, time_ns: int) -> None:
+        """End the run if all that is still to come is at an instant [ns] beyond the end of time."""
+        if NEVER_NS > time_ns > self.end_ns:
+            self.advance_to(self.end_ns + 1)
 
     def add_wire(self, firmware: Firmware) -> None:
         """Add the serial line of one more robot."""
@@ -115,14 +134,32 @@ class EventLoop:
         Raises:
             ParameterError: If it is no whole number, or beyond the end of the clock.
         """
-        if not (time_ns.__class__ is int and time_ns <= CLOCK_END_NS):
-            time_ns = check_count("time_ns", time_ns, -CLOCK_END_NS, CLOCK_END_NS)
+        if not (time_ns.__class__ is int and time_ns <= self._near_ns):
+            time_ns = self._come_near(time_ns)
         supervisor = self.supervisor
         if supervisor is not None:
             while supervisor.next_ns <= time_ns:
                 self._pass_gate_to(supervisor.next_ns)
                 supervisor.act()
         self._pass_gate_to(time_ns)
+
+    def _come_near(self, time_ns: int) -> int:
+        """Let time pass in slices until one more is left to a time [ns]; return that time.
+
+        The engine is behind the clock until the state is read. After each slice it catches up, so that never more than
+        some milliseconds of work are due, and a signal or a request need not wait for a long sleep of a program.
+        """
+        time_ns = check_count("time_ns", time_ns, -CLOCK_END_NS, CLOCK_END_NS)
+        world = self.world
+        while True:
+            self._near_ns = min(world.state.tick_count * TICK_NS + world.slice_ns, self.end_ns)
+            if time_ns <= self._near_ns:
+                return time_ns
+            if world.now_ns >= self.end_ns:
+                self._end()
+            self.advance_to(self._near_ns)
+            self._sync()
+            self.on_slice()
 
     def _pass_gate_to(self, time_ns: int) -> None:
         gate = self.gate

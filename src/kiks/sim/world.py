@@ -28,8 +28,11 @@ from kiks.sim.free_space import FreeSpace
 from kiks.sim.paths import Watcher
 from kiks.units import TICK_NS
 
-TICKS_AT_ONCE = 10_000
-"""Most ticks of one kernel call, so that Python can react to Ctrl-C: some milliseconds for a lone robot."""
+SLICE_TICKS = (100, 10_000)
+"""Least and most ticks of one kernel call."""
+
+SLICE_MOVES = 100_000
+"""Ticks of one kernel call times the things that move: some milliseconds, after which Python can react to Ctrl-C."""
 
 NEVER_TICK = 2**62
 """A tick that never comes."""
@@ -150,18 +153,27 @@ class World:
     def rebuild_scene(self) -> None:
         """Arrange the state for the engine again: needed when its arrays were replaced."""
         lamps, seeds = self._lamps[None], [self.seed]
+        things: int = self.state.robots.shape[1] + self.state.bodies.shape[1]
+        self._slice_ticks = min(max(SLICE_MOVES // max(things, 1), SLICE_TICKS[0]), SLICE_TICKS[1])
         self._scene = Scene(self.state, self.kinds, [self.arena], self._networks, lamps, seeds)
         self.scene = self._scene.record
 
     # ---- time ----
 
+    @property
+    def slice_ns(self) -> int:
+        """Simulated time that takes some milliseconds of real time [ns]."""
+        return self._slice_ticks * TICK_NS
+
     def tick_to(self, time_ns: int) -> None:
         """Do the ticks that have begun up to a time [ns]."""
         state, end = self.state, -(-time_ns // TICK_NS)
         while state.tick_count < end:
-            until = min(end, state.tick_count + TICKS_AT_ONCE, self._due_tick)
-            step.advance(self.scene, state.tick_count, until - state.tick_count)
+            begin = state.tick_count
+            until = min(end, begin + self._slice_ticks, self._due_tick)
+            # First: the exception of a signal comes after the kernel, whose ticks have then been done.
             state.tick_count = until
+            step.advance(self.scene, begin, until - begin)
             if until >= self._from_tick:
                 self._look()
 

@@ -1,11 +1,13 @@
 """Follow the wall: keep it at the left hand, always at the same distance."""
 
 import sys
+import time
 
 import serial
 
 PORT = sys.argv[1] if len(sys.argv) > 1 else "/dev/ttyUSB0"
 
+SECONDS = 60  # how long it drives
 SPEED = 6  # [pulses in 10 ms]
 WANTED = 300  # what the left sensor reads at the right distance; more is nearer
 NEAR = 150  # from here on something is in front
@@ -21,7 +23,8 @@ def main() -> None:
 
         has_wall = False
         try:
-            while True:
+            end = time.time() + SECONDS
+            while time.time() < end:
                 left, half_left, front_left, front_right = ask("N")[:4]
                 in_front = max(front_left, front_right)
                 has_wall = has_wall or in_front > NEAR

@@ -1,0 +1,129 @@
+"""How time passes: in slices, so that little work is ever due, and to an end if one is set."""
+
+from __future__ import annotations
+
+from typing import NoReturn
+
+import pytest
+
+from kiks.client.khepera import Khepera
+from kiks.engine import step
+from kiks.model.arena import Arena
+from kiks.sim.saved_state import Layout, SavedState, Setup, restore_state, state_bytes
+from kiks.sim.simulation import Simulation
+from kiks.units import NS_PER_S, TICK_NS
+
+HOUR_S = 3600
+
+
+def driving(robots: int = 1) -> Simulation:
+    sim = Simulation(Arena.box(600, 400), robots=robots, seed=3)
+    for number in range(1, robots + 1):
+        Khepera(sim.port(number)).set_speed(4, 5)
+    return sim
+
+
+def behind_ns(sim: Simulation) -> int:
+    return sim.now_ns - sim.world.state.tick_count * TICK_NS
+
+
+def test_never_more_than_a_slice_is_due_however_time_passes() -> None:
+    sim = driving()
+    for _ in range(HOUR_S):
+        sim.run(1)
+        assert behind_ns(sim) <= sim.world.slice_ns
+    sim.run(100 * HOUR_S)
+    assert behind_ns(sim) <= sim.world.slice_ns
+
+
+def test_a_slice_is_shorter_the_more_there_is_to_move() -> None:
+    assert driving(1).world.slice_ns == 100 * NS_PER_S
+    sim = Simulation(Arena.box(2000, 2000), robots=20, seed=3)
+    assert sim.world.slice_ns == 50 * NS_PER_S
+    for column in range(5):
+        sim.add_cylinder(200 + 400 * column, 30)
+    assert sim.world.slice_ns == 40 * NS_PER_S
+
+
+def test_a_long_sleep_can_be_stopped_between_two_slices_and_leaves_the_world_there() -> None:
+    sim = driving()
+    calls: list[int] = []
+
+    def stop() -> None:
+        calls.append(sim.now_ns)
+        if len(calls) == 3:
+            raise KeyboardInterrupt
+
+    sim.loop.on_slice = stop
+    with pytest.raises(KeyboardInterrupt):
+        sim.run(1e8)
+    assert sim.now_ns == calls[-1] < 4 * sim.world.slice_ns
+    assert behind_ns(sim) <= 0
+
+
+def test_slices_change_nothing() -> None:
+    whole, parts = driving(3), driving(3)
+    whole.run(HOUR_S)
+    end_ns = parts.now_ns + HOUR_S * NS_PER_S
+    while parts.now_ns < end_ns:
+        parts.advance_to(min(parts.now_ns + 7_123_456_789, end_ns))
+        parts.sync()
+    assert whole.state_hash() == parts.state_hash()
+
+
+def test_after_a_step_back_in_time_little_is_due_as_well() -> None:
+    sim = driving()
+    setup = Setup.of(sim)
+    saved = SavedState.from_bytes(state_bytes(sim), setup, Layout(), "a state")
+    sim.run(10 * HOUR_S)
+    restore_state(sim, saved)
+    for _ in range(HOUR_S):
+        sim.run(1)
+        assert behind_ns(sim) <= sim.world.slice_ns
+
+
+def test_a_signal_within_the_kernel_leaves_the_ticks_that_were_done_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    sim, whole = driving(), driving()
+    advance = step.advance
+
+    def interrupted(*args: int) -> None:
+        advance(*args)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(step, "advance", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        sim.run(1000)
+    monkeypatch.setattr(step, "advance", advance)
+    sim.run(0)
+    whole.advance_to(sim.now_ns)
+    assert sim.state_hash() == whole.state_hash()
+
+
+class OverError(Exception):
+    pass
+
+
+def end() -> NoReturn:
+    raise OverError
+
+
+@pytest.mark.parametrize("end_s", [0.5, 1234.5])
+def test_time_ends_where_it_is_told_to(end_s: float) -> None:
+    sim, whole = driving(), driving()
+    sim.loop.end_at(round(end_s * NS_PER_S), end)
+    sim.advance_to(round(end_s * NS_PER_S))  # up to there, not beyond
+    with pytest.raises(OverError):
+        sim.run(1e-9)
+    with pytest.raises(OverError):
+        sim.run(1e6)
+    whole.advance_to(round(end_s * NS_PER_S))
+    assert (sim.time_s, sim.state_hash()) == (end_s, whole.state_hash())
+
+
+def test_what_is_still_to_come_beyond_the_end_ends_the_run() -> None:
+    sim = driving()
+    sim.loop.end_at(5 * NS_PER_S, end)
+    sim.loop.check_end(5 * NS_PER_S)
+    with pytest.raises(OverError):
+        sim.loop.check_end(6 * NS_PER_S)
+    assert sim.time_s == 5
