@@ -20,6 +20,7 @@ from typing import IO, Any, NamedTuple, Protocol
 from kiks.errors import KiksError, ParameterError, shown
 from kiks.model.atomic_files import program_in
 from kiks.model.project import Project
+from kiks.ports.hash_seed import HASH_SEED, VARIABLE
 from kiks.sim.ring_buffer import RingBuffer
 
 OUTPUT_LIMIT = 1000
@@ -224,10 +225,11 @@ class Process:
     # ---- inside ----
 
     def _start(self, line: list[str], connection: socket.socket) -> subprocess.Popen[bytes]:
+        environment = {VARIABLE: HASH_SEED, **os.environ}
         if self._writer is None:
-            return subprocess.Popen(line, pass_fds=[connection.fileno()])
+            return subprocess.Popen(line, pass_fds=[connection.fileno()], env=environment)
         # Unbuffered: each line of output comes at once.
-        environment = {**os.environ, "PYTHONUNBUFFERED": "1"}
+        environment["PYTHONUNBUFFERED"] = "1"
         keeps_output = self.output is not None
         if keeps_output:
             environment["PYTHONIOENCODING"] = "utf-8:backslashreplace"

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from kiks.clock.program_clock import ProgramClock
 from kiks.errors import KiksError
+from kiks.ports import hash_seed
 from kiks.script import clocks, cpython, event_loops, locks, serial_ports, socket_waits, unsupported
 from kiks.script.chance import Chance
 from kiks.script.file_system import FileSystem
@@ -157,6 +158,7 @@ def run_program(
         ends.run()
         return code
 
+    hash_seed.hide()
     if os.environ.get("PYTHONSAFEPATH") == "kiks":
         del os.environ["PYTHONSAFEPATH"]  # what the program starts is as it is without KiKS
     hook_before = sys.excepthook
