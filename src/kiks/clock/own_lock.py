@@ -10,15 +10,13 @@ import threading
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from threading import _RLock as _Base
+    OwnLock = threading.RLock
 else:
     _Base = type(threading.RLock())
 
+    class OwnLock(_Base):
+        """A reentrant lock with the methods of `RLock` as they are now."""
 
-class OwnLock(_Base):
-    """A reentrant lock with the methods of `RLock` as they are now."""
-
-
-for _name, _method in list(vars(_Base).items()):
-    if callable(_method) and _name not in ("__new__", "__repr__"):
-        setattr(OwnLock, _name, _method)
+    for _name, _method in list(vars(_Base).items()):
+        if callable(_method) and _name not in ("__new__", "__repr__"):
+            setattr(OwnLock, _name, _method)

@@ -20,7 +20,7 @@ from kiks.sim.port import VirtualPort
 from kiks.units import NS_PER_S
 
 with suppress(ImportError):
-    import _uuid  # noqa: F401  (only what has been imported can be replaced)
+    import _uuid  # type: ignore[import-not-found]  # noqa: F401  (only what was imported can be replaced)
 
 CALENDARS = frozenset(getattr(time, name) for name in ("CLOCK_REALTIME", "CLOCK_TAI") if hasattr(time, name))
 """Clocks of `time.clock_gettime` that tell the date; the others tell the time since the program's start."""
@@ -95,7 +95,7 @@ def replacements(scheduler: Scheduler, clock: VirtualPort) -> dict[str, dict[str
     functions |= {name: of_now(name) for name in _real}
 
     def usage(who: int, /) -> resource.struct_rusage:
-        real = _real_usage(who)
+        real: resource.struct_rusage = _real_usage(who)
         return type(real)((clock.ask_ns() / NS_PER_S, 0.0, *real[2:])) if who == resource.RUSAGE_SELF else real
 
     def times() -> os.times_result:

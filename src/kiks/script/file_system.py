@@ -44,7 +44,7 @@ class _PortEntry:
 
     def inode(self) -> int:
         """See `os.DirEntry.inode`."""
-        return _real_stat(os.devnull).st_ino
+        return int(_real_stat(os.devnull).st_ino)
 
     def is_dir(self, *, follow_symlinks: bool = True) -> bool:
         """See `os.DirEntry.is_dir`."""
@@ -147,7 +147,9 @@ class FileSystem:
             if (status.st_dev, status.st_ino, "mtime") not in self._known and self._is_new(status.st_mtime_ns):
                 self._note(status, opened_ns)
         times_ns = [self._of(real, field) for field in _FIELDS]
-        plain, more = real.__reduce__()[1]
+        plain: tuple[Any, ...]
+        more: dict[str, Any]
+        plain, more = real.__reduce__()[1]  # type: ignore[str-unpack, assignment]
         plain = (*plain[:7], *(each // NS_PER_S for each in times_ns), *plain[10:])
         for field, time_ns in zip(_FIELDS, times_ns, strict=True):
             more[f"st_{field}"], more[f"st_{field}_ns"] = time_ns / NS_PER_S, time_ns

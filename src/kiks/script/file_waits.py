@@ -251,7 +251,7 @@ class Files:
             if descriptor in ports:
                 return ports[descriptor].read(length)
             self.wait_for_pipe(descriptor, select.POLLIN)
-            return _real_read(descriptor, length)
+            return bytes(_real_read(descriptor, length))
 
         def write(descriptor: int, data: Any, /) -> int:
             if descriptor in ports:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from functools import partial
 from types import BuiltinFunctionType
 from typing import Any
 
@@ -56,8 +57,8 @@ def replaced(replacements: Replacements, scheduler: Scheduler) -> Iterator[None]
                 elif isinstance(before, BuiltinFunctionType) and (callable(value) or isinstance(value, Reading)):
                     change_function(before, for_program(scheduler, value, unchanged(before)), undo)
                 else:
+                    undo.add(partial(setattr, owner, name, before))
                     setattr(owner, name, value)
-                    undo.add(lambda owner=owner, name=name, before=before: setattr(owner, name, before))
         yield
     finally:
         undo()

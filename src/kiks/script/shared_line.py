@@ -44,6 +44,11 @@ class SharedLine:
         return self._line.now_ns
 
     @property
+    def known_ns(self) -> int:
+        """The same as far as it is known [ns]; see `Line`."""
+        return self._line.known_ns
+
+    @property
     def baud(self) -> int:
         """Speed of the line [bit/s]."""
         return self._line.baud

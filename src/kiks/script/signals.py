@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import _signal
 import contextlib
 import os
 import signal
+import sys
 import threading
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -25,6 +25,7 @@ EXIT_OF_SIGNAL = 128
 _HERE = os.path.dirname(kiks.__file__)
 _ROOT = Scheduler.start.__code__.co_filename
 
+_signal: Any = sys.modules["_signal"]
 _real_signal, _real_getsignal, _real_wakeup = (
     unchanged(each) for each in (_signal.signal, _signal.getsignal, _signal.set_wakeup_fd)
 )
@@ -103,7 +104,7 @@ class Signals:
 
     def _set_wakeup(self, descriptor: int, /, **options: Any) -> int:
         self._wakeup = descriptor
-        return _real_wakeup(descriptor, **options)
+        return int(_real_wakeup(descriptor, **options))
 
     def _set_timer(self, which: int, seconds: float, interval: float = 0.0, /) -> tuple[float, float]:
         self._check_timer(which)

@@ -117,7 +117,7 @@ def replacements(scheduler: Scheduler, files: Files) -> dict[str, dict[str, Any]
         files.note_inside(*(each.fileno() for each in pair))
         return pair
 
-    own = {"sendall": sendall, "connect": connect, "bind": bind, "_accept": accept}
+    own: dict[str, Any] = {"sendall": sendall, "connect": connect, "bind": bind, "_accept": accept}
     return {
         "_socket": {"socketpair": socketpair},
         "_socket.socket": {

@@ -38,7 +38,7 @@ no thread can go on at all."""
 BLOCK_MS = 50
 """Longest wait for files between two checks for signals [ms of real time]."""
 
-get_ident = unchanged(threading.get_ident)
+get_ident: Callable[[], int] = unchanged(threading.get_ident)
 
 _KEPT: list[Scheduler] = []
 """Schedulers with threads that never end: a waiting thread without a reference would be collected and run `finally`."""
@@ -47,8 +47,9 @@ _KEPT: list[Scheduler] = []
 class FileWait(Protocol):
     """What a thread waits for at real files: pipes, sockets, the keyboard."""
 
-    is_inside: bool
-    """Whether threads of the program alone can end the wait."""
+    @property
+    def is_inside(self) -> bool:
+        """Whether threads of the program alone can end the wait."""
 
     def is_over(self, block_ms: int) -> bool:
         """Return whether a file is ready, after at most this real time [ms]."""

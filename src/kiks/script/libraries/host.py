@@ -32,7 +32,7 @@ def keyboard(host: Host) -> dict[str, dict[str, Any]]:
     def read_line(prompt: object = "", /) -> str:
         if sys.stdin is not None and sys.stdin.isatty() and not is_readable(sys.stdin.fileno(), 0):
             refuse_keyboard(host.scheduler)
-        return real_input(prompt)
+        return str(real_input(prompt))
 
     return {"builtins": {"input": read_line}}
 
