@@ -286,16 +286,15 @@ class Files:
             if file is not None and queue in (termios.TCOFLUSH, termios.TCIOFLUSH):
                 file.port.reset_output_buffer()
 
-        def reading(name: str) -> Any:
+        def reading(name: str) -> Callable[..., Any]:
             """Return a method of files that waits before it reads."""
-            real = _file_methods[name]
 
             def call(file: Any, *args: Any) -> Any:
                 if not file.closed:
                     self.wait_for_pipe(file.fileno(), select.POLLIN)
-                return real(file, *args)
+                return _file_methods[name](file, *args)
 
-            return for_program(scheduler, call, real)
+            return call
 
         def write_file(file: Any, data: Any, /) -> Any:
             if file.closed:
@@ -308,20 +307,18 @@ class Files:
         def read_all(file: Any) -> Any:
             if file.closed or not self._is_pipe(file.fileno()):
                 return _file_methods["readall"](file)
-            return b"".join(iter(lambda: file.read(PIPE_CHARACTERS), b""))
+            return b"".join(iter(lambda: reads["read"](file, PIPE_CHARACTERS), b""))
 
         def close_file(file: Any) -> None:
             if not file.closed and file.writable():
                 self._system.note_close(file.fileno())
             _file_methods["close"](file)
 
+        reads = {name: reading(name) for name in ("read", "readinto")}
+        of_file = {**reads, "readall": read_all, "write": write_file, "close": close_file}
         return {
             "_io.FileIO": {
-                "read": reading("read"),
-                "readinto": reading("readinto"),
-                "readall": for_program(scheduler, read_all, _file_methods["readall"]),
-                "write": for_program(scheduler, write_file, _file_methods["write"]),
-                "close": for_program(scheduler, close_file, _file_methods["close"]),
+                name: for_program(scheduler, method, _file_methods[name]) for name, method in of_file.items()
             },
             "select": {"select": simulated_select},
             f"{__name__}._Poll": {"poll": for_program(scheduler, poll, _real_poll)},

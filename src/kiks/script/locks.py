@@ -119,15 +119,13 @@ def _plain_locks(scheduler: Scheduler, room: WaitingRoom) -> dict[str, Any]:
                 key = id(lock)
                 foreign[key] = weakref.ref(lock, lambda _: foreign.pop(key, None))
             return is_acquired
-        if timeout == -1 and _real_acquire(lock, False):
+        until_ns = NEVER_NS if timeout == -1 else _deadline_ns(scheduler, blocking, timeout)
+        if _real_acquire(lock, False):
             scheduler.lock_count += 1
             if scheduler.lock_count > LOCKS_IN_A_ROW:
                 # A thread that checks a value behind a lock in a loop waits for others.
                 scheduler.lock_count = 0
                 scheduler.ask()
-            return True
-        until_ns = NEVER_NS if timeout == -1 else _deadline_ns(scheduler, blocking, timeout)
-        if _real_acquire(lock, False):
             return True
         if not blocking:
             scheduler.poll()
