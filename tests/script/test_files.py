@@ -78,6 +78,7 @@ thread.start()
 print(urllib.request.urlopen(f"http://localhost:{server.server_port}/page").read(), time.monotonic())
 server.shutdown()
 thread.join()
+server.server_close()
 """,
     "streams of asyncio": """
 import asyncio, time

@@ -171,11 +171,8 @@ def _record(evolution: Evolution, folder: Path, file: Path) -> None:
 
 
 def _stop(evolution: Evolution | None, folder: Path) -> NoReturn:
-    """Save the picture of an evolution that was interrupted, if it has begun, print how far it is, and exit."""
-    from kiks.learn.evolution_plot import save_plot
-
+    """Print how far an evolution is that was interrupted, and exit at once: its picture is drawn at its end."""
     if evolution is not None and evolution.generations:
-        save_plot(evolution, folder / "fitness.png")
         _tell_champion(evolution, folder)
         typer.echo(f"Stopped after generation {len(evolution.generations)}; the same command continues.")
     else:
