@@ -16,12 +16,15 @@ class Caller(Enum):
     REAL = 2
     """What lives in real time: KiKS, compilers that measure themselves, and what loads modules."""
     PASSES = 3
-    """A module that passes a call on to code in C: who calls it counts."""
+    """A module of Python that asks on behalf of its caller, so that the caller counts."""
 
 
 _WAITS = frozenset({"asyncio", "concurrent", "queue", "threading", "trio"})
 _REAL = frozenset({"importlib", "kiks", "llvmlite", "numba", "subprocess"})
-_PASSES = frozenset({"signal"})
+_PASSES = frozenset(
+    ("genericpath", "glob", "logging", "os", "pathlib", "posixpath", "random", "secrets", "shutil", "signal")
+    + ("tempfile", "uuid")
+)
 _CLIENT = "kiks.client"
 """The part of KiKS that programs use."""
 

@@ -31,7 +31,7 @@ USB_ADAPTER = (0x0403, 0x6001)
 def replacements(
     open_port: Callable[[str], VirtualPort], ports: Files, names: Sequence[str]
 ) -> dict[str, dict[str, Any]]:
-    """Return what stands in for names of `serial`, `glob` and `os`, by module.
+    """Return what stands in for names of `serial`, by module.
 
     Args:
         open_port: Returns the port behind a name.
