@@ -22,8 +22,7 @@ class Caller(Enum):
 _WAITS = frozenset({"asyncio", "concurrent", "queue", "threading", "trio"})
 _REAL = frozenset({"importlib", "kiks", "llvmlite", "numba", "subprocess"})
 _PASSES = frozenset(
-    ("genericpath", "glob", "logging", "os", "pathlib", "posixpath", "random", "secrets", "shutil", "signal")
-    + ("tempfile", "uuid")
+    "genericpath glob logging os pathlib posixpath random secrets shutil signal tempfile uuid".split()  # noqa: SIM905
 )
 _CLIENT = "kiks.client"
 """The part of KiKS that programs use."""

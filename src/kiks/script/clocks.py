@@ -13,7 +13,6 @@ from contextlib import suppress
 from typing import Any
 
 from kiks.clock.program_clock import EPOCH_S, calendar_ns
-from kiks.script.cpython import unchanged
 from kiks.script.patching import Reading, for_program
 from kiks.script.thread_scheduler import Scheduler
 from kiks.sim.port import VirtualPort
@@ -34,8 +33,9 @@ UUID_EPOCH = 0x01B21DD213814000
 NODE = b"\x02KiKS\x01"
 """Address of the simulated network card in UUIDs, a locally administered one (RFC 9562, section 6.10)."""
 
-_real = {name: unchanged(getattr(time, name)) for name in ("localtime", "gmtime", "ctime", "asctime", "strftime")}
-_real_usage = unchanged(resource.getrusage)
+OF_NOW = ("localtime", "gmtime", "ctime", "asctime", "strftime")
+"""Functions of `time` that convert the present time if they are given none."""
+
 _real_now, _real_utcnow = (vars(datetime.datetime)[name] for name in ("now", "utcnow"))
 
 
@@ -74,11 +74,11 @@ def replacements(scheduler: Scheduler, clock: VirtualPort) -> dict[str, dict[str
 
         def converted(*given: Any) -> Any:
             if name == "strftime" and len(given) == 1:
-                given = (given[0], _real["localtime"](calendar_ns(clock.ask_ns()) / NS_PER_S))
+                given = (given[0], time.localtime(calendar_ns(clock.ask_ns()) / NS_PER_S))
             elif name != "strftime" and (not given or given[0] is None):
                 seconds = calendar_ns(clock.ask_ns()) / NS_PER_S
-                given = (_real["localtime"](seconds),) if is_of_struct else (seconds,)
-            return _real[name](*given)
+                given = (time.localtime(seconds),) if is_of_struct else (seconds,)
+            return getattr(time, name)(*given)
 
         return converted
 
@@ -92,10 +92,10 @@ def replacements(scheduler: Scheduler, clock: VirtualPort) -> dict[str, dict[str
     for name in ("monotonic", "perf_counter", "process_time", "thread_time"):
         functions[name] = reading(lambda now_ns: now_ns / NS_PER_S)
         functions[f"{name}_ns"] = reading(lambda now_ns: now_ns)
-    functions |= {name: of_now(name) for name in _real}
+    functions |= {name: of_now(name) for name in OF_NOW}
 
     def usage(who: int, /) -> resource.struct_rusage:
-        real: resource.struct_rusage = _real_usage(who)
+        real: resource.struct_rusage = resource.getrusage(who)
         return type(real)((clock.ask_ns() / NS_PER_S, 0.0, *real[2:])) if who == resource.RUSAGE_SELF else real
 
     def times() -> os.times_result:

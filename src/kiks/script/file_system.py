@@ -16,7 +16,6 @@ from types import TracebackType
 from typing import Any
 
 from kiks.clock.program_clock import calendar_ns
-from kiks.script.cpython import unchanged
 from kiks.script.patching import for_program
 from kiks.script.thread_scheduler import Scheduler
 from kiks.units import NS_PER_S
@@ -25,10 +24,6 @@ COARSE_NS = 20_000_000
 """Longest time by which the operating system's stamps may lag behind its clock [ns]: one tick of its timer."""
 
 _FIELDS = ("atime", "mtime", "ctime")
-_real_stat, _real_lstat, _real_fstat, _real_utime = (
-    unchanged(getattr(os, name)) for name in ("stat", "lstat", "fstat", "utime")
-)
-_real_access, _real_listdir, _real_scandir = unchanged(os.access), unchanged(os.listdir), unchanged(os.scandir)
 _real_entry_stat = os.DirEntry.stat
 
 
@@ -44,7 +39,7 @@ class _PortEntry:
 
     def inode(self) -> int:
         """See `os.DirEntry.inode`."""
-        return int(_real_stat(os.devnull).st_ino)
+        return int(os.stat(os.devnull).st_ino)
 
     def is_dir(self, *, follow_symlinks: bool = True) -> bool:
         """See `os.DirEntry.is_dir`."""
@@ -122,13 +117,13 @@ class FileSystem:
 
     def note_write(self, descriptor: int) -> None:
         """Note that the program has written into a file now."""
-        real = _real_fstat(descriptor)
+        real = os.fstat(descriptor)
         if stat.S_ISREG(real.st_mode):
             self._note(real, self._now_ns())
 
     def note_close(self, descriptor: int) -> None:
         """Note the last change of a file that is closed now, by code in C."""
-        real = _real_fstat(descriptor)
+        real = os.fstat(descriptor)
         if stat.S_ISREG(real.st_mode):
             self.translated(real)
 
@@ -141,7 +136,7 @@ class FileSystem:
         while self._opened:
             path, opened_ns = self._opened.popitem()
             try:
-                status = _real_stat(path)
+                status = os.stat(path)
             except OSError:
                 continue
             if (status.st_dev, status.st_ino, "mtime") not in self._known and self._is_new(status.st_mtime_ns):
@@ -182,8 +177,8 @@ class FileSystem:
             if ns is None:
                 ns = (self._now_ns(), self._now_ns())
             accessed_ns, changed_ns = ns
-            _real_utime(path, times, ns=(accessed_ns + self._shift_ns, changed_ns + self._shift_ns), **where)
-            real = _real_stat(path, **where)
+            os.utime(path, times, ns=(accessed_ns + self._shift_ns, changed_ns + self._shift_ns), **where)
+            real = os.stat(path, **where)
             for field, time_ns in (("atime", accessed_ns), ("mtime", changed_ns), ("ctime", self._now_ns())):
                 self._known[real.st_dev, real.st_ino, field] = getattr(real, f"st_{field}_ns"), time_ns
 
@@ -197,7 +192,7 @@ class FileSystem:
             )
 
         def access(path: Any, *args: Any, **kwargs: Any) -> bool:
-            return is_port(path) or _real_access(path, *args, **kwargs)
+            return is_port(path) or os.access(path, *args, **kwargs)
 
         def ports_in(folder: Any, there: Sequence[str]) -> list[str]:
             if not isinstance(folder, str | os.PathLike):
@@ -206,20 +201,20 @@ class FileSystem:
             return [name for parent, name in split if parent == os.fspath(folder) and name not in there]
 
         def listdir(path: Any = ".") -> list[Any]:
-            there = _real_listdir(path)
+            there = os.listdir(path)
             return [*there, *ports_in(path, there)]
 
         def scandir(path: Any = ".") -> Any:
             if names := ports_in(path, ()):
-                there = _real_listdir(path)
-                return _Entries(_real_scandir(path), [_PortEntry(path, each) for each in names if each not in there])
-            return _real_scandir(path)
+                there = os.listdir(path)
+                return _Entries(os.scandir(path), [_PortEntry(path, each) for each in names if each not in there])
+            return os.scandir(path)
 
         return {
             "posix": {
-                "stat": status(_real_stat),
-                "lstat": status(_real_lstat),
-                "fstat": lambda fd: self.translated(_real_fstat(fd)),
+                "stat": status(os.stat),
+                "lstat": status(os.lstat),
+                "fstat": lambda fd: self.translated(os.fstat(fd)),
                 "utime": utime,
                 "access": access,
                 "listdir": listdir,

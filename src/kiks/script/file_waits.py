@@ -20,7 +20,6 @@ from collections.abc import Callable, Iterable
 from contextlib import suppress
 from typing import Any, TypeVar
 
-from kiks.script.cpython import unchanged
 from kiks.script.file_system import FileSystem
 from kiks.script.patching import for_program
 from kiks.script.shared_line import SharedLine
@@ -36,9 +35,6 @@ PIPE_CHARACTERS = 1 << 16
 SETTLED_MS = 100
 """Longest time that the operating system may need to carry characters through a terminal [ms of real time]."""
 
-_real_read, _real_write, _real_pipe = unchanged(os.read), unchanged(os.write), unchanged(os.pipe)
-_real_ioctl, _real_select, _new_poll = unchanged(fcntl.ioctl), unchanged(select.select), unchanged(select.poll)
-_real_drain, _real_flush = unchanged(termios.tcdrain), unchanged(termios.tcflush)
 _Poll = type(select.poll())
 _file_methods = dict(vars(_io.FileIO))
 _real_poll, _real_epoll = _Poll.poll, select.epoll.poll
@@ -48,7 +44,7 @@ Found = TypeVar("Found")
 
 def is_readable(descriptor: int, timeout_ms: int) -> bool:
     """Wait in real time until a file can be read; return whether it can."""
-    poll = _new_poll()
+    poll = select.poll()
     poll.register(descriptor, select.POLLIN)
     return bool(_real_poll(poll, timeout_ms))
 
@@ -78,15 +74,15 @@ class _PortFile:
         arrived = self.line.arrived_count()
         wanted, there = min(arrived, TERMINAL_CHARACTERS), self._count()
         if wanted < there:
-            _real_read(self.descriptor, there - wanted)
+            os.read(self.descriptor, there - wanted)
         elif wanted > there:
-            _real_write(self._other, bytes(wanted - there))
+            os.write(self._other, bytes(wanted - there))
             while self._count() < wanted and is_readable(self.descriptor, SETTLED_MS):
                 pass
         return arrived
 
     def _count(self) -> int:
-        return int(struct.unpack("i", _real_ioctl(self.descriptor, termios.FIONREAD, bytes(4)))[0])
+        return int(struct.unpack("i", fcntl.ioctl(self.descriptor, termios.FIONREAD, bytes(4)))[0])
 
     def read(self, length: int) -> bytes:
         """Read what has arrived, as a terminal would: wait as its settings say unless it does not block.
@@ -213,7 +209,7 @@ class Files:
 
     def wait_for(self, descriptor: int, events: int, timeout_s: float | None = None) -> bool:
         """Wait until a file is ready; return whether it is."""
-        poll = _new_poll()
+        poll = select.poll()
         poll.register(descriptor, events)
         return bool(self.wait(lambda block_ms: _real_poll(poll, block_ms), timeout_s, (descriptor,)))
 
@@ -226,15 +222,15 @@ class Files:
         def simulated_select(
             rlist: Iterable[Any], wlist: Iterable[Any], xlist: Iterable[Any], timeout: float | None = None, /
         ) -> tuple[list[Any], list[Any], list[Any]]:
-            lists = [list(each) for each in (rlist, wlist, xlist)]
+            lists = list(rlist), list(wlist), list(xlist)
             if timeout is not None and timeout < 0:
                 raise ValueError("timeout must be non-negative")
             wanted = {each if isinstance(each, int) else each.fileno() for each in (*lists[0], *lists[1], *lists[2])}
             empty: tuple[list[Any], list[Any], list[Any]] = [], [], []
-            _real_select(*lists, 0)  # says what is wrong with the arguments
+            select.select(*lists, 0)  # says what is wrong with the arguments
 
             def look(block_ms: int) -> Any:
-                found = _real_select(*lists, block_ms / 1000)
+                found = select.select(*lists, block_ms / 1000)
                 return found if any(found) else None
 
             return self.wait(look, timeout, wanted) or empty
@@ -251,18 +247,18 @@ class Files:
             if descriptor in ports:
                 return ports[descriptor].read(length)
             self.wait_for_pipe(descriptor, select.POLLIN)
-            return bytes(_real_read(descriptor, length))
+            return bytes(os.read(descriptor, length))
 
         def write(descriptor: int, data: Any, /) -> int:
             if descriptor in ports:
                 return int(ports[descriptor].port.write(data))
             self.wait_for_pipe(descriptor, select.POLLOUT)
-            count: int = _real_write(descriptor, data)
+            count: int = os.write(descriptor, data)
             self._system.note_write(descriptor)
             return count
 
         def pipe() -> tuple[int, int]:
-            ends: tuple[int, int] = _real_pipe()
+            ends: tuple[int, int] = os.pipe()
             self.note_inside(*ends)
             return ends
 
@@ -272,15 +268,15 @@ class Files:
                 file.fill()
                 if request == termios.TIOCOUTQ and rest and isinstance(rest[0], bytes):
                     return struct.pack("i", file.port.out_waiting)
-            return _real_ioctl(fd, request, *rest)
+            return fcntl.ioctl(fd, request, *rest)
 
         def drain(fd: Any, /) -> None:
             file = ports.get(fd if isinstance(fd, int) else fd.fileno())
-            _real_drain(fd) if file is None else file.port.flush()
+            termios.tcdrain(fd) if file is None else file.port.flush()
 
         def flush(fd: Any, queue: int, /) -> None:
             file = ports.get(fd if isinstance(fd, int) else fd.fileno())
-            _real_flush(fd, queue)
+            termios.tcflush(fd, queue)
             if file is not None and queue in (termios.TCIFLUSH, termios.TCIOFLUSH):
                 file.port.reset_input_buffer()
             if file is not None and queue in (termios.TCOFLUSH, termios.TCIOFLUSH):
@@ -315,7 +311,12 @@ class Files:
             _file_methods["close"](file)
 
         reads = {name: reading(name) for name in ("read", "readinto")}
-        of_file = {**reads, "readall": read_all, "write": write_file, "close": close_file}
+        of_file: dict[str, Callable[..., Any]] = {
+            **reads,
+            "readall": read_all,
+            "write": write_file,
+            "close": close_file,
+        }
         return {
             "_io.FileIO": {
                 name: for_program(scheduler, method, _file_methods[name]) for name, method in of_file.items()

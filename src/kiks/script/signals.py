@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import os
 import signal
-import sys
 import threading
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -14,7 +13,6 @@ from types import FrameType
 from typing import Any
 
 import kiks
-from kiks.script.cpython import unchanged
 from kiks.script.thread_scheduler import SIGNALLED, Scheduler, timeout_ns
 from kiks.sim.read_completion import NEVER_NS
 from kiks.units import s_from_ns
@@ -24,14 +22,6 @@ EXIT_OF_SIGNAL = 128
 
 _HERE = os.path.dirname(kiks.__file__)
 _ROOT = Scheduler.start.__code__.co_filename
-
-_signal: Any = sys.modules["_signal"]
-_real_signal, _real_getsignal, _real_wakeup = (
-    unchanged(each) for each in (_signal.signal, _signal.getsignal, _signal.set_wakeup_fd)
-)
-_real_mask, _real_pending, _real_wait = (
-    unchanged(each) for each in (_signal.pthread_sigmask, _signal.sigpending, _signal.sigtimedwait)
-)
 
 
 class Signals:
@@ -61,7 +51,7 @@ class Signals:
         before = {
             number: handler
             for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-            if (handler := _real_getsignal(number)) is signal.default_int_handler
+            if (handler := signal.getsignal(number)) is signal.default_int_handler
         }
         for name, handler in before.items():
             self._set(name, handler)
@@ -69,7 +59,7 @@ class Signals:
             yield
         finally:
             for changed, handler in self._before.items():
-                _real_signal(changed, handler)
+                signal.signal(changed, handler)
 
     def replacements(self) -> dict[str, dict[str, Any]]:
         """Return the replacements for names of `signal`."""
@@ -83,7 +73,7 @@ class Signals:
                 "getitimer": self._get_timer,
                 "pause": self._pause,
                 "pthread_sigmask": self._set_mask,
-                "sigpending": lambda: self._pending | _real_pending(),
+                "sigpending": lambda: self._pending | signal.sigpending(),
                 "sigwait": lambda signals, /: self._wait_for(signals, NEVER_NS),
                 "sigwaitinfo": lambda signals, /: _told(self._wait_for(signals, NEVER_NS)),
                 "sigtimedwait": self._wait_until,
@@ -94,17 +84,17 @@ class Signals:
 
     def _set(self, number: int, handler: Any, /) -> Any:
         before = self._get(number)
-        self._before.setdefault(number, _real_getsignal(number))
-        _real_signal(number, self._come if callable(handler) else handler)
+        self._before.setdefault(number, signal.getsignal(number))
+        signal.signal(number, self._come if callable(handler) else handler)
         self._handlers[number] = handler
         return before
 
     def _get(self, number: int, /) -> Any:
-        return self._handlers[number] if number in self._handlers else _real_getsignal(number)
+        return self._handlers[number] if number in self._handlers else signal.getsignal(number)
 
     def _set_wakeup(self, descriptor: int, /, **options: Any) -> int:
         self._wakeup = descriptor
-        return int(_real_wakeup(descriptor, **options))
+        return signal.set_wakeup_fd(descriptor, **options)
 
     def _set_timer(self, which: int, seconds: float, interval: float = 0.0, /) -> tuple[float, float]:
         self._check_timer(which)
@@ -125,8 +115,8 @@ class Signals:
             )
 
     def _set_mask(self, how: int, mask: Iterable[int], /) -> set[int]:
-        before: set[int] = _real_mask(how, mask)
-        for number in sorted(self._pending - _real_mask(signal.SIG_BLOCK, ())):
+        before: set[int] = signal.pthread_sigmask(how, mask)
+        for number in sorted(self._pending - signal.pthread_sigmask(signal.SIG_BLOCK, ())):
             self._pending.remove(number)
             self._raise(number)
         return before
@@ -182,7 +172,7 @@ class Signals:
 
     def _raise(self, number: int) -> None:
         """Deliver a simulated signal."""
-        if number in _real_mask(signal.SIG_BLOCK, ()):
+        if number in signal.pthread_sigmask(signal.SIG_BLOCK, ()):
             self._pending.add(number)
             for task in self._scheduler.waiting_for("a signal"):
                 self._scheduler.wake(task, None)
@@ -213,7 +203,7 @@ class _SignalWait:
 
     def is_over(self, block_ms: int) -> bool:
         """Return whether one has come."""
-        found = _real_wait(self._wanted, block_ms / 1000)
+        found = signal.sigtimedwait(self._wanted, block_ms / 1000)
         self.number = found.si_signo if found is not None else 0
         return bool(self.number)
 

@@ -12,7 +12,6 @@ import socket
 import weakref
 from typing import Any
 
-from kiks.script.cpython import unchanged
 from kiks.script.file_waits import Files
 from kiks.script.patching import for_program
 from kiks.script.refusals import refuse_network
@@ -26,7 +25,6 @@ EVENTS = frozenset(
 _READS = ("recv", "recv_into", "recvfrom", "recvfrom_into", "recvmsg", "recvmsg_into", "_accept")
 _WRITES = ("send", "sendto", "sendmsg")
 _methods = dict(vars(_socket.socket))
-_new_pair = unchanged(_socket.socketpair)
 
 # Sockets of the program that have an address of their own.
 _own: weakref.WeakSet[Any] = weakref.WeakSet()
@@ -113,7 +111,7 @@ def replacements(scheduler: Scheduler, files: Files) -> dict[str, dict[str, Any]
         files.note_inside(sock.fileno())
 
     def socketpair(*args: Any) -> Any:
-        pair = _new_pair(*args)
+        pair = _socket.socketpair(*args)
         files.note_inside(*(each.fileno() for each in pair))
         return pair
 

@@ -8,8 +8,6 @@ from typing import Any
 
 from kiks.script.libraries.host import BLINK_S, Host, refuse_keyboard
 
-_real_sleep = time.sleep
-
 
 def adapt(curses: ModuleType, host: Host) -> dict[Any, dict[str, Any]]:
     """Return what stands in for names of `curses`."""
@@ -65,7 +63,7 @@ def adapt(curses: ModuleType, host: Host) -> dict[Any, dict[str, Any]]:
             if delay_ms is None:
                 refuse_keyboard(scheduler)
                 while not self._has_key():
-                    _real_sleep(BLINK_S)
+                    time.sleep(BLINK_S)
             elif delay_ms:
                 clock.sleep(delay_ms / 1000)
             else:

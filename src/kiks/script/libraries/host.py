@@ -7,7 +7,6 @@ import sys
 from typing import Any, NamedTuple
 
 from kiks.script.chance import Chance
-from kiks.script.cpython import unchanged
 from kiks.script.file_waits import is_readable
 from kiks.script.refusals import refuse
 from kiks.script.thread_scheduler import Scheduler
@@ -27,12 +26,11 @@ class Host(NamedTuple):
 
 def keyboard(host: Host) -> dict[str, dict[str, Any]]:
     """Return what stands in for `input`."""
-    real_input = unchanged(builtins.input)
 
     def read_line(prompt: object = "", /) -> str:
         if sys.stdin is not None and sys.stdin.isatty() and not is_readable(sys.stdin.fileno(), 0):
             refuse_keyboard(host.scheduler)
-        return str(real_input(prompt))
+        return str(builtins.input(prompt))
 
     return {"builtins": {"input": read_line}}
 

@@ -15,7 +15,6 @@ NS_PER_MS = 1_000_000
 FPS_FRAMES = 10
 """Number of frames that `Clock.get_fps` averages."""
 
-_real_sleep = time.sleep
 _waiting: list[Task] = []
 
 
@@ -111,7 +110,7 @@ def adapt_events(module: ModuleType, host: Host) -> dict[Any, dict[str, Any]]:
                 _waiting.remove(task)
             if cause is STUCK:
                 # Only a person can go on.
-                _real_sleep(BLINK_S)
+                time.sleep(BLINK_S)
         return event
 
     return {module: {"post": post, "wait": wait}}

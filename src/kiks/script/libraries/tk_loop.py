@@ -12,7 +12,6 @@ from kiks.script.thread_scheduler import STUCK, Task
 from kiks.sim.read_completion import NEVER_NS
 from kiks.units import NS_PER_S
 
-_real_sleep = time.sleep
 _DONT_WAIT = 1 << 1
 """TCL_DONT_WAIT of Tcl (tcl.h)."""
 
@@ -67,7 +66,7 @@ class _Timers:
             self._loops.remove(task)
         if cause is STUCK:
             # Only a person can go on.
-            _real_sleep(BLINK_S)
+            time.sleep(BLINK_S)
 
 
 def adapt(tkinter: ModuleType, host: Host) -> dict[Any, dict[str, Any]]:
