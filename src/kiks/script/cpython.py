@@ -14,7 +14,8 @@ import gc
 import sys
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from types import BuiltinFunctionType, ModuleType
 from typing import TYPE_CHECKING, Any
 
@@ -102,6 +103,18 @@ def _flags(owner: type) -> ctypes.c_ulong:
     return ctypes.c_ulong.from_address(id(owner) + _FLAGS_OFFSET)
 
 
+@contextmanager
+def uncollected() -> Iterator[None]:
+    """Collect no garbage meanwhile: what finalizes it would find classes that are changed by half."""
+    was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_enabled:
+            gc.enable()
+
+
 class Undo:
     """Takes changes back, the last one first."""
 
@@ -114,8 +127,9 @@ class Undo:
 
     def __call__(self) -> None:
         """Take all changes back."""
-        while self._steps:
-            self._steps.pop()()
+        with uncollected():
+            while self._steps:
+                self._steps.pop()()
 
 
 def change_function(function: BuiltinFunctionType, body: Callable[..., Any], undo: Undo) -> None:
