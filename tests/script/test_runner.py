@@ -200,6 +200,28 @@ def test_other_threads_of_this_process_live_in_real_time(run: Run, tmp_path: Pat
     assert before_s - 60 < told[0] < time.time() + 60
 
 
+def test_each_thread_has_its_own_event_loop(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("""
+        import asyncio, threading, time
+        async def work():
+            me = asyncio.current_task()
+            for _ in range(3):
+                await asyncio.sleep(0.1)
+                time.sleep(0.05)
+                assert asyncio.current_task() is me
+        async def main():
+            threads = [threading.Thread(target=lambda: asyncio.run(work())) for _ in range(2)]
+            for thread in threads: thread.start()
+            me = asyncio.current_task()
+            time.sleep(0.02)
+            assert asyncio.current_task() is me
+            await asyncio.sleep(1)
+            print([thread.is_alive() for thread in threads])
+        asyncio.run(main())
+    """)[:2] == (0, 1.02)
+    assert capsys.readouterr().out == "[False, False]\n"
+
+
 def test_thinking_of_threads_is_charged(tmp_path: Path) -> None:
     counted = """
         import queue, serial, threading

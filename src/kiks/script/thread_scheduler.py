@@ -96,7 +96,7 @@ class Scheduler:
         tasks: Started threads that have not ended, by ident.
         lock_count: Number of free locks that the running thread has taken since it went on.
         os_thread: The thread of the operating system that runs the program; 0 when none does.
-        carried: Functions that save and restore values that libraries keep per thread of the operating system.
+        carried: Functions that take away, and put back, values that libraries keep per thread of the operating system.
     """
 
     def __init__(self, world: Line, program: ProgramClock) -> None:
@@ -142,7 +142,7 @@ class Scheduler:
         self._hub = greenlet.getcurrent()
         self._main.greenlet = greenlet.greenlet(run_main, self._hub)
         self.program.waiting = self._main.waiting
-        self._main.greenlet.switch()
+        self._switch(self._main)
         # What libraries in C keep of this program must not take later callers for it.
         self.os_thread = 0
         if self.tasks or not self._main.greenlet.dead:
@@ -332,14 +332,18 @@ class Scheduler:
         chosen = self._choose()
         self._is_choosing = False
         if chosen is not task:
-            saved = [take() for take, _ in self.carried]
-            chosen.greenlet.switch()
-            for (_, put), value in zip(self.carried, saved, strict=True):
-                put(value)
+            self._switch(chosen)
         if thinks:
             self.program.go_on()
         while self._calls and task is self._main:
             self._calls.popleft()()
+
+    def _switch(self, task: Task) -> None:
+        """Let a thread go on, which finds no values of this one; return when this one goes on."""
+        saved = [take() for take, _ in self.carried]
+        task.greenlet.switch()
+        for (_, put), value in zip(self.carried, saved, strict=True):
+            put(value)
 
     def _choose(self) -> Task:
         """Return the next thread; let time pass until one is ready."""
