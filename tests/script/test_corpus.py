@@ -12,7 +12,7 @@ import shlex
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -61,12 +61,17 @@ Runs = dict[str, tuple[str, str]]
 def environment() -> Iterator[dict[str, str]]:
     """What programs find in their environment: a screen for windows and none for sound."""
     with display() as found:
-        yield {**found, "SDL_AUDIODRIVER": "dummy", "PYTHONUNBUFFERED": "1"}
+        yield on_screen(found)
 
 
-def run_alone(folder: Path, environment: Mapping[str, str]) -> tuple[Runs, Runs]:
+def on_screen(environment: Mapping[str, str]) -> dict[str, str]:
+    """Return the environment of programs on a screen: they have no sound, and write at once."""
+    return {**environment, "SDL_AUDIODRIVER": "dummy", "PYTHONUNBUFFERED": "1"}
+
+
+def run_alone(folder: Path, environment: Mapping[str, str], again: Collection[str]) -> tuple[Runs, Runs]:
     """Run each program by `kiks run`, some twice; return what it said each time, with the state at its end."""
-    runs = {f"{name}.{time}": name for name in CORPUS for time in (1, 2) if time == 1 or name in AGAIN}
+    runs = {f"{name}.{time}": name for name in CORPUS for time in (1, 2) if time == 1 or name in again}
     plain = [shlex.join([run, CORPUS[name]]) for run, name in runs.items() if name not in WITH_TERMINAL]
     command = [sys.executable, EACH_ALONE, str(folder), str(AT_ONCE), "--seed", SEED, "--", *plain]
     subprocess.run(command, env=dict(environment), timeout=280, check=True, stdin=subprocess.DEVNULL)
@@ -76,9 +81,9 @@ def run_alone(folder: Path, environment: Mapping[str, str]) -> tuple[Runs, Runs]
             for name in names
             if name not in WITH_TERMINAL
         }
-        for time, names in ((1, CORPUS), (2, AGAIN))
+        for time, names in ((1, CORPUS), (2, again))
     )
-    for runs, names in ((first, CORPUS), (second, AGAIN)):
+    for runs, names in ((first, CORPUS), (second, again)):
         for name in WITH_TERMINAL.intersection(names):
             words = [sys.executable, ON_TERMINAL, *KIKS, "run", "--seed", SEED, CORPUS[name]]
             done = subprocess.run(words, env=dict(environment), timeout=GUARD_S, check=True, stdout=PIPE, text=True)
@@ -92,7 +97,7 @@ def run_alone(folder: Path, environment: Mapping[str, str]) -> tuple[Runs, Runs]
 
 @pytest.fixture(scope="module")
 def alone(tmp_path_factory: pytest.TempPathFactory, environment: dict[str, str]) -> tuple[Runs, Runs]:
-    return run_alone(tmp_path_factory.mktemp("alone"), environment)
+    return run_alone(tmp_path_factory.mktemp("alone"), environment, AGAIN)
 
 
 def printed(run: Runs) -> dict[str, str]:

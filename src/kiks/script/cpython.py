@@ -11,10 +11,13 @@ from __future__ import annotations
 import _thread
 import ctypes
 import gc
+import mmap
 import sys
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from itertools import count
 from types import BuiltinFunctionType, ModuleType
 from typing import TYPE_CHECKING, Any
 
@@ -102,6 +105,18 @@ def _flags(owner: type) -> ctypes.c_ulong:
     return ctypes.c_ulong.from_address(id(owner) + _FLAGS_OFFSET)
 
 
+@contextmanager
+def uncollected() -> Iterator[None]:
+    """Collect no garbage meanwhile: what finalizes it would find classes that are changed by half."""
+    was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_enabled:
+            gc.enable()
+
+
 class Undo:
     """Takes changes back, the last one first."""
 
@@ -114,8 +129,9 @@ class Undo:
 
     def __call__(self) -> None:
         """Take all changes back."""
-        while self._steps:
-            self._steps.pop()()
+        with uncollected():
+            while self._steps:
+                self._steps.pop()()
 
 
 def change_function(function: BuiltinFunctionType, body: Callable[..., Any], undo: Undo) -> None:
@@ -170,6 +186,29 @@ def change_class(owner: type, name: str, value: Any, undo: Undo) -> None:
 
 
 # ---- threads ----
+
+FIRST_IDENT = 1 << 32
+"""`threading.get_ident` of the first thread that a program starts."""
+
+IDENT_STEP, IDENT_COUNT = 4096, 1 << 16
+"""Distance between two of them [bytes], more than what the C library keeps of a thread, and their number."""
+
+_PLACED = 0x02 | 0x20 | 0x4000 | 0x100000
+"""MAP_PRIVATE, MAP_ANONYMOUS, MAP_NORESERVE and MAP_FIXED_NOREPLACE of Linux (sys/mman.h)."""
+
+
+def new_idents() -> Iterator[int]:
+    """Return the identities of a program's threads.
+
+    Libraries in C take such a number for the address of what the C library knows of a thread (`pthread_t`), for example
+    to give the thread a name. So there is memory at these addresses, full of zeros: a thread that has ended.
+    """
+    if sys.platform == "linux":
+        map_memory = ctypes.CDLL(None).mmap
+        map_memory.argtypes = [ctypes.c_void_p, ctypes.c_size_t, *[ctypes.c_int] * 3, ctypes.c_long]
+        map_memory(FIRST_IDENT, IDENT_STEP * IDENT_COUNT, mmap.PROT_READ | mmap.PROT_WRITE, _PLACED, -1, 0)
+    return count(FIRST_IDENT, IDENT_STEP)
+
 
 _HAS_HANDLES = sys.version_info >= (3, 13)
 

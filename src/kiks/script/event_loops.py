@@ -11,6 +11,27 @@ from typing import Any
 
 from kiks.script.thread_scheduler import Scheduler
 
+_enter_task, _leave_task = asyncio._enter_task, asyncio._leave_task
+"""What asyncio has for those who extend it, around each step of a task."""
+
+
+def _take() -> tuple[Any, Any]:
+    """Take the running loop and the task that it runs away from this thread."""
+    loop = asyncio._get_running_loop()
+    task = None if loop is None else asyncio.current_task(loop)
+    if loop is not None and task is not None:
+        _leave_task(loop, task)
+    asyncio._set_running_loop(None)
+    return loop, task
+
+
+def _put(taken: tuple[Any, Any]) -> None:
+    """Put them back."""
+    loop, task = taken
+    asyncio._set_running_loop(loop)
+    if task is not None:
+        _enter_task(loop, task)
+
 
 def replacements(scheduler: Scheduler) -> dict[str, dict[str, Any]]:
     """Return the replacements for names of `asyncio` and `concurrent.futures`, by module.
@@ -18,7 +39,7 @@ def replacements(scheduler: Scheduler) -> dict[str, dict[str, Any]]:
     Args:
         scheduler: The program's threads; each gets a running loop of its own.
     """
-    scheduler.carried.append((asyncio._get_running_loop, asyncio._set_running_loop))
+    scheduler.carried.append((_take, _put))
 
     class Local(local):
         """The loop of each thread."""
@@ -37,7 +58,8 @@ def replacements(scheduler: Scheduler) -> dict[str, dict[str, Any]]:
         return known[key][0]
 
     return {
-        "asyncio.events.BaseDefaultEventLoopPolicy": {"_Local": Local},
+        # Its name begins with an underscore from 3.14 on.
+        **{f"asyncio.events.{name}DefaultEventLoopPolicy": {"_Local": Local} for name in ("Base", "_Base")},
         "asyncio.events": {"_event_loop_policy": None},
         "asyncio.Future": {"__hash__": hash_by_number},
         "asyncio.Task": {"__hash__": hash_by_number},

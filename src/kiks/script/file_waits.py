@@ -117,13 +117,16 @@ class _Wait:
         self._files = files
         self._look = look
         self._descriptors = descriptors
+        # What was ready when somebody looked last: an event may be told only once.
+        self.found: Any = None
 
     @property
     def is_inside(self) -> bool:
         return self._descriptors is not None and self._files.are_inside(self._descriptors)
 
     def is_over(self, block_ms: int) -> bool:
-        return bool(self._look(block_ms))
+        self.found = self._look(block_ms)
+        return bool(self.found)
 
 
 class Files:
@@ -199,13 +202,15 @@ class Files:
         while True:
             ports = [each for each in ports if each.descriptor in self._ports]
             arrived = _fill(ports)
-            found = look(0)
-            if found or scheduler.world.now_ns >= deadline_ns:
-                return found
+            if files.is_over(0) or scheduler.world.now_ns >= deadline_ns:
+                break
             # One more character at any of the ports can end the wait.
             reads = [Read(each.line.robot, count + 1) for each, count in zip(ports, arrived, strict=True)]
             scheduler.wait("files", until_ns=deadline_ns, reads=reads, files=files)
             scheduler.program.waiting.act()
+            if files.found:
+                break
+        return files.found  # type: ignore[no-any-return]
 
     def wait_for(self, descriptor: int, events: int, timeout_s: float | None = None) -> bool:
         """Wait until a file is ready; return whether it is."""
@@ -225,9 +230,9 @@ class Files:
             lists = list(rlist), list(wlist), list(xlist)
             if timeout is not None and timeout < 0:
                 raise ValueError("timeout must be non-negative")
+            select.select(*lists, 0)  # says what is wrong with the arguments
             wanted = {each if isinstance(each, int) else each.fileno() for each in (*lists[0], *lists[1], *lists[2])}
             empty: tuple[list[Any], list[Any], list[Any]] = [], [], []
-            select.select(*lists, 0)  # says what is wrong with the arguments
 
             def look(block_ms: int) -> Any:
                 found = select.select(*lists, block_ms / 1000)

@@ -10,7 +10,7 @@ from types import BuiltinFunctionType
 from typing import Any
 
 from kiks.script.callers import Caller, caller
-from kiks.script.cpython import Undo, change_class, change_function, unchanged
+from kiks.script.cpython import Undo, change_class, change_function, unchanged, uncollected
 from kiks.script.thread_scheduler import Scheduler
 
 Replacements = Mapping[str, Mapping[str, Any]]
@@ -46,22 +46,27 @@ def replaced(replacements: Replacements, scheduler: Scheduler) -> Iterator[None]
     """
     undo = Undo()
     try:
-        for path, names in replacements.items():
-            owner = _find(path)
-            for name, value in names.items():
-                before = vars(owner).get(name, _MISSING) if owner is not None else _MISSING
-                if isinstance(owner, type):
-                    change_class(owner, name, value, undo)
-                elif before is _MISSING:
-                    continue
-                elif isinstance(before, BuiltinFunctionType) and (callable(value) or isinstance(value, Reading)):
-                    change_function(before, for_program(scheduler, value, unchanged(before)), undo)
-                else:
-                    undo.add(partial(setattr, owner, name, before))
-                    setattr(owner, name, value)
+        with uncollected():
+            _change(replacements, scheduler, undo)
         yield
     finally:
         undo()
+
+
+def _change(replacements: Replacements, scheduler: Scheduler, undo: Undo) -> None:
+    for path, names in replacements.items():
+        owner = _find(path)
+        for name, value in names.items():
+            before = vars(owner).get(name, _MISSING) if owner is not None else _MISSING
+            if isinstance(owner, type):
+                change_class(owner, name, value, undo)
+            elif before is _MISSING:
+                continue
+            elif isinstance(before, BuiltinFunctionType) and (callable(value) or isinstance(value, Reading)):
+                change_function(before, for_program(scheduler, value, unchanged(before)), undo)
+            else:
+                undo.add(partial(setattr, owner, name, before))
+                setattr(owner, name, value)
 
 
 def for_program(

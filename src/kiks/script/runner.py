@@ -11,6 +11,7 @@ from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, NoReturn
+from weakref import WeakSet
 
 from kiks.clock.program_clock import ProgramClock
 from kiks.errors import KiksError
@@ -129,6 +130,7 @@ def run_program(
     chance, system = Chance(scheduler, seed), FileSystem(scheduler, offered)
     host, files = Host(scheduler, clock, chance), Files(scheduler, system)
     ends, signals = _AtExit(), Signals(scheduler)
+    opened: WeakSet[Any] = WeakSet()
 
     def end_at_once(code: int) -> None:
         sys.stdout.flush()
@@ -142,7 +144,7 @@ def run_program(
         files.replacements(),
         socket_waits.replacements(scheduler, files),
         chance.replacements(),
-        serial_ports.replacements(open_port, files, offered),
+        serial_ports.replacements(open_port, files, offered, opened),
         event_loops.replacements(scheduler),
         signals.replacements(),
         unsupported.replacements(scheduler),
@@ -171,6 +173,7 @@ def run_program(
             signals.taken(),
             chance.taken(),
             replaced(replacements, scheduler),
+            serial_ports.left_open(opened),
             adapted(host),
             unsupported.watched(scheduler, system),
         ):

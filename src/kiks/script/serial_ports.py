@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import errno
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, MutableSet, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 from kiks.ports import url as urls
@@ -28,8 +29,18 @@ USB_ADAPTER = (0x0403, 0x6001)
 """Vendor and product of the most common adapter from USB to a serial line, FTDI's FT232: programs look for it."""
 
 
+@contextmanager
+def left_open(ports: MutableSet[Any]) -> Iterator[None]:
+    """Leave ports that a program has not closed to the end of its process, for pyserial's own `close` finds nothing."""
+    try:
+        yield
+    finally:
+        for port in ports:
+            port.is_open = False
+
+
 def replacements(
-    open_port: Callable[[str], VirtualPort], ports: Files, names: Sequence[str]
+    open_port: Callable[[str], VirtualPort], ports: Files, names: Sequence[str], opened: MutableSet[Any]
 ) -> dict[str, dict[str, Any]]:
     """Return what stands in for names of `serial`, by module.
 
@@ -37,6 +48,7 @@ def replacements(
         open_port: Returns the port behind a name.
         ports: Where ports get their file descriptors.
         names: Port names that a program finds when it looks for ports, one a robot.
+        opened: Gets the ports that it opens.
     """
     import serial
     import serial.rfc2217
@@ -50,6 +62,10 @@ def replacements(
         """The methods of a port in a program: besides the robot's, those that need the program's descriptors."""
 
         _descriptor: int | None = None
+
+        def open(self) -> None:
+            RobotPort.open(self)
+            opened.add(self)
 
         def _reconfigure_port(self, force_update: bool = False) -> None:
             if self._exclusive:

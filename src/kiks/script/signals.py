@@ -92,9 +92,10 @@ class Signals:
     def _get(self, number: int, /) -> Any:
         return self._handlers[number] if number in self._handlers else signal.getsignal(number)
 
-    def _set_wakeup(self, descriptor: int, /, **options: Any) -> int:
-        self._wakeup = descriptor
-        return signal.set_wakeup_fd(descriptor, **options)
+    def _set_wakeup(self, descriptor: int, /, *, warn_on_full_buffer: bool = True) -> int:
+        # The descriptor that the operating system knows is KiKS's own.
+        before, self._wakeup = self._wakeup, descriptor
+        return before
 
     def _set_timer(self, which: int, seconds: float, interval: float = 0.0, /) -> tuple[float, float]:
         self._check_timer(which)
@@ -177,17 +178,22 @@ class Signals:
             for task in self._scheduler.waiting_for("a signal"):
                 self._scheduler.wake(task, None)
             return
+        self._wake(number)
         handler = self._get(number)
-        if self._wakeup >= 0:
-            with contextlib.suppress(OSError):
-                os.write(self._wakeup, bytes([number]))
         if handler == signal.SIG_DFL:
             self._scheduler.end(EXIT_OF_SIGNAL + number, f"the program was ended by signal {number}.")
         elif callable(handler):
             self._scheduler.interrupt(partial(handler, number, None), at_once=False)
 
+    def _wake(self, number: int) -> None:
+        """Write a signal where the program, or its event loop, looks for it."""
+        if self._wakeup >= 0:
+            with contextlib.suppress(OSError):
+                os.write(self._wakeup, bytes([number]))
+
     def _come(self, number: int, frame: FrameType | None) -> None:
         """Handle a signal of the operating system, in the running thread."""
+        self._wake(number)
         handler = self._handlers.get(number, signal.default_int_handler)
         self._scheduler.interrupt(partial(handler, number, frame), at_once=_is_in_program(frame))
 

@@ -14,7 +14,7 @@ import threading
 import traceback
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from itertools import count
 from typing import Any, NoReturn, Protocol
 
@@ -22,14 +22,10 @@ import greenlet
 
 from kiks.clock.program_clock import PollCost, ProgramClock
 from kiks.model.checks import SECONDS_MAX
-from kiks.script.cpython import unchanged
+from kiks.script.cpython import new_idents, unchanged
 from kiks.sim.port import Line
 from kiks.sim.read_completion import NEVER_NS, Read
 from kiks.units import wait_ns
-
-TASK_IDENT = 1 << 20
-"""`threading.get_ident` of the first thread that a program starts."""
-
 
 SIGNALLED, COMPLETE, ALONE, STUCK = object(), object(), object(), object()
 """Reasons for which a thread goes on: a signal; a complete read; no other thread can go on before its read is complete;
@@ -97,7 +93,7 @@ class Scheduler:
         tasks: Started threads that have not ended, by ident.
         lock_count: Number of free locks that the running thread has taken since it went on.
         os_thread: The thread of the operating system that runs the program; 0 when none does.
-        carried: Functions that save and restore values that libraries keep per thread of the operating system.
+        carried: Functions that take away, and put back, values that libraries keep per thread of the operating system.
     """
 
     def __init__(self, world: Line, program: ProgramClock) -> None:
@@ -107,7 +103,7 @@ class Scheduler:
         self.os_thread = get_ident()
         self._hub = greenlet.getcurrent()
         self._end: EndedError | None = None
-        self._idents = count(TASK_IDENT)
+        self._new_idents, self._free_idents = new_idents(), list[int]()
         self._numbers = count(1)
         # Functions that the main thread must call, for signals, and whether the next thread is being chosen.
         self._calls: deque[Callable[[], object]] = deque()
@@ -143,7 +139,7 @@ class Scheduler:
         self._hub = greenlet.getcurrent()
         self._main.greenlet = greenlet.greenlet(run_main, self._hub)
         self.program.waiting = self._main.waiting
-        self._main.greenlet.switch()
+        self._switch(self._main)
         # What libraries in C keep of this program must not take later callers for it.
         self.os_thread = 0
         if self.tasks or not self._main.greenlet.dead:
@@ -171,15 +167,18 @@ class Scheduler:
             except Exception:
                 # `threading` handles exceptions of its threads; this is a thread of `_thread`, which prints them.
                 traceback.print_exc()
-            if task.sentinel is not None and task.sentinel.locked():
-                task.sentinel.release()
+            if task.sentinel is not None:
+                with suppress(RuntimeError):
+                    task.sentinel.release()
             del self.tasks[task.ident]
+            heapq.heappush(self._free_idents, task.ident)
             # When a greenlet ends, its parent goes on: the next thread.
             self._is_choosing = True
             task.greenlet.parent = self._choose().greenlet
             self._is_choosing = False
 
-        task = Task(next(self._idents), run, self._hub)
+        ident = heapq.heappop(self._free_idents) if self._free_idents else next(self._new_idents)
+        task = Task(ident, run, self._hub)
         self.tasks[task.ident] = task
         self._ready.append(task)
         return task
@@ -333,14 +332,18 @@ class Scheduler:
         chosen = self._choose()
         self._is_choosing = False
         if chosen is not task:
-            saved = [take() for take, _ in self.carried]
-            chosen.greenlet.switch()
-            for (_, put), value in zip(self.carried, saved, strict=True):
-                put(value)
+            self._switch(chosen)
         if thinks:
             self.program.go_on()
         while self._calls and task is self._main:
             self._calls.popleft()()
+
+    def _switch(self, task: Task) -> None:
+        """Let a thread go on, which finds no values of this one; return when this one goes on."""
+        saved = [take() for take, _ in self.carried]
+        task.greenlet.switch()
+        for (_, put), value in zip(self.carried, saved, strict=True):
+            put(value)
 
     def _choose(self) -> Task:
         """Return the next thread; let time pass until one is ready."""

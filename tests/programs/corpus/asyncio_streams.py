@@ -39,7 +39,8 @@ async def main():
     began = time.monotonic()
     watching = asyncio.create_task(watch(robot, seen))
     try:
-        print(await asyncio.wait_for(steer(robot), timeout=10))
+        # A task, so that it takes its turn after `watching`, as in each version of Python.
+        print(await asyncio.wait_for(asyncio.create_task(steer(robot)), timeout=10))
     finally:
         watching.cancel()
         print(await asyncio.gather(watching, return_exceptions=True))
