@@ -11,10 +11,12 @@ from __future__ import annotations
 import _thread
 import ctypes
 import gc
+import mmap
 import sys
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from itertools import count
 from types import BuiltinFunctionType, ModuleType
 from typing import TYPE_CHECKING, Any
 
@@ -171,7 +173,29 @@ def change_class(owner: type, name: str, value: Any, undo: Undo) -> None:
 
 # ---- threads ----
 
+_IDENTS, _IDENT_STEP, _IDENT_SPACE = 1 << 44, 1 << 12, 1 << 28
+"""`threading.get_ident` of the first thread that a program starts, the step to the next one, and their space."""
+
+_MAP_FIXED_NOREPLACE = 0x100000
+"""Of mmap of Linux (asm-generic/mman-common.h)."""
+
 _HAS_HANDLES = sys.version_info >= (3, 13)
+
+
+def thread_idents() -> Iterator[int]:
+    """Return the idents of threads: the same in each run.
+
+    Code in C may take an ident for the address of a `pthread_t`. It finds memory there, with zeros: a thread that has
+    ended.
+    """
+    map_memory = ctypes.CDLL(None).mmap
+    map_memory.argtypes = [ctypes.c_void_p, ctypes.c_size_t, *[ctypes.c_int] * 3, ctypes.c_long]
+    if sys.platform == "linux":
+        reading_and_writing = mmap.PROT_READ | mmap.PROT_WRITE
+        private_and_empty = mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS
+        # Memory that is mapped there already stays as it is: it is this, or not needed.
+        map_memory(_IDENTS, _IDENT_SPACE, reading_and_writing, private_and_empty | _MAP_FIXED_NOREPLACE, -1, 0)
+    return count(_IDENTS, _IDENT_STEP)
 
 
 def thread_starts(scheduler: Scheduler) -> dict[str, dict[str, Any]]:
