@@ -539,8 +539,8 @@ def test_what_kiks_computes_is_not_told(
 
 def test_a_wait_in_code_in_c_ends_the_process_that_it_never_leaves(tmp_path: Path) -> None:
     (tmp_path / "waits.py").write_text(
-        "import signal\nsignal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGALRM])\n"
-        "signal.setitimer(signal.ITIMER_REAL, 0.5)\nsignal.sigwait([signal.SIGALRM])\n"
+        "import ctypes\nnone = ctypes.create_string_buffer(128)\n"
+        "found = ctypes.c_int()\nctypes.CDLL(None).sigwait(none, ctypes.byref(found))\n"
     )
     head = "from pathlib import Path\nfrom kiks.script import watchdog\nfrom kiks.script.runner import run_here\n"
     script = (
