@@ -26,6 +26,8 @@ from kiks.script.thread_scheduler import Scheduler
 _FORKS = frozenset({"os.fork", "os.forkpty"})
 _STARTS = frozenset({"subprocess.Popen", "os.system", "os.posix_spawn", "os.exec", "os.spawn"})
 _OTHER_LOOPS = frozenset({"uvloop", "gevent", "eventlet"})
+_OTHER_CLOCKS = frozenset({"time_machine"})
+"""Modules that change functions in C as KiKS does, each in ignorance of the other."""
 _DEVICE = re.compile(r"/dev/(tty(?!$)|cu\.|serial/|rfcomm)")
 # A command of Python, at the beginning of a line of a shell or of one of its parts.
 _PYTHON = re.compile(r"(^|[;&|(]|/sh -c )\s*((env|nohup|sudo|exec)\s+)*(\S*/)?((python|pypy)[\d.]*|\S+\.py)(\s|$)")
@@ -111,6 +113,8 @@ def _judge(scheduler: Scheduler, system: FileSystem, event: str, arguments: tupl
     elif event == "import":
         if arguments[0] in _OTHER_LOOPS:
             refuse(scheduler, "wait by Python's own event loops", f"it imported {arguments[0]}", "Use asyncio, or ")
+        if arguments[0] in _OTHER_CLOCKS:
+            refuse(scheduler, "leave Python's clocks alone", f"it imported {arguments[0]}")
     elif event in socket_waits.EVENTS:
         if not socket_waits.is_inside(event, arguments):
             refuse_network(scheduler, "it used the network")
