@@ -7,7 +7,6 @@ import random
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from types import ModuleType
 from typing import Any
 
 from kiks.script.patching import for_program
@@ -42,9 +41,9 @@ class Chance:
             if numpy_random is not None:
                 numpy_random.set_state(before[1])
 
-    def seed_numpy(self, module: ModuleType) -> None:
-        """Seed the generator that NumPy's functions share, which it seeds when it is imported."""
-        module.seed(random.Random(f"{self._seed} numpy").getrandbits(32))
+    def number(self, library: str, bits: int) -> int:
+        """Return a seed for the generator of a library, which it seeds by itself when it is imported."""
+        return random.Random(f"{self._seed} {library}").getrandbits(bits)
 
     def replacements(self) -> dict[str, dict[str, Any]]:
         """Return the replacements for names of `os` and `random`."""

@@ -246,7 +246,14 @@ class Files:
 
         def epoll(epoll: Any, timeout: float | None = None, maxevents: int = -1) -> list[tuple[int, int]]:
             timeout_s = None if timeout is None or timeout < 0 else timeout
-            return self.wait(lambda block_ms: _real_epoll(epoll, block_ms / 1000, maxevents), timeout_s)
+            found: list[tuple[int, int]] = []
+
+            def look(block_ms: int) -> list[tuple[int, int]]:
+                # The operating system may tell an event only once (EPOLLONESHOT, EPOLLET).
+                found[:] = found or _real_epoll(epoll, block_ms / 1000, maxevents)
+                return found
+
+            return self.wait(look, timeout_s)
 
         def read(descriptor: int, length: int, /) -> bytes:
             if descriptor in ports:

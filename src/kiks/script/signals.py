@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import signal
 import threading
+import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from types import FrameType
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import kiks
-from kiks.script.thread_scheduler import SIGNALLED, Scheduler, timeout_ns
+from kiks.script.thread_scheduler import SIGNALLED, Scheduler, Task, timeout_ns
 from kiks.sim.read_completion import NEVER_NS
 from kiks.units import s_from_ns
 
@@ -22,6 +25,12 @@ EXIT_OF_SIGNAL = 128
 
 _HERE = os.path.dirname(kiks.__file__)
 _ROOT = Scheduler.start.__code__.co_filename
+
+_OF_FAULTS = frozenset({signal.SIGBUS, signal.SIGFPE, signal.SIGILL, signal.SIGSEGV})
+"""Signals that a fault in C raises: they cannot wait."""
+
+_HARMLESS = frozenset({signal.SIGCHLD, signal.SIGCONT, signal.SIGURG, signal.SIGWINCH})
+"""Signals that do nothing where the program has no handler."""
 
 
 class Signals:
@@ -37,7 +46,10 @@ class Signals:
         # The handlers from before the program.
         self._before: dict[int, Any] = {}
         self._wakeup = -1
-        # Simulated signals that the program has blocked, and not yet waited for.
+        # What each thread has blocked; the main thread's counts. The operating system blocks nothing: it would give the
+        # signal to a thread of KiKS, or of a library, and end the process.
+        self._masks: WeakKeyDictionary[Task, set[int]] = WeakKeyDictionary()
+        # Signals that the program has blocked, and not yet waited for.
         self._pending: set[int] = set()
         # Number of the present alarm, its time [ns], and its interval [ns].
         self._alarm = (0, NEVER_NS, 0)
@@ -73,7 +85,7 @@ class Signals:
                 "getitimer": self._get_timer,
                 "pause": self._pause,
                 "pthread_sigmask": self._set_mask,
-                "sigpending": lambda: self._pending | signal.sigpending(),
+                "sigpending": lambda: set(self._pending),
                 "sigwait": lambda signals, /: self._wait_for(signals, NEVER_NS),
                 "sigwaitinfo": lambda signals, /: _told(self._wait_for(signals, NEVER_NS)),
                 "sigtimedwait": self._wait_until,
@@ -85,15 +97,17 @@ class Signals:
     def _set(self, number: int, handler: Any, /) -> Any:
         before = self._get(number)
         self._before.setdefault(number, signal.getsignal(number))
-        signal.signal(number, self._come if callable(handler) else handler)
+        is_heard = callable(handler) or (handler == signal.SIG_DFL and number in self._blocked - _OF_FAULTS)
+        signal.signal(number, self._come if is_heard else handler)
         self._handlers[number] = handler
         return before
 
     def _get(self, number: int, /) -> Any:
         return self._handlers[number] if number in self._handlers else signal.getsignal(number)
 
-    def _set_wakeup(self, descriptor: int, /, *, warn_on_full_buffer: bool = True) -> int:
-        # The descriptor that the operating system knows is KiKS's own.
+    def _set_wakeup(self, descriptor: int, /, **options: Any) -> int:
+        # The real one is KiKS's; this checks what the program gives.
+        signal.set_wakeup_fd(signal.set_wakeup_fd(descriptor, **options), warn_on_full_buffer=False)
         before, self._wakeup = self._wakeup, descriptor
         return before
 
@@ -115,27 +129,38 @@ class Signals:
                 "Use ITIMER_REAL, or run the program on kiks serve.",
             )
 
+    @property
+    def _blocked(self) -> set[int]:
+        """What the main thread has blocked."""
+        return self._masks.get(self._scheduler.main, set())
+
     def _set_mask(self, how: int, mask: Iterable[int], /) -> set[int]:
-        before: set[int] = signal.pthread_sigmask(how, mask)
-        for number in sorted(self._pending - signal.pthread_sigmask(signal.SIG_BLOCK, ())):
-            self._pending.remove(number)
-            self._raise(number)
+        task, given = self._scheduler.current, {int(each) for each in mask}
+        before = self._masks.get(task, self._blocked)
+        masks: dict[int, set[int]] = {signal.SIG_BLOCK: before | given, signal.SIG_UNBLOCK: before - given, signal.SIG_SETMASK: given}
+        if how not in masks:
+            raise OSError(errno.EINVAL, os.strerror(errno.EINVAL))
+        self._masks[task] = masks[how]
+        if task is self._scheduler.main:
+            for number in sorted(before ^ masks[how]):
+                if self._get(number) == signal.SIG_DFL:
+                    with contextlib.suppress(OSError):  # two can have no handler
+                        self._set(number, signal.SIG_DFL)
+            for number in sorted(self._pending - masks[how]):
+                self._pending.remove(number)
+                self._raise(number)
         return before
 
     def _wait_for(self, signals: Iterable[int], until_ns: int) -> int:
         """Wait for one of several signals until a time [ns]; return its number, or 0."""
         wanted = {int(each) for each in signals}
-        wait = _SignalWait(wanted)
-        while True:
-            if found := wanted & self._pending:
-                number = min(found)
-                self._pending.remove(number)
-                return number
-            if wait.number or wait.is_over(0):
-                return wait.number
+        while not (found := wanted & self._pending):
             if self._scheduler.world.now_ns >= until_ns:
                 return 0
-            self._scheduler.wait("a signal", until_ns=until_ns, files=wait)
+            self._scheduler.wait("a signal", until_ns=until_ns, files=_FromOutside())
+        number = min(found)
+        self._pending.remove(number)
+        return number
 
     def _wait_until(self, signals: Iterable[int], timeout: float, /) -> Any:
         if timeout < 0:
@@ -173,45 +198,46 @@ class Signals:
 
     def _raise(self, number: int) -> None:
         """Deliver a simulated signal."""
-        if number in signal.pthread_sigmask(signal.SIG_BLOCK, ()):
-            self._pending.add(number)
-            for task in self._scheduler.waiting_for("a signal"):
-                self._scheduler.wake(task, None)
-            return
-        self._wake(number)
         handler = self._get(number)
-        if handler == signal.SIG_DFL:
+        if self._hold(number):
+            return
+        if handler == signal.SIG_DFL and number not in _HARMLESS:
             self._scheduler.end(EXIT_OF_SIGNAL + number, f"the program was ended by signal {number}.")
         elif callable(handler):
             self._scheduler.interrupt(partial(handler, number, None), at_once=False)
 
-    def _wake(self, number: int) -> None:
-        """Write a signal where the program, or its event loop, looks for it."""
+    def _hold(self, number: int) -> bool:
+        """Keep a signal that the program has blocked for those who wait for it, or announce it; return which."""
+        if number in self._blocked:
+            self._pending.add(number)
+            for task in self._scheduler.waiting_for("a signal"):
+                self._scheduler.wake(task, None)
+            return True
         if self._wakeup >= 0:
             with contextlib.suppress(OSError):
                 os.write(self._wakeup, bytes([number]))
+        return False
 
     def _come(self, number: int, frame: FrameType | None) -> None:
         """Handle a signal of the operating system, in the running thread."""
-        self._wake(number)
+        if self._hold(number):
+            return
         handler = self._handlers.get(number, signal.default_int_handler)
+        if not callable(handler):
+            return  # it has come while the program changed its mask
         self._scheduler.interrupt(partial(handler, number, frame), at_once=_is_in_program(frame))
 
 
-class _SignalWait:
-    """A wait for real signals; see `thread_scheduler.FileWait`."""
+class _FromOutside:
+    """Signals that may come from other processes; see `thread_scheduler.FileWait`."""
 
     is_inside = False
 
-    def __init__(self, wanted: set[int]) -> None:
-        self._wanted = wanted
-        self.number = 0
-
     def is_over(self, block_ms: int) -> bool:
-        """Return whether one has come."""
-        found = signal.sigtimedwait(self._wanted, block_ms / 1000)
-        self.number = found.si_signo if found is not None else 0
-        return bool(self.number)
+        """Give signals some real time; their handler ends the wait."""
+        if block_ms:
+            time.sleep(block_ms / 1000)
+        return False
 
 
 def _told(number: int) -> signal.struct_siginfo:

@@ -10,6 +10,7 @@ import ipaddress
 import select
 import socket
 import weakref
+from contextlib import suppress
 from typing import Any
 
 from kiks.script.file_waits import Files
@@ -94,9 +95,19 @@ def replacements(scheduler: Scheduler, files: Files) -> dict[str, dict[str, Any]
             wait(sock, select.POLLOUT)
             left = left[_methods["send"](sock, left, flags | socket.MSG_DONTWAIT) :]
 
-    def connect(sock: Any, address: Any, /) -> None:
-        _methods["connect"](sock, address)
-        files.note_inside(sock.fileno())
+    def addressing(name: str) -> Any:
+        """Return a method that gives a socket its address, or that of the other end."""
+        real = _methods[name]
+
+        def call(sock: Any, address: Any, /) -> Any:
+            files.note_inside(sock.fileno())
+            # TCP would keep characters back for some real time, until earlier ones are acknowledged. What a socket
+            # accepts inherits this.
+            with suppress(OSError):
+                _methods["setsockopt"](sock, socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            return real(sock, address)
+
+        return for_program(scheduler, call, real)
 
     def accept(sock: Any) -> Any:
         wait(sock, select.POLLIN)
@@ -106,21 +117,18 @@ def replacements(scheduler: Scheduler, files: Files) -> dict[str, dict[str, Any]
         files.note_inside(descriptor)
         return descriptor, address
 
-    def bind(sock: Any, address: Any, /) -> None:
-        _methods["bind"](sock, address)
-        files.note_inside(sock.fileno())
-
     def socketpair(*args: Any) -> Any:
         pair = _socket.socketpair(*args)
         files.note_inside(*(each.fileno() for each in pair))
         return pair
 
-    own: dict[str, Any] = {"sendall": sendall, "connect": connect, "bind": bind, "_accept": accept}
+    own: dict[str, Any] = {"sendall": sendall, "_accept": accept}
     return {
         "_socket": {"socketpair": socketpair},
         "_socket.socket": {
             **{name: waiting(name, select.POLLIN) for name in _READS},
             **{name: waiting(name, select.POLLOUT) for name in _WRITES},
+            **{name: addressing(name) for name in ("bind", "connect", "connect_ex")},
             **{name: for_program(scheduler, method, _methods[name]) for name, method in own.items()},
         },
     }

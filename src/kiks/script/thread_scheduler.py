@@ -89,6 +89,7 @@ class Scheduler:
         program: The cost of thinking and polling.
 
     Attributes:
+        main: The main thread.
         current: The running thread.
         tasks: Started threads that have not ended, by ident.
         lock_count: Number of free locks that the running thread has taken since it went on.
@@ -116,8 +117,8 @@ class Scheduler:
         self._patient: list[Task] = []
         self.lock_count = 0
         self.tasks: dict[int, Task] = {}
-        self._main = Task(get_ident(), lambda: None, self._hub)
-        self.current = self._main
+        self.main = Task(get_ident(), lambda: None, self._hub)
+        self.current = self.main
 
     # ---- start and end ----
 
@@ -137,12 +138,12 @@ class Scheduler:
                 errors.append(error)
 
         self._hub = greenlet.getcurrent()
-        self._main.greenlet = greenlet.greenlet(run_main, self._hub)
-        self.program.waiting = self._main.waiting
-        self._switch(self._main)
+        self.main.greenlet = greenlet.greenlet(run_main, self._hub)
+        self.program.waiting = self.main.waiting
+        self._switch(self.main)
         # What libraries in C keep of this program must not take later callers for it.
         self.os_thread = 0
-        if self.tasks or not self._main.greenlet.dead:
+        if self.tasks or not self.main.greenlet.dead:
             _KEPT.append(self)
         if self._end is not None:
             raise self._end
@@ -299,7 +300,7 @@ class Scheduler:
 
     def waiting_for(self, what: str) -> list[Task]:
         """Return the threads that wait for something, in the order in which they began."""
-        waiting = [task for task in (self._main, *self.tasks.values()) if task.waits_for == what]
+        waiting = [task for task in (self.main, *self.tasks.values()) if task.waits_for == what]
         return sorted(waiting, key=lambda task: task.number)
 
     def interrupt(self, call: Callable[[], object], *, at_once: bool) -> None:
@@ -309,14 +310,14 @@ class Scheduler:
             call: The function; an exception in it is raised from the wait.
             at_once: Whether it may preempt the running thread here.
         """
-        if greenlet.getcurrent() is self._main.greenlet:
+        if greenlet.getcurrent() is self.main.greenlet:
             call()
             return
         self._calls.append(call)
-        self.wake(self._main, SIGNALLED)
-        if at_once and not self._is_choosing and self._main in self._ready:
-            self._ready.remove(self._main)
-            self._ready.appendleft(self._main)
+        self.wake(self.main, SIGNALLED)
+        if at_once and not self._is_choosing and self.main in self._ready:
+            self._ready.remove(self.main)
+            self._ready.appendleft(self.main)
             self.give_way()
 
     # ---- inside ----
@@ -335,7 +336,7 @@ class Scheduler:
             self._switch(chosen)
         if thinks:
             self.program.go_on()
-        while self._calls and task is self._main:
+        while self._calls and task is self.main:
             self._calls.popleft()()
 
     def _switch(self, task: Task) -> None:
@@ -409,7 +410,7 @@ class Scheduler:
         """End the program, because none of its threads can ever go on."""
         self.current.waits_for = self.current.waits_for or "a robot that was asked nothing"
         waiting = ", ".join(
-            f"{_name_of(task)} for {task.waits_for}" for task in (self._main, *self.tasks.values()) if task.waits_for
+            f"{_name_of(task)} for {task.waits_for}" for task in (self.main, *self.tasks.values()) if task.waits_for
         )
         self.end(
             1,

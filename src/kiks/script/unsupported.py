@@ -9,21 +9,25 @@ from __future__ import annotations
 
 import os
 import re
-import subprocess
 import sys
+from _multiprocessing import SemLock
 from collections.abc import Iterator
 from contextlib import contextmanager
 from multiprocessing.process import BaseProcess
+from subprocess import Popen
 from typing import Any
 
 from kiks.script import socket_waits
 from kiks.script.file_system import FileSystem
+from kiks.script.patching import for_program
 from kiks.script.refusals import refuse, refuse_network
 from kiks.script.thread_scheduler import Scheduler
 
 _FORKS = frozenset({"os.fork", "os.forkpty"})
 _STARTS = frozenset({"subprocess.Popen", "os.system", "os.posix_spawn", "os.exec", "os.spawn"})
 _OTHER_LOOPS = frozenset({"uvloop", "gevent", "eventlet"})
+_OTHER_CLOCKS = frozenset({"time_machine"})
+"""Modules that change functions in C as KiKS does, each in ignorance of the other."""
 _DEVICE = re.compile(r"/dev/(tty(?!$)|cu\.|serial/|rfcomm)")
 # A command of Python, at the beginning of a line of a shell or of one of its parts.
 _PYTHON = re.compile(r"(^|[;&|(]|/sh -c )\s*((env|nohup|sudo|exec)\s+)*(\S*/)?((python|pypy)[\d.]*|\S+\.py)(\s|$)")
@@ -37,20 +41,31 @@ def replacements(scheduler: Scheduler) -> dict[str, dict[str, Any]]:
     def start(process: Any) -> None:
         refuse(scheduler, "start no process of Python by itself", "it did, by multiprocessing", "Use threads, or ")
 
-    def wait(popen: subprocess.Popen[Any], timeout: float | None = None) -> int:
+    def wait(popen: Popen[Any], timeout: float | None = None) -> int:
         with scheduler.real_time():
             return real_wait(popen, None)
 
-    def poll(popen: subprocess.Popen[Any]) -> int | None:
+    def poll(popen: Popen[Any]) -> int | None:
         return wait(popen)
 
-    def communicate(popen: subprocess.Popen[Any], input: Any = None, timeout: float | None = None) -> Any:
+    def communicate(popen: Popen[Any], input: Any = None, timeout: float | None = None) -> Any:
         with scheduler.real_time():
             return real_communicate(popen, input, None)
 
-    real_wait, real_communicate = subprocess.Popen.wait, subprocess.Popen.communicate
+    def acquire(lock: Any, block: bool = True, timeout: float | None = None) -> bool:
+        if is_acquired := real_acquire(lock, False):
+            return bool(is_acquired)
+        if block:
+            refuse(scheduler, "wait by locks of threading", "it waited for one of multiprocessing", "Use those, or ")
+        scheduler.poll()
+        return False
+
+    real_wait, real_poll, real_communicate = Popen.wait, Popen.poll, Popen.communicate
+    real_acquire = SemLock.acquire
     return {
-        "subprocess.Popen": {"wait": wait, "poll": poll, "communicate": communicate},
+        # `terminate` and the like only look whether there is a process.
+        "subprocess.Popen": {"wait": wait, "poll": for_program(scheduler, poll, real_poll), "communicate": communicate},
+        "_multiprocessing.SemLock": dict.fromkeys(("acquire", "__enter__"), acquire),
         f"{BaseProcess.__module__}.BaseProcess": {"start": start},
     }
 
@@ -98,6 +113,8 @@ def _judge(scheduler: Scheduler, system: FileSystem, event: str, arguments: tupl
     elif event == "import":
         if arguments[0] in _OTHER_LOOPS:
             refuse(scheduler, "wait by Python's own event loops", f"it imported {arguments[0]}", "Use asyncio, or ")
+        if arguments[0] in _OTHER_CLOCKS:
+            refuse(scheduler, "leave Python's clocks alone", f"it imported {arguments[0]}")
     elif event in socket_waits.EVENTS:
         if not socket_waits.is_inside(event, arguments):
             refuse_network(scheduler, "it used the network")

@@ -174,7 +174,7 @@ class _Watch:
         if "futex" in reason or ("pipe" in reason and self._scheduler.tasks):
             # A pipe may be one that another thread of the program writes to.
             kind = "lock"
-        elif any(word in reason for word in ("nanosleep", "poll", "select", "sigtimedwait")):
+        elif any(word in reason for word in ("nanosleep", "poll", "select", "sigtimedwait", "inode_wait")):
             kind = "time"
         else:
             return ""

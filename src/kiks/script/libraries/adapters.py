@@ -13,6 +13,7 @@ from typing import Any
 
 from kiks.script.libraries import c_clocks, curses_keys, pygame_time, tk_loop
 from kiks.script.libraries.host import Host
+from kiks.units import NS_PER_S
 
 Adapter = Callable[[ModuleType, Host], dict[Any, dict[str, Any]]]
 """Returns what stands in for names, by the module or class that has them."""
@@ -24,16 +25,23 @@ def _adapters() -> dict[str, Adapter]:
         "pygame.time": pygame_time.adapt,
         "pygame.event": pygame_time.adapt_events,
         "curses": curses_keys.adapt,
-        "numpy": c_clocks.adapt_numpy,
+        "cv2": _adapt_cv2,
+        "numpy": c_clocks.adapt_extension("numpy._core._multiarray_umath"),
         "numpy.random": _seed_numpy,
+        "pydantic_core": c_clocks.adapt_extension("pydantic_core._pydantic_core"),
         "sqlite3": c_clocks.adapt_sqlite,
     }
 
 
 def _seed_numpy(module: ModuleType, host: Host) -> dict[Any, dict[str, Any]]:
     """Seed the generator that NumPy's functions share."""
-    host.chance.seed_numpy(module)
+    module.seed(host.chance.number("numpy", 32))
     return {}
+
+
+def _adapt_cv2(module: ModuleType, host: Host) -> dict[Any, dict[str, Any]]:
+    """Count ticks in simulated nanoseconds."""
+    return {module: {"getTickCount": host.clock.ask_ns, "getTickFrequency": lambda: float(NS_PER_S)}}
 
 
 @contextmanager

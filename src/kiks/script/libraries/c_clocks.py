@@ -1,4 +1,4 @@
-"""NumPy and SQLite: code in C that asks the operating system for the date gets the program's.
+"""Libraries whose code in C asks the operating system for the date: they get the program's.
 
 Each library that is loaded from a file has a table of the functions that it calls in others (ELF, "Global Offset
 Table"). The entries for the date are changed there.
@@ -20,6 +20,7 @@ from types import ModuleType
 from typing import Any
 
 from kiks.clock.program_clock import calendar_ns
+from kiks.script.clocks import CALENDARS
 from kiks.script.libraries.host import Host
 from kiks.units import NS_PER_S
 
@@ -32,8 +33,12 @@ _SYMBOL_SIZE = 24
 _LOADED_ALREADY = 4
 """RTLD_NOLOAD (dlfcn.h)."""
 
+_SEED = 28
+"""SQLITE_TESTCTRL_PRNG_SEED (sqlite3.h)."""
+
 _Time = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.POINTER(ctypes.c_int64))
 _TimeOfDay = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.POINTER(ctypes.c_int64), ctypes.c_void_p)
+_GetTime = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_int, ctypes.POINTER(ctypes.c_int64))
 
 _KEPT: list[object] = []
 
@@ -44,23 +49,31 @@ class _Library(ctypes.Structure):
     _fields_ = (("base", ctypes.c_uint64), ("name", ctypes.c_char_p), ("tables", ctypes.c_uint64))
 
 
-def adapt_numpy(module: ModuleType, host: Host) -> dict[Any, dict[str, Any]]:
-    """Let `datetime64('now')` tell the program's date; return nothing more that stands in."""
-    code = sys.modules.get("numpy._core._multiarray_umath")
-    if code is not None and code.__file__:
-        # A program may ask in a loop, so that asking costs time.
-        _redirect(
-            code.__file__, lambda: host.clock.ask_ns() if host.scheduler.is_alone else host.scheduler.world.now_ns, host
-        )
-    return {}
+def adapt_extension(name: str) -> Callable[[ModuleType, Host], dict[Any, dict[str, Any]]]:
+    """Return an adapter that lets a module in C tell the program's date; nothing more stands in."""
+
+    def adapt(_: ModuleType, host: Host) -> dict[Any, dict[str, Any]]:
+        code = sys.modules.get(name)
+        if code is not None and code.__file__:
+            # A program may ask in a loop, so that asking costs time.
+            _redirect(
+                code.__file__,
+                lambda: host.clock.ask_ns() if host.scheduler.is_alone else host.scheduler.world.now_ns,
+                host,
+            )
+        return {}
+
+    return adapt
 
 
 def adapt_sqlite(module: ModuleType, host: Host) -> dict[Any, dict[str, Any]]:
-    """Let `current_timestamp` and the like tell the program's date; return nothing more that stands in."""
+    """Let `current_timestamp` and the like tell the program's date, and `random` follow from its seed."""
     with open("/proc/self/maps") as maps:
         files = {line.split()[-1] for line in maps if "sqlite3" in os.path.basename(line.split()[-1])}
     for each in sorted(files):
         _redirect(each, lambda: host.scheduler.world.now_ns, host)
+        with suppress(OSError, AttributeError):
+            ctypes.CDLL(each, mode=_LOADED_ALREADY).sqlite3_test_control(_SEED, host.chance.number("sqlite", 31), None)
     return {}
 
 
@@ -83,7 +96,11 @@ def _redirect(path: str, now_ns: Callable[[], int], host: Host) -> None:
         seconds[1] = rest_ns // 1000
         return 0
 
-    bodies = {"time": _Time(tell), "gettimeofday": _TimeOfDay(tell_exactly)}
+    def tell_clock(clock: int, seconds: Any) -> int:
+        seconds[0], seconds[1] = divmod(date_ns() if clock in CALENDARS else time.clock_gettime_ns(clock), NS_PER_S)
+        return 0
+
+    bodies = {"time": _Time(tell), "gettimeofday": _TimeOfDay(tell_exactly), "clock_gettime": _GetTime(tell_clock)}
     _KEPT.extend(bodies.values())
     with suppress(OSError):
         for name, place in _entries(path):
@@ -92,7 +109,7 @@ def _redirect(path: str, now_ns: Callable[[], int], host: Host) -> None:
 
 @cache
 def _entries(path: str) -> list[tuple[str, int]]:
-    """Return where the addresses of `time` and `gettimeofday` stand in a loaded library, each with its name."""
+    """Return where the addresses of functions that tell the date stand in a loaded library, each with its name."""
     library = _Library.from_address(ctypes.CDLL(path, mode=_LOADED_ALREADY)._handle)
     tables = {}
     place = library.tables
@@ -101,7 +118,9 @@ def _entries(path: str) -> list[tuple[str, int]]:
         place += 16
     names = ctypes.string_at(tables[_NAMES], tables[_NAMES_SIZE])
     # One name may be the end of a longer one.
-    wanted = {found.start(1): found[1].decode() for found in re.finditer(rb"(?=(time|gettimeofday)\0)", names)}
+    wanted = {
+        found.start(1): found[1].decode() for found in re.finditer(rb"(?=(time|gettimeofday|clock_gettime)\0)", names)
+    }
     entries = [
         entry
         for start, size in ((_CALLS, _CALLS_SIZE), (_DATA, _DATA_SIZE))

@@ -1,0 +1,1056 @@
+"""What programs for robots import most: each package does under `kiks run` what it should, in simulated time.
+
+A package that cannot is told of in one line. Programs run twice, and must say the same to the letter.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import subprocess
+import sys
+from collections.abc import Iterator
+from importlib.util import find_spec
+
+import pytest
+from tests.served import PROGRAMS as FOLDER
+
+pytestmark = pytest.mark.slow
+
+AT_ONCE = 2
+TIMES = 2
+
+PROGRAMS: dict[str, tuple[str, str]] = {
+    "PIL": (
+        r"""
+import io, time
+from PIL import Image
+image = Image.new("L", (8, 8))
+image.putpixel((3, 3), 255)
+out = io.BytesIO()
+image.save(out, "PNG")
+print(Image.open(out).getbbox())
+out = io.BytesIO()
+image.save(out, "PDF")
+print(b"D:20000101" in out.getvalue())
+""",
+        """\
+(3, 3, 4, 4)
+True
+""",
+    ),
+    "aiohttp": (
+        r"""
+import aiohttp, asyncio, time
+from aiohttp import web
+async def now(request):
+    await asyncio.sleep(1)
+    return web.Response(text="ok")
+async def main():
+    app = web.Application()
+    app.router.add_get("/", now)
+    runner = web.AppRunner(app)
+    await runner.setup()
+    site = web.TCPSite(runner, "127.0.0.1", 0)
+    await site.start()
+    port = site._server.sockets[0].getsockname()[1]
+    async with aiohttp.ClientSession() as session, session.get(f"http://127.0.0.1:{port}/") as answer:
+        print(await answer.text(), answer.headers["Date"], round(time.monotonic(), 1))
+    await runner.cleanup()
+asyncio.run(main())
+""",
+        """\
+""",
+    ),
+    "aioserial": (
+        r"""
+import aioserial, asyncio, time
+async def main():
+    port = aioserial.AioSerial("/dev/ttyUSB0", 9600, timeout=1)
+    await port.write_async(b"D,2,2\n")
+    print(await port.readline_async(), await port.read_async(1), round(time.monotonic(), 1))
+asyncio.run(main())
+""",
+        """\
+b'd\\r\\n' b'' 1.0
+""",
+    ),
+    "anyio": (
+        r"""
+import anyio, time
+async def main():
+    send, receive = anyio.create_memory_object_stream(1)
+    async def talk():
+        for item in range(3):
+            await anyio.sleep(0.5)
+            await send.send(item)
+        await send.aclose()
+    async with anyio.create_task_group() as group:
+        group.start_soon(talk)
+        print([item async for item in receive], round(time.monotonic(), 2))
+    with anyio.move_on_after(1) as scope:
+        await anyio.sleep_forever()
+    print(scope.cancelled_caught, round(time.monotonic(), 2))
+    print(await anyio.to_thread.run_sync(lambda: time.sleep(2) or 7), round(time.monotonic(), 2))
+anyio.run(main)
+""",
+        """\
+[0, 1, 2] 1.5
+True 2.5
+7 4.5
+""",
+    ),
+    "argparse": (
+        r"""
+import argparse, configparser, io
+parser = argparse.ArgumentParser()
+parser.add_argument("--speed", type=int, default=5)
+settings = configparser.ConfigParser()
+settings.read_string("[robot]\nport = /dev/ttyUSB0\n")
+print(parser.parse_args([]), settings["robot"]["port"])
+""",
+        """\
+Namespace(speed=5) /dev/ttyUSB0
+""",
+    ),
+    "asyncio": (
+        r"""
+import asyncio, socket, time
+def at(): return round(time.monotonic(), 2)
+async def main():
+    ours, theirs = socket.socketpair()
+    reader, writer = await asyncio.open_connection(sock=ours)
+    other, answers = await asyncio.open_connection(sock=theirs)
+    async def echo():
+        line = await other.readline()
+        await asyncio.sleep(0.5)
+        answers.write(line.upper())
+        await answers.drain()
+    task = asyncio.create_task(echo())
+    writer.write(b"hello\n")
+    print(await reader.readline(), at())
+    await task
+    writer.close()
+    answers.close()
+    try:
+        async with asyncio.timeout(1):
+            await asyncio.Event().wait()
+    except TimeoutError:
+        print("timeout", at())
+    print(await asyncio.to_thread(time.sleep, 1), at())
+    async def serve(reader, writer):
+        writer.write(await reader.readline())
+        writer.close()
+    async with await asyncio.start_server(serve, "127.0.0.1", 0) as server:
+        reader, writer = await asyncio.open_connection(*server.sockets[0].getsockname())
+        writer.write(b"round\n")
+        print(await reader.read(), at())
+        writer.close()
+asyncio.run(main())
+""",
+        """\
+b'HELLO\\n' 0.5
+timeout 1.5
+None 2.5
+b'round\\n' 2.5
+""",
+    ),
+    "asyncio.subprocess": (
+        r"""
+import asyncio, sys
+async def main():
+    process = await asyncio.create_subprocess_exec("echo", "spoken", stdout=asyncio.subprocess.PIPE)
+    print(await process.communicate(), process.returncode)
+asyncio.run(main())
+""",
+        """\
+(b'spoken\\n', None) 0
+""",
+    ),
+    "attrs": (
+        r"""
+import attrs, datetime
+@attrs.define
+class Sample:
+    taken: datetime.datetime = attrs.field(factory=datetime.datetime.now, validator=attrs.validators.instance_of(datetime.datetime))
+print(str(Sample().taken)[:19])
+""",
+        """\
+2000-01-01 00:00:00
+""",
+    ),
+    "click": (
+        r"""
+import click, colorama
+colorama.init()
+@click.command()
+@click.option("--since", type=click.DateTime(), default="2000-01-01")
+def main(since):
+    with click.progressbar(range(3)) as bar:
+        click.echo(sum(bar))
+    click.echo(since)
+main([], standalone_mode=False)
+""",
+        """\
+
+3
+2000-01-01 00:00:00
+""",
+    ),
+    "concurrent.futures": (
+        r"""
+import concurrent.futures as futures, time
+def work(left):
+    time.sleep(left)
+    return left, round(time.monotonic(), 2)
+with futures.ThreadPoolExecutor(2) as pool:
+    print(list(pool.map(work, [1, 2, 1])))
+    jobs = [pool.submit(work, each) for each in (2, 1)]
+    print([job.result()[0] for job in futures.as_completed(jobs)])
+    try:
+        pool.submit(work, 5).result(timeout=1)
+    except TimeoutError:
+        print("late", round(time.monotonic(), 2))
+""",
+        """\
+[(1, 1.0), (2, 2.0), (1, 2.0)]
+[1, 2]
+late 5.0
+""",
+    ),
+    "concurrent.futures.process": (
+        r"""
+import concurrent.futures
+with concurrent.futures.ProcessPoolExecutor(2) as pool:
+    print(list(pool.map(abs, [1, -2])))
+""",
+        """\
+kiks: a program in simulated time must start no process of Python by itself, but it did, by multiprocessing (program.py, line 3). Use threads, or run it on kiks serve, where time is real.
+""",
+    ),
+    "csv": (
+        r"""
+import csv, datetime, json, os, pickle, tempfile, threading
+now = datetime.datetime.now().replace(microsecond=0)
+assert pickle.loads(pickle.dumps([now, now.date()])) == [now, now.date()]
+assert pickle.loads(pickle.dumps([threading.Lock, type(threading.RLock()), threading.Event])) == [threading.Lock, type(threading.RLock()), threading.Event]
+with tempfile.NamedTemporaryFile("w+", suffix=".csv", newline="") as file:
+    csv.writer(file).writerow([now, 1])
+    file.seek(0)
+    print(list(csv.reader(file)))
+    print("~", os.path.basename(file.name))
+print(json.dumps({"now": now.isoformat()}))
+""",
+        """\
+[['2000-01-01 00:00:00', '1']]
+{"now": "2000-01-01T00:00:00"}
+""",
+    ),
+    "cv2": (
+        r"""
+import cv2, numpy, time
+image = numpy.zeros((20, 20), numpy.uint8)
+cv2.circle(image, (10, 10), 5, 255, -1)
+found, _ = cv2.findContours(image, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
+start = cv2.getTickCount()
+time.sleep(2)
+print(len(found), round((cv2.getTickCount() - start) / cv2.getTickFrequency(), 2))
+""",
+        """\
+1 2.0
+""",
+    ),
+    "email": (
+        r"""
+import email.utils, time
+print(email.utils.formatdate(), email.utils.localtime().year)
+print(email.utils.format_datetime(email.utils.parsedate_to_datetime(email.utils.formatdate())))
+print("~", email.utils.make_msgid(domain="here").split(".")[2])
+print(email.utils.make_msgid(domain="here")[:10])
+""",
+        """\
+Sat, 01 Jan 2000 00:00:00 -0000 2000
+Sat, 01 Jan 2000 00:00:00 -0000
+<946684800
+""",
+    ),
+    "fcntl": (
+        r"""
+import fcntl, tempfile
+with tempfile.NamedTemporaryFile() as first, open(first.name) as second:
+    fcntl.flock(first, fcntl.LOCK_EX)
+    fcntl.flock(second, fcntl.LOCK_EX)
+""",
+        """\
+kiks: a program in simulated time must wait by time.sleep, a lock or a port, but it waited by itself (program.py, line 4). Run it on kiks serve, where time is real.
+""",
+    ),
+    "flask": (
+        r"""
+import flask, datetime
+app = flask.Flask("app")
+@app.route("/now")
+def now():
+    return {"now": datetime.datetime.now(datetime.timezone.utc)}
+answer = app.test_client().get("/now")
+print(answer.json)
+""",
+        """\
+{'now': 'Sat, 01 Jan 2000 00:00:00 GMT'}
+""",
+    ),
+    "gevent": (
+        r"""
+import gevent
+gevent.sleep(1)
+""",
+        """\
+kiks: a program in simulated time must wait by Python's own event loops, but it imported gevent (program.py, line 1). Use asyncio, or run it on kiks serve, where time is real.
+""",
+    ),
+    "gymnasium": (
+        r"""
+import gymnasium
+env = gymnasium.make("CartPole-v1")
+print("~", env.reset()[0], env.action_space.sample())
+env.close()
+print(env.unwrapped.spec.id)
+""",
+        """\
+CartPole-v1
+""",
+    ),
+    "http.server": (
+        r"""
+import http.server, threading, time, urllib.request
+class Handler(http.server.BaseHTTPRequestHandler):
+    def log_message(self, *args):
+        print(self.log_date_time_string())
+    def do_GET(self):
+        time.sleep(1)
+        self.send_response(200)
+        self.end_headers()
+        self.wfile.write(self.path.encode())
+server = http.server.ThreadingHTTPServer(("localhost", 0), Handler)
+threading.Thread(target=server.serve_forever).start()
+with urllib.request.urlopen(f"http://localhost:{server.server_port}/speed", timeout=5) as answer:
+    print(answer.read(), answer.headers["Date"], round(time.monotonic(), 1))
+server.shutdown()
+server.server_close()
+print(round(time.monotonic(), 1))
+""",
+        """\
+01/Jan/2000 00:00:01
+b'/speed' Sat, 01 Jan 2000 00:00:01 GMT 1.0
+1.5
+""",
+    ),
+    "logging": (
+        r"""
+import logging, logging.handlers, os, tempfile, time
+folder = tempfile.mkdtemp()
+log = logging.getLogger("robot")
+def start():
+    handler = logging.handlers.TimedRotatingFileHandler(os.path.join(folder, "log"), when="S", interval=60, utc=True)
+    handler.setFormatter(logging.Formatter("%(asctime)s %(relativeCreated)d %(threadName)s %(message)s"))
+    log.addHandler(handler)
+    return handler
+handler = start()
+for number in range(4):
+    log.warning(number)
+    time.sleep(45)
+log.removeHandler(handler)
+handler.close()
+start()
+time.sleep(20)
+log.warning("again")
+print(sorted(os.listdir(folder)))
+with open(os.path.join(folder, "log.2000-01-01_00-00-00")) as file:
+    print(file.read(), end="")
+""",
+        """\
+['log', 'log.2000-01-01_00-00-00', 'log.2000-01-01_00-02-15']
+2000-01-01 00:00:00,000 0 MainThread 0
+2000-01-01 00:00:45,000 45000 MainThread 1
+""",
+    ),
+    "matplotlib": (
+        r"""
+import matplotlib, io, os, tempfile, time
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt, matplotlib.dates as dates, datetime
+plt.plot([datetime.datetime.now(), datetime.datetime.now() + datetime.timedelta(1)], [1, 2])
+plt.pause(0.5)
+name = tempfile.mktemp(suffix=".svg")
+plt.savefig(name)
+text = open(name).read()
+print(text.count("2000-01-01"), round(time.monotonic(), 1), round(time.time() - os.path.getmtime(name)))
+""",
+        """\
+1 0.5 0
+""",
+    ),
+    "multiprocessing": (
+        r"""
+import multiprocessing
+multiprocessing.Process(target=print).start()
+""",
+        """\
+kiks: a program in simulated time must start no process of Python by itself, but it did, by multiprocessing (program.py, line 2). Use threads, or run it on kiks serve, where time is real.
+""",
+    ),
+    "multiprocessing locks": (
+        r"""
+import multiprocessing
+print(multiprocessing.Value("i", 3).value, multiprocessing.Lock().acquire(timeout=1))
+multiprocessing.Event().wait(5)
+""",
+        """\
+3 True
+kiks: a program in simulated time must wait by locks of threading, but it waited for one of multiprocessing (program.py, line 3). Use those, or run it on kiks serve, where time is real.
+""",
+    ),
+    "multiprocessing queue": (
+        r"""
+import multiprocessing
+queue = multiprocessing.Queue()
+queue.put(1)
+print(queue.get())
+""",
+        """\
+1
+""",
+    ),
+    "multiprocessing.pool": (
+        r"""
+from multiprocessing.pool import ThreadPool
+from multiprocessing.dummy import Pool
+import time
+with ThreadPool(3) as pool:
+    print(pool.map(lambda left: time.sleep(left), [1, 2, 3]), round(time.monotonic(), 1))
+""",
+        """\
+[None, None, None] 3.0
+""",
+    ),
+    "networkx": (
+        r"""
+import networkx
+print(networkx.shortest_path(networkx.path_graph(4), 0, 3))
+graph = networkx.gnm_random_graph(10, 20)
+print("~", sorted(graph.edges)[:3], networkx.spring_layout(graph)[0])
+""",
+        """\
+[0, 1, 2, 3]
+""",
+    ),
+    "numba": (
+        r"""
+import numba, numpy, time
+@numba.njit
+def total(values):
+    whole = 0.0
+    for each in values:
+        whole += each
+    return whole
+before = time.monotonic()
+print(total(numpy.arange(5.0)), round(time.monotonic() - before, 3))
+""",
+        """\
+10.0 0.0
+""",
+    ),
+    "numpy": (
+        r"""
+import numpy, time
+time.sleep(90061)
+print(numpy.datetime64("now"), numpy.datetime64("today"))
+print("~", numpy.random.default_rng().random(2), numpy.random.rand(2), numpy.random.RandomState().rand(), numpy.random.SeedSequence().entropy)
+""",
+        """\
+2000-01-02T01:01:01 2000-01-02
+""",
+    ),
+    "os": (
+        r"""
+import os, shutil, tempfile, time, zipfile
+folder = tempfile.mkdtemp()
+name = os.path.join(folder, "file")
+with open(name, "w") as file:
+    file.write("first")
+time.sleep(2)
+print(round(time.time() - os.path.getmtime(name), 3))
+with open(name, "a") as file:
+    file.write("second")
+time.sleep(60)
+print(round(time.time() - os.stat(name).st_mtime, 3), time.ctime(os.stat(name).st_mtime))
+shutil.copy2(name, name + "2")
+print(os.path.getmtime(name + "2") == os.path.getmtime(name), time.time() > os.path.getmtime(os.__file__))
+with zipfile.ZipFile(name + ".zip", "w") as archive:
+    archive.write(name)
+    print(archive.infolist()[0].date_time)
+shutil.rmtree(folder)
+""",
+        """\
+2.0
+60.0 Sat Jan  1 00:00:02 2000
+True False
+(2000, 1, 1, 0, 0, 2)
+""",
+    ),
+    "pandas": (
+        r"""
+import io, time
+import pandas
+time.sleep(3600)
+now = [pandas.Timestamp.now(), pandas.Timestamp("today"), pandas.to_datetime("now"), pandas.Timestamp.now("Europe/Berlin")]
+print([str(each.floor("s")) for each in now])
+table = pandas.DataFrame({"day": pandas.date_range(now[0].normalize(), periods=3), "speed": [1, 2, 3]})
+again = pandas.read_csv(io.StringIO(table.to_csv(index=False)), parse_dates=["day"])
+print(list(again.day) == list(table.day), again.speed.sum(), table.day.iloc[-1].date())
+print("~", table.sample(2).speed.to_list())
+""",
+        """\
+['2000-01-01 01:00:00', '2000-01-01 01:00:00', '2000-01-01 01:00:00', '2000-01-01 02:00:00+01:00']
+True 6 2000-01-03
+""",
+    ),
+    "psutil": (
+        r"""
+import os, time
+import psutil
+me = psutil.Process()
+print(me.pid == os.getpid(), psutil.cpu_count() > 0, psutil.virtual_memory().total > 0, me.is_running())
+print(psutil.cpu_percent(interval=1) >= 0, round(time.monotonic(), 1))
+""",
+        """\
+True True True True
+True 1.0
+""",
+    ),
+    "pydantic": (
+        r"""
+import datetime, pydantic
+class Sample(pydantic.BaseModel):
+    taken: datetime.datetime = pydantic.Field(default_factory=datetime.datetime.now)
+    day: pydantic.PastDate = datetime.date(1999, 12, 31)
+class Later(pydantic.BaseModel):
+    at: pydantic.FutureDatetime
+print(Sample().model_dump_json()[:30], Sample(day="1999-12-31").day)
+print(Later(at="2000-01-02T00:00:00").at)
+try:
+    Sample(day="2005-01-01")
+    print("wrong")
+except pydantic.ValidationError:
+    print("future")
+""",
+        """\
+{"taken":"2000-01-01T00:00:00" 1999-12-31
+2000-01-02 00:00:00
+future
+""",
+    ),
+    "pygame": (
+        r"""
+import pygame, time
+pygame.init()
+clock = pygame.time.Clock()
+for _ in range(10):
+    clock.tick(20)
+print(round(time.monotonic(), 2), pygame.time.get_ticks() // 100)
+""",
+        """\
+0.5 5
+""",
+    ),
+    "queue": (
+        r"""
+import queue, sched, threading, time
+items = queue.Queue(maxsize=1)
+def feed():
+    for number in range(3):
+        items.put(number)
+        time.sleep(1)
+threading.Thread(target=feed).start()
+print([items.get(timeout=5) for _ in range(3)], round(time.monotonic(), 2))
+try:
+    items.get(timeout=2)
+except queue.Empty:
+    print("empty", round(time.monotonic(), 2))
+simple = queue.SimpleQueue()
+threading.Timer(1, simple.put, ["late"]).start()
+print(simple.get(), round(time.monotonic(), 2))
+plan = sched.scheduler()
+plan.enter(2, 1, print, ("planned",))
+plan.run()
+print(round(time.monotonic(), 2))
+""",
+        """\
+[0, 1, 2] 2.0
+empty 4.0
+late 5.0
+planned
+7.0
+""",
+    ),
+    "random": (
+        r"""
+import os, random, secrets, tempfile, uuid
+generators = random.Random(), random.SystemRandom()
+print("~", random.random(), [each.random() for each in generators], secrets.token_hex(4), uuid.uuid4(), os.urandom(3))
+print("~", tempfile.mktemp(), {"left", "right", "front", "back"}, uuid.uuid1())
+print((uuid.uuid1().time - 0x01B21DD213814000) // 10**7 - 946684800)
+""",
+        """\
+0
+""",
+    ),
+    "requests": (
+        r"""
+import requests, urllib3
+print("imported")
+requests.get("http://example.com/")
+""",
+        """\
+imported
+kiks: a program in simulated time must talk to its robots alone, but it used the network (program.py, line 3). Run it on kiks serve, where time is real.
+""",
+    ),
+    "requests here": (
+        r"""
+import http.server, threading, time, requests
+class Handler(http.server.BaseHTTPRequestHandler):
+    protocol_version = "HTTP/1.1"
+    def do_GET(self):
+        self.send_response(200)
+        self.send_header("Content-Length", "2")
+        self.end_headers()
+        self.wfile.write(b"ok")
+    def log_message(self, *args): pass
+server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler)
+server.daemon_threads = True
+threading.Thread(target=server.serve_forever, daemon=True).start()
+with requests.Session() as session:
+    print([session.get(f"http://127.0.0.1:{server.server_port}/").text for _ in range(2)])
+server.shutdown()
+""",
+        """\
+['ok', 'ok']
+""",
+    ),
+    "rich": (
+        r"""
+import io, time
+from rich.console import Console
+from rich.progress import track
+from rich.table import Table
+console = Console(file=io.StringIO(), width=40)
+table = Table("name")
+table.add_row("robot")
+console.print(table)
+console.log("hello")
+print("robot" in console.file.getvalue(), console.file.getvalue().count("[00:00:00]"))
+print(sum(1 for _ in track(range(3), console=console) if time.sleep(1) is None), round(time.monotonic()))
+with console.status("busy"):
+    time.sleep(1)
+print(round(time.monotonic()))
+""",
+        """\
+True 1
+3 3
+4
+""",
+    ),
+    "schedule": (
+        r"""
+import schedule, time
+schedule.every(2).seconds.do(lambda: print("tick", round(time.monotonic(), 1)))
+schedule.every().day.at("00:00:05").do(lambda: print("daily", round(time.monotonic(), 1)))
+while time.monotonic() < 6:
+    schedule.run_pending()
+    time.sleep(0.5)
+""",
+        """\
+tick 2.0
+tick 4.0
+daily 5.0
+""",
+    ),
+    "scipy": (
+        r"""
+import numpy
+from scipy import integrate, optimize, signal, spatial, stats
+print(round(optimize.brentq(lambda x: x * x - 2, 0, 2), 6), signal.butter(1, 0.5)[0].round(3))
+print(round(integrate.solve_ivp(lambda t, y: -y, (0, 1), [1]).y[0, -1], 3), spatial.KDTree(numpy.eye(3)).query([1, 0, 0])[1])
+print("~", stats.norm.rvs(size=2))
+""",
+        """\
+1.414214 [0.5 0.5]
+0.368 0
+""",
+    ),
+    "select": (
+        r"""
+import os, select, selectors, socket, threading, time
+def at(): return round(time.monotonic(), 2)
+ours, theirs = socket.socketpair()
+threading.Timer(1, theirs.send, [b"a"]).start()
+print(select.select([ours], [], [])[0] == [ours], ours.recv(1), at())
+print(select.select([ours], [], [], 0.5), at())
+poll = select.poll()
+poll.register(ours, select.POLLIN)
+threading.Timer(1, theirs.send, [b"b"]).start()
+print(poll.poll(5000)[0][1] == select.POLLIN, ours.recv(1), at())
+selector = selectors.DefaultSelector()
+end, begin = os.pipe()
+selector.register(end, selectors.EVENT_READ)
+threading.Timer(1, os.write, [begin, b"c"]).start()
+print(len(selector.select()), os.read(end, 5), at())
+""",
+        """\
+True b'a' 1.0
+([], [], []) 1.5
+True b'b' 2.5
+1 b'c' 3.5
+""",
+    ),
+    "serial_asyncio": (
+        r"""
+import asyncio, serial_asyncio, time
+async def main():
+    reader, writer = await serial_asyncio.open_serial_connection(url="/dev/ttyUSB0", baudrate=9600)
+    writer.write(b"D,2,2\n")
+    print(await reader.readline(), round(time.monotonic(), 2))
+    writer.close()
+asyncio.run(main())
+""",
+        """\
+b'd\\r\\n' 0.01
+""",
+    ),
+    "signal": (
+        r"""
+import signal, time, threading, os
+def at(): return round(time.monotonic(), 2)
+signal.signal(signal.SIGALRM, lambda *_: print("alarm", at()))
+signal.setitimer(signal.ITIMER_REAL, 0.5, 1)
+time.sleep(2)
+signal.setitimer(signal.ITIMER_REAL, 0)
+signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGALRM, signal.SIGUSR1])
+signal.alarm(2)
+print(signal.sigwait([signal.SIGALRM]), at())
+threading.Timer(1, os.kill, [os.getpid(), signal.SIGUSR1]).start()
+print(signal.sigwaitinfo([signal.SIGUSR1]).si_signo, at())
+print(signal.sigtimedwait([signal.SIGUSR1], 1.5), at())
+""",
+        """\
+alarm 0.5
+alarm 1.5
+14 4.0
+10 5.0
+None 6.5
+""",
+    ),
+    "simple_pid": (
+        r"""
+from simple_pid import PID
+import time
+pid = PID(1, 0.5, 0.1, setpoint=10, sample_time=0.1)
+values, speed = [], 0
+for _ in range(5):
+    speed = pid(speed) * 0.5
+    time.sleep(0.1)
+    values.append(round(speed, 3))
+print(values)
+""",
+        """\
+[5.0, 0.125, 7.747, -2.256, -2.256]
+""",
+    ),
+    "sklearn": (
+        r"""
+import numpy
+from sklearn.cluster import KMeans
+from sklearn.linear_model import LinearRegression
+x = numpy.arange(8.0)[:, None]
+print(LinearRegression().fit(x, 2 * x[:, 0]).coef_.round(3))
+print("~", KMeans(2, n_init=1).fit(x).cluster_centers_)
+""",
+        """\
+[2.]
+""",
+    ),
+    "socket": (
+        r"""
+import socket, socketserver, threading, time
+def at(): return round(time.monotonic(), 2)
+class Echo(socketserver.StreamRequestHandler):
+    def handle(self):
+        for line in self.rfile:
+            time.sleep(1)
+            self.wfile.write(line.upper())
+server = socketserver.ThreadingTCPServer(("127.0.0.1", 0), Echo)
+threading.Thread(target=server.serve_forever, daemon=True).start()
+with socket.create_connection(server.server_address, timeout=3) as client, client.makefile("rw") as file:
+    for word in ("one", "two"):
+        print(word, file=file, flush=True)
+        print(file.readline().strip(), at())
+    try:
+        client.settimeout(0.5)
+        client.recv(1)
+    except TimeoutError:
+        print("timeout", at())
+left, right = socket.socket(socket.AF_INET, socket.SOCK_DGRAM), socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+left.bind(("127.0.0.1", 0))
+threading.Timer(1, right.sendto, [b"datagram", left.getsockname()]).start()
+print(left.recvfrom(100)[0], at())
+""",
+        """\
+ONE 1.0
+TWO 2.0
+timeout 2.5
+b'datagram' 3.5
+""",
+    ),
+    "sqlite3": (
+        r"""
+import sqlite3, time
+time.sleep(100)
+base = sqlite3.connect(":memory:", check_same_thread=False)
+base.execute("create table log (at text default current_timestamp, what text)")
+base.execute("insert into log (what) values ('start')")
+print(base.execute("select at, date('now'), strftime('%s', 'now') from log").fetchall())
+print("~", base.execute("select random(), hex(randomblob(4))").fetchall())
+""",
+        """\
+[('2000-01-01 00:01:40', '2000-01-01', '946684900')]
+""",
+    ),
+    "sqlite3 waits": (
+        r"""
+import os, sqlite3, tempfile
+name = os.path.join(tempfile.mkdtemp(), "base")
+first = sqlite3.connect(name, isolation_level=None)
+first.execute("begin exclusive")
+sqlite3.connect(name, timeout=50).execute("create table log (at text)")
+""",
+        """\
+kiks: a program in simulated time must wait by time.sleep, a lock or a port, but it waited by itself (program.py, line 5). Run it on kiks serve, where time is real.
+""",
+    ),
+    "subprocess": (
+        r"""
+import os, subprocess, time
+print(subprocess.run(["echo", "hello"], capture_output=True, text=True, timeout=5).stdout.strip(), os.system("true"))
+process = subprocess.Popen(["cat"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+print("line", file=process.stdin, flush=True)
+print(process.stdout.readline().strip())
+process.terminate()
+print(process.wait(), time.monotonic() < 0.1)
+""",
+        """\
+hello 0
+line
+-15 True
+""",
+    ),
+    "sympy": (
+        r"""
+import sympy
+x = sympy.symbols("x")
+print(sympy.integrate(sympy.sin(x) ** 2, (x, 0, sympy.pi)), sympy.solve(x ** 2 - 2), sympy.lambdify(x, x ** 2)(3))
+""",
+        """\
+pi/2 [-sqrt(2), sqrt(2)] 9
+""",
+    ),
+    "threading": (
+        r"""
+import ctypes, signal, threading, time
+thread = threading.Thread(target=time.sleep, args=(1,))
+thread.start()
+print(ctypes.CDLL(None).pthread_setname_np(ctypes.c_ulong(thread.ident), b"name") != 0)
+signal.signal(signal.SIGUSR1, lambda *_: print("signal"))
+signal.pthread_kill(threading.get_ident(), signal.SIGUSR1)
+thread.join()
+print(round(time.monotonic(), 2), "~" if thread.ident == 0 else thread.ident == 1 << 44)
+""",
+        """\
+True
+signal
+1.0 True
+""",
+    ),
+    "time_machine": (
+        r"""
+import time_machine
+""",
+        """\
+kiks: a program in simulated time must leave Python's clocks alone, but it imported time_machine (program.py, line 1). Run it on kiks serve, where time is real.
+""",
+    ),
+    "tqdm": (
+        r"""
+import io, time
+from tqdm import tqdm
+out = io.StringIO()
+for _ in tqdm(range(10), file=out, ascii=True, ncols=50):
+    time.sleep(1)
+print(out.getvalue().split("\r")[-1].strip().split("|")[-1], round(time.monotonic()))
+""",
+        """\
+ 10/10 [00:10<00:00,  1.00s/it] 10
+""",
+    ),
+    "transitions": (
+        r"""
+from transitions import Machine
+from transitions.extensions.asyncio import AsyncMachine
+from transitions.extensions.states import add_state_features, Timeout
+import time
+@add_state_features(Timeout)
+class Timed(Machine): pass
+class Robot:
+    def stop(self): print("stopped", round(time.monotonic(), 1)); self.rest()
+robot = Robot()
+Timed(robot, states=["resting", {"name": "turning", "timeout": 2, "on_timeout": "stop"}], transitions=[["go", "resting", "turning"], ["rest", "turning", "resting"]], initial="resting")
+robot.go()
+time.sleep(3)
+print(robot.state)
+""",
+        """\
+stopped 2.0
+resting
+""",
+    ),
+    "trio": (
+        r"""
+import trio, time
+def at(): return round(time.monotonic(), 2)
+async def main():
+    send, receive = trio.open_memory_channel(0)
+    async def talk():
+        for item in range(3):
+            await trio.sleep(0.5)
+            await send.send(item)
+        await send.aclose()
+    async with trio.open_nursery() as nursery:
+        nursery.start_soon(talk)
+        print([item async for item in receive], at())
+    with trio.move_on_after(1):
+        await trio.sleep_forever()
+    print(at(), await trio.to_thread.run_sync(lambda: time.sleep(2) or 7), at())
+    listeners = await trio.open_tcp_listeners(0, host="127.0.0.1")
+    async def serve(stream):
+        await stream.send_all(await stream.receive_some(10))
+    async with trio.open_nursery() as nursery:
+        nursery.start_soon(trio.serve_listeners, serve, listeners)
+        stream = await trio.open_tcp_stream("127.0.0.1", listeners[0].socket.getsockname()[1])
+        await stream.send_all(b"round")
+        print(await stream.receive_some(10), at())
+        nursery.cancel_scope.cancel()
+trio.run(main)
+""",
+        """\
+[0, 1, 2] 1.5
+2.5 7 4.5
+b'round' 4.5
+""",
+    ),
+    "urllib3": (
+        r"""
+import urllib3
+urllib3.PoolManager().request("GET", "http://example.com/", retries=False)
+""",
+        """\
+kiks: a program in simulated time must talk to its robots alone, but it used the network (program.py, line 2). Run it on kiks serve, where time is real.
+""",
+    ),
+    "uvloop": (
+        r"""
+import uvloop
+""",
+        """\
+kiks: a program in simulated time must wait by Python's own event loops, but it imported uvloop (program.py, line 1). Use asyncio, or run it on kiks serve, where time is real.
+""",
+    ),
+    "websockets": (
+        r"""
+import asyncio, websockets, time
+async def serve(socket):
+    async for message in socket:
+        await asyncio.sleep(1)
+        await socket.send(message.upper())
+async def main():
+    async with websockets.serve(serve, "127.0.0.1", 0) as server:
+        port = server.sockets[0].getsockname()[1]
+        async with websockets.connect(f"ws://127.0.0.1:{port}") as client:
+            await client.send("hi")
+            print(await client.recv(), round(time.monotonic(), 1))
+asyncio.run(main())
+""",
+        """\
+HI 1.0
+""",
+    ),
+    "yaml": (
+        r"""
+import datetime
+import yaml
+print(yaml.safe_dump({"day": datetime.date.today(), "now": datetime.datetime.now().replace(microsecond=0)}), end="")
+print(yaml.safe_load("at: 2000-01-01"))
+""",
+        """\
+day: 2000-01-01
+now: 2000-01-01 00:00:00
+{'at': datetime.date(2000, 1, 1)}
+""",
+    ),
+    "zoneinfo": (
+        r"""
+import zoneinfo, datetime, time
+print(datetime.datetime.now(zoneinfo.ZoneInfo("Europe/Berlin")).isoformat(timespec="seconds"), datetime.datetime.now(datetime.timezone.utc).date(), time.strftime("%Y"), time.localtime().tm_year, datetime.date.today())
+""",
+        """\
+2000-01-01T01:00:00+01:00 2000-01-01 2000 2000 2000-01-01
+""",
+    ),
+}
+"""A program for each package, and what it says; lines with a "~" depend on the seed alone."""
+
+
+def is_here(name: str) -> bool:
+    return find_spec(name.split()[0].partition(".")[0]) is not None
+
+
+@pytest.fixture(scope="module")
+def said(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, list[tuple[str, str]]]]:
+    """What each program, and KiKS beside it, has said each time, and KiKS's last lines, with the state."""
+    folder, runs = tmp_path_factory.mktemp("packages"), []
+    for name, (text, _) in PROGRAMS.items():
+        if is_here(name):
+            path = folder / name / "program.py"
+            path.parent.mkdir()
+            path.write_text(text.lstrip("\n"))
+            runs += [shlex.join([f"{name}.{number}", str(path)]) for number in range(TIMES)]
+    surroundings = {**os.environ, "SDL_VIDEODRIVER": "dummy", "PYGAME_HIDE_SUPPORT_PROMPT": "1"}
+    command = [sys.executable, str(FOLDER / "each_alone.py"), str(folder), str(AT_ONCE), "--", *runs]
+    subprocess.run(command, env=surroundings, timeout=280, check=True, stdin=subprocess.DEVNULL)
+
+    def read(run: str) -> tuple[str, str]:
+        out, err = ((folder / f"{run}.{kind}").read_text() for kind in ("out", "err"))
+        told, _, ending = err.rpartition("kiks: robot 1: ")
+        return out + told, ending
+
+    yield {name: [read(f"{name}.{number}") for number in range(TIMES)] for name in PROGRAMS if is_here(name)}
+
+
+@pytest.mark.parametrize("name", PROGRAMS)
+def test_package_lives_in_simulated_time(name: str, said: dict[str, list[tuple[str, str]]]) -> None:
+    if name not in said:
+        pytest.skip(f"{name.split()[0]} is not installed")
+    first, second = said[name]
+    assert re.sub(r"^~.*\n", "", first[0], flags=re.MULTILINE) == PROGRAMS[name][1]
+    assert re.search("state [0-9a-f]{16}\n", first[1])
+    assert first == second
