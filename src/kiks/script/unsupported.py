@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import re
 import sys
-from _multiprocessing import SemLock
+from _multiprocessing import SemLock  # type: ignore[import-not-found]
 from collections.abc import Iterator
 from contextlib import contextmanager
 from multiprocessing.process import BaseProcess
