@@ -28,6 +28,9 @@ _ROOT = Scheduler.start.__code__.co_filename
 _real_signal, _real_getsignal, _real_wakeup = (
     unchanged(each) for each in (_signal.signal, _signal.getsignal, _signal.set_wakeup_fd)
 )
+_real_kill, _real_raise, _real_kill_thread = (
+    unchanged(each) for each in (os.kill, _signal.raise_signal, _signal.pthread_kill)
+)
 _real_mask, _real_pending, _real_wait = (
     unchanged(each) for each in (_signal.pthread_sigmask, _signal.sigpending, _signal.sigtimedwait)
 )
@@ -86,15 +89,17 @@ class Signals:
                 "sigwait": lambda signals, /: self._wait_for(signals, NEVER_NS),
                 "sigwaitinfo": lambda signals, /: _told(self._wait_for(signals, NEVER_NS)),
                 "sigtimedwait": self._wait_until,
-            }
+                "pthread_kill": self._kill_thread,
+            },
+            "posix": {"kill": self._kill},
         }
 
     # ---- calls of the program ----
 
     def _set(self, number: int, handler: Any, /) -> Any:
         before = self._get(number)
-        self._before.setdefault(number, _real_getsignal(number))
-        _real_signal(number, self._come if callable(handler) else handler)
+        before_here = _real_signal(number, self._come if callable(handler) else handler)
+        self._before.setdefault(number, before_here)
         self._handlers[number] = handler
         return before
 
@@ -102,8 +107,10 @@ class Signals:
         return self._handlers[number] if number in self._handlers else _real_getsignal(number)
 
     def _set_wakeup(self, descriptor: int, /, **options: Any) -> int:
-        self._wakeup = descriptor
-        return _real_wakeup(descriptor, **options)
+        _real_wakeup(descriptor, **options)
+        # The one from before the program is not the program's.
+        before, self._wakeup = self._wakeup, descriptor
+        return before
 
     def _set_timer(self, which: int, seconds: float, interval: float = 0.0, /) -> tuple[float, float]:
         self._check_timer(which)
@@ -154,6 +161,19 @@ class Signals:
     def _pause(self) -> None:
         while self._scheduler.wait("a signal") is not SIGNALLED:
             pass
+
+    def _kill(self, process: int, number: int, /) -> None:
+        # Other threads of this process, such as the watchdog, must not take what this one blocks.
+        if process == os.getpid() and number:
+            _real_raise(number)
+        else:
+            _real_kill(process, number)
+
+    def _kill_thread(self, ident: int, number: int, /) -> None:
+        if threading.get_ident() == ident or ident in self._scheduler.tasks:
+            self._kill(os.getpid(), number)
+        else:
+            _real_kill_thread(ident, number)
 
     # ---- delivery ----
 

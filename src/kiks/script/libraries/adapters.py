@@ -27,6 +27,8 @@ def _adapters() -> dict[str, Adapter]:
         "numpy": c_clocks.adapt_numpy,
         "numpy.random": _seed_numpy,
         "sqlite3": c_clocks.adapt_sqlite,
+        # It gives the system's threads names, but threads of a program are none.
+        "trio._core._thread_cache": lambda module, host: {module: {"set_os_thread_name": None}},
     }
 
 
