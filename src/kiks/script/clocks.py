@@ -61,7 +61,7 @@ def replacements(scheduler: Scheduler, clock: VirtualPort) -> dict[str, dict[str
 
         return Reading(lambda *given: convert(clock.ask_ns(), *given), waited)
 
-    def sleep(seconds: float, /) -> None:
+    def sleep(seconds: Any, /) -> None:
         if not isinstance(seconds, float):
             seconds = operator.index(seconds)
         if not 0 <= seconds <= threading.TIMEOUT_MAX:

@@ -206,7 +206,7 @@ class Files:
         while True:
             ports = [each for each in ports if each.descriptor in self._ports]
             arrived = _fill(ports)
-            found: Found = files.found or look(0)
+            found = files.found or look(0)
             if found or scheduler.world.now_ns >= deadline_ns:
                 return found
             # One more character at any of the ports can end the wait.

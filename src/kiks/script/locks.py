@@ -151,9 +151,7 @@ def _plain_locks(scheduler: Scheduler, room: WaitingRoom) -> dict[str, Any]:
         **dict.fromkeys(("acquire", "acquire_lock", "__enter__"), acquire),
         **dict.fromkeys(("release", "release_lock", "__exit__"), release),
         # `threading` itself only looks, at the locks of all its threads and in the order of their addresses.
-        **dict.fromkeys(
-            ("locked", "locked_lock"), for_program(scheduler, Reading(locked, _real_locked), _real_locked)
-        ),
+        **dict.fromkeys(("locked", "locked_lock"), for_program(scheduler, Reading(locked, _real_locked), _real_locked)),
     }
 
 

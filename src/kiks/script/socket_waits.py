@@ -135,7 +135,7 @@ def replacements(scheduler: Scheduler, files: Files) -> dict[str, dict[str, Any]
         files.note_inside(*(each.fileno() for each in pair))
         return pair
 
-    own = {"send": send, "sendall": sendall, "_accept": accept}
+    own: dict[str, Any] = {"send": send, "sendall": sendall, "_accept": accept}
     return {
         "_socket": {"socketpair": socketpair},
         "_socket.socket": {
