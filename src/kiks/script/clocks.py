@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import datetime
+import operator
 import os
 import resource
 import sys
+import threading
 import time
 import warnings
 from collections.abc import Callable
 from contextlib import suppress
+from functools import update_wrapper
 from typing import Any
 
 from kiks.clock.program_clock import EPOCH_S, calendar_ns
+from kiks.model.checks import SECONDS_MAX
 from kiks.script.patching import Reading, for_program
 from kiks.script.thread_scheduler import Scheduler
 from kiks.sim.port import VirtualPort
@@ -56,14 +60,16 @@ def replacements(scheduler: Scheduler, clock: VirtualPort) -> dict[str, dict[str
 
         return Reading(lambda *given: convert(clock.ask_ns(), *given), waited)
 
-    def sleep(seconds: float, /) -> None:
-        if seconds < 0:
-            raise ValueError("sleep length must be non-negative")
+    def sleep(seconds: Any, /) -> None:
+        if not isinstance(seconds, float):
+            seconds = operator.index(seconds)
+        if not 0 <= seconds <= threading.TIMEOUT_MAX:
+            time.sleep(seconds)  # says what is wrong with it
         if seconds == 0:
             scheduler.give_way()
             clock.ask_ns()
         else:
-            clock.sleep(max(seconds, SHORTEST_S))
+            clock.sleep(min(max(seconds, SHORTEST_S), SECONDS_MAX))
 
     def clock_gettime_ns(now_ns: int, clock_id: int) -> int:
         return calendar_ns(now_ns) if clock_id in CALENDARS else now_ns
@@ -141,7 +147,10 @@ def _dates(scheduler: Scheduler, clock: VirtualPort) -> dict[str, Any]:
         return now(cls, datetime.UTC).replace(tzinfo=None)
 
     def real(method: Any) -> Callable[..., Any]:
-        return lambda cls, *args, **kwargs: method.__get__(None, cls)(*args, **kwargs)
+        def call(cls: Any, *args: Any, **kwargs: Any) -> Any:
+            return method.__get__(None, cls)(*args, **kwargs)
+
+        return update_wrapper(call, method, ("__name__", "__qualname__", "__doc__"), ())
 
     return {
         "now": classmethod(for_program(scheduler, now, real(_real_now))),

@@ -247,7 +247,10 @@ def thread_starts(scheduler: Scheduler) -> dict[str, dict[str, Any]]:
             self.lives = _thread.allocate_lock()
 
         def is_done(self) -> bool:
-            return self.ident is not None and not self.lives.locked()
+            is_done = self.ident is not None and not self.lives.locked()
+            if not is_done:
+                scheduler.poll()
+            return is_done
 
         def join(self, timeout: float | None = None) -> None:
             if self.ident is None:

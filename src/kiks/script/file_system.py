@@ -11,6 +11,7 @@ import os
 import stat
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from functools import cached_property
 from types import TracebackType
 from typing import Any
@@ -182,6 +183,17 @@ class FileSystem:
             for field, time_ns in (("atime", accessed_ns), ("mtime", changed_ns), ("ctime", self._now_ns())):
                 self._known[real.st_dev, real.st_ino, field] = getattr(real, f"st_{field}_ns"), time_ns
 
+        def noting(name: str, place: int) -> Any:
+            """Return a function that changes a file, and notes when it has done so."""
+
+            def call(*args: Any, **kwargs: Any) -> Any:
+                done = getattr(os, name)(*args, **kwargs)
+                with suppress(OSError, IndexError):
+                    self.translated(os.lstat(args[place]))
+                return done
+
+            return call
+
         def is_port(path: Any) -> bool:
             return isinstance(path, str | os.PathLike) and os.fspath(path) in self._ports
 
@@ -216,6 +228,8 @@ class FileSystem:
                 "lstat": status(os.lstat),
                 "fstat": lambda fd: self.translated(os.fstat(fd)),
                 "utime": utime,
+                **{name: noting(name, 0) for name in ("chmod", "mkdir", "mkfifo", "truncate")},
+                "symlink": noting("symlink", 1),
                 "access": access,
                 "listdir": listdir,
                 "scandir": scandir,

@@ -261,11 +261,23 @@ class Files:
             self.wait_for_pipe(descriptor, select.POLLIN)
             return bytes(os.read(descriptor, length))
 
+        def put(descriptor: int, data: Any, write: Callable[[Any], Any]) -> Any:
+            """Write by a function: into a pipe as much at once as a pipe that is ready takes."""
+            if not self._is_pipe(descriptor):
+                self.wait_for_pipe(descriptor, select.POLLOUT)
+                return write(data)
+            left = memoryview(data).cast("B")
+            size = len(left)
+            while True:
+                self.wait_for_pipe(descriptor, select.POLLOUT)
+                left = left[write(left[: select.PIPE_BUF]) :]
+                if not left:
+                    return size
+
         def write(descriptor: int, data: Any, /) -> int:
             if descriptor in ports:
                 return int(ports[descriptor].port.write(data))
-            self.wait_for_pipe(descriptor, select.POLLOUT)
-            count: int = os.write(descriptor, data)
+            count: int = put(descriptor, data, lambda piece: os.write(descriptor, piece))
             self._system.note_write(descriptor)
             return count
 
@@ -307,15 +319,19 @@ class Files:
         def write_file(file: Any, data: Any, /) -> Any:
             if file.closed:
                 return _file_methods["write"](file, data)
-            self.wait_for_pipe(file.fileno(), select.POLLOUT)
-            count = _file_methods["write"](file, data)
+            count = put(file.fileno(), data, lambda piece: _file_methods["write"](file, piece))
             self._system.note_write(file.fileno())
             return count
 
         def read_all(file: Any) -> Any:
             if file.closed or not self._is_pipe(file.fileno()):
                 return _file_methods["readall"](file)
-            return b"".join(iter(lambda: reads["read"](file, PIPE_CHARACTERS), b""))
+
+            def read_piece() -> Any:
+                self.wait_for_pipe(file.fileno(), select.POLLIN)
+                return _file_methods["read"](file, PIPE_CHARACTERS)
+
+            return b"".join(iter(read_piece, b""))
 
         def close_file(file: Any) -> None:
             if not file.closed and file.writable():
@@ -343,13 +359,19 @@ class Files:
 
     def _is_pipe(self, descriptor: int) -> bool:
         """Return whether a descriptor leads to the program itself, and reading it waits."""
+        return self._is_inside(descriptor) and os.get_blocking(descriptor)
+
+    def _is_inside(self, descriptor: int) -> bool:
         state = _status(descriptor) if self._inside else None
-        return state is not None and (state.st_dev, state.st_ino) in self._inside and os.get_blocking(descriptor)
+        return state is not None and (state.st_dev, state.st_ino) in self._inside
 
     def wait_for_pipe(self, descriptor: int, event: int) -> None:
-        """Wait until a pipe or socket to which other threads of the program have the other end can be used."""
-        if self._is_pipe(descriptor):
-            self.wait_for(descriptor, event)
+        """Wait until a pipe or socket to which other threads of the program have the other end can be used.
+
+        If it does not block, looking at it is a poll.
+        """
+        if self._is_inside(descriptor):
+            self.wait_for(descriptor, event, None if os.get_blocking(descriptor) else 0)
 
 
 def _fill(ports: Iterable[_PortFile]) -> list[int]:

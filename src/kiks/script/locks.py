@@ -18,7 +18,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any
 
-from kiks.script.patching import for_program
+from kiks.script.patching import Reading, for_program
 from kiks.script.thread_scheduler import SIGNALLED, Scheduler, Task, get_ident, timeout_ns
 from kiks.sim.read_completion import NEVER_NS
 
@@ -142,14 +142,14 @@ def _plain_locks(scheduler: Scheduler, room: WaitingRoom) -> dict[str, Any]:
             _real_release(lock)
 
     def locked(lock: Any) -> bool:
-        if scheduler.is_here:
-            scheduler.poll()
+        scheduler.poll()
         return _real_locked(lock)
 
     return {
         **dict.fromkeys(("acquire", "acquire_lock", "__enter__"), acquire),
         **dict.fromkeys(("release", "release_lock", "__exit__"), release),
-        **dict.fromkeys(("locked", "locked_lock"), locked),
+        # `threading` itself only looks, at the locks of all its threads and in the order of their addresses.
+        **dict.fromkeys(("locked", "locked_lock"), for_program(scheduler, Reading(locked, _real_locked), _real_locked)),
     }
 
 
@@ -287,7 +287,7 @@ def replacements(scheduler: Scheduler) -> dict[str, dict[str, Any]]:
     room = WaitingRoom(scheduler)
 
     def is_set(event: threading.Event) -> bool:
-        if not event._flag and scheduler.is_here:  # type: ignore[attr-defined]
+        if not event._flag:  # type: ignore[attr-defined]
             scheduler.poll()
         return real_is_set(event)
 
@@ -310,7 +310,7 @@ def replacements(scheduler: Scheduler) -> dict[str, dict[str, Any]]:
             # The first thread of a program is Thread-1, even if other threads ran in this process before.
             "_counter": itertools.count(1).__next__,
         },
-        "threading.Event": {"is_set": is_set},
+        "threading.Event": {"is_set": for_program(scheduler, Reading(is_set, real_is_set), real_is_set)},
         "threading.Condition": {"_is_owned": is_owned},
         # Running executors: those of this process are not the program's.
         concurrent.futures.thread.__name__: {"_shutdown": False, "_threads_queues": weakref.WeakKeyDictionary()},

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from functools import partial
+from functools import partial, update_wrapper
 from types import BuiltinFunctionType
 from typing import Any
 
@@ -78,9 +78,15 @@ def for_program(
     bodies = {Caller.PROGRAM: asked, Caller.WAITS: waited, Caller.REAL: real}
 
     def call(*args: Any, **kwargs: Any) -> Any:
-        return (bodies[caller(frame(1))] if scheduler.is_here else real)(*args, **kwargs)
+        body = bodies[caller(frame(1))] if scheduler.is_here else real
+        try:
+            return body(*args, **kwargs)
+        except TypeError as error:
+            if error.__traceback__ is not None and error.__traceback__.tb_next is None and body is not real:
+                return real(*args, **kwargs)  # the arguments do not fit: Python says why
+            raise
 
-    return call
+    return update_wrapper(call, real, ("__name__", "__qualname__", "__doc__"), ())
 
 
 def _find(path: str) -> Any:

@@ -211,7 +211,7 @@ class _AtExit:
             call, args, kwargs = self._calls.pop()
             try:
                 call(*args, **kwargs)
-            except Exception as error:
+            except (Exception, SystemExit) as error:
                 print(f"Exception ignored in atexit callback: {call!r}", file=sys.stderr)
                 _print_program_trace(error)
 
@@ -233,7 +233,9 @@ def _run_main_thread(start: Callable[[], None]) -> int:
         return _complain(str(leaving.code))
     except KiksError as error:
         return _complain(f"kiks: {error}")
-    except Exception as error:
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
         sys.excepthook(type(error), error, error.__traceback__)
         return 1
     return 0

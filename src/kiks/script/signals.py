@@ -89,16 +89,18 @@ class Signals:
                 "sigwait": lambda signals, /: self._wait_for(signals, NEVER_NS),
                 "sigwaitinfo": lambda signals, /: _told(self._wait_for(signals, NEVER_NS)),
                 "sigtimedwait": self._wait_until,
-            }
+                "pthread_kill": self._kill_thread,
+            },
+            "posix": {"kill": self._kill},
         }
 
     # ---- calls of the program ----
 
     def _set(self, number: int, handler: Any, /) -> Any:
         before = self._get(number)
-        self._before.setdefault(number, signal.getsignal(number))
         is_heard = callable(handler) or (handler == signal.SIG_DFL and number in self._blocked - _OF_FAULTS)
-        signal.signal(number, self._come if is_heard else handler)
+        before_here = signal.signal(number, self._come if is_heard else handler)
+        self._before.setdefault(number, before_here)
         self._handlers[number] = handler
         return before
 
@@ -172,6 +174,19 @@ class Signals:
     def _pause(self) -> None:
         while self._scheduler.wait("a signal") is not SIGNALLED:
             pass
+
+    def _kill(self, process: int, number: int, /) -> None:
+        # Other threads of this process, such as the watchdog, must not take what this one blocks.
+        if process == os.getpid() and number:
+            signal.raise_signal(number)
+        else:
+            os.kill(process, number)
+
+    def _kill_thread(self, ident: int, number: int, /) -> None:
+        if threading.get_ident() == ident or ident in self._scheduler.tasks:
+            self._kill(os.getpid(), number)
+        else:
+            signal.pthread_kill(ident, number)
 
     # ---- delivery ----
 

@@ -24,11 +24,14 @@ EVENTS = frozenset(
 """Audit events of calls that may reach the outside (docs.python.org/3/library/audit_events.html)."""
 
 _READS = ("recv", "recv_into", "recvfrom", "recvfrom_into", "recvmsg", "recvmsg_into", "_accept")
-_WRITES = ("send", "sendto", "sendmsg")
+_NAMES = ("bind", "connect", "connect_ex", "sendto", "sendmsg")
+"""Methods that give a socket an address."""
 _methods = dict(vars(_socket.socket))
 
 # Sockets of the program that have an address of their own.
 _own: weakref.WeakSet[Any] = weakref.WeakSet()
+# Addresses of such sockets, which may be closed before anybody asks who has sent from there.
+_addresses: set[Any] = set()
 
 
 def is_inside(event: str, arguments: tuple[Any, ...]) -> bool:
@@ -36,8 +39,7 @@ def is_inside(event: str, arguments: tuple[Any, ...]) -> bool:
     if event in ("socket.getaddrinfo", "socket.gethostbyname"):
         return _is_here(arguments[0])
     where, address = arguments[0], arguments[1]
-    if event in ("socket.bind", "socket.connect"):
-        _own.add(where)
+    _own.add(where)
     return event == "socket.bind" or address is None or _owner_of(address) is not None
 
 
@@ -77,14 +79,14 @@ def replacements(scheduler: Scheduler, files: Files) -> dict[str, dict[str, Any]
 
     def wait(sock: Any, event: int) -> None:
         timeout_s = sock.gettimeout()
-        if timeout_s != 0 and not files.wait_for(sock.fileno(), event, timeout_s):
+        if not files.wait_for(sock.fileno(), event, timeout_s) and timeout_s != 0:
             raise TimeoutError("timed out")
 
-    def waiting(name: str, event: int) -> Any:
+    def reading(name: str) -> Any:
         real = _methods[name]
 
         def call(sock: Any, *args: Any, **kwargs: Any) -> Any:
-            wait(sock, event)
+            wait(sock, select.POLLIN)
             return real(sock, *args, **kwargs)
 
         return for_program(scheduler, call, real)
@@ -95,24 +97,39 @@ def replacements(scheduler: Scheduler, files: Files) -> dict[str, dict[str, Any]
             wait(sock, select.POLLOUT)
             left = left[_methods["send"](sock, left, flags | socket.MSG_DONTWAIT) :]
 
-    def addressing(name: str) -> Any:
-        """Return a method that gives a socket its address, or that of the other end."""
+    def send(sock: Any, data: Any, flags: int = 0, /) -> int:
+        size = memoryview(data).nbytes
+        if size and sock.gettimeout() is None:
+            # It returns when all has been taken, for which others may have to read.
+            sendall(sock, data, flags)
+            return size
+        wait(sock, select.POLLOUT)
+        return int(_methods["send"](sock, data, flags))
+
+    def naming(name: str) -> Any:
         real = _methods[name]
 
-        def call(sock: Any, address: Any, /) -> Any:
-            files.note_inside(sock.fileno())
-            # TCP would keep characters back for some real time, until earlier ones are acknowledged. What a socket
-            # accepts inherits this.
-            with suppress(OSError):
-                _methods["setsockopt"](sock, socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            return real(sock, address)
+        def call(sock: Any, *args: Any) -> Any:
+            if name.startswith("send"):
+                wait(sock, select.POLLOUT)
+            else:
+                # TCP would keep characters back for some real time, until earlier ones are acknowledged. What a socket
+                # accepts inherits this.
+                with suppress(OSError):
+                    _methods["setsockopt"](sock, socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            try:
+                return real(sock, *args)
+            finally:
+                if sock.fileno() >= 0:
+                    files.note_inside(sock.fileno())
+                    _addresses.add(sock.getsockname())
 
         return for_program(scheduler, call, real)
 
     def accept(sock: Any) -> Any:
         wait(sock, select.POLLIN)
         descriptor, address = _methods["_accept"](sock)
-        if address and _owner_of(address) is None:
+        if address and address not in _addresses and _owner_of(address) is None:
             refuse_network(scheduler, "another program has connected to it")
         files.note_inside(descriptor)
         return descriptor, address
@@ -122,13 +139,12 @@ def replacements(scheduler: Scheduler, files: Files) -> dict[str, dict[str, Any]
         files.note_inside(*(each.fileno() for each in pair))
         return pair
 
-    own: dict[str, Any] = {"sendall": sendall, "_accept": accept}
+    own: dict[str, Any] = {"send": send, "sendall": sendall, "_accept": accept}
     return {
         "_socket": {"socketpair": socketpair},
         "_socket.socket": {
-            **{name: waiting(name, select.POLLIN) for name in _READS},
-            **{name: waiting(name, select.POLLOUT) for name in _WRITES},
-            **{name: addressing(name) for name in ("bind", "connect", "connect_ex")},
+            **{name: reading(name) for name in _READS},
+            **{name: naming(name) for name in _NAMES},
             **{name: for_program(scheduler, method, _methods[name]) for name, method in own.items()},
         },
     }

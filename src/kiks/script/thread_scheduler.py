@@ -10,6 +10,7 @@ which they began to wait.
 from __future__ import annotations
 
 import heapq
+import math
 import threading
 import traceback
 from collections import deque
@@ -421,6 +422,8 @@ class Scheduler:
 
 def timeout_ns(seconds: float) -> int:
     """Return a timeout [s] as a time [ns]: 0 if it is negative, for ever if it is longer than any run."""
+    if math.isnan(seconds):
+        raise ValueError("Invalid value NaN (not a number)")
     if seconds <= 0:
         return 0
     return wait_ns(seconds) if seconds <= SECONDS_MAX else NEVER_NS

@@ -25,9 +25,12 @@ from kiks.script.thread_scheduler import Scheduler
 
 _FORKS = frozenset({"os.fork", "os.forkpty"})
 _STARTS = frozenset({"subprocess.Popen", "os.system", "os.posix_spawn", "os.exec", "os.spawn"})
-_OTHER_LOOPS = frozenset({"uvloop", "gevent", "eventlet"})
-_OTHER_CLOCKS = frozenset({"time_machine"})
-"""Modules that change functions in C as KiKS does, each in ignorance of the other."""
+_REFUSED = {
+    **dict.fromkeys(("uvloop", "gevent", "eventlet"), ("wait by Python's own event loops", "Use asyncio, or ")),
+    "time_machine": ("leave the insides of Python's clocks alone", "Use unittest.mock or freezegun, or "),
+}
+"""Modules that cannot be there: what a program must do, and what it can use instead."""
+
 _DEVICE = re.compile(r"/dev/(tty(?!$)|cu\.|serial/|rfcomm)")
 # A command of Python, at the beginning of a line of a shell or of one of its parts.
 _PYTHON = re.compile(r"(^|[;&|(]|/sh -c )\s*((env|nohup|sudo|exec)\s+)*(\S*/)?((python|pypy)[\d.]*|\S+\.py)(\s|$)")
@@ -111,10 +114,9 @@ def _judge(scheduler: Scheduler, system: FileSystem, event: str, arguments: tupl
         if isinstance(path, str | bytes) and flags & os.O_CREAT and flags & (os.O_TRUNC | os.O_EXCL):
             system.note_open(path)
     elif event == "import":
-        if arguments[0] in _OTHER_LOOPS:
-            refuse(scheduler, "wait by Python's own event loops", f"it imported {arguments[0]}", "Use asyncio, or ")
-        if arguments[0] in _OTHER_CLOCKS:
-            refuse(scheduler, "leave Python's clocks alone", f"it imported {arguments[0]}")
+        if arguments[0] in _REFUSED:
+            must, way = _REFUSED[arguments[0]]
+            refuse(scheduler, must, f"it imported {arguments[0]}", way)
     elif event in socket_waits.EVENTS:
         if not socket_waits.is_inside(event, arguments):
             refuse_network(scheduler, "it used the network")

@@ -30,6 +30,8 @@ def _adapters() -> dict[str, Adapter]:
         "numpy.random": _seed_numpy,
         "pydantic_core": c_clocks.adapt_extension("pydantic_core._pydantic_core"),
         "sqlite3": c_clocks.adapt_sqlite,
+        # It gives the system's threads names, but threads of a program are none.
+        "trio._core._thread_cache": lambda module, host: {module: {"set_os_thread_name": None}},
     }
 
 
