@@ -28,6 +28,9 @@ CALENDARS = frozenset(getattr(time, name) for name in ("CLOCK_REALTIME", "CLOCK_
 SHORTEST_S = 1e-9
 """Shortest sleep [s]: rounding may leave less of a wait, and time must pass nevertheless."""
 
+SLEPT_MAX_S = 2**63 / NS_PER_S
+"""Limit of the times that Python knows [s]."""
+
 UUID_EPOCH = 0x01B21DD213814000
 """Time of 1970 in UUIDs [100 ns since 15 October 1582] (RFC 9562, section 5.1)."""
 
@@ -35,6 +38,7 @@ NODE = b"\x02KiKS\x01"
 """Address of the simulated network card in UUIDs, a locally administered one (RFC 9562, section 6.10)."""
 
 _real = {name: unchanged(getattr(time, name)) for name in ("localtime", "gmtime", "ctime", "asctime", "strftime")}
+_real_sleep, _real_clock = unchanged(time.sleep), unchanged(time.clock_gettime_ns)
 _real_usage = unchanged(resource.getrusage)
 _real_now, _real_utcnow = (vars(datetime.datetime)[name] for name in ("now", "utcnow"))
 
@@ -57,8 +61,8 @@ def replacements(scheduler: Scheduler, clock: VirtualPort) -> dict[str, dict[str
         return Reading(lambda *given: convert(clock.ask_ns(), *given), waited)
 
     def sleep(seconds: float, /) -> None:
-        if seconds < 0:
-            raise ValueError("sleep length must be non-negative")
+        if not 0 <= seconds < SLEPT_MAX_S:
+            _real_sleep(seconds)  # says what is wrong
         if seconds == 0:
             scheduler.give_way()
             clock.ask_ns()
@@ -66,6 +70,7 @@ def replacements(scheduler: Scheduler, clock: VirtualPort) -> dict[str, dict[str
             clock.sleep(max(seconds, SHORTEST_S))
 
     def clock_gettime_ns(now_ns: int, clock_id: int) -> int:
+        _real_clock(clock_id)  # says whether there is such a clock
         return calendar_ns(now_ns) if clock_id in CALENDARS else now_ns
 
     def of_now(name: str) -> Callable[..., Any]:

@@ -59,9 +59,7 @@ def replacements(scheduler: Scheduler) -> dict[str, dict[str, Any]]:
 
     return {
         # Its name begins with an underscore from 3.14 on.
-        **dict.fromkeys(
-            (f"asyncio.events.{name}DefaultEventLoopPolicy" for name in ("Base", "_Base")), {"_Local": Local}
-        ),
+        **{f"asyncio.events.{name}DefaultEventLoopPolicy": {"_Local": Local} for name in ("Base", "_Base")},
         "asyncio.events": {"_event_loop_policy": None},
         "asyncio.Future": {"__hash__": hash_by_number},
         "asyncio.Task": {"__hash__": hash_by_number},

@@ -31,7 +31,7 @@ USB_ADAPTER = (0x0403, 0x6001)
 
 @contextmanager
 def left_open(ports: MutableSet[Any]) -> Iterator[None]:
-    """Leave ports that a program has not closed to the end of its process: later, pyserial's own `close` finds nothing."""
+    """Leave what a program has not closed to the end of its process, so that pyserial's own `close` does nothing later."""
     try:
         yield
     finally:

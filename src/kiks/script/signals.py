@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import _signal
 import contextlib
+import errno
 import os
 import signal
 import threading
@@ -28,6 +29,7 @@ _ROOT = Scheduler.start.__code__.co_filename
 _real_signal, _real_getsignal, _real_wakeup = (
     unchanged(each) for each in (_signal.signal, _signal.getsignal, _signal.set_wakeup_fd)
 )
+_real_get_timer = unchanged(_signal.getitimer)
 _real_mask, _real_pending, _real_wait = (
     unchanged(each) for each in (_signal.pthread_sigmask, _signal.sigpending, _signal.sigtimedwait)
 )
@@ -107,6 +109,8 @@ class Signals:
 
     def _set_timer(self, which: int, seconds: float, interval: float = 0.0, /) -> tuple[float, float]:
         self._check_timer(which)
+        if min(seconds, interval) < 0:
+            raise signal.ItimerError(errno.EINVAL, os.strerror(errno.EINVAL))
         return self._set_alarm(seconds, interval)
 
     def _get_timer(self, which: int, /) -> tuple[float, float]:
@@ -116,6 +120,7 @@ class Signals:
         return s_from_ns(left_ns), s_from_ns(interval_ns)
 
     def _check_timer(self, which: int) -> None:
+        _real_get_timer(which)  # says whether there is such a timer
         if which != signal.ITIMER_REAL:
             self._scheduler.end(
                 1,
