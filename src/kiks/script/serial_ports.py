@@ -31,7 +31,7 @@ USB_ADAPTER = (0x0403, 0x6001)
 
 @contextmanager
 def left_open(ports: MutableSet[Any]) -> Iterator[None]:
-    """Leave what a program has not closed to the end of its process, so that pyserial's own `close` does nothing later."""
+    """Leave what a program has not closed to the end of its process: pyserial's own `close` does nothing later."""
     try:
         yield
     finally:
