@@ -236,8 +236,8 @@ _MISSING = object()
 def change_class(owner: type, name: str, value: Any, undo: Undo) -> None:
     """Give a class, in Python or in C, another attribute.
 
-    An operator, such as `__hash__`, cannot be changed in a class that is part of the interpreter itself, such as `dict`:
-    from 3.12 on, those have other dictionaries.
+    An operator, such as `__hash__`, cannot be changed in a class of the interpreter itself, such as `dict`: from 3.12
+    on, those have other dictionaries.
     """
     names: dict[str, Any]
     (names,) = gc.get_referents(owner.__dict__)
