@@ -23,12 +23,9 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from types import BuiltinFunctionType, ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from kiks.errors import KiksError
-
-if TYPE_CHECKING:
-    from kiks.script.thread_scheduler import Scheduler, Task
 
 FIRST, LAST = (3, 11), (3, 13)
 """The versions of CPython whose insides are known: those under which all tests have passed."""
@@ -265,8 +262,12 @@ def change_class(owner: type, name: str, value: Any, undo: Undo) -> None:
 # ---- threads ----
 
 
-def thread_starts(scheduler: Scheduler) -> dict[str, dict[str, Any]]:
-    """Return what stands in for the functions by which `threading` starts threads and knows of their end."""
+def thread_starts(scheduler: Any) -> dict[str, dict[str, Any]]:
+    """Return what stands in for the functions by which `threading` starts threads and knows of their end.
+
+    Args:
+        scheduler: The program's threads, a `Scheduler`, which needs this file itself.
+    """
 
     def check(function: object, args: object = (), kwargs: object = None) -> None:
         if not (callable(function) and isinstance(args, tuple) and isinstance({} if kwargs is None else kwargs, dict)):
@@ -333,7 +334,7 @@ def name_of_thread(ident: int) -> str:
     return "a thread" if thread is None else thread.name
 
 
-def forget_threads(tasks: Mapping[int, Task]) -> None:
+def forget_threads(tasks: Mapping[int, Any]) -> None:
     """Make `threading` forget threads that have not ended, because they never go on."""
     for ident, task in tasks.items():
         thread: Any = threading._active.pop(ident, None)  # type: ignore[attr-defined]
