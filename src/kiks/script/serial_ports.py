@@ -36,7 +36,8 @@ def left_open(ports: MutableSet[Any]) -> Iterator[None]:
         yield
     finally:
         for port in ports:
-            port.is_open = False
+            # Nor does that of the next program, whose descriptors and lines are others.
+            vars(port).update(is_open=False, sim_port=None, _descriptor=None)
 
 
 def replacements(
