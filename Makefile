@@ -32,7 +32,7 @@ checked: setup
 	NUMBA_BOUNDSCHECK=1 $(PYTEST) -m "not slow" tests/engine tests/batch
 
 # The tests of what depends on the interpreter, under the other versions of Python that are here (noxfile.py).
-interpreters: setup
+interpreters: setup system
 	PATH="$(BIN):$$PATH" $(BIN)/nox
 
 user: $(VENV)/.user

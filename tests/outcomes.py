@@ -1,6 +1,7 @@
 """What programs do under this Python: those of the corpus, threads that do random steps, and a demonstration.
 
 Arguments: the file to write, in JSON; then that of another Python, if there is one, whose threads do the same steps.
+Those are the names of their outcomes.
 """
 
 from __future__ import annotations
@@ -46,16 +47,15 @@ def random_programs() -> list[Any]:
 
 
 def main(path: str, other: str = "") -> None:
-    threads = json.loads(Path(other).read_text())["threads"] if other else []
-    programs = [json.loads(program) for program in threads] if other else random_programs()
+    if other:
+        programs = [json.loads(name) for name in json.loads(Path(other).read_text()) if name.startswith("[")]
+    else:
+        programs = random_programs()
+    outcomes: dict[str, Any] = {json.dumps(program): run_threads(program) for program in programs}
+    demonstration = subprocess.run([*KIKS, *DEMONSTRATION], capture_output=True, text=True, check=True)
+    outcomes[" ".join(DEMONSTRATION)] = demonstration.stdout.partition("state ")[2]
     with tempfile.TemporaryDirectory() as folder, display() as screen:
-        corpus, _ = run_alone(Path(folder), on_screen(screen), again=())
-    said = subprocess.run([*KIKS, *DEMONSTRATION], capture_output=True, text=True, check=True)
-    outcomes = {
-        "corpus": corpus,
-        "threads": {json.dumps(program): run_threads(program) for program in programs},
-        "demonstration": {" ".join(DEMONSTRATION): said.stdout},
-    }
+        outcomes |= run_alone(Path(folder), on_screen(screen), again=())[0]
     Path(path).write_text(json.dumps(outcomes, indent=1))
 
 

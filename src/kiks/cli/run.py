@@ -164,6 +164,8 @@ def run(
         say(f"the programs of {arena} do not start here. kiks run {arena} starts them, too.")
     mapping = dict(parse_map(entry) for entry in map_ or [])
     check_policy(when_silent, patience)
+    import kiks.script  # noqa: F401  (under an interpreter that it does not know, KiKS ends here)
+
     thinking = thinking_of(project, home) if thinking is None else thinking
     if not thinking.startswith("live"):
         leave_out(context, f"with --thinking {thinking}", "save_thinking")

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import datetime
-import operator
 import os
 import resource
 import sys
-import threading
 import time
 import warnings
 from collections.abc import Callable
@@ -30,6 +28,9 @@ CALENDARS = frozenset(getattr(time, name) for name in ("CLOCK_REALTIME", "CLOCK_
 
 SHORTEST_S = 1e-9
 """Shortest sleep [s]: rounding may leave less of a wait, and time must pass nevertheless."""
+
+SLEPT_MAX_S = 2**63 / NS_PER_S
+"""Limit of the times that Python knows [s]."""
 
 UUID_EPOCH = 0x01B21DD213814000
 """Time of 1970 in UUIDs [100 ns since 15 October 1582] (RFC 9562, section 5.1)."""
@@ -61,17 +62,16 @@ def replacements(scheduler: Scheduler, clock: VirtualPort) -> dict[str, dict[str
         return Reading(lambda *given: convert(clock.ask_ns(), *given), waited)
 
     def sleep(seconds: Any, /) -> None:
-        if not isinstance(seconds, float):
-            seconds = operator.index(seconds)
-        if not 0 <= seconds <= threading.TIMEOUT_MAX:
-            time.sleep(seconds)  # says what is wrong with it
+        if not 0 <= seconds < SLEPT_MAX_S:
+            time.sleep(seconds)  # says what is wrong
         if seconds == 0:
             scheduler.give_way()
             clock.ask_ns()
         else:
-            clock.sleep(min(max(seconds, SHORTEST_S), SECONDS_MAX))
+            clock.sleep(min(max(float(seconds), SHORTEST_S), SECONDS_MAX))
 
     def clock_gettime_ns(now_ns: int, clock_id: int) -> int:
+        time.clock_gettime_ns(clock_id)  # says whether there is such a clock
         return calendar_ns(now_ns) if clock_id in CALENDARS else now_ns
 
     def of_now(name: str) -> Callable[..., Any]:

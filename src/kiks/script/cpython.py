@@ -8,10 +8,16 @@ runs.
 
 from __future__ import annotations
 
+import _queue
+import _random
 import _thread
+import asyncio
+import concurrent.futures.thread
 import ctypes
 import gc
+import logging
 import mmap
+import runpy
 import sys
 import threading
 import time
@@ -19,15 +25,17 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from itertools import count
 from types import BuiltinFunctionType, ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from kiks.errors import KiksError
 
-if TYPE_CHECKING:
-    from kiks.script.thread_scheduler import Scheduler, Task
+FIRST, LAST = (3, 11), (3, 13)
+"""The versions of CPython whose insides are known: those under which all tests have passed."""
 
-FIRST, LAST = (3, 11), (3, 14)
-"""The versions of CPython whose insides are known."""
+_HAS_HANDLES = sys.version_info >= (3, 13)
+"""Whether `threading` knows of the end of a thread by a handle, not by a lock."""
+
+_HANDLE = "_os_thread_handle" if sys.version_info >= (3, 14) else "_handle"
 
 _METHOD_OF_ARGUMENTS_AND_KEYWORDS = 0x0001 | 0x0002
 """METH_VARARGS | METH_KEYWORDS (methodobject.h)."""
@@ -69,7 +77,38 @@ _new_function.argtypes = [ctypes.c_void_p] * 3
 _type_modified = ctypes.pythonapi.PyType_Modified
 _type_modified.argtypes = [ctypes.py_object]
 _type_modified.restype = None
+_own, _disown = ctypes.pythonapi.Py_IncRef, ctypes.pythonapi.Py_DecRef
+_own.argtypes = _disown.argtypes = [ctypes.py_object]
+_own.restype = _disown.restype = None
 _CALL = ctypes.cast(ctypes.pythonapi.PyObject_Call, ctypes.c_void_p)
+
+
+def _private_names() -> Iterator[tuple[Any, tuple[str, ...]]]:
+    """Yield the private names of the standard library that `script` uses, with the objects that have them."""
+    yield asyncio, ("_get_running_loop", "_set_running_loop", "_enter_task", "_leave_task")
+    yield asyncio.events, ("_event_loop_policy",)
+    yield asyncio.DefaultEventLoopPolicy, ("_Local",)
+    yield concurrent.futures.thread, ("_shutdown", "_threads_queues")
+    yield concurrent.futures._base.Future, ("__hash__",)
+    yield logging, ("_startTime",)
+    yield runpy, ("_run_module_as_main",)
+    yield sys, ("_current_frames", "_getframe")
+    yield _queue.SimpleQueue, ("get", "get_nowait", "put", "put_nowait")
+    yield _random.Random, ("seed",)
+    yield _thread, ("LockType", "RLock", "_local", "allocate_lock", "get_ident", "start_new_thread")
+    yield _thread.LockType, ("acquire", "locked", "release")
+    yield _thread.RLock, ("_acquire_restore", "_is_owned", "_release_save", "acquire", "release")
+    yield threading, ("_active", "_counter", "_threading_atexits")
+    yield threading.Condition(), ("_is_owned", "_lock")
+    thread = threading.Thread(name="")
+    if _HAS_HANDLES:
+        yield _thread, ("_ThreadHandle", "start_joinable_thread")
+        yield threading, ("_ThreadHandle",)
+        yield thread, (_HANDLE,)
+    else:
+        yield _thread, ("_set_sentinel",)
+        yield threading, ("_shutdown_locks",)
+        yield thread, ("_is_stopped", "_tstate_lock")
 
 
 def check_interpreter() -> None:
@@ -78,20 +117,32 @@ def check_interpreter() -> None:
     Raises:
         KiksError: If they are not.
     """
-    version = sys.version_info[:2]
-    is_known = sys.implementation.name == "cpython" and FIRST <= version <= LAST
-    if is_known and getattr(sys, "_is_gil_enabled", lambda: True)():
-        sample = _CFunction.from_address(id(time.sleep))
-        if (
-            _MethodDef.from_address(sample.definition).name == b"sleep"
-            and sample.owner == id(time)
-            and _flags(dict).value == dict.__flags__
-        ):
-            return
-    raise KiksError(
-        f"a program in simulated time must run under CPython {'.'.join(map(str, FIRST))} to "
-        f"{'.'.join(map(str, LAST))} with its lock of the interpreter, but this is {sys.implementation.name} "
-        f"{sys.version.split()[0]}. Install KiKS under one of these, or run the program on kiks serve."
+    lacks = ""
+    if sys.implementation.name != "cpython" or not FIRST <= sys.version_info[:2] <= LAST:
+        lacks = "whose insides are not known"
+    elif not getattr(sys, "_is_gil_enabled", lambda: True)():
+        lacks = "without its lock of the interpreter"
+    elif not _has_known_structures():
+        lacks = "whose structures are not those of its version"
+    else:
+        for owner, names in _private_names():
+            for name in names:
+                if not hasattr(owner, name):
+                    lacks = f"where {getattr(owner, '__name__', type(owner).__name__)} has no {name}"
+    if lacks:
+        raise KiksError(
+            f"a program in simulated time must run under CPython {'.'.join(map(str, FIRST))} to "
+            f"{'.'.join(map(str, LAST))}, but this is {sys.implementation.name} {sys.version.split()[0]}, {lacks}. "
+            "Install KiKS under one of these, or run the program on kiks serve."
+        )
+
+
+def _has_known_structures() -> bool:
+    sample = _CFunction.from_address(id(time.sleep))
+    return (
+        _MethodDef.from_address(sample.definition).name == b"sleep"
+        and sample.owner == id(time)
+        and _flags(dict).value == dict.__flags__
     )
 
 
@@ -134,34 +185,59 @@ class Undo:
                 self._steps.pop()()
 
 
+class _StandIn:
+    """The definition and the owner that a changed function has meanwhile.
+
+    They live for ever, as a call may be under way when the change is taken back; the next change takes them again.
+
+    Args:
+        function: The function.
+    """
+
+    def __init__(self, function: BuiltinFunctionType) -> None:
+        real = _MethodDef.from_address(_CFunction.from_address(id(function)).definition)
+        # A function in C calls its body with its owner and the arguments, and so does PyObject_Call with what it calls.
+        self.definition = _MethodDef(real.name, _CALL.value, _METHOD_OF_ARGUMENTS_AND_KEYWORDS, real.doc)
+        # Pickles take the owner for the module that has the function, so it must look like one.
+        self.kind: Any = type("module", (ModuleType,), {})
+        self.owner = self.kind(getattr(function.__self__, "__name__", function.__name__))
+        # The function must not end while it is changed.
+        self.function = function
+
+
+_spare: dict[int, list[_StandIn]] = {}
+"""Those that are not in use, by the identity of the function."""
+
+
 def change_function(function: BuiltinFunctionType, body: Callable[..., Any], undo: Undo) -> None:
     """Let a function in C call one in Python, for all who have it."""
     head = _CFunction.from_address(id(function))
     before = head.definition, head.owner, head.vectorcall
-    real_module = function.__self__
-    # A function in C calls its body with its owner and the arguments, and so does PyObject_Call with what it calls.
-    # Pickles take the owner for the module that has the function, so it must look like one.
-    kind = type("module", (ModuleType,), {"__call__": staticmethod(body)})
-    owner = kind(getattr(real_module, "__name__", function.__name__))
-    real = _MethodDef.from_address(head.definition)
-    definition = _MethodDef(real.name, _CALL.value, _METHOD_OF_ARGUMENTS_AND_KEYWORDS, real.doc)
-    # The function owns its owner; a call that is under way needs both after the change was taken back, too.
-    ctypes.pythonapi.Py_IncRef(ctypes.py_object(owner))
-    _KEPT.append(definition)
-    head.definition, head.owner, head.vectorcall = ctypes.addressof(definition), id(owner), None
+    spare = _spare.setdefault(id(function), [])
+    stand_in = spare.pop() if spare else _StandIn(function)
+    stand_in.kind.__call__ = staticmethod(body)
+    # The collector of garbage counts on it that a function owns its owner.
+    _own(stand_in.owner)
+    head.definition, head.owner, head.vectorcall = ctypes.addressof(stand_in.definition), id(stand_in.owner), None
 
     def take_back() -> None:
         head.definition, head.owner, head.vectorcall = before
+        _disown(stand_in.owner)
+        del stand_in.kind.__call__
+        spare.append(stand_in)
 
     undo.add(take_back)
 
 
-_KEPT: list[object] = []
 _MISSING = object()
 
 
 def change_class(owner: type, name: str, value: Any, undo: Undo) -> None:
-    """Give a class, in Python or in C, another attribute."""
+    """Give a class, in Python or in C, another attribute.
+
+    An operator, such as `__hash__`, cannot be changed in a class of the interpreter itself, such as `dict`: from 3.12
+    on, those have other dictionaries.
+    """
     names: dict[str, Any]
     (names,) = gc.get_referents(owner.__dict__)
     before = names.get(name, _MISSING)
@@ -210,21 +286,22 @@ def new_idents() -> Iterator[int]:
     return count(FIRST_IDENT, IDENT_STEP)
 
 
-_HAS_HANDLES = sys.version_info >= (3, 13)
+def thread_starts(scheduler: Any) -> dict[str, dict[str, Any]]:
+    """Return what stands in for the functions by which `threading` starts threads and knows of their end.
 
+    Args:
+        scheduler: The program's threads, a `Scheduler`, which needs this file itself.
+    """
 
-def thread_starts(scheduler: Scheduler) -> dict[str, dict[str, Any]]:
-    """Return what stands in for the functions by which `threading` starts threads and knows of their end."""
-
-    def check(function: object) -> None:
-        if not callable(function):
-            raise TypeError("first arg must be callable")
+    def check(function: object, args: object = (), kwargs: object = None) -> None:
+        if not (callable(function) and isinstance(args, tuple) and isinstance({} if kwargs is None else kwargs, dict)):
+            raise TypeError  # Python's own function says what is wrong
 
     def start_new_thread(
         function: Callable[..., object], args: tuple[Any, ...], kwargs: dict[str, Any] | None = None, /
     ) -> int:
-        check(function)
-        return scheduler.start(function, tuple(args), kwargs or {}).ident
+        check(function, args, kwargs)
+        return int(scheduler.start(function, args, kwargs or {}).ident)
 
     starts: dict[str, Any] = {"start_new_thread": start_new_thread, "start_new": start_new_thread}
     if not _HAS_HANDLES:
@@ -278,13 +355,19 @@ def thread_starts(scheduler: Scheduler) -> dict[str, dict[str, Any]]:
     }
 
 
-def forget_threads(tasks: Mapping[int, Task]) -> None:
+def name_of_thread(ident: int) -> str:
+    """Return what `threading` calls a thread; it has no name if only `_thread` knows it."""
+    thread = threading._active.get(ident)  # type: ignore[attr-defined]
+    return "a thread" if thread is None else thread.name
+
+
+def forget_threads(tasks: Mapping[int, Any]) -> None:
     """Make `threading` forget threads that have not ended, because they never go on."""
     for ident, task in tasks.items():
         thread: Any = threading._active.pop(ident, None)  # type: ignore[attr-defined]
         if _HAS_HANDLES:
             if thread is not None:
-                thread._handle._set_done()
+                getattr(thread, _HANDLE)._set_done()
             continue
         threading._shutdown_locks.discard(task.sentinel)  # type: ignore[attr-defined]
         if thread is not None:

@@ -88,21 +88,9 @@ class WaitingRoom:
 
 
 def _deadline_ns(scheduler: Scheduler, blocking: bool, timeout: float) -> int:
-    """Return when a wait for a lock ends [ns].
-
-    Raises:
-        ValueError: If the timeout is out of range, as `_thread` says it.
-        OverflowError: If it is too long.
-    """
-    if timeout == -1:
-        return NEVER_NS
-    if not blocking:
-        raise ValueError("can't specify a timeout for a non-blocking call")
-    if timeout < 0:
-        raise ValueError("timeout value must be a non-negative number")
-    if timeout > threading.TIMEOUT_MAX:
-        raise OverflowError("timeout value is too large")
-    return scheduler.world.now_ns + timeout_ns(timeout)
+    """Return when a wait for a lock ends [ns]; if it cannot be meant so, a free lock says what is wrong."""
+    _real_acquire(_thread.allocate_lock(), blocking, timeout)
+    return NEVER_NS if timeout == -1 else scheduler.world.now_ns + timeout_ns(timeout)
 
 
 def _plain_locks(scheduler: Scheduler, room: WaitingRoom) -> dict[str, Any]:
@@ -287,7 +275,7 @@ def replacements(scheduler: Scheduler) -> dict[str, dict[str, Any]]:
     room = WaitingRoom(scheduler)
 
     def is_set(event: threading.Event) -> bool:
-        if not event._flag:  # type: ignore[attr-defined]
+        if not real_is_set(event):
             scheduler.poll()
         return real_is_set(event)
 

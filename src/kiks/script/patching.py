@@ -78,15 +78,27 @@ def for_program(
     bodies = {Caller.PROGRAM: asked, Caller.WAITS: waited, Caller.REAL: real}
 
     def call(*args: Any, **kwargs: Any) -> Any:
-        body = bodies[caller(frame(1))] if scheduler.is_here else real
+        if not scheduler.is_here:
+            return real(*args, **kwargs)
         try:
-            return body(*args, **kwargs)
-        except TypeError as error:
-            if error.__traceback__ is not None and error.__traceback__.tb_next is None and body is not real:
-                return real(*args, **kwargs)  # the arguments do not fit: Python says why
-            raise
+            return bodies[caller(frame(1))](*args, **kwargs)
+        except (AttributeError, TypeError) as error:
+            if not _is_about_arguments(error):
+                raise
+            wrong = error
+        # Python has its own words for it.
+        real(*args, **kwargs)
+        raise wrong
 
     return update_wrapper(call, real, ("__name__", "__qualname__", "__doc__"), ())
+
+
+def _is_about_arguments(error: AttributeError | TypeError) -> bool:
+    """Return whether an error came up in what stands in, not in code of the program that it called."""
+    trace = error.__traceback__
+    while trace is not None and trace.tb_next is not None:
+        trace = trace.tb_next
+    return trace is not None and str(trace.tb_frame.f_globals.get("__name__")).startswith("kiks.script.")
 
 
 def _find(path: str) -> Any:

@@ -109,11 +109,7 @@ def run_program(
         seed: What all its random numbers follow from; see `chance_seed`.
         module: Name of a module to run in place of the file, as `python -m` does.
         limited: See `run_here`.
-
-    Raises:
-        KiksError: If it cannot run under this interpreter.
     """
-    cpython.check_interpreter()
     world = line_of(1)
     scheduler = Scheduler(world, policy)
     lines: dict[int, SharedLine] = {}
@@ -243,7 +239,7 @@ def _run_main_thread(start: Callable[[], None]) -> int:
 
 def _wait_for_threads(scheduler: Scheduler) -> None:
     """Wait for the threads that still run, as Python does when its main thread ends."""
-    for call in reversed(getattr(threading, "_threading_atexits", [])):
+    for call in reversed(threading._threading_atexits):  # type: ignore[attr-defined]
         call()
     while left := [each for each in threading.enumerate() if each.ident in scheduler.tasks and not each.daemon]:
         for thread in left:

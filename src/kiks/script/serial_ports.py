@@ -31,12 +31,13 @@ USB_ADAPTER = (0x0403, 0x6001)
 
 @contextmanager
 def left_open(ports: MutableSet[Any]) -> Iterator[None]:
-    """Leave ports that a program has not closed to the end of its process, for pyserial's own `close` finds nothing."""
+    """Leave what a program has not closed to the end of its process: pyserial's own `close` does nothing later."""
     try:
         yield
     finally:
         for port in ports:
-            port.is_open = False
+            # Nor does that of the next program, whose descriptors and lines are others.
+            vars(port).update(is_open=False, sim_port=None, _descriptor=None)
 
 
 def replacements(

@@ -115,6 +115,8 @@ class Signals:
 
     def _set_timer(self, which: int, seconds: float, interval: float = 0.0, /) -> tuple[float, float]:
         self._check_timer(which)
+        if min(seconds, interval) < 0:
+            raise signal.ItimerError(errno.EINVAL, os.strerror(errno.EINVAL))
         return self._set_alarm(seconds, interval)
 
     def _get_timer(self, which: int, /) -> tuple[float, float]:
@@ -124,6 +126,7 @@ class Signals:
         return s_from_ns(left_ns), s_from_ns(interval_ns)
 
     def _check_timer(self, which: int) -> None:
+        signal.getitimer(which)  # says whether there is such a timer
         if which != signal.ITIMER_REAL:
             self._scheduler.end(
                 1,

@@ -23,7 +23,7 @@ import greenlet
 
 from kiks.clock.program_clock import PollCost, ProgramClock
 from kiks.model.checks import SECONDS_MAX
-from kiks.script.cpython import new_idents, unchanged
+from kiks.script.cpython import name_of_thread, new_idents, unchanged
 from kiks.sim.port import Line
 from kiks.sim.read_completion import NEVER_NS, Read
 from kiks.units import wait_ns
@@ -411,7 +411,9 @@ class Scheduler:
         """End the program, because none of its threads can ever go on."""
         self.current.waits_for = self.current.waits_for or "a robot that was asked nothing"
         waiting = ", ".join(
-            f"{_name_of(task)} for {task.waits_for}" for task in (self.main, *self.tasks.values()) if task.waits_for
+            f"{name_of_thread(task.ident)} for {task.waits_for}"
+            for task in (self.main, *self.tasks.values())
+            if task.waits_for
         )
         self.end(
             1,
@@ -427,8 +429,3 @@ def timeout_ns(seconds: float) -> int:
     if seconds <= 0:
         return 0
     return wait_ns(seconds) if seconds <= SECONDS_MAX else NEVER_NS
-
-
-def _name_of(task: Task) -> str:
-    thread = threading._active.get(task.ident)  # type: ignore[attr-defined]
-    return thread.name if thread is not None else "a thread"
