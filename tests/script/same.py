@@ -15,12 +15,16 @@ import signal
 import socket
 import sqlite3
 import subprocess
+import sys
 import threading
 import time
 import uuid
 
 import numpy as np
 import serial
+
+# From 3.13 on, code in C keeps its values out of reach.
+_LOCAL = " local" if sys.version_info < (3, 13) else ""
 
 BEFORE = {
     f"{name}.{attribute}": getattr(module, attribute)
@@ -41,13 +45,16 @@ BEFORE = {
         ("socket", socket, "create_connection socket socketpair"),
         ("sqlite3", sqlite3, "Connection connect"),
         ("subprocess", subprocess, "Popen TimeoutExpired run"),
-        ("threading", threading, "Condition Event Lock RLock Thread Timer get_ident local"),
+        ("threading", threading, "Condition Event Lock RLock Thread Timer get_ident" + _LOCAL),
         ("time", time, "ctime gmtime localtime monotonic perf_counter sleep strftime time time_ns"),
         ("uuid", uuid, "UUID uuid1 uuid4"),
     )
     for attribute in attributes.split()
 }
 """Functions and classes, by their names."""
+
+_IS_IMMUTABLE = 1 << 8
+"""Py_TPFLAGS_IMMUTABLETYPE (object.h); other flags tell what Python has noted of a class."""
 
 KINDS = {kind.__qualname__: kind for kind in map(type, (threading.Lock(), threading.RLock(), select.poll(), time.time))}
 """Classes that have no name in a module."""
@@ -62,7 +69,7 @@ def look() -> dict[str, tuple[object, ...]]:
             each.__module__,
             each.__qualname__,
             each.__doc__,
-            isinstance(each, type) and (each.__basicsize__, each.__mro__, each.__flags__),
+            isinstance(each, type) and (each.__basicsize__, each.__mro__, each.__flags__ & _IS_IMMUTABLE),
             pickled(each),
         )
         for name, each in (*BEFORE.items(), *KINDS.items())

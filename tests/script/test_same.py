@@ -25,7 +25,9 @@ assert type(datetime.datetime.now()) is datetime.datetime and type(datetime.date
 assert datetime.datetime.now().year == datetime.date.today().year == time.gmtime().tm_year == 2000
 assert [type(threading.Lock()), type(threading.RLock()), type(select.poll())] == list(same.KINDS.values())[:3]
 assert type(queue.SimpleQueue()) is queue.SimpleQueue and isinstance(time.time, types.BuiltinFunctionType)
-assert [type(each) for each in socket.socketpair()] == [socket.socket] * 2
+ours, theirs = socket.socketpair()
+with ours, theirs:
+    assert type(ours) is type(theirs) is socket.socket
 
 class Later(datetime.datetime): pass
 assert type(Later.now()) is Later and Later.now().year == 2000

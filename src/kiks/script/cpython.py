@@ -15,6 +15,7 @@ import mmap
 import sys
 import threading
 import time
+from _threading_local import local
 from collections.abc import Callable, Iterator, Mapping
 from itertools import count
 from types import BuiltinFunctionType, ModuleType
@@ -65,6 +66,8 @@ _FLAGS_OFFSET = object.__basicsize__ + 19 * ctypes.sizeof(ctypes.c_void_p)
 _new_function = ctypes.pythonapi.PyCFunction_NewEx
 _new_function.restype = ctypes.py_object
 _new_function.argtypes = [ctypes.c_void_p] * 3
+_thread_values = ctypes.pythonapi.PyThreadState_GetDict
+_thread_values.restype = ctypes.py_object
 _type_modified = ctypes.pythonapi.PyType_Modified
 _type_modified.argtypes = [ctypes.py_object]
 _type_modified.restype = None
@@ -196,6 +199,22 @@ def thread_idents() -> Iterator[int]:
         # Memory that is mapped there already stays as it is: it is this, or not needed.
         map_memory(_IDENTS, _IDENT_SPACE, reading_and_writing, private_and_empty | _MAP_FIXED_NOREPLACE, -1, 0)
     return count(_IDENTS, _IDENT_STEP)
+
+
+def thread_locals() -> dict[str, dict[str, Any]]:
+    """Return what stands in for `threading.local` where its values cannot be saved by `thread_values`."""
+    return {"_thread": {"_local": local}, "threading": {"local": local}} if _HAS_HANDLES else {}
+
+
+def thread_values() -> tuple[Callable[[], object], Callable[[Any], object]]:
+    """Return functions that save and restore all values of this thread, such as those of `threading.local`."""
+    values: dict[Any, Any] = _thread_values()
+
+    def put(saved: Any) -> None:
+        values.clear()
+        values.update(saved or ())
+
+    return values.copy, put
 
 
 def thread_starts(scheduler: Scheduler) -> dict[str, dict[str, Any]]:

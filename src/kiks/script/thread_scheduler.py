@@ -95,13 +95,14 @@ class Scheduler:
         tasks: Started threads that have not ended, by ident.
         lock_count: Number of free locks that the running thread has taken since it went on.
         os_thread: The thread of the operating system that runs the program; 0 when none does.
-        carried: Functions that save and restore values that libraries keep per thread of the operating system.
+        carried: Functions that save and restore values that Python keeps per thread of the operating system; a new
+            thread restores None.
     """
 
     def __init__(self, world: Line, program: ProgramClock) -> None:
         self.world = world
         self.program = program
-        self.carried: list[tuple[Callable[[], object], Callable[[Any], object]]] = []
+        self.carried: list[tuple[Callable[[], object], Callable[[Any], object]]] = [cpython.thread_values()]
         self.os_thread = get_ident()
         self._hub = greenlet.getcurrent()
         self._end: EndedError | None = None
@@ -141,7 +142,7 @@ class Scheduler:
         self._hub = greenlet.getcurrent()
         self.main.greenlet = greenlet.greenlet(run_main, self._hub)
         self.program.waiting = self.main.waiting
-        self.main.greenlet.switch()
+        self._switch_to(self.main)
         # What libraries in C keep of this program must not take later callers for it.
         self.os_thread = 0
         if self.tasks or not self.main.greenlet.dead:
@@ -162,6 +163,8 @@ class Scheduler:
         """Start a thread, which goes on when this one waits."""
 
         def run() -> None:
+            for _, put in self.carried:
+                put(None)
             try:
                 function(*arguments, **keywords)
             except SystemExit:
@@ -331,14 +334,18 @@ class Scheduler:
         chosen = self._choose()
         self._is_choosing = False
         if chosen is not task:
-            saved = [take() for take, _ in self.carried]
-            chosen.greenlet.switch()
-            for (_, put), value in zip(self.carried, saved, strict=True):
-                put(value)
+            self._switch_to(chosen)
         if thinks:
             self.program.go_on()
         while self._calls and task is self.main:
             self._calls.popleft()()
+
+    def _switch_to(self, task: Task) -> None:
+        """Run a thread; return when this one goes on."""
+        saved = [take() for take, _ in self.carried]
+        task.greenlet.switch()
+        for (_, put), value in zip(self.carried, saved, strict=True):
+            put(value)
 
     def _choose(self) -> Task:
         """Return the next thread; let time pass until one is ready."""
