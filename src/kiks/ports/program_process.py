@@ -227,7 +227,8 @@ class Process:
         if self._writer is None:
             return subprocess.Popen(line, pass_fds=[connection.fileno()])
         # Unbuffered: each line of output comes at once.
-        environment = {**os.environ, "PYTHONUNBUFFERED": "1"}
+        # As for a program alone; see `kiks.__main__`.
+        environment = {"PYTHONHASHSEED": "0", **os.environ, "PYTHONUNBUFFERED": "1"}
         keeps_output = self.output is not None
         if keeps_output:
             environment["PYTHONIOENCODING"] = "utf-8:backslashreplace"
