@@ -3,6 +3,8 @@
 A package that cannot is told of in one line. Programs run twice, and must say the same to the letter.
 """
 
+# ruff: noqa: E501 (one line of KiKS is longer)
+
 from __future__ import annotations
 
 import os
@@ -11,7 +13,6 @@ import shlex
 import subprocess
 import sys
 from importlib.util import find_spec
-from pathlib import Path
 
 import pytest
 from tests.at_length import share
@@ -1029,7 +1030,12 @@ def said(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[tuple[str, 
         path.parent.mkdir()
         path.write_text(PROGRAMS[name][0].lstrip("\n"))
         runs += [shlex.join([f"{name}.{number}", str(path)]) for number in range(count)]
-    surroundings = {**os.environ, "SDL_VIDEODRIVER": "dummy", "SDL_AUDIODRIVER": "dummy", "PYGAME_HIDE_SUPPORT_PROMPT": "1"}
+    surroundings = {
+        **os.environ,
+        "SDL_VIDEODRIVER": "dummy",
+        "SDL_AUDIODRIVER": "dummy",
+        "PYGAME_HIDE_SUPPORT_PROMPT": "1",
+    }
     command = [sys.executable, str(FOLDER / "each_alone.py"), str(folder), str(AT_ONCE), "--", *runs]
     subprocess.run(command, env=surroundings, timeout=280, check=True, stdin=subprocess.DEVNULL)
 

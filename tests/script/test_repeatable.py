@@ -34,9 +34,7 @@ def run(folder: Path, *words: str, **surroundings: str) -> tuple[int, str, list[
     (folder / "wander.py").write_text(WANDER)
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONHASHSEED"} | surroundings
     command = [*KIKS, "run", *words, str(folder / "wander.py")]
-    done = subprocess.run(
-        command, env=environment, capture_output=True, text=True, timeout=3 * GUARD_S, check=False
-    )
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=3 * GUARD_S, check=False)
     return done.returncode, done.stdout, done.stderr.splitlines()
 
 

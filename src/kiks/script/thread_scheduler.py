@@ -28,7 +28,6 @@ from kiks.sim.port import Line
 from kiks.sim.read_completion import NEVER_NS, Read
 from kiks.units import wait_ns
 
-
 SIGNALLED, COMPLETE, ALONE, STUCK = object(), object(), object(), object()
 """Reasons for which a thread goes on: a signal; a complete read; no other thread can go on before its read is complete;
 no thread can go on at all."""

@@ -10,8 +10,8 @@ from __future__ import annotations
 import os
 import re
 import sys
+from _multiprocessing import SemLock  # type: ignore[import-not-found]
 from collections.abc import Iterator
-from _multiprocessing import SemLock
 from contextlib import contextmanager
 from multiprocessing.process import BaseProcess
 from subprocess import Popen

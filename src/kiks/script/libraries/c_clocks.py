@@ -118,7 +118,9 @@ def _entries(path: str) -> list[tuple[str, int]]:
         place += 16
     names = ctypes.string_at(tables[_NAMES], tables[_NAMES_SIZE])
     # One name may be the end of a longer one.
-    wanted = {found.start(1): found[1].decode() for found in re.finditer(rb"(?=(time|gettimeofday|clock_gettime)\0)", names)}
+    wanted = {
+        found.start(1): found[1].decode() for found in re.finditer(rb"(?=(time|gettimeofday|clock_gettime)\0)", names)
+    }
     entries = [
         entry
         for start, size in ((_CALLS, _CALLS_SIZE), (_DATA, _DATA_SIZE))
