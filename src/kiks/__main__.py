@@ -9,11 +9,11 @@ from kiks.ports.hash_seed import HASH_SEED, VARIABLE
 
 def main() -> None:
     """Run the command."""
-    end_at_once()
-    # This command runs a program in this process, and the order of its sets is settled when the process starts.
-    runs_here = sys.argv[1:2] == ["run"] and sys.argv[1:] == sys.orig_argv[-len(sys.argv) + 1 :]
-    if runs_here and VARIABLE not in os.environ:
+    words = sys.argv[1:]
+    if words[:1] == ["run"] and sys.orig_argv[-len(words) :] == words and VARIABLE not in os.environ:
+        # This command runs a program in this process, and the order of its sets is settled when the process starts.
         os.execve(sys.executable, [sys.executable, *sys.orig_argv[1:]], {**os.environ, VARIABLE: HASH_SEED})
+    end_at_once()
     # The current folder may be a stranger's: processes that libraries start import nothing from it, either.
     os.environ.setdefault("PYTHONSAFEPATH", "kiks")
     from kiks.cli import main as run_command

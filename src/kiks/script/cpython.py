@@ -21,6 +21,7 @@ import runpy
 import sys
 import threading
 import time
+from _threading_local import local
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from itertools import count
@@ -74,6 +75,8 @@ _FLAGS_OFFSET = object.__basicsize__ + 19 * ctypes.sizeof(ctypes.c_void_p)
 _new_function = ctypes.pythonapi.PyCFunction_NewEx
 _new_function.restype = ctypes.py_object
 _new_function.argtypes = [ctypes.c_void_p] * 3
+_thread_values = ctypes.pythonapi.PyThreadState_GetDict
+_thread_values.restype = ctypes.py_object
 _type_modified = ctypes.pythonapi.PyType_Modified
 _type_modified.argtypes = [ctypes.py_object]
 _type_modified.restype = None
@@ -284,6 +287,27 @@ def new_idents() -> Iterator[int]:
         map_memory.argtypes = [ctypes.c_void_p, ctypes.c_size_t, *[ctypes.c_int] * 3, ctypes.c_long]
         map_memory(FIRST_IDENT, IDENT_STEP * IDENT_COUNT, mmap.PROT_READ | mmap.PROT_WRITE, _PLACED, -1, 0)
     return count(FIRST_IDENT, IDENT_STEP)
+
+
+def thread_locals() -> dict[str, dict[str, Any]]:
+    """Return what stands in for `threading.local` where its values cannot be saved by `thread_values`."""
+    return {"_thread": {"_local": local}, "threading": {"local": local}} if _HAS_HANDLES else {}
+
+
+def thread_values() -> tuple[Callable[[], Any], Callable[[Any], None]]:
+    """Return functions that take this thread's values away, such as those of `threading.local`, and put them back."""
+    values: dict[Any, Any] = _thread_values()
+
+    def take() -> dict[Any, Any]:
+        taken = values.copy()
+        values.clear()
+        return taken
+
+    def put(taken: dict[Any, Any]) -> None:
+        values.clear()
+        values.update(taken)
+
+    return take, put
 
 
 def thread_starts(scheduler: Any) -> dict[str, dict[str, Any]]:

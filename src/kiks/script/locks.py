@@ -13,7 +13,6 @@ import itertools
 import queue
 import threading
 import weakref
-from _threading_local import local
 from collections import deque
 from collections.abc import Callable
 from typing import Any
@@ -289,12 +288,11 @@ def replacements(scheduler: Scheduler) -> dict[str, dict[str, Any]]:
 
     real_is_set, real_is_owned = threading.Event.is_set, threading.Condition._is_owned  # type: ignore[attr-defined]
     return {
-        "_thread": {"get_ident": get_ident, "_local": local},
+        "_thread": {"get_ident": get_ident},
         "_thread.LockType": _plain_locks(scheduler, room),
         "_thread.RLock": _reentrant_locks(scheduler, room),
         "_queue.SimpleQueue": _queues(scheduler, room),
         "threading": {
-            "local": local,
             # The first thread of a program is Thread-1, even if other threads ran in this process before.
             "_counter": itertools.count(1).__next__,
         },

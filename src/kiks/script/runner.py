@@ -134,6 +134,7 @@ def run_program(
 
     replacements = _merged(
         cpython.thread_starts(scheduler),
+        cpython.thread_locals(),
         locks.replacements(scheduler),
         clocks.replacements(scheduler, clock),
         system.replacements(),

@@ -142,8 +142,11 @@ class Signals:
     def _set_mask(self, how: int, mask: Iterable[int], /) -> set[int]:
         task, given = self._scheduler.current, {int(each) for each in mask}
         before = self._masks.get(task, self._blocked)
-        masks: dict[int, set[int]] = {signal.SIG_BLOCK: before | given, signal.SIG_SETMASK: given}
-        masks[signal.SIG_UNBLOCK] = before - given
+        masks: dict[int, set[int]] = {
+            signal.SIG_BLOCK: before | given,
+            signal.SIG_UNBLOCK: before - given,
+            signal.SIG_SETMASK: given,
+        }
         if how not in masks:
             raise OSError(errno.EINVAL, os.strerror(errno.EINVAL))
         self._masks[task] = masks[how]

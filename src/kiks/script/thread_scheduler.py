@@ -23,7 +23,7 @@ import greenlet
 
 from kiks.clock.program_clock import PollCost, ProgramClock
 from kiks.model.checks import SECONDS_MAX
-from kiks.script.cpython import name_of_thread, new_idents, unchanged
+from kiks.script.cpython import name_of_thread, new_idents, thread_values, unchanged
 from kiks.sim.port import Line
 from kiks.sim.read_completion import NEVER_NS, Read
 from kiks.units import wait_ns
@@ -133,6 +133,8 @@ class Scheduler:
         errors: list[BaseException] = []
 
         def run_main() -> None:
+            # The main thread begins with the values of this one, and others with none.
+            self.carried.append(thread_values())
             try:
                 codes.append(main())
             except BaseException as error:
@@ -162,6 +164,8 @@ class Scheduler:
         """Start a thread, which goes on when this one waits."""
 
         def run() -> None:
+            for _, put in self.carried:
+                put(None)
             try:
                 function(*arguments, **keywords)
             except SystemExit:
@@ -342,9 +346,9 @@ class Scheduler:
 
     def _switch(self, task: Task) -> None:
         """Let a thread go on, which finds no values of this one; return when this one goes on."""
-        saved = [take() for take, _ in self.carried]
+        saved = [(put, take()) for take, put in self.carried]
         task.greenlet.switch()
-        for (_, put), value in zip(self.carried, saved, strict=True):
+        for put, value in saved:
             put(value)
 
     def _choose(self) -> Task:

@@ -1,0 +1,63 @@
+"""The same program is the same run, whatever Python draws by chance, and whatever has become of compiled code."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+from tests.at_length import cases
+from tests.cli.test_cli import KIKS
+from tests.guard import GUARD_S
+
+from kiks.engine import code_cache
+
+pytestmark = pytest.mark.slow
+
+WANDER = """
+import random, time, uuid
+import serial
+port = serial.Serial("/dev/ttyUSB0", 9600, timeout=1)
+for _ in range(5):
+    port.write(b"D,%d,%d\\n" % (random.randint(-5, 5), random.randint(-5, 5)))
+    port.readline()
+    time.sleep(0.3)
+port.write(b"H\\n")
+print(port.readline(), list({"left", "right", "front", "back"}), uuid.uuid4())
+"""
+
+
+def run(folder: Path, *words: str, **surroundings: str) -> tuple[int, str, list[str]]:
+    """Run a program that wanders by chance; return its exit code, what it has said, and the lines of KiKS."""
+    (folder / "wander.py").write_text(WANDER)
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONHASHSEED"} | surroundings
+    command = [*KIKS, "run", *words, str(folder / "wander.py")]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=3 * GUARD_S, check=False)
+    return done.returncode, done.stdout, done.stderr.splitlines()
+
+
+def test_chance_follows_from_the_seed(tmp_path: Path) -> None:
+    first = run(tmp_path)
+    assert first[0] == 0
+    assert run(tmp_path) == first
+    other = run(tmp_path, "--seed", "5")
+    assert other[0] == 0
+    assert other[1] != first[1]
+    assert other[2][-1] != first[2][-1]
+
+
+@pytest.mark.parametrize("is_there", cases([True, False]))
+def test_a_kernel_is_compiled_while_a_program_runs(is_there: bool, tmp_path: Path) -> None:
+    cache = next(code_cache.cache_folders())
+    shutil.copytree(cache, tmp_path / "cache" / "kiks" / cache.name)
+    (file,) = (tmp_path / "cache").rglob("kiks.engine.physics.motor.set_speed-*.code")
+    if is_there:
+        file.write_bytes(file.read_bytes() + b"x")
+    else:
+        file.unlink()
+    code, said, told = run(tmp_path, NUMBA_CACHE_DIR=str(tmp_path / "cache"))
+    assert (code, said, told[is_there:]) == run(tmp_path)
+    assert [line.split(" in ")[0] for line in told[:is_there]] == ["kiks: Damaged files"] * is_there
+    assert list((tmp_path / "cache").rglob("kiks.engine.physics.motor.set_speed-*.code"))
