@@ -164,8 +164,6 @@ class Scheduler:
         """Start a thread, which goes on when this one waits."""
 
         def run() -> None:
-            for _, put in self.carried:
-                put(None)
             try:
                 function(*arguments, **keywords)
             except SystemExit:
