@@ -346,7 +346,7 @@ class Scheduler:
         """Let a thread go on, which finds no values of this one; return when this one goes on."""
         saved = [(put, take()) for take, put in self.carried]
         task.greenlet.switch()
-        for put, value in saved:
+        for put, value in reversed(saved):
             put(value)
 
     def _choose(self) -> Task:
