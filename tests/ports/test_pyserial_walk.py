@@ -32,6 +32,9 @@ from kiks.sim.port import VirtualPort
 NOISE_S = 0.04
 """By how much a real run may differ [s]; one that differs by more was disturbed and is repeated."""
 
+REPEATS = 4
+"""How often a real run is repeated that said something else than the simulated ones."""
+
 ERROR = re.compile(r"[A-Z]\w+: ")
 """What a program says that ends with an exception."""
 
@@ -263,17 +266,28 @@ def test_no_name_of_pyserial_is_forgotten() -> None:
     assert PUBLIC - set(dir(VirtualPort)) == NOT_IN_MEMORY
 
 
+def compare(script: Script, folder: Path, real: object) -> list[str]:
+    """Return in what all simulated ports differ from an answer of pyserial."""
+    found = differences(script, "kiks run", real, run_program(script, folder))
+    if script.needs in ("", SETTINGS):
+        found += differences(script, "kiks://", real, run_url(script))
+    if not script.needs and not WALKED[script.text] & NOT_IN_MEMORY and "serial." not in script.text:
+        found += differences(script, "memory", real, run_memory(script))
+    return found
+
+
 def test_ports_are_pyserials_to_the_letter(tmp_path: Path) -> None:
     found = []
     for text, (real, real_s) in run_all_real().items():
         script = next(each for each in SCRIPTS if each.text == text)
         if abs(real_s - script.takes_s) > NOISE_S:
             found.append(f"pyserial: {text}: took {real_s:.3f} s, but should take {script.takes_s} s")
-        found += differences(script, "kiks run", real, run_program(script, tmp_path))
-        if script.needs in ("", SETTINGS):
-            found += differences(script, "kiks://", real, run_url(script))
-        if not script.needs and not WALKED[text] & NOT_IN_MEMORY and "serial." not in text:
-            found += differences(script, "memory", real, run_memory(script))
+        differs = compare(script, tmp_path, real)
+        for _ in range(REPEATS):
+            # A busy computer may delay a single character of a real run, which shows in no time: it is repeated alone.
+            if differs:
+                differs = compare(script, tmp_path, run_real(script)[0])
+        found += differs
     assert "\n".join(found) == ""
 
 
