@@ -297,6 +297,8 @@ def thread_locals() -> dict[str, dict[str, Any]]:
 def thread_values() -> tuple[Callable[[], Any], Callable[[Any], None]]:
     """Return functions that take this thread's values away, such as those of `threading.local`, and put them back."""
     values: dict[Any, Any] = _thread_values()
+    # It is only lent: ctypes would give it back once more than it was taken.
+    _own(values)
 
     def take() -> dict[Any, Any]:
         taken = values.copy()

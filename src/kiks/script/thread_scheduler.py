@@ -134,7 +134,7 @@ class Scheduler:
 
         def run_main() -> None:
             # The main thread begins with the values of this one, and others with none.
-            self.carried.append(thread_values())
+            self.carried.append((take, put))
             try:
                 codes.append(main())
             except BaseException as error:
@@ -143,7 +143,12 @@ class Scheduler:
         self._hub = greenlet.getcurrent()
         self.main.greenlet = greenlet.greenlet(run_main, self._hub)
         self.program.waiting = self.main.waiting
+        take, put = thread_values()
+        values = take()
+        put(values)
         self._switch(self.main)
+        # The program may have ended in any of its threads.
+        put(values)
         # What libraries in C keep of this program must not take later callers for it.
         self.os_thread = 0
         if self.tasks or not self.main.greenlet.dead:
