@@ -59,4 +59,5 @@ def main(path: str, other: str = "") -> None:
     Path(path).write_text(json.dumps(outcomes, indent=1))
 
 
-main(*sys.argv[1:])
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -17,6 +17,7 @@ import kiks
 from kiks.desk.panels.page import Page
 from kiks.desk.server.desk import Desk, foreign_project
 from kiks.desk.server.live_editing import Editing
+from kiks.ports.program_process import Command
 from kiks.sim.ring_buffer import RingBuffer
 
 CASES = 300
@@ -61,7 +62,7 @@ def _program(name: str, number: int, *, is_running: bool) -> Any:
     output: RingBuffer[Any] = RingBuffer(10)
     output.append(SimpleNamespace(text=name, is_error=is_running))
     return SimpleNamespace(
-        command=SimpleNamespace(program=Path(f"{name}.py")), number=number, robot=1, output=output,
+        command=Command(Path(f"{name}.py")), number=number, robot=1, output=output,
         state="running" if is_running else "ended", is_running=is_running, code=None if is_running else 1,
     )  # fmt: skip
 
