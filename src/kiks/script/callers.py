@@ -1,4 +1,4 @@
-"""Who calls a function that is simulated: the program lives in simulated time, and what serves it in real time."""
+"""Finds out who calls a simulated function: a program gets simulated time, KiKS and compilers get real time."""
 
 from __future__ import annotations
 

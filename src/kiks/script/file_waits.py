@@ -117,7 +117,7 @@ class _Wait:
         self._files = files
         self._look = look
         self._descriptors = descriptors
-        # What was ready when somebody looked last: an event may be told only once.
+        # What is ready. It is kept, because the system may report an event only once (EPOLLONESHOT, EPOLLET).
         self.found: Any = None
 
     @property
@@ -125,7 +125,7 @@ class _Wait:
         return self._descriptors is not None and self._files.are_inside(self._descriptors)
 
     def is_over(self, block_ms: int) -> bool:
-        self.found = self._look(block_ms)
+        self.found = self.found or self._look(block_ms)
         return bool(self.found)
 
 
@@ -246,14 +246,7 @@ class Files:
 
         def epoll(epoll: Any, timeout: float | None = None, maxevents: int = -1) -> list[tuple[int, int]]:
             timeout_s = None if timeout is None or timeout < 0 else timeout
-            found: list[tuple[int, int]] = []
-
-            def look(block_ms: int) -> list[tuple[int, int]]:
-                # The operating system may tell an event only once (EPOLLONESHOT, EPOLLET).
-                found[:] = found or _real_epoll(epoll, block_ms / 1000, maxevents)
-                return found
-
-            return self.wait(look, timeout_s)
+            return self.wait(lambda block_ms: _real_epoll(epoll, block_ms / 1000, maxevents), timeout_s)
 
         def read(descriptor: int, length: int, /) -> bytes:
             if descriptor in ports:

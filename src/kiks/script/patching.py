@@ -38,7 +38,7 @@ def replaced(replacements: Replacements, scheduler: Scheduler) -> Iterator[None]
 
     A function in C stays the same object and gets another body, which the program and its libraries reach. KiKS, and
     other threads of this process, still get the function as it was. Anything else in a module gets another value.
-    A class stays the same object and gets an attribute; its methods decide themselves whom they serve.
+    A class stays the same object and gets an attribute; a method that must tell callers apart uses `for_program`.
 
     Args:
         replacements: What stands in. A module that has not been imported, or has no such name, is left alone.

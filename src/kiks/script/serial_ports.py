@@ -115,7 +115,7 @@ def replacements(
         def read(self, size: int = 1) -> bytes:
             return self._ask(lambda port: port.read_in_pieces(size))
 
-    # Who has locked a line with `exclusive`.
+    # The port that has locked each line with `exclusive`.
     lock_holders: dict[Line, Port] = {}
 
     def unlock(port: Port) -> None:

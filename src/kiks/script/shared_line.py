@@ -129,7 +129,7 @@ class SharedLine:
         self._claim_count += 1
 
     def hang_up(self) -> None:
-        """Release the line and drop unread characters, if nobody else in the program has it open."""
+        """Release the line and drop unread characters, unless the program has it open a second time."""
         self._claim_count = max(self._claim_count - 1, 0)
         if not self._claim_count:
             self._line.hang_up()
