@@ -1,4 +1,4 @@
-"""How much the tests do: `make test` tests each feature once, `make test-all` and `.ci/run` everything."""
+"""How much the tests do: `make test` and `.ci/run` test each feature once, `make test-all` everything."""
 
 from __future__ import annotations
 

@@ -63,6 +63,8 @@ def speeds(page: Page, address: str) -> list[list[int]]:
 
 @at_length
 def test_loop_that_asks_for_nothing_is_told_on_the_page_while_time_stands_still(page: Page) -> None:
+    at(page, "new-program").click()
+    at(page, "name").fill("endless")
     write(page, "print('begun', flush=True)\nready = False\nwhile not ready:\n    pass\n")
     at(page, "run-program").click()
     expect(at(page, "output")).to_contain_text("begun")
