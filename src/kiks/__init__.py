@@ -7,6 +7,7 @@
     robot.set_speed(5, 5)
 
 With `kiks` imported, pyserial knows simulated ports too: `serial.serial_for_url("kiks://1")`.
+Every public call raises a `KiksError` for an argument or a file that it cannot use.
 """
 
 from __future__ import annotations

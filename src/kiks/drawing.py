@@ -136,9 +136,6 @@ def save_simulation(sim: Simulation, path: str | Path, trace: Trace | None = Non
         sim: The simulation.
         path: The file; its type follows from the ending.
         trace: The way there, as for `draw_simulation`.
-
-    Raises:
-        ParameterError: If the place cannot be written or the ending names no type of picture.
     """
     if _picture_type(path) != "SVG":
         save_picture(draw_simulation(sim, trace), path)
@@ -175,11 +172,7 @@ def _draw(
 
 
 def save_picture(image: Image, path: str | Path) -> None:
-    """Write a picture; the type follows from the ending.
-
-    Raises:
-        ParameterError: If the place cannot be written or the ending names no type of picture.
-    """
+    """Write a picture; the type follows from the ending."""
     pixels, kind = BytesIO(), _picture_type(path)
     if kind == "SVG":
         replace_file(path, _svg(image, []), "a picture")
@@ -190,11 +183,7 @@ def save_picture(image: Image, path: str | Path) -> None:
 
 
 def check_picture(path: str | Path) -> None:
-    """Raise, before the run that is drawn, what `save_picture` would raise.
-
-    Raises:
-        ParameterError: If the place cannot be written or the ending names no type of picture.
-    """
+    """Raise, before the run that is drawn, what `save_picture` would raise."""
     _picture_type(path)
     check_writable(path, "a picture")
 

@@ -1,4 +1,8 @@
-"""What can go wrong, for a user's eyes: every message says what must hold, what was given and what to do."""
+"""What can go wrong, for a user's eyes: every message says what must hold, what was given and what to do.
+
+Every public call raises a `KiksError` for an argument, a file or an extra that it cannot use. So `Raises:` names only
+what is particular.
+"""
 
 from __future__ import annotations
 
@@ -109,9 +113,6 @@ def library(name: str, extra: str = "learn") -> Any:
     Args:
         name: Its name.
         extra: The extra of KiKS that installs it.
-
-    Raises:
-        ParameterError: If it is not installed.
     """
     try:
         return importlib.import_module(name)

@@ -48,20 +48,13 @@ def save_plot(recordings: Sequence[Recording], path: str | Path, *, robot: int =
         recordings: The recordings.
         path: The picture's file, .png, .svg or .pdf.
         robot: Number of the robot whose readings, speeds and time are drawn; a run without a robot has paths alone.
-
-    Raises:
-        ParameterError: If the file cannot be written, or a run with robots has no such robot.
     """
     kind = ending_of(path, "a plot", TYPES)[1:]
     replace_file(path, _file_of(figure_of(recordings, robot=robot), kind), "a plot")
 
 
 def save_figure(figure: Any, path: str | Path) -> None:
-    """Write a figure, whose texts become plain, as a PNG.
-
-    Raises:
-        ParameterError: If the file cannot be written.
-    """
+    """Write a figure, whose texts become plain, as a PNG."""
     replace_file(path, _file_of(_with_plain_texts(figure), "png", 110), "the picture")
 
 
@@ -75,11 +68,7 @@ def _with_plain_texts(figure: Any) -> Any:
 
 
 def panels_of(recording: Recording, *, robot: int = 1) -> dict[str, bytes]:
-    """Return what `save_plot` draws of one recording as single pictures, by the names of `PANELS`, in SVG.
-
-    Raises:
-        ParameterError: If a run with robots has no such robot.
-    """
+    """Return what `save_plot` draws of one recording as single pictures, by the names of `PANELS`, in SVG."""
     from matplotlib.figure import Figure
 
     pictures = {}
@@ -114,11 +103,7 @@ def _file_of(figure: Any, kind: str, dots_per_inch: int = DOTS_PER_INCH) -> byte
 
 
 def figure_of(recordings: Sequence[Recording], *, robot: int = 1) -> Any:
-    """Return the figure of `save_plot`, a `matplotlib.figure.Figure`.
-
-    Raises:
-        ParameterError: If a recording with robots has no such robot.
-    """
+    """Return the figure of `save_plot`, a `matplotlib.figure.Figure`."""
     from matplotlib.figure import Figure
     from matplotlib.layout_engine import ConstrainedLayoutEngine
 
@@ -135,11 +120,7 @@ def figure_of(recordings: Sequence[Recording], *, robot: int = 1) -> Any:
 
 
 def figure_of_run(sim: Simulation, *, robot: int = 1) -> Any:
-    """Return the figure of a run that is being recorded; see `figure_of`.
-
-    Raises:
-        ParameterError: If it is not, or there is no such robot.
-    """
+    """Return the figure of a run that is being recorded; see `figure_of`."""
     recorder = sim.loop.recorder
     if not isinstance(recorder, RunRecorder):
         raise ParameterError(
@@ -150,11 +131,7 @@ def figure_of_run(sim: Simulation, *, robot: int = 1) -> Any:
 
 
 def _drawings(recording: Recording, robot: int) -> dict[str, Callable[[Any], None]]:
-    """Return functions that draw the rows on axes, by the names of `PANELS`: of a run without a robot, paths alone.
-
-    Raises:
-        ParameterError: If a run with robots has no such robot.
-    """
+    """Return functions that draw the rows on axes, by the names of `PANELS`: of a run without a robot, paths alone."""
     poses, wheels = recording.table("poses"), recording.table("wheels")
     paths = {"paths": lambda axes: _draw_paths(axes, recording, poses, wheels)}
     if not recording.robots:

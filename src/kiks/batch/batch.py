@@ -88,10 +88,6 @@ class Batch:
     Attributes:
         notes: State slots of the measures for step-by-step use, float64 [world, robot, note].
 
-    Raises:
-        ParameterError: If an argument is out of range or a start is not free.
-        ArenaError: If something has no free place where an arena puts it.
-
     Example:
         >>> import kiks
         >>> @kiks.controller(parameters=2)
@@ -172,9 +168,6 @@ class Batch:
                 or [world, parameter].
             seconds: Simulated time after which no loop begins [s].
             measures: The measures.
-
-        Raises:
-            ParameterError: If an argument is out of range, or Numba cannot compile the controller or a measure.
         """
         until_ns = ns_from_s(check_number("seconds", seconds, 0, SECONDS_MAX))
         driving = robot_controllers(controller, parameters, self.world_count, self.robot_count)
@@ -222,9 +215,6 @@ class Batch:
 
         Returns:
             The last readings of all robots of all worlds, float64 [world, robot, sensor]; a copy.
-
-        Raises:
-            ParameterError: If an argument is out of range or a start is not free.
         """
         chosen = np.arange(self.world_count)
         if worlds is not None:
@@ -258,9 +248,6 @@ class Batch:
 
         Returns:
             The readings of the robots, float64 [world, robot, sensor]; a copy.
-
-        Raises:
-            ParameterError: If the shape is wrong, a speed is NaN, or `reset` was not called before.
         """
         given = array_of(wheels)
         if given is None or given.shape != self._worlds.wheels.shape:
@@ -281,9 +268,6 @@ class Batch:
         """The lamps: x_mm, y_mm, power_w, and 1 for on or 0 for off, float64 [world, lamp, 4].
 
         Write to the array to move or switch lamps; a lamp with a place of NaN lights nothing.
-
-        Raises:
-            ParameterError: If the new value is not an array of finite numbers of that shape.
         """
         return self._lamps
 
@@ -316,11 +300,7 @@ class Batch:
 
     @_alone
     def state_hash(self, world: int) -> str:
-        """Return the hash of a world's state, 16 hexadecimal digits; a simulation in the same state has the same hash.
-
-        Raises:
-            ParameterError: If there is no such world.
-        """
+        """Return the hash of a world's state, 16 hexadecimal digits, as a simulation in the same state has it."""
         world = check_count("world", world, 0, self.world_count - 1)
         robots: Any = self.state.robots[world : world + 1].copy()
         # A simulation numbers only the kinds of its own robots.
@@ -358,11 +338,7 @@ class Batch:
         chosen: NDArray[np.int64] | None = None,
         least: int = LANES,
     ) -> None:
-        """Run `roll_out` in threads on blocks of at least `least` worlds; it calls some functions of users.
-
-        Raises:
-            ParameterError: If one of them fails.
-        """
+        """Run `roll_out` in threads on blocks of at least `least` worlds; it calls some functions of users."""
         blocks = list(self._blocks(np.arange(self.world_count) if chosen is None else chosen, least))
         left, errors = iter(blocks), list[Exception]()
 

@@ -73,11 +73,7 @@ def begin_of(typing: Any, row: Any, count: Any) -> Any:
 
 @functools.lru_cache(maxsize=256)
 def decider_of(controller: Controller, parameter_count: int) -> Any:
-    """Return what calls a controller, with so many parameters, for its robots in all worlds of a bunch.
-
-    Raises:
-        ParameterError: If Numba cannot compile the controller.
-    """
+    """Return what calls a controller, with so many parameters, for its robots in all worlds of a bunch."""
     controller.check((_ROW,) * len(ARGUMENTS))
     decide, sensor_count, memory_count = controller.kernel, controller.sensor_count, controller.memory_count
 
@@ -111,9 +107,6 @@ def deciders_of(controllers: Sequence[Controller], parameter_counts: Sequence[in
     Args:
         controllers: The controller of each robot.
         parameter_counts: The number of parameters of each robot.
-
-    Raises:
-        ParameterError: If Numba cannot compile a controller.
     """
     rows, first = [], 0
     for (controller, parameter_count), run in groupby(zip(controllers, parameter_counts, strict=True)):
@@ -124,11 +117,7 @@ def deciders_of(controllers: Sequence[Controller], parameter_counts: Sequence[in
 
 
 def watchers_of(measures: tuple[Measure, ...]) -> NDArray[np.int64]:
-    """Return the address of each measure and the range of its notes, int64 [measure, 3]: address, begin, end.
-
-    Raises:
-        ParameterError: If Numba cannot compile a measure.
-    """
+    """Return the address of each measure and the range of its notes, int64 [measure, 3]: address, begin, end."""
     watchers, begin = np.zeros((len(measures), 3), np.int64), 0
     for each, row in zip(measures, watchers, strict=True):
         row[:] = address_of(each.check(MEASURE)), begin, begin + each.note_count

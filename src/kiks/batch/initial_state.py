@@ -62,10 +62,6 @@ class InitialState:
         networks: The tables for their responses (`kiks.engine.sensing.thesis_networks`).
         state: A state with room for all worlds.
         lamps: The lamps of each arena, float64 [arena, lamp, 4]; where there are fewer, the others are off.
-
-    Raises:
-        ParameterError: If an argument is out of range.
-        ArenaError: If something has no free place where an arena puts it.
     """
 
     def __init__(
@@ -113,11 +109,7 @@ class InitialState:
             )
 
     def check_seeds(self, seeds: ArrayLike, count: int) -> NDArray[np.int64]:
-        """Return seeds as int64 [count].
-
-        Raises:
-            ParameterError: If they are not `count` whole numbers from 0 to 2^63 - 1.
-        """
+        """Return seeds as int64 [count]."""
         try:
             given = np.asarray(seeds)
         except (TypeError, ValueError, OverflowError):
@@ -130,11 +122,7 @@ class InitialState:
         return given.astype(np.int64)
 
     def seeds_of(self, seed: int | ArrayLike) -> NDArray[np.int64]:
-        """Return a seed for each world: the given seeds, or seeds that count up from the given one.
-
-        Raises:
-            ParameterError: If they are not valid seeds, one for each world.
-        """
+        """Return a seed for each world: the given seeds, or seeds that count up from the given one."""
         world_count = len(self.arena_indices)
         if isinstance(seed, int | np.integer) and 0 <= seed < 2**63 - world_count:
             return seed + np.arange(world_count, dtype=np.int64)
@@ -152,10 +140,6 @@ class InitialState:
             seeds: Seeds of the worlds.
             starts: Given poses, or anything that broadcasts to them; None for the start poses of simulations.
             worlds: Indices of the worlds; all if left out.
-
-        Raises:
-            ParameterError: If the shape is wrong, or a start is not free.
-            ArenaError: If there is no free place for a robot.
         """
         chosen = np.arange(len(self.arena_indices)) if worlds is None else worlds
         robot_count = self.state.robots.shape[1]
@@ -201,11 +185,7 @@ class InitialState:
 def _kinds_of(
     robot: str | RobotSpec | Sequence[Any], worlds: int, robots: int, response: str | None
 ) -> list[tuple[RobotSpec, ...]]:
-    """Return the kinds of the robots, one row for each world, or one row for all worlds.
-
-    Raises:
-        ParameterError: If one is no kind, or their number is not that of the worlds or robots.
-    """
+    """Return the kinds of the robots, one row for each world, or one row for all worlds."""
 
     def row_of(row: Any) -> tuple[RobotSpec, ...]:
         check_kinds(row, response)
@@ -243,9 +223,6 @@ def random_starts(
 
     Returns:
         float64 [count, 3], or [count, robot, 3] if `robots` is given.
-
-    Raises:
-        ParameterError: If the arena has too few free places.
     """
     rng = np.random.default_rng(seed)
     if robots is None:

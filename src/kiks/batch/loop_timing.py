@@ -46,9 +46,6 @@ class Timing:
         baud: Speed of the lines [bit/s]; None for a robot that senses and acts at once, without a line.
         think_s: Thinking time of the program before each command [s], like the thinking policy 'fixed'.
 
-    Raises:
-        ParameterError: If a number is out of range.
-
     Example:
         >>> Timing(period_s=0.05, baud=None)
         Timing(period_s=0.05, baud=None, think_s=0.0)

@@ -26,9 +26,6 @@ class MeasureSlots:
     Attributes:
         measures: The measures.
         note_count: Number of state slots of all measures together, for each robot.
-
-    Raises:
-        ParameterError: If one is no measure, or needs senses that these robots do not have.
     """
 
     def __init__(self, measures: Sequence[Measure], senses: Sequence[str], subject: str) -> None:
@@ -48,11 +45,7 @@ class MeasureSlots:
 
     @functools.cached_property
     def watchers(self) -> NDArray[np.int64]:
-        """Addresses and slots of the measures, for the loop of a batch (`kiks.batch.callbacks.watchers_of`).
-
-        Raises:
-            ParameterError: If Numba cannot compile one.
-        """
+        """Addresses and slots of the measures, for the loop of a batch (`kiks.batch.callbacks.watchers_of`)."""
         return watchers_of(self.measures)
 
     def values(self, notes: NDArray[np.float64]) -> NDArray[np.float64]:

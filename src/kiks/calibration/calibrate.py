@@ -122,7 +122,6 @@ def calibrate(
         say: Called with a line of text about each step.
 
     Raises:
-        ParameterError: If the gaps are not usable, or the response has directions of its own.
         CalibrationError: If a measurement shows something unexpected, or measurements contradict each other.
         LinkError: If the robot does not answer.
     """
@@ -138,11 +137,7 @@ def calibrate(
 
 
 def check_response(base: RobotSpec) -> None:
-    """Check that the simulated robot's sensors depend on what is measured.
-
-    Raises:
-        ParameterError: If the response has directions of its own.
-    """
+    """Check that the simulated robot's sensors depend on what is measured."""
     if base.proximity.response in NETWORK_RESPONSES:
         others = [response for response in RESPONSES if response not in NETWORK_RESPONSES]
         raise ParameterError(
@@ -152,11 +147,7 @@ def check_response(base: RobotSpec) -> None:
 
 
 def checked_gaps(gaps_mm: Sequence[float] | None, run_up_mm: float, base: RobotSpec) -> list[float]:
-    """Return the gaps to spin at, nearest first [mm].
-
-    Raises:
-        ParameterError: If they are too few, too near or too far, or the run-up is too short.
-    """
+    """Return the gaps to spin at, nearest first [mm]."""
     range_mm = base.proximity.range_mm
     gaps = sorted(gaps_mm) if gaps_mm else default_gaps_mm(base)
     if len(set(gaps)) < 2 or not all(2 <= gap <= range_mm for gap in gaps):

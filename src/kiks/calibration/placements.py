@@ -58,11 +58,7 @@ class SimPlacements:
         self.skew_rad = skew_rad
 
     def place(self, instruction: Instruction) -> float:
-        """Put the robot there.
-
-        Raises:
-            ParameterError: If the arena has no room there.
-        """
+        """Put the robot there."""
         arena, radius_mm = self.sim.arena, self.sim.spec.body.radius_mm
         x_mm, y_mm = arena.width_mm / 2, arena.height_mm / 2
         if instruction.place is Place.WALL:

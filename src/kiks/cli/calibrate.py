@@ -117,9 +117,6 @@ def hand_of(robot: Khepera) -> Placements | None:
 def parse_gaps(text: str) -> list[float]:
     """Return the numbers of '5,15,25' [mm].
 
-    Raises:
-        ParameterError: If a part is no number.
-
     Example:
         >>> parse_gaps("5,15,25.5")
         [5.0, 15.0, 25.5]

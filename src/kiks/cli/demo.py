@@ -171,11 +171,7 @@ def _individual(folder: str, generation: int, rank: int, world: int, task: str |
 
 
 def _champion(path: Path, at: str | None) -> Champion:
-    """Return the champion of a file or of a folder; with `at`, the elite there of the folder's archive.
-
-    Raises:
-        ParameterError: If there is none, or `at` is no place.
-    """
+    """Return the champion of a file or of a folder; with `at`, the elite there of the folder's archive."""
     from kiks.learn.archive import CHAMPION, Archive
     from kiks.learn.champion import Champion
 

@@ -45,11 +45,7 @@ def run_champion(
     on_desk: bool,
     waits: bool,
 ) -> None:
-    """Let a champion drive all robots of a simulation, and print the result; `files` are those of `recorded`.
-
-    Raises:
-        ParameterError: If the file is no champion's, or a result cannot be written.
-    """
+    """Let a champion drive all robots of a simulation, and print the result; `files` are those of `recorded`."""
     from kiks.learn.champion import Champion
 
     champion = Champion.load(file)

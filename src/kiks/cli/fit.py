@@ -60,9 +60,6 @@ def fit(
 def parse_file(entry: str) -> tuple[str, float]:
     """Return the path and the radius [mm] of 'post.sam=12.5'; the radius of a wall is infinite.
 
-    Raises:
-        ParameterError: If what stands after = is no positive number.
-
     Example:
         >>> parse_file("post.sam=12.5")
         ('post.sam', 12.5)

@@ -49,9 +49,6 @@ class Limits:
 
     Attributes:
         doubt: Why the run is not repeatable; empty if a limit of real time has not ended it.
-
-    Raises:
-        ParameterError: If one is no time.
     """
 
     def __init__(self, seconds: float | None, max_wall_s: float | None) -> None:

@@ -54,22 +54,14 @@ SeedOrOwn = Annotated[
 
 
 def written_folder(param: typer.CallbackParam, value: Path | None) -> Path | None:
-    """Make the folder of an option whose results go there.
-
-    Raises:
-        ParameterError: If nothing could be written into it.
-    """
+    """Make the folder of an option whose results go there."""
     if value is not None:
         make_folder(value, param.opts[0])
     return value
 
 
 def load_arena(file: str | None) -> Arena:
-    """Return the arena of a file, the classic box if there is none; of a project say that nothing else is taken.
-
-    Raises:
-        ArenaError: If the file is no arena.
-    """
+    """Return the arena of a file, the classic box if there is none; of a project say that nothing else is taken."""
     from kiks.model.arena import Arena
 
     if file is None:
@@ -86,11 +78,7 @@ def is_project(file: str | Path) -> bool:
 
 
 def load_world(file: str | None) -> tuple[Project, Path]:
-    """Return the project of a file and the folder in which it lies; one Khepera if the file is another arena, or none.
-
-    Raises:
-        ArenaError: If the file is neither.
-    """
+    """Return the project of a file and its folder; a project of one Khepera if the file is another arena, or none."""
     from kiks.model.project import Project
 
     if file is not None and is_project(file):
@@ -107,9 +95,6 @@ def with_robots(project: Project, count: int | None, least: int) -> Project:
         project: The project.
         count: Number of robots; None for the project's, or more if they are too few.
         least: Smallest number of robots.
-
-    Raises:
-        ParameterError: If the number is smaller.
     """
     from kiks.model.project import ProjectRobot
 
@@ -148,11 +133,7 @@ def say_without_world(champion: Champion, arena: Arena | None) -> None:
 
 
 def fit_turrets(sim: Simulation, entries: list[str] | None) -> None:
-    """Fit turrets to robots that do not have them.
-
-    Raises:
-        ParameterError: If an entry names no turret or no robot.
-    """
+    """Fit turrets to robots that do not have them."""
     from kiks.sim.turret_host import name_of
 
     for entry in entries or []:
@@ -164,9 +145,6 @@ def fit_turrets(sim: Simulation, entries: list[str] | None) -> None:
 
 def parse_turret(entry: str, robot_count: int) -> tuple[str, int | None]:
     """Return the turret and the robot's number of 'gripper=2'; no number for all robots.
-
-    Raises:
-        ParameterError: If it has another form, or the robot does not exist.
 
     Example:
         >>> parse_turret("gripper=2", 2), parse_turret("k213", 1)
@@ -203,9 +181,6 @@ def parse_words(words: list[str]) -> list[Command]:
     A word that names a .py file begins a program. A word with blanks that is no file is split like in a shell; if it
     begins with a .py file or -m, it is a program with all its arguments, which may be .py files themselves. The first
     program may also be -m and a module's name in words of their own, another file, or a folder with a `__main__.py`.
-
-    Raises:
-        ParameterError: If the first word is no program, or one names a project.
     """
     from kiks.ports.program_process import Command, module_command
 

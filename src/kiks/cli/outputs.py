@@ -110,9 +110,6 @@ def leave_out(context: typer.Context, when: str, *names: str) -> None:
         context: That of the command.
         when: Where that is, for people.
         names: The options' names in the command's function.
-
-    Raises:
-        ParameterError: If one was given.
     """
     for param in context.command.params:
         source = context.get_parameter_source(param.name or "")

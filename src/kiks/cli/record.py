@@ -71,9 +71,6 @@ def recorded(
         csv: File of the table; none if None.
         record: File of the recording; none if None.
         programs: The programs that drive its robots, whose texts the recording keeps.
-
-    Raises:
-        ParameterError: If a file cannot be written.
     """
     # A program may go to another folder.
     picture, csv, record = picture and picture.absolute(), csv and csv.absolute(), record and record.absolute()

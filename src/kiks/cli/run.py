@@ -272,9 +272,6 @@ def _run_one(sim: Simulation, command: Command, told: dict[str, int], record: Pa
 def parse_map(entry: str) -> tuple[str, int]:
     """Return port name and robot of '/dev/ttyS0=1'.
 
-    Raises:
-        ParameterError: If it has another form.
-
     Example:
         >>> parse_map("/dev/ttyS0=1")
         ('/dev/ttyS0', 1)

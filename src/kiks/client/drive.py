@@ -47,7 +47,6 @@ def drive(
         Number of loops.
 
     Raises:
-        ParameterError: If a number is out of range.
         LinkError: If a port cannot be opened, or a robot does not send the expected reply.
 
     Example:
@@ -78,7 +77,6 @@ class Driver:
         loop_count: Number of loops so far.
 
     Raises:
-        ParameterError: If a number is out of range.
         LinkError: If a port cannot be opened.
     """
 

@@ -45,8 +45,6 @@ class Khepera:
     Raises:
         LinkError: If the port cannot be opened; from every method, if it was closed or the robot does not send the
             expected reply.
-        ParameterError: If `port` is not a port; from every method, if an argument is out of its range, before
-            anything is sent.
 
     Example:
         >>> import kiks
@@ -136,7 +134,6 @@ class Khepera:
             poll_s: Pause between two polls [s].
 
         Raises:
-            ParameterError: If an argument is not a number, or is out of range.
             LinkError: If the reply is unexpected, or the wheels do not arrive within `ARRIVAL_MAX_S`.
         """
         check_kind("wait", wait, bool)
@@ -256,7 +253,6 @@ class Khepera:
         """Read the reply to a command that the robot confirms with its letter alone.
 
         Raises:
-            ParameterError: If the request is not bytes.
             LinkError: If the reply is unexpected, or does not come.
         """
         if request.__class__ is not bytes:
@@ -269,7 +265,6 @@ class Khepera:
         """Read a reply of `count` whole numbers, after the command's letter; after a turret's order, `t,2,t`.
 
         Raises:
-            ParameterError: If the request is not bytes, or the count is not a whole number.
             LinkError: If the reply is unexpected, or does not come.
         """
         if request.__class__ is not bytes or count.__class__ is not int or count < 0:
@@ -314,11 +309,7 @@ class Khepera:
 
 
 def _whole(least: int, most: int, **numbers: float) -> tuple[int, ...]:
-    """Return numbers for a command, rounded. A robot cuts what is out of range, or does not say what is.
-
-    Raises:
-        ParameterError: If one is out of range.
-    """
+    """Return numbers for a command, rounded. A robot cuts what is out of range, or does not say what is."""
     return tuple(round(check_number(name, number, least, most)) for name, number in numbers.items())
 
 

@@ -36,7 +36,6 @@ def kopen(settings: Sequence[float]) -> Reference:
             timeout [s] (1 if left out).
 
     Raises:
-        ParameterError: If a number is missing or out of range.
         LinkError: If the port does not exist or is open already.
 
     Example:
@@ -83,7 +82,6 @@ def ksend(text: str, ref: Sequence[float], timeout: float | None = None) -> str:
         The reply, or the part of it that arrived before the timeout.
 
     Raises:
-        ParameterError: If `text` is not a string, or the timeout is out of range; nothing is sent then.
         LinkError: If the port is not open.
     """
     check_kind("text", text, str, r'Write ksend("N\n", ref).')
@@ -131,11 +129,7 @@ def ktime(port: int | Sequence[float]) -> float | None:
 
 
 def pause(seconds: float) -> None:
-    """Let time pass [s]: simulated time if a simulated port was opened last, else real time.
-
-    Raises:
-        ParameterError: If the time is negative or not finite.
-    """
+    """Let time pass [s]: simulated time if a simulated port was opened last, else real time."""
     reference = next(reversed(_OPEN.values()), None)
     if reference is not None and isinstance(reference.port, VirtualPort):
         reference.port.sleep(seconds)
@@ -154,11 +148,7 @@ def _open_reference(ref: Sequence[float]) -> Reference:
 
 
 def _number_of(ref: Any) -> int:
-    """Return the number of the port that a reference, or the number itself, names.
-
-    Raises:
-        ParameterError: If it holds no number.
-    """
+    """Return the number of the port that a reference, or the number itself, names."""
     numbers = check_numbers("ref", ref).ravel()
     if not len(numbers):
         raise ParameterError("ref must be what kopen returned, or a port's number, but it was empty.")

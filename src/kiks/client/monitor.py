@@ -69,7 +69,6 @@ def samples(robot: Khepera, *, rate_hz: float = 10.0, seconds: float | None = No
         seconds: Duration by the robot's clock [s]; without end if left out.
 
     Raises:
-        ParameterError: If a number is out of range.
         LinkError: If the robot does not answer.
     """
     rate_hz = check_number("rate_hz", rate_hz, RATE_MIN_HZ, RATE_MAX_HZ, "At 9600 baud about 6 are possible.")
@@ -117,9 +116,6 @@ class CsvLog:
 
     Args:
         path: A file that does not exist yet.
-
-    Raises:
-        ParameterError: If the file exists, or cannot be written.
     """
 
     def __init__(self, path: str | Path) -> None:
@@ -132,11 +128,7 @@ class CsvLog:
         self._write(",".join(COLUMNS))
 
     def add(self, sample: Sample) -> None:
-        """Write a sample.
-
-        Raises:
-            ParameterError: If the disk is full or gone.
-        """
+        """Write a sample."""
         self._write(sample.row())
 
     def close(self) -> None:

@@ -44,7 +44,6 @@ def open_port(name: str, baud: int = 9600, timeout_s: float | None = TIMEOUT_S) 
         timeout_s: Timeout of a read [s]; None for no limit.
 
     Raises:
-        ParameterError: If the speed or the timeout is out of range.
         LinkError: If the port does not exist, or is busy.
     """
     baud = check_count("baud", baud, BAUD_MIN, BAUD_MAX, "Usual: 9600 bit/s.")

@@ -49,9 +49,6 @@ class Gate:
         is_up: Whether the event loop must call `admit`. False while time passes freely: then the gate costs nothing.
         pace: The speed of time, and whether it stands still.
 
-    Raises:
-        ParameterError: If the speed is out of range.
-
     Example:
         >>> gate = Gate(threading.RLock(), speed=None)
         >>> gate.is_up
@@ -91,11 +88,7 @@ class Gate:
         return self.pace.speed
 
     def set_speed(self, speed: float | None, now_ns: int) -> None:
-        """Change the speed from a simulated time [ns] on.
-
-        Raises:
-            ParameterError: If it is out of range.
-        """
+        """Change the speed from a simulated time [ns] on."""
         self.pace.set_speed(speed, now_ns)
         self._update_is_up()
 
@@ -160,11 +153,7 @@ class Gate:
         return self._wall_ns() - self._held_ns
 
     def patience(self, seconds: float) -> Patience:
-        """Return a patience that does not run out while time stands still.
-
-        Raises:
-            ParameterError: If the time is out of range.
-        """
+        """Return a patience that does not run out while time stands still."""
         return Patience(seconds, wall_ns=self.wall_ns)
 
     # ---- for the simulation ----

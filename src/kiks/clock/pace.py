@@ -33,9 +33,6 @@ class Pace:
         speed: Simulated seconds per real second; `set_speed` changes it.
         is_held: Whether simulated time stands still.
 
-    Raises:
-        ParameterError: If the speed is out of range.
-
     Example:
         >>> wall = [5_000]
         >>> pace = Pace(2.0, wall_ns=lambda: wall[0])
@@ -64,11 +61,7 @@ class Pace:
         self._start_ns = time_ns
 
     def set_speed(self, speed: float | None, time_ns: int) -> None:
-        """Change the speed from a simulated time [ns] on.
-
-        Raises:
-            ParameterError: If it is out of range.
-        """
+        """Change the speed from a simulated time [ns] on."""
         self.speed = _check_speed(speed)
         self.start(time_ns)
 

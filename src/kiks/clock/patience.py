@@ -19,9 +19,6 @@ class Patience:
         seconds: Its length [s of real time].
         wall_ns: A monotonic clock [ns]; tests pass their own.
 
-    Raises:
-        ParameterError: If the time is out of range.
-
     Example:
         >>> wall = [0]
         >>> patience = Patience(2.0, wall_ns=lambda: wall[0])

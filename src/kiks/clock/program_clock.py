@@ -66,9 +66,6 @@ class ProgramClock:
         measures: Whether thinking costs the real time that it takes.
         waiting: The cost of polls of the running thread.
         act_count: Number of calls of ports and clocks.
-
-    Raises:
-        ParameterError: If the policy is unknown.
     """
 
     def __init__(self, thinking: str) -> None:

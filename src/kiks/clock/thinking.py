@@ -85,9 +85,6 @@ def parse_thinking(text: str) -> Thinking:
         text: 'none', 'fixed:2.5' (ms before each command), 'live', 'live:0.5' (measured, times a factor) or
             'replay:FILE' (one time [ns] a line, written by `save_thinking`).
 
-    Raises:
-        ParameterError: If the text names no policy or its number is out of range.
-
     Example:
         >>> parse_thinking("fixed:2.5").enter(is_command=True)
         2500000
@@ -99,11 +96,7 @@ def parse_thinking(text: str) -> Thinking:
 
 
 def save_thinking(measured_ns: list[int], path: str | Path) -> None:
-    """Write the times that a live run measured [ns], one a line, for 'replay:FILE'.
-
-    Raises:
-        ParameterError: If the file cannot be written.
-    """
+    """Write the times that a live run measured [ns], one a line, for 'replay:FILE'."""
     replace_file(path, "".join(f"{time_ns}\n" for time_ns in measured_ns), "thinking times")
 
 

@@ -40,9 +40,6 @@ class Compiled:
         function: The function as it was written.
         name: Its name.
         kernel: The same, compiled; other kernels call it.
-
-    Raises:
-        ParameterError: If it is no function of so many arguments.
     """
 
     what: str
@@ -83,11 +80,7 @@ class Compiled:
         )
 
     def check(self, argument_types: tuple[Any, ...]) -> Any:
-        """Compile it for arguments of these types; return what Numba knows of the result.
-
-        Raises:
-            ParameterError: If Numba cannot compile it, or it returns something.
-        """
+        """Compile it for arguments of these types; return what Numba knows of the result."""
         try:
             return compiled_for(self.kernel, argument_types)
         except Exception as error:

@@ -88,11 +88,7 @@ class Controller(Compiled):
         parameters: NDArray[np.float64],
         wheels: NDArray[np.float64],
     ) -> None:
-        """Decide once, with the same machine code as in a batch.
-
-        Raises:
-            ParameterError: If Numba cannot compile the function, or it fails.
-        """
+        """Decide once, with the same machine code as in a batch."""
         try:
             returned = self.kernel(sensors, memory, parameters, wheels)
         except Exception as error:
@@ -101,11 +97,7 @@ class Controller(Compiled):
             raise self.refused(TypeError(RETURNS))
 
     def check_parameters(self, parameters: ArrayLike) -> NDArray[np.float64]:
-        """Return parameters as float64, their last axis one controller's.
-
-        Raises:
-            ParameterError: If they are no finite numbers, or not as many as the controller has.
-        """
+        """Return parameters as float64, their last axis one controller's."""
         given = check_numbers("parameters", parameters)
         given = given.reshape(1) if given.ndim == 0 else given
         if self.parameter_count not in (None, given.shape[-1]):
@@ -136,9 +128,6 @@ def controller(
         senses: What it senses, of 'proximity', 'ambient' and 'camera'.
         memory: How many numbers it remembers.
         parameters: How many parameters it has; any count if left out.
-
-    Raises:
-        ParameterError: If it is no such function or an argument is out of range.
     """
 
     def make(function: Callable[..., Any]) -> Controller:

@@ -212,11 +212,7 @@ def relative_to(recipe: Mapping[str, Any], folder: str | Path) -> dict[str, Any]
 
 
 def find(recipe: InModule | InFile, folder: str | Path) -> Any:
-    """Return what a recipe of a user's own controller names. The module or file is run, as by `import`.
-
-    Raises:
-        ParameterError: If there is no such module, file or name, or the file lies elsewhere.
-    """
+    """Return what a recipe of a user's own controller names. The module or file is run, as by `import`."""
     if isinstance(recipe, InFile):
         path = program_in(Path(folder), recipe.file, "the recipe's file")
         return _named(module_in(path), recipe.name, f"file {str(path)!r}")
@@ -232,11 +228,7 @@ def find(recipe: InModule | InFile, folder: str | Path) -> Any:
 
 
 def module_in(path: Path) -> Any:
-    """Run a Python file as a module of its own; once, until it has changed.
-
-    Raises:
-        ParameterError: If it does not run.
-    """
+    """Run a Python file as a module of its own; once, until it has changed."""
     try:
         return _run(path, path.stat().st_mtime_ns)
     except (Exception, SystemExit) as error:

@@ -58,9 +58,6 @@ def linear(
         speed_limit: The speed of an output of 1 [pulses/10 ms].
         feedback: Whether its last outputs are inputs.
 
-    Raises:
-        ParameterError: If an argument is out of range.
-
     Example:
         >>> import kiks
         >>> kiks.controllers.linear().parameter_count
@@ -88,9 +85,6 @@ def mlp(
         speed_limit: The speed of an output of 1 [pulses/10 ms].
         feedback: Whether its last outputs are inputs, after the sensors.
 
-    Raises:
-        ParameterError: If an argument is out of range.
-
     Example:
         >>> import kiks
         >>> kiks.controllers.mlp(hidden=(6,)).parameter_count
@@ -111,9 +105,6 @@ def elman(*, units: int = 4, senses: Sequence[str] = ("proximity",), speed_limit
         units: Number of hidden units.
         senses: Its senses, of 'proximity', 'ambient' and 'camera'.
         speed_limit: The highest speed [pulses/10 ms].
-
-    Raises:
-        ParameterError: If an argument is out of range.
 
     Example:
         >>> import kiks
@@ -146,9 +137,6 @@ def ctrnn(
         time_constant_s: T of a parameter of 0 [s].
         senses: Its senses, of 'proximity', 'ambient' and 'camera'.
         speed_limit: The highest speed [pulses/10 ms].
-
-    Raises:
-        ParameterError: If an argument is out of range.
     """
     return _made(
         ControllerKind.CTRNN,
@@ -173,9 +161,6 @@ def gru(*, units: int = 4, senses: Sequence[str] = ("proximity",), speed_limit: 
         units: Number of units.
         senses: Its senses, of 'proximity', 'ambient' and 'camera'.
         speed_limit: The highest speed [pulses/10 ms].
-
-    Raises:
-        ParameterError: If an argument is out of range.
     """
     return _made(ControllerKind.GRU, units=units, senses=senses, speed_limit=speed_limit)
 
@@ -214,9 +199,6 @@ def plastic(
         senses: Its senses, of 'proximity', 'ambient' and 'camera'.
         speed_limit: The highest speed [pulses/10 ms].
 
-    Raises:
-        ParameterError: If an argument is out of range.
-
     Example:
         >>> import kiks
         >>> [kiks.controllers.plastic(per=each).parameter_count for each in ("synapse", "neuron")]
@@ -245,9 +227,6 @@ def policy(
         senses: Its senses, of 'proximity', 'ambient' and 'camera'.
         speed_limit: The speed of an output of 1 [pulses/10 ms].
 
-    Raises:
-        ParameterError: If an argument is out of range.
-
     Example:
         >>> import kiks
         >>> kiks.controllers.policy(hidden=(64, 64)).parameter_count
@@ -272,9 +251,6 @@ def from_recipe(recipe: Mapping[str, Any], folder: str | Path = ".") -> Controll
         recipe: {"kind": "mlp", "hidden": [6], ...}, {"function": "module:name"} or {"file": "my.py", "name": "shy"}.
         folder: Where a relative file is looked for.
 
-    Raises:
-        ParameterError: If it is no recipe, or what it names is not there or no controller.
-
     Example:
         >>> import kiks
         >>> kiks.controllers.from_recipe({"kind": "gru", "units": 3}) is kiks.controllers.gru(units=3)
@@ -284,22 +260,14 @@ def from_recipe(recipe: Mapping[str, Any], folder: str | Path = ".") -> Controll
 
 
 def check_recipe(recipe: object) -> Recipe:
-    """Return the recipe of a table; nothing that it names is run.
-
-    Raises:
-        ParameterError: If it is none.
-    """
+    """Return the recipe of a table; nothing that it names is run."""
     model: Any = Recipe
     made: Recipe = check(model, recipe, "the recipe")
     return made
 
 
 def controller_of(recipe: Recipe, folder: str | Path) -> Controller:
-    """Return the controller of a recipe in a file of a folder. A user's own module or file is run.
-
-    Raises:
-        ParameterError: If what it names is not there or no controller.
-    """
+    """Return the controller of a recipe in a file of a folder. A user's own module or file is run."""
     if not isinstance(recipe, InModule | InFile):
         return _shaped(recipe)
     found = find(recipe, folder)
@@ -312,11 +280,7 @@ def controller_of(recipe: Recipe, folder: str | Path) -> Controller:
 
 
 def recipe_for(controller: Controller, folder: str | Path = ".") -> dict[str, Any]:
-    """Return the recipe of a controller for a file in a folder: JSON-able, with paths relative to there.
-
-    Raises:
-        ParameterError: If the controller has none.
-    """
+    """Return the recipe of a controller for a file in a folder: JSON-able, with paths relative to there."""
     check_kind("controller", controller, Controller)
     if controller.recipe is None:
         raise ParameterError(
@@ -328,11 +292,7 @@ def recipe_for(controller: Controller, folder: str | Path = ".") -> dict[str, An
 
 
 def random_parameters(controller: Controller, count: int, *, seed: int) -> NDArray[np.float64]:
-    """Return parameters to begin with, normally distributed around 0 with a deviation of 1, float64 [count, parameter].
-
-    Raises:
-        ParameterError: If the controller takes any number of parameters, or `count` or `seed` is out of range.
-    """
+    """Return random parameters to begin with, of normal distribution (0, 1), float64 [count, parameter]."""
     check_kind("controller", controller, Controller)
     if controller.parameter_count is None:
         raise ParameterError(

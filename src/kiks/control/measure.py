@@ -67,9 +67,6 @@ class Measure(Compiled):
         note_count: Numbers that it keeps for each robot, zeros at the start.
         result: From the notes at the end, float64 [..., note], to the values, float64 [...].
         senses: The senses that must come first in `moment.sensors`; controllers with others are rejected.
-
-    Raises:
-        ParameterError: If it is no such function or an argument is out of range.
     """
 
     what, arguments, options = "measure", ("moment", "notes"), ("notes",)
@@ -95,11 +92,7 @@ class Measure(Compiled):
         return {"notes": self.note_count}
 
     def value(self, notes: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the values of all worlds and robots for their notes, float64 [world, robot, note].
-
-        Raises:
-            ParameterError: If `result` fails, or gives another number of values.
-        """
+        """Return the values of all worlds and robots for their notes, float64 [world, robot, note]."""
         try:
             values: NDArray[np.float64] = np.asarray(self.result(notes.copy()))
         except Exception as error:
@@ -134,9 +127,6 @@ def measure(
         notes: Numbers that it keeps for each robot, zeros at the start.
         result: From the notes at the end, float64 [..., note], to the values, float64 [...]; the first if left out.
         senses: The senses that must come first in `moment.sensors`, of 'proximity', 'ambient' and 'camera'.
-
-    Raises:
-        ParameterError: If it is no such function or an argument is out of range.
 
     Example:
         >>> import kiks

@@ -145,9 +145,6 @@ def wall_following(side: str = "left", *, counts: float = 50.0) -> Measure:
     Args:
         side: 'left' or 'right'.
         counts: Proximity of the sensor on that side from which on a wall is at its side.
-
-    Raises:
-        ParameterError: If an argument is out of range.
     """
     return _wall_following(_side_sensor(side), _wall_counts(counts))
 
@@ -176,9 +173,6 @@ def beside_wall_share(side: str = "left", *, counts: float = 50.0) -> Measure:
     Args:
         side: 'left' or 'right'.
         counts: Proximity of the sensor on that side from which on a wall is at its side.
-
-    Raises:
-        ParameterError: If an argument is out of range.
     """
     return _beside_wall_share(_side_sensor(side), _wall_counts(counts))
 
@@ -214,9 +208,6 @@ def coverage(arena: Arena, *, square_mm: float = 100.0) -> Measure:
     Args:
         arena: The arena; squares that are all wall count, too.
         square_mm: Edge of a square [mm].
-
-    Raises:
-        ParameterError: If an argument is out of range or there are more than a million squares.
     """
     if not isinstance(arena, Arena):
         raise ParameterError(f"arena must be a kiks.Arena, but it was {shown(arena)}.")
@@ -247,11 +238,7 @@ def _coverage(columns: int, rows: int, edge_mm: float) -> Measure:
 
 
 def goal_mm(x_mm: float, y_mm: float) -> Measure:
-    """How far it is from a place [mm].
-
-    Raises:
-        ParameterError: If an argument is out of range.
-    """
+    """How far it is from a place [mm]."""
     return _goal_mm(_place("x_mm", x_mm), _place("y_mm", y_mm))
 
 
@@ -265,11 +252,7 @@ def _goal_mm(x_mm: float, y_mm: float) -> Measure:
 
 
 def closest_mm(x_mm: float, y_mm: float) -> Measure:
-    """How near it has come to a place, at best [mm].
-
-    Raises:
-        ParameterError: If an argument is out of range.
-    """
+    """How near it has come to a place, at best [mm]."""
     return _closest_mm(_place("x_mm", x_mm), _place("y_mm", y_mm))
 
 
@@ -285,11 +268,7 @@ def _closest_mm(x_mm: float, y_mm: float) -> Measure:
 
 
 def reached_s(x_mm: float, y_mm: float, *, radius_mm: float = 50.0) -> Measure:
-    """When it first came within a radius of a place [s]; if it never did, how long it has tried.
-
-    Raises:
-        ParameterError: If an argument is out of range.
-    """
+    """When it first came within a radius of a place [s]; if it never did, how long it has tried."""
     return _reached_s(_place("x_mm", x_mm), _place("y_mm", y_mm), _radius(radius_mm))
 
 
@@ -312,9 +291,6 @@ def escaped_share(*, radius_mm: float = 57.0) -> Measure:
 
     Args:
         radius_mm: The radius [mm].
-
-    Raises:
-        ParameterError: If an argument is out of range.
     """
     return _escaped_share(_radius(radius_mm))
 
@@ -355,11 +331,7 @@ def light_approach(moment: Any, notes: Any) -> None:
 
 
 def light_stay_s(radius_mm: float = 100.0) -> Measure:
-    """How long it has been within a radius of a lamp that burns, without a break until the end [s]; 0 if it is not.
-
-    Raises:
-        ParameterError: If the radius is out of range.
-    """
+    """How long it has been within a radius of a lamp that burns, without a break until the end [s]; 0 if it is not."""
     return _light_stay_s(_radius(radius_mm))
 
 
@@ -373,11 +345,7 @@ def _light_stay_s(radius_mm: float) -> Measure:
 
 
 def near_light_share(radius_mm: float = 100.0) -> Measure:
-    """Share of control steps in which it was within a radius of a lamp that burns.
-
-    Raises:
-        ParameterError: If the radius is out of range.
-    """
+    """Share of control steps in which it was within a radius of a lamp that burns."""
     return _near_light_share(_radius(radius_mm))
 
 
@@ -392,11 +360,7 @@ def _near_light_share(radius_mm: float) -> Measure:
 
 
 def gathered(x_mm: float, y_mm: float, *, radius_mm: float = 150.0) -> Measure:
-    """How many balls and cylinders have their middle within a radius of a place.
-
-    Raises:
-        ParameterError: If an argument is out of range.
-    """
+    """How many balls and cylinders have their middle within a radius of a place."""
     return _gathered(_place("x_mm", x_mm), _place("y_mm", y_mm), _radius(radius_mm))
 
 
@@ -413,11 +377,7 @@ def _gathered(x_mm: float, y_mm: float, radius_mm: float) -> Measure:
 
 
 def largest_group(radius_mm: float = 100.0) -> Measure:
-    """Largest number of balls and cylinders that have their middles within a radius of one of them, itself included.
-
-    Raises:
-        ParameterError: If the radius is out of range.
-    """
+    """Largest number of balls and cylinders that have their middles within a radius of one of them, itself included."""
     return _largest_group(_radius(radius_mm))
 
 

@@ -62,10 +62,6 @@ def robot_controllers(given: Any, parameters: Any, world_count: int, robot_count
         parameters: As for `kiks.Batch.run`.
         world_count: Number of worlds.
         robot_count: Number of robots in each.
-
-    Raises:
-        ParameterError: If one is no controller, their number is wrong, their senses do not go together, or parameters
-            have another shape.
     """
     if not isinstance(given, Sequence):
         _check_controller(given)

@@ -43,11 +43,7 @@ def reading_count(senses: Sequence[str]) -> int:
 
 
 def check_senses(senses: str | Sequence[str]) -> tuple[str, ...]:
-    """Return some of `SENSES`.
-
-    Raises:
-        ParameterError: If there is another among them, or one twice.
-    """
+    """Return some of `SENSES`."""
     if not isinstance(senses, Iterable):
         raise ParameterError(f"senses must be some of {', '.join(SENSES)}, but they were {shown(senses)}.")
     given = (senses,) if isinstance(senses, str) else tuple(senses)

@@ -20,9 +20,6 @@ class ChampionScene(Scene):
         arena: Where they drive; the champion's own world if left out.
         seed: Seed of the world; the champion's own, else 0, if left out.
         baud: Speed of the line [bit/s]; the champion's own if left out.
-
-    Raises:
-        ArenaError: If the arena has no room for them.
     """
 
     seconds: ClassVar[float] = 180.0

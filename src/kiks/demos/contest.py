@@ -33,10 +33,6 @@ class ContestScene(Scene):
         arena: Where they drive; an arena of the contest if left out.
         seed: Seed of the world, and of random starts.
         baud: Speed of the lines [bit/s]; that of the champions if left out.
-
-    Raises:
-        ParameterError: If the folder has no champions of a contest that comes with KiKS.
-        ArenaError: If the arena has no room for them.
     """
 
     seconds: ClassVar[float] = 60.0
@@ -119,11 +115,7 @@ ENDS: dict[str, tuple[Callable[[ContestScene], str], str]] = {
 
 
 def _load(folder: Path) -> tuple[Contest, list[Champion]]:
-    """Return the contest of a folder, and the champion of each side.
-
-    Raises:
-        ParameterError: If there are no such champions.
-    """
+    """Return the contest of a folder, and the champion of each side."""
     for contest in (make() for make in tasks.CONTESTS.values()):
         files = [folder / f"{name}.toml" for name in contest.side_names]
         if all(file.is_file() for file in files):

@@ -33,9 +33,6 @@ class Scene:
     Attributes:
         sim: The world.
         robot: The first robot.
-
-    Raises:
-        ArenaError: If the arena has no room for what the scene puts into it.
     """
 
     seconds: ClassVar[float] = 120.0
@@ -124,11 +121,7 @@ class Scene:
         return float(uniform(self.seed, 0, about, STREAM_SCENE, number, axis))
 
     def random_place(self, about: int, radius_mm: float, gap_mm: float) -> tuple[float, float]:
-        """Return a random place for a disc that leaves a gap to walls, robots, balls and cylinders [mm].
-
-        Raises:
-            ArenaError: If none is found.
-        """
+        """Return a random place for a disc that leaves a gap to walls, robots, balls and cylinders [mm]."""
         arena, bodies = self.sim.arena, self.sim.bodies()
         taken = [(x, y, self.sim.spec.body.radius_mm) for x, y, _ in self.sim.poses().tolist()]
         taken += zip(bodies["x_mm"].tolist(), bodies["y_mm"].tolist(), bodies["radius_mm"].tolist(), strict=True)

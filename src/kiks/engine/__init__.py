@@ -15,11 +15,7 @@ from kiks.errors import ParameterError, shown
 
 
 def _load_numba() -> None:
-    """Import Numba.
-
-    Raises:
-        ParameterError: If it cannot work with its settings.
-    """
+    """Import Numba."""
     modules: dict[str, Any] = sys.modules
     yaml = modules.pop("yaml", None)
     modules["yaml"] = None  # without YAML, Numba cannot read the file

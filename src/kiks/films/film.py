@@ -78,9 +78,6 @@ def save_film(
     Returns:
         The number of pictures.
 
-    Raises:
-        ParameterError: If a value is out of range, the file cannot be written, or the recording is damaged.
-
     Example:
         >>> import tempfile, kiks
         >>> folder = Path(tempfile.mkdtemp())
@@ -126,21 +123,13 @@ def save_film(
 
 
 def check_film(path: str | Path) -> str:
-    """Return the ending of a film's file.
-
-    Raises:
-        ParameterError: If it is none of a film, or the library that writes films is not installed.
-    """
+    """Return the ending of a film's file."""
     library("av", "film")
     return ending_of(path, "a film", ENDINGS)
 
 
 def checked_size(size: object) -> tuple[int, int]:
-    """Return the size of a film.
-
-    Raises:
-        ParameterError: If it is none.
-    """
+    """Return the size of a film."""
     if not isinstance(size, Sequence) or len(size) != 2:
         raise ParameterError(f"size must be a width and a height, but it was {shown(size)}. Give (1280, 720).")
     width = check_count("the width of size", size[0], SIDE_MIN, SIDE_MAX)
@@ -148,11 +137,7 @@ def checked_size(size: object) -> tuple[int, int]:
 
 
 def checked_follow(recording: Recording, follow: object, zoom: object) -> tuple[int | None, float]:
-    """Return the number of the followed robot, and the zoom.
-
-    Raises:
-        ParameterError: If there is no such robot, or the zoom is out of range or without one.
-    """
+    """Return the number of the followed robot, and the zoom."""
     if follow is None and zoom is not None:
         raise ParameterError(f"zoom must be left out where no robot is followed, but it was {shown(zoom)}. Add follow.")
     if follow is None:

@@ -62,9 +62,6 @@ def save_photo(
         follow: Number of the robot in the middle; if left out, the whole arena is seen.
         zoom: How much larger the arena is than one that is seen as a whole; 3 if left out, with `follow` alone.
         samples: Rays through a pixel.
-
-    Raises:
-        ParameterError: If Mitsuba is not installed, a value is out of range, or the file cannot be written.
     """
     from PIL import Image
 

@@ -48,9 +48,6 @@ class SolidStage:
         follow: Index of the robot that stays in the middle; None: the whole arena is seen.
         zoom: How much larger the arena is than one that is seen as a whole.
         has_trails: Whether robots, balls and cylinders leave trails.
-
-    Raises:
-        ParameterError: If VTK is not installed.
     """
 
     def __init__(self, size: tuple[int, int], *, follow: int | None, zoom: float, has_trails: bool) -> None:

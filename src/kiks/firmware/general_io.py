@@ -41,11 +41,7 @@ class GeneralIO(Turret):
 
     @property
     def inputs(self) -> int:
-        """The byte that the program reads; write to it.
-
-        Raises:
-            ParameterError: If it is set to anything but a whole number from 0 to 255.
-        """
+        """The byte that the program reads; write to it."""
         return int(self.site.record["bus_inputs"][ADDRESS])
 
     @inputs.setter
@@ -60,9 +56,6 @@ class GeneralIO(Turret):
         Args:
             wire: Which, 0 to 7; 0 is the lowest bit of the byte.
             is_high: What it carries.
-
-        Raises:
-            ParameterError: If there is no such wire.
         """
         wire = check_count("wire", wire, 0, 7, "There are eight.")
         with self.site.lock:
@@ -74,9 +67,6 @@ class GeneralIO(Turret):
         Args:
             channel: 3, 4 or 5, as in command `I`.
             volts: Its voltage [V].
-
-        Raises:
-            ParameterError: If there is no such channel, or the voltage is not a number.
         """
         channel = check_count("channel", channel, CHANNELS[0], CHANNELS[-1], "Command I has the same numbers.")
         volts = check_number("volts", volts, advice="Inputs read 0 to 4.09 V.")

@@ -112,19 +112,12 @@ def fit_reflection(tables: Sequence[Samples], base: RobotSpec, *, steps: int = 4
         tables: Samples of white objects.
         base: Where the search begins; a robot with the response 'reflection'.
         steps: Most steps of the search.
-
-    Raises:
-        ParameterError: If `base` has no such response, or no reading of the samples tells anything.
     """
     return _Search(tables, base).run(steps, is_robot_free=True)
 
 
 def find_rigs(tables: Sequence[Samples], spec: RobotSpec, *, steps: int = 20) -> tuple[Rig, ...]:
-    """Return how the sweeps of tables differed, seen by a robot that is known.
-
-    Raises:
-        ParameterError: As `fit_reflection`.
-    """
+    """Return how the sweeps of tables differed, seen by a robot that is known."""
     return _Search(tables, spec).run(steps, is_robot_free=False).rigs
 
 

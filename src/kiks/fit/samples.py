@@ -175,9 +175,6 @@ def load_samples(file: str | Path, *, name: str = "", radius_mm: float = math.in
         file: A .npz with `values`, `gap_mm` and `object_angle_deg_cw`, or a text file.
         name: What people call the object; the file's name without its ending if left out.
         radius_mm: Radius of the object [mm]: infinite for a straight wall. The files do not tell.
-
-    Raises:
-        ParameterError: If the file cannot be read or is no file of samples, or the radius is not positive.
     """
     path = path_of(file, "file")
     if not (radius_mm == math.inf or (is_number(radius_mm) and radius_mm > 0)):

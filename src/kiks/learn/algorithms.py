@@ -133,9 +133,6 @@ class Diverse:
         seed: Seed of its random numbers.
         axes: Axes along which behaviours differ.
         spread: Standard deviation of each parameter at the beginning.
-
-    Raises:
-        ParameterError: If there are no axes.
     """
 
     def __init__(
@@ -167,11 +164,7 @@ class Diverse:
         return np.array(self._scheduler.ask())
 
     def tell(self, fitness: Floats, behaviours: Floats) -> None:
-        """Put candidates into the archive that are new, or better than what is there.
-
-        Raises:
-            ParameterError: If the behaviours are missing.
-        """
+        """Put candidates into the archive that are new, or better than what is there."""
         if behaviours.shape[1] != len(self._low):
             raise ParameterError(
                 "tell() must be given fitness and measures for this algorithm, but it was given fitness alone."
@@ -274,11 +267,7 @@ ALGORITHMS: dict[str, type[Cma] | type[Ga] | type[MapElites] | type[CmaMe]] = {
 def make_algorithm(
     name: str, parameter_count: int, population: int, seed: int, axes: Sequence[Axis], spread: float
 ) -> Algorithm:
-    """Return an algorithm.
-
-    Raises:
-        ParameterError: If the name is unknown, or its library is not installed.
-    """
+    """Return an algorithm."""
     if name not in ALGORITHMS:
         raise ParameterError(
             f"algorithm must be one of {', '.join(ALGORITHMS)}, or an object with ask and tell, but it was "

@@ -85,9 +85,6 @@ class Archive:
         value_names: Names of the values of a candidate.
         champion: The champion.
 
-    Raises:
-        ParameterError: If there are too many cells, or an axis names none of the values.
-
     Example:
         >>> import kiks
         >>> task = kiks.tasks.avoid(seconds=1, worlds=3)
@@ -149,9 +146,6 @@ class Archive:
 
         Args:
             place: The place along each axis.
-
-        Raises:
-            ParameterError: If the place has another number of axes, or the archive is empty.
         """
         if len(place) != len(self.axes):
             names = ", ".join(axis.measure for axis in self.axes)
@@ -176,11 +170,7 @@ class Archive:
         )
 
     def champion_at(self, *place: float) -> Champion:
-        """Return the elite of a place, as `elite_at` finds it, as a champion.
-
-        Raises:
-            ParameterError: If the place has another number of axes, or the archive is empty.
-        """
+        """Return the elite of a place, as `elite_at` finds it, as a champion."""
         return self.champion_of(self.elite_at(*place))
 
     # ---- the whole ----
@@ -205,11 +195,7 @@ class Archive:
     # ---- files ----
 
     def save(self, folder: str | Path) -> None:
-        """Write `archive.parquet` into a folder, with a row for each elite.
-
-        Raises:
-            ParameterError: If it cannot be written, or pyarrow is not installed.
-        """
+        """Write `archive.parquet` into a folder, with a row for each elite."""
         pyarrow, parquet = library("pyarrow"), library("pyarrow.parquet")
         elites = self.elites
         columns: dict[str, Any] = {"generation": np.array([elite.generation for elite in elites], np.int64)}
@@ -228,11 +214,7 @@ class Archive:
 
     @classmethod
     def load(cls, folder: str | Path) -> Archive:
-        """Read the archive in the folder of an evolution, and its champion. The champion's controller may run code.
-
-        Raises:
-            ParameterError: If there is none, a file is broken, or they do not belong together.
-        """
+        """Read the archive in the folder of an evolution, and its champion. The champion's controller may run code."""
         folder = path_of(folder, "folder")
         what = f"Archive {str(folder / ARCHIVE)!r}"
         data = read_file(folder / ARCHIVE, what, bytes_max=FILE_BYTES_MAX)
@@ -252,11 +234,7 @@ class Archive:
 
 
 def _read(data: bytes, parameter_count: int) -> tuple[_Head, dict[str, NDArray[Any]]]:
-    """Return head and columns of a file, checked.
-
-    Raises:
-        ParameterError: If it is none of an archive.
-    """
+    """Return head and columns of a file, checked."""
     pyarrow, parquet = library("pyarrow"), library("pyarrow.parquet")
     try:
         file = parquet.ParquetFile(pyarrow.BufferReader(data))

@@ -37,9 +37,6 @@ def baselines_of(task: Task, seed: int, threads: int | None = None) -> Baselines
         task: Its task.
         seed: Its seed.
         threads: Number of threads; the number of cores if left out.
-
-    Raises:
-        ParameterError: If the fitness is not finite.
     """
     threads = threads or os.cpu_count() or 1
     trials = np.array([seed_for(seed, TRIAL_SEED, number) for number in range(TRIALS)])

@@ -45,11 +45,7 @@ class InWorlds:
         return _unpickled, (type(self), dumps({each.name: getattr(self, each.name) for each in fields(self)}))
 
     def with_changes(self, **changes: Any) -> Self:
-        """Return a copy with some arguments changed.
-
-        Raises:
-            ParameterError: If an argument is out of range.
-        """
+        """Return a copy with some arguments changed."""
         changed: Any = self
         return replace(changed, **changes)  # type: ignore[no-any-return]
 
@@ -69,9 +65,6 @@ class InWorlds:
         """Return the starts of candidates with such seeds, float64 [candidate and world, robot, 3].
 
         They are the same for the same seed; None for those of the arena.
-
-        Raises:
-            ParameterError: If an arena has too few free places.
         """
         if self.starts == "arena":
             return None
@@ -95,10 +88,6 @@ class InWorlds:
 
         Returns:
             The values that `value_names` lists, the measures averaged over worlds, float64 [candidate, value].
-
-        Raises:
-            ParameterError: If candidates, seeds or a fitness have the wrong shape, or a measure or a fitness is not
-                finite.
         """
         candidates, seeds = check_candidates(candidates, seeds)
         seconds = self.seconds if seconds is None else check_number("seconds", seconds, SECONDS_MIN, SECONDS_MAX)
@@ -125,11 +114,7 @@ def digest_of(work: Any, **loaded: Any) -> dict[str, str]:
 
 
 def check_even(name: str, count: int, arenas: Sequence[Arena]) -> None:
-    """Check that arenas share worlds or starts evenly.
-
-    Raises:
-        ParameterError: If the count is no multiple of the number of arenas.
-    """
+    """Check that arenas share worlds or starts evenly."""
     if count % len(arenas):
         raise ParameterError(f"{name} must be a multiple of the number of arenas, {len(arenas)}, but it was {count}.")
 
@@ -146,9 +131,6 @@ def spread_starts(
         radius_mm: Radius of a robot [mm].
         robots: Number of robots in each world.
         apart_mm: Least distance between the edges of two robots [mm].
-
-    Raises:
-        ParameterError: If an arena has too few free places.
     """
     given: dict[str, Any] = {"robots": robots, "radius_mm": radius_mm, "clear_mm": CLEAR_MM, "apart_mm": apart_mm}
     poses = [random_starts(arena, count // len(arenas), seed=seed, **given) for arena in arenas]
@@ -162,9 +144,6 @@ def fitness_of(fitness: Fitness | None, measure_names: Sequence[str], values: Fl
         fitness: The fitness function; None for `cautious_mean` of the first measure.
         measure_names: Names of the measures.
         values: Values of the measures, float64 [candidate, world, measure].
-
-    Raises:
-        ParameterError: If a value or a fitness is not finite, or the fitness has another shape.
     """
     for number, name in enumerate(measure_names):
         if not np.isfinite(values[:, :, number]).all():

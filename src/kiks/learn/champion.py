@@ -119,7 +119,6 @@ class Champion:
             Number of loops.
 
         Raises:
-            ParameterError: If seconds are out of range.
             LinkError: If a port cannot be opened, or a robot does not answer as it should.
         """
         period_s = self.timing.period_s
@@ -147,10 +146,6 @@ class Champion:
             arena: The arena; its own world if left out, or the default box if it has none.
             robots: Number of robots; that of its own world, else 1, if left out.
             seed: Seed of all random numbers; that of its own world, else 0, if left out.
-
-        Raises:
-            ParameterError: If an argument is out of range.
-            ArenaError: If the arena has no free place for a robot.
         """
         project = self.world if arena is None and self.world is not None else Project(arena or Arena.default())
         there = project.robots or (ProjectRobot(),)
@@ -174,9 +169,6 @@ class Champion:
         """Write a file that `load` reads, and beside it the files that it names.
 
         These are its world, its robot if that does not come with KiKS, and the Python file that defines its controller.
-
-        Raises:
-            ParameterError: If a file cannot be written, or the controller is not defined in a file.
         """
         target = path_of(path)
         recipe = recipe_for(self.controller, target.parent)
@@ -223,11 +215,7 @@ class Champion:
 
     @classmethod
     def load(cls, path: str | Path) -> Champion:
-        """Read a champion's file. A controller from a Python file or module is imported, which runs its code.
-
-        Raises:
-            ParameterError: If the file does not hold a champion.
-        """
+        """Read a champion's file. A controller from a Python file or module is imported, which runs its code."""
         path = path_of(path)
         what = f"Champion's file {str(path)!r}"
         read = check(_ChampionFile, parse_toml(read_file(path, what, bytes_max=FILE_BYTES_MAX), what), what)
@@ -251,11 +239,7 @@ def _code_of(controller: Controller) -> dict[str, str]:
 
 
 def _robot_of(name: str, folder: Path) -> str | RobotSpec:
-    """Return the robot of a file that lies beside the champion's, as `save` writes it; any other name as it is.
-
-    Raises:
-        ParameterError: If the file is no robot.
-    """
+    """Return the robot of a file that lies beside the champion's, as `save` writes it; any other name as it is."""
     if name in robot_names() or "/" in name:
         return name
     path = inside(folder, name, "robot")

@@ -67,11 +67,7 @@ class Tournament:
         return first, second
 
     def save(self, path: str | Path) -> None:
-        """Write a Parquet file with a row for each pair: the generations of both sides, and the fitness of both.
-
-        Raises:
-            ParameterError: If it cannot be written, or pyarrow is not installed.
-        """
+        """Write a Parquet file with a row for each pair: the generations of both sides, and the fitness of both."""
         places = np.meshgrid(self.generations, self.generations, indexing="ij")
         columns = {f"{side}_generation": place.ravel() for side, place in zip(self.sides, places, strict=True)}
         columns |= {side: scores.ravel() for side, scores in zip(self.sides, self.scores, strict=True)}
@@ -99,9 +95,6 @@ class Coevolution:
         generations: The generations, in order. A row of `candidates` is one of the first side followed by one of the
             second side. A row of `values` has their mean values over their own contests, as in `contest.value_names`;
             `seeds` has the seed of the first of these.
-
-    Raises:
-        ParameterError: If an argument is out of range, or the folder holds another evolution.
 
     Example:
         >>> import kiks
@@ -174,9 +167,6 @@ class Coevolution:
 
         Args:
             values: Float64 [pair, value], as `Contest.evaluate` returns them.
-
-        Raises:
-            ParameterError: If the shape is wrong or a number is not finite.
         """
         value_count, measure_count = len(self.contest.value_names), len(self.contest.measures)
         given = check_numbers("values", values, (2 * self.population * self.opponents, value_count))
@@ -242,18 +232,13 @@ class Coevolution:
             The champions of the last generation.
 
         Raises:
-            ParameterError: If neither generations nor seconds are given, or one is out of range.
             WorkError: If the contest cannot be evaluated.
         """
         run_generations(self, generations=generations, seconds=seconds, executor=executor, each=each)
         return self.champion(0), self.champion(1)
 
     def save_log(self) -> None:
-        """Write the champions of the last generation and the log into the folder, if there is one.
-
-        Raises:
-            ParameterError: If they cannot be written, or pyarrow is not installed.
-        """
+        """Write the champions of the last generation and the log into the folder, if there is one."""
         if self._folder is not None and self.generations:
             for side, name in enumerate(self.contest.side_names):
                 self.champion(side).save(self._folder.path / f"{name}.toml")
@@ -299,9 +284,6 @@ class Coevolution:
         Args:
             side: Number or name of the side.
             generation: Number of the generation, from 1; the last one if left out.
-
-        Raises:
-            ParameterError: If there is no such side or generation.
         """
         contest, count = self.contest, len(self.generations)
         if not isinstance(side, int | str) or side not in (0, 1, *contest.side_names):
@@ -340,7 +322,6 @@ class Coevolution:
             executor: An open executor, or where to evaluate: see `kiks.learn.executors.executor_for`.
 
         Raises:
-            ParameterError: If an argument is out of range, or there is no generation yet.
             WorkError: If the contest cannot be evaluated.
         """
         trials, every = check_count("trials", trials, 1, 10_000), check_count("every", every, 1)
@@ -363,11 +344,7 @@ class Coevolution:
     # ---- folders ----
 
     def _resume(self, folder: Folder) -> None:
-        """Take the generations of the folder.
-
-        Raises:
-            ParameterError: If it holds another evolution.
-        """
+        """Take the generations of the folder."""
         contest = self.contest
         algorithm = f"{self.name}, {self.opponents} opponents"
         controllers = " and ".join(side.controller.name for side in contest.sides)

@@ -14,11 +14,7 @@ COLOURS = ("tab:red", "tab:blue")
 
 
 def save_fitness_plot(coevolution: Coevolution, path: str | Path) -> None:
-    """Draw best, quartiles and median of each generation for both sides.
-
-    Raises:
-        ParameterError: If the file cannot be written.
-    """
+    """Draw best, quartiles and median of each generation for both sides."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(12.0, 4.4), layout="constrained")
@@ -38,11 +34,7 @@ def save_fitness_plot(coevolution: Coevolution, path: str | Path) -> None:
 
 
 def save_tournament_plot(tournament: Tournament, path: str | Path) -> None:
-    """Draw the fitness of the first side in all pairs of champions as grey squares, and both sides' means.
-
-    Raises:
-        ParameterError: If the file cannot be written.
-    """
+    """Draw the fitness of the first side in all pairs of champions as grey squares, and both sides' means."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(12.0, 4.8), layout="constrained")

@@ -42,9 +42,6 @@ class Side:
             better. Left out, it is `kiks.learn.task.cautious_mean` of the first measure.
         robot: Kind of its robots: a name or a robot file.
         robots: Number of its robots in each world.
-
-    Raises:
-        ParameterError: If an argument is out of range.
     """
 
     name: Annotated[Text, Field(pattern=r"^[^\W\d]\w{0,29}$"), Rule("1 to 30 letters, digits and _, no digit first")]
@@ -92,9 +89,6 @@ class Contest(InWorlds):
         generations: How many generations a co-evolution has, unless the user says otherwise.
         about: A description in one line.
         file: The user's file that defines it.
-
-    Raises:
-        ParameterError: If an argument is out of range.
 
     Example:
         >>> import kiks

@@ -43,9 +43,6 @@ class EnvSpec:
         starts: 'random' for new free places in each episode; 'arena' for the starts of the arena.
         speed_limit: Wheel speed of action 1 [pulses/10 ms].
         timing: Timing of the control loop; that of a program on a line of 9600 baud if left out.
-
-    Raises:
-        ParameterError: If an argument is out of range.
     """
 
     name: Text
@@ -67,11 +64,7 @@ class EnvSpec:
         return reading_count(self.senses)
 
     def with_changes(self, **changes: Any) -> EnvSpec:
-        """Return a copy with some arguments changed.
-
-        Raises:
-            ParameterError: If an argument is unknown or out of range.
-        """
+        """Return a copy with some arguments changed."""
         return replace(self, **changes)
 
 
@@ -113,9 +106,6 @@ def without_contacts(reward: Measure, cost: float = CONTACT_COST) -> Measure:
     Args:
         reward: A measure; the gain of its first note is the reward.
         cost: What a contact takes off.
-
-    Raises:
-        ParameterError: If an argument is out of range.
     """
     check_kind("reward", reward, Measure, "Write @kiks.measure over the function.")
     cost = check_number("cost", cost, 0, 1e6)
@@ -206,11 +196,7 @@ def _named(name: str) -> EnvSpec:
 
 
 def env_spec_of(spec: str | EnvSpec) -> EnvSpec:
-    """Return a specification, given or by its name.
-
-    Raises:
-        ParameterError: If the name is unknown.
-    """
+    """Return a specification, given or by its name."""
     if isinstance(spec, EnvSpec):
         return spec
     if not isinstance(spec, str) or spec not in ENV_SPECS:

@@ -43,9 +43,6 @@ class Episodes:
         robot: Kind of robot: a name, a robot file or a `kiks.RobotSpec`.
         response: Response of the proximity sensors, if not that of the robot's file.
         threads: Number of threads; the number of cores if left out.
-
-    Raises:
-        ParameterError: If an argument is out of range, or there is no room to start.
     """
 
     def __init__(
@@ -113,9 +110,6 @@ class Episodes:
 
         Returns:
             Rewards, float64 [world, robot].
-
-        Raises:
-            ParameterError: If the shape is another, or a number is not from -1 to 1.
         """
         try:
             given = np.asarray(actions)
@@ -172,11 +166,7 @@ class Episodes:
         return random_starts(arena, PLACE_COUNT, seed=0, radius_mm=self._body.radius_mm, clear_mm=CLEAR_MM)
 
     def _draw_starts(self, world: int, rng: np.random.Generator) -> list[list[float]]:
-        """Return start poses of a world's robots that do not overlap.
-
-        Raises:
-            ParameterError: If the arena has not enough room.
-        """
+        """Return start poses of a world's robots that do not overlap."""
         places = self._places[self.batch.arena_indices[world]]
         distance_min_mm = 2 * self._body.radius_mm + CLEAR_MM
         taken: list[list[float]] = []

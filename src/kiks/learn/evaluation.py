@@ -48,9 +48,6 @@ def check_candidates(candidates: object, seeds: object) -> tuple[Floats, Integer
     Args:
         candidates: Parameters, float64 [candidate, parameter].
         seeds: A seed for each, int64 [candidate].
-
-    Raises:
-        ParameterError: If they have not these shapes and types.
     """
     candidates, seeds = _array(candidates), _array(seeds)
     if candidates.ndim != 2 or candidates.dtype != np.float64:
@@ -174,7 +171,6 @@ class Executor(ABC):
         """Open it.
 
         Raises:
-            ParameterError: If the work cannot be sent to workers, or these cannot be reached.
             WorkError: If the work raises when it is prepared; on a cluster the first evaluation raises this.
         """
         self._open()
@@ -196,7 +192,6 @@ class Executor(ABC):
             Values [candidate, value], in the order of the candidates; [0, 0] if there are none.
 
         Raises:
-            ParameterError: If candidates and seeds have not these shapes and types.
             WorkError: If the work raises, too many workers are lost, or the executor is not open.
         """
         if not self._is_open:

@@ -69,9 +69,6 @@ class Evolution:
         generations: The generations with their values, in order.
         finals: The finals, if they were held after the last generation; else None.
 
-    Raises:
-        ParameterError: If an argument is out of range, or the folder holds another evolution.
-
     Example:
         >>> import kiks
         >>> evolution = kiks.Evolution(kiks.tasks.avoid(seconds=2), "ga", seed=1, population=8)
@@ -132,9 +129,6 @@ class Evolution:
         """Return the candidates of the next generation, float64 [candidate, parameter]; the same until `tell`.
 
         After the population come the trials of the last generation's rival, if there is one.
-
-        Raises:
-            ParameterError: If the algorithm returns anything else than so many candidates.
         """
         if self._asked is None:
             asked = self._candidates(self.population)
@@ -148,9 +142,6 @@ class Evolution:
 
         Args:
             count: Number of candidates; any from 1 if None.
-
-        Raises:
-            ParameterError: If it returns something else.
         """
         candidates = check_numbers("candidates of ask()", self.algorithm.ask(), (count, self.task.parameter_count))
         if not len(candidates):
@@ -172,10 +163,6 @@ class Evolution:
         Args:
             values: Fitness, then the measures, float64 [candidate, 1 + measure], as `Task.evaluate` returns them; or
                 fitness alone, float64 [candidate]. More is better.
-
-        Raises:
-            ParameterError: If the shape is wrong, a number is not finite, or `ask` was not called; or if fitness is
-                given alone to an algorithm that looks for many behaviours.
         """
         self._tell(values, self._now_s())
         if self._folder is not None:
@@ -220,9 +207,6 @@ class Evolution:
 
         Args:
             best: The best candidate of the generation, for an algorithm that does not say what it prefers.
-
-        Raises:
-            ParameterError: If `favourite` returns something else than parameters.
         """
         favourite: Any = getattr(self.algorithm, "favourite", None)
         preferred = best if favourite is None else favourite()
@@ -261,7 +245,6 @@ class Evolution:
             The champion.
 
         Raises:
-            ParameterError: If neither generations nor seconds are given, or one is out of range.
             WorkError: If the task cannot be evaluated.
         """
         finish = partial(self.hold_finals, each_round=each_round)
@@ -283,7 +266,6 @@ class Evolution:
             The champion.
 
         Raises:
-            ParameterError: Before the first generation, or if the executor is none.
             WorkError: If the task cannot be evaluated.
         """
         finals = None if self.finals else self._new_finals()
@@ -309,11 +291,7 @@ class Evolution:
         return Finals(finalists, self.seed, evaluations, len(self.task.value_names))
 
     def save_log(self) -> None:
-        """Write the champion, the archive and the log into the folder, if there is one.
-
-        Raises:
-            ParameterError: If they cannot be written, or pyarrow is not installed.
-        """
+        """Write the champion, the archive and the log into the folder, if there is one."""
         if self._folder is not None and self.generations:
             self.champion.save(self._folder.path / CHAMPION)
             if self.archive is not None:
@@ -340,11 +318,7 @@ class Evolution:
 
     @property
     def champion(self) -> Champion:
-        """The winner of the finals; before these, the best rival; before the first trial, the best candidate.
-
-        Raises:
-            ParameterError: Before the first generation.
-        """
+        """The winner of the finals; before these, the best rival; before the first trial, the best candidate."""
         if self.finals is not None:
             winner = self.finals.winner
             return self._champion(self.finals.finalists[winner], self.finals.means(winner))
@@ -376,11 +350,7 @@ class Evolution:
     # ---- folders ----
 
     def _resume(self, folder: Folder) -> None:
-        """Take the generations of the folder.
-
-        Raises:
-            ParameterError: If it holds another evolution.
-        """
+        """Take the generations of the folder."""
         task = self.task
         controller = task.controller.name
         digest = task.digest() | fingerprints({"algorithm": type(self.algorithm)})

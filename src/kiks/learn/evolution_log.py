@@ -87,11 +87,7 @@ class Generation:
 def check_alike(
     one: Any, other: Any, names: Collection[str], whose: str, advice: str, free: Collection[str] = ()
 ) -> None:
-    """Check that identities or results have the same attributes, and tasks that are the same but for some arguments.
-
-    Raises:
-        ParameterError: If they differ.
-    """
+    """Check that identities or results have the same attributes, and tasks that are the same but for some arguments."""
     for name in names:
         if (known := getattr(one, name)) != (value := getattr(other, name)):
             raise ParameterError(
@@ -106,20 +102,13 @@ class Folder:
 
     Args:
         path: The folder.
-
-    Raises:
-        ParameterError: If it is no name of a folder.
     """
 
     def __init__(self, path: str | Path) -> None:
         self.path = path_of(path, "folder")
 
     def identity(self) -> Identity:
-        """Return the identity of the evolution in the folder.
-
-        Raises:
-            ParameterError: If there is none, or it is broken.
-        """
+        """Return the identity of the evolution in the folder."""
         file = self.path / IDENTITY
         if not file.exists():
             raise ParameterError(
@@ -130,11 +119,7 @@ class Folder:
         return check(Identity, parse_json(read_file(file, what), what), what, advice="Take a new folder.")
 
     def check_identity(self, identity: Identity) -> None:
-        """Write the identity of an evolution into the folder, which is made if need be, or compare it with that there.
-
-        Raises:
-            ParameterError: If the folder belongs to another evolution, or has a champion of none, or cannot be written.
-        """
+        """Write the identity of an evolution into the folder, or compare it with the one that is there."""
         file = self.path / IDENTITY
         if not file.exists() and (self.path / "champion.toml").exists():
             raise ParameterError(
@@ -160,9 +145,6 @@ class Folder:
             candidate_counts: Numbers of candidates of which it must have one.
             parameter_count: Number of parameters of a candidate.
             value_count: Largest number of values of a candidate.
-
-        Raises:
-            ParameterError: If its file is broken, or belongs to another evolution.
         """
         file = self._file(number)
         if not file.exists():
@@ -185,9 +167,6 @@ class Folder:
         Args:
             ask: Returns the candidates that the evolution has for its next generation, float64 [candidate, parameter].
             value_count: Largest number of values of a candidate.
-
-        Raises:
-            ParameterError: If a generation has other candidates.
         """
         number = 0
         while (saved := self.generation(number, ask().shape[:1], ask().shape[1], value_count)) is not None:
@@ -208,11 +187,7 @@ class Folder:
         return number
 
     def save(self, number: int, generation: Generation) -> None:
-        """Save a generation.
-
-        Raises:
-            ParameterError: If it cannot be written.
-        """
+        """Save a generation."""
         arrays = {"candidates": generation.candidates, "values": generation.values}
         _save_arrays(self._file(number), arrays, generation.seconds, "a generation")
 
@@ -222,9 +197,6 @@ class Folder:
         Args:
             number: Number of the generation after which they were held, from 0.
             finals: Finals with the same finalists, before their first round.
-
-        Raises:
-            ParameterError: If the file is broken, or holds other finalists.
         """
         file, what = self._finals_file(number), f"Finals {str(self._finals_file(number))!r}"
         if not file.exists():
@@ -248,20 +220,13 @@ class Folder:
         Args:
             number: Number of the generation after which they were held, from 0.
             finals: The finals.
-
-        Raises:
-            ParameterError: If they cannot be written.
         """
         numbers, seeds, values = finals.evaluated
         arrays: dict[str, Any] = {"finalists": finals.candidates, "finalist": numbers, "seed": seeds, "values": values}
         _save_arrays(self._finals_file(number), arrays, finals.seconds, "finals")
 
     def save_log(self, generations: Sequence[Generation], value_names: Sequence[str]) -> None:
-        """Write the log of all generations, a row for each evaluation: the population, then the trials of a rival.
-
-        Raises:
-            ParameterError: If it cannot be written, or pyarrow is not installed.
-        """
+        """Write the log of all generations, a row for each evaluation: the population, then the trials of a rival."""
         counts = [len(each.values) for each in generations]
 
         def per_candidate(values: Sequence[float]) -> NDArray[Any]:
@@ -296,11 +261,7 @@ def _save_arrays(file: Path, arrays: Mapping[str, Any], seconds: float, what: st
 
 
 def write_table(columns: Mapping[str, NDArray[Any]], path: str | Path, what: str) -> None:
-    """Write a Parquet file.
-
-    Raises:
-        ParameterError: If it cannot be written, or pyarrow is not installed.
-    """
+    """Write a Parquet file."""
     pyarrow, parquet = library("pyarrow"), library("pyarrow.parquet")
     buffer = io.BytesIO()
     parquet.write_table(pyarrow.table(dict(columns)), buffer)

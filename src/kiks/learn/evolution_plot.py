@@ -31,9 +31,6 @@ def save_plot(evolution: Evolution, path: str | Path, baselines: Baselines | Non
         evolution: The evolution.
         path: File of the picture.
         baselines: Its baselines, drawn as lines.
-
-    Raises:
-        ParameterError: If the file cannot be written.
     """
     from matplotlib.figure import Figure
 

@@ -87,9 +87,6 @@ class Exam:
         starts: 'random' for free places anywhere, or 'arena' for the start poses of the arenas: lone robots take those
             of an arena in turn, each with noise of its own.
 
-    Raises:
-        ParameterError: If an argument is out of range.
-
     Example:
         >>> import kiks
         >>> @kiks.controller(parameters=2)
@@ -124,10 +121,6 @@ class Exam:
             robots: Number of robots in each world, all driven by it. A start is that of all of them.
             kinds: Kinds of robots, such as those of `imperfect_robots`. All starts are taken with each, so the result
                 has as many times more starts. Left out, the champion's own.
-
-        Raises:
-            ParameterError: If an argument is wrong, or `solved` returns something else than a yes or no for each start.
-            ArenaError: If something has no free place in an arena.
         """
         check_kind("champion", champion, Champion, "kiks.Champion.load() returns one.")
         named = specs_of(champion.robot if kinds is None else kinds, None, None)
@@ -159,9 +152,6 @@ class Exam:
         Args:
             robot: Kind of the robots.
             robots: Number of robots.
-
-        Raises:
-            ParameterError: If the arena has too few free places, or more in it than a project may have.
         """
         poses = self._poses(robot, robots) if self.starts == "random" else None
         return world_of(
@@ -193,9 +183,6 @@ def world_of(arena: Arena, poses: Floats | None, robots: int, seed: int) -> Proj
         poses: Start poses [start, 3], which are rounded like those of projects from the desk; the arena's own if None.
         robots: Number of robots.
         seed: Seed of all random numbers.
-
-    Raises:
-        ParameterError: If the arena has more in it than a project may have.
     """
     starts = tuple(rounded_pose(*pose) for pose in (arena.starts if poses is None else poses[:THINGS_MAX].tolist()))
     return Project(replace(arena, starts=starts), robots=(ProjectRobot(),) * robots, seed=seed)

@@ -47,9 +47,6 @@ def executor_for(where: str, work: Evaluation) -> Executor:
             the one that this computer belongs to.
         work: Evaluates candidates.
 
-    Raises:
-        ParameterError: If `where` is unknown, or the work has no method `evaluate`.
-
     Example:
         >>> import numpy as np
         >>> class Squares:

@@ -130,9 +130,6 @@ class Finals:
 
         Args:
             values: Fitness, then the measures, float64 [candidate, 1 + measure].
-
-        Raises:
-            ParameterError: If the shape is wrong, or a number is not finite.
         """
         numbers, seeds = self._of_evaluation(), self.seeds
         given = check_numbers("values", values, (len(numbers), self.value_count))

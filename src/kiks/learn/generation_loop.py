@@ -90,7 +90,6 @@ def run_generations(
         finish: Called with the open executor after the last generation, unless the run is interrupted.
 
     Raises:
-        ParameterError: If neither generations nor seconds are given, or one is out of range.
         WorkError: If candidates cannot be evaluated.
     """
     if generations is None and seconds is None:
@@ -125,7 +124,6 @@ def opened(executor: Executor | str, work: Evaluation) -> Iterator[Executor]:
         work: Evaluates candidates.
 
     Raises:
-        ParameterError: If it is neither.
         WorkError: If the work raises when it is prepared.
     """
     if isinstance(executor, str):

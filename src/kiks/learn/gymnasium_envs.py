@@ -55,9 +55,6 @@ class KheperaEnv(gymnasium.Env[Floats32, Floats32]):
         render_mode: 'rgb_array' for pictures from above, None for none.
         **changes: Changed arguments of the specification, such as `arenas` or `timing`; and `robot` and `response` as
             for `Episodes`.
-
-    Raises:
-        ParameterError: If an argument is out of range.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 10}  # noqa: RUF012  (a class attribute in Gymnasium)
@@ -70,21 +67,13 @@ class KheperaEnv(gymnasium.Env[Floats32, Floats32]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Floats32, dict[str, Any]]:
-        """Begin an episode; the same seed gives the same episode.
-
-        Raises:
-            ParameterError: If the seed is no whole number from 0 to 2^63 - 1.
-        """
+        """Begin an episode; the same seed gives the same episode."""
         super().reset(seed=checked_seed(seed))
         self.episodes.begin([0], [self.np_random])
         return self.episodes.observations()[0, 0], self._info()
 
     def step(self, action: Floats32) -> tuple[Floats32, float, bool, bool, dict[str, Any]]:
-        """Set the wheels' speeds, wait for the next loop, and sense.
-
-        Raises:
-            ParameterError: If the action is not two numbers from -1 to 1.
-        """
+        """Set the wheels' speeds, wait for the next loop, and sense."""
         reward = self.episodes.step([action])[0, 0]
         is_over = bool(self.episodes.terminations()[0])
         return self.episodes.observations()[0, 0], float(reward), is_over, False, self._info()
@@ -110,9 +99,6 @@ class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[An
         render_mode: 'rgb_array' for pictures from above, None for none.
         threads: Number of threads; the number of cores if left out. Results do not depend on it.
         **changes: As for `KheperaEnv`.
-
-    Raises:
-        ParameterError: If an argument is out of range.
     """
 
     metadata = {**KheperaEnv.metadata, "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
@@ -156,9 +142,6 @@ class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[An
             seed: World k gets `seed` + k; or a list with a seed for each. Without one, each world continues its random
                 numbers.
             options: "reset_mask" selects worlds, bool [world].
-
-        Raises:
-            ParameterError: If there are not as many seeds as worlds, or the mask is invalid.
         """
         mask = options.get("reset_mask") if isinstance(options, dict) else None
         if mask is not None and not (
@@ -179,12 +162,7 @@ class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[An
         return self.episodes.observations()[:, 0], self._infos()
 
     def step(self, actions: Floats32) -> tuple[Floats32, NDArray[Any], NDArray[Any], NDArray[Any], dict[str, Any]]:
-        """Let all robots act and read their sensors; ended worlds reset according to the autoreset mode.
-
-        Raises:
-            ParameterError: If the actions are not two numbers from -1 to 1 for each robot, or an ended world was not
-                reset while autoreset is disabled.
-        """
+        """Let all robots act and read their sensors; ended worlds reset according to the autoreset mode."""
         if self.autoreset_mode is AutoresetMode.DISABLED and self._done.any():
             raise ParameterError(
                 "worlds that have ended must be reset before the next step, but "
@@ -254,40 +232,24 @@ class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[An
 
 
 def episodes_of(spec: str | EnvSpec, worlds: int, changes: dict[str, Any]) -> Episodes:
-    """Return episodes; changes are arguments of `Episodes` or of the specification.
-
-    Raises:
-        ParameterError: If an argument is unknown or out of range.
-    """
+    """Return episodes; changes are arguments of `Episodes` or of the specification."""
     of_episodes = {name: changes[name] for name in ("robot", "robots", "response", "threads") if name in changes}
     of_spec = {name: value for name, value in changes.items() if name not in of_episodes}
     return Episodes(env_spec_of(spec).with_changes(**of_spec), worlds, **of_episodes)
 
 
 def checked_seed(seed: int | None) -> int | None:
-    """Return a checked seed, or None.
-
-    Raises:
-        ParameterError: If it is invalid.
-    """
+    """Return a checked seed, or None."""
     return None if seed is None else check_count("seed", seed, 0, SEED_LIMIT)
 
 
 def checked_limit(name: str, steps: int | None) -> int | None:
-    """Return a checked number of steps, or None for no limit.
-
-    Raises:
-        ParameterError: If it is invalid.
-    """
+    """Return a checked number of steps, or None for no limit."""
     return None if steps is None else check_count(name, steps, 1, SEED_LIMIT)
 
 
 def checked_mode(render_mode: str | None) -> str | None:
-    """Return a checked render mode.
-
-    Raises:
-        ParameterError: If it is unknown.
-    """
+    """Return a checked render mode."""
     if not isinstance(render_mode, str | None) or render_mode not in (None, "rgb_array"):
         raise ParameterError(f"render_mode must be 'rgb_array' or None, but it was {shown(render_mode)}.")
     return render_mode

@@ -46,9 +46,6 @@ def individual_of(
         rank: 1 for the best of the generation, 2 for the next one; equal ones by their numbers.
         world: Number of the world of its evaluation, from 0.
         task: The task; looked up if left out: a ready-made one, or a task file (.toml).
-
-    Raises:
-        ParameterError: If a number is out of range, the folder holds no evolution, or its task cannot be found again.
     """
     saved = Folder(folder)
     identity = saved.identity()
@@ -70,11 +67,7 @@ def individual_of(
 
 
 def _task_of(folder: Folder, identity: Identity, given: Task | None) -> Task:
-    """Return the task of an evolution.
-
-    Raises:
-        ParameterError: If it cannot be found, or was changed.
-    """
+    """Return the task of an evolution."""
     name, file = identity.task, identity.task_file
     where = f"the task {shown(name)} of the evolution in {str(folder.path)!r}"
     if given is not None:

@@ -33,9 +33,6 @@ class KheperaTeam(ParallelEnv[str, Floats32, Floats32]):  # type: ignore[misc, u
         max_cycles: Number of steps after which an episode is truncated.
         render_mode: 'rgb_array' for pictures from above, None for none.
         **changes: As for `kiks.learn.gymnasium_envs.KheperaEnv`.
-
-    Raises:
-        ParameterError: If an argument is out of range, or the arena has not enough room.
     """
 
     metadata: ClassVar[dict[str, Any]] = {"name": "kiks_team_v0", "render_modes": ["rgb_array"], "render_fps": 10}
@@ -71,11 +68,7 @@ class KheperaTeam(ParallelEnv[str, Floats32, Floats32]):  # type: ignore[misc, u
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Floats32], dict[str, dict[str, Any]]]:
-        """Begin an episode; the same seed gives the same episode.
-
-        Raises:
-            ParameterError: If the seed is no whole number from 0 to 2^63 - 1.
-        """
+        """Begin an episode; the same seed gives the same episode."""
         if seed is not None or self._rng is None:
             self._rng, _ = np_random(checked_seed(seed))
         self.episodes.begin([0], [self._rng])
@@ -86,11 +79,7 @@ class KheperaTeam(ParallelEnv[str, Floats32, Floats32]):  # type: ignore[misc, u
     def step(
         self, actions: dict[str, Floats32]
     ) -> tuple[dict[str, Floats32], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]]:
-        """Let all robots act, then read their sensors.
-
-        Raises:
-            ParameterError: If an action is not two numbers from -1 to 1, or a robot has none.
-        """
+        """Let all robots act, then read their sensors."""
         if not self.agents or not isinstance(actions, dict) or set(actions) != set(self.agents):
             raise ParameterError(
                 f"actions must be given for {', '.join(self.agents) or 'no robot: the episode is over, call reset()'}, "

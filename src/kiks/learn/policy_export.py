@@ -72,10 +72,6 @@ def champion_of_policy(
         output: What keeps the actions within +-1, 'clip' or 'tanh'; if neither this nor the policy says it, 'clip'.
         robot: The kind of robot that it drove.
 
-    Raises:
-        ParameterError: If the policy is none of these, does something else than such a network, or does not fit the
-            environment.
-
     Example:
         >>> import numpy as np
         >>> import kiks
@@ -116,11 +112,7 @@ def champion_of_policy(
 
 
 def _network_of(policy: Any) -> _Network:
-    """Return the network of a policy, of whatever sort it is.
-
-    Raises:
-        ParameterError: If it is none that this module knows, or it has parts that no controller has.
-    """
+    """Return the network of a policy, of whatever sort it is."""
     if isinstance(policy, Mapping):
         return _Network(_pairs_of(policy))
     if isinstance(policy, list | tuple):
@@ -141,11 +133,7 @@ def _network_of(policy: Any) -> _Network:
 
 
 def _check_is_unchanged(policy: Any) -> None:
-    """Refuse a model of Stable-Baselines3 that sees or does something else than what the environment has.
-
-    Raises:
-        ParameterError: If it does.
-    """
+    """Refuse a model of Stable-Baselines3 that sees or does something else than what the environment has."""
     normalizing = getattr(policy, "get_vec_normalize_env", lambda: None)()
     if normalizing is not None and normalizing.norm_obs:
         raise ParameterError(
@@ -175,11 +163,7 @@ def _parts(module: Any) -> list[Any]:
 
 
 def _of_modules(modules: Sequence[Any]) -> _Network:
-    """Return the network of modules of PyTorch in their order.
-
-    Raises:
-        ParameterError: If there is one that no controller has.
-    """
+    """Return the network of modules of PyTorch in their order."""
     layers: list[tuple[Any, Any]] = []
     between: list[str] = []
     for module in modules:
@@ -211,11 +195,7 @@ def _refused_order() -> ParameterError:
 
 
 def _pairs_of(state: Mapping[str, Any]) -> list[tuple[Any, Any]]:
-    """Return the layers in a state_dict.
-
-    Raises:
-        ParameterError: If there is anything else in it.
-    """
+    """Return the layers in a state_dict."""
     names = list(state)
     if not all(isinstance(name, str) for name in names):
         raise ParameterError(f"policy must be {ACCEPTED}, but it was {shown(state)}.")
@@ -240,11 +220,7 @@ def _pair(given: Any) -> tuple[Any, Any]:
 
 
 def _checked(layers: Sequence[tuple[Any, Any]], spec: EnvSpec) -> list[Layer]:
-    """Return layers as arrays: each takes what the one before it gives, the first the observation of an environment.
-
-    Raises:
-        ParameterError: If they do not fit, or hold something else than finite numbers.
-    """
+    """Return layers as arrays: each takes what the one before it gives, the first the observation of an environment."""
     if not layers:
         raise ParameterError(f"policy must be {ACCEPTED}, but it had no layer.")
     checked: list[Layer] = []
@@ -274,11 +250,7 @@ def _as_array(numbers: Any) -> Any:
 
 
 def _chosen(name: str, given: str | None, found: str | None) -> str | None:
-    """Return what the caller says, else what the policy says.
-
-    Raises:
-        ParameterError: If they differ.
-    """
+    """Return what the caller says, else what the policy says."""
     if given is not None and found is not None and given != found:
         raise ParameterError(
             f"{name} must be {found!r}, as the policy has it, but it was {shown(given)}. Leave it out."

@@ -277,11 +277,7 @@ class RayPool:
         self._stored_work: Any = None
 
     def open(self) -> None:
-        """Connect to the cluster, put the work into its store, once for all workers, and start the workers.
-
-        Raises:
-            ParameterError: If Ray is not installed, no cluster is reached, or the work cannot be pickled.
-        """
+        """Connect to the cluster, put the work into its store, once for all workers, and start the workers."""
         self._ray = ray = _import_ray(loopback_only=self._address is None)
         try:
             pickled = ray.cloudpickle.dumps((self._work, _digest_of(self._work)))
@@ -421,11 +417,7 @@ def _digest_of(work: Evaluation) -> dict[str, str]:
 
 
 def _unpickled(pickled: bytes) -> Evaluation:
-    """Return the work that a program has sent.
-
-    Raises:
-        ParameterError: If it would have other values here, because modules that it imports differ.
-    """
+    """Return the work that a program has sent."""
     work, digest = pickle.loads(pickled)
     if names := differing(digest, _digest_of(work)):
         raise ParameterError(
@@ -491,9 +483,6 @@ def _import_ray(*, loopback_only: bool) -> Any:
     Args:
         loopback_only: Whether it will start a cluster for this computer alone. Otherwise Ray listens at the address
             that this computer has in the network, whatever address it is given, and some of its parts listen on all.
-
-    Raises:
-        ParameterError: If it is not installed.
     """
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
     if loopback_only:

@@ -121,9 +121,6 @@ def follow(controller: Controller | None = None, *, side: str = "left", **change
             wall.
         side: The side of the robot on which the wall is: 'left' or 'right'.
         changes: Other arguments of `Task`.
-
-    Raises:
-        ParameterError: If the side is neither 'left' nor 'right'.
     """
     task = Task(
         "follow",
@@ -285,9 +282,6 @@ def room_with_cylinders(side_mm: int, seed: int) -> Arena:
     Args:
         side_mm: Side of the room [mm].
         seed: Seed of the random generator.
-
-    Raises:
-        ParameterError: If the room is too small for them.
     """
     rng = np.random.default_rng(seed)
     rows, columns = np.tril_indices(CYLINDERS, -1)

@@ -116,20 +116,12 @@ class Result:
             )
 
     def save(self, folder: Path) -> None:
-        """Write it into the folder of the evolution.
-
-        Raises:
-            ParameterError: If it cannot be written.
-        """
+        """Write it into the folder of the evolution."""
         replace_file(folder / RESULT, json.dumps(asdict(self)) + "\n", "the result")
 
 
 def result_of(evolution: Evolution) -> Result:
-    """Return the result of an evolution: this examines its champion and measures baselines.
-
-    Raises:
-        ParameterError: If it has no generation.
-    """
+    """Return the result of an evolution: this examines its champion and measures baselines."""
     task, champion = evolution.task, evolution.champion
     score = None
     if task.exam is not None:
@@ -175,11 +167,7 @@ def result_of(evolution: Evolution) -> Result:
 
 
 def load_result(folder: Path) -> Result | None:
-    """Return the result of the evolution in a folder; None if it is not finished.
-
-    Raises:
-        ParameterError: If its file is broken.
-    """
+    """Return the result of the evolution in a folder; None if it is not finished."""
     file = folder / RESULT
     if not file.exists():
         return None
@@ -195,11 +183,7 @@ def seed_folder(folder: Path, seed: int) -> Path:
 
 
 def load_results(folder: str | Path) -> list[Result]:
-    """Return the results of the evolutions in a folder of `kiks evolve --seeds`, by seed, or of the one in a folder.
-
-    Raises:
-        ParameterError: If it holds none, one is not finished, or they differ in more than the seed.
-    """
+    """Return the results of the evolutions in a folder of `kiks evolve --seeds`, by seed, or of the one in a folder."""
     path = path_of(folder, "folder")
     homes = [path] if (path / IDENTITY).exists() else [each.parent for each in path.glob(f"seed-*/{IDENTITY}")]
     if not homes:
@@ -228,11 +212,7 @@ def load_results(folder: str | Path) -> list[Result]:
 
 
 def comparable(first: Sequence[Result], second: Sequence[Result]) -> list[list[Result]]:
-    """Return two groups of the same task, with the same KiKS; without their exams if these differ.
-
-    Raises:
-        ParameterError: If anything differs on which fitness depends.
-    """
+    """Return two groups of the same task, with the same KiKS; without their exams if these differ."""
     one, other = first[0], second[0]
     check_alike(one, other, ("task", "kiks"), "evolutions that are compared", "Compare two of one task.", _FREE)
     tell_unseen(one.task_digest, "Fitness is compared")
@@ -243,11 +223,7 @@ def comparable(first: Sequence[Result], second: Sequence[Result]) -> list[list[R
 
 
 def save_summary(results: Sequence[Result], folder: Path) -> None:
-    """Write the results of several evolutions without their curves, and what they have in common.
-
-    Raises:
-        ParameterError: If it cannot be written.
-    """
+    """Write the results of several evolutions without their curves, and what they have in common."""
     low, median, high = quartiles(results)
     summary: dict[str, Any] = {"median_fitness": median, "quartiles_fitness": [low, high]}
     if (passed := passed_count(results)) is not None:

@@ -26,9 +26,6 @@ def save_results_plot(groups: Mapping[str, Sequence[Result]], path: str | Path) 
     Args:
         groups: The groups by their names.
         path: File of the picture.
-
-    Raises:
-        ParameterError: If the file cannot be written.
     """
     from matplotlib.figure import Figure
 

@@ -64,9 +64,6 @@ class Axis:
         low: Its lower end.
         high: Its upper end; values beyond an end belong to the last cell.
         cells: Number of cells.
-
-    Raises:
-        ParameterError: If an argument is out of range.
     """
 
     measure: Text
@@ -109,9 +106,6 @@ class Task(InWorlds):
         exam: The exam of its champions.
         about: A description in one line.
         file: The user's file that defines it.
-
-    Raises:
-        ParameterError: If an argument is out of range.
 
     Example:
         >>> import kiks
@@ -190,11 +184,7 @@ class Task(InWorlds):
         return self.controller.parameter_count or 0
 
     def world(self) -> Project:
-        """Return the world in which its champions are shown: that of their exam, or of training if there is none.
-
-        Raises:
-            ParameterError: If the arena has too few free places, or more in it than a project may have.
-        """
+        """Return the world in which its champions are shown: that of their exam, or of training if there is none."""
         if self.exam is not None:
             return self.exam.world(self.kinds[0], self.robots)
         poses = self.start_poses(np.zeros(1, np.int64))
@@ -211,9 +201,6 @@ class Task(InWorlds):
             parameters: Its parameters, float64 [parameter].
             seed: Its seed.
             world: Number of the world, from 0.
-
-        Raises:
-            ParameterError: If an argument is out of range.
         """
         world, seeds = check_count("world", world, 0, self.worlds - 1), np.array([seed])
         kinds, timings = self._turns(seeds)

@@ -74,9 +74,6 @@ def load(name: str | Path, controller: Controller | None = None) -> Task:
     Args:
         name: A key of `TASKS`, or a path that ends in .toml or .py.
         controller: Replaces the task's own controller.
-
-    Raises:
-        ParameterError: If the task is unknown, or the file does not hold one.
     """
     name = str(path_of(name, "the name of a task"))
     if name in TASKS:
@@ -97,11 +94,7 @@ def load(name: str | Path, controller: Controller | None = None) -> Task:
 
 
 def _load_task_file(path: Path, controller: Controller | None) -> Task:
-    """Return the task of a file; the files that it names lie in its folder or below.
-
-    Raises:
-        ParameterError: If it is no task file, or a file that it names is invalid.
-    """
+    """Return the task of a file; the files that it names lie in its folder or below."""
     what = f"Task file {str(path)!r}"
     given = check(TaskFile, parse_toml(read_file(path, what), what), what)
     try:

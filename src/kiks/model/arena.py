@@ -56,11 +56,6 @@ class Arena:
         balls: Balls, each centre on floor.
         cylinders: Cylinders, each centre on floor.
 
-    Raises:
-        ParameterError: If `brightness` is no uint8 [row, column], `mm_per_cell` is out of range or an entry's
-            number is none.
-        ArenaError: If the raster is too small, too large or has no floor, or an entry stands where it cannot.
-
     Example:
         >>> arena = Arena.box(400, 300)
         >>> arena.clearance_at_mm(60, 150)
@@ -130,10 +125,6 @@ class Arena:
             brightness: Integers 0..255 [row, column] with row 0 on top, 0 = floor; or booleans, True = wall of 255.
             mm_per_pixel: Edge of a pixel [mm]. A pixel above 1 mm becomes k x k cells, k = ceil(mm_per_pixel).
             name: Its name.
-
-        Raises:
-            ParameterError: If the array has another type, or `mm_per_pixel` is out of range.
-            ArenaError: If the arena would be too small, too large or without floor.
         """
         if not isinstance(brightness, np.ndarray) or brightness.ndim != 2 or brightness.dtype.kind not in "bui":
             raise ParameterError(
@@ -161,10 +152,6 @@ class Arena:
         Args:
             path: A PNG, TIF, PGM or BMP file.
             mm_per_pixel: Edge of a pixel [mm].
-
-        Raises:
-            ParameterError: If `mm_per_pixel` is out of range.
-            ArenaError: If the file is missing, damaged, of another type or no arena.
         """
         from kiks.model.picture import read_picture
 
@@ -173,11 +160,7 @@ class Arena:
 
     @classmethod
     def load(cls, path: str | Path) -> Arena:
-        """Read an arena file (.toml), a project's arena (.kiks), one of the Matlab KiKS (.kad), or a 1 mm picture.
-
-        Raises:
-            ArenaError: If the file is missing, damaged or no arena.
-        """
+        """Read an arena file (.toml), a project's arena (.kiks), one of the Matlab KiKS (.kad), or a 1 mm picture."""
         arena: Arena = upwards.load_arena_file(path_of(path))
         return arena
 
@@ -200,10 +183,6 @@ class Arena:
             rounded_mm: Radius of the corners of the floor [mm].
             brightness: Brightness of the wall, 1..255, or a material of `kiks.model.materials`, such as 'wood'.
 
-        Raises:
-            ParameterError: If a number is not whole or out of range, or a material unknown.
-            ArenaError: If the box is too small or too large.
-
         Example:
             >>> int(Arena.box(400, 300, brightness="wood").brightness.max())
             190
@@ -223,10 +202,6 @@ class Arena:
             path_mm: Width of a passage [mm], at least 2 `wall_mm` + 77.
             wall_mm: Thickness of a wall between passages [mm].
             seed: The same seed, the same maze, on every computer.
-
-        Raises:
-            ParameterError: If a number is not whole or out of range.
-            ArenaError: If the maze is too small or too large for an arena.
 
         Example:
             >>> Arena.maze(columns=5, rows=5).width_mm
@@ -288,9 +263,6 @@ class Arena:
         Interpolates `clearance` between cell centres and takes off half a cell. That is exact before a straight wall
         along the raster; before a corner it is up to 0.21 cells too much, half way between two walls up to half a
         cell too little. In walls and outside it is negative.
-
-        Raises:
-            ParameterError: If a coordinate is not finite.
         """
         x_mm, y_mm = check_number("x_mm", x_mm), check_number("y_mm", y_mm)
         column, column_share = between(x_mm / self.mm_per_cell + PAD - 0.5, self.clearance.shape[1])
@@ -300,11 +272,7 @@ class Arena:
         return float(upright[0] + column_share * (upright[1] - upright[0]) - 0.5 * self.mm_per_cell)
 
     def free_for(self, x_mm: float, y_mm: float, radius_mm: float) -> bool:
-        """Return whether a disc of `radius_mm` [mm] at a place [mm] touches no wall.
-
-        Raises:
-            ParameterError: If a coordinate is not finite or `radius_mm` is not positive and finite.
-        """
+        """Return whether a disc of `radius_mm` [mm] at a place [mm] touches no wall."""
         if check_number("radius_mm", radius_mm, 0, advice="A Khepera has 27.5.") == 0:
             raise ParameterError("radius_mm must be positive, but it was 0. A Khepera has 27.5.")
         return self.clearance_at_mm(x_mm, y_mm) >= radius_mm
@@ -314,10 +282,6 @@ class Arena:
 
         That is the first of `starts`. Without any it is the cell with most room, among equals the one nearest to
         the middle, heading up: the same one every time.
-
-        Raises:
-            ParameterError: If `radius_mm` is not positive and finite.
-            ArenaError: If the start pose, or every place, is too narrow for the robot.
         """
         pose = self.starts[0] if self.starts else self._widest_place()
         if not self.free_for(pose.x_mm, pose.y_mm, radius_mm):

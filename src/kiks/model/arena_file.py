@@ -89,23 +89,14 @@ class Walls:
     brightness: Brightness | None = None
 
     def box(self) -> Arena:
-        """Return the box.
-
-        Raises:
-            ParameterError: If there is no size, or a number does not fit the others.
-            ArenaError: If the box is too small or too large.
-        """
+        """Return the box."""
         if self.size_mm is None:
             raise ParameterError("size_mm must be given, but it is missing. Give size_mm = [width, height].")
         keys = {name: getattr(self, name) for name in ("wall_mm", "rounded_mm", "brightness")}
         return Arena.box(*self.size_mm, **{name: value for name, value in keys.items() if value is not None})
 
     def check_is_alone(self, rival: str) -> None:
-        """Check that no key of a box came with one of a picture.
-
-        Raises:
-            ParameterError: If one did.
-        """
+        """Check that no key of a box came with one of a picture."""
         given = [name for name in ("size_mm", "wall_mm", "rounded_mm", "brightness") if getattr(self, name) is not None]
         if given:
             raise ParameterError(
@@ -142,9 +133,6 @@ def load_arena(path: Path) -> Arena:
 
     Args:
         path: The TOML file; its picture lies in the same folder or below.
-
-    Raises:
-        ArenaError: If the file or its picture is missing, damaged, or no arena. The message names file and entry.
     """
     what = f"Arena file {str(path)!r}"
     return _decode(read_file(path, what, error=ArenaError), what, path.stem, path.parent)
@@ -157,9 +145,6 @@ def decode_arena(data: bytes, name: str = "arena", what: str = "The arena file")
         data: The bytes.
         name: Name of the arena if the file has none.
         what: Name of the file in messages.
-
-    Raises:
-        ArenaError: If it is damaged, no arena, or has a picture.
     """
     return _decode(data, what, name, None)
 
@@ -203,9 +188,6 @@ def save_arena(arena: Arena, path: str | Path) -> None:
     Args:
         arena: The arena.
         path: The TOML file.
-
-    Raises:
-        ParameterError: If the name does not end in .toml, or the files cannot be written.
     """
     from PIL import Image
 

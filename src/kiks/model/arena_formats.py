@@ -18,9 +18,5 @@ _READERS: dict[str, Callable[[Path], Arena]] = {
 
 
 def load_arena_file(path: Path) -> Arena:
-    """Read an arena file, a project's arena, a `.kad` file of the Matlab KiKS, or a picture of 1 mm cells.
-
-    Raises:
-        ArenaError: If the file is missing, damaged or no arena.
-    """
+    """Read an arena file, a project's arena, a `.kad` file of the Matlab KiKS, or a picture of 1 mm cells."""
     return _READERS.get(path.suffix.lower(), Arena.from_image)(path)

@@ -94,10 +94,6 @@ def checked_places(
         entries: The entries, or plain tuples of the same values.
         brightness: The arena's raster, uint8 [row, column], row 0 at the bottom.
         mm_per_cell: Edge of a cell [mm].
-
-    Raises:
-        ParameterError: If a value of an entry breaks its rule.
-        ArenaError: If an entry lies outside the arena or in a wall.
     """
     places: list[_Place] = []
     model: Any = kind

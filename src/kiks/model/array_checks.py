@@ -70,9 +70,6 @@ def check_numbers(name: str, numbers: Any, shape: tuple[int | None, ...] | None 
         name: What they are called in the message.
         numbers: An array, or a list of numbers.
         shape: The shape that it must have, None for any length along an axis; any shape if left out.
-
-    Raises:
-        ParameterError: If one is no finite number, or the shape is another.
     """
     values = array_of(numbers)
     if values is None or not np.isfinite(values).all():
@@ -109,9 +106,6 @@ def check_array(values: object, rule: Numbers, name: str, counts: dict[str, int]
 
     Returns:
         int64 for whole numbers, else float64; the array itself if it is of that type.
-
-    Raises:
-        ParameterError: If it holds anything else.
     """
     try:
         given = np.asarray(values)
@@ -144,9 +138,6 @@ def read_arrays(
 
     Returns:
         What `check_array` returns of each.
-
-    Raises:
-        ParameterError: If the file cannot be read, or an array is missing or breaks its rule.
     """
     data = read_file(path, what, bytes_max=8 * numbers_max + (1 << 16))
     found: dict[str, npt.NDArray[Any]] = {}
@@ -172,7 +163,6 @@ def _array(
     """Return an array of the file without conversion.
 
     Raises:
-        ParameterError: If it is missing, its type or shape breaks the rule, or it has too many numbers.
         ValueError: If its head is none, or something else follows than it announces.
     """
     if f"{name}.npy" not in archive.NameToInfo:
@@ -198,11 +188,7 @@ def _array(
 
 
 def _check_form(kind: np.dtype[Any], shape: tuple[int, ...], rule: Numbers, name: str, counts: dict[str, int]) -> None:
-    """Check type and shape, and learn how long axes with names are.
-
-    Raises:
-        ParameterError: If they are others than the rule's.
-    """
+    """Check type and shape, and learn how long axes with names are."""
     if kind.kind not in "biuf":
         raise _broken(name, rule, f"was of type {shown(str(kind))}")
     known = [counts.get(axis) if isinstance(axis, str) else axis for axis in rule.axes]

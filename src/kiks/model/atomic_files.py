@@ -28,19 +28,12 @@ def replace_file(path: str | Path, data: bytes | str, what: str = "The file", *,
         data: Its content; text becomes UTF-8.
         what: Its name in messages.
         rights: Its permissions, at most; those of the earlier file, or those of the umask, if left out.
-
-    Raises:
-        ParameterError: If it cannot be written; an earlier file is then as it was.
     """
     replace_files({path_of(path, what): data}, what, rights=rights)
 
 
 def replace_files(files: Mapping[Path, bytes | str], what: str = "The file", *, rights: int | None = None) -> None:
-    """Write files that belong together like `replace_file`: none is replaced before all are on the disk.
-
-    Raises:
-        ParameterError: If one of them cannot be written; the earlier ones are then as they were.
-    """
+    """Write files that belong together like `replace_file`: none is replaced before all are on the disk."""
     with ExitStack() as stack:
         fresh = []
         for path, data in files.items():
@@ -199,9 +192,6 @@ class GrowingFile:
     Args:
         path: The file, as for `replace_file`.
         what: Its name in messages.
-
-    Raises:
-        ParameterError: If it cannot be written.
     """
 
     def __init__(self, path: str | Path, what: str = "The file") -> None:
@@ -214,11 +204,7 @@ class GrowingFile:
         self._beside.attempt(lambda: self._beside.file.write(text.encode()))
 
     def close(self) -> None:
-        """Replace the old file.
-
-        Raises:
-            ParameterError: If it could not be written; an earlier file is then as it was.
-        """
+        """Replace the old file."""
         with writing(self._what, self._path), closing(self._beside):
             self._beside.attempt(self._beside.take_place)
 
@@ -230,9 +216,6 @@ def file_beside(path: str | Path, what: str) -> Iterator[Path]:
     Args:
         path: The file that it replaces, as for `replace_file`; no pipe.
         what: Its name in messages.
-
-    Raises:
-        ParameterError: If it cannot be written; an earlier file is then as it was.
     """
     with writing(what, path):
         target = target_of(path_of(path, what))
@@ -252,9 +235,6 @@ def check_writable(path: str | Path, what: str, *, is_new: bool = False) -> None
         path: The file.
         what: Its name in messages.
         is_new: Whether the file must not exist yet.
-
-    Raises:
-        ParameterError: If it cannot be written.
     """
     if is_new and os.path.lexists(path):
         raise ParameterError(f"{what} must name a new file, but {str(path)!r} exists. Choose another name.")
@@ -265,11 +245,7 @@ def check_writable(path: str | Path, what: str, *, is_new: bool = False) -> None
 
 
 def make_folder(path: str | Path, what: str) -> None:
-    """Make a folder, if it is not there, in which files can be written.
-
-    Raises:
-        ParameterError: If it cannot be one.
-    """
+    """Make a folder, if it is not there, in which files can be written."""
     with writing(what, path, "folder"):
         path_of(path, what).mkdir(parents=True, exist_ok=True)
         FileBeside(Path(path, "file"), 0o600).close()
@@ -301,11 +277,7 @@ def _settle(folder: Path) -> None:
 
 @contextmanager
 def writing(what: str, path: str | Path, kind: str = "file") -> Iterator[None]:
-    """Tell of a file or folder that cannot be written.
-
-    Raises:
-        ParameterError: If an error says so.
-    """
+    """Tell of a file or folder that cannot be written."""
     try:
         yield
     except KiksError:  # one may be an OSError, too
@@ -323,9 +295,6 @@ def path_of(path: object, what: str = "path") -> Path:
     Args:
         path: A text or a path.
         what: What messages call it.
-
-    Raises:
-        ParameterError: If it is something else, or a text that no path can be.
     """
     with suppress(UnicodeEncodeError):
         if isinstance(path, str | Path) and "\0" not in str(path):
@@ -344,9 +313,6 @@ def ending_of(path: object, what: str, endings: Iterable[str]) -> str:
         path: The file.
         what: What messages call it.
         endings: Those that it may have.
-
-    Raises:
-        ParameterError: If it has another one.
     """
     ending = path_of(path, what).suffix.lower()
     if ending not in endings:
@@ -360,9 +326,6 @@ def check_relative(text: object, what: str) -> None:
     Args:
         text: The path, with / between its parts.
         what: What messages call it.
-
-    Raises:
-        ParameterError: If it is empty, absolute, leads upwards, or has characters that paths cannot have.
     """
     parts = text.split("/") if isinstance(text, str) else []
     is_clean = isinstance(text, str) and text.isprintable() and not set(text) & set('\\:*?"<>|') and len(text) <= 1000
@@ -380,20 +343,13 @@ def inside(folder: Path, text: str, what: str) -> Path:
         folder: The folder.
         text: The path of the file from there, with / between its parts.
         what: What messages call it.
-
-    Raises:
-        ParameterError: If the text suits only some computers, or the file lies elsewhere.
     """
     check_relative(text, what)
     return within(folder, text, what)
 
 
 def within(folder: Path, text: str, what: str) -> Path:
-    """Return the path of a file in a folder or below it, after following links.
-
-    Raises:
-        ParameterError: If it lies elsewhere.
-    """
+    """Return the path of a file in a folder or below it, after following links."""
     try:
         home = folder.resolve()
         path = (home / text).resolve()
@@ -415,9 +371,6 @@ def program_in(folder: Path, name: str, what: str = "program") -> Path:
         folder: The folder in which it must lie, there or below.
         name: Its path from there, with / between its parts.
         what: What messages call it.
-
-    Raises:
-        ParameterError: If it leads elsewhere, is no .py file, or lies in a folder whose name begins with a dot.
     """
     path = inside(folder, name, what)
     for parts in (PurePosixPath(name).parts, path.relative_to(folder.resolve()).parts):

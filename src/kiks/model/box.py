@@ -47,11 +47,7 @@ class Box:
                 raise ParameterError(f"{name} must be a whole number from 0 to {most}, but it was {value}. {advice}")
 
     def raster(self) -> npt.NDArray[np.uint8]:
-        """Draw it at 1 mm per cell: uint8 [row, column].
-
-        Raises:
-            ArenaError: If the box is too small or too large.
-        """
+        """Draw it at 1 mm per cell: uint8 [row, column]."""
         cells_per_pixel(self.height_mm, self.width_mm, 1.0)
         raster = np.full((self.height_mm, self.width_mm), self.brightness, np.uint8)
         wall, radius = self.wall_mm, self.rounded_mm

@@ -35,9 +35,6 @@ def check_number(
         least: The least that it may be.
         most: The most.
         advice: What else the message says.
-
-    Raises:
-        ParameterError: If it is no number, not finite, or out of range.
     """
     is_number = isinstance(number, int | float | Real) and not isinstance(number, bool)
     if is_number:
@@ -64,9 +61,6 @@ def check_count(name: str, count: object, least: int = 0, most: int = 1_000_000,
         least: The least that it may be.
         most: The most.
         advice: What else the message says.
-
-    Raises:
-        ParameterError: If it is no whole number or out of range.
     """
     if isinstance(count, int | Integral) and not isinstance(count, bool) and least <= (whole := int(count)) <= most:
         return whole
@@ -86,9 +80,6 @@ def check_kind(name: str, value: object, kind: type[_Kind], advice: str = "") ->
         value: The value.
         kind: The type.
         advice: What else the message says.
-
-    Raises:
-        ParameterError: If it is of another type.
     """
     if isinstance(value, kind):
         return value
@@ -107,9 +98,6 @@ def check_heading(name: str, heading_rad: object) -> float:
     """Return a heading [rad], wrapped to one turn if it is beyond `HEADING_KEPT_RAD`.
 
     A multiple of 0.5 from 10 on is a slip: a heading in degrees. A program that counts turns never meets one.
-
-    Raises:
-        ParameterError: If it is no finite number, or one in degrees.
     """
     value = check_number(name, heading_rad)
     if DEGREES_FROM <= abs(value) <= HEADING_KEPT_RAD and value % 0.5 == 0:

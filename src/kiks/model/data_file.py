@@ -109,9 +109,6 @@ def check(
         what: What the message calls the file.
         advice: What the message says where the field says nothing.
         error: What is raised.
-
-    Raises:
-        KiksError: If the values break a rule. It is an `error`.
     """
     try:
         made: _Model = adapter(model).validate_python(values)  # type: ignore[arg-type] # a class can be hashed
@@ -149,9 +146,6 @@ def read_file(path: Path, what: str, *, bytes_max: int = BYTES_MAX, error: type[
         what: What the message calls it.
         bytes_max: Most bytes that it may have.
         error: What is raised.
-
-    Raises:
-        KiksError: If there is nothing, a folder, no right to read, or too much. It is an `error`.
     """
     try:
         if path.is_dir():
@@ -171,31 +165,19 @@ def read_file(path: Path, what: str, *, bytes_max: int = BYTES_MAX, error: type[
 
 
 def check_size(data: bytes, what: str, *, bytes_max: int, error: type[KiksError] = ParameterError) -> None:
-    """Check that a file is not too large.
-
-    Raises:
-        KiksError: If it has more than `bytes_max` bytes. It is an `error`.
-    """
+    """Check that a file is not too large."""
     if len(data) > bytes_max:
         raise error(f"{what} must have at most {bytes_max / 2**20:g} MiB, but it has more. Is it the right file?")
 
 
 def parse_toml(data: bytes, what: str, *, error: type[KiksError] = ParameterError) -> dict[str, Any]:
-    """Return the table of a TOML file.
-
-    Raises:
-        KiksError: If the bytes are no TOML in UTF-8. It is an `error`.
-    """
+    """Return the table of a TOML file."""
     table: dict[str, Any] = _parsed(data, "TOML", _load_toml, what, error)
     return table
 
 
 def parse_json(data: bytes, what: str, *, error: type[KiksError] = ParameterError) -> Any:
-    """Return the content of a JSON file.
-
-    Raises:
-        KiksError: If the bytes are no JSON in UTF-8. It is an `error`.
-    """
+    """Return the content of a JSON file."""
     return _parsed(data, "JSON", json.loads, what, error)
 
 

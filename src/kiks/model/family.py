@@ -32,9 +32,6 @@ def family(
         motor_spread: The same of each motor's gain.
         dead_share: Share of proximity sensors that see nothing.
 
-    Raises:
-        ParameterError: If a number is out of range.
-
     Example:
         >>> robots = family(RobotSpec.load("khepera"), 3, seed=1)
         >>> len({robot.body.pulse_mm for robot in robots})

@@ -64,9 +64,6 @@ def free_place(
         radius_mm: Radius of the disc [mm].
         near: x and y of the wanted place [mm].
         what: Name of the disc in messages.
-
-    Raises:
-        ArenaError: If there is none.
     """
     cell = arena.mm_per_cell
     rows, columns = arena.brightness.shape

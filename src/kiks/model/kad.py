@@ -45,11 +45,7 @@ _WHOLE = Numbers(("number",), 0, 65535, is_whole=True, advice="Is it an arena of
 
 
 def load_kad(path: str | Path) -> Arena:
-    """Read a `.kad` file.
-
-    Raises:
-        ArenaError: If it is missing, damaged, too large, or no arena.
-    """
+    """Read a `.kad` file."""
     path = path_of(path)
     what = f"Arena file {str(path)!r}"
     return decode_kad(read_file(path, what, bytes_max=FILE_BYTES_MAX, error=ArenaError), path.stem, what)
@@ -62,9 +58,6 @@ def decode_kad(data: bytes, name: str = "arena", what: str = "The arena file") -
         data: The bytes.
         name: What people call the arena.
         what: What messages call the file.
-
-    Raises:
-        ArenaError: If it is damaged, too large, or no arena.
     """
     found = read_numbers(data, what)
     if "walls" not in found:
@@ -80,21 +73,12 @@ def decode_kad(data: bytes, name: str = "arena", what: str = "The arena file") -
 
 
 def save_kad(arena: Arena, path: str | Path) -> None:
-    """Write a `.kad` file; an earlier one of that name is replaced in one step.
-
-    Raises:
-        ArenaError: If the arena has no cells of 1 mm, or too many pieces.
-        ParameterError: If the file cannot be written.
-    """
+    """Write a `.kad` file; an earlier one of that name is replaced in one step."""
     replace_file(path, encode_kad(arena), "an arena")
 
 
 def encode_kad(arena: Arena) -> bytes:
-    """Return the bytes of a `.kad` file.
-
-    Raises:
-        ArenaError: If the arena has no cells of 1 mm, is too long, or has too many pieces.
-    """
+    """Return the bytes of a `.kad` file."""
     from io import BytesIO
 
     from scipy.io import savemat

@@ -37,9 +37,6 @@ def read_numbers(data: bytes, what: str) -> dict[str, npt.NDArray[Any]]:
     Args:
         data: The bytes of the file.
         what: What messages call it.
-
-    Raises:
-        ArenaError: If it is no such file, damaged, or too large.
     """
     check_size(data, what, bytes_max=FILE_BYTES_MAX, error=ArenaError)
     order = {b"IM": "<", b"MI": ">"}.get(data[126:128])

@@ -29,9 +29,6 @@ REFLECTANCES = {
 def brightness_of(material: Any) -> Any:
     """Return the brightness 1..255 of a material by its name; what is no text is returned as it is.
 
-    Raises:
-        ParameterError: If there is no such material.
-
     Example:
         >>> brightness_of("wood"), brightness_of(120)
         (190, 120)

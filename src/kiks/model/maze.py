@@ -44,10 +44,6 @@ def draw_maze(
 
     Returns:
         The picture, uint8 [row, column] with row 0 on top; the start pose in the entrance; the lamp in the exit.
-
-    Raises:
-        ParameterError: If a number is not whole or out of range.
-        ArenaError: If the maze is too small or too large for an arena.
     """
     columns = check_count("columns", columns, 1, SIDE_MAX, "It counts the cells side by side.")
     rows = check_count("rows", rows, 1, SIDE_MAX, "It counts the cells one above the other.")

@@ -44,10 +44,6 @@ def read_picture(path: Path, mm_per_pixel: float) -> npt.NDArray[np.uint8]:
 
     Returns:
         uint8 [row, column] with row 0 on top: 0 = floor.
-
-    Raises:
-        ParameterError: If `mm_per_pixel` is out of range.
-        ArenaError: If the file is missing, damaged, of another type, or too small or too large for an arena.
     """
     what = f"Picture {shown(str(path))}"
     return decode_picture(read_file(path, what, bytes_max=PICTURE_BYTES_MAX, error=ArenaError), mm_per_pixel, what)
@@ -60,10 +56,6 @@ def decode_picture(data: bytes, mm_per_pixel: float, what: str = "The picture") 
         data: The bytes of the picture's file.
         mm_per_pixel: Edge of a pixel [mm].
         what: Its name in messages.
-
-    Raises:
-        ParameterError: If `mm_per_pixel` is out of range.
-        ArenaError: If it is damaged, of another type, too small or too large for an arena, or has too many bytes.
     """
     from PIL import Image, UnidentifiedImageError
 
@@ -149,11 +141,7 @@ _GREY: dict[str, Callable[[Image.Image], npt.NDArray[np.uint8]]] = {"1": _grey_o
 
 
 def _white(image: Image.Image, low: float, high: float) -> float:
-    """Return the white of a deep picture that has values from `low` to `high`.
-
-    Raises:
-        ArenaError: If there are values below 0, or endless ones.
-    """
+    """Return the white of a deep picture that has values from `low` to `high`."""
     if not (low >= 0 and high < np.inf):
         raise ArenaError(f"It must hold brightness from 0 up, but its values span {low:g}..{high:g}. {_SAVE_AS}")
     if image.mode.startswith("I;16") or image.format in ("PNG", "PPM"):

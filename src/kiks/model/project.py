@@ -103,9 +103,6 @@ class ProjectRobot:
         brightness: Its brightness for other robots' sensors, 1 black to 255 white; that of its file if None.
         changes: What is different from its file: the keys of each section and their values.
 
-    Raises:
-        ParameterError: If a name is unknown, a path leaves the folder, or the brightness is out of range.
-
     Example:
         >>> ProjectRobot(changes={"body": {"diameter_mm": 70.0}}).kind
         'khepera'
@@ -141,9 +138,6 @@ class Project:
         noise: Whether sensors are noisy.
         speed: Simulated seconds per real second on the desk; None for no limit.
 
-    Raises:
-        ParameterError: If a value is out of range, or a path leaves the folder.
-
     Example:
         >>> project = Project(Arena.default(), robots=(ProjectRobot(turrets=("gripper",)),), seed=7)
         >>> Project.from_bytes(project.to_bytes()).robots[0].turrets
@@ -166,11 +160,7 @@ class Project:
 
     @classmethod
     def load(cls, path: str | Path) -> Project:
-        """Read a project, or an arena of any kind, which becomes a project with a robot for each of its starts.
-
-        Raises:
-            ArenaError: If the file is missing, damaged, or neither.
-        """
+        """Read a project, or an arena of any kind, which becomes a project with a robot for each of its starts."""
         path = path_of(path)
         if path.suffix.lower() != ".kiks":
             return cls.of_arena(Arena.load(path))
@@ -180,19 +170,11 @@ class Project:
 
     @classmethod
     def of_arena(cls, arena: Arena) -> Project:
-        """Return a project of an arena, with a Khepera for each of its starts, at least one.
-
-        Raises:
-            ParameterError: If the arena has too much in it for a project.
-        """
+        """Return a project of an arena, with a Khepera for each of its starts, at least one."""
         return cls(arena, robots=(ProjectRobot(),) * max(len(arena.starts), 1))
 
     def save(self, path: str | Path) -> None:
-        """Write the file, in one step.
-
-        Raises:
-            ParameterError: If its name does not end in .kiks, or it cannot be written.
-        """
+        """Write the file, in one step."""
         ending_of(path, "a project's file", (".kiks",))
         replace_file(path, self.to_bytes(), "a project")
 
@@ -212,9 +194,6 @@ class Project:
             name: What the arena is called if the file does not say.
             what: What messages call the file.
             bytes_max: Most bytes that it may have.
-
-        Raises:
-            ArenaError: If it is no project, or too large.
         """
         check_size(data, what, bytes_max=bytes_max, error=ArenaError)
         table = parse_toml(data, what, error=ArenaError)
@@ -272,11 +251,7 @@ class ProjectWalls(Walls):
             raise ParameterError("mm_per_cell must come with a png, but there is none. Boxes have cells of 1 mm.")
 
     def arena(self) -> Arena:
-        """Return the walls as an arena.
-
-        Raises:
-            KiksError: If they are none.
-        """
+        """Return the walls as an arena."""
         return self.box() if self.png is None else raster_of_text(self.png, self.mm_per_cell or 1.0)
 
 

@@ -47,10 +47,6 @@ def cells_per_pixel(row_count: int, column_count: int, mm_per_pixel: float) -> i
         row_count: Rows of the picture.
         column_count: Columns of the picture.
         mm_per_pixel: Edge of a pixel [mm].
-
-    Raises:
-        ParameterError: If `mm_per_pixel` is out of range.
-        ArenaError: If the arena would be smaller than `SIZE_MIN_MM` or have more than `MAX_CELLS` cells.
     """
     if not is_number(mm_per_pixel) or not MM_PER_PIXEL_MIN <= mm_per_pixel <= MM_PER_PIXEL_MAX:
         raise ParameterError(

@@ -28,12 +28,7 @@ def raster_text(arena: Arena) -> str:
 
 
 def raster_of_text(text: str, mm_per_cell: Any) -> Arena:
-    """Return an arena of what `raster_text` returned.
-
-    Raises:
-        ParameterError: If `mm_per_cell` is out of range.
-        ArenaError: If the text is no PNG in base64, or no arena.
-    """
+    """Return an arena of what `raster_text` returned."""
     try:
         data = base64.b64decode("".join(text.split()).encode("ascii"), validate=True)
     except (binascii.Error, UnicodeEncodeError) as error:

@@ -91,9 +91,6 @@ class RobotSpec:
             name_or_path: Name of a robot of ours, or the path of a TOML file with the same keys.
             response: What makes counts of the rays of its proximity sensors, one of `RESPONSES`; what the file says
                 if left out.
-
-        Raises:
-            ParameterError: If there is no such robot, the file is no TOML, or a key is missing, unknown or wrong.
         """
         path, known = path_of(name_or_path, "robot"), robot_names()
         source = str(path)
@@ -154,9 +151,6 @@ class RobotSpec:
         Example:
             >>> RobotSpec.load("khepera").with_changes(body__wall_friction=0.0).body.wall_friction
             0.0
-
-        Raises:
-            ParameterError: If there is no such section or key, or a value is out of range.
         """
         table = {name: values for name, values in asdict(self).items() if values is not None}
         for name, value in changes.items():
@@ -192,9 +186,6 @@ def specs_of(
         robot: The kind of all, or a list with that of each: names that `RobotSpec.load` knows, files, or specs.
         robots: How many there are, 0 for none; as many as kinds are named if None.
         response: What makes counts of their proximity sensors' rays; what their files say if None.
-
-    Raises:
-        ParameterError: If the numbers do not fit each other, or a name is unknown.
     """
     named = [robot] if isinstance(robot, str | RobotSpec) else list(robot)
     count, least = (len(named), 1) if robots is None else (robots, 0)
@@ -217,9 +208,6 @@ def save_robot(spec: RobotSpec, path: str | Path, *, comment: str = "") -> None:
         spec: The robot.
         path: Where it goes, usually 'something.toml'.
         comment: What stands above it, line by line.
-
-    Raises:
-        ParameterError: If the file cannot be written.
     """
     replace_file(path, robot_toml(spec, comment), "a robot")
 

@@ -52,9 +52,6 @@ class Sketch:
         things: What stands or hangs in it, by numbers that stay the same; numbers rise with time.
         version: Rises with each step, forth or back.
 
-    Raises:
-        ArenaError: If there is no room for a robot.
-
     Example:
         >>> sketch = Sketch(Arena.box(400, 300))
         >>> sketch.line([(100, 50), (100, 250)], width_mm=10, brightness="wood")
@@ -114,11 +111,7 @@ class Sketch:
         return tuple(robot.kind for robot in self.of(SketchRobot).values())
 
     def arena(self) -> Arena:
-        """Return what is drawn.
-
-        Raises:
-            ArenaError: If it is no arena.
-        """
+        """Return what is drawn."""
         return Arena(
             self._canvas.brightness.copy(),
             self._canvas.mm_per_cell,
@@ -138,10 +131,6 @@ class Sketch:
             data: The bytes of a PNG, TIF, PGM or BMP file.
             mm_per_pixel: Edge of a pixel [mm].
             name: What people call the arena.
-
-        Raises:
-            ParameterError: If `mm_per_pixel` is out of range.
-            ArenaError: If it is no such picture, too large, or has no room for the robots.
         """
         self.begin(Arena.from_array(decode_picture(data, mm_per_pixel), mm_per_pixel=mm_per_pixel, name=name))
 
@@ -149,9 +138,6 @@ class Sketch:
         """Begin with another arena, a box or a maze, as one step.
 
         Robots go to its starts; those beyond stay where they are, or go to the nearest place with room.
-
-        Raises:
-            ArenaError: If it has no room for the robots.
         """
         before, canvas = WholePatch(self._canvas, self.things), self._canvas
         wanted: dict[int, SketchRobot | str] = {
@@ -190,22 +176,12 @@ class Sketch:
     # ---- walls ----
 
     def rectangle(self, x0_mm: float, y0_mm: float, x1_mm: float, y1_mm: float, brightness: int | str = 255) -> None:
-        """Fill a rectangle between two corners.
-
-        Raises:
-            ParameterError: If a number is out of range.
-            ArenaError: If something stands there, or no floor would remain.
-        """
+        """Fill a rectangle between two corners."""
         corner, opposite = self._cells([(x0_mm, y0_mm), (x1_mm, y1_mm)])
         self._paint(rectangle_cells(self._shape, corner, opposite), brightness)
 
     def line(self, points_mm: Sequence[Point], *, width_mm: float, brightness: int | str = 255) -> None:
-        """Draw a line through points with a round brush: from one to another, freehand through many, a dot at one.
-
-        Raises:
-            ParameterError: If a number is out of range, or there is no point, or too many.
-            ArenaError: If something stands there, or no floor would remain.
-        """
+        """Draw a line through points with a round brush: from one to another, freehand through many, a dot at one."""
         if not is_number(width_mm) or not 0 < width_mm <= WIDTH_MAX_MM:
             raise ParameterError(f"width_mm must be above 0 and up to {WIDTH_MAX_MM:g}, but it was {shown(width_mm)}.")
         if not 1 <= len(points_mm) <= POINTS_MAX:
@@ -278,12 +254,7 @@ class Sketch:
     # ---- things ----
 
     def add(self, thing: Thing) -> int:
-        """Put a robot, ball, cylinder or lamp into the arena; return its number.
-
-        Raises:
-            ParameterError: If one of its numbers is out of range, or there are too many.
-            ArenaError: If something is in the way.
-        """
+        """Put a robot, ball, cylinder or lamp into the arena; return its number."""
         checked = self._checked(thing)
         alike = [
             each for each in self.things.values() if isinstance(each, SketchRobot) == isinstance(thing, SketchRobot)
@@ -295,33 +266,20 @@ class Sketch:
         return self._next - 1
 
     def change(self, number: int, thing: Thing) -> None:
-        """Put something in the place of a thing: the same one elsewhere, or with other numbers.
-
-        Raises:
-            ParameterError: If there is no such thing, or a number is out of range.
-            ArenaError: If something is in the way.
-        """
+        """Put something in the place of a thing: the same one elsewhere, or with other numbers."""
         before = self._thing(number)
         checked = self._checked(thing, but=number)
         self._push(ThingPatch(number, before))
         self.things[number] = checked
 
     def remove(self, number: int) -> None:
-        """Take a thing away.
-
-        Raises:
-            ParameterError: If there is no such thing.
-        """
+        """Take a thing away."""
         thing = self._thing(number)
         self._push(ThingPatch(number, thing))
         del self.things[number]
 
     def note(self, number: int, thing: Thing) -> None:
-        """Take over where a thing has gone by itself, which is no step to take back.
-
-        Raises:
-            ParameterError: If there is no such thing.
-        """
+        """Take over where a thing has gone by itself, which is no step to take back."""
         self._thing(number)
         self.things[number] = thing
 
@@ -368,19 +326,11 @@ class Sketch:
     # ---- steps ----
 
     def undo(self) -> bool:
-        """Take the last step back; return whether there was one.
-
-        Raises:
-            ArenaError: If something has gone to where it needs room since.
-        """
+        """Take the last step back; return whether there was one."""
         return self._swap(self._history.undoable, self._history.redoable)
 
     def redo(self) -> bool:
-        """Do again what was taken back last; return whether there was something.
-
-        Raises:
-            ArenaError: If something has gone to where it needs room since.
-        """
+        """Do again what was taken back last; return whether there was something."""
         return self._swap(self._history.redoable, self._history.undoable)
 
     def take_back(self) -> None:

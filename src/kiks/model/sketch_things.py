@@ -52,19 +52,11 @@ def overlap_of(thing: SketchRobot | Ball | Cylinder, things: Mapping[int, Thing]
 
 
 def radius_of(thing: SketchRobot | Ball | Cylinder) -> float:
-    """Return the radius of what stands on the floor [mm].
-
-    Raises:
-        ParameterError: If there is no such kind of robot.
-    """
+    """Return the radius of what stands on the floor [mm]."""
     return robot_radius_mm(thing.kind) if isinstance(thing, SketchRobot) else thing.radius_mm
 
 
 @lru_cache(maxsize=64)
 def robot_radius_mm(kind: str) -> float:
-    """Return the radius of a kind of robot [mm].
-
-    Raises:
-        ParameterError: If the kind is unknown.
-    """
+    """Return the radius of a kind of robot [mm]."""
     return RobotSpec.load(kind).body.radius_mm

@@ -48,9 +48,6 @@ class NetworkResponse:
         hidden: Weights of the tanh neurons, 8 sensors of 13 neurons of 8 weights.
         middle: Weights of the linear neurons, 8 of 7 of 14.
         last: Weights of the output [counts], 8 of 8.
-
-    Raises:
-        ParameterError: If a list has another length, or a number is out of range.
     """
 
     mount_angle_deg: Angles
@@ -75,9 +72,6 @@ class NetworkResponse:
     def load(cls, file: str | Path = THESIS) -> NetworkResponse:
         """Read networks from a file; those that come with KiKS if left out.
 
-        Raises:
-            ParameterError: If the file cannot be read or holds something else.
-
         Example:
             >>> NetworkResponse.load().range_mm
             50.0
@@ -86,11 +80,7 @@ class NetworkResponse:
         return check(NetworkResponse, parse_json(read_file(Path(file), what), what), what, advice=_ADVICE)
 
     def save(self, file: str | Path) -> None:
-        """Write the networks to a file, weights with six digits, one neuron a line.
-
-        Raises:
-            ParameterError: If the file cannot be written.
-        """
+        """Write the networks to a file, weights with six digits, one neuron a line."""
         parts = [f'"{each.name}": {_written(getattr(self, each.name))}' for each in fields(self)]
         replace_file(file, "{\n" + ",\n".join(parts) + "\n}\n", "networks")
 

@@ -12,9 +12,6 @@ _FORMS = "'none', 'fixed:MS', 'live', 'live:FACTOR' or 'replay:FILE'"
 def split_thinking(text: str) -> tuple[str, float | str]:
     """Return the name of a policy and its number: milliseconds or a factor; of a replay, the file.
 
-    Raises:
-        ParameterError: If the text names no policy or its number is out of range.
-
     Example:
         >>> split_thinking("live:0.5"), split_thinking("none"), split_thinking("replay:times.txt")
         (('live', 0.5), ('none', 0.0), ('replay', 'times.txt'))

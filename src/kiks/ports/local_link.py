@@ -63,9 +63,6 @@ class LocalConnection(Connection):
         rank: Order among programs that act at the same instant.
         pending: State of the answer that the program waits for.
         advice: What its user can do if it is silent while others wait, as a sentence.
-
-    Raises:
-        KiksError: If the world has ended.
     """
 
     def __init__(self, programs: Programs, name: str, rank: int, pending: PendingAnswer, advice: str) -> None:

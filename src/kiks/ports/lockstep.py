@@ -42,9 +42,6 @@ class Lockstep:
         when_silent: What happens to a program that is silent while others wait: 'wait', 'drop' or 'ignore'.
         patience_s: How long a program may be silent [s of real time].
         new_patience: Makes patiences with another wall clock.
-
-    Raises:
-        ParameterError: If the policy is unknown, or the patience is out of range.
     """
 
     forgets = False

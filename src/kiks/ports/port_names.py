@@ -16,9 +16,6 @@ class PortNames:
         sim: The simulation.
         by_name: Robots by port name, for all programs.
         programs: Number of programs; the first owns robot 1, and so on.
-
-    Raises:
-        ParameterError: If `by_name` names a robot that does not exist.
     """
 
     def __init__(self, sim: Simulation, by_name: dict[str, int], programs: int = 1) -> None:

@@ -81,11 +81,7 @@ class Command:
         return self.program / "__main__.py" if self.program.is_dir() else self.program
 
     def check_file(self) -> None:
-        """Check that the program's file exists.
-
-        Raises:
-            ParameterError: If it does not.
-        """
+        """Check that the program's file exists."""
         if not self.file.is_file():
             raise ParameterError(
                 f"a program must be a Python file, but there is none at {str(self.program)!r}. Save it first."
@@ -93,11 +89,7 @@ class Command:
 
 
 def commands_of(project: Project, folder: Path) -> list[Command | None]:
-    """Return the program of each robot of a project in a folder; None for a robot without one.
-
-    Raises:
-        ParameterError: If a program lies elsewhere, or is no Python file.
-    """
+    """Return the program of each robot of a project in a folder; None for a robot without one."""
     return [
         None if robot.program is None else Command(program_in(folder, robot.program), list(robot.arguments))
         for robot in project.robots
@@ -105,11 +97,7 @@ def commands_of(project: Project, folder: Path) -> list[Command | None]:
 
 
 def module_command(module: str, arguments: Sequence[str]) -> Command:
-    """Return the program that `python -m` would run; nothing is imported to find its file.
-
-    Raises:
-        ParameterError: If there is no such module, or it is a package without a `__main__.py`.
-    """
+    """Return the program that `python -m` would run; nothing is imported to find its file."""
     path: Sequence[str] | None = [os.getcwd(), *sys.path]
     for part in module.split("."):
         spec = None if path is None else _find_spec(part, path)
@@ -158,9 +146,6 @@ class Process:
 
     Attributes:
         output: Its output; None if it is not kept.
-
-    Raises:
-        KiksError: If the operating system does not start it.
     """
 
     def __init__(
@@ -438,11 +423,7 @@ class Permission:
         self.may_start_others = may_start_others
 
     def check(self, command: Command) -> None:
-        """Check that a program may start.
-
-        Raises:
-            ParameterError: If it may not start.
-        """
+        """Check that a program may start."""
         if command in self._granted:
             return
         name = command.name[:80]

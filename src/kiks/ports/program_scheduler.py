@@ -124,9 +124,6 @@ class ProgramScheduler:
         start_patience_s: How long the world waits for the programs with which it begins [s of real time]; without a
             limit if `when_silent` is 'wait'.
 
-    Raises:
-        ParameterError: If the policy is unknown, or the patience is out of range.
-
     Attributes:
         participants: The programs, in the order in which they have come.
         has_begun: Whether the world has begun.
@@ -369,11 +366,7 @@ class ProgramScheduler:
 
 
 def check_policy(when_silent: str, patience_s: float) -> None:
-    """Check the policy for silent programs.
-
-    Raises:
-        ParameterError: If the policy is unknown, or the patience is out of range.
-    """
+    """Check the policy for silent programs."""
     if when_silent not in POLICIES:
         raise ParameterError(
             f"when_silent must be 'wait', 'drop' or 'ignore', but it was {shown(when_silent)}."

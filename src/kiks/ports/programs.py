@@ -125,10 +125,6 @@ class Programs:
     Attributes:
         handles: The programs; of ended ones, the last one of each robot.
         permission: Which programs may start; all by default.
-
-    Raises:
-        ParameterError: If a value is out of range or unknown.
-        KiksError: If the operating system has no file descriptors left.
     """
 
     def __init__(
@@ -183,11 +179,7 @@ class Programs:
         self._selector.register(self._wake_receiver, selectors.EVENT_READ)
 
     def begin(self) -> None:
-        """Start the programs that begin together; does nothing if they have been started.
-
-        Raises:
-            KiksError: If the operating system does not start one.
-        """
+        """Start the programs that begin together; does nothing if they have been started."""
         with self.sim.lock:
             first_programs, self._first_programs = self._first_programs, []
             try:
@@ -219,10 +211,6 @@ class Programs:
         Args:
             command: The program.
             robot: Number of its own robot, independent of the port that it opens.
-
-        Raises:
-            ParameterError: If it may not start, the file or the robot does not exist, or another program has the robot.
-            KiksError: If the operating system does not start it.
         """
         command.check_file()
         with self.sim.lock:
@@ -252,9 +240,6 @@ class Programs:
         Args:
             name: Its name in messages.
             rank: Its place in the order of programs that act at the same instant.
-
-        Raises:
-            KiksError: If the world has ended.
         """
         with self.sim.lock:
             self._check_open(name)
@@ -304,11 +289,7 @@ class Programs:
         grace.start()
 
     def run(self) -> int:
-        """Run until the last program has ended, or `end`; return the first exit code that is not 0, else 0.
-
-        Raises:
-            KiksError: If the operating system does not start one.
-        """
+        """Run until the last program has ended, or `end`; return the first exit code that is not 0, else 0."""
         self.begin()
         loop = self.sim.loop
         try:

@@ -41,9 +41,6 @@ class Server:
         pace: A pace to share, instead of `speed`.
         new_patience: Makes patiences with another wall clock, such as one that stands still while the world does.
 
-    Raises:
-        ParameterError: If there is no such robot, or a value is out of range.
-
     Example:
         >>> from kiks.ports.tcp import TcpEndpoint
         >>> server = Server(Simulation(), {1: [TcpEndpoint(0)]}, thinking="none")

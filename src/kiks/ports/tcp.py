@@ -31,7 +31,6 @@ class TcpEndpoint(Endpoint):
             robots behind TCP often take one `recv` for one reply, so each reply comes whole if this is left out.
 
     Raises:
-        ParameterError: If the number is out of range.
         LinkError: If the port is busy, or other computers could reach the host.
     """
 

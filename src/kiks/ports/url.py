@@ -24,8 +24,6 @@ def find_port(url: str) -> SimPort:
 
     Raises:
         LinkError: If the name is malformed, or the simulation or the robot does not exist.
-        ParameterError: If an option is unknown or out of range.
-        ArenaError: If the arena cannot be read.
     """
     # Imported here: a program in a process of its own finds its ports by another function, and needs no simulation.
     from kiks.sim.simulation import REGISTRY, SimPort, Simulation

@@ -39,9 +39,6 @@ def check_recording(log: RecordedLog) -> Checked:
 
     Args:
         log: The log of the recording.
-
-    Raises:
-        KiksError: If the recording is damaged.
     """
     equal: list[int] = []
     differing: list[int] = []

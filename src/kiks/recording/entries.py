@@ -76,9 +76,6 @@ class Columns(NamedTuple):
         Args:
             block: Of `block_of`.
             what: What messages call it.
-
-        Raises:
-            ParameterError: If it is none.
         """
         count = _COUNT.unpack_from(block)[0] if len(block) >= _COUNT.size else -1
         begin = _COUNT.size + count * _COLUMN_COUNT * 8

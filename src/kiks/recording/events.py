@@ -44,11 +44,7 @@ class EventReader:
         self._contacts: NDArray[np.int64] = np.zeros(0, np.int64)
 
     def read(self) -> list[Event]:
-        """Return the events since the last call, in their order.
-
-        Raises:
-            KiksError: If the recording is damaged there.
-        """
+        """Return the events since the last call, in their order."""
         events: list[Event] = []
         while self._block < self._log.block_count:
             # Both of one block at once: an error leaves no half of it behind.

@@ -47,9 +47,6 @@ class RecordedLog:
     Attributes:
         reader: Reads the file.
         layout: The layout of the records in it.
-
-    Raises:
-        ParameterError: If it is missing, damaged or no recording of KiKS.
     """
 
     def __init__(self, file: str | Path) -> None:
@@ -135,11 +132,7 @@ class RecordedLog:
         return None
 
     def setup(self, number: int) -> Setup:
-        """Return a setup by its number.
-
-        Raises:
-            ParameterError: If there is none.
-        """
+        """Return a setup by its number."""
         if number not in self._setups:
             name = f"setup/{number}.json"
             if name not in self.reader.attachments:

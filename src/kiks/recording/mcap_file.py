@@ -100,10 +100,6 @@ class McapFile:
     Args:
         path: The file.
         topics: The channels.
-
-    Raises:
-        ParameterError: If its name does not end in .mcap, it cannot be written, another recording grows there, or its
-            disk has only the reserve left.
     """
 
     def __init__(self, path: str | Path, topics: Iterable[Topic]) -> None:
@@ -178,11 +174,7 @@ class McapFile:
         return self._writer.register_channel(topic.name, topic.encoding, schema)
 
     def close(self) -> None:
-        """Write the index, and close the file; it goes if it never took its place.
-
-        Raises:
-            ParameterError: If something could not be written.
-        """
+        """Write the index, and close the file; it goes if it never took its place."""
         self._do(self._writer.finish)
         self._do(self._beside.file.flush)
         with writing("a recording", self._path):
@@ -217,9 +209,6 @@ class McapReader:
         attachments: Names and contents of its attachments.
         told: Texts of its metadata, by name.
         is_whole: Whether it has an end; else the run that wrote it was killed, or still writes.
-
-    Raises:
-        ParameterError: If it is missing or no MCAP file.
     """
 
     def __init__(self, path: str | Path) -> None:
@@ -245,11 +234,7 @@ class McapReader:
             raise ParameterError(f"{self.what} must be readable, but: {error}. Check its rights.") from None
 
     def find_more(self) -> None:
-        """Find the records that were written since the last call.
-
-        Raises:
-            ParameterError: If one is too large.
-        """
+        """Find the records that were written since the last call."""
         with self._open() as stream:
             size = os.fstat(stream.fileno()).st_size
             while not self.is_whole and self._offset + _HEAD.size <= size:
@@ -285,11 +270,7 @@ class McapReader:
             self.is_whole = True
 
     def messages(self, chunk: FoundChunk) -> Iterator[tuple[str, int, bytes]]:
-        """Yield topic, time [ns] and data of each message of a chunk.
-
-        Raises:
-            ParameterError: If it is damaged.
-        """
+        """Yield topic, time [ns] and data of each message of a chunk."""
         if not self._topics:
             # The first chunk says which channels there are.
             for record in self._inside(self.chunks[0]):
@@ -301,11 +282,7 @@ class McapReader:
                 yield self._topics.get(channel, ""), time_ns, record[_MESSAGE.size :]
 
     def _inside(self, chunk: FoundChunk) -> Iterator[bytes]:
-        """Yield the records in a chunk, each with its head. None is smaller than an empty message.
-
-        Raises:
-            ParameterError: If one is damaged.
-        """
+        """Yield the records in a chunk, each with its head. None is smaller than an empty message."""
         with self._open() as stream:
             stream.seek(chunk.offset)
             packed = stream.read(chunk.length)
@@ -337,11 +314,7 @@ class McapReader:
         return data
 
     def _records(self, data: bytes) -> Iterator[Any]:
-        """Yield the MCAP records in bytes.
-
-        Raises:
-            ParameterError: If one is damaged.
-        """
+        """Yield the MCAP records in bytes."""
         stream = io.BytesIO(data)
         reader = StreamReader(stream, skip_magic=True, emit_chunks=True, record_size_limit=len(data))
         records = reader.records

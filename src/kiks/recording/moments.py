@@ -70,9 +70,6 @@ def moments(log: RecordedLog, times_ns: Sequence[int]) -> Iterator[Moment]:
     Args:
         log: The log of the recording.
         times_ns: The instants [ns], at least one, in their order, within the recording.
-
-    Raises:
-        ParameterError: If the recording is damaged there.
     """
     block, told = log.row_before(times_ns[0]).block, _Told()
     # The last tick before a block may stand in the one before.

@@ -134,9 +134,6 @@ def decode(block: bytes, layout: Layout, what: str, parts_max: int) -> Iterator[
         layout: That of the records.
         what: What messages call the block.
         parts_max: How often things may have come or gone.
-
-    Raises:
-        ParameterError: If it is none, or a number in it is out of range.
     """
     offset = count = 0
     while offset < len(block):

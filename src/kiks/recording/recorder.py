@@ -74,10 +74,6 @@ class RunRecorder:
         note: Takes an entry.
         clock: The world's.
         change_count: Of the world, when its changes were noted last.
-
-    Raises:
-        ParameterError: If the file cannot be written, another recording is being written there, its disk would have
-            less than the reserve left, or the simulation is being recorded already.
     """
 
     def __init__(
@@ -138,11 +134,7 @@ class RunRecorder:
         self.close()
 
     def close(self) -> None:
-        """End the recording with the present state.
-
-        Raises:
-            ParameterError: If it has ended by itself; once.
-        """
+        """End the recording with the present state."""
         with self._sim.lock, postponing_endings():
             self.flush(is_asked=False)
             if self._is_on:
@@ -237,11 +229,7 @@ class RunRecorder:
         self._lines.append((self._world.now_ns, robot, line[:LINE_CHARACTERS_MAX]))
 
     def mark(self, note: str) -> None:
-        """Set a bookmark at this time.
-
-        Raises:
-            ParameterError: If the note is no text, or the recording was closed.
-        """
+        """Set a bookmark at this time."""
         check_kind("note", note, str)
         with self._sim.lock:
             if not self._is_on:

@@ -39,9 +39,6 @@ class Recording:
         about: What is told of the run: the version of KiKS, the command, the policy of thinking.
         programs: Texts of the programs that drove its robots, by name.
 
-    Raises:
-        ParameterError: If it is missing, damaged or no recording of KiKS.
-
     Example:
         >>> import tempfile, kiks
         >>> file = Path(tempfile.mkdtemp(), "run.mcap")
@@ -117,9 +114,6 @@ class Recording:
             robot: The number.
             advice: What else the message says.
             name: What it is called there.
-
-        Raises:
-            ParameterError: If it has no such robot.
         """
         if not self.robots:
             raise ParameterError(f"{self._reader.what} must have a robot for this, but its world has none.")
@@ -140,9 +134,6 @@ class Recording:
                 'readings': what programs read of the sensors. 'wire': characters both ways. 'events': contacts, lines
                 of output, bookmarks, changes by hand.
             robot: Of this robot alone; of all if left out.
-
-        Raises:
-            ParameterError: If there is no such table or robot.
 
         Example:
             >>> Recording("run.mcap").table("poses")["x_mm"].mean()  # doctest: +SKIP
@@ -167,9 +158,6 @@ class Recording:
 
         Args:
             time_s: The time [s], from the beginning to the end of the recording.
-
-        Raises:
-            ParameterError: If it is no such time.
         """
         return self.replay(time_s).let_go()
 
@@ -178,9 +166,6 @@ class Recording:
 
         Args:
             time_s: The time [s]; the beginning if left out.
-
-        Raises:
-            ParameterError: If the recording has no such time.
         """
         return Replay(self.log, self.log.begin_ns if time_s is None else self.time_ns(time_s))
 
@@ -192,9 +177,6 @@ class Recording:
 
         Returns:
             A Matplotlib figure, which notebooks show.
-
-        Raises:
-            ParameterError: If there is no such robot.
         """
         return upwards.plot_recordings([self], robot=robot)
 
@@ -204,9 +186,6 @@ class Recording:
         Args:
             time_s: The time [s].
             name: What messages call it.
-
-        Raises:
-            ParameterError: If the recording has no such time.
         """
         begin_s, end_s = s_from_ns(self.log.begin_ns), s_from_ns(self.log.end_ns)
         time_s = check_number(name, time_s, begin_s, end_s, "That is where the recording begins and ends.")

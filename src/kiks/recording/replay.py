@@ -56,9 +56,6 @@ class Replay:
     Attributes:
         sim: The simulation.
         next_ns: When the next input is due [ns].
-
-    Raises:
-        KiksError: If the recording is damaged there.
     """
 
     def __init__(
@@ -87,9 +84,6 @@ class Replay:
         Returns:
             Whether that was possible: a simulation gets robots and turrets, but never loses them. Where the world has
             fewer of them, nothing has changed, and another replay can begin there.
-
-        Raises:
-            KiksError: If the recording is damaged there.
         """
         sim = self.sim
         if not 0 <= time_ns - sim.now_ns <= CHECK_NS:

@@ -128,11 +128,7 @@ def events(log: RecordedLog) -> Table:
 
 
 def _longest(log: RecordedLog, lengths: Sequence[int]) -> int:
-    """Return the greatest of the lengths of a column's texts, at least 1.
-
-    Raises:
-        ParameterError: If all of them together would be too long.
-    """
+    """Return the greatest of the lengths of a column's texts, at least 1."""
     longest = max(lengths, default=1)
     if longest * len(lengths) > TEXT_BYTES_MAX:
         raise ParameterError(

@@ -115,11 +115,7 @@ def _private_names() -> Iterator[tuple[Any, tuple[str, ...]]]:
 
 
 def check_interpreter() -> None:
-    """Check that the insides of this interpreter are known.
-
-    Raises:
-        KiksError: If they are not.
-    """
+    """Check that the insides of this interpreter are known."""
     lacks = ""
     if sys.implementation.name != "cpython" or not FIRST <= sys.version_info[:2] <= LAST:
         lacks = "whose insides are not known"

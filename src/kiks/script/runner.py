@@ -55,9 +55,6 @@ def run_here(
         told: Robots by port name.
         module: Name of a module to run in place of the file, as `python -m` does.
         limited: Limits the time of the program: it gets a function that ends it with an exit code and a message.
-
-    Raises:
-        ParameterError: If `told` names a robot that does not exist.
     """
     from kiks.ports.port_names import PortNames
     from kiks.ports.program_process import chance_seed

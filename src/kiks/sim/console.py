@@ -56,7 +56,6 @@ def type_lines(sim: Simulation, robot: int, text: str) -> list[Typed]:
 
     Raises:
         LinkError: If a program has the line, or it is full.
-        ParameterError: If there is no such robot, nothing to send, or it cannot be sent.
 
     Example:
         >>> sim = Simulation()

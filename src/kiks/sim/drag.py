@@ -75,11 +75,7 @@ class Drags:
         return any(held.what == what and held.index == index for held in self._held.values())
 
     def grab(self, owner: str, what: str, index: int) -> None:
-        """Take a thing in a viewer's hand; the hand drops the thing that it held before.
-
-        Raises:
-            ParameterError: If there is no such thing, or another hand has it.
-        """
+        """Take a thing in a viewer's hand; the hand drops the thing that it held before."""
         self.drop(owner)
         counts = self._counts()
         if not isinstance(what, str) or what not in KINDS:
@@ -90,11 +86,7 @@ class Drags:
         self._held[owner] = self._found(what, index)
 
     def move(self, owner: str, x_mm: float, y_mm: float) -> None:
-        """Move what a hand holds towards a place, as far as it gets: it slides along what is in the way.
-
-        Raises:
-            ParameterError: If a number is not finite.
-        """
+        """Move what a hand holds towards a place, as far as it gets: it slides along what is in the way."""
         x_mm, y_mm = check_number("x_mm", x_mm), check_number("y_mm", y_mm)
         held = self._held_by(owner)
         if held is None:
@@ -107,11 +99,7 @@ class Drags:
         self._put(held)
 
     def turn(self, owner: str, heading_rad: float) -> None:
-        """Turn the robot that a hand holds.
-
-        Raises:
-            ParameterError: If the heading is not finite.
-        """
+        """Turn the robot that a hand holds."""
         heading_rad = check_heading("heading_rad", heading_rad)
         held = self._held_by(owner)
         if held is not None and held.what == "robot":

@@ -129,11 +129,7 @@ class EventLoop:
         self.wires.append(Wire(firmware, self._events.add, len(self.wires)))
 
     def advance_to(self, time_ns: int) -> None:
-        """Let time pass up to a time [ns]; does nothing if that has passed already.
-
-        Raises:
-            ParameterError: If it is no whole number, or beyond the end of the clock.
-        """
+        """Let time pass up to a time [ns]; does nothing if that has passed already."""
         if not (time_ns.__class__ is int and time_ns <= self._near_ns):
             time_ns = self._come_near(time_ns)
         supervisor = self.supervisor

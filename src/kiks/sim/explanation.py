@@ -212,9 +212,6 @@ def explain_proximity(world: World, robot: int, sensor: int) -> Explanation:
         world: The world.
         robot: Number of the robot, from 1.
         sensor: Index of the sensor, from 0.
-
-    Raises:
-        ParameterError: If there is no such robot or sensor.
     """
     index = world.index_of(robot)
     _check_sensor(sensor)
@@ -258,11 +255,7 @@ def explain_proximity(world: World, robot: int, sensor: int) -> Explanation:
 
 
 def explain_ambient(world: World, robot: int, sensor: int) -> LightExplanation:
-    """Return why O returns what it returns for a sensor in a world whose ticks are done.
-
-    Raises:
-        ParameterError: If there is no such robot or sensor.
-    """
+    """Return why O returns what it returns for a sensor in a world whose ticks are done."""
     index = world.index_of(robot)
     _check_sensor(sensor)
     facts, why = np.empty((len(world.lamps), 3)), np.empty((len(world.lamps), 2), np.int64)

@@ -51,11 +51,7 @@ class FreeSpace:
         return len(self._specs)
 
     def start_poses(self, seed: int) -> NDArray[np.float64]:
-        """Return where robots start in this arena with a seed, float64 [robot, 3]: x_mm, y_mm, heading_rad.
-
-        Raises:
-            ArenaError: If there is no free place for one.
-        """
+        """Return where robots start in this arena with a seed, float64 [robot, 3]: x_mm, y_mm, heading_rad."""
         poses = np.zeros((self._robot_count, 3))
         # A robot without a place yet blocks nothing.
         bodies = [(body.x_mm, body.y_mm, body.radius_mm) for body in self.arena.bodies]
@@ -71,9 +67,6 @@ class FreeSpace:
         Args:
             poses: x_mm, y_mm, heading_rad, float64 [robot, 3], finite; headings are wrapped in place (`check_heading`).
             whose: Whose poses they are, for the message.
-
-        Raises:
-            ParameterError: If a heading is in degrees, or something is in the way.
         """
         discs = self.discs()
         discs[: self._robot_count, :2] = poses[:, :2]
@@ -87,11 +80,7 @@ class FreeSpace:
                 )
 
     def _start(self, index: int, seed: int, others: NDArray[np.float64]) -> tuple[float, float, float]:
-        """Return the arena's start pose for a robot, else a free place; for the first the roomiest, if it is free.
-
-        Raises:
-            ArenaError: If there is no free place for it.
-        """
+        """Return the arena's start pose for a robot, else a free place; for the first the roomiest, if it is free."""
         radius_mm = self._specs[index].body.radius_mm
         if index == 0 and not self.arena.starts:
             widest = self.arena.find_start(radius_mm)
@@ -113,11 +102,7 @@ class FreeSpace:
     def random_place(
         self, index: int, seed: int, radius_mm: float, others: NDArray[np.float64], count: int
     ) -> tuple[float, float, float]:
-        """Return a random free place for one of some robots.
-
-        Raises:
-            ArenaError: If none is found.
-        """
+        """Return a random free place for one of some robots."""
         for attempt in range(ATTEMPTS):
             x, y, turn = (uniform(seed, 0, index, STREAM_PLACE, attempt, axis) for axis in range(3))
             x, y = x * self.arena.width_mm, y * self.arena.height_mm
@@ -203,11 +188,7 @@ class FreeSpace:
         but: int = -1,
         overlap_mm: float = OVERLAP_MM,
     ) -> None:
-        """Check that a disc [mm] would overlap neither a wall nor another disc than `but`.
-
-        Raises:
-            ParameterError: If it would.
-        """
+        """Check that a disc [mm] would overlap neither a wall nor another disc than `but`."""
         obstacle = self.obstacle(x_mm, y_mm, radius_mm, self.discs(), but, overlap_mm)
         if obstacle is not None:
             raise ParameterError(

@@ -33,11 +33,6 @@ def simulation_of(
         kinds: Kinds of robots in place of the project's: one for all or one for each. Files among them lie anywhere.
         thinking: What programs' computing costs, in place of what the project says; a replay lies anywhere.
 
-    Raises:
-        ParameterError: If a robot's file is none, a path leads out of the folder, or there are too few or too many
-            kinds.
-        ArenaError: If something has no free place.
-
     Example:
         >>> from kiks.model.project import ProjectRobot
         >>> sim = simulation_of(Project(robots=(ProjectRobot(turrets=("k213",)),), baud=38400))
@@ -67,9 +62,6 @@ def spec_of(robot: ProjectRobot, project: Project, folder: Path) -> RobotSpec:
         robot: The robot.
         project: The project, whose response and noise are its own.
         folder: Where the project lies.
-
-    Raises:
-        ParameterError: If the robot's file is none, or leads out of the folder, or one of its changes is wrong.
     """
     path = inside(folder, robot.kind, "kind") if robot.kind.lower().endswith(".toml") else robot.kind
     spec = RobotSpec.load(path, response=project.response)
@@ -89,11 +81,7 @@ def _as_set(spec: RobotSpec, robot: ProjectRobot, project: Project) -> RobotSpec
 
 
 def thinking_of(project: Project, folder: Path) -> str:
-    """Return what the computing of a project's programs costs; a replay with its whole path.
-
-    Raises:
-        ParameterError: If the replay's path leads out of the folder.
-    """
+    """Return what the computing of a project's programs costs; a replay with its whole path."""
     kind, file = split_thinking(project.thinking)
     return f"{kind}:{inside(folder, file, 'replay')}" if isinstance(file, str) else project.thinking
 
@@ -107,9 +95,6 @@ def project_of(sim: Simulation, project: Project) -> Project:
     Args:
         sim: A simulation of the project, or of one with as many robots.
         project: Where all the rest comes from.
-
-    Raises:
-        ArenaError: If there is no room for what a gripper holds up.
     """
     with sim.lock:
         poses, bodies, lamps = sim.poses(), sim.bodies(), sim.lamps.copy()

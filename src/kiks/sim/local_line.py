@@ -142,7 +142,6 @@ def claim(wire: Wire, robot: int, holder: str) -> None:
     """Reserve a robot's line for one program.
 
     Raises:
-        ParameterError: If the name of the holder is no text.
         LinkError: If another program holds it.
     """
     if wire.holder is not None:

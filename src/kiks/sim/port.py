@@ -169,11 +169,7 @@ class VirtualPort:
 
     @property
     def timeout(self) -> float | None:
-        """Longest simulated time that a read waits [s]; None waits without end.
-
-        Raises:
-            ParameterError: If it is set to anything but None or a number from 0.
-        """
+        """Longest simulated time that a read waits [s]; None waits without end."""
         return self._timeout_s
 
     @timeout.setter
@@ -183,11 +179,7 @@ class VirtualPort:
 
     @property
     def write_timeout(self) -> float | None:
-        """Longest simulated time that a write waits for room on the line [s]; None waits without end.
-
-        Raises:
-            ParameterError: If it is set to anything but None or a number from 0.
-        """
+        """Longest simulated time that a write waits for room on the line [s]; None waits without end."""
         return self._write_timeout_s
 
     @write_timeout.setter
@@ -214,7 +206,6 @@ class VirtualPort:
 
         Raises:
             TypeError: If they are a text, or no numbers at all, as in pyserial.
-            ParameterError: If a number is out of range.
             WriteTimeoutError: If there is no room for all of them within the `write_timeout`; some have been sent.
         """
         if data.__class__ is not bytes:
@@ -398,11 +389,7 @@ class VirtualPort:
         return s_from_ns(self.ask_ns())
 
     def sleep(self, seconds: float) -> None:
-        """Let simulated time pass [s] without waiting for it.
-
-        Raises:
-            ParameterError: If it is negative, longer than 1e9 s or no number.
-        """
+        """Let simulated time pass [s] without waiting for it."""
         passing_ns = wait_ns(check_number("seconds", seconds, 0, SECONDS_MAX, "Time never runs backwards."))
         with self.line.lock:
             if self._program.thinks:
@@ -511,7 +498,6 @@ def _characters(data: Any) -> bytes:
 
     Raises:
         TypeError: If it is a text, or no numbers at all.
-        ParameterError: If a number is out of range.
     """
     if isinstance(data, str):
         raise TypeError(f"unicode strings are not supported, please encode to bytes: {shown(data)}")
@@ -525,11 +511,7 @@ def _characters(data: Any) -> bytes:
 
 
 def _timeout_ns(name: str, timeout_s: Any) -> int | None:
-    """Return a timeout [ns]; None if it never ends a wait, because it is longer than any run.
-
-    Raises:
-        ParameterError: If it is anything but None or a number from 0.
-    """
+    """Return a timeout [ns]; None if it never ends a wait, because it is longer than any run."""
     checked_s = None if timeout_s is None else check_number(name, timeout_s, 0)
     return None if checked_s is None or checked_s > SECONDS_MAX else ns_from_s(checked_s)
 

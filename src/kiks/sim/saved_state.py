@@ -117,9 +117,6 @@ class Setup:
         Args:
             data: The bytes.
             what: What messages call them.
-
-        Raises:
-            KiksError: If they are none.
         """
         file = check(_SetupFile, parse_json(data, what), what)
         arena = Project.from_bytes(file.arena.encode(), what=what).arena
@@ -140,9 +137,6 @@ class Setup:
 
         Args:
             poses: Where its robots are, whatever is there, float64 [robot, 3].
-
-        Raises:
-            ParameterError: If turrets do not fit.
         """
         sim = Simulation.of_world(World(self.arena, self.specs, self.seed, poses))
         self.bring(sim, poses)
@@ -154,9 +148,6 @@ class Setup:
         Args:
             sim: A simulation of an earlier setup of the same run.
             poses: Where its robots are then, whatever is there, float64 [robot, 3].
-
-        Raises:
-            ParameterError: If turrets do not fit.
         """
         with sim.lock:
             # No robot may look from a place that the new walls do not have.
@@ -252,9 +243,6 @@ class SavedState:
             setup: That of the world.
             layout: That of the records.
             what: What messages call them.
-
-        Raises:
-            KiksError: If they are none, or values are out of range.
         """
         line, _, rest = data.partition(b"\n")
         values = parse_json(line, what)
@@ -308,11 +296,7 @@ def state_bytes(sim: Simulation) -> bytes:
 
 
 def restore_state(sim: Simulation, saved: SavedState) -> None:
-    """Take a simulation back, or on, to a state of a simulation of the same setup.
-
-    Raises:
-        ParameterError: If that had another number of robots.
-    """
+    """Take a simulation back, or on, to a state of a simulation of the same setup."""
     with sim.lock:
         world = sim.world
         if saved.robots.shape != world.state.robots.shape:
@@ -356,11 +340,7 @@ class Layout:
 
     @classmethod
     def from_bytes(cls, data: bytes, what: str) -> Layout:
-        """Read what `to_bytes` returned.
-
-        Raises:
-            KiksError: If it is none.
-        """
+        """Read what `to_bytes` returned."""
         own = cls()
         if data == own.to_bytes():
             return own
@@ -471,9 +451,6 @@ def check_records(robots: NDArray[Any], bodies: NDArray[Any], size_mm: tuple[flo
         bodies: Records of bodies, shape [instant, body].
         size_mm: Width and height of the arena [mm], at most.
         what: What messages call them.
-
-    Raises:
-        ParameterError: If a value is out of range.
     """
     limits: dict[str, tuple[float, float] | None] = {
         **_LIMITS,

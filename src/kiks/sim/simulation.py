@@ -63,10 +63,6 @@ class Simulation:
         program: What the computing of the program on its ports costs.
         name: The name in its ports' URLs.
 
-    Raises:
-        ParameterError: If a number is out of range or a name unknown.
-        ArenaError: If the arena has no free place for a robot, a ball or a cylinder.
-
     Example:
         >>> sim = Simulation(Arena.box(500, 500), seed=1)
         >>> port = sim.port(1)
@@ -183,11 +179,7 @@ class Simulation:
 
     @property
     def spec(self) -> RobotSpec:
-        """The kind of robot 1.
-
-        Raises:
-            ParameterError: If there is no robot.
-        """
+        """The kind of robot 1."""
         return self.world.specs[self.index_of(1)]
 
     @property
@@ -214,9 +206,6 @@ class Simulation:
         """The lamps: x_mm, y_mm, power_w, and 1 for on or 0 for off: float64 [lamp, 4].
 
         Write to it to move or switch them; a lamp at a place that is no number is nowhere.
-
-        Raises:
-            ParameterError: If it is set to anything but finite numbers of that shape.
         """
         return self.world.lend_lamps()
 
@@ -242,20 +231,13 @@ class Simulation:
 
         Args:
             seconds: How long [s], at most 1e9.
-
-        Raises:
-            ParameterError: If it is negative, too long or no number.
         """
         passing_ns = ns_from_s(check_number("seconds", seconds, 0, SECONDS_MAX, "Time never runs backwards."))
         with self.lock:
             self.loop.advance_to(self.now_ns + passing_ns)
 
     def advance_to(self, time_ns: int) -> None:
-        """Let time pass up to a time [ns]; does nothing if that has passed already.
-
-        Raises:
-            ParameterError: If it is no whole number, or beyond the end of the clock.
-        """
+        """Let time pass up to a time [ns]; does nothing if that has passed already."""
         self.loop.advance_to(time_ns)
 
     def next_event_ns(self) -> int | None:
@@ -272,19 +254,11 @@ class Simulation:
     # ---- robots ----
 
     def index_of(self, robot: int) -> int:
-        """Return the index of a robot by its number.
-
-        Raises:
-            ParameterError: If there is no such robot.
-        """
+        """Return the index of a robot by its number."""
         return self.world.index_of(robot)
 
     def pose(self, robot: int) -> tuple[float, float, float]:
-        """Return where a robot is at this instant: x_mm, y_mm, heading_rad (not wrapped).
-
-        Raises:
-            ParameterError: If there is no such robot.
-        """
+        """Return where a robot is at this instant: x_mm, y_mm, heading_rad (not wrapped)."""
         index = self.index_of(robot)
         with self._up_to_date() as world:
             return world.pose(index)
@@ -303,9 +277,6 @@ class Simulation:
             y_mm: From the arena's lower left corner upwards.
             heading_rad: Counter-clockwise from the x axis; wrapped to one turn beyond a million. A multiple of 0.5
                 from 10 on is an error: it is a heading in degrees.
-
-        Raises:
-            ParameterError: If there is no such robot, a number is no such number, or something is in the way.
         """
         index = self.index_of(robot)
         with self._changing() as world:
@@ -320,10 +291,6 @@ class Simulation:
         Args:
             robot: Its kind: a name that `RobotSpec.load` knows, a file, or a `RobotSpec`.
             pose: x_mm, y_mm, heading_rad, whatever is there; for those who know that it stood there.
-
-        Raises:
-            ParameterError: If there is no such kind, or the pose is none.
-            ArenaError: If there is no free place for it.
 
         Example:
             >>> sim = Simulation(Arena.box(500, 500))
@@ -350,9 +317,6 @@ class Simulation:
         Returns:
             The turret, which 'io' and some of your own are set and read by.
 
-        Raises:
-            ParameterError: If there is no such robot or turret, or the robot has one of its number already.
-
         Example:
             >>> sim = Simulation()
             >>> camera = sim.fit(1, "k213")
@@ -366,11 +330,7 @@ class Simulation:
             return self._turrets.fit(index, turret)
 
     def turrets(self, robot: int) -> tuple[Turret, ...]:
-        """Return the turrets that a robot carries, in the order in which they were fitted.
-
-        Raises:
-            ParameterError: If there is no such robot.
-        """
+        """Return the turrets that a robot carries, in the order in which they were fitted."""
         return tuple(self.wires[self.index_of(robot)].firmware.fitted)
 
     def port(self, robot: int) -> SimPort:
@@ -378,9 +338,6 @@ class Simulation:
 
         Args:
             robot: Number of the robot, from 1.
-
-        Raises:
-            ParameterError: If there is no such robot.
         """
         index = self.index_of(robot)
         if index not in self._ports or self._ports[index].line is CLOSED:
@@ -388,19 +345,11 @@ class Simulation:
         return self._ports[index]
 
     def url(self, robot: int) -> str:
-        """Return the name under which pyserial opens a robot's port: 'kiks://sim1/1'.
-
-        Raises:
-            ParameterError: If there is no such robot.
-        """
+        """Return the name under which pyserial opens a robot's port: 'kiks://sim1/1'."""
         return f"kiks://{self.name}/{self.index_of(robot) + 1}"
 
     def travelled_mm(self, robot: int) -> float:
-        """Return the length of a robot's path so far [mm].
-
-        Raises:
-            ParameterError: If there is no such robot.
-        """
+        """Return the length of a robot's path so far [mm]."""
         forwards_mm, backwards_mm, _ = self.distances_mm()[self.index_of(robot)]
         return float(forwards_mm + backwards_mm)
 
@@ -414,11 +363,7 @@ class Simulation:
             return world.distances_mm()
 
     def contacts(self, robot: int) -> int:
-        """Return how often a robot has touched something so far: a wall, a robot, a ball or a cylinder.
-
-        Raises:
-            ParameterError: If there is no such robot.
-        """
+        """Return how often a robot has touched something so far: a wall, a robot, a ball or a cylinder."""
         index = self.index_of(robot)
         with self._up_to_date() as world:
             return int(world.state.robots["contact_count"][0, index])
@@ -430,9 +375,6 @@ class Simulation:
 
         Args:
             arena: The walls; lamps, balls, cylinders and starts in it are ignored.
-
-        Raises:
-            ParameterError: If a robot, ball or cylinder would be deeper in a wall than it is.
         """
         _check_arena(arena)
         # These take a while: they are computed before other threads have to wait.
@@ -448,9 +390,6 @@ class Simulation:
             x_mm: Its centre [mm].
             y_mm: Its centre [mm].
             **changes: `radius_mm`, `friction_mm_s2` or `brightness` (1..255 or a material), where not the usual ones.
-
-        Raises:
-            ParameterError: If a value is out of range, or something is in the way.
 
         Example:
             >>> from kiks import Arena, Simulation
@@ -471,9 +410,6 @@ class Simulation:
             x_mm: Its centre [mm].
             y_mm: Its centre [mm].
             **changes: `radius_mm`, `friction_mm_s2` or `brightness` (1..255 or a material), where not the usual ones.
-
-        Raises:
-            ParameterError: If a value is out of range, or something is in the way.
         """
         with self._changing():
             return self.things.add_body(Cylinder, x_mm, y_mm, changes)
@@ -498,37 +434,22 @@ class Simulation:
             y_mm: Where its centre goes [mm].
             speed_mm_s: How fast it rolls from there [mm/s].
             heading_rad: Where to.
-
-        Raises:
-            ParameterError: If there is no such body, a number is out of range, or something is in the way.
         """
         with self._changing():
             self.things.move_body(body, x_mm, y_mm, speed_mm_s, heading_rad)
 
     def remove_body(self, body: int) -> None:
-        """Remove a ball or cylinder.
-
-        Raises:
-            ParameterError: If there is no such body.
-        """
+        """Remove a ball or cylinder."""
         with self._changing():
             self.things.remove_body(body)
 
     def add_lamp(self, x_mm: float, y_mm: float, power_w: float = 1.0, *, is_on: bool = True) -> int:
-        """Add a lamp; return its row in `lamps`, counted from 1.
-
-        Raises:
-            ParameterError: If it would hang outside the arena, or a value is out of range.
-        """
+        """Add a lamp; return its row in `lamps`, counted from 1."""
         with self._up_to_date():
             return self.things.add_lamp(x_mm, y_mm, power_w, is_on)
 
     def remove_lamp(self, lamp: int) -> None:
-        """Remove a lamp; those below it move up a row.
-
-        Raises:
-            ParameterError: If there is no such lamp.
-        """
+        """Remove a lamp; those below it move up a row."""
         with self._up_to_date():
             self.things.remove_lamp(lamp)
 
@@ -541,9 +462,6 @@ class Simulation:
         """Move everything back to a checkpoint: bodies and lamps added since then go, removed ones come back.
 
         Time, programs, wheels and counters go on.
-
-        Raises:
-            ParameterError: If it is no checkpoint, or one of a simulation with another number of robots.
         """
         with self._changing():
             self.things.reset(checkpoint)
@@ -556,9 +474,6 @@ class Simulation:
         Args:
             robot: Number of the robot, from 1.
             noise: True for the counts that command `N` would report now, with noise and rounding.
-
-        Raises:
-            ParameterError: If there is no such robot.
         """
         index = self.index_of(robot)
         with self._up_to_date():
@@ -572,9 +487,6 @@ class Simulation:
         Args:
             robot: Number of the robot, from 1.
             poses: float64 [pose, 3]: x_mm, y_mm, heading_rad.
-
-        Raises:
-            ParameterError: If there is no such robot, a number is not finite, or a place is outside the arena.
         """
         index = self.index_of(robot)
         with self._up_to_date() as world:
@@ -586,9 +498,6 @@ class Simulation:
         Args:
             robot: Number of the robot, from 1.
             noise: True for the counts that command `O` would report now, with noise and rounding.
-
-        Raises:
-            ParameterError: If there is no such robot.
         """
         index = self.index_of(robot)
         with self._up_to_date():
@@ -599,9 +508,6 @@ class Simulation:
 
         The leftmost ray is first; lengths are counted from the sensor, and infinite where nothing is within its reach.
         They are exact, even where the robot's response uses coarser ones.
-
-        Raises:
-            ParameterError: If there is no such robot.
         """
         index = self.index_of(robot)
         with self._up_to_date() as world:
@@ -614,9 +520,6 @@ class Simulation:
         Args:
             robot: Number of the robot, from 1.
             sensor: Index of the sensor in the answer to `N`, from 0.
-
-        Raises:
-            ParameterError: If there is no such robot or sensor.
 
         Example:
             >>> sim = Simulation(Arena.box(200, 200))
@@ -636,19 +539,12 @@ class Simulation:
         Args:
             robot: Number of the robot, from 1.
             sensor: Index of the sensor in the answer to `O`, from 0.
-
-        Raises:
-            ParameterError: If there is no such robot or sensor.
         """
         with self._up_to_date() as world:
             return explain_ambient(world, robot, sensor)
 
     def image(self, robot: int) -> list[float]:
-        """Return what a K213 would see at this instant and pose, 64 greys from the left, without noise or rounding.
-
-        Raises:
-            ParameterError: If there is no such robot.
-        """
+        """Return what a K213 would see at this instant and pose, 64 greys from the left, without noise or rounding."""
         index = self.index_of(robot)
         with self._up_to_date():
             return self._turrets.cameras.expect(index)
@@ -670,9 +566,6 @@ class Simulation:
 
         Returns:
             A `kiks.recording.recorder.RunRecorder`, with `mark(note)` for bookmarks.
-
-        Raises:
-            ParameterError: If the file cannot be written, its disk is almost full, or the run is recorded already.
         """
         return record_simulation(self, file)
 
@@ -684,9 +577,6 @@ class Simulation:
 
         Returns:
             A Matplotlib figure, which notebooks show.
-
-        Raises:
-            ParameterError: If the run is not being recorded, Matplotlib is not installed, or there is no such robot.
         """
         return plot_simulation(self, robot=robot)
 
@@ -697,9 +587,6 @@ class Simulation:
             every_s: Time between two points [s]: whole hundredths, at least one.
             points_max: Most points that are kept, from 2. When there are more, every second one is dropped, and from
                 then on half as many come; None for all.
-
-        Raises:
-            ParameterError: If one is none of these.
         """
         ticks = 100 * check_number("every_s", every_s, 0, 1e7, "Take 0.1.")
         if ticks < 1 - 1e-9 or abs(ticks - round(ticks)) > 1e-6:
@@ -713,20 +600,12 @@ class Simulation:
             world.watch(self._paths)
 
     def paths(self) -> NDArray[np.float64]:
-        """Return the paths since `record_paths`, float64 [robot, point, 4]: time_s, x_mm, y_mm, heading_rad.
-
-        Raises:
-            ParameterError: If none were recorded.
-        """
+        """Return the paths since `record_paths`, float64 [robot, point, 4]: time_s, x_mm, y_mm, heading_rad."""
         with self.lock:
             return self._recorded().array()
 
     def body_paths(self) -> dict[int, list[tuple[float, float]]]:
-        """Return where balls and cylinders were since `record_paths`, by their numbers: x_mm, y_mm.
-
-        Raises:
-            ParameterError: If nothing was recorded.
-        """
+        """Return where balls and cylinders were since `record_paths`, by their numbers: x_mm, y_mm."""
         with self.lock:
             return self._recorded().of_bodies()
 
@@ -759,7 +638,6 @@ class Simulation:
 
         Raises:
             LinkError: If the page cannot be served there.
-            ParameterError: If the speed is out of range, or the desk is open on another port.
         """
         return show_in_browser(self, speed=speed, is_alive=is_alive, port=port, browser=browser)
 
@@ -788,9 +666,6 @@ def check_kinds(kinds: object, response: object = None) -> None:
     Args:
         kinds: The name of a kind, a robot file or a `RobotSpec`, or a list of such.
         response: The name of a response of their proximity sensors, or None.
-
-    Raises:
-        ParameterError: If one is something else.
     """
     for kind in kinds if isinstance(kinds, list | tuple) else (kinds,):
         if not isinstance(kind, str | os.PathLike | RobotSpec):

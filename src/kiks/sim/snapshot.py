@@ -74,9 +74,6 @@ def proximity_at(world: World, index: int, poses: NDArray[np.float64]) -> NDArra
         world: The world, whose ticks are done.
         index: The robot's index.
         poses: float64 [pose, 3]: x_mm, y_mm, heading_rad.
-
-    Raises:
-        ParameterError: If a number is not finite, or a place is outside the arena.
     """
     poses = check_numbers("poses", poses, (None, 3))
     size_mm = (world.arena.width_mm, world.arena.height_mm)

@@ -43,9 +43,6 @@ class Things:
 
     Attributes:
         body_count: Number of bodies that there ever were: the last number given.
-
-    Raises:
-        ArenaError: If something has no free place where the arena puts it.
     """
 
     def __init__(self, world: World) -> None:
@@ -60,11 +57,7 @@ class Things:
     # ---- balls and cylinders ----
 
     def add_body(self, kind: type[Ball | Cylinder], x_mm: float, y_mm: float, changes: dict[str, Any]) -> int:
-        """Add a ball or cylinder at rest; return its number.
-
-        Raises:
-            ParameterError: If a value is out of range, or something is in the way.
-        """
+        """Add a ball or cylinder at rest; return its number."""
         try:
             body = kind(x_mm, y_mm, **changes)
         except TypeError:
@@ -91,11 +84,7 @@ class Things:
         return self.body_count
 
     def move_body(self, body: int, x_mm: float, y_mm: float, speed_mm_s: float, heading_rad: float) -> None:
-        """Put a ball or cylinder down at a free place, rolling from there.
-
-        Raises:
-            ParameterError: If there is no such body, a number is out of range, or something is in the way.
-        """
+        """Put a ball or cylinder down at a free place, rolling from there."""
         x_mm, y_mm = check_number("x_mm", x_mm), check_number("y_mm", y_mm)
         speed_mm_s = check_number("speed_mm_s", speed_mm_s, 0, 1000)
         sine, cosine = sin_cos(check_heading("heading_rad", heading_rad))
@@ -110,11 +99,7 @@ class Things:
         enter_all_worlds(world.scene)
 
     def remove_body(self, body: int) -> None:
-        """Remove a ball or cylinder.
-
-        Raises:
-            ParameterError: If there is no such body.
-        """
+        """Remove a ball or cylinder."""
         state = self._world.state
         state.bodies = np.delete(state.bodies, self._index_of(body), axis=1)
         self._world.rebuild_scene()
@@ -129,21 +114,13 @@ class Things:
     # ---- lamps ----
 
     def add_lamp(self, x_mm: float, y_mm: float, power_w: float, is_on: bool) -> int:
-        """Add a lamp; return its row in `lamps`, counted from 1.
-
-        Raises:
-            ParameterError: If it would hang outside the arena, or a value is out of range.
-        """
+        """Add a lamp; return its row in `lamps`, counted from 1."""
         added = self._checked(lamps=(Lamp(x_mm, y_mm, power_w, is_on),)).lamps
         self._world.lamps = np.vstack([self._world.lamps, added])
         return len(self._world.lamps)
 
     def remove_lamp(self, lamp: int) -> None:
-        """Remove a lamp.
-
-        Raises:
-            ParameterError: If there is no such lamp.
-        """
+        """Remove a lamp."""
         lamps = self._world.lamps
         if not len(lamps):
             raise ParameterError(f"lamp must be the row of a lamp, but it was {shown(lamp)}. There is none.")
@@ -151,11 +128,7 @@ class Things:
         self._world.lamps = np.delete(lamps, lamp - 1, axis=0)
 
     def _checked(self, **things: Any) -> Arena:
-        """Return an arena with these things alone: so they are checked by the rules of arena files.
-
-        Raises:
-            ParameterError: If one breaks a rule.
-        """
+        """Return an arena with these things alone: so they are checked by the rules of arena files."""
         nothing: dict[str, Any] = {"starts": (), "lamps": (), "balls": (), "cylinders": ()}
         try:
             return replace(self._world.arena, **nothing | things)
@@ -175,11 +148,7 @@ class Things:
         return saved
 
     def reset(self, checkpoint: Checkpoint) -> None:
-        """Move robots, bodies and lamps back to a checkpoint.
-
-        Raises:
-            ParameterError: If it is no checkpoint, or one of a simulation with another number of robots.
-        """
+        """Move robots, bodies and lamps back to a checkpoint."""
         world = self._world
         check_kind("checkpoint", checkpoint, Checkpoint, "checkpoint() returns one.")
         if len(checkpoint.poses) != world.robot_count:

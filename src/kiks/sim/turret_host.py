@@ -60,9 +60,6 @@ class Turrets:
         Args:
             index: The robot's index.
             turret: Its name, or one of a user's own.
-
-        Raises:
-            ParameterError: If there is no such turret, or the robot has one of its number already.
         """
         firmware = self._firmwares[index]
         fitted = named(turret, lambda: self.cameras.camera(index))
@@ -202,9 +199,6 @@ def named(turret: object, camera: Callable[[], Turret]) -> Turret:
     Args:
         turret: The name or the turret.
         camera: Makes a K213.
-
-    Raises:
-        ParameterError: If it is neither, or one of a user's own that breaks the rules.
     """
     if isinstance(turret, str):
         if turret == "k213":
@@ -260,11 +254,7 @@ def _check(turret: Turret) -> None:
 
 
 def first_memory(turret: Turret, fitted: list[Turret]) -> int:
-    """Return where the numbers of one more turret begin among those that the turrets of a robot remember.
-
-    Raises:
-        ParameterError: If there is no room for them.
-    """
+    """Return where the numbers of one more turret begin among those that the turrets of a robot remember."""
     first = sum(each.memory_count for each in fitted)
     advice = f"All turrets of a robot share {MEMORY_COUNT} numbers."
     check_count("memory_count of a turret", turret.memory_count, 0, MEMORY_COUNT - first, advice)

@@ -59,9 +59,6 @@ class World:
         change_count: How often something other than time and the robots' lines has changed the world.
         on_change: Called at each of these changes.
         lamps_are_lent: Whether a caller has the array of lamps, and may write to it without a word.
-
-    Raises:
-        ArenaError: If the arena has no free place for a robot.
     """
 
     def __init__(
@@ -128,11 +125,7 @@ class World:
         return self.free_space.arena
 
     def set_arena(self, free_space: FreeSpace) -> None:
-        """Replace the walls by those of another arena.
-
-        Raises:
-            ParameterError: If a robot, ball or cylinder would be deeper in a wall than it is.
-        """
+        """Replace the walls by those of another arena."""
         for disc, (x_mm, y_mm, radius_mm) in enumerate(free_space.discs().tolist()):
             if radius_mm < 0:
                 continue
@@ -203,11 +196,7 @@ class World:
     # ---- robots ----
 
     def index_of(self, robot: int) -> int:
-        """Return the index of a robot by its number.
-
-        Raises:
-            ParameterError: If there is no such robot.
-        """
+        """Return the index of a robot by its number."""
         if not isinstance(robot, int | np.integer) or not 1 <= robot <= self.robot_count:
             numbers = {0: "no robot", 1: "robot 1"}.get(self.robot_count, f"robots 1 to {self.robot_count}")
             raise ParameterError(
@@ -238,11 +227,7 @@ class World:
         return bodies
 
     def place_robot(self, index: int, x_mm: float, y_mm: float, heading_rad: float) -> None:
-        """Put a robot down at a free place.
-
-        Raises:
-            ParameterError: If a number is not finite, or something is in the way.
-        """
+        """Put a robot down at a free place."""
         x_mm, y_mm = check_number("x_mm", x_mm), check_number("y_mm", y_mm)
         heading_rad = check_heading("heading_rad", heading_rad)
         radius_mm = self.specs[index].body.radius_mm
@@ -265,10 +250,6 @@ class World:
             spec: Its kind.
             place: Its pose, whatever is there; if left out, the arena's start pose for it, if that is free, else a
                 random place.
-
-        Raises:
-            ParameterError: If the pose is none.
-            ArenaError: If there is no free place for it.
         """
         index, discs, radius_mm = self.robot_count, self.free_space.discs(), spec.body.radius_mm
         if place is not None:

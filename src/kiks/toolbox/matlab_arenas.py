@@ -58,11 +58,6 @@ def arena_of(
         ball: Brightness of balls; the default if left out.
         cylinder: Brightness of cylinders; the default if left out.
 
-    Raises:
-        ParameterError: If a code is unknown, a brightness is out of range, there are too many things, or the sizes
-            differ.
-        ArenaError: If the arena is too small or too large, or a thing has no free place.
-
     Example:
         >>> codes = np.zeros((200, 300)); codes[49, 99] = -270; codes[0] = 1
         >>> arena = arena_of(codes)
@@ -129,9 +124,6 @@ def settled(arena: Arena, robot_radius_mm: float) -> tuple[Arena, list[str]]:
     Returns:
         The arena, and a sentence for each thing that was moved, in the user's coordinates. If there are more than
         `MOVED_MAX` of these, the arena as it was.
-
-    Raises:
-        ArenaError: If there is no free place for one.
 
     Example:
         >>> codes = np.zeros((200, 300)); codes[9, 99] = -90

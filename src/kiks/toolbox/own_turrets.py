@@ -33,9 +33,6 @@ class OwnTurret(Turret):
 def turrets_of(words: str) -> dict[int, str]:
     """Return the names of turrets by their numbers.
 
-    Raises:
-        ParameterError: If the words are not numbers from 1 to 99, each with a name.
-
     Example:
         >>> turrets_of("24 compass 25 gps")
         {24: 'compass', 25: 'gps'}

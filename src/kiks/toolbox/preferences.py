@@ -68,9 +68,6 @@ class Settings(OldConstants):
     def changed(self, name: str, value: str) -> Settings:
         """Return a copy with one changed value; an empty text stands for the default.
 
-        Raises:
-            ParameterError: If there is no such setting, or the value is invalid.
-
         Example:
             >>> Settings().changed("seed", "7").seed
             7
@@ -85,11 +82,7 @@ class Settings(OldConstants):
 
     @property
     def project_robot(self) -> ProjectRobot:
-        """Each robot of a world; the path of its file is relative to `folder`.
-
-        Raises:
-            ParameterError: If a value is out of range.
-        """
+        """Each robot of a world; the path of its file is relative to `folder`."""
         return ProjectRobot(
             kind=Path(self.robot).name,
             turrets=self.turrets,
@@ -98,11 +91,7 @@ class Settings(OldConstants):
         )
 
     def project_of(self, arena: Arena) -> Project:
-        """Return the project of an arena with these settings; its paths are relative to `folder`.
-
-        Raises:
-            ParameterError: If a value is out of range.
-        """
+        """Return the project of an arena with these settings; its paths are relative to `folder`."""
         count = max(len(arena.starts), 1) if self.robots is None else self.robots
         return Project(
             arena,

@@ -104,9 +104,6 @@ class Session:
         Args:
             project: The project of the world.
             folder: The folder of its files.
-
-        Raises:
-            KiksError: If the project is not valid.
         """
         from kiks.desk.server.desk import Desk
 
@@ -137,20 +134,13 @@ class Session:
             self._has_world.set()
 
     def begin_arena(self, arena: Arena) -> None:
-        """Begin the world of an arena with the present settings.
-
-        Raises:
-            KiksError: If they do not fit each other.
-        """
+        """Begin the world of an arena with the present settings."""
         self.begin(self.settings.project_of(arena), self.settings.folder)
 
     def begin_file(self, path: str) -> None:
         """Begin the world of a file: a project with its own settings, or an arena with the present ones.
 
         The present settings may ask for a world without a robot in either case.
-
-        Raises:
-            ArenaError: If the file is neither.
         """
         if path.lower().endswith(".kiks"):
             project = Project.load(path)
@@ -170,11 +160,7 @@ class Session:
         return {client.number: client.name for client in self.clients[:]}
 
     def evaluate(self, number: int, command: str) -> None:
-        """Let one of them evaluate a command at its next request, or at its prompt.
-
-        Raises:
-            ParameterError: If it is not there, or the command is empty or too long.
-        """
+        """Let one of them evaluate a command at its next request, or at its prompt."""
         client = next((each for each in self.clients[:] if each.number == number), None)
         if client is None:
             raise ParameterError(
@@ -219,12 +205,7 @@ class Session:
             sim.record_paths(PATH_PERIOD_S, points_max=self.settings.path_points)
 
     def record(self, path: Path | None) -> None:
-        """Record this world from now on, until it ends or the next call; with None, record no more.
-
-        Raises:
-            ParameterError: If the file cannot be written, a film is being made of the world, or the recording before
-                has ended by itself.
-        """
+        """Record this world from now on, until it ends or the next call; with None, record no more."""
         with self.lock:
             recorder, self._recorder = self._recorder, None
             if recorder is not None:
@@ -242,9 +223,6 @@ class Session:
         Args:
             owner: The client.
             wanted: Number of the preferred robot.
-
-        Raises:
-            KiksError: If there is no room for another robot.
         """
         with self.lock:
             desk = self._present_desk()

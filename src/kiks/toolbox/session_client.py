@@ -126,7 +126,6 @@ class SessionClient:
 
         Raises:
             LinkError: If it is open already.
-            KiksError: If there is no room for its robot, or the baud rate is not valid.
         """
         session = self.session
         if number in self.ports:
@@ -326,9 +325,6 @@ class SessionClient:
         Args:
             number: Of the port whose robot's readings are shown.
             path: The film's file.
-
-        Raises:
-            ParameterError: If it cannot be written, or another film is made already.
         """
         robot = self.opened(number).robot
         if self.film is not None:
@@ -344,11 +340,7 @@ class SessionClient:
             film.stop()
 
     def save_film(self) -> int:
-        """Make the file of the film; return the number of its pictures, 0 without a film.
-
-        Raises:
-            KiksError: If it cannot be written, or the program no longer waits for it.
-        """
+        """Make the file of the film; return the number of its pictures, 0 without a film."""
         film, self.film = self.film, None
         return 0 if film is None else film.save(lambda done, count: self._check_pending())
 
@@ -426,11 +418,7 @@ class SessionClient:
         return robot if is_there and self.session.owners.get(robot, self) is self else None
 
     def take_robot(self, number: int) -> int:
-        """Take a robot for a port that has none yet, a new one if all are taken; return its number.
-
-        Raises:
-            KiksError: If there is no room for another robot.
-        """
+        """Take a robot for a port that has none yet, a new one if all are taken; return its number."""
         return self.session.take_robot(self, self._usual_robot(number))
 
     # ---- inside ----

@@ -20,9 +20,6 @@ class SessionFilm:
         sim: The world.
         path: The film's file, .mp4, .gif or .webp.
         robot: Number of the robot whose readings are shown.
-
-    Raises:
-        ParameterError: If the file cannot be written, or the world is being recorded already.
     """
 
     def __init__(self, sim: Simulation, path: Path, robot: int) -> None:
@@ -46,9 +43,6 @@ class SessionFilm:
 
         Args:
             on_picture: See `save_film`.
-
-        Raises:
-            ParameterError: If the film cannot be written, or no time has passed.
         """
         try:
             self.stop()

@@ -51,11 +51,7 @@ def numbers_text(values: Iterable[float]) -> str:
 
 
 def numbers_of(words: Sequence[str], count: int, what: str) -> list[float]:
-    """Convert words to numbers; `NaN` stands for a value that is not given.
-
-    Raises:
-        ParameterError: If there are not `count` of them, or one is not a number or beyond `NUMBER_MAX`.
-    """
+    """Convert words to numbers; `NaN` stands for a value that is not given."""
     try:
         numbers = [float(word) for word in words] if len(words) == count else []
     except ValueError:
@@ -88,9 +84,6 @@ def matrix_text(matrix: NDArray[Any]) -> str:
 
 def matrices_of(text: str) -> list[NDArray[Any]]:
     """Return the one or two matrices of a text, each of int16 or float64.
-
-    Raises:
-        ParameterError: If the text is anything else.
 
     Example:
         >>> [matrix.tolist() for matrix in matrices_of("2 2 2 0 2 1 1 1 1 -7.5")]

@@ -99,9 +99,6 @@ class ArenaView(
         on_pick: Called with each click that is not a drag.
         on_draw: Called with each stroke of a tool.
         on_remove: Called with the place of a thing that a person removes [mm].
-
-    Raises:
-        ParameterError: If there is no such view.
     """
 
     def __init__(
@@ -127,22 +124,14 @@ class ArenaView(
             self.on("remove", lambda event: on_remove(float(event.args["x_mm"]), float(event.args["y_mm"])))
 
     def set_view(self, view: View) -> None:
-        """Show the arena from above ('top'), in 3-D ('solid') or 'both'.
-
-        Raises:
-            ParameterError: If there is no such view.
-        """
+        """Show the arena from above ('top'), in 3-D ('solid') or 'both'."""
         if view not in VIEWS:
             raise ParameterError(f"view must be one of {list(VIEWS)}, but it was {shown(view)}.")
         self._props["view"] = view
         self.update()
 
     def set_show(self, shown: Mapping[str, bool]) -> None:
-        """Show or hide layers; other layers stay as they are.
-
-        Raises:
-            ParameterError: If there is no such layer.
-        """
+        """Show or hide layers; other layers stay as they are."""
         for name in shown:
             if name not in SHOWN:
                 raise ParameterError(f"a layer must be one of {list(SHOWN)}, but it was {name!r}.")

@@ -235,11 +235,7 @@ class ProgramsPanel:
         self._mistake.text = ""
 
     def _store(self) -> Script:
-        """Save the program under its name and return its script; an unchanged example needs no saving.
-
-        Raises:
-            ParameterError: If the name leads out of the folder, or is that of a file that was not opened here.
-        """
+        """Save the program under its name and return its script; an unchanged example needs no saving."""
         text = self._editor.value or ""
         script, folder = self._script, self._desk.folder
         if script is not None and script.is_example and text == read_script(folder, script):
@@ -271,11 +267,7 @@ class ProgramsPanel:
         await self._start(command, self._robot.value or 1)
 
     async def _start(self, command: Command, robot: int) -> None:
-        """Start a program on a robot after stopping the one that runs there.
-
-        Raises:
-            KiksError: If it cannot start.
-        """
+        """Start a program on a robot after stopping the one that runs there."""
         desk, programs = self._desk, self._desk.programs
         desk.check_present()
         for handle in list(programs.handles):

@@ -53,9 +53,6 @@ def save_page(
         title: Its title; the programs' names if left out.
         robot: Number of the robot whose readings, speeds, time and wire are shown; a run without a robot has none.
         on_progress: Called now and then with the share that is done.
-
-    Raises:
-        KiksError: If there is no such robot, the recording is damaged, or the file cannot be written.
     """
     figures = panels_of(recording, robot=robot)
     frames = RunFrames(recording.log, on_progress)

@@ -51,9 +51,6 @@ class RunFrames:
         checkpoint_count: Number of checkpoints.
         equal_count: How many of them were the same, to the bit.
         state_hash: The recorded hash of the state at the last checkpoint.
-
-    Raises:
-        KiksError: If the recording is damaged.
     """
 
     def __init__(self, log: RecordedLog, on_progress: Callable[[float], None] = lambda share: None) -> None:

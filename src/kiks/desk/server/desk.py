@@ -172,11 +172,7 @@ class Desk:
         return any(command is not None for command in self._commands)
 
     def begin(self) -> None:
-        """Start the programs of this world; those of later worlds start with them. A recording is played.
-
-        Raises:
-            KiksError: If one of them cannot start.
-        """
+        """Start the programs of this world; those of later worlds start with them. A recording is played."""
         self._has_begun = True
         self.programs.begin()
         if (past := self.past) is not None:
@@ -241,20 +237,12 @@ class Desk:
         return await self.shown.do(act)
 
     async def change(self, act: Callable[[Simulation], Done]) -> Done:
-        """Do that with a function that changes the world.
-
-        Raises:
-            ParameterError: If the past is shown.
-        """
+        """Do that with a function that changes the world."""
         self.check_present()
         return await self.do(act)
 
     def check_present(self) -> None:
-        """Check that the present is shown, which may be changed.
-
-        Raises:
-            ParameterError: If the past is shown.
-        """
+        """Check that the present is shown, which may be changed."""
         if self.past is not None:
             back = "'Back to now' or " if self.looking.has_present else ""
             raise ParameterError(
@@ -269,8 +257,6 @@ class Desk:
 
         Raises:
             LinkError: If the world cannot be replaced.
-            ParameterError: If the project or one of its programs is not valid.
-            ArenaError: If a thing has no free place.
         """
         await self._put(project, commands_of(project, self.folder))
 
@@ -325,11 +311,7 @@ class Desk:
             self._retired.pop().close()
 
     async def present_project(self, world: DeskWorld | None = None) -> Project:
-        """Return the project with the poses in a world: the one that is shown if left out.
-
-        Raises:
-            ArenaError: If there is no room for a thing that a gripper holds up.
-        """
+        """Return the project with the poses in a world: the one that is shown if left out."""
         world, project = world or self.shown, self.project
         return replace(await world.do(lambda sim: project_of(sim, project)), speed=self.present.gate.speed)
 
@@ -346,11 +328,7 @@ class Desk:
         await world.do(lambda _: world.pause())
 
     async def go_on(self) -> None:
-        """Resume simulated time; where the past ends, the present goes on, and a recording begins again.
-
-        Raises:
-            KiksError: If the recording is damaged.
-        """
+        """Resume simulated time; where the past ends, the present goes on, and a recording begins again."""
         await self.looking.turn_at_the_end()
         world = self.shown
         await world.do(lambda _: world.go_on())
@@ -361,20 +339,12 @@ class Desk:
         await world.do(lambda _: world.step(seconds))
 
     async def set_speed(self, speed: float | None) -> None:
-        """Set the speed [simulated seconds per real second]; None for full speed.
-
-        Raises:
-            ParameterError: If it is out of range.
-        """
+        """Set the speed [simulated seconds per real second]; None for full speed."""
         world = self.shown
         await world.do(lambda _: world.set_speed(speed))
 
     async def halt(self) -> None:
-        """Stop all programs and all robots.
-
-        Raises:
-            ParameterError: If the past is shown.
-        """
+        """Stop all programs and all robots."""
         self.check_present()
         for handle in list(self.programs.handles):
             self.programs.stop(handle)
@@ -393,7 +363,6 @@ class Desk:
 
         Raises:
             LinkError: If the world cannot be replaced, or the present is shown.
-            KiksError: If it cannot begin.
         """
         past = self._past_to_leave()
         sim = await past.do(lambda _: past.let_go())
@@ -412,8 +381,6 @@ class Desk:
 
         Raises:
             LinkError: If the world cannot be replaced, or the present is shown.
-            ParameterError: If its programs cannot run again.
-            KiksError: If it cannot begin.
         """
         past = self._past_to_leave()
         if reason := self.why_not_again():
@@ -445,11 +412,7 @@ class Desk:
     # ---- checkpoints ----
 
     async def mark(self) -> None:
-        """Take a checkpoint for `reset`.
-
-        Raises:
-            ParameterError: If the past is shown.
-        """
+        """Take a checkpoint for `reset`."""
         self.check_present()
         await self.mark_present()
 
@@ -458,11 +421,7 @@ class Desk:
         self._mark = await self.present.do(lambda sim: sim.checkpoint())
 
     async def reset(self) -> None:
-        """Restore the last checkpoint, or the initial state; time and programs go on.
-
-        Raises:
-            ParameterError: If the past is shown.
-        """
+        """Restore the last checkpoint, or the initial state; time and programs go on."""
         self.check_present()
         await self.reset_present()
 
@@ -478,11 +437,7 @@ class Desk:
     # ---- hands ----
 
     async def grab(self, owner: str, what: str, index: int) -> None:
-        """Let the hand of `owner` take a thing.
-
-        Raises:
-            ParameterError: If there is no such thing, another hand has it, or the past is shown.
-        """
+        """Let the hand of `owner` take a thing."""
         world = self.present
 
         def take(_sim: Simulation) -> None:

@@ -78,9 +78,6 @@ class DeskWorld:
         gate: Where its time passes.
         hands: The things that people hold.
         meter: Measures how fast its time passes.
-
-    Raises:
-        ParameterError: If the speed is out of range.
     """
 
     def __init__(self, sim: Simulation, speed: float | None) -> None:
@@ -124,11 +121,7 @@ class DeskWorld:
         self.gate.step(seconds)
 
     def set_speed(self, speed: float | None) -> None:
-        """Set the speed [simulated seconds per real second]; None for full speed.
-
-        Raises:
-            ParameterError: If it is out of range.
-        """
+        """Set the speed [simulated seconds per real second]; None for full speed."""
         self.gate.set_speed(speed, self.sim.now_ns)
 
     def drop_all(self) -> None:

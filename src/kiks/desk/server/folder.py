@@ -64,12 +64,7 @@ class Folder:
         return sorted(found, key=str.lower)[:LISTED_MAX]
 
     def open(self, name: str) -> Project:
-        """Read a project, an arena or a picture.
-
-        Raises:
-            ParameterError: If the name leads out of the folder.
-            ArenaError: If the file is missing, damaged, or of another kind.
-        """
+        """Read a project, an arena or a picture."""
         path, version = self._path(name, OPENED), self._version(name)
         project = Project.load(path)
         self._known[name] = version
@@ -82,11 +77,6 @@ class Folder:
             project: The project.
             name: Name of the file, .kiks if it has no ending.
             may_replace: Whether to replace an existing file as it was when it was opened, saved or asked about here.
-
-        Raises:
-            ParameterError: If the name leads out of the folder, is not valid or is taken, or the file has changed
-                or cannot be written.
-            ArenaError: If the arena does not fit into the file.
         """
         full = self.full_name(name)
         path = self._path(full, SAVED)
@@ -97,11 +87,7 @@ class Folder:
         return full
 
     def question(self, name: str) -> str:
-        """Return what a person is to be asked before a file is saved under a name; nothing if it would be a new one.
-
-        Raises:
-            ParameterError: If the name leads out of the folder or is not valid.
-        """
+        """Return what a person is to be asked before a file is saved under a name; nothing if it would be a new one."""
         full = self.full_name(name)
         if not self._path(full, SAVED).exists():
             return ""
@@ -143,9 +129,6 @@ def check_name(name: str, endings: tuple[str, ...]) -> None:
     Args:
         name: The name, with / between folders.
         endings: Permitted endings.
-
-    Raises:
-        ParameterError: If it is not.
     """
     check_relative(name, "The name")
     for part in name.split("/"):
@@ -160,11 +143,7 @@ def check_name(name: str, endings: tuple[str, ...]) -> None:
 
 
 def encode(project: Project, name: str) -> bytes:
-    """Encode a project, or its arena alone if the name ends in .kad.
-
-    Raises:
-        ArenaError: If the arena does not fit into a .kad file.
-    """
+    """Encode a project, or its arena alone if the name ends in .kad."""
     return encode_kad(project.arena) if name.lower().endswith(".kad") else project.to_bytes()
 
 
@@ -174,10 +153,6 @@ def decode(name: str, data: bytes) -> Project:
     Args:
         name: Name of the file. Its ending tells the format; its stem becomes the name of the arena.
         data: The bytes of the file.
-
-    Raises:
-        ParameterError: If the name has another ending.
-        ArenaError: If the file is too large, damaged, or of another kind.
     """
     path = PurePosixPath(name.replace("\\", "/"))
     ending, stem = ending_of(path.name[-_NAME_MAX:], "A file", OPENED), path.stem[:_NAME_MAX] or "arena"

@@ -251,11 +251,7 @@ class Gateway:
                     viewer.tell({"kind": "error", "text": str(error)})
 
     async def _obey(self, viewer: Viewer, text: str) -> None:
-        """Execute a message.
-
-        Raises:
-            ParameterError: If it is not valid, or its thing cannot be taken.
-        """
+        """Execute a message."""
         message = _parse(text)
         kind = message["kind"]
         if kind == "ack":

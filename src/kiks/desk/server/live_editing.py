@@ -66,46 +66,23 @@ class Editing:
 
         Args:
             act: At most one step of the sketch.
-
-        Raises:
-            ParameterError: If a number is out of range, or the world has no room for the change.
-            ArenaError: If the sketch has no room for it.
         """
         await self._do(act, Sketch.take_back)
 
     async def undo(self) -> None:
-        """Undo the last step.
-
-        Raises:
-            ParameterError: If the world has no room for what was there.
-            ArenaError: If the sketch has none.
-        """
+        """Undo the last step."""
         await self._do(Sketch.undo, Sketch.redo)
 
     async def redo(self) -> None:
-        """Redo the step that was undone last.
-
-        Raises:
-            ParameterError: If the world has no room for it.
-            ArenaError: If the sketch has none.
-        """
+        """Redo the step that was undone last."""
         await self._do(Sketch.redo, Sketch.undo)
 
     async def place(self, thing: Thing) -> None:
-        """Put a robot, ball, cylinder or lamp into the world.
-
-        Raises:
-            ParameterError: If a number is out of range.
-            ArenaError: If its place is not free.
-        """
+        """Put a robot, ball, cylinder or lamp into the world."""
         await self.draw(lambda sketch: sketch.add(thing))
 
     async def remove(self, x_mm: float, y_mm: float) -> None:
-        """Remove the thing at a place.
-
-        Raises:
-            ParameterError: If no thing is there.
-        """
+        """Remove the thing at a place."""
         await self.draw(lambda sketch: sketch.remove(_thing_at(sketch, x_mm, y_mm)))
 
     async def begin(self, arena: Arena) -> None:
@@ -113,7 +90,6 @@ class Editing:
 
         Raises:
             LinkError: If the world cannot be replaced.
-            ArenaError: If there is no room for the robots.
         """
         await self.draw(lambda sketch: sketch.begin(arena))
 

@@ -81,11 +81,7 @@ class LookingBack:
             self._say(f"People cannot look back at this run: {error}")
 
     def show_recording(self, file: Path, time_ns: int) -> None:
-        """Show a recording from a time on [ns]; the present world stands still until a person goes on from there.
-
-        Raises:
-            KiksError: If it cannot be read.
-        """
+        """Show a recording from a time on [ns]; the present world stands still until a person goes on from there."""
         self._timeline.open(file)
         self.marks = self._timeline.read()
         self._present().pause()
@@ -123,11 +119,7 @@ class LookingBack:
         return None if past is None else self._timeline.run_at(past.sim.now_ns)
 
     async def file(self) -> Path:
-        """Return the file of the recording of the time that is shown, with all that has happened up to now.
-
-        Raises:
-            KiksError: If there is none, or it is damaged.
-        """
+        """Return the file of the recording of the time that is shown, with all that has happened up to now."""
         await self.tend()
         present = self._present()
         await present.do(lambda _: self._timeline.flush())
@@ -154,7 +146,6 @@ class LookingBack:
 
         Raises:
             LinkError: If there is no past.
-            KiksError: If the recording is damaged there.
         """
         self._wanted_ns = time_ns
         async with self._turn:
@@ -218,7 +209,6 @@ class LookingBack:
 
         Raises:
             LinkError: If there is no past.
-            KiksError: If the recording is damaged.
         """
         if self.past is None:
             await self.look_at(self._present().sim.now_ns)
@@ -230,7 +220,6 @@ class LookingBack:
 
         Raises:
             LinkError: If there is no past.
-            KiksError: If the recording is damaged there.
         """
         world = self.past or self._present()
         if self.past is not None or seconds < 0:
@@ -244,7 +233,6 @@ class LookingBack:
 
         Raises:
             LinkError: If there is no past.
-            KiksError: If the recording is damaged there.
         """
         world = self.past or self._present()
         mark = next_mark(self.marks, world.sim.now_ns, is_before=is_before)
@@ -258,11 +246,7 @@ class LookingBack:
         await self.look_at(time_ns)
 
     async def turn_at_the_end(self) -> None:
-        """Where the past ends, show the present, or the beginning of a recording.
-
-        Raises:
-            KiksError: If the recording is damaged.
-        """
+        """Where the past ends, show the present, or the beginning of a recording."""
         past, span = self.past, self.span
         if past is not None and span is not None and past.sim.now_ns >= span.end_ns:
             if self.has_present:

@@ -18,11 +18,7 @@ class OutsidePrograms(Protocol):
         """Return the names of those that evaluate commands, by their numbers."""
 
     def evaluate(self, number: int, command: str) -> None:
-        """Let an interpreter evaluate a command.
-
-        Raises:
-            ParameterError: If there is no such interpreter, or it does not take the command.
-        """
+        """Let an interpreter evaluate a command."""
 
 
 class PlainPrograms:
@@ -44,9 +40,5 @@ class PlainPrograms:
         return {}
 
     def evaluate(self, number: int, command: str) -> None:
-        """Refuse a command.
-
-        Raises:
-            ParameterError: Always.
-        """
+        """Refuse a command."""
         raise ParameterError(f"a command must be for a program of Octave or MATLAB, but {number} is none of them.")

@@ -131,9 +131,6 @@ class Player(DeskWorld):
 
         Returns:
             Whether this player can show it; else nothing has changed.
-
-        Raises:
-            KiksError: If the recording is damaged there.
         """
         if not self.span.begin_ns <= time_ns <= self.span.end_ns:
             return False

@@ -60,20 +60,12 @@ def offered(folder: Path) -> list[Script]:
 
 
 def path_of(folder: Path, script: Script) -> Path:
-    """Return the path of a program.
-
-    Raises:
-        ParameterError: If its name leads out of the folder or is not that of a program.
-    """
+    """Return the path of a program."""
     return program_in(EXAMPLES if script.is_example else folder, script.name)
 
 
 def read_script(folder: Path, script: Script) -> str:
-    """Return the text of a program.
-
-    Raises:
-        ParameterError: If its name leads out of the folder, or the file is too long or not a readable text.
-    """
+    """Return the text of a program."""
     path = path_of(folder, script)
     try:
         if path.stat().st_size > SIZE_LIMIT:
@@ -97,10 +89,6 @@ def save_script(
         text: The program.
         may_replace: The script that it was read from; no other file is replaced.
         known: The text that was read or saved last; another one is not replaced. Any if left out.
-
-    Raises:
-        ParameterError: If the name leads out of the folder or is taken, the script was changed meanwhile, the text is
-            too long, or it cannot be written.
     """
     name = name.strip()
     name = name if name.endswith(".py") else f"{name}.py"
@@ -167,11 +155,7 @@ def find_mistake(text: str) -> Mistake | None:
 
 
 def split_arguments(text: str) -> list[str]:
-    """Split a line into words as a shell does.
-
-    Raises:
-        ParameterError: If a quote is not closed.
-    """
+    """Split a line into words as a shell does."""
     try:
         return shlex.split(text)
     except ValueError as error:

@@ -89,7 +89,6 @@ class DeskServer:
 
         Raises:
             LinkError: If it cannot listen there.
-            ParameterError: If it already listens at another port.
         """
         with self._lock:
             if self._socket is not None:

@@ -86,7 +86,6 @@ class Shown:
 
     Raises:
         LinkError: If it cannot listen there.
-        ParameterError: If the server already listens at another port.
     """
 
     def __init__(self, desk: Desk, *, host: str = "127.0.0.1", port: int | None = None) -> None:
@@ -171,7 +170,6 @@ def show(
 
     Raises:
         LinkError: If the desk cannot listen there.
-        ParameterError: If an argument is out of range, or the server already listens at another port.
     """
     check_kind("is_alive", is_alive, bool)
     port = None if port is None else check_count("port", port, 0, 65535, "Leave it out for a free one.")

@@ -106,9 +106,6 @@ class Part:
         recorder: As above.
         own_recorder: The same if the desk has begun it, into a temporary file; else None.
         marks: What has happened in it, as far as it was read.
-
-    Raises:
-        KiksError: If the file cannot be read.
     """
 
     def __init__(self, file: Path, run: Run | None = None, recorder: RunRecorder | None = None) -> None:
@@ -150,11 +147,7 @@ class Part:
                 self.file.unlink(missing_ok=True)
 
     def read(self) -> None:
-        """Read what has happened since the last call.
-
-        Raises:
-            KiksError: If the recording is damaged.
-        """
+        """Read what has happened since the last call."""
         self._events_log.find_more()
         for event in self._events.read():
             if self.end_ns is None or event.time_s <= s_from_ns(self.end_ns):
@@ -190,11 +183,7 @@ class Timeline:
     # ---- recording; with the lock of the present world ----
 
     def open(self, file: Path) -> None:
-        """Take a recording that exists.
-
-        Raises:
-            KiksError: If it cannot be read.
-        """
+        """Take a recording that exists."""
         self.parts = (Part(file),)
 
     def begin(self, sim: Simulation, run: Run | None) -> None:
@@ -203,9 +192,6 @@ class Timeline:
         Args:
             sim: The world.
             run: How it began; None if programs that are not this desk's own drive it.
-
-        Raises:
-            KiksError: If it cannot be recorded.
         """
         before, self.parts = self.parts, ()
         for part in before:
@@ -214,11 +200,7 @@ class Timeline:
         self._record(sim, run)
 
     def branch(self, sim: Simulation) -> None:
-        """Keep what was before the present time of a world, and record that from now on.
-
-        Raises:
-            KiksError: If it cannot be recorded.
-        """
+        """Keep what was before the present time of a world, and record that from now on."""
         now_ns = sim.now_ns
         for part in self.parts:
             if part.begin_ns >= now_ns:
@@ -261,7 +243,6 @@ class Timeline:
         """Return how many bytes all temporary recordings, which lie in a folder, may have now.
 
         Raises:
-            ParameterError: If the disk has too little space for any.
             OSError: If the folder or a file is gone.
         """
         room = room_of(folder)
@@ -291,11 +272,7 @@ class Timeline:
         )
 
     def flush(self) -> None:
-        """Write all that has happened up to now, and find it.
-
-        Raises:
-            KiksError: If the recording is damaged.
-        """
+        """Write all that has happened up to now, and find it."""
         if self.parts and (last := self.parts[-1]).end_ns is None and last.recorder is not None:
             last.recorder.flush()
             last.log.find_more()
@@ -359,20 +336,13 @@ class Timeline:
         Args:
             time_ns: The time [ns].
             now_ns: The time of the present world [ns].
-
-        Raises:
-            KiksError: If the recording is damaged there.
         """
         part = self.part_at(time_ns)
         end_ns = min(now_ns if part.end_ns is None else part.end_ns, part.log.end_ns)
         return Replay(part.log, min(max(time_ns, part.begin_ns), end_ns)), Span(part.begin_ns, end_ns)
 
     def read(self) -> list[Mark]:
-        """Read what has happened since the last call, and return all of it.
-
-        Raises:
-            KiksError: If a recording is damaged.
-        """
+        """Read what has happened since the last call, and return all of it."""
         marks: list[Mark] = []
         with self._reading:
             for part in self.parts:
