@@ -39,7 +39,7 @@ RIDES = (("default", Follow), ("default", Avoid), ("office", Follow), ("office",
 MOMENTS, LOOPS_BETWEEN = 400, 5
 TICK = 1000  # all moments are taken to be this tick
 
-RESPONSES = ("thesis", "fast", "standin", "reflection")
+RESPONSES = ("thesis", "fast", "reflection")
 """Responses of the Khepera; the first is what the others are compared with."""
 
 PLACES, NEAREST_MM, FARTHEST_MM = 1000, 2.0, 25.0

@@ -33,8 +33,8 @@ KIKS_EMULATED_CPU = '';
 % for such a file in the current folder and on the path, there also in folders named robots. '.m' may be left out.
 KIKS_ROBOT = 'Khepera';
 
-% The model of its proximity sensors: '' the robot's own ('reflection' of a Khepera, 'curve' of a Khepera II); 'thesis',
-% 'fast' and 'standin' are of both.
+% The model of its proximity sensors: '' the robot's own ('reflection' of a Khepera, 'curve' of a Khepera II); 'thesis'
+% and 'fast' are of both.
 KIKS_RESPONSE = '';
 
 % 1: sensors are noisy; 0: they are not.
@@ -60,7 +60,7 @@ KIKS_WINDOW = [];
 
 % The brightness of things as sensors see them, 1 black to 255 white. [] suits the response: white balls, wooden
 % cylinders and the robot's own brightness with the responses of real robots; the values of KiKS 2.2.0 (ball 25,
-% cylinder 70, robot 120) with 'thesis', 'fast' and 'standin', which use its rule of colours. A sensor that measures
+% cylinder 70, robot 120) with 'thesis' and 'fast', which use its rule of colours. A sensor that measures
 % reflected light hardly sees a ball of 25. A KIKS_COLOR_ROBOT of -X stands for X black and X white stripes around
 % each robot.
 KIKS_COLOR_BALL = [];

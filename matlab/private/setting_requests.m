@@ -18,7 +18,7 @@ if any(p.KIKS_COLOR_ROBOT < 0)
     p.KIKS_COLOR_ROBOT = [];
 end
 greys = {p.KIKS_COLOR_BALL, p.KIKS_COLOR_CYLINDER, p.KIKS_COLOR_ROBOT};
-if any(strcmpi(p.KIKS_RESPONSE, {'thesis', 'fast', 'standin'}))
+if any(strcmpi(p.KIKS_RESPONSE, {'thesis', 'fast'}))
     of_the_old = struct2cell(greys_of_kiks_2())';
     is_open = cellfun(@isempty, greys);
     greys(is_open) = of_the_old(is_open);

@@ -175,7 +175,7 @@ def test_no_data_is_said(tmp_path, monkeypatch):
 def made_up():
     gaps, angles = np.arange(5.0, 45.0, 6.0), np.tile(np.arange(0.0, 360.0, 20.0), (7, 1))
     wall = Samples("wall", math.inf, gaps, angles, np.zeros((*angles.shape, 8), np.int64))
-    counts = np.rint(models.kiks2(wall)).astype(np.int64)
+    counts = np.rint(models.thesis(wall)).astype(np.int64)
     return Samples("wall", math.inf, gaps, angles, counts)
 
 
@@ -234,5 +234,5 @@ def test_published_formulas():
     x = (27.5 - 13 * math.sqrt(2)) / 10
     assert models.enki(wall)[0, 0, 1] == pytest.approx(1200 * 6.19 / (x * x + 1.8 * x + 7))
     far = Samples("wall", math.inf, np.array([200.0]), np.array([[0.0]]), np.zeros((1, 1, 8), np.int64))
-    for model in (models.default, models.thesis, models.fast, models.kiks2, models.webots, models.enki):
+    for model in (models.default, models.thesis, models.fast, models.webots, models.enki):
         assert model(far).max() <= 20

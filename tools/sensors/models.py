@@ -22,7 +22,6 @@ Model = Callable[[Samples], Floats]
 _CELL_MM = 0.25
 _ROOM_MM = 100.0  # what a model may look at around the robot
 _PLAN = PLACES["protocol"]
-_KIKS2_WEIGHTS = (0.35, 0.33, 0.69, 0.43, 0.69, 0.33, 0.35)  # kiks-behaviour.md 3.1.1
 
 
 def default(samples: Samples, response: str | None = None) -> Floats:
@@ -72,15 +71,6 @@ def fast(samples: Samples) -> Floats:
     return counts
 
 
-def kiks2(samples: Samples) -> Floats:
-    """Answer with the formula that stands in for the lost table of KiKS 2.2.0 (kiks-behaviour.md 3.1 and 3.1.1)."""
-    lengths_mm = ray_lengths_mm(samples, Fan.spread(*_PLAN, range_mm=53.0))
-    # Rays were sampled every 6 mm: a surface at d counts as 51 - d to 55 - d, and 49 at most.
-    near = np.clip(53.0 - lengths_mm, 0.0, 49.0) / 50.0
-    total = near**1.75 @ np.array(_KIKS2_WEIGHTS)
-    return np.asarray(MAXIMUM_COUNTS * (1.0 - np.exp(-(total**1.61))), np.float64)
-
-
 def webots(samples: Samples) -> Floats:
     """Answer with one ray for each sensor: 1023 at 0 mm, falling on a line to 0 at 50 mm (Webots' Khepera)."""
     fan = Fan.spread(*_PLAN, offsets_deg=(0.0,))
@@ -118,7 +108,6 @@ MODELS: dict[str, tuple[str, Model]] = {
     "default": ("KiKS (default)", default),
     "thesis": ("thesis networks", thesis),
     "fast": ("thesis, fast table", fast),
-    "kiks2": ("KiKS 2.2.0, stand-in", kiks2),
     "webots": ("Webots, one ray", webots),
     "enki": ("Enki, three rays", enki),
     "floor": ("neighbouring samples", neighbours),

@@ -40,9 +40,6 @@ CURVE_POINT_COUNT = 129
 LIGHT_MM = 20.0
 """Length of a ray at which the light of a sensor is given [mm]."""
 
-STANDIN_RANGE_MM, STANDIN_REACH = 50.0, 1.06
-"""Range of KiKS 2.2.0, and how much farther its sampled rays saw, in ranges (kiks-behaviour.md 3.1)."""
-
 _NEARER_MM, _ROUNDINGS = 1.01, 1e-6
 
 PARAMETERS = np.dtype(
@@ -164,9 +161,7 @@ def _pack_response(robot: Any, spec: RobotSpec) -> None:
     geometry: Proximity | NetworkResponse = proximity
     radius_mm: Sequence[float] = proximity.mount_radius_mm
     reach_mm = proximity.range_mm
-    if proximity.response == "standin":
-        robot["range_mm"], reach_mm = STANDIN_RANGE_MM, STANDIN_RANGE_MM * STANDIN_REACH
-    elif proximity.response in NETWORK_RESPONSES:
+    if proximity.response in NETWORK_RESPONSES:
         geometry = networks = NetworkResponse.load()
         robot["range_mm"] = reach_mm = networks.range_mm
         if proximity.response == "fast":

@@ -14,7 +14,7 @@ from kiks.model.data_file import Number, OneOf, Switch, Text, Whole, record
 SENSOR_COUNT = 8
 """Infra-red sensors of a Khepera, clockwise from the left side (khepera-protocol.md 4.14)."""
 
-RESPONSES = ("reflection", "thesis", "fast", "standin", "curve")
+RESPONSES = ("reflection", "thesis", "fast", "curve")
 """The responses (`kiks.engine.sensing.responses`)."""
 
 JITTER_POINT_LIMIT = 51

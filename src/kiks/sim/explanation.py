@@ -23,7 +23,6 @@ RESPONSES = {
     "reflection": "the light that comes back along each ray, and the share of it above a threshold",
     "thesis": "the thesis's networks, trained on a real robot",
     "fast": "the thesis's table, which takes lengths in steps of 10 mm",
-    "standin": "a formula in place of the table of KiKS 2.2.0",
     "curve": "counts against distance as they were measured on a real robot",
 }
 """What each response goes by (docs/sensors.md)."""

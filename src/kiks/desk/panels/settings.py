@@ -27,7 +27,6 @@ MODELS = {
     "thesis": "thesis: the networks of the thesis of 2001",
     "fast": "fast: a table of those networks",
     "curve": "curve: a measured curve of one colour",
-    "standin": "stand-in: a simple formula",
 }
 
 BAUDS = [9600, 19200, 38400, 57600, 115200]

@@ -6,7 +6,6 @@ the response, too (`kiks.engine.parameters`); baseline, noise and rounding are c
 gain is a factor on the light if the response computes it, otherwise on the counts.
 
 * REFLECTION: the light that returns along the rays, and its share above a threshold (`kiks.model.robot.Reflection`).
-* STANDIN: a formula in place of the lost table of KiKS 2.2.0 (kiks-behaviour.md 3.1.1).
 * THESIS, FAST: the thesis's networks, and its table made of them (`kiks.engine.sensing.thesis_networks`).
 * CURVE: measured counts over distance, times reflectance, over rays that are weighted by their angle off the axis
   (khepera-protocol.md 8.6).
@@ -16,24 +15,20 @@ A new response needs a number here, a name in `kiks.model.robot.RESPONSES`, a ke
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
 
 from kiks.engine.compiling import entry, inlined, kernel
-from kiks.engine.numbers import exponential, power
-from kiks.engine.parameters import CURVE_POINT_COUNT, RAY_COUNT, STANDIN_REACH
+from kiks.engine.parameters import CURVE_POINT_COUNT, RAY_COUNT
 from kiks.engine.sensing.thesis_networks import network_count, table_count
 from kiks.engine.simd.lanes import LANES, load, narrow, store, total
 from kiks.engine.simd.masks import choose
 from kiks.engine.simd.stack_arrays import stack_floats, stack_narrow
 from kiks.model.materials import BLACK_REFLECTANCE
 
-REFLECTION, THESIS, FAST, STANDIN, CURVE = 0, 1, 2, 3, 4
+REFLECTION, THESIS, FAST, CURVE = 0, 1, 2, 3
 """Responses in the order of `kiks.model.robot.RESPONSES`."""
-
-_WEIGHTS = (0.35, 0.33, 0.69, 0.43, 0.69, 0.33, 0.35)  # kiks-behaviour.md 3.1.1
 
 
 @kernel
@@ -70,21 +65,6 @@ def reflection_count(parameters: Any, sensor: Any, lengths_mm: Any, cosines: Any
     return parameters.maximum_counts * max(rounded, 0.0)
 
 
-@kernel
-def standin_count(range_mm: Any, lengths_mm: Any, brightnesses: Any) -> Any:
-    """Return the count of the stand-in; it uses lengths relative to the robot's range."""
-    total, per_range = 0.0, 1.0 / range_mm
-    for ray in range(RAY_COUNT):
-        if brightnesses[ray] > 0.0:
-            inverted = min(max(STANDIN_REACH - lengths_mm[ray] * per_range, 0.0), 0.98)
-            near = inverted * darkness(brightnesses[ray])
-            root = math.sqrt(near)
-            total += _WEIGHTS[ray] * near * root * math.sqrt(root)  # to the power of 1.75
-    if total == 0.0:
-        return 0.0
-    return 1023.0 * (1.0 - exponential(-power(total, 1.61)))
-
-
 @inlined
 def nearnesses(range_mm: Any, lengths_mm: Any, brightnesses: Any) -> Any:
     """Return the inputs of the thesis's networks: 1 at the sensor, 0 out of range, less for a dark surface; `Lanes`."""
@@ -93,8 +73,11 @@ def nearnesses(range_mm: Any, lengths_mm: Any, brightnesses: Any) -> Any:
 
 
 @kernel
-def curve_count(parameters: Any, sensor: Any, lengths_mm: Any, brightnesses: Any) -> Any:
+def curve_count(parameters: Any, sensor: Any, lengths: Any, shades: Any) -> Any:
     """Return the count of a measured curve, whose values up to its range are in the robot's record."""
+    lengths_mm, brightnesses = stack_floats(LANES), stack_floats(LANES)
+    store(lengths_mm, lengths)
+    store(brightnesses, shades)
     total, points_per_mm = 0.0, (CURVE_POINT_COUNT - 1) / parameters.range_mm
     for ray in range(RAY_COUNT):
         place = min(max(0.0, lengths_mm[ray] * points_per_mm), CURVE_POINT_COUNT - 1.001)
@@ -117,18 +100,7 @@ def respond(networks: Any, parameters: Any, sensor: Any, lengths_mm: Any, cosine
         if parameters.response == THESIS:
             return gain * network_count(networks[0], sensor, seen)
         return gain * table_count(networks[0].table, seen)
-    return gain * respond_one_by_one(parameters, sensor, lengths_mm, brightnesses)
-
-
-@kernel
-def respond_one_by_one(parameters: Any, sensor: Any, lengths: Any, shades: Any) -> Any:
-    """Return the counts without the gain, for responses that take rays one by one."""
-    lengths_mm, brightnesses = stack_floats(LANES), stack_floats(LANES)
-    store(lengths_mm, lengths)
-    store(brightnesses, shades)
-    if parameters.response == STANDIN:
-        return standin_count(parameters.range_mm, lengths_mm, brightnesses)
-    return curve_count(parameters, sensor, lengths_mm, brightnesses)
+    return gain * curve_count(parameters, sensor, lengths_mm, brightnesses)
 
 
 @entry
