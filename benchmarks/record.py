@@ -19,7 +19,7 @@ from statistics import median
 import kiks
 from calibration import calibration_loops_per_s, report
 from kiks.demos.follow import Follow
-from kiks.films.film import save_film
+from kiks.export.film import save_film
 
 ARENA = Path(__file__).parent.parent / "examples" / "arenas" / "office.toml"
 SECONDS, ROUNDS, HOUR_S, JUMPS = 300.0, 15, 3600.0, 20

@@ -64,7 +64,7 @@ def show_match(
 
 def _play(match: Match, players: list[Command], picture: Path, record: Path | None) -> None:
     """Play the match to the end, print the result, and draw it."""
-    from kiks.drawing import save_picture
+    from kiks.export.pictures import save_picture
 
     end_as_with_ctrl_c()
     start_s = perf_counter()

@@ -130,12 +130,12 @@ _MODULES = {"controllers", "measures", "tasks"}
 """Names of whole modules."""
 
 upwards.load_arena_file.provide("kiks.model.arena_formats", "load_arena_file")
-upwards.draw_arena.provide("kiks.drawing", "arena_for_notebook")
-upwards.draw_simulation.provide("kiks.drawing", "simulation_for_notebook")
-upwards.draw_recording.provide("kiks.plots", "recording_for_notebook")
+upwards.draw_arena.provide("kiks.export.pictures", "arena_for_notebook")
+upwards.draw_simulation.provide("kiks.export.pictures", "simulation_for_notebook")
+upwards.draw_recording.provide("kiks.export.figures", "recording_for_notebook")
 upwards.record_simulation.provide("kiks.recording.recorder", "RunRecorder")
-upwards.plot_simulation.provide("kiks.plots", "figure_of_run")
-upwards.plot_recordings.provide("kiks.plots", "figure_of")
+upwards.plot_simulation.provide("kiks.export.figures", "figure_of_run")
+upwards.plot_recordings.provide("kiks.export.figures", "figure_of")
 upwards.show_in_browser.provide("kiks.desk.server.show", "show")
 
 if "kiks.ports.pyserial" not in serial.protocol_handler_packages:

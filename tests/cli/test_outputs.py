@@ -12,10 +12,10 @@ import pytest
 import typer
 from tests.cli.test_cli import RESULTS, WANDER
 
-from kiks import drawing
 from kiks.cli import app
 from kiks.cli.outputs import BEGINNINGS, PICTURES
 from kiks.errors import ParameterError
+from kiks.export import pictures
 from kiks.model.arena import Arena
 from kiks.model.arena_file import save_arena
 
@@ -57,7 +57,7 @@ def words_for(output: tuple[str, str], path: Path) -> list[str]:
 
 
 def test_pictures_are_those_that_can_be_drawn() -> None:
-    assert set(PICTURES) == set(drawing.PICTURES)
+    assert set(PICTURES) == set(pictures.PICTURES)
 
 
 def test_all_outputs_are_known() -> None:

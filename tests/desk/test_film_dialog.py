@@ -11,7 +11,7 @@ from playwright.sync_api import expect
 from tests.at_length import at_length
 from tests.desk.visitor import Visitor
 
-from kiks.films.film import FPS
+from kiks.export.film import FPS
 
 pytestmark = pytest.mark.slow
 

@@ -10,7 +10,7 @@ import pytest
 from tests.at_length import at_length
 from tests.matlab.octave import needs_octave, run
 
-from kiks.sheet import robot_colour
+from kiks.export.sheet import robot_colour
 
 pytestmark = [needs_octave, pytest.mark.slow]
 

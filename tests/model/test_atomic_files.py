@@ -15,8 +15,8 @@ import pytest
 import kiks
 from kiks.clock.thinking import save_thinking
 from kiks.control.controllers import linear
-from kiks.drawing import check_picture, draw_world, save_picture
 from kiks.errors import ParameterError
+from kiks.export.pictures import check_picture, draw_world, save_picture
 from kiks.learn.champion import Champion
 from kiks.model.arena import Arena
 from kiks.model.arena_file import save_arena

@@ -22,7 +22,7 @@ from tools.campaigns.recordings import Parts, many_entries, many_parts, sound, s
 import kiks
 from kiks.engine.state import ROBOT
 from kiks.errors import KiksError, ParameterError
-from kiks.films.film import save_film
+from kiks.export.film import save_film
 from kiks.recording import motion
 from kiks.recording.check import check_recording
 from kiks.recording.entries import Entry

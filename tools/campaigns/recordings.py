@@ -17,10 +17,10 @@ import numpy as np
 from tools.campaigns.hostile import NUMBERS, mutated, mutated_text
 
 import kiks
-from kiks.desk.run_page.page_file import save_page
 from kiks.engine.state import BODY, ROBOT
-from kiks.films.film import save_film
-from kiks.plots import save_plot
+from kiks.export.figures import save_plot
+from kiks.export.film import save_film
+from kiks.export.page import save_page
 from kiks.recording import motion as motion_block
 from kiks.recording.check import check_recording
 from kiks.recording.entries import Columns, Entry, block_of

@@ -195,7 +195,7 @@ def _run(scene: Scene, behaviour: str, total_s: float, picture: Path) -> None:
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn
 
-    from kiks.drawing import Trace, save_simulation
+    from kiks.export.pictures import Trace, save_simulation
 
     end_as_with_ctrl_c()
     sim = scene.sim

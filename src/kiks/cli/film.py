@@ -40,7 +40,7 @@ def film(
 
     Example: kiks film run.mcap run.mp4 --speed 4 --follow 1
     """
-    from kiks.films.film import save_film
+    from kiks.export.film import save_film
     from kiks.recording.recording import Recording
 
     if plain and robot is not None:
@@ -79,7 +79,7 @@ def photo(
 
     Example: kiks photo run.mcap run.png --time 12.5 --follow 1
     """
-    from kiks.films.photo import save_photo
+    from kiks.export.photo import save_photo
     from kiks.recording.recording import Recording
 
     save_photo(Recording(file), out, time_s=time, size=_parse_size(size), follow=follow, zoom=zoom, samples=samples)

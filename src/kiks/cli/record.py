@@ -81,7 +81,7 @@ def recorded(
             texts = {f"{number}-{path.name}": _text_of(path) for number, path in enumerate(programs, 1)}
             at_the_end.enter_context(RunRecorder(sim, record, programs=texts, about={"command": _command_line()}))
         if picture is not None:
-            from kiks.drawing import Trace, save_simulation
+            from kiks.export.pictures import Trace, save_simulation
 
             trace = Trace(sim, points_max=max(POINTS_MAX // max(sim.robot_count, 1), LEAST_POINTS_MAX))
             at_the_end.callback(save_simulation, sim, picture, trace)

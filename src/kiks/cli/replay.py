@@ -99,7 +99,7 @@ def plot(
 
     Example: kiks plot avoid.mcap maze.mcap --out both.pdf
     """
-    from kiks.plots import save_plot
+    from kiks.export.figures import save_plot
     from kiks.recording.recording import Recording
 
     save_plot([Recording(file) for file in files], out, robot=robot)
@@ -125,7 +125,7 @@ def page(
     Example: kiks page run.mcap --title "Exercise 3, Ada Lovelace"
     """
     ready_engine()
-    from kiks.desk.run_page.page_file import save_page
+    from kiks.export.page import save_page
     from kiks.recording.recording import Recording
 
     recording = Recording(file)

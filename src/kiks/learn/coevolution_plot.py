@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+from kiks.export.figures import save_figure
 from kiks.learn.coevolution import Coevolution, Tournament
-from kiks.plots import save_figure
 
 COLOURS = ("tab:red", "tab:blue")
 """Colours of the sides."""

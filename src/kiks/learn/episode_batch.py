@@ -13,8 +13,8 @@ from kiks.batch.batch import Batch
 from kiks.batch.initial_state import random_starts
 from kiks.control.measures import contacts, path_mm
 from kiks.control.senses import SENSES
-from kiks.drawing import draw_world
 from kiks.errors import ParameterError
+from kiks.export.pictures import draw_world
 from kiks.learn.env_specs import EnvSpec
 from kiks.model.robot import RobotSpec
 

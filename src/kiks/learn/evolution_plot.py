@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
+from kiks.export.figures import save_figure
 from kiks.learn.archive import Archive
 from kiks.learn.baselines import Baselines
 from kiks.learn.champion import Champion
 from kiks.learn.evolution import Evolution
 from kiks.learn.task import Axis
-from kiks.plots import save_figure
 
 CHAMPION_MARK: dict[str, Any] = {
     "marker": "*",

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from kiks.export.figures import save_figure
 from kiks.learn.baselines import Baselines
 from kiks.learn.evolution_plot import draw_baselines
 from kiks.learn.exam import PASS_SHARE
 from kiks.learn.results import Result, curves, passed_count
-from kiks.plots import save_figure
 
 COLOURS = ("tab:blue", "tab:orange")
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from kiks.films.film import check_film, save_film
+from kiks.export.film import check_film, save_film
 from kiks.model.atomic_files import check_writable
 from kiks.recording.recorder import RunRecorder
 from kiks.recording.recording import Recording

@@ -11,8 +11,8 @@ from nicegui import ui
 from kiks.desk.panels.widgets import told, with_props
 from kiks.desk.server.desk import Desk
 from kiks.errors import ParameterError, library
-from kiks.films.film import FPS, save_film
-from kiks.films.video_file import ENDINGS
+from kiks.export.film import FPS, save_film
+from kiks.export.video_file import ENDINGS
 from kiks.recording.recording import Recording
 from kiks.units import s_from_ns
 

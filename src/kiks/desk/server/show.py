@@ -12,11 +12,11 @@ from collections.abc import Callable
 from typing import Any
 
 from kiks.desk.server.desk import Desk, NewsHandler
-from kiks.desk.server.frames import pack_frame
 from kiks.desk.server.outside_programs import PlainPrograms
 from kiks.desk.server.server import SERVER
 from kiks.engine.code_cache import is_compiled
 from kiks.engine.compiling import LAST
+from kiks.export.frames import pack_frame
 from kiks.model.checks import check_count, check_kind
 from kiks.sim.simulation import Simulation
 from kiks.units import NS_PER_S

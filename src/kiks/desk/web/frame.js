@@ -1,6 +1,6 @@
 /* One frame of the feed: typed views of the received bytes. This module copies nothing and draws nothing.
 
-   The layout is that of kiks/desk/server/frames.py: a head of 32 bytes, then 32 words for each robot, 3 for each body,
+   The layout is that of kiks/export/frames.py: a head of 32 bytes, then 32 words for each robot, 3 for each body,
    4 for each lamp, 68 bytes for each camera and 56 ray lengths for each robot. It is little endian, like the arrays of
    all browsers. */
 

@@ -18,7 +18,7 @@ class RecordedFrame extends Frame {
   share() { return this.part; }
 }
 
-/** Unpack the text of kiks/desk/run_page/run_frames.py: {period_s, scenes, shapes, groups: [{size, count, bytes}]}. */
+/** Unpack the text of kiks/export/run_frames.py: {period_s, scenes, shapes, groups: [{size, count, bytes}]}. */
 export async function unpackRun(text) {
   const packed = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
   const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));

@@ -1,4 +1,4 @@
-/* The page of a recorded run (see kiks/desk/run_page): the player with the desk's own views, and what belongs to it. */
+/* The page of a recorded run (see kiks/export/page.py): the player with the desk's own views, and what belongs to it. */
 
 import { setPageFeed } from "./feed.js";
 import { Player } from "./player.js";

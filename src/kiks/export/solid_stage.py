@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from kiks.engine.state import BALL
 from kiks.errors import library
-from kiks.films.stage import OUTSIDE, Canvas, Ground, Pixels
+from kiks.export.sheet import INK, Colour, robot_colour, tint
+from kiks.export.stage import OUTSIDE, Canvas, Ground, Pixels
 from kiks.model.arena import Arena
 from kiks.model.robot_parts import Body
 from kiks.recording.moments import Moment
-from kiks.sheet import INK, Colour, robot_colour, tint
 
 WALL_MM, ROBOT_MM, CYLINDER_MM, CHASSIS_MM = 36.0, 32.0, 50.0, 4.0
 """Heights [mm], low enough that walls hide little; the chassis of a robot begins above the floor."""
@@ -41,7 +41,7 @@ ROUND = 40
 
 
 class SolidStage:
-    """Draws the world of a film in space, as `kiks.films.stage.Stage` does from above.
+    """Draws the world of a film in space, as `kiks.export.stage.Stage` does from above.
 
     Args:
         size: Width and height of the pictures.
@@ -74,7 +74,7 @@ class SolidStage:
         self._bodies: dict[int, Any] = {}
 
     def draw(self, moment: Moment, share: float, picture: Pixels) -> None:
-        """Draw a moment, as `kiks.films.stage.Stage.draw` does."""
+        """Draw a moment, as `kiks.export.stage.Stage.draw` does."""
         arena = moment.setup.arena
         self._ground.draw(moment, share, GROUND_PIXELS / max(arena.width_mm, arena.height_mm))
         if arena is not self._arena:

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 from PIL import Image, ImageSequence
 
 from kiks import Arena, Khepera, ParameterError, Recording, RobotSpec, Simulation
-from kiks.films.film import save_film
-from kiks.films.solid_stage import CELLS_MAX, wall_boxes
+from kiks.export.film import save_film
+from kiks.export.sheet import robot_colour
+from kiks.export.solid_stage import CELLS_MAX, wall_boxes
 from kiks.model.arena import Pose
-from kiks.sheet import robot_colour
 
 Pixels = NDArray[np.uint8]
 
@@ -92,7 +92,7 @@ def test_stripes_stand_around_robots(striped: Recording, tmp_path: Path) -> None
 
 @pytest.mark.parametrize("name", ["maze", "track", "office", "default"])
 def test_boxes_of_walls_cover_what_is_wall(name: str) -> None:
-    arena = Arena.load(Path(__file__).parents[1] / "examples" / "arenas" / f"{name}.toml")
+    arena = Arena.load(Path(__file__).parents[2] / "examples" / "arenas" / f"{name}.toml")
     cells = np.zeros_like(arena.brightness)
     step = -(-max(cells.shape) // CELLS_MAX)
     for brightness, boxes in wall_boxes(arena).items():

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from kiks.desk.server.frames import NO_HIT, arena_picture, describe_scene, describe_shapes, pack_frame
+from kiks.export.frames import NO_HIT, arena_picture, describe_scene, describe_shapes, pack_frame
 from kiks.model.arena import Arena
 from kiks.model.arena_objects import Ball, Cylinder, Lamp, Pose
 from kiks.sim.simulation import Simulation

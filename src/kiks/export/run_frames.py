@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from kiks.desk.server.frames import arena_picture, describe_scene, describe_shapes, pack_frame, scene_key
+from kiks.export.frames import arena_picture, describe_scene, describe_shapes, pack_frame, scene_key
 from kiks.recording.check import is_same
 from kiks.recording.entries import Entry
 from kiks.recording.log import HASH_LENGTH, RecordedLog

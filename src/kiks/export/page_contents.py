@@ -12,8 +12,8 @@ from pygments import highlight
 from pygments.formatters import HtmlFormatter
 from pygments.lexers import PythonLexer, TextLexer
 
-from kiks.desk.run_page.run_frames import RunFrames
 from kiks.errors import counted
+from kiks.export.run_frames import RunFrames
 from kiks.recording.analysis import all_time_shares
 from kiks.recording.recording import Recording
 from kiks.recording.tables import Table

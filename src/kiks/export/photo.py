@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kiks.drawing import check_picture, save_picture
 from kiks.engine.state import BALL
 from kiks.errors import library
-from kiks.films.film import SIZE, checked_follow, checked_size
-from kiks.films.solid_stage import (
+from kiks.export.film import SIZE, checked_follow, checked_size
+from kiks.export.pictures import check_picture, save_picture
+from kiks.export.sheet import FLOOR, INK, Colour, robot_colour, tint
+from kiks.export.solid_stage import (
     CHASSIS_MM,
     CYLINDER_MM,
     ROBOT_MM,
@@ -28,7 +29,6 @@ from kiks.model.checks import check_count
 from kiks.model.robot_parts import Body
 from kiks.recording.moments import Moment, moments
 from kiks.recording.recording import Recording
-from kiks.sheet import FLOOR, INK, Colour, robot_colour, tint
 
 SAMPLES, SAMPLES_MAX = 48, 4096
 """Rays through a pixel if nothing else is asked for, and the most: more of them are slower and less grainy."""
@@ -56,7 +56,7 @@ def save_photo(
 
     Args:
         recording: The recording.
-        path: The picture's file, .png, .jpg or another of `kiks.drawing.save_picture`.
+        path: The picture's file, .png, .jpg or another of `kiks.export.pictures.save_picture`.
         time_s: When [s]; the end of the recording if left out.
         size: Width and height [pixels].
         follow: Number of the robot in the middle; if left out, the whole arena is seen.

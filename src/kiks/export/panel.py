@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from kiks.films.stage import Pixels
+from kiks.export.sheet import INK, Colour, font, mixed, robot_colour
+from kiks.export.stage import Pixels
 from kiks.model.robot import SENSOR_COUNT
 from kiks.recording.moments import Moment
-from kiks.sheet import INK, Colour, font, mixed, robot_colour
 from kiks.units import s_from_ns
 
 WIDTH, HEIGHT, LEAST_SCALE = 250.0, 500.0, 0.7

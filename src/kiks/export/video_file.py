@@ -10,8 +10,8 @@ from typing import cast
 
 import numpy as np
 
-from kiks.films.palette import Palette
-from kiks.films.stage import Pixels
+from kiks.export.palette import Palette
+from kiks.export.stage import Pixels
 
 MP4, GIF, WEBP = ".mp4", ".gif", ".webp"
 

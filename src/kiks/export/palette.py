@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import NDArray
 
-from kiks.films.stage import Pixels
+from kiks.export.stage import Pixels
 
 EXACT = 128
 """The most frequent colours of the pictures are exactly there; so many they are."""

@@ -14,10 +14,10 @@ import pytest
 from tests.at_length import at_length
 
 from kiks import Arena, Khepera, ParameterError, Recording, Simulation
-from kiks.desk.run_page import contents
-from kiks.desk.run_page.bundle import bundle
-from kiks.desk.run_page.page_file import WEB, save_page
-from kiks.desk.run_page.run_frames import RunFrames
+from kiks.export import page_contents as contents
+from kiks.export.bundle import bundle
+from kiks.export.page import WEB, save_page
+from kiks.export.run_frames import RunFrames
 from kiks.recording.entries import Entry
 from kiks.recording.recorder import RunRecorder
 from kiks.recording.replay import Replay
@@ -207,7 +207,7 @@ def test_there_is_a_scene_for_each_change(rich: Path) -> None:
 
 @at_length
 def test_a_long_run_has_a_longer_period(short: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr("kiks.desk.run_page.run_frames.FRAME_BYTES_MAX", 50_000)
+    monkeypatch.setattr("kiks.export.run_frames.FRAME_BYTES_MAX", 50_000)
     run = RunFrames(Recording(short).log)
     assert run.period_ns == 80_000_000
     assert sum(map(len, run.frames)) < 50_000

@@ -14,11 +14,11 @@ from tests.model.test_atomic_files import full_disk
 
 from kiks import Arena, Khepera, ParameterError, Recording, Simulation
 from kiks.cli.film import film
-from kiks.films import film as film_of_recording
-from kiks.films.film import save_film
-from kiks.films.stage import MARGIN, OUTSIDE
+from kiks.export import film as film_of_recording
+from kiks.export.film import save_film
+from kiks.export.sheet import robot_colour
+from kiks.export.stage import MARGIN, OUTSIDE
 from kiks.recording import recorder
-from kiks.sheet import robot_colour
 
 WIDTH_MM, HEIGHT_MM, SECONDS = 400.0, 300.0, 6.0
 GREEN = robot_colour(0, 1)

@@ -14,8 +14,8 @@ from PIL import Image
 from tests.at_length import at_length
 
 from kiks import Arena, ParameterError, Recording, RobotSpec, Simulation
-from kiks.films.film import save_film
-from kiks.films.photo import save_photo
+from kiks.export.film import save_film
+from kiks.export.photo import save_photo
 from kiks.model.arena import Pose
 
 pytestmark = pytest.mark.slow

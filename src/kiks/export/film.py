@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from kiks.errors import ParameterError, library, shown
-from kiks.films.panel import Panel
-from kiks.films.solid_stage import SolidStage
-from kiks.films.stage import Pixels, Stage
-from kiks.films.video_file import ENDINGS, GIF, MP4, VideoFile
+from kiks.export.panel import Panel
+from kiks.export.solid_stage import SolidStage
+from kiks.export.stage import Pixels, Stage
+from kiks.export.video_file import ENDINGS, GIF, MP4, VideoFile
 from kiks.model.atomic_files import ending_of, file_beside
 from kiks.model.checks import check_count, check_number
 from kiks.recording.moments import moments

@@ -14,16 +14,16 @@ from pathlib import Path
 import jinja2
 from markupsafe import Markup
 
-from kiks.desk.run_page.bundle import bundle
-from kiks.desk.run_page.contents import contents_of
-from kiks.desk.run_page.run_frames import PERIOD_NS, RunFrames
+from kiks.export.bundle import bundle
+from kiks.export.figures import NO_ROBOT, panels_of
+from kiks.export.page_contents import contents_of
+from kiks.export.run_frames import PERIOD_NS, RunFrames
 from kiks.model.atomic_files import replace_file
-from kiks.plots import NO_ROBOT, panels_of
 from kiks.recording.recording import Recording
 from kiks.units import clock_text, s_from_ns
 from kiks.version import __version__
 
-WEB = Path(__file__).parents[1] / "web"
+WEB = Path(__file__).parents[1] / "desk" / "web"
 
 STYLES = ("arena_view.css", "monitor_view.css", "run_page.css")
 

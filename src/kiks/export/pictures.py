@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.engine.state import BALL, BODY, CYLINDER
+from kiks.export.sheet import FINER, Colour, Place, Sheet, path_colour, path_mm, robot_colour, tint, wall_picture
 from kiks.model.arena import Arena, Ball
 from kiks.model.atomic_files import check_writable, ending_of, replace_file
 from kiks.model.robot import RobotSpec
 from kiks.model.robot_parts import Body
-from kiks.sheet import FINER, Colour, Place, Sheet, path_colour, path_mm, robot_colour, tint, wall_picture
 from kiks.sim.simulation import Simulation
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from tests.at_length import cases
 
 import kiks
 from kiks import Arena, Khepera, ParameterError, Recording
-from kiks.plots import NO_ROBOT, PANELS, ROWS, figure_of, panels_of, save_plot
+from kiks.export.figures import NO_ROBOT, PANELS, ROWS, figure_of, panels_of, save_plot
 from kiks.recording.analysis import odometry, time_shares
 from kiks.recording.recorder import RunRecorder
 from kiks.sim.simulation import Simulation

@@ -8,8 +8,8 @@ from dataclasses import replace
 import pytest
 
 import kiks
-from kiks.drawing import Trace, draw_simulation, save_picture
 from kiks.errors import ParameterError
+from kiks.export.pictures import Trace, draw_simulation, save_picture
 from kiks.model.arena import Pose
 
 FLOOR = (246, 243, 236)

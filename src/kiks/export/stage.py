@@ -15,9 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.errors import ParameterError
-from kiks.model.arena import Arena
-from kiks.recording.moments import LEAP_MM, Moment
-from kiks.sheet import (
+from kiks.export.sheet import (
     FINER,
     FLOOR,
     LAMP_MM,
@@ -31,6 +29,8 @@ from kiks.sheet import (
     tint,
     wall_picture,
 )
+from kiks.model.arena import Arena
+from kiks.recording.moments import LEAP_MM, Moment
 
 Pixels = NDArray[np.uint8]
 """A picture, [row, column, red or green or blue]."""

@@ -1,1 +1,0 @@
-"""The page to hand in: a recorded run as one HTML file that needs no network."""
