@@ -7,7 +7,8 @@ import math
 import numpy as np
 
 import kiks
-from kiks.learn import ready_tasks, training_arenas
+from kiks.learn import ready_tasks
+from kiks.model.shipped import shipped_arena
 
 
 def test_standing_still_earns_nothing() -> None:
@@ -17,7 +18,7 @@ def test_standing_still_earns_nothing() -> None:
 
 
 def test_the_exam_starts_far_from_the_lamp_where_no_sensor_sees_it() -> None:
-    arena = training_arenas.lit_unseen()
+    arena = shipped_arena("training/lit_unseen")
     lamp = arena.lamps[0]
     assert len(set(arena.starts)) == 20
     sim = kiks.Simulation(arena)
@@ -27,13 +28,6 @@ def test_the_exam_starts_far_from_the_lamp_where_no_sensor_sees_it() -> None:
         for heading_rad in np.arange(8) * math.pi / 4:
             sim.place(1, start.x_mm, start.y_mm, heading_rad)
             assert set(sim.ambient(1)) == {dark_counts}
-
-
-def test_a_wall_between_two_places() -> None:
-    arena = training_arenas.lit_unseen()
-    lamp_mm = arena.lamps[0].x_mm, arena.lamps[0].y_mm
-    assert training_arenas.is_wall_between(arena, (700.0, 700.0), lamp_mm)
-    assert not training_arenas.is_wall_between(arena, (260.0, 700.0), lamp_mm)
 
 
 def test_a_start_is_solved_by_staying_at_the_lamp_for_the_last_half_minute() -> None:

@@ -19,7 +19,7 @@ from tests import forked
 from tests.at_length import at_length, share
 from tests.guard import GUARD_S
 
-from kiks.cli.options import shipped_folder
+from kiks.model.shipped import shipped
 
 pytestmark = pytest.mark.slow
 
@@ -269,8 +269,8 @@ def test_printed_text_never_mixes_with_answers(tmp_path: Path) -> None:
 
 
 def test_kiks_matlab_prints_the_folder_of_the_toolbox() -> None:
-    assert (shipped_folder("matlab", "kiks.m") / "kiks.m").is_file()
-    assert str(shipped_folder("matlab", "kiks.m")) in forked.run("matlab").stdout
+    assert (shipped("matlab") / "kiks.m").is_file()
+    assert str(shipped("matlab")) in forked.run("matlab").stdout
 
 
 # ---- unauthenticated connections ----

@@ -11,7 +11,7 @@ import typer
 
 from kiks.cli.desk import NoWait, WithDesk, open_desk
 from kiks.cli.engine_start import ready_engine
-from kiks.cli.options import SeedOrOwn, load_arena, say, say_without_world, shipped_folder
+from kiks.cli.options import SeedOrOwn, load_arena, say, say_without_world
 from kiks.cli.outputs import PICTURES, leave_out, output
 from kiks.cli.record import RecordFile, recorded
 from kiks.ending import end_as_with_ctrl_c
@@ -114,7 +114,9 @@ def demo(
     assert picture is not None  # `output` has filled it in
     ready_engine(as_needed=not (is_soccer or desk))
     if is_soccer:
-        sys.path.append(str(shipped_folder("examples/soccer", "player.py")))
+        from kiks.model.shipped import shipped
+
+        sys.path.append(str(shipped("examples/soccer")))
         importlib.import_module("soccer_command").show_match(
             seconds, seed or 0, (picture, record), left, right, on_desk=desk, waits=not no_wait
         )

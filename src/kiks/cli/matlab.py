@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import typer
 
-from kiks.cli.options import shipped_folder
-
 
 def matlab() -> None:
     """Print the line that adds the toolbox to the path of Octave and MATLAB: type it there, or put it into startup.m.
 
     Example: octave --eval "$(kiks matlab) kiks; follow"
     """
-    folder = shipped_folder("matlab", "kiks.m")
+    from kiks.model.shipped import shipped
+
+    folder = shipped("matlab")
     typer.echo(f"addpath('{folder}'); addpath('{folder / 'demos'}');")

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-import kiks
 from kiks.errors import ParameterError, shown
 from kiks.model.atomic_files import make_folder
 from kiks.model.checks import ROBOTS_MAX
@@ -217,15 +216,3 @@ def _split(word: str) -> list[str]:
         return shlex.split(word)
     except ValueError:
         return []
-
-
-def shipped_folder(name: str, file: str) -> Path:
-    """Return a folder that comes with KiKS: in the installed package, or beside `src` in a checkout.
-
-    Args:
-        name: Its path from the root of a checkout.
-        file: A file in it.
-    """
-    package = Path(kiks.__file__).parent
-    folders = (package / name, package.parents[1] / name)
-    return next((folder for folder in folders if (folder / file).is_file()), folders[0])

@@ -21,7 +21,6 @@ from kiks.errors import ParameterError, nearest, shown
 from kiks.learn import football as game
 from kiks.learn import ready_contests, ready_tasks
 from kiks.learn.task import Task
-from kiks.learn.training_arenas import pillars
 from kiks.model.arena import Arena, Cylinder, Pose
 from kiks.model.checks import check_kind, check_number
 from kiks.model.data_file import Number, Text, record
@@ -124,7 +123,7 @@ def without_contacts(reward: Measure, cost: float = CONTACT_COST) -> Measure:
 
 def avoid() -> EnvSpec:
     """Drive fast and straight, far from everything."""
-    return EnvSpec("Avoid", (pillars(),), avoidance)
+    return EnvSpec("Avoid", ready_tasks.training("pillars"), avoidance)
 
 
 def follow() -> EnvSpec:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -13,12 +14,11 @@ from numpy.typing import NDArray
 from kiks.batch.loop_timing import Timing
 from kiks.control import controllers, measures
 from kiks.control.controller import Controller
-from kiks.errors import ParameterError
-from kiks.learn import training_arenas
 from kiks.learn.candidate_worlds import cautious_mean
 from kiks.learn.exam import Exam
 from kiks.learn.task import Axis, Task
-from kiks.model.arena import Arena, Cylinder
+from kiks.model.arena import Arena, Pose
+from kiks.model.shipped import shipped_arena
 
 Floats = NDArray[np.float64]
 Values = Mapping[str, Floats]
@@ -41,6 +41,11 @@ def without_contacts(fitness: Floats, values: Values, cost: float = CONTACT_COST
     contacts = np.minimum(values["contacts"], CONTACTS_COUNTED).mean(axis=1)
     reduced: Floats = fitness / (1 + cost * contacts)
     return reduced
+
+
+def training(*names: str) -> tuple[Arena, ...]:
+    """Return arenas of `examples/arenas/training`."""
+    return tuple(shipped_arena(f"training/{name}") for name in names)
 
 
 # ---- avoid ----
@@ -67,7 +72,7 @@ def avoid(controller: Controller | None = None, **changes: Any) -> Task:
     """
     task = Task(
         "avoid",
-        (training_arenas.pillars(), training_arenas.corridors(), training_arenas.wedges()),
+        training("pillars", "corridors", "wedges"),
         controllers.linear(speed_limit=AVOID_SPEED_LIMIT) if controller is None else controller,
         (measures.avoidance, measures.roaming, measures.contacts, measures.path_mm, measures.straightness),
         fitness=avoid_fitness,
@@ -76,7 +81,7 @@ def avoid(controller: Controller | None = None, **changes: Any) -> Task:
         timing=Timing(period_s=AVOID_PERIOD_S),
         axes=(Axis("path_mm", 0, 1000), Axis("straightness", 0, 1)),
         exam=Exam(
-            (training_arenas.unseen(), training_arenas.rooms()),
+            training("unseen", "rooms"),
             (measures.contacts, measures.roaming),
             avoid_solved,
             "got around for three minutes and touched nothing",
@@ -124,7 +129,7 @@ def follow(controller: Controller | None = None, *, side: str = "left", **change
     """
     task = Task(
         "follow",
-        (training_arenas.wall_ends(), training_arenas.alcoves(), training_arenas.corridors()),
+        training("wall_ends", "alcoves", "corridors"),
         controllers.mlp(hidden=(), feedback=True, speed_limit=SPEED_LIMIT) if controller is None else controller,
         (measures.wall_following(side), measures.beside_wall_share(side), measures.contacts, measures.path_mm),
         fitness=follow_fitness,
@@ -136,7 +141,7 @@ def follow(controller: Controller | None = None, *, side: str = "left", **change
         spread=1.0,
         generations=140,
         exam=Exam(
-            (training_arenas.unseen(), training_arenas.unseen_rooms()),
+            training("unseen", "unseen_rooms"),
             (measures.beside_wall_share(side), measures.roaming, measures.contacts),
             follow_solved,
             "followed the wall for 80 % of three minutes",
@@ -187,7 +192,7 @@ def light(controller: Controller | None = None, **changes: Any) -> Task:
     default = controllers.mlp(hidden=(4,), senses=("proximity", "ambient"), speed_limit=LIGHT_SPEED_LIMIT)
     task = Task(
         "light",
-        (training_arenas.lit_pillars(), training_arenas.lit_walls(), training_arenas.lit_rooms()),
+        training("lit_pillars", "lit_walls", "lit_rooms"),
         default if controller is None else controller,
         (
             measures.light_approach,
@@ -201,7 +206,7 @@ def light(controller: Controller | None = None, **changes: Any) -> Task:
         worlds=6,
         axes=(Axis("light_mm", 0, 600), Axis("path_mm", 0, 4000)),
         exam=Exam(
-            (training_arenas.lit_unseen(),),
+            training("lit_unseen"),
             (measures.light_stay_s(AT_LAMP_MM),),
             light_solved,
             "reached the lamp from the shadow, 1 m away, and stayed",
@@ -217,17 +222,11 @@ def light(controller: Controller | None = None, **changes: Any) -> Task:
 GATHER_SPEED_LIMIT = 15.0
 """Highest speed of `gather` [pulses/10 ms]: 120 mm/s. Contacts do no harm here, and a faster robot meets more."""
 
-CYLINDERS, GATHERED = 5, 4
-"""Cylinders of `gather`, and those that must be together to pass the exam."""
+GATHERED = 4
+"""How many of the five cylinders must be together to pass the exam of `gather`."""
 
-GROUP_MM, APART_MM = 150.0, 170.0
-"""Distance from one of them within which cylinders are together, and their least distance at the start [mm]."""
-
-FROM_WALL_MM = 90.0
-"""Least distance of cylinders from the outside of a room's walls [mm]: there a robot can get behind them."""
-
-PLACES_TRIED = 10_000
-"""How often places of the cylinders are drawn."""
+GROUP_MM = 150.0
+"""Distance from one of them within which cylinders are together [mm]; at the start they are at least 170 mm apart."""
 
 CLOSENESS_WEIGHT = 5.0
 """Cylinders in a group that a `closeness` of 1 is worth."""
@@ -252,7 +251,7 @@ def gather(controller: Controller | None = None, **changes: Any) -> Task:
     default = controllers.mlp(hidden=(), feedback=True, speed_limit=GATHER_SPEED_LIMIT)
     task = Task(
         "gather",
-        tuple(room_with_cylinders(600, seed) for seed in range(8)),
+        training(*(f"cylinders_{k}" for k in range(8))),
         default if controller is None else controller,
         (measures.largest_group(GROUP_MM), measures.closeness, measures.contacts, measures.path_mm),
         fitness=gather_fitness,
@@ -261,7 +260,7 @@ def gather(controller: Controller | None = None, **changes: Any) -> Task:
         axes=(Axis("closeness", 0, 0.6), Axis("path_mm", 0, 10_000)),
         generations=120,
         exam=Exam(
-            tuple(room_with_cylinders(side_mm, 100 + k) for k, side_mm in enumerate((600, 560, 640, 680))),
+            training(*(f"cylinders_{k}" for k in range(100, 104))),
             (measures.largest_group(GROUP_MM),),
             gather_solved,
             "brought four of five cylinders together",
@@ -274,31 +273,6 @@ def gather(controller: Controller | None = None, **changes: Any) -> Task:
 def gather_solved(values: Values) -> NDArray[np.bool_]:
     """Return whether most cylinders were brought together."""
     return values["largest_group"] >= GATHERED
-
-
-def room_with_cylinders(side_mm: int, seed: int) -> Arena:
-    """Return a square room with cylinders that are far from each other and from walls, placed at random.
-
-    Args:
-        side_mm: Side of the room [mm].
-        seed: Seed of the random generator.
-    """
-    rng = np.random.default_rng(seed)
-    rows, columns = np.tril_indices(CYLINDERS, -1)
-    for _ in range(PLACES_TRIED):
-        places_mm = rng.uniform(FROM_WALL_MM, side_mm - FROM_WALL_MM, (CYLINDERS, 2))
-        if np.linalg.norm(places_mm[rows] - places_mm[columns], axis=1).min() >= APART_MM:
-            break
-    else:
-        raise ParameterError(
-            f"side_mm must leave room for {CYLINDERS} cylinders {APART_MM:g} mm apart, but it was {side_mm}. "
-            "Take 500 or more."
-        )
-    return replace(
-        Arena.box(side_mm, side_mm),
-        name=f"cylinders {seed}",
-        cylinders=tuple(Cylinder(x_mm, y_mm) for x_mm, y_mm in places_mm.tolist()),
-    )
 
 
 # ---- disperse ----
@@ -314,6 +288,21 @@ DISPERSE_CONTACT_COST = 0.1
 
 EXAM_SIDE_MM = 1500
 """Side of the rooms of that exam [mm]."""
+
+HEAP_PITCH_MM = 75.0
+"""Distance between neighbours in a heap of robots [mm]: they see each other."""
+
+
+@cache
+def heap(side_mm: int, x_mm: float, y_mm: float, number: int) -> Arena:
+    """Return a square room where twenty robots start in a heap around a place, each with another heading."""
+    rng = np.random.default_rng(number)
+    columns, rows = (each.ravel() for each in np.meshgrid(np.arange(5) - 2.0, np.arange(4) - 1.5))
+    starts = tuple(
+        Pose(x_mm + HEAP_PITCH_MM * column, y_mm + HEAP_PITCH_MM * row, float(rng.uniform(-np.pi, np.pi)))
+        for column, row in zip(columns.tolist(), rows.tolist(), strict=True)
+    )
+    return replace(Arena.box(side_mm, side_mm), name=f"heap {number}", starts=starts)
 
 
 def disperse_fitness(values: Values) -> Floats:
@@ -339,7 +328,7 @@ def disperse(controller: Controller | None = None, **changes: Any) -> Task:
     """
     task = Task(
         "disperse",
-        (training_arenas.heap(1400, 700, 700, 1), training_arenas.heap(1600, 400, 500, 2)),
+        (heap(1400, 700, 700, 1), heap(1600, 400, 500, 2)),
         controllers.mlp(hidden=(), feedback=True, speed_limit=SPEED_LIMIT) if controller is None else controller,
         (measures.neighbour_mm, measures.contacts, measures.path_mm),
         fitness=disperse_fitness,
@@ -351,10 +340,7 @@ def disperse(controller: Controller | None = None, **changes: Any) -> Task:
         spread=1.0,
         generations=30,
         exam=Exam(
-            (
-                training_arenas.heap(EXAM_SIDE_MM, 1000, 400, 3),
-                training_arenas.heap(EXAM_SIDE_MM, 300, 750, 4),
-            ),
+            (heap(EXAM_SIDE_MM, 1000, 400, 3), heap(EXAM_SIDE_MM, 300, 750, 4)),
             (measures.neighbour_mm,),
             disperse_solved,
             "spread out nearly as far as random places",
@@ -366,6 +352,12 @@ def disperse(controller: Controller | None = None, **changes: Any) -> Task:
 
 
 # ---- maze ----
+
+MAZE_SIDE_MM = 27.5 / 0.015
+"""Inner side of the arena `kheperax` [mm]: there a Khepera is as large as the robot of Kheperax in its maze."""
+
+MAZE_GOAL_MM = 0.15 * MAZE_SIDE_MM + 10.0, 0.9 * MAZE_SIDE_MM + 10.0
+"""x and y of the goal [mm]; the outer wall is 10 mm thick."""
 
 GOAL_RADIUS_MM = 100.0
 """Distance from the goal at which it counts as reached [mm]."""
@@ -400,15 +392,15 @@ def maze(controller: Controller | None = None, **changes: Any) -> Task:
         controller: The controller to evolve; a network with eight hidden units if left out.
         changes: Other arguments of `Task`.
     """
-    goal_mm = measures.closest_mm(*training_arenas.goal_mm())
+    goal_mm = measures.closest_mm(*MAZE_GOAL_MM)
     task = Task(
         "maze",
-        (training_arenas.kheperax(),),
+        training("kheperax"),
         controllers.mlp(hidden=(8,), speed_limit=MAZE_SPEED_LIMIT) if controller is None else controller,
         (goal_mm, measures.final_x_mm, measures.final_y_mm, measures.turned_pulses),
         fitness=maze_fitness,
         seconds=70.0,
-        axes=(Axis("final_x_mm", 0, training_arenas.SIDE_MM, 32), Axis("final_y_mm", 0, training_arenas.SIDE_MM, 32)),
+        axes=(Axis("final_x_mm", 0, MAZE_SIDE_MM, 32), Axis("final_y_mm", 0, MAZE_SIDE_MM, 32)),
         starts="arena",
         # Larger parameters saturate the wheels: then the robot turns on the spot or shuttles.
         spread=1.0,
@@ -416,7 +408,7 @@ def maze(controller: Controller | None = None, **changes: Any) -> Task:
         generations=250,
         population=200,
         exam=Exam(
-            (training_arenas.kheperax(),),
+            training("kheperax"),
             (goal_mm,),
             maze_solved,
             "reached the goal",

@@ -1,0 +1,25 @@
+"""Files that come with KiKS: in the installed package, or beside `src` in a checkout."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+from kiks.model.arena import Arena
+
+
+def shipped(name: str) -> Path:
+    """Return the path of a file or folder that comes with KiKS.
+
+    Args:
+        name: Its path from the root of a checkout.
+    """
+    package = Path(__file__).parents[1]
+    places = (package / name, package.parents[1] / name)
+    return next((place for place in places if place.exists()), places[0])
+
+
+@cache
+def shipped_arena(name: str) -> Arena:
+    """Return an arena of `examples/arenas`, such as 'maze' or 'training/rooms'; the same object each time."""
+    return Arena.load(shipped(f"examples/arenas/{name}.toml"))
