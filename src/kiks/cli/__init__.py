@@ -17,7 +17,7 @@ from kiks.cli.film import film, photo
 from kiks.cli.fit import fit
 from kiks.cli.matlab import matlab
 from kiks.cli.monitor import monitor
-from kiks.cli.options import show_log
+from kiks.cli.options import show_log, with_options
 from kiks.cli.outputs import Command
 from kiks.cli.replay import page, plot, replay, table
 from kiks.cli.run import RunCommand, run
@@ -59,7 +59,7 @@ for _command in (
     schema,
     warmup,
 ):
-    app.command(cls=RunCommand if _command is run else Command)(_command)
+    app.command(cls=RunCommand if _command is run else Command)(with_options(_command))
 app.add_typer(arena, name="arena")
 
 

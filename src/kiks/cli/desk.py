@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from kiks.cli.engine_start import ready_engine
-from kiks.cli.options import RobotKinds, Robots, SeedOrOwn, Turrets, is_project, parse_turret, parse_words, with_robots
+from kiks.cli.options import World, is_project, parse_words
 from kiks.cli.record import RecordFile, recorded
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import HaltError, ParameterError
 
 if TYPE_CHECKING:
     from kiks.desk.server.desk import Desk
-    from kiks.model.project import Project, ProjectRobot
+    from kiks.model.project import Project
     from kiks.sim.simulation import Simulation
 
 WithDesk = Annotated[bool, typer.Option("--desk", help="Show the world in a browser, at first in real time.")]
@@ -30,18 +30,11 @@ NoWait = Annotated[bool, typer.Option("--no-wait", help="Begin at once, without 
 
 
 def desk(
+    world: World,
     program: Annotated[
         list[str] | None,
         typer.Argument(help="Programs to begin with, in robots 1, 2, and so on; a project may stand first."),
     ] = None,
-    arena: Annotated[
-        str | None,
-        typer.Option(help="Project (.kiks), arena file (.toml, .kad) or picture; the classic box if left out."),
-    ] = None,
-    robots: Robots = None,
-    robot: RobotKinds = None,
-    turret: Turrets = None,
-    seed: SeedOrOwn = None,
     thinking: Annotated[
         str | None, typer.Option(help="Thinking time of programs: none, fixed:MS, live, live:FACTOR.")
     ] = None,
@@ -73,21 +66,18 @@ def desk(
     ready_engine()
     from kiks.desk.server.access import LOOPBACK
     from kiks.desk.server.desk import Desk
-    from kiks.model.project import Project
     from kiks.ports.program_process import commands_of
     from kiks.sim.from_project import simulation_of
 
-    if program and is_project(program[0]) and arena is None:
-        arena, *program = program
-    project = Project() if arena is None else Project.load(arena)
-    home = folder or (Path(arena).parent if arena is not None and is_project(arena) else Path())
+    words = list(program or [])
+    file = words.pop(0) if words and is_project(words[0]) else None
+    begin = parse_words(words)
+    project, home = world.project(file, programs=len(begin), fills_starts=True)
+    home = folder or home
     if not home.is_dir():
         raise ParameterError(f"--folder must be a folder, but {str(home)!r} is none. Create it first.")
-    begin = parse_words(program) if program else []
     project = replace(
-        project,
-        robots=_robots(project, robots, robot or [], turret or [], len(begin)),
-        seed=project.seed if seed is None else seed,
+        _with_kinds(project, world.robot or []),
         thinking=thinking or project.thinking,
         speed=project.speed if speed is None else speed or None,
     )
@@ -109,25 +99,15 @@ def desk(
         open_desk(shown, host=host, port=port, browser=browser, waits=not no_wait)
 
 
-def _robots(
-    project: Project, count: int | None, kinds: list[str], turrets: list[str], least: int
-) -> tuple[ProjectRobot, ...]:
-    """Return a project's robots with the changes of the command line."""
-    robots = list(with_robots(project, count, max(len(kinds), least)).robots)
-    count = len(robots)
-    if kinds and len(kinds) not in (1, count):
+def _with_kinds(project: Project, kinds: list[str]) -> Project:
+    """Return a project with other kinds of robots, whose files lie in its folder: the desk saves it and begins anew."""
+    robots = project.robots
+    if kinds and len(kinds) not in (1, len(robots)):
         raise ParameterError(
-            f"--robot must name one kind for all or one for each of {count} robots, but it named {len(kinds)}."
+            f"--robot must name one kind for all or one for each of {len(robots)} robots, but it named {len(kinds)}."
         )
-    if kinds:
-        kinds = kinds * count if len(kinds) == 1 else kinds
-        robots = [replace(each, kind=kind) for each, kind in zip(robots, kinds, strict=True)]
-    for entry in turrets:
-        name, number = parse_turret(entry, count)
-        for index in range(count) if number is None else [number - 1]:
-            if name not in robots[index].turrets:
-                robots[index] = replace(robots[index], turrets=(*robots[index].turrets, name))
-    return tuple(robots)
+    named = kinds * len(robots) if len(kinds) == 1 else kinds or [each.kind for each in robots]
+    return replace(project, robots=tuple(replace(each, kind=kind) for each, kind in zip(robots, named, strict=True)))
 
 
 def open_desk(

@@ -9,7 +9,7 @@ import typer
 
 from kiks.cli.desk import open_desk
 from kiks.cli.limits import LimitReached, Limits
-from kiks.cli.options import fit_turrets, load_arena, say, say_without_world
+from kiks.cli.options import World, load_arena, say, say_without_world
 from kiks.cli.record import recorded, tell_run
 from kiks.ending import end_as_with_ctrl_c
 
@@ -34,10 +34,7 @@ def drive(
 
 def run_champion(
     file: Path,
-    arena: str | None,
-    robots: int | None,
-    turret: list[str] | None,
-    seed: int | None,
+    world: World,
     seconds: float,
     limits: Limits,
     files: tuple[Path | None, Path | None, Path | None],
@@ -49,10 +46,9 @@ def run_champion(
     from kiks.learn.champion import Champion
 
     champion = Champion.load(file)
-    given = None if arena is None else load_arena(arena)
+    given = None if world.arena is None else load_arena(world.arena)
     say_without_world(champion, given)
-    sim, ports = champion.simulation(given, robots=robots, seed=seed)
-    fit_turrets(sim, turret)
+    sim, ports = champion.simulation(given, robots=world.robots, seed=world.seed)
     end_as_with_ctrl_c()
 
     def work() -> None:

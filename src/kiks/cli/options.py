@@ -6,9 +6,11 @@ import logging
 import shlex
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, fields, is_dataclass, replace
+from functools import wraps
+from inspect import Parameter, Signature, signature
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 
@@ -23,33 +25,131 @@ if TYPE_CHECKING:
     from kiks.ports.program_process import Command
     from kiks.sim.simulation import Simulation
 
-ArenaFile = Annotated[
-    str | None, typer.Option(help="Arena (.toml, .kad), picture, or project's world (.kiks); the classic box if none.")
-]
-Robots = Annotated[
-    int | None,
-    typer.Option(help="Robots in the arena; as many as a project has, else 1, if left out.", min=1, max=ROBOTS_MAX),
-]
-RobotKinds = Annotated[
-    list[str] | None,
-    typer.Option("--robot", help="Kind of robot: khepera, khepera_ii, or a file; once for all, or once for each."),
-]
-Turrets = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--turret", help="k213, gripper, radio, io or battle, for all robots; with a number, gripper=2, for that one."
-    ),
-]
-WhenSilent = Annotated[
-    str,
-    typer.Option(help="A program that is silent while others wait: wait for it, drop it, or ignore: go on without it."),
-]
-PatienceS = Annotated[float, typer.Option("--patience", help="Time for which it may be silent [s of real time].")]
 Seed = Annotated[int, typer.Option(help="Seed: the same seed, the same run.", min=0)]
 SeedOrOwn = Annotated[
     int | None,
     typer.Option(help="Seed: the same seed, the same run; the own one of a project or champion, else 0.", min=0),
 ]
+
+
+@dataclass(frozen=True)
+class World:
+    """The options that choose a world: an arena or a project, and what differs from it."""
+
+    arena: Annotated[
+        str | None,
+        typer.Option(help="Arena (.toml, .kad), picture, or project's world (.kiks); the classic box if none."),
+    ] = None
+    robots: Annotated[
+        int | None,
+        typer.Option(help="Robots in the arena; as many as a project has, else 1, if left out.", min=1, max=ROBOTS_MAX),
+    ] = None
+    robot: Annotated[
+        list[str] | None,
+        typer.Option(help="Kind of robot: khepera, khepera_ii, or a file; once for all, or once for each."),
+    ] = None
+    turret: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="k213, gripper, radio, io or battle, for all robots; with a number, gripper=2, for that one."
+        ),
+    ] = None
+    seed: SeedOrOwn = None
+    baud: Annotated[
+        int | None,
+        typer.Option(
+            help="Line speed until a program sets one; a project's or the robot's own, 9600, if left out.",
+            min=75,
+            max=4_000_000,
+        ),
+    ] = None
+
+    def project(
+        self, file: str | None = None, *, programs: int = 0, fills_starts: bool = False
+    ) -> tuple[Project, Path]:
+        """Return the project that these options describe, and its folder; `simulation` needs the kinds of robots, too.
+
+        Args:
+            file: A project, whose arena `arena` replaces.
+            programs: Number of programs for robots 1, 2, and so on, named apart from the project.
+            fills_starts: Whether each start of an arena has a robot, or only the first.
+        """
+        from kiks.model.project import Project
+
+        read, home = self.arena if file is None else file, Path()
+        if read is not None and is_project(read):
+            project, home = Project.load(read), Path(read).parent
+        else:
+            project = (Project.of_arena if fills_starts else Project)(load_arena(read))
+        if file is not None and self.arena is not None:
+            project = replace(project, arena=load_arena(self.arena))
+        return self.changed(project, programs), home
+
+    def changed(self, project: Project, programs: int = 0) -> Project:
+        """Return a project with what the options change in it. New robots are of the kind of the last, or Kheperas."""
+        from kiks.model.project import ProjectRobot
+
+        robots, least = list(project.robots), max(len(self.robot or ()), programs)
+        if self.robots is not None and self.robots < least:
+            raise ParameterError(
+                f"--robots must be at least {least}, for so many are named, but it was {self.robots}. Leave it out."
+            )
+        count = max(len(robots) if self.robots is None else self.robots, least)
+        kind = robots[-1].kind if robots else "khepera"
+        robots = robots[:count] + [ProjectRobot(kind=kind)] * (count - len(robots))
+        for entry in self.turret or []:
+            name, number = parse_turret(entry, count)
+            for index in range(count) if number is None else [number - 1]:
+                if name not in robots[index].turrets:
+                    robots[index] = replace(robots[index], turrets=(*robots[index].turrets, name))
+        settings = {name: value for name in ("seed", "baud") if (value := getattr(self, name)) is not None}
+        return replace(project, robots=tuple(robots), **settings)
+
+    def simulation(self, project: Project, folder: Path, thinking: str) -> Simulation:
+        """Return the world of a project with the kinds of robots that the options name, whose files lie anywhere."""
+        from kiks.sim.from_project import simulation_of
+
+        return simulation_of(project, folder, kinds=self.robot or (), thinking=thinking)
+
+
+@dataclass(frozen=True)
+class Silence:
+    """The options for programs that are silent while others wait."""
+
+    when_silent: Annotated[
+        str,
+        typer.Option(
+            help="A program that is silent while others wait: wait for it, drop it, or ignore: go on without it."
+        ),
+    ] = "ignore"
+    patience: Annotated[float, typer.Option(help="Time for which it may be silent [s of real time].")] = 2.0
+
+
+def with_options(function: Callable[..., None]) -> Callable[..., None]:
+    """Return a command that takes the fields of its dataclass parameters as options of their own."""
+    hints = get_type_hints(function, include_extras=True)
+    groups: dict[str, Any] = {name: kind for name, kind in hints.items() if is_dataclass(kind)}
+    options: list[Parameter] = []
+    for name, parameter in signature(function).parameters.items():
+        group = groups.get(name)
+        if group is None:
+            options.append(parameter.replace(annotation=hints[name], kind=Parameter.KEYWORD_ONLY))
+            continue
+        kinds = get_type_hints(group, include_extras=True)
+        options += [
+            Parameter(each.name, Parameter.KEYWORD_ONLY, default=each.default, annotation=kinds[each.name])
+            for each in fields(group)
+        ]
+
+    @wraps(function)
+    def command(**given: Any) -> None:
+        for name, group in groups.items():
+            given[name] = group(**{each.name: given.pop(each.name) for each in fields(group)})
+        function(**given)
+
+    command.__signature__ = Signature(options)  # type: ignore[attr-defined]
+    command.__annotations__ = {each.name: each.annotation for each in options}
+    return command
 
 
 def written_folder(param: typer.CallbackParam, value: Path | None) -> Path | None:
@@ -76,38 +176,6 @@ def is_project(file: str | Path) -> bool:
     return str(file).lower().endswith(".kiks")
 
 
-def load_world(file: str | None) -> tuple[Project, Path]:
-    """Return the project of a file and its folder; a project of one Khepera if the file is another arena, or none."""
-    from kiks.model.project import Project
-
-    if file is not None and is_project(file):
-        return Project.load(file), Path(file).parent
-    return Project(load_arena(file)), Path()
-
-
-def with_robots(project: Project, count: int | None, least: int) -> Project:
-    """Return a project with the number of robots that the command line names.
-
-    New robots are of the kind of the last, or Kheperas.
-
-    Args:
-        project: The project.
-        count: Number of robots; None for the project's, or more if they are too few.
-        least: Smallest number of robots.
-    """
-    from kiks.model.project import ProjectRobot
-
-    robots = project.robots
-    if count is not None and count < least:
-        raise ParameterError(
-            f"--robots must be at least {least}, for so many are named, but it was {count}. Leave it out."
-        )
-    count = max(len(robots) if count is None else count, least)
-    kind = robots[-1].kind if robots else "khepera"
-    more = (ProjectRobot(kind=kind),) * (count - len(robots))
-    return replace(project, robots=robots[:count] + more)
-
-
 def say(text: str) -> None:
     """Print a message for the user on the error output, apart from the results."""
     typer.echo(f"kiks: {text}", err=True)
@@ -129,17 +197,6 @@ def say_without_world(champion: Champion, arena: Arena | None) -> None:
     """Say so if a champion will drive in the default box because its file names no world."""
     if arena is None and champion.world is None:
         say("the champion's file names no world, so it drives in the default box. --arena names another arena.")
-
-
-def fit_turrets(sim: Simulation, entries: list[str] | None) -> None:
-    """Fit turrets to robots that do not have them."""
-    from kiks.sim.turret_host import name_of
-
-    for entry in entries or []:
-        name, number = parse_turret(entry, sim.robot_count)
-        for robot in range(1, sim.robot_count + 1) if number is None else [number]:
-            if name not in map(name_of, sim.turrets(robot)):
-                sim.fit(robot, name)
 
 
 def parse_turret(entry: str, robot_count: int) -> tuple[str, int | None]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -13,23 +12,7 @@ import typer
 from kiks.cli.desk import NoWait, WithDesk, open_desk
 from kiks.cli.engine_start import ready_engine
 from kiks.cli.limits import Limits, MaxWall, Seconds
-from kiks.cli.options import (
-    ArenaFile,
-    PatienceS,
-    RobotKinds,
-    Robots,
-    SeedOrOwn,
-    Turrets,
-    WhenSilent,
-    fit_turrets,
-    is_project,
-    load_arena,
-    load_world,
-    parse_words,
-    say,
-    show_log,
-    with_robots,
-)
+from kiks.cli.options import Silence, World, is_project, parse_words, say, show_log
 from kiks.cli.outputs import Command as CheckedCommand
 from kiks.cli.outputs import leave_out, output
 from kiks.cli.record import Picture, RecordFile, Table, noting_output, recorded, tell_run
@@ -67,6 +50,8 @@ class RunCommand(CheckedCommand):
 
 def run(
     context: typer.Context,
+    world: World,
+    silence: Silence,
     program: Annotated[
         Path,
         typer.Argument(
@@ -78,11 +63,6 @@ def run(
         list[str] | None,
         typer.Argument(help="The program's arguments; each .py file, and each quoted '-m MODULE', begins another."),
     ] = None,
-    arena: ArenaFile = None,
-    robots: Robots = None,
-    robot: RobotKinds = None,
-    turret: Turrets = None,
-    seed: SeedOrOwn = None,
     thinking: Annotated[
         str | None,
         typer.Option(
@@ -98,8 +78,6 @@ def run(
         Path | None,
         typer.Option(help="Write the thinking times of a live run here, for replay:FILE.", callback=output()),
     ] = None,
-    when_silent: WhenSilent = "ignore",
-    patience: PatienceS = 2.0,
     seconds: Seconds = None,
     max_wall: MaxWall = None,
     picture: Picture = None,
@@ -134,25 +112,22 @@ def run(
         leave_out(context, "of a champion", "robot", "thinking", "map_", "save_thinking", "when_silent", "patience")
         files = (picture, csv, record)
         seconds, limits = 60.0 if seconds is None else seconds, Limits(None, max_wall)
-        run_champion(program, arena, robots, turret, seed, seconds, limits, files, on_desk=desk, waits=not no_wait)
+        run_champion(program, world, seconds, limits, files, on_desk=desk, waits=not no_wait)
         return
     if desk:
         leave_out(context, "with programs on the desk, where a person ends them", "seconds")
     limits = Limits(seconds, max_wall)
-    kinds = robot or []
     from kiks.ports.program_process import Labels, commands_of
     from kiks.ports.program_scheduler import check_policy
     from kiks.ports.programs import Programs
-    from kiks.sim.from_project import simulation_of, thinking_of
+    from kiks.sim.from_project import thinking_of
 
-    named = parse_words(arguments or [] if is_project(program) else [str(program), *(arguments or [])])
-    project, home = load_world(str(program) if is_project(program) else arena)
-    if is_project(program) and arena is not None:
-        project = replace(project, arena=load_arena(arena))
-    project = with_robots(project, robots, max(len(kinds), len(named)))
-    project = project if seed is None else replace(project, seed=seed)
+    words = [str(program), *(arguments or [])]
+    file = words.pop(0) if is_project(program) else None
+    named = parse_words(words)
+    project, home = world.project(file, programs=len(named))
     own = commands_of(project, home)
-    commands: list[Command | None] = [*named, *own[len(named) :]] if is_project(program) else [*named]
+    commands: list[Command | None] = [*named, *own[len(named) :]] if file else [*named]
     while commands and commands[-1] is None:
         commands.pop()
     if not commands:
@@ -160,10 +135,10 @@ def run(
             f"a project must name a program for a robot, but {str(program)!r} names none. Name one after it: "
             f"kiks run {program} my_program.py."
         )
-    if any(own) and not is_project(program):
-        say(f"the programs of {arena} do not start here. kiks run {arena} starts them, too.")
+    if any(own) and not file:
+        say(f"the programs of {world.arena} do not start here. kiks run {world.arena} starts them, too.")
     mapping = dict(parse_map(entry) for entry in map_ or [])
-    check_policy(when_silent, patience)
+    check_policy(silence.when_silent, silence.patience)
     import kiks.script  # noqa: F401  (under an interpreter that it does not know, KiKS ends here)
 
     thinking = thinking_of(project, home) if thinking is None else thinking
@@ -173,10 +148,9 @@ def run(
         leave_out(context, "with one program", "when_silent", "patience")
     # A program may change the working folder.
     thoughts = None if save_thinking is None else save_thinking.absolute()
-    sim = simulation_of(project, home, kinds=kinds, thinking=thinking if len(commands) == 1 else "none")
+    sim = world.simulation(project, home, thinking if len(commands) == 1 else "none")
     for number in mapping.values():
         sim.world.index_of(number)
-    fit_turrets(sim, turret)
     names = [each.name for each in commands if each is not None]
     labels = Labels(names) if len(names) > 1 else None
     host = partial(
@@ -184,16 +158,16 @@ def run(
         robots_by_name=mapping,
         thinking=thinking,
         record=thoughts,
-        when_silent=when_silent,
-        patience_s=patience,
+        when_silent=silence.when_silent,
+        patience_s=silence.patience,
         say=say if labels is None else labels.say,
         labels=labels,
     )
     texts = [each.file for each in commands if each is not None]
     if desk:
         with recorded(sim, picture, csv, record, texts):
-            # If the command line has changed the robots, the desk derives the project from the simulation.
-            told = None if kinds or turret else project
+            # If the command line has changed the kinds of robots, the desk derives the project from the simulation.
+            told = None if world.robot else project
             _run_on_desk(
                 sim, commands, host, thinking, waits=not no_wait, project=told, speed=project.speed, folder=home
             )

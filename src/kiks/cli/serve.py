@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -12,19 +12,7 @@ import typer
 
 from kiks.cli.desk import WithDesk
 from kiks.cli.engine_start import compile_everything, ready_engine
-from kiks.cli.options import (
-    ArenaFile,
-    PatienceS,
-    RobotKinds,
-    Robots,
-    SeedOrOwn,
-    Turrets,
-    WhenSilent,
-    fit_turrets,
-    load_world,
-    show_log,
-    with_robots,
-)
+from kiks.cli.options import Silence, World, show_log
 from kiks.cli.outputs import leave_out
 from kiks.cli.record import RecordFile, recorded
 from kiks.ending import end_as_with_ctrl_c
@@ -41,11 +29,8 @@ TCP_PORT = 10020
 
 def serve(
     context: typer.Context,
-    arena: ArenaFile = None,
-    robots: Robots = None,
-    robot: RobotKinds = None,
-    turret: Turrets = None,
-    seed: SeedOrOwn = None,
+    world: World,
+    silence: Silence,
     speed: Annotated[float, typer.Option(help="Simulated seconds per real second, for thinking live.")] = 1.0,
     thinking: Annotated[
         str, typer.Option(help="live: the world runs all the time; none or fixed:MS: it waits for each command.")
@@ -53,16 +38,6 @@ def serve(
     programs: Annotated[
         int | None,
         typer.Option(help="Programs that begin together if the world waits for them; one per robot if left out."),
-    ] = None,
-    when_silent: WhenSilent = "ignore",
-    patience: PatienceS = 2.0,
-    baud: Annotated[
-        int | None,
-        typer.Option(
-            help="Line speed until a program sets one; a project's or the robot's own, 9600, if left out.",
-            min=75,
-            max=4_000_000,
-        ),
     ] = None,
     pty: Annotated[bool, typer.Option(help="Make a serial port for each robot.")] = True,
     link: Annotated[
@@ -96,7 +71,6 @@ def serve(
     """
     from kiks.clock.patience import Patience
     from kiks.ports.server import Server
-    from kiks.sim.from_project import simulation_of
 
     def say(text: str) -> None:
         if not quiet:
@@ -111,14 +85,10 @@ def serve(
     if not pty:
         leave_out(context, "with --no-pty", "link")
     show_log(is_quiet=quiet)
-    kinds = robot or []
-    project, home = load_world(arena)
+    project, home = world.project()
     if any(each.program for each in project.robots):
-        say(f"The programs of {arena} do not start here; other programs may connect. kiks run {arena} starts them.")
-    project = with_robots(project, robots, len(kinds))
-    project = replace(project, seed=project.seed if seed is None else seed, baud=project.baud if baud is None else baud)
-    sim = simulation_of(project, home, kinds=kinds, thinking="none")
-    fit_turrets(sim, turret)
+        say(f"The programs of {world.arena} do not start here; other programs may connect. kiks run starts them.")
+    sim = world.simulation(project, home, "none")
     if not quiet:
         ready_engine()
     compile_everything()  # or load it, so that the first program does not wait for it
@@ -135,8 +105,8 @@ def serve(
             speed=speed,
             thinking=thinking,
             programs=programs,
-            when_silent=when_silent,
-            patience_s=patience,
+            when_silent=silence.when_silent,
+            patience_s=silence.patience,
             pace=None if gate is None else gate.pace,
             new_patience=Patience if gate is None else gate.patience,
         )
