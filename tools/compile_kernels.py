@@ -39,7 +39,7 @@ def compile_like(folder: Path) -> None:
     import kiks.sim.simulation  # noqa: F401  # they define the types of signatures
 
     for path in sorted(folder.glob("*.code")):
-        module, name = path.name.rsplit("-", 2)[0].rsplit(".", 1)
+        module, name = path.name.rsplit("-", 1)[0].rsplit(".", 1)
         head, _, rest = path.read_bytes().partition(b"\n")
         signature, _ = pickle.loads(rest[: int(head.split(b" ")[1])])
         getattr(importlib.import_module(module), name).compile(tuple(signature))
@@ -49,6 +49,11 @@ def start(root: Path, level: str, *arguments: str) -> subprocess.Popen[bytes]:
     """Start this program for a level."""
     settings = {"NUMBA_CPU_NAME": level, "NUMBA_CPU_FEATURES": "", "NUMBA_CACHE_DIR": str(root)}
     return subprocess.Popen([sys.executable, __file__, str(root), *arguments], env=os.environ | settings)
+
+
+def folders(root: Path) -> list[Path]:
+    """Return the folders of code that have been filled, one for each level."""
+    return [each for each in (root / "kiks").iterdir() if each.is_dir()]
 
 
 def fill(root: Path) -> None:
@@ -66,13 +71,13 @@ def fill(root: Path) -> None:
         raise SystemExit("The kernels in a wheel are for x86-64-v2 and above, but this processor is another.")
     if start(root, own, "--run").wait():
         raise SystemExit(f"The kernels could not be compiled for {own}.")
-    (filled,) = (root / "kiks").iterdir()
+    (filled,) = folders(root)
     others = {level: start(root, level, "--like", str(filled)) for level in LEVELS if level != own}
     failed = [level for level, process in others.items() if process.wait()]
     if failed:
         raise SystemExit(f"The kernels could not be compiled for {' and '.join(failed)}.")
-    counts = {len(list(folder.iterdir())) for folder in (root / "kiks").iterdir()}
-    if len(counts) != 1 or len(list((root / "kiks").iterdir())) != len(LEVELS):
+    counts = {len(list(folder.iterdir())) for folder in folders(root)}
+    if len(counts) != 1 or len(folders(root)) != len(LEVELS):
         raise SystemExit(f"Each level must have the same functions, but their numbers are {sorted(counts)}.")
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import pickle
 import random
+import re
 import resource
 import shutil
 import signal
@@ -61,7 +62,7 @@ def test_the_second_call_comes_from_the_disk(tmp_path: Path, caplog: pytest.LogC
 def test_a_start_that_was_interrupted_has_not_compiled_all() -> None:
     folder = next(code_cache.cache_folders())
     folder.mkdir(parents=True)
-    (folder / "kiks.engine.step.advance-26-0123456789abcdef.code").touch()
+    (folder / "kiks.engine.step.advance-0123456789abcdef.code").touch()
     assert is_compiled("advance")
     assert not is_compiled(LAST)
 
@@ -238,6 +239,27 @@ def test_concurrent_writes_of_programs_are_all_kept() -> None:
     other.compile(real)
     other.compile(whole)
     assert [call(1), call(1.5)] == [True, True]
+
+
+def test_only_a_changed_syntax_tree_of_the_sources_has_a_folder_of_its_own(tmp_path: Path) -> None:
+    source = b'"""A file."""\nX = 1\n"""A number."""\ndef f(a):\n    """Return a number."""\n    return a + X\n'
+    syntax = code_cache._syntax(source)
+    assert code_cache._syntax(source.replace(b"number", b"sum") + b"# a comment") == syntax
+    assert code_cache._syntax(source.replace(b"X = 1", b"X = 2")) != syntax
+    assert code_cache._syntax(source.replace(b"a + X", b"X + a")) != syntax
+    digest = code_cache._syntax_digest()
+    (known,) = (tmp_path / "cache" / "kiks").glob("sources-*")
+    assert known.read_bytes() == digest
+    known.write_bytes(b"0" * 64)
+    assert code_cache._syntax_digest() == b"0" * 64
+    known.write_bytes(b"..")
+    assert code_cache._syntax_digest() == digest
+
+
+def test_kernels_in_a_file_have_names_of_their_own() -> None:
+    for path in (Path(code_cache.__file__).parents[1]).rglob("*.py"):
+        names = re.findall(r"^@entry\ndef (\w+)", path.read_text(), re.M)
+        assert len(names) == len(set(names))
 
 
 def test_another_version_has_a_folder_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:

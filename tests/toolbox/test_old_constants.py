@@ -33,7 +33,7 @@ def figures(
 
 def world(arena: Arena = ROOM, **constants: Any) -> Simulation:
     """Return a world whose robots have these constants, through the text of its project."""
-    project = Settings(turrets=("k213",), **constants).project_of(arena)
+    project = Settings(turrets=("k213",), thinking="none", **constants).project_of(arena)
     return simulation_of(Project.from_bytes(project.to_bytes()))
 
 

@@ -6,11 +6,13 @@ Method: each file holds one function for one signature, and the digests of what 
 folder belong to this user or the superuser and others cannot write there. A damaged file is deleted and its function
 compiled again; damaged is what has not its digests, and nothing else.
 The name of the folder is a digest of all that the code depends on, so files of another version are never read. Neither
-paths nor times are part of it: the files fit the same sources on another computer. A wheel can bring some.
+paths nor times are part of it: the files fit the same sources on another computer. A wheel can bring some. Of the
+sources it has the syntax trees without docstrings, so a changed comment compiles nothing again.
 """
 
 from __future__ import annotations
 
+import ast
 import contextlib
 import functools
 import hashlib
@@ -38,6 +40,9 @@ from kiks.model.atomic_files import replace_file
 KERNEL_FOLDERS = ("engine", "control", "batch")
 """Folders beside one another whose files hold kernels."""
 
+CONSTANT_FILES = ("units.py", "model/*.py", "firmware/k213.py")
+"""Other files of the package from which kernels have constants."""
+
 SHIPPED = Path(__file__).parent / "compiled"
 """Folder of what a wheel brings (`make wheel`), with a folder for each version; most installations have none."""
 
@@ -47,6 +52,7 @@ _Result: Any = CompileResult
 
 _FORMAT = b"kiks-code-1"
 _HEAD = re.compile(_FORMAT + rb" ([0-9]{1,12}) ([0-9a-f]{64}) ([0-9a-f]{64})")
+_DIGEST = re.compile(rb"[0-9a-f]{64}")
 _ENDING = ".code"
 
 _ANNOTATION = 6
@@ -63,7 +69,7 @@ class CodeCache:
     cache_path = ""
 
     def __init__(self, function: Callable[..., Any]) -> None:
-        self._name = f"{function.__module__}.{function.__qualname__}-{function.__code__.co_firstlineno}"
+        self._name = f"{function.__module__}.{function.__qualname__}"
 
     def enable(self) -> None:
         """Do nothing; Numba asks for it."""
@@ -119,31 +125,67 @@ def is_compiled(name: str) -> bool:
 
 def cache_folders() -> Iterator[Path]:
     """Yield the folders for the compiled engine: the user's, then one among temporary files for when that fails."""
-    for name in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME"):
-        if root := os.environ.get(name):
-            yield Path(root).absolute() / "kiks" / _version()
-            break
-    else:
-        # A user may have none, or one that leads nowhere.
-        with contextlib.suppress(RuntimeError):
-            yield Path.home().absolute() / ".cache" / "kiks" / _version()
+    for root in _roots():
+        yield root / _version()
     with _IfAllowed():
         yield Path(tempfile.gettempdir(), f"kiks-code-{_user()}-{_version()}")
+
+
+def _roots() -> Iterator[Path]:
+    """Yield the folder in which the user's folders for compiled engines lie, if there is one."""
+    for name in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME"):
+        if root := os.environ.get(name):
+            yield Path(root).absolute() / "kiks"
+            return
+    # A user may have none, or one that leads nowhere.
+    with contextlib.suppress(RuntimeError):
+        yield Path.home().absolute() / ".cache" / "kiks"
 
 
 @functools.cache
 def _version() -> str:
     """Return a digest of all that machine code depends on: sources, compilers, Python, processor."""
-    digest = hashlib.sha256()
-    package = Path(__file__).parent.parent
-    for folder in KERNEL_FOLDERS:
-        for source in sorted((package / folder).rglob("*.py")):
-            digest.update(repr((source.relative_to(package).parts, source.read_bytes())).encode())
     config: Any = numba.config
     settings = processor(), config.OPT, bool(config.BOUNDSCHECK)
     versions = numba.__version__, llvmlite.__version__, np.__version__, sys.implementation.cache_tag
-    digest.update(repr((settings, versions)).encode())
-    return digest.hexdigest()[:16]
+    return _digest(repr((_syntax_digest(), settings, versions)).encode())[:16].decode()
+
+
+def _syntax_digest() -> bytes:
+    """Return a digest of the syntax trees of all sources of kernels and of their constants.
+
+    To parse the sources takes a fifth of a second. So the digest lies in a file beside the folders of code, under the
+    digest of the sources' bytes.
+    """
+    package = Path(__file__).parent.parent
+    globs = (*(f"{folder}/**/*.py" for folder in KERNEL_FOLDERS), *CONSTANT_FILES)
+    sources = {path.relative_to(package).parts: path.read_bytes() for each in globs for path in package.glob(each)}
+    sources = dict(sorted(sources.items()))
+    name = f"sources-{_digest(repr(sources).encode())[:32].decode()}"
+    for file in (root / name for root in (SHIPPED, *_roots())):
+        with _IfAllowed():
+            if _is_believed(file.parent) and _is_safe(file.lstat()) and _DIGEST.fullmatch(digest := file.read_bytes()):
+                return digest
+    digest = _digest("".join(map(_syntax, sources.values())).encode())
+    for root in _roots():
+        with contextlib.suppress(ParameterError), _IfAllowed():
+            _make_own(root)
+            replace_file(root / name, digest, rights=0o644)
+    return digest
+
+
+def _syntax(source: bytes) -> str:
+    """Return the syntax tree of a source as text, without docstrings and places."""
+    tree = ast.parse(source)
+    for node in ast.walk(tree):
+        if isinstance(body := getattr(node, "body", None), list):
+            node.body = [each for each in body if not _is_text(each)]  # type: ignore[attr-defined]
+    return ast.dump(tree)
+
+
+def _is_text(statement: ast.stmt) -> bool:
+    value = getattr(statement, "value", None)
+    return isinstance(statement, ast.Expr) and isinstance(value, ast.Constant) and isinstance(value.value, str)
 
 
 def _key(signature: Any, codegen: Any) -> tuple[Any, ...]:
@@ -220,14 +262,14 @@ def _make_own(folder: Path) -> None:
     made = _made(folder)
     made[0].parent.mkdir(parents=True, exist_ok=True)
     for each in made:
-        each.mkdir(mode=0o755 if len(made) > 1 else 0o700, exist_ok=True)
+        each.mkdir(mode=0o700 if str(each.parent) == tempfile.gettempdir() else 0o755, exist_ok=True)
     if not _is_believed(folder):
         raise PermissionError(None, "others may write there")
 
 
 def _made(folder: Path) -> list[Path]:
-    """Return which folders KiKS makes for a folder of code: one among temporary files, else two."""
-    return [folder] if str(folder.parent) == tempfile.gettempdir() else [folder.parent, folder]
+    """Return which folders KiKS makes for a folder: itself, and above it the one that has the name of KiKS."""
+    return [each for each in (folder.parent, folder) if each is folder or each.name == "kiks"]
 
 
 def _user() -> int:
