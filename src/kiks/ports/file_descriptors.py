@@ -1,20 +1,17 @@
-"""File descriptors: a server that has run out of them logs one line and goes on.
+"""File descriptors: a server that has run out of them logs one line and goes on, and new clients wait.
 
-Each connection and each pseudo-terminal takes descriptors, and their number is limited. A listener that cannot accept
-stays readable: a loop that tries again spins, and a loop that raises ends. So one descriptor is held in reserve. When
-there is no other, the reserve is closed, the waiting client is accepted and disconnected, and the reserve is opened
-again. So the queue always empties.
+Each connection and each pseudo-terminal takes descriptors, and their number is limited.
 """
 
 from __future__ import annotations
 
 import contextlib
 import errno
+import functools
 import logging
-import os
 import resource
+import select
 import socket
-import threading
 from collections.abc import Iterator
 
 from kiks.errors import LinkError
@@ -24,6 +21,9 @@ WANTED = 1 << 14
 
 SHORTAGES = (errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM)
 """Errors that mean that this process or the computer has none left, or no memory for one."""
+
+SHORTAGE_PAUSE_S = 0.05
+"""Pause before a server without descriptors tries to accept a client again [s of real time]."""
 
 _log = logging.getLogger("kiks.ports")
 
@@ -66,57 +66,27 @@ def opening(what: str) -> Iterator[None]:
         raise LinkError(f"{what} must be able to open, but {why}") from None
 
 
-class Reserve:
-    """A descriptor for rejecting a client when there is no other; `RESERVE` is the process's."""
+def accept(listener: socket.socket) -> socket.socket | None:
+    """Return the next connection; None if there is none, or no descriptor for it: then it waits in the queue.
 
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._spare = -1
-        self._has_warned = False
-
-    def hold(self) -> None:
-        """Open the reserve, if a descriptor is free; called when a listener opens."""
-        with self._lock:
-            if self._spare < 0:
-                with contextlib.suppress(OSError):
-                    self._spare = os.open(os.devnull, os.O_RDONLY | os.O_CLOEXEC)
-
-    def accept(self, listener: socket.socket) -> socket.socket | None:
-        """Return the next connection; None if there is none, or no descriptor for it: then it is disconnected.
-
-        Raises:
-            OSError: If the listener is closed.
-        """
-        self.hold()
-        try:
-            connection, _ = listener.accept()
-        except (BlockingIOError, ConnectionAbortedError):
-            return None
-        except OSError as error:
-            if error.errno not in SHORTAGES:
-                raise
-            self._reject(listener)
-            return None
-        return connection
-
-    def _reject(self, listener: socket.socket) -> None:
-        if not self._has_warned:
-            self._has_warned = True
-            _log.warning("a client needs a file descriptor: %s Clients are rejected until some are free.", shortage())
-        with self._lock:
-            if self._spare >= 0:
-                os.close(self._spare)
-                self._spare = -1
-            timeout_s = listener.gettimeout()
-            try:
-                listener.setblocking(False)
-                listener.accept()[0].close()
-            except OSError:
-                pass
-            finally:
-                listener.settimeout(timeout_s)
-        self.hold()
+    Raises:
+        OSError: If the listener is closed.
+    """
+    try:
+        connection, _ = listener.accept()
+    except (BlockingIOError, ConnectionAbortedError):
+        return None
+    except OSError as error:
+        if error.errno not in SHORTAGES:
+            raise
+        _warn_of_shortage()
+        # The listener stays readable, so a loop that tries again at once would spin.
+        select.select([], [], [], SHORTAGE_PAUSE_S)
+        return None
+    return connection
 
 
-RESERVE = Reserve()
-"""The reserve of this process."""
+@functools.cache
+def _warn_of_shortage() -> None:
+    """Log the shortage, once in a process."""
+    _log.warning("a client needs a file descriptor: %s Clients wait until some are free.", shortage())

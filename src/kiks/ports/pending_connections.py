@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import hmac
-import selectors
 import socket
+import threading
 from collections.abc import Callable
-from dataclasses import dataclass, field
 
 from kiks.clock.patience import Patience
-from kiks.ports.file_descriptors import RESERVE
+from kiks.ports.file_descriptors import accept
 
 PENDING_MAX = 16
 """Most pending connections; when one more comes, the oldest is closed."""
@@ -19,14 +18,7 @@ PATIENCE_S = 5.0
 """Time within which a connection must show the token [s of real time]."""
 
 CHECK_S = 0.25
-"""Longest time between two checks of these times [s of real time]."""
-
-
-@dataclass
-class _Pending:
-    connection: socket.socket
-    patience: Patience
-    received: bytearray = field(default_factory=bytearray)
+"""Time within which `run` ends after `close` [s of real time]."""
 
 
 class PendingConnections:
@@ -37,8 +29,8 @@ class PendingConnections:
     Args:
         listener: The listening socket.
         token: The token: letters, digits, `-` and `_`.
-        let_in: Called with a connection that has shown the token, and the bytes after it.
-        new_patience: For tests: makes patiences with their own wall clock.
+        let_in: Called in a thread of its own with a connection that has shown the token, and the bytes after it.
+        patience_s: Time within which a connection must show the token [s of real time].
     """
 
     def __init__(
@@ -47,77 +39,59 @@ class PendingConnections:
         token: str,
         let_in: Callable[[socket.socket, bytes], None],
         *,
-        new_patience: Callable[[float], Patience] = Patience,
+        patience_s: float = PATIENCE_S,
     ) -> None:
-        listener.setblocking(False)
-        RESERVE.hold()
+        listener.settimeout(CHECK_S)
         self._listener = listener
         self._token = token.encode("ascii")
         self._let_in = let_in
-        self._new_patience = new_patience
-        self._pending: dict[int, _Pending] = {}
-        self._selector = selectors.DefaultSelector()
-        self._selector.register(listener, selectors.EVENT_READ)
+        self._patience_s = patience_s
+        self._pending: list[socket.socket] = []
+        self._lock = threading.Lock()
         self._is_closed = False
 
     def run(self) -> None:
         """Serve until `close`."""
         while not self._is_closed:
-            self.round(CHECK_S)
-        for number in list(self._pending):
-            self._close(number)
-        self._selector.close()
+            connection = None
+            # The client may have gone again.
+            with contextlib.suppress(OSError):
+                connection = accept(self._listener)
+            if connection is not None:
+                self._limit(PENDING_MAX - 1)
+                self._pending.append(connection)
+                threading.Thread(target=self._check, args=(connection,), daemon=True).start()
         self._listener.close()
+        self._limit(0)
 
     def close(self) -> None:
         """Stop accepting connections; from any thread."""
         self._is_closed = True
 
-    def round(self, wait_s: float) -> None:
-        """Accept and read, for at most `wait_s` [s], and close connections that have taken too long."""
-        for key, _ in self._selector.select(wait_s):
-            if key.fileobj is self._listener:
-                self._accept()
-            elif key.fd in self._pending:
-                self._read(key.fd)
-        for number, pending in list(self._pending.items()):
-            if pending.patience.left_s() == 0:
-                self._close(number)
+    def _limit(self, count: int) -> None:
+        """End the oldest connections until so many are left; the thread of each then closes it."""
+        with self._lock:
+            while len(self._pending) > count:
+                with contextlib.suppress(OSError):
+                    self._pending.pop(0).shutdown(socket.SHUT_RDWR)
 
-    def _accept(self) -> None:
-        connection = None
-        # The client may have gone again.
+    def _check(self, connection: socket.socket) -> None:
+        """Let a connection in if its first line is the token, and close any other."""
+        received, patience = b"", Patience(self._patience_s)
         with contextlib.suppress(OSError):
-            connection = RESERVE.accept(self._listener)
-        if connection is None:
-            return
-        if len(self._pending) >= PENDING_MAX:
-            self._close(next(iter(self._pending)))
-        connection.setblocking(False)
-        pending = _Pending(connection, self._new_patience(PATIENCE_S))
-        pending.patience.left_s()
-        self._pending[connection.fileno()] = pending
-        self._selector.register(connection.fileno(), selectors.EVENT_READ)
-
-    def _read(self, number: int) -> None:
-        pending = self._pending[number]
-        try:
-            piece = pending.connection.recv(1 + len(self._token))
-        except BlockingIOError:
-            return
-        except OSError:
-            piece = b""
-        pending.received += piece
-        line, end, rest = bytes(pending.received).partition(b"\n")
-        if end and hmac.compare_digest(line.rstrip(b"\r"), self._token):
-            del self._pending[number]
-            self._selector.unregister(number)
-            pending.connection.setblocking(True)
-            self._let_in(pending.connection, rest)
-        elif end or not piece or len(line) > len(self._token) + 1 or b" " in line:
-            self._close(number)
-
-    def _close(self, number: int) -> None:
-        self._selector.unregister(number)
-        with contextlib.suppress(OSError):
-            self._pending.pop(number).connection.close()
+            while b"\n" not in received and b" " not in received and len(received) <= len(self._token) + 1:
+                connection.settimeout(max(patience.left_s(), 1e-3))
+                piece = connection.recv(1 + len(self._token))
+                if not piece:
+                    break
+                received += piece
+        line, end, rest = received.partition(b"\n")
+        with self._lock:
+            is_pending = connection in self._pending
+            if is_pending:
+                self._pending.remove(connection)
+        if is_pending and end and hmac.compare_digest(line.rstrip(b"\r"), self._token):
+            connection.settimeout(None)
+            self._let_in(connection, rest)
+        else:
+            connection.close()

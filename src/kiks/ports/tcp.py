@@ -9,7 +9,7 @@ import socket
 
 from kiks.errors import LinkError, ParameterError, shown
 from kiks.ports.endpoint import READ_SIZE, Channel, Endpoint
-from kiks.ports.file_descriptors import RESERVE, opening
+from kiks.ports.file_descriptors import accept, opening
 
 WAITING_MAX = 128
 """Most clients that wait at a port until the commands of the last client are done; others must try again."""
@@ -17,6 +17,12 @@ WAITING_MAX = 128
 AHEAD_MAX = 16 << 20
 """Most bytes read ahead of a robot: more than the operating system holds for a client that has gone. They are read only
 when another client connects."""
+
+HTTP_REQUEST = re.compile(rb"(GET|HEAD|POST|PUT|OPTIONS|DELETE|PATCH|CONNECT|PRI) ")
+"""The first bytes of a browser.
+
+Pages of other sites can make a browser send a request to any port of this computer, with commands for a robot in its
+body. No program for a Khepera begins so. These bytes are no whole command yet, and all that follow are dropped."""
 
 _log = logging.getLogger("kiks.serve")
 
@@ -57,7 +63,6 @@ class TcpEndpoint(Endpoint):
                 f"port {port} of {host} must be free, but it is not ({error.strerror}). 0 takes a free one."
             ) from None
         self._listener.setblocking(False)
-        RESERVE.hold()
         self._has_refused_http = False
         self.by_character = by_character
         self.port = int(self._listener.getsockname()[1])
@@ -74,7 +79,7 @@ class TcpEndpoint(Endpoint):
 
     def _connect(self) -> socket.socket | None:
         try:
-            connection = RESERVE.accept(self._listener)
+            connection = accept(self._listener)
         except OSError:
             return None
         if connection is None:
@@ -105,36 +110,6 @@ class TcpEndpoint(Endpoint):
             )
 
 
-class FirstLine:
-    """Detects a client that begins with an HTTP request, from bytes in any pieces.
-
-    Pages of other sites can make a browser send a request to any port of this computer, with commands for a robot in
-    its body. No command of a Khepera looks like a request line, such as `POST / HTTP/1.1`. The bytes of the first line
-    go on to the robot at once, so no program waits. If it is a request line, its end and all that follows are dropped.
-    So no command is ever complete.
-    """
-
-    _METHOD = re.compile(rb"[A-Z]+ \S")
-    _VERSION = re.compile(rb" HTTP/\d(\.\d)?\Z")
-
-    def __init__(self) -> None:
-        self._is_over = False
-        self._head = b""
-        self._tail = b""
-
-    def is_http(self, data: bytes) -> bool:
-        """Take the next bytes; return whether they end the line of a request."""
-        if self._is_over:
-            return False
-        end = re.search(rb"[\r\n]", data)
-        line = data if end is None else data[: end.start()]
-        # Only the beginning and the end of the line count, however long it is.
-        self._head += line[: 32 - len(self._head)]
-        self._tail = (self._tail + line)[-16:]
-        self._is_over = end is not None
-        return self._is_over and bool(self._METHOD.match(self._head)) and bool(self._VERSION.search(self._tail))
-
-
 class TcpChannel(Channel):
     """A client on a connection.
 
@@ -148,7 +123,7 @@ class TcpChannel(Channel):
         self.by_character = endpoint.by_character
         self._connection = connection
         self._endpoint = endpoint
-        self._first_line = FirstLine()
+        self._first_bytes = b""
         self._ahead = bytearray()
 
     def fileno(self) -> int:
@@ -157,14 +132,14 @@ class TcpChannel(Channel):
 
     def read(self) -> bytes | None:
         """Return the bytes of the client; None when the connection is over, or the client is a browser."""
-        if self._ahead:
-            data: bytes | None = bytes(self._ahead[:READ_SIZE])
-            del self._ahead[:READ_SIZE]
-        else:
-            data = self._receive()
-        if data and self._first_line.is_http(data):
-            self._endpoint.refuse_http()
-            return None
+        data: bytes | None = bytes(self._ahead[:READ_SIZE])
+        del self._ahead[:READ_SIZE]
+        data = data or self._receive()
+        if data and len(self._first_bytes) < 8:
+            self._first_bytes = (self._first_bytes + data)[:8]
+            if HTTP_REQUEST.match(self._first_bytes):
+                self._endpoint.refuse_http()
+                return None
         return data
 
     def _receive(self) -> bytes | None:
@@ -188,10 +163,8 @@ class TcpChannel(Channel):
         """
         while len(self._ahead) < AHEAD_MAX:
             data = self._receive()
-            if data is None:
-                return True
             if not data:
-                return False
+                return data is None
             self._ahead += data
         return False
 
