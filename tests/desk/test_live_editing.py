@@ -11,12 +11,13 @@ import numpy as np
 import pytest
 
 from kiks.clock.gate import Gate
+from kiks.desk.server import live_editing
 from kiks.desk.server.desk import Desk
-from kiks.desk.server.live_editing import Editing
+from kiks.desk.server.live_editing import Editing, Robot
 from kiks.errors import KiksError, LinkError, ParameterError
+from kiks.model import brush
 from kiks.model.arena import Arena, Ball, Cylinder, Lamp, Pose
 from kiks.model.project import Project, ProjectRobot
-from kiks.model.sketch_things import SketchRobot
 from kiks.ports.programs import Programs
 from kiks.sim.from_project import simulation_of
 from kiks.sim.simulation import Simulation
@@ -58,7 +59,7 @@ def in_order(desk: Desk, *acts: Callable[[Editing], Awaitable[None]]) -> Editing
 
 
 def line(editing: Editing) -> Awaitable[None]:
-    return editing.draw(lambda sketch: sketch.line([(200, 10), (200, 200)], width_mm=6))
+    return editing.draw(lambda arena: brush.line(arena, [(200, 10), (200, 200)], width_mm=6))
 
 
 def counts(desk: Desk) -> tuple[int, int, int]:
@@ -125,10 +126,10 @@ def test_refused_edits_change_nothing(desk):
         assert not editing.can_redo
 
     async def do() -> None:
-        await refused(editing.draw(lambda sketch: sketch.rectangle(90, 90, 110, 110)), "robot 1")
+        await refused(editing.draw(lambda arena: brush.rectangle(arena, 90, 90, 110, 110)), "robot 1")
         await refused(editing.place(Ball(100, 100)), "robot 1")
         await refused(editing.remove(250, 20), "nothing")
-        await refused(editing.place(SketchRobot(250, 200, 0.0, "kepera")), "Did you mean")
+        await refused(editing.place(Robot(10, 200)), "wall")
 
     asyncio.run(do())
 
@@ -157,7 +158,7 @@ def test_an_edit_that_the_world_refuses_is_undone(desk, monkeypatch):
     asyncio.run(do())
 
 
-def test_the_sketch_follows_what_moves(desk):
+def test_edits_leave_what_has_moved_where_it_is(desk):
 
     async def do() -> None:
         editing = Editing(desk)
@@ -165,8 +166,8 @@ def test_the_sketch_follows_what_moves(desk):
         desk.sim.place(1, 400, 300, 0.0)
         desk.sim.move_body(1, 50, 50)
         with pytest.raises(KiksError, match="robot 1"):
-            await editing.draw(lambda sketch: sketch.rectangle(390, 290, 410, 310))
-        await editing.draw(lambda sketch: sketch.rectangle(95, 95, 105, 105))
+            await editing.draw(lambda arena: brush.rectangle(arena, 390, 290, 410, 310))
+        await editing.draw(lambda arena: brush.rectangle(arena, 95, 95, 105, 105))
         assert editing.can_undo
         await editing.undo()
         await editing.undo()
@@ -196,7 +197,7 @@ def test_resets_keep_the_drawing(desk):
     async def do() -> None:
         editing = Editing(desk)
         desk.sim.place(1, 400, 300, 0.0)
-        await editing.draw(lambda sketch: sketch.rectangle(50, 50, 150, 150))
+        await editing.draw(lambda arena: brush.rectangle(arena, 50, 50, 150, 150))
         desk.sim.place(1, 250, 200, 0.0)
         await desk.reset()
         assert desk.sim.pose(1)[:2] == (400, 300)
@@ -213,7 +214,7 @@ def test_adding_a_robot_restarts_the_world(desk):
     async def do() -> None:
         editing = Editing(desk)
         await line(editing)
-        await editing.place(SketchRobot(400, 300, 1.0, "khepera_ii"))
+        await editing.place(Robot(400, 300, 1.0, ProjectRobot("khepera_ii")))
         assert desk.sim is not first
         assert [spec.name for spec in desk.sim.specs] == ["Khepera", "Khepera II"]
         assert desk.sim.pose(2) == pytest.approx((400, 300, 1.0), abs=1e-4)
@@ -239,7 +240,7 @@ def test_the_last_robot_may_go_and_come_back(desk):
         await editing.remove(100, 100)
         assert counts(desk) == (0, 2, 1)
         assert desk.project.robots == ()
-        await editing.draw(lambda sketch: sketch.rectangle(90, 90, 110, 110))
+        await editing.draw(lambda arena: brush.rectangle(arena, 90, 90, 110, 110))
         await editing.undo()
         await editing.undo()
         assert desk.names() == ["Ada"]
@@ -257,7 +258,7 @@ def test_another_arena_keeps_the_robots(desk):
         assert desk.sim.arena.name == "maze"
         assert counts(desk) == (1, 0, 1)
         assert len(desk.sim.wires[0].firmware.fitted) == 1
-        await editing.draw(lambda sketch: sketch.line([(500, 50)], width_mm=30, brightness=0))
+        await editing.draw(lambda arena: brush.line(arena, [(500, 50)], width_mm=30, brightness=0))
         await editing.undo()
         await editing.undo()
         assert counts(desk) == (1, 2, 1)
@@ -274,7 +275,7 @@ def test_a_world_of_another_program_keeps_its_robots():
         editing = Editing(desk)
         await line(editing)
         assert sim.arena.brightness[100, 200] == 255
-        for act in (editing.place(SketchRobot(400, 300)), editing.begin(Arena.box(300, 300))):
+        for act in (editing.place(Robot(400, 300)), editing.begin(Arena.box(300, 300))):
             with pytest.raises(LinkError, match="own"):
                 await act
             assert editing.can_undo
@@ -294,10 +295,75 @@ def test_two_people_may_draw_at_once(desk):
     async def do() -> None:
         editing = Editing(desk)
         strokes = [
-            editing.draw(lambda sketch, y=y: sketch.line([(240, y), (260, y)], width_mm=4, brightness=y))
+            editing.draw(lambda arena, y=y: brush.line(arena, [(240, y), (260, y)], width_mm=4, brightness=y))
             for y in range(20, 240, 20)
         ]
         await asyncio.gather(*strokes)
         assert [int(desk.sim.arena.brightness[y, 250]) for y in range(20, 240, 20)] == list(range(20, 240, 20))
+
+    asyncio.run(do())
+
+
+def test_steps_back_find_their_things_whatever_their_order(desk):
+
+    async def do() -> None:
+        editing = Editing(desk)
+        await editing.place(Ball(430, 320))
+        await editing.remove(300, 300)
+        await editing.undo()  # comes back as the last one
+        desk.sim.move_body(int(desk.sim.bodies()["number"][-1]), 250, 200)
+        await editing.undo()
+        assert sorted(desk.sim.bodies()["x_mm"].tolist()) == [250, 400]
+        await editing.redo()
+        await editing.redo()
+        assert sorted(desk.sim.bodies()["x_mm"].tolist()) == [400, 430]
+
+    asyncio.run(do())
+
+
+def test_steps_back_wait_until_there_is_room(desk):
+
+    async def do() -> None:
+        editing = Editing(desk)
+        await line(editing)
+        await editing.draw(lambda arena: brush.rectangle(arena, 190, 10, 210, 300, 0))
+        desk.sim.place(1, 200, 150, 0.0)
+        with pytest.raises(KiksError, match="robot 1"):
+            await editing.undo()
+        assert not desk.sim.arena.brightness[100, 200]
+        desk.sim.place(1, 100, 100, 0.0)
+        await editing.undo()
+        assert desk.sim.arena.brightness[100, 200]
+
+    asyncio.run(do())
+
+
+def test_steps_beyond_the_limit_are_forgotten(desk, monkeypatch):
+    monkeypatch.setattr(live_editing, "STEPS_MAX", 5)
+
+    async def do() -> None:
+        editing = Editing(desk)
+        for x_mm in range(200, 220):
+            await editing.draw(lambda arena, x_mm=x_mm: brush.line(arena, [(x_mm + 0.5, 50.5)], width_mm=1))
+        for _ in range(5):
+            assert editing.can_undo
+            await editing.undo()
+        assert not editing.can_undo
+        assert np.count_nonzero(desk.sim.arena.brightness[50, 200:220]) == 15
+
+    asyncio.run(do())
+
+
+def test_robots_beyond_the_starts_of_another_arena_find_room(desk):
+
+    async def do() -> None:
+        editing = Editing(desk)
+        await editing.place(Robot(400, 300))
+        await editing.begin(Arena.maze(columns=3, rows=3))
+        assert desk.sim.pose(1) == pytest.approx(Arena.maze(columns=3, rows=3).starts[0])
+        arena = desk.sim.arena
+        assert all(arena.free_for(*start[:2], 27.4) for start in arena.starts)
+        with pytest.raises(KiksError, match="room for robot 1"):
+            await editing.begin(Arena.box(100, 100, wall_mm=30))
 
     asyncio.run(do())

@@ -1,19 +1,33 @@
-"""Which cells of a raster a rectangle or the stroke of a brush covers: those whose centres lie in it, borders included.
+"""Painting walls: functions from an arena to an arena. Brightness 0 is floor, so painting with it erases.
 
 Need: what is drawn mirrored comes out mirrored, to the cell, and a stroke over 8 m must not take the memory of 8 x 8 m.
-Method: everything is counted in whole 64ths of a cell, so that no rounding decides about a centre on the border; and a
-stroke is cut into pieces of a few rows, and only columns near the stroke are examined.
+Method: a cell is covered if its centre is, borders included. Everything is counted in whole 64ths of a cell, so that no
+rounding decides about a centre on the border; and a stroke is cut into pieces of a few rows, of which only the columns
+near the stroke are examined.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+
+from kiks.model.arena import Arena
+from kiks.model.checks import check_count, check_number
+from kiks.model.materials import brightness_of
+
+WIDTH_MAX_MM = 1000.0
+"""Widest brush [mm]."""
+
+POINTS_MAX = 10_000
+"""Most points of one stroke."""
+
+_FAR_MM = 1e5
 
 _PER_CELL = 64
 """Units in a cell."""
@@ -23,7 +37,50 @@ _STRIP_ROWS, _STRIP_COLUMNS = 64, 8192
 Point = tuple[float, float]
 
 
-class Area(NamedTuple):
+def rectangle(
+    arena: Arena, x0_mm: float, y0_mm: float, x1_mm: float, y1_mm: float, brightness: int | str = 255
+) -> Arena:
+    """Return an arena with a rectangle between two corners [mm] filled, the same one if that changes nothing."""
+    corner, opposite = _cells(arena, [(x0_mm, y0_mm), (x1_mm, y1_mm)])
+    return _painted(arena, _rectangle_cells(arena.brightness.shape, corner, opposite), brightness)
+
+
+def line(arena: Arena, points_mm: Sequence[Point], *, width_mm: float, brightness: int | str = 255) -> Arena:
+    """Return an arena with a line of a round brush: from one point to another, freehand through many, a dot at one.
+
+    Example:
+        >>> int(line(Arena.box(400, 300), [(100, 50), (100, 250)], width_mm=10, brightness="wood").brightness[150, 100])
+        190
+    """
+    check_number("width_mm", width_mm, 1 / _PER_CELL, WIDTH_MAX_MM)
+    check_count("the number of points", len(points_mm), 1, POINTS_MAX, "Draw in shorter strokes.")
+    points = _cells(arena, points_mm)
+    return _painted(arena, _stroke_cells(arena.brightness.shape, points, width_mm / arena.mm_per_cell), brightness)
+
+
+def _cells(arena: Arena, points_mm: Sequence[Point]) -> list[Point]:
+    limits = (-_FAR_MM, _FAR_MM)
+    return [
+        (
+            check_number("x_mm", x_mm, *limits) / arena.mm_per_cell,
+            check_number("y_mm", y_mm, *limits) / arena.mm_per_cell,
+        )
+        for x_mm, y_mm in points_mm
+    ]
+
+
+def _painted(arena: Arena, areas: Iterable[_Area], brightness: int | str) -> Arena:
+    grey = check_count("brightness", brightness_of(brightness), 0, 255, "0 is floor.")
+    raster = arena.brightness.copy()
+    for rows, columns, mask in areas:
+        raster[rows, columns][... if mask is None else mask] = grey
+    if np.array_equal(raster, arena.brightness):
+        return arena
+    raster.setflags(write=False)
+    return replace(arena, brightness=raster)
+
+
+class _Area(NamedTuple):
     """Cells of a raster: a box of rows and columns, and which of them, all if `mask` is None."""
 
     rows: slice
@@ -31,7 +88,7 @@ class Area(NamedTuple):
     mask: npt.NDArray[np.bool_] | None = None
 
 
-def rectangle_cells(shape: tuple[int, int], corner: Point, opposite: Point) -> list[Area]:
+def _rectangle_cells(shape: tuple[int, int], corner: Point, opposite: Point) -> list[_Area]:
     """Return the cells of a raster whose centres lie in a rectangle.
 
     Args:
@@ -43,10 +100,10 @@ def rectangle_cells(shape: tuple[int, int], corner: Point, opposite: Point) -> l
         _centres(_units(min(a, b)), _units(max(a, b)), count)
         for a, b, count in zip(corner, opposite, shape[::-1], strict=True)
     )
-    return [Area(rows, columns)] if rows.start < rows.stop and columns.start < columns.stop else []
+    return [_Area(rows, columns)] if rows.start < rows.stop and columns.start < columns.stop else []
 
 
-def stroke_cells(shape: tuple[int, int], points: Sequence[Point], width: float) -> Iterator[Area]:
+def _stroke_cells(shape: tuple[int, int], points: Sequence[Point], width: float) -> Iterator[_Area]:
     """Yield the cells of a raster whose centres are at most half a width from a line through points.
 
     Args:
@@ -62,7 +119,7 @@ def stroke_cells(shape: tuple[int, int], points: Sequence[Point], width: float) 
 
 def _segment_cells(
     shape: tuple[int, int], begin: tuple[int, int], end: tuple[int, int], radius: float
-) -> Iterator[Area]:
+) -> Iterator[_Area]:
     low, high = sorted((begin[1], end[1]))
     rows = _centres(math.ceil(low - radius), math.floor(high + radius), shape[0])
     for first in range(rows.start, rows.stop, _STRIP_ROWS):
@@ -75,13 +132,13 @@ def _segment_cells(
             x = (np.arange(columns.start, columns.stop) * 2 + 1) * (_PER_CELL // 2)
             mask = _near(x, y, begin, end, radius)
             if mask.any():
-                yield Area(strip, columns, mask)
+                yield _Area(strip, columns, mask)
 
 
 def _near(
     x: npt.NDArray[np.int64], y: npt.NDArray[np.int64], begin: tuple[int, int], end: tuple[int, int], radius: float
 ) -> npt.NDArray[np.bool_]:
-    """Tell which of the places are at most a radius from a line between two points."""
+    """Return which places are at most a radius from a line between two points."""
     way_x, way_y = end[0] - begin[0], end[1] - begin[1]
     from_begin_x, from_begin_y = x - begin[0], y - begin[1]
     square = int(4 * radius * radius) // 4

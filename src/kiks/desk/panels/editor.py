@@ -14,12 +14,13 @@ from kiks.desk.panels.files import FilesPanel
 from kiks.desk.panels.new_arena import ask_for_box, ask_for_maze
 from kiks.desk.panels.widgets import named, text_button, told, with_props
 from kiks.desk.server.desk import Desk
-from kiks.desk.server.live_editing import Editing
+from kiks.desk.server.live_editing import Editing, Robot
 from kiks.errors import ParameterError
+from kiks.model import brush
 from kiks.model.arena_objects import Ball, Cylinder, Lamp
 from kiks.model.materials import REFLECTANCES, brightness_of
+from kiks.model.project import ProjectRobot
 from kiks.model.robot import robot_names
-from kiks.model.sketch_things import SketchRobot
 
 BRUSH_MAX_MM = 100
 SNAPS: dict[float, str] = {0.0: "off", 1.0: "1 mm", 5.0: "5 mm", 10.0: "10 mm", 50.0: "50 mm"}
@@ -172,14 +173,14 @@ class EditorPanel:
         grey = 0 if tool.startswith("erase") else int(self._brightness.value)
         width_mm = float(self._brush.value)
         if stroke.kind == "rectangle":
-            return editing.draw(lambda sketch: sketch.rectangle(*points[0], *points[-1], grey))
+            return editing.draw(lambda arena: brush.rectangle(arena, *points[0], *points[-1], grey))
         if stroke.kind in ("line", "freehand"):
-            return editing.draw(lambda sketch: sketch.line(points, width_mm=width_mm, brightness=grey))
+            return editing.draw(lambda arena: brush.line(arena, points, width_mm=width_mm, brightness=grey))
         (x_mm, y_mm) = points[0]
         if tool == "remove":
             return editing.remove(x_mm, y_mm)
         if tool == "robot":
-            return editing.place(SketchRobot(x_mm, y_mm, math.pi / 2, self._kind.value))
+            return editing.place(Robot(x_mm, y_mm, math.pi / 2, ProjectRobot(self._kind.value)))
         kinds: dict[str, type[Ball | Cylinder | Lamp]] = {"ball": Ball, "cylinder": Cylinder, "lamp": Lamp}
         return editing.place(kinds[tool](x_mm, y_mm))
 
@@ -195,7 +196,7 @@ class EditorPanel:
 
     @told
     async def _clear(self) -> None:
-        await self._editing.draw(lambda sketch: sketch.clear())
+        await self._editing.draw(lambda arena: brush.rectangle(arena, 0, 0, arena.width_mm, arena.height_mm, 0))
         self._refresh()
 
     @told

@@ -1,39 +1,92 @@
-"""Drawing in a running world: a sketch follows the world, and each edit of the sketch is applied to the world."""
+"""Editing a running world by values: an edit makes new walls and things of the old ones; what differs is applied.
+
+Walls and things never change, so the history is a list of them. A world moves on while people edit it: things have
+numbers, and undoing a step changes nothing but what the step changed.
+"""
 
 from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import Callable
+import pickle
+import zlib
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import TypeVar
-
-import numpy as np
+from itertools import count
+from typing import Any, NamedTuple
 
 from kiks.desk.server.desk import Desk
 from kiks.engine.state import BALL
-from kiks.errors import KiksError, ParameterError
-from kiks.model.arena import Arena, Ball, Cylinder, Lamp
-from kiks.model.atomic_files import inside
-from kiks.model.project import ProjectRobot
-from kiks.model.sketch import Sketch
-from kiks.model.sketch_things import SketchRobot, Thing, radius_of
+from kiks.errors import ParameterError
+from kiks.model.arena import Arena, Ball, Cylinder, Lamp, Pose
+from kiks.model.arena_objects import THINGS_MAX
+from kiks.model.free_disc import free_place
+from kiks.model.project import Project, ProjectRobot
 from kiks.sim.simulation import Simulation
-
-Done = TypeVar("Done")
 
 LAMP_REACH_MM = 20.0
 """Distance within which a click hits a lamp [mm]."""
 
+HISTORY_BYTES_MAX = 64 << 20
+"""Memory that packed steps may take in each direction; the last step stays whatever it takes."""
+
+STEPS_MAX = 1000
+"""Most steps that can be undone."""
+
 _LARGE_CELLS = 4_000_000
 
 
-class Editing:
-    """Edits the world of a desk; all browsers of the desk share it and its undo history.
+class Robot(NamedTuple):
+    """A robot of a project at its start: x [mm], y [mm], heading [rad]."""
 
-    The world moves on while people draw, so the sketch follows it before each step, and undoes a step that the world
-    refuses. Walls, bodies and lamps change in the running world; a different number of robots or another arena starts a
-    new world. Each edit takes a checkpoint for resets.
+    x_mm: float
+    y_mm: float
+    heading_rad: float = math.pi / 2
+    robot: ProjectRobot = ProjectRobot()
+
+
+Thing = Robot | Ball | Cylinder | Lamp
+_KINDS = (Robot, Ball, Cylinder, Lamp)
+
+
+class Content(NamedTuple):
+    """What people can edit.
+
+    Attributes:
+        walls: The walls, an arena without objects.
+        things: What stands or hangs in it, by numbers that stay the same.
+    """
+
+    walls: Arena
+    things: Mapping[int, Thing]
+
+    def of(self, kind: type[Thing]) -> dict[int, Any]:
+        """Return the things of a kind, in the world's order: a robot that comes back stands where it stood."""
+        found = {number: thing for number, thing in self.things.items() if isinstance(thing, kind)}
+        return dict(sorted(found.items())) if kind is Robot else found
+
+    def in_project(self, project: Project) -> Project:
+        """Return a project with this content instead of its own."""
+        robots, balls, cylinders, lamps = (tuple(self.of(kind).values()) for kind in _KINDS)
+        arena = replace(
+            self.walls, starts=tuple(Pose(*each[:3]) for each in robots), balls=balls, cylinders=cylinders, lamps=lamps
+        )
+        return replace(project, arena=arena, robots=tuple(each.robot for each in robots))
+
+
+class _Step(NamedTuple):
+    """A step that can be taken: what was there and what will be there."""
+
+    here: Content
+    there: Content
+    is_another_arena: bool
+
+
+class Editing:
+    """Edits the world of a desk; all browsers of the desk share it and its history.
+
+    Walls, bodies and lamps change in the running world; a different number of robots or another arena starts a new
+    world. Each edit takes a checkpoint for resets. The world itself refuses what cannot be.
 
     Args:
         desk: The desk.
@@ -42,197 +95,190 @@ class Editing:
     def __init__(self, desk: Desk) -> None:
         self._desk = desk
         self._lock = asyncio.Lock()
-        self._sim: Simulation | None = None
-        self._sketch = Sketch(Arena.box(100, 100), kinds=())
-        self._bodies: dict[int, int] = {}  # body numbers in the world by numbers in the sketch
-        self._lamps: list[int] = []  # lamp numbers in the sketch, in the world's order
-        self._robots: dict[int, ProjectRobot] = {}  # project robots by numbers in the sketch
-        self._arena_number = -1  # of the sketch's arena when the world was built
+        self._undoable: list[bytes] = []
+        self._redoable: list[bytes] = []
+        self._numbers: list[int] = []  # of the things in the world: robots, balls, cylinders, lamps
+        self._fresh = count(1)
+        self._known: tuple[Any, ...] = ()  # what of the world only edits change
 
     @property
     def can_undo(self) -> bool:
         """Whether this world has a step to undo."""
-        return self._sim is self._desk.sim and self._sketch.can_undo
+        return bool(self._undoable) and self._known[0] is self._desk.sim
 
     @property
     def can_redo(self) -> bool:
         """Whether this world has a step to redo."""
-        return self._sim is self._desk.sim and self._sketch.can_redo
+        return bool(self._redoable) and self._known[0] is self._desk.sim
 
     # ---- steps ----
 
-    async def draw(self, act: Callable[[Sketch], object]) -> None:
-        """Edit the sketch and the world.
-
-        Args:
-            act: At most one step of the sketch.
-        """
-        await self._do(act, Sketch.take_back)
-
-    async def undo(self) -> None:
-        """Undo the last step."""
-        await self._do(Sketch.undo, Sketch.redo)
-
-    async def redo(self) -> None:
-        """Redo the step that was undone last."""
-        await self._do(Sketch.redo, Sketch.undo)
+    async def draw(self, paint: Callable[[Arena], Arena]) -> None:
+        """Change the walls by a function from an arena to an arena, such as `kiks.model.brush.line`."""
+        await self._edit(lambda now: now._replace(walls=paint(now.walls)))
 
     async def place(self, thing: Thing) -> None:
         """Put a robot, ball, cylinder or lamp into the world."""
-        await self.draw(lambda sketch: sketch.add(thing))
+
+        def added(now: Content) -> Content:
+            if len(now.things) >= THINGS_MAX:
+                raise ParameterError(f"There must be at most {THINGS_MAX} things, but there are {len(now.things)}.")
+            return now._replace(things={**now.things, next(self._fresh): thing})
+
+        await self._edit(added)
 
     async def remove(self, x_mm: float, y_mm: float) -> None:
         """Remove the thing at a place."""
-        await self.draw(lambda sketch: sketch.remove(_thing_at(sketch, x_mm, y_mm)))
+
+        def removed(now: Content) -> Content:
+            gone = self._thing_at(now, x_mm, y_mm)
+            return now._replace(things={number: thing for number, thing in now.things.items() if number != gone})
+
+        await self._edit(removed)
 
     async def begin(self, arena: Arena) -> None:
         """Begin with another arena and the same robots, as a step that can be undone.
 
+        Robots go to its starts; those beyond stay where they are, or go to the nearest place with room.
+
         Raises:
             LinkError: If the world cannot be replaced.
         """
-        await self.draw(lambda sketch: sketch.begin(arena))
+        await self._edit(lambda now: self._in_another_arena(now, arena), is_another_arena=True)
 
-    async def _do(self, act: Callable[[Sketch], object], take_back: Callable[[Sketch], object]) -> None:
-        self._desk.check_present()
+    async def undo(self) -> None:
+        """Undo the last step."""
+        await self._go(self._undoable, self._redoable)
+
+    async def redo(self) -> None:
+        """Redo the step that was undone last."""
+        await self._go(self._redoable, self._undoable)
+
+    async def _go(self, source: list[bytes], target: list[bytes]) -> None:
         async with self._lock:
-            await self._follow()
-            sketch = self._sketch
-            before, version = sketch.arena(), sketch.version
-            things = dict(sketch.things)
-            await _aside(sketch, lambda: act(sketch))
-            if sketch.version == version:
+            now = await self._content()
+            if source:
+                here, there, is_another = _unpacked(source[-1])
+                then = there if is_another else _with_change(now, here, there)
+                await self._apply(now, then, is_another)
+                source.pop()
+                _push(target, _Step(then, now, is_another))
+
+    async def _edit(self, edit: Callable[[Content], Content], *, is_another_arena: bool = False) -> None:
+        async with self._lock:
+            now = await self._content()
+            # A large arena takes a while: other browsers need not wait for it.
+            is_large = now.walls.brightness.size > _LARGE_CELLS
+            then = await asyncio.to_thread(edit, now) if is_large else edit(now)
+            if then == now:
                 return
-            try:
-                await self._apply(before, things)
-            except KiksError:
-                take_back(sketch)
-                raise
+            await self._apply(now, then, is_another_arena)
+            _push(self._undoable, _Step(then, now, is_another_arena))
+            self._redoable.clear()
 
-    async def _apply(self, before: Arena, things: dict[int, Thing]) -> None:
-        """Apply the change of the sketch to the world."""
-        sketch, desk = self._sketch, self._desk
-        arena = sketch.arena()
-        robots = sketch.of(SketchRobot)
-        have_changed = robots.keys() != {number for number, thing in things.items() if isinstance(thing, SketchRobot)}
-        if have_changed or sketch.arena_number != self._arena_number:
-            for number, robot in robots.items():
-                self._robots.setdefault(number, ProjectRobot(robot.kind))
-            project = await desk.present_project()
-            await desk.replace(replace(project, arena=arena, robots=tuple(self._robots[number] for number in robots)))
-            self._meet()
-            return
-        # The arena caches its wall faces, which take a while: compute them before locking the world.
-        if not np.array_equal(arena.brightness, before.brightness):
-            await asyncio.to_thread(lambda: arena.faces)
-        await desk.do(lambda sim: self._change(sim, before, arena, things))
-        # Resets return to here: the places of the old checkpoint may be walls by now.
-        await desk.mark()
-        desk.project = await desk.present_project()
-        desk.tell()
+    # ---- the world ----
 
-    def _change(self, sim: Simulation, before: Arena, arena: Arena, things: dict[int, Thing]) -> None:
-        """Apply the difference of one step to the world."""
-        now = self._sketch.things
-        for number, thing in things.items():
-            if number in now:
-                continue
-            if isinstance(thing, Lamp):
-                sim.remove_lamp(self._lamps.index(number) + 1)
-                self._lamps.remove(number)
-            elif not isinstance(thing, SketchRobot):
-                sim.remove_body(self._bodies.pop(number))
-        if not np.array_equal(arena.brightness, before.brightness):
-            sim.set_arena(arena)
-        for number, thing in now.items():
-            if number not in things:
-                self._add(sim, number, thing)
-            elif thing != things[number]:
-                self._move(sim, number, thing)
+    async def _content(self) -> Content:
+        """Return what is in the world now; if something else than an edit has changed it, the history ends."""
+        self._desk.check_present()
+        known, project = await self._desk.do(_known_of), await self._desk.present_project()
+        arena = project.arena
+        robots = [Robot(*start, robot) for start, robot in zip(arena.starts, project.robots, strict=False)]
+        things: list[Thing] = [*robots, *arena.bodies, *arena.lamps]
+        if known != self._known or len(things) != len(self._numbers):
+            self._known, self._numbers = known, [next(self._fresh) for _ in things]
+            self._undoable.clear()
+            self._redoable.clear()
+        walls = replace(arena, starts=(), balls=(), cylinders=(), lamps=())
+        return Content(walls, dict(zip(self._numbers, things, strict=True)))
 
-    def _add(self, sim: Simulation, number: int, thing: Thing) -> None:
-        if isinstance(thing, Lamp):
-            sim.add_lamp(thing.x_mm, thing.y_mm, thing.power_w, is_on=thing.is_on)
-            self._lamps.append(number)
-        elif isinstance(thing, Ball | Cylinder):
-            add = sim.add_ball if isinstance(thing, Ball) else sim.add_cylinder
-            self._bodies[number] = add(
-                thing.x_mm,
-                thing.y_mm,
-                radius_mm=thing.radius_mm,
-                friction_mm_s2=thing.friction_mm_s2,
-                brightness=thing.brightness,
-            )
-
-    def _move(self, sim: Simulation, number: int, thing: Thing) -> None:
-        if isinstance(thing, Lamp):
-            sim.lamps[self._lamps.index(number)] = (thing.x_mm, thing.y_mm, thing.power_w, float(thing.is_on))
-        elif isinstance(thing, SketchRobot):
-            sim.place([*self._sketch.of(SketchRobot)].index(number) + 1, thing.x_mm, thing.y_mm, thing.heading_rad)
+    async def _apply(self, now: Content, then: Content, is_another_arena: bool) -> None:
+        desk = self._desk
+        if is_another_arena or now.of(Robot).keys() != then.of(Robot).keys():
+            await desk.replace(then.in_project(await desk.present_project()))
         else:
-            sim.move_body(self._bodies[number], thing.x_mm, thing.y_mm)
+            # The faces of walls take a while: they are computed before the world is locked.
+            if then.walls is not now.walls:
+                await asyncio.to_thread(lambda: then.walls.faces)
+            await desk.do(lambda sim: _change(sim, now, then))
+            # Resets return to here: the places of the old checkpoint may be walls by now.
+            await desk.mark()
+            desk.project = await desk.present_project()
+            desk.tell()
+        self._known = await desk.do(_known_of)
+        self._numbers = [number for kind in _KINDS for number in then.of(kind)]
 
-    # ---- following the world ----
+    def _in_another_arena(self, now: Content, arena: Arena) -> Content:
+        discs = [(body.x_mm, body.y_mm, body.radius_mm) for body in arena.bodies]
+        things: dict[int, Thing] = {}
+        for index, (number, robot) in enumerate(now.of(Robot).items()):
+            x_mm, y_mm, heading_rad = (*arena.starts, *[robot[:3]] * (index + 1))[index]
+            radius_mm = self._desk.sim.specs[index].body.radius_mm
+            x_mm, y_mm = free_place(arena, discs, radius_mm, (x_mm, y_mm), f"robot {index + 1}")
+            discs.append((x_mm, y_mm, radius_mm))
+            things[number] = Robot(x_mm, y_mm, heading_rad, robot.robot)
+        things |= {next(self._fresh): thing for thing in (*arena.bodies, *arena.lamps)}
+        return Content(replace(arena, starts=(), balls=(), cylinders=(), lamps=()), things)
 
-    async def _follow(self) -> None:
-        """Update the sketch from the world, in which things have moved and may have been changed from outside."""
-        if not await self._desk.do(self._note):
-            project = await self._desk.present_project()
-            kinds = [self._file(robot.kind) for robot in project.robots]
-            arena = project.arena
-            self._sketch = await _aside(arena, lambda: Sketch(arena, kinds))
-            self._robots = dict(zip(self._sketch.of(SketchRobot), project.robots, strict=True))
-            self._meet()
-
-    def _note(self, sim: Simulation) -> bool:
-        """Copy the present places into the sketch; return False if the world has other things or walls."""
-        if sim is not self._sim or sim is not self._desk.sim:
-            return False
-        bodies = {int(body["number"]): body for body in sim.bodies()}
-        is_known = set(bodies) == set(self._bodies.values()) and len(sim.lamps) == len(self._lamps)
-        if not is_known or not np.array_equal(sim.arena.brightness, self._sketch.brightness):
-            return False
-        sketch = self._sketch
-        for (number, robot), pose in zip(sketch.of(SketchRobot).items(), sim.poses().tolist(), strict=True):
-            x_mm, y_mm, heading_rad = pose
-            sketch.note(number, SketchRobot(x_mm, y_mm, heading_rad, robot.kind))
-        for number, there in self._bodies.items():
-            thing = sketch.things[number]
-            x_mm, y_mm = float(bodies[there]["x_mm"]), float(bodies[there]["y_mm"])
-            sketch.note(number, thing._replace(x_mm=x_mm, y_mm=y_mm))
-        for number, (x_mm, y_mm, power_w, is_on) in zip(self._lamps, sim.lamps.tolist(), strict=True):
-            sketch.note(number, Lamp(x_mm, y_mm, power_w, is_on != 0))
-        return True
-
-    def _meet(self) -> None:
-        """Match the things of the sketch with those of a world that was just built from it."""
-        self._sim = self._desk.sim
-        self._arena_number = self._sketch.arena_number
-        bodies = self._sim.bodies()
-        balls = [int(body["number"]) for body in bodies if body["what"] == BALL]
-        cylinders = [int(body["number"]) for body in bodies if body["what"] != BALL]
-        self._bodies = dict(zip(self._sketch.of(Ball), balls, strict=True))
-        self._bodies |= dict(zip(self._sketch.of(Cylinder), cylinders, strict=True))
-        self._lamps = list(self._sketch.of(Lamp))
-
-    def _file(self, kind: str) -> str:
-        return str(inside(self._desk.folder, kind, "kind")) if kind.lower().endswith(".toml") else kind
+    def _thing_at(self, now: Content, x_mm: float, y_mm: float) -> int:
+        """Return the number of the thing that a click hits."""
+        reaches_mm = dict.fromkeys(now.of(Lamp), LAMP_REACH_MM)
+        reaches_mm |= {number: body.radius_mm for kind in (Ball, Cylinder) for number, body in now.of(kind).items()}
+        reaches_mm |= {
+            number: spec.body.radius_mm for number, spec in zip(now.of(Robot), self._desk.sim.specs, strict=False)
+        }
+        gaps_mm = {
+            number: math.hypot(thing.x_mm - x_mm, thing.y_mm - y_mm) - reaches_mm[number]
+            for number, thing in now.things.items()
+        }
+        if not gaps_mm or min(gaps_mm.values()) > 0:
+            raise ParameterError(
+                "A thing must be at the place of a click, but nothing is there. Click a robot, a ball, a cylinder or "
+                "a lamp."
+            )
+        return min(gaps_mm, key=gaps_mm.__getitem__)
 
 
-def _thing_at(sketch: Sketch, x_mm: float, y_mm: float) -> int:
-    def gap_mm(thing: Thing) -> float:
-        reach_mm = LAMP_REACH_MM if isinstance(thing, Lamp) else radius_of(thing)
-        return math.hypot(thing.x_mm - x_mm, thing.y_mm - y_mm) - reach_mm
-
-    number = min(sketch.things, key=lambda number: gap_mm(sketch.things[number]), default=0)
-    if number == 0 or gap_mm(sketch.things[number]) > 0:
-        raise ParameterError(
-            "A thing must be at the place of a click, but nothing is there. Click a robot, a ball, a cylinder or "
-            "a lamp."
-        )
-    return number
+def _known_of(sim: Simulation) -> tuple[Any, ...]:
+    return sim, sim.arena, sim.bodies()["number"].tolist(), len(sim.lamps)
 
 
-async def _aside(what: Arena | Sketch, act: Callable[[], Done]) -> Done:
-    """Run a slow action (a large arena) in a thread, so that other browsers need not wait; any other at once."""
-    return await asyncio.to_thread(act) if what.brightness.size > _LARGE_CELLS else act()
+def _with_change(now: Content, here: Content, there: Content) -> Content:
+    """Return the content of now with what changes from here to there; what has moved since then stays where it is."""
+    things = {number: thing for number, thing in now.things.items() if number in there.things}
+    things |= {number: thing for number, thing in there.things.items() if number not in here.things}
+    return Content(there.walls, things)
+
+
+def _change(sim: Simulation, now: Content, then: Content) -> None:
+    """Apply the difference between two contents to a world that has the robots of both."""
+    numbers, are_balls = sim.bodies()["number"].tolist(), (sim.bodies()["what"] == BALL).tolist()
+    # A project has all balls before all cylinders, in the world's order.
+    in_order = sorted(range(len(numbers)), key=lambda index: not are_balls[index])
+    bodies = dict(zip((*now.of(Ball), *now.of(Cylinder)), (numbers[index] for index in in_order), strict=True))
+    for row, number in reversed([*enumerate(now.of(Lamp), 1)]):
+        if number not in then.things:
+            sim.remove_lamp(row)
+    for number, body in bodies.items():
+        if number not in then.things:
+            sim.remove_body(body)
+    if then.walls is not now.walls:
+        sim.set_arena(then.walls)
+    for thing in (thing for number, thing in then.things.items() if number not in now.things):
+        if isinstance(thing, Lamp):
+            sim.add_lamp(**thing._asdict())
+        elif not isinstance(thing, Robot):
+            add = sim.add_ball if isinstance(thing, Ball) else sim.add_cylinder
+            add(**thing._asdict())
+
+
+def _push(steps: list[bytes], step: _Step) -> None:
+    """Add a packed step, and forget the oldest ones if there are too many: rasters pack well."""
+    steps.append(zlib.compress(pickle.dumps(step), 1))
+    while len(steps) > 1 and (len(steps) > STEPS_MAX or sum(map(len, steps)) > HISTORY_BYTES_MAX):
+        del steps[0]
+
+
+def _unpacked(step: bytes) -> _Step:
+    unpacked: _Step = pickle.loads(zlib.decompress(step))
+    return unpacked
