@@ -77,16 +77,16 @@ def swarm_task() -> kiks.Task:
     )
 
 
-def coevolutions(seeds: range, where: str) -> list[tuple[str, float, str]]:
+def coevolutions(seeds: range) -> list[tuple[str, float, str]]:
     """Return how long predator and prey take to evolve against each other, and who progressed."""
     rows: list[tuple[str, float, str]] = []
     contest, wholes_s = kiks.tasks.pursuit(), []
     for seed in seeds:
         start_s = time.perf_counter()
         coevolution = kiks.Coevolution(contest, seed=seed)
-        coevolution.run(generations=contest.generations, executor=where)
+        coevolution.run(generations=contest.generations)
         wholes_s.append(time.perf_counter() - start_s)
-        tournament = coevolution.master_tournament(executor=where)
+        tournament = coevolution.master_tournament()
         for side, means in zip(contest.side_names, tournament.means, strict=True):
             for number, period in enumerate(np.array_split(means, PERIODS), 1):
                 rows.append((f"evolve.pursuit_{side}_{number}", period.mean(), f"against all champions, seed {seed}"))
@@ -101,12 +101,11 @@ def main() -> None:
     arguments.add_argument("--seeds", type=int, default=5, help="how many evolutions of each task")
     arguments.add_argument("--task", nargs="+", choices=(*TASKS, CONTEST), default=(*TASKS, CONTEST), help="the tasks")
     arguments.add_argument("--kheperax", type=Path, metavar="FOLDER", help="environment of Kheperax, for maze")
-    arguments.add_argument("--where", default="threads", help="where candidates are evaluated")
     options = arguments.parse_args()
 
     rows: list[tuple[str, float, str]] = []
     if CONTEST in options.task:
-        rows += coevolutions(range(1, options.seeds + 1), options.where)
+        rows += coevolutions(range(1, options.seeds + 1))
     for name in (name for name in options.task if name != CONTEST):
         task, wholes_s, cpus_s, passed = kiks.tasks.load(name), [], [], Counter[str]()
         coverages: dict[str, list[float]] = {"coverage": [], "qd_score": [], "kheperax_coverage": []}
@@ -114,7 +113,7 @@ def main() -> None:
         for seed in range(1, options.seeds + 1):
             start_s, start_cpu_s = time.perf_counter(), time.process_time()
             evolution = kiks.Evolution(task, seed=seed)
-            champion = evolution.run(generations=task.generations, executor=options.where)
+            champion = evolution.run(generations=task.generations)
             wholes_s.append(time.perf_counter() - start_s)
             cpus_s.append(time.process_time() - start_cpu_s)
             if name == "maze" and evolution.archive is not None:
@@ -140,7 +139,7 @@ def main() -> None:
             rows.append(("evolve.generations_per_min", pace, "of one robot that avoids"))
     start_s = time.perf_counter()
     swarm = kiks.Evolution(swarm_task(), seed=1, population=SWARM_POPULATION)
-    swarm.run(generations=SWARM_GENERATIONS, executor=options.where)
+    swarm.run(generations=SWARM_GENERATIONS)
     pace = 60 * SWARM_GENERATIONS / (time.perf_counter() - start_s)
     rows.append(("evolve.swarm_generations_per_min", pace, f"of {SWARM} robots and {SWARM} balls"))
     report(rows, as_json=options.json)

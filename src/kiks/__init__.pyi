@@ -36,7 +36,6 @@ from .learn.contest import Contest as Contest
 from .learn.contest import Side as Side
 from .learn.evolution import Evolution as Evolution
 from .learn.exam import Exam as Exam
-from .learn.executors import executor_for as executor_for
 from .learn.policy_export import champion_of_policy as champion_of_policy
 from .learn.task import Axis as Axis
 from .learn.task import Task as Task

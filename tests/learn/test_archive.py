@@ -31,7 +31,7 @@ def small(**changes: Any) -> kiks.Task:
 
 def run(algorithm: str, generations: int = 4, folder: Path | None = None, **changes: Any) -> kiks.Evolution:
     evolution = kiks.Evolution(small(**changes), algorithm, population=8, seed=3, folder=folder)
-    evolution.run(generations=generations, executor="threads:1")
+    evolution.run(generations=generations)
     return evolution
 
 

@@ -36,7 +36,7 @@ def test_the_worlds_are_those_of_the_trials() -> None:
     seen = []
 
     class Task(kiks.Task):
-        def evaluate(self, candidates, seeds, threads, seconds=None):
+        def evaluate(self, candidates, seeds, threads=None, seconds=None):
             seen.append(seeds)
             return super().evaluate(candidates, seeds, threads, seconds)
 

@@ -7,6 +7,7 @@ import pickle
 import signal
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -34,7 +35,7 @@ def small(**changes: Any) -> kiks.Contest:
     return kiks.tasks.pursuit(**{"seconds": 2.0} | changes)
 
 
-def run(folder: Path | None = None, executor: str = "threads:1", **given: Any) -> kiks.Coevolution:
+def run(folder: Path | None = None, executor: Any = None, **given: Any) -> kiks.Coevolution:
     coevolution = kiks.Coevolution(small(), folder=folder, **{"seed": 3, "population": 6, "opponents": 3} | given)
     coevolution.run(generations=4, executor=executor)
     return coevolution
@@ -183,7 +184,7 @@ def test_wrong_sides_and_pairs_are_errors() -> None:
 
 
 def test_the_same_seed_gives_the_same_coevolution() -> None:
-    one, two, other = run(), run(executor="threads:2"), run(seed=4)
+    one, two, other = run(), run(executor=ThreadPoolExecutor(2)), run(seed=4)
     assert bytes_of(one) == bytes_of(two) != bytes_of(other)
 
 
@@ -217,7 +218,7 @@ def test_fitness_is_the_mean_over_the_contests_of_a_candidate() -> None:
 def test_a_resumed_coevolution_equals_one_that_never_stopped(tmp_path: Path) -> None:
     whole = run(tmp_path / "whole")
     part = kiks.Coevolution(small(), seed=3, population=6, opponents=3, folder=tmp_path / "part")
-    part.run(generations=2, executor="threads:1")
+    part.run(generations=2)
     assert bytes_of(run(tmp_path / "part")) == bytes_of(whole)
     for name in ("predator.toml", "prey.toml"):
         assert (tmp_path / "part" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
@@ -233,7 +234,7 @@ def report(coevolution):
     print(len(coevolution.generations), flush=True)
 contest = kiks.tasks.pursuit(seconds=2.0)
 coevolution = kiks.Coevolution(contest, population=6, opponents=3, seed=3, folder=sys.argv[1])
-coevolution.run(generations=10**6, executor="threads:1", each=report)
+coevolution.run(generations=10**6, each=report)
 """
 
 
@@ -246,9 +247,9 @@ def test_a_killed_coevolution_loses_at_most_the_current_generation(tmp_path: Pat
     again = kiks.Coevolution(small(), population=6, opponents=3, seed=3, folder=tmp_path)
     count = len(again.generations)
     assert count >= reported_count
-    again.run(generations=count + 1, executor="threads:1")
+    again.run(generations=count + 1)
     whole = kiks.Coevolution(small(), population=6, opponents=3, seed=3)
-    whole.run(generations=count + 1, executor="threads:1")
+    whole.run(generations=count + 1)
     assert bytes_of(again) == bytes_of(whole)
 
 
@@ -310,7 +311,7 @@ def test_wrong_calls_are_errors() -> None:
 
 def test_the_tournament_equals_a_loop_over_all_pairs() -> None:
     coevolution = run()
-    tournament = coevolution.master_tournament(trials=2, executor="threads:1")
+    tournament = coevolution.master_tournament(trials=2)
     square = latin_square(4, seed_for(3, _SQUARE_SEED))
     for first in range(4):
         for second in range(4):
@@ -323,7 +324,7 @@ def test_the_tournament_equals_a_loop_over_all_pairs() -> None:
             values = coevolution.contest.evaluate(np.array([pair, pair]), seeds, 1)
             np.testing.assert_array_equal(tournament.scores[:, first, second], (values[0, :2] + values[1, :2]) / 2)
     np.testing.assert_array_equal(tournament.generations, [1, 2, 3, 4])
-    some = coevolution.master_tournament(trials=2, every=2, executor="threads:1")
+    some = coevolution.master_tournament(trials=2, every=2)
     np.testing.assert_array_equal(some.generations, [2, 4])
     assert some.scores.shape == (2, 2, 2)
 

@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +28,7 @@ def small(**changes: Any) -> kiks.Task:
     return kiks.tasks.avoid(**{"seconds": 1.0, "worlds": 3} | changes)
 
 
-def run(algorithm: str, folder: Path | None = None, executor: str = "threads:1", **given: Any) -> kiks.Evolution:
+def run(algorithm: str, folder: Path | None = None, executor: Any = None, **given: Any) -> kiks.Evolution:
     evolution = kiks.Evolution(small(), algorithm, population=8, folder=folder, **{"seed": 3} | given)
     evolution.run(generations=4, executor=executor)
     return evolution
@@ -45,7 +46,7 @@ def test_the_same_seed_gives_the_same_evolution(algorithm: str) -> None:
     np.random.seed(1)
     one = run(algorithm)
     np.random.seed(2)
-    two = run(algorithm, executor="threads:2")
+    two = run(algorithm, executor=ThreadPoolExecutor(2))
     other = run(algorithm, seed=4)
     assert candidates_of(one) == candidates_of(two) != candidates_of(other)
     assert one.champion.parameters == two.champion.parameters
@@ -217,7 +218,7 @@ class OwnWithFavourite(Own):
 def test_an_object_with_ask_and_tell_is_an_algorithm(tmp_path: Path) -> None:
     own = Own()
     evolution = kiks.Evolution(small(), own, folder=tmp_path)
-    evolution.run(generations=3, executor="threads:1")
+    evolution.run(generations=3)
     assert evolution.algorithm is own
     assert (evolution.population, evolution.champion.algorithm) == (8, "Own")
     for (fitness, shape), generation in zip(own.told, evolution.generations, strict=True):
@@ -335,7 +336,7 @@ def test_a_champion_does_not_need_the_python_file_of_its_task(tmp_path: Path) ->
     (tmp_path / "far.py").write_text(OWN)
     task = kiks.tasks.load(str(tmp_path / "far.py"))
     evolution = kiks.Evolution(task, "ga", population=8, folder=tmp_path / "out")
-    champion = evolution.run(generations=3, executor="threads:1")
+    champion = evolution.run(generations=3)
     (tmp_path / "far.py").unlink()
     again = kiks.Champion.load(tmp_path / "out/champion.toml")
     assert again.parameters == champion.parameters
@@ -362,7 +363,7 @@ def test_wrong_tasks_are_errors() -> None:
         small(axes=(kiks.Axis("nothing", 0, 1),))
     task = small(fitness=lambda values: values["contacts"])
     with pytest.raises(ParameterError, match="fitness must return a finite number for each of 1"):
-        task.prepare()
+        task.evaluate(np.zeros((1, task.parameter_count)), np.zeros(1, np.int64))
 
 
 # ---- champions ----

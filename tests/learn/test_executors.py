@@ -1,211 +1,209 @@
-"""Executors: the same values wherever they run, with or without lost workers. Ray: test_ray.py."""
+"""The same values on any executor, with or without lost workers."""
 
 from __future__ import annotations
 
 import os
+import signal
+import subprocess
 import sys
+import threading
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from tests.learn import works
+from tests.at_length import at_length
 
+import kiks
 from kiks.errors import ParameterError, WorkError
-from kiks.learn.evaluation import Lost, Ready, Values, Worker
-from kiks.learn.executors import executor_for
-from kiks.learn.ray_executor import LOSSES_MAX, Chunks, RayExecutor
+from kiks.learn.evaluation import evaluate
+from kiks.learn.ray_executor import RayExecutor
+
+pytestmark = pytest.mark.slow
+
+ROOT = Path(__file__).parents[2]
 
 
-def expected(candidates, seeds):
-    work = works.Sums()
-    work.prepare()
-    return work.evaluate(candidates.copy(), seeds.copy(), 1)
+class Sums:
+    """Values that depend on all bits of parameters and seed. At a marked candidate it does what `mark` says."""
+
+    def __init__(self, mark: str = "", memory: Path | None = None) -> None:
+        self.mark, self.memory = mark, memory
+
+    def digest(self) -> dict[str, str]:
+        return {}
+
+    def evaluate(self, candidates: Any, seeds: Any, threads: int | None = None) -> Any:
+        if 0.125 in candidates[:, 0] and not (self.memory and self.memory.is_file()):
+            if self.mark == "raise":
+                raise ZeroDivisionError("a wheel came off")
+            if self.mark == "refuse":
+                raise ParameterError("measures must be finite.")
+            if self.mark == "wait":
+                assert self.memory
+                with self.memory.open("w") as pipe:
+                    pipe.write("here\n")
+                    pipe.flush()
+                    while True:
+                        signal.pause()
+            if self.mark == "die":
+                if self.memory:
+                    self.memory.touch()
+                os.kill(os.getpid(), signal.SIGKILL)
+        return np.stack([candidates[:, 0] / 3 + candidates[:, 1] * candidates[:, 2], candidates[:, 1] / seeds], axis=1)
 
 
-@given(
-    count=st.integers(1, 3000),
-    worker_count=st.integers(1, 40),
-    paces=st.lists(st.none() | st.floats(1e-6, 10), min_size=1, max_size=5),
-)
-def test_chunks_hold_each_candidate_once(count, worker_count, paces):
-    chunks = Chunks(count, worker_count=worker_count)
-    ends = [0]
-    while chunks:
-        chunk = chunks.take(paces[len(ends) % len(paces)])
-        assert chunk.first == ends[-1] < chunk.end
-        assert len(chunk) <= -(-count // worker_count)
-        ends.append(chunk.end)
-    assert ends[-1] == count
+def drawn(count: int, marked: bool = False) -> tuple[Any, Any]:
+    candidates = np.random.default_rng(count).standard_normal((count, 3))
+    candidates[count // 2 :, 0] = 0.125 if marked else candidates[count // 2 :, 0]
+    return candidates, np.arange(count, dtype=np.int64) * 7 + 1
 
 
-def test_chunks_are_long_enough_and_equal_workers_finish_together():
-    chunks = Chunks(1000, worker_count=8)
-    # Each worker has 125 ms of work: two chunks of 63 ms, rounded up to a multiple of eight candidates.
-    assert [len(chunks.take(0.001)) for _ in range(16)] == [64] * 15 + [40]
-    assert not chunks
-    # Every worker gets a chunk, even if it holds fewer than eight candidates.
-    assert len(Chunks(16, worker_count=8).take(10.0)) == 2
+def check_values(executor: Any) -> None:
+    for count in (300, 1, 0, 17, 3000):
+        candidates, seeds = drawn(count)
+        assert evaluate(Sums(), candidates, seeds, executor).tobytes() == Sums().evaluate(candidates, seeds).tobytes()
 
 
-class FakePool:
-    """Workers in this process with scripted speeds, which are lost at scripted moments."""
-
-    def __init__(self, worker_count, durations_s=(0.01,), deaths=(), *, dies_at_start=False):
-        self.worker_count = worker_count
-        self.durations_s = durations_s
-        self.deaths = deaths
-        self.dies_at_start = dies_at_start
-        self.workers = {}
-        self.pending = []
-        self.started_count = 0
-        self.chunk_count = 0
-
-    def open(self):
-        pass
-
-    def close(self):
-        self.workers.clear()
-
-    def refill(self):
-        busy = {worker for worker, _ in self.pending}
-        self.pending += [(worker, None) for worker in self.workers if worker not in busy]
-        while len(self.workers) < self.worker_count:
-            worker = Worker(works.Sums, threads=1)
-            worker.prepare()
-            self.workers[self.started_count] = worker
-            self.pending.append((self.started_count, None))
-            self.started_count += 1
-        return self.worker_count
-
-    def send(self, worker, candidates, seeds):
-        assert all(worker != other for other, _ in self.pending)
-        self.pending.append((worker, (candidates, seeds)))
-
-    def wait(self):
-        # Answers arrive latest first, not in the order of the chunks.
-        number, chunk = self.pending.pop()
-        if chunk is None and not self.dies_at_start:
-            return [(number, Ready())]
-        self.chunk_count += 1
-        if self.dies_at_start or self.chunk_count in self.deaths:
-            del self.workers[number]
-            return [(number, Lost("was ended by signal 9"))]
-        answer = self.workers[number].evaluate(*chunk)
-        return [(number, Values(answer.values, self.durations_s[self.chunk_count % len(self.durations_s)]))]
-
-    def end(self, worker):
-        del self.workers[worker]
-        self.pending = [(other, chunk) for other, chunk in self.pending if other != worker]
-
-
-@given(
-    count=st.integers(1, 300),
-    worker_count=st.integers(1, 9),
-    durations_s=st.lists(st.floats(1e-5, 1), min_size=1, max_size=7),
-    deaths=st.sets(st.integers(1, 40).map(lambda number: 2 * number)),
-)
-def test_values_are_the_same_for_any_chunks_and_losses(count, worker_count, durations_s, deaths):
-    candidates, seeds = works.candidates(count), works.seeds(count)
-    # No two losses are consecutive, so no chunk loses three workers.
-    with RayExecutor(FakePool(worker_count, durations_s, deaths)) as executor:
+def test_values_are_the_same_on_threads_and_processes() -> None:
+    check_values(None)
+    with ThreadPoolExecutor(3) as threads:
+        check_values(threads)
+    with ProcessPoolExecutor(2, get_context("spawn")) as processes:
+        check_values(processes)
+        task, candidates, seeds = kiks.tasks.avoid(seconds=1.0), np.ones((9, 18)), np.arange(9)
+        expected = task.evaluate(candidates, seeds, 1)
         for _ in range(2):
-            assert np.array_equal(executor.evaluate(candidates, seeds), expected(candidates, seeds))
+            assert evaluate(task, candidates, seeds, processes).tobytes() == expected.tobytes()
 
 
-def test_the_error_names_a_chunk_that_loses_three_workers():
-    pool = FakePool(1, deaths=range(1, 1 + LOSSES_MAX))
-    with RayExecutor(pool) as executor:
-        with pytest.raises(WorkError, match="3 in a row were lost with candidates 0 to 7; the last one was ended"):
-            executor.evaluate(works.candidates(20), works.seeds(20))
-        # The next evaluation works.
-        assert len(executor.evaluate(works.candidates(20), works.seeds(20))) == 20
+def test_what_a_task_raises_is_an_error_that_names_its_candidates() -> None:
+    with ThreadPoolExecutor(2) as threads:
+        with pytest.raises(WorkError, match=r"Cannot evaluate candidates 4 to 7: ZeroDivisionError: a wheel came off"):
+            evaluate(Sums("raise"), *drawn(9, marked=True), threads)
+        with pytest.raises(WorkError, match="Cannot evaluate candidates 0 to 8: ZeroDivisionError"):
+            evaluate(Sums("raise"), *drawn(9, marked=True))
+        with pytest.raises(ParameterError, match=r"^measures must be finite\.$"):
+            evaluate(Sums("refuse"), *drawn(9, marked=True), threads)
 
 
-def test_workers_that_end_before_their_first_evaluation_are_an_error():
+def test_a_lost_worker_is_an_error_if_the_executor_does_not_repeat_its_work() -> None:
     with (
-        RayExecutor(FakePool(5, dies_at_start=True)) as executor,
-        pytest.raises(WorkError, match="must live until its first evaluation, but 5 in a row did not"),
+        ProcessPoolExecutor(2, get_context("spawn")) as processes,
+        pytest.raises(WorkError, match=r"Cannot evaluate candidates \d to \d: BrokenProcessPool: .* to see why"),
     ):
-        executor.evaluate(works.candidates(20), works.seeds(20))
+        evaluate(Sums("die"), *drawn(9, marked=True), processes)
 
 
-@pytest.mark.parametrize("where", ["threads", "threads:2"])
-def test_values_are_the_same_on_any_number_of_threads(where):
-    candidates, seeds = works.candidates(300), works.seeds(300)
-    before = candidates.copy()
-    with executor_for(where, works.Sums()) as executor:
-        for count in (300, 1, 0, 17):
-            values = executor.evaluate(candidates[:count], seeds[:count])
-            assert len(values) == count
-            if count:
-                assert values.tobytes() == expected(candidates[:count], seeds[:count]).tobytes()
-    assert np.array_equal(candidates, before)
-
-
-def test_the_work_gets_the_number_of_threads():
-    with executor_for("threads:3", works.WorkerFacts()) as executor:
-        (value,) = executor.evaluate(works.candidates(1), works.seeds(1))
-    assert list(value) == [os.getpid(), 1, 3]
-
-
-def test_an_exception_in_evaluate_is_an_error_with_its_traceback():
-    with executor_for("threads", works.Failing()) as executor:
-        with pytest.raises(
-            WorkError, match=r"evaluate\(\) for candidates 0 to 4 raised ZeroDivisionError: a"
-        ) as caught:
-            executor.evaluate(works.candidates(5, marked=3), works.seeds(5))
-        assert 'raise ZeroDivisionError("a wheel came off")' in caught.value.__notes__[0]
-        # The executor still works.
-        assert len(executor.evaluate(works.candidates(5), works.seeds(5))) == 5
-
-
-def test_an_exception_in_prepare_is_an_error():
-    with (
-        pytest.raises(WorkError, match=r"prepare\(\) raised FileNotFoundError: no arena"),
-        executor_for("threads", works.Unprepared()) as executor,
+def test_wrong_arguments_are_errors() -> None:
+    candidates, seeds = drawn(5)
+    for given, message in (
+        ((candidates[0], seeds), r"it was float64 of shape \(3,"),
+        ((candidates, seeds[:4]), r"one seed for each of 5 candidates, but it was int64 of shape \(4,"),
+        ((candidates, np.ones(5)), "but it was float64"),
+        ((candidates, seeds, "threads"), r"executor must have submit\(\) .* but it was 'threads'"),
     ):
-        executor.evaluate(works.candidates(5), works.seeds(5))
+        with pytest.raises(ParameterError, match=message):
+            evaluate(Sums(), *given)
 
 
-def test_values_must_have_their_shape():
-    with (
-        executor_for("threads", works.WrongShape()) as executor,
-        pytest.raises(WorkError, match=r"for 5 candidates, but it was shape \(5,\)"),
-    ):
-        executor.evaluate(works.candidates(5), works.seeds(5))
+# ---- Ray ----
 
 
-@pytest.mark.parametrize(
-    ("where", "message"),
-    [
-        ("thread", "Did you mean 'threads'"),
-        ("processes", r"must run on 'threads\[:COUNT\]', 'ray' or 'ray:ADDRESS', but it was 'processes'"),
-        ("threads:", "must run on 'threads"),
-        ("threads:0", "whole number from 1"),
-        ("threads:many", "it was 'many'"),
-        ("", "it was ''"),
-    ],
-)
-def test_unknown_executors_are_errors(where, message):
-    with pytest.raises(ParameterError, match=message):
-        executor_for(where, works.Sums())
+@pytest.fixture(scope="module")
+def ray():
+    with pytest.MonkeyPatch.context() as patch:
+        # This token is for the tests alone; without it, Ray would write one into the home folder.
+        patch.setenv("RAY_AUTH_MODE", "token")
+        patch.setenv("RAY_AUTH_TOKEN", os.urandom(32).hex())
+        patch.setenv("RAY_USAGE_STATS_ENABLED", "0")
+        # Ray listens on the loopback address alone only with this variable.
+        patch.setenv("RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER", "0")
+        patch.setenv("PYTHONPATH", str(ROOT))
+        yield pytest.importorskip("ray", reason="Ray is not installed: pip install '.[ray]'")
 
 
-def test_wrong_arguments_are_errors():
-    executor = executor_for("threads", works.Sums())
-    with pytest.raises(WorkError, match="must be open"):
-        executor.evaluate(works.candidates(5), works.seeds(5))
-    with executor:
-        with pytest.raises(ParameterError, match=r"it was float64 of shape \(3,"):
-            executor.evaluate(works.candidates(5)[0], works.seeds(5))
-        with pytest.raises(ParameterError, match=r"one seed for each of 5 candidates, but it was int64 of shape \(4,"):
-            executor.evaluate(works.candidates(5), works.seeds(4))
-        with pytest.raises(ParameterError, match="but it was float64"):
-            executor.evaluate(works.candidates(5), np.ones(5))
-
-
-def test_the_error_without_ray_says_how_to_install_it(monkeypatch):
+def test_the_error_without_ray_says_how_to_install_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "ray", None)
     with pytest.raises(ParameterError, match=r"pip install '\.\[ray\]'"):
-        executor_for("ray", works.Sums()).__enter__()
+        RayExecutor()
+
+
+def test_an_address_without_a_server_is_an_error(ray: Any) -> None:
+    with pytest.raises(ParameterError, match=r"must be reached, but at 127\.0\.0\.1:1 none was.*ray start --head"):
+        RayExecutor("127.0.0.1:1")
+
+
+@at_length
+def test_ray_repeats_the_work_of_lost_workers_on_loopback_alone(ray: Any, tmp_path: Path) -> None:
+    handler = signal.getsignal(signal.SIGTERM)
+    with RayExecutor() as executor:
+        assert signal.getsignal(signal.SIGTERM) is handler
+        assert ray.get_runtime_context().gcs_address.startswith("127.0.0.1:")
+        check_values(executor)
+        given = drawn(9, marked=True)
+        values = evaluate(Sums("die", tmp_path / "died"), *given, executor)
+        assert (tmp_path / "died").exists()
+        assert values.tobytes() == Sums().evaluate(*given).tobytes()
+        with pytest.raises(WorkError, match=r"Cannot evaluate candidates \d to \d: WorkerCrashedError"):
+            evaluate(Sums("die"), *given, executor)
+        with pytest.raises(WorkError, match=r"candidates 4 to 7: ZeroDivisionError: a wheel came off\. Eval"):
+            evaluate(Sums("raise"), *given, executor)
+        with pytest.raises(ParameterError, match=r"^measures must be finite\.$"):
+            evaluate(Sums("refuse"), *given, executor)
+        broken: Any = Sums()
+        broken.lock = threading.Lock()
+        with pytest.raises(WorkError, match=r"TypeError: .*lock"):
+            evaluate(broken, *given, executor)
+        with RayExecutor("auto") as second:  # the connection of the program stays open
+            check_values(second)
+        with pytest.raises(ParameterError, match=r"must use one cluster at a time.*asked for 127\.0\.0\.1:1\."):
+            RayExecutor("127.0.0.1:1")
+        assert ray.is_initialized()
+    assert not ray.is_initialized()
+
+
+@at_length
+def test_work_of_a_lost_computer_is_done_on_the_others(ray: Any) -> None:
+    from ray.cluster_utils import Cluster
+
+    node = {"num_cpus": 1, "node_ip_address": "127.0.0.1", "object_store_memory": 80 * 2**20}
+    cluster = Cluster(initialize_head=True, head_node_args={**node, "include_dashboard": False})
+    second = cluster.add_node(**node)
+    try:
+        with RayExecutor(cluster.address) as executor:
+            check_values(executor)
+            cluster.remove_node(second, allow_graceful=False)
+            check_values(executor)
+    finally:
+        cluster.shutdown()
+
+
+@at_length
+def test_ctrl_c_ends_all_workers(ray: Any, tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "program.py").write_text(
+        "import pathlib, signal, sys\n"
+        "from kiks.learn.evaluation import evaluate\nfrom kiks.learn.ray_executor import RayExecutor\n"
+        "from tests.learn.test_executors import Sums, drawn\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+        "with RayExecutor() as executor:\n"
+        "    evaluate(Sums('wait', pathlib.Path(sys.argv[1])), *drawn(2, marked=True), executor)\n"
+    )
+    with subprocess.Popen(
+        [sys.executable, str(tmp_path / "program.py"), str(tmp_path / "pipe")],
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    ) as running:
+        with (tmp_path / "pipe").open() as pipe:
+            assert pipe.readline() == "here\n"
+            os.killpg(running.pid, signal.SIGINT)
+            # The pipe closes when the worker has ended.
+            assert pipe.read() == ""
+        _, errors = running.communicate(timeout=60)
+    assert running.returncode == -signal.SIGINT
+    assert "KeyboardInterrupt" in errors

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 from collections import Counter
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,6 @@ from tests.at_length import at_length, cases
 import kiks
 from kiks import ParameterError
 from kiks.learn.algorithm_name import AlgorithmName
-from kiks.learn.evaluation import Executor
 from kiks.learn.finals import FINALISTS, FINALS_SEED, SHARE, Contender, Finals, finalists_of
 from kiks.learn.generation_loop import seed_for
 from kiks.learn.results import result_of
@@ -41,7 +41,7 @@ def evolution_of(algorithm: str = "cma", folder: Path | None = None, **given: An
 
 def run(algorithm: str = "cma", folder: Path | None = None, generations: int = 6, **given: Any) -> kiks.Evolution:
     evolution = evolution_of(algorithm, folder)
-    evolution.run(generations=generations, **{"executor": "threads:1"} | given)
+    evolution.run(generations=generations, **given)
     return evolution
 
 
@@ -148,17 +148,12 @@ class Scripted(Executor):
     """Evaluates by a function of candidates and seeds."""
 
     def __init__(self, function: Any) -> None:
-        super().__init__()
         self.function = function
 
-    def _open(self) -> None:
-        pass
-
-    def _close(self) -> None:
-        pass
-
-    def _evaluate(self, candidates: Any, seeds: Any) -> Any:
-        return self.function(candidates, seeds)
+    def submit(self, evaluate: Any, task: Any, identity: Any, candidates: Any, seeds: Any) -> Any:
+        future: Future[Any] = Future()
+        future.set_result(self.function(candidates, seeds))
+        return future
 
 
 def never(*_: Any) -> Any:
@@ -202,19 +197,9 @@ def test_a_rival_that_was_lucky_in_its_trials_loses() -> None:
     assert not {seed for each in evolution.generations for seed in each.seeds.tolist()} & set(seeds.tolist())
 
 
-def test_threads_and_blocks_do_not_matter(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_chunks_and_batches_do_not_matter(monkeypatch: pytest.MonkeyPatch) -> None:
     first = outcome(run())
-    assert outcome(run(executor="threads:2")) == first
-    evolution = evolution_of()
-    with kiks.executor_for("threads:1", evolution.task) as one:
-
-        def by_blocks(candidates: Any, seeds: Any) -> Any:
-            blocks = [slice(begin, begin + 3) for begin in range(0, len(candidates), 3)]
-            return np.concatenate([one.evaluate(candidates[block], seeds[block]) for block in blocks])
-
-        with Scripted(by_blocks) as executor:
-            evolution.run(generations=6, executor=executor)
-    assert outcome(evolution) == first
+    assert outcome(run(executor=ThreadPoolExecutor(2))) == first
     monkeypatch.setattr("kiks.learn.candidate_worlds.BATCH_WORLDS_MAX", 6)
     assert outcome(run()) == first
 
@@ -225,7 +210,7 @@ def test_a_continued_evolution_holds_finals_at_its_new_end(algorithm: str, tmp_p
     early = run(algorithm, tmp_path / "part", 4)
     assert len(finals_of(early).finalists) < len(finals_of(whole).finalists)
     rest = run(algorithm, tmp_path / "part")
-    early.run(generations=6, executor="threads:1")
+    early.run(generations=6)
     assert outcome(rest) == outcome(early) == outcome(whole)
     part = (tmp_path / "part/champion.toml").read_bytes()
     assert part == (tmp_path / "whole/champion.toml").read_bytes()
@@ -249,7 +234,7 @@ def kill(finals):
         os.kill(os.getpid(), signal.SIGKILL)
 task = kiks.tasks.avoid(seconds=1.0, worlds=3)
 evolution = kiks.Evolution(task, "cma", population=8, seed=3, folder=sys.argv[1])
-evolution.run(generations=6, executor="threads:1", each_round=kill)
+evolution.run(generations=6, each_round=kill)
 """
 
 
@@ -260,7 +245,7 @@ def test_finals_in_which_the_process_was_killed_are_held_again(tmp_path: Path) -
     again = evolution_of(folder=tmp_path / "killed")
     assert (len(again.generations), again.finals) == (6, None)
     whole = run(folder=tmp_path / "whole")
-    again.run(generations=6, executor="threads:1")
+    again.run(generations=6)
     assert outcome(again) == outcome(whole)
     assert (tmp_path / "killed/champion.toml").read_bytes() == (tmp_path / "whole/champion.toml").read_bytes()
 
@@ -273,7 +258,7 @@ def test_an_interrupted_evolution_holds_no_finals(when: str, tmp_path: Path) -> 
 
     evolution = evolution_of(folder=tmp_path)
     with pytest.raises(KeyboardInterrupt):
-        evolution.run(generations=6, executor="threads:1", **{when: interrupt})
+        evolution.run(generations=6, **{when: interrupt})
     assert evolution.finals is None
     assert not list(tmp_path.glob("generations/*finals*"))
     best = evolution.generations[-1].champion_fitness
@@ -313,11 +298,10 @@ def test_finals_after_ask_and_tell() -> None:
     evolution = evolution_of()
     with pytest.raises(ParameterError, match="before there is a champion"):
         evolution.hold_finals()
-    with kiks.executor_for("threads:1", evolution.task) as executor:
-        for _ in range(6):
-            evolution.tell(executor.evaluate(evolution.ask(), evolution.seeds))
-        rounds: list[int] = []
-        champion = evolution.hold_finals(executor, each_round=lambda finals: rounds.append(len(finals.ask())))
+    for _ in range(6):
+        evolution.tell(evolution.task.evaluate(evolution.ask(), evolution.seeds))
+    rounds: list[int] = []
+    champion = evolution.hold_finals(each_round=lambda finals: rounds.append(len(finals.ask())))
     assert sum(rounds) == finals_of(evolution).evaluation_count
     assert champion.parameters == evolution.champion.parameters == run().champion.parameters
     evolution.tell(np.zeros(len(evolution.ask())))

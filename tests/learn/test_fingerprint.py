@@ -7,6 +7,7 @@ import functools
 import itertools
 import json
 import logging
+import pickle
 import subprocess
 import sys
 from collections.abc import Callable
@@ -17,11 +18,10 @@ from typing import Any
 import numba
 import numpy as np
 import pytest
-from numba import cloudpickle
 
 import kiks
+from kiks.learn.evaluation import _evaluate_chunk, _identity
 from kiks.learn.fingerprint import differing, fingerprints, tell_unseen
-from kiks.learn.ray_executor import _unpickled
 from kiks.model.robot import RobotSpec
 
 LIBRARY = ctypes.CDLL(None)
@@ -219,15 +219,16 @@ def test_a_helper_beside_a_task_counts_and_its_folder_and_process_do_not(own_tas
 
 @pytest.mark.slow
 def test_a_worker_gets_what_was_sent_or_says_what_differs() -> None:
-    code = "import sys; from kiks.learn.ray_executor import _unpickled; _unpickled(sys.stdin.buffer.read())"
-    dumps: Any = cloudpickle.dumps
+    code = (
+        "import pickle, sys\nfrom kiks.learn.evaluation import _identity\n"
+        "work, identity = pickle.load(sys.stdin.buffer)\nassert _identity(work) == identity\n"
+    )
     arena = kiks.Arena.box(400, 400)
     own = kiks.Task("own", [arena], kiks.controllers.linear(), [kiks.measures.path_mm], scaled(2.0))
     for work in (own, kiks.tasks.follow(), kiks.tasks.pursuit()):
-        subprocess.run([sys.executable, "-c", code], input=dumps((work, work.digest())), check=True)
-    task, digest = own, own.digest()
+        subprocess.run([sys.executable, "-c", code], input=pickle.dumps((work, _identity(work))), check=True)
     with pytest.raises(kiks.ParameterError, match=r"the same modules of yours, but on one these differ: fitness\."):
-        _unpickled(dumps((task, digest | {"fitness": "0"})))
+        _evaluate_chunk(own, _identity(own) | {"fitness": "0"}, np.zeros((1, 18)), np.zeros(1, np.int64))
 
 
 # ---- what cannot be seen ----

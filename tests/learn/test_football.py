@@ -89,7 +89,7 @@ def _stand(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
 def test_champions_play_in_a_demonstration_until_a_goal(tmp_path: Path) -> None:
     assert set(ENDS) == set(CONTESTS)
     coevolution = kiks.Coevolution(football(seconds=1.0), seed=1, population=4, opponents=1, folder=tmp_path)
-    coevolution.run(generations=1, executor="threads:1")
+    coevolution.run(generations=1)
     scene = ContestScene(tmp_path, seed=1)
     assert scene.run(1.0) == "no goal"
     scene = ContestScene(tmp_path, before_goal(0))

@@ -27,7 +27,7 @@ KHEPERA = kiks.RobotSpec.load("khepera")
 
 def evolved(task: kiks.Task, folder: Path) -> kiks.Evolution:
     evolution = kiks.Evolution(task, "ga", seed=3, population=6, folder=folder)
-    evolution.run(generations=3, executor="threads:1")
+    evolution.run(generations=3)
     return evolution
 
 

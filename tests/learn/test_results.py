@@ -206,9 +206,9 @@ def test_the_result_of_an_evolution(tmp_path: Path) -> None:
     evolution = kiks.Evolution(kiks.tasks.avoid(seconds=1.0, worlds=3), "ga", population=8, folder=tmp_path)
     with pytest.raises(ParameterError, match="before there is a champion"):
         result_of(evolution)
-    evolution.run(generations=1, executor="threads:1")
+    evolution.run(generations=1)
     assert (result_of(evolution).evaluations, result_of(evolution).fitness) == ((8,), evolution.champion.fitness)
-    evolution.run(generations=3, executor="threads:1")
+    evolution.run(generations=3)
     assert load_result(tmp_path) is None
     result = result_of(evolution)
     result.save(tmp_path)
@@ -219,5 +219,5 @@ def test_the_result_of_an_evolution(tmp_path: Path) -> None:
     assert result.fitness == result.champion_fitness[-1] == evolution.champion.fitness
     assert result.exam is not None
     assert (result.exam.starts, result.exam.imperfect_starts) == (20, 200)
-    evolution.run(generations=4, executor="threads:1")
+    evolution.run(generations=4)
     assert load_result(tmp_path) is None

@@ -112,7 +112,7 @@ def test_wrong_files_are_errors_of_one_short_line(text: str, message: str, folde
 def test_an_evolution_resumes_only_with_the_same_task_file(folder: Path) -> None:
     text = 'base = "avoid"\nseconds = 0.5\nworlds = 1\narenas = ["room.toml"]\n'
     options: dict[str, Any] = {"population": 4, "folder": folder / "out"}
-    kiks.Evolution(load(folder, text), "ga", **options).run(generations=2, executor="threads:1")
+    kiks.Evolution(load(folder, text), "ga", **options).run(generations=2)
     assert len(kiks.Evolution(load(folder, text), "ga", **options).generations) == 2
     with pytest.raises(kiks.ParameterError, match="but these differ: worlds"):
         kiks.Evolution(load(folder, text.replace("worlds = 1", "worlds = 2")), "ga", **options)

@@ -94,7 +94,7 @@ def test_wrong_lists_are_errors(changes: dict[str, Any]) -> None:
 def test_champions_of_a_family_drive_its_first_robot(tmp_path: Any) -> None:
     robots = family(KHEPERA, 3, seed=3)
     evolution = kiks.Evolution(task_of(robot=robots, timing=TIMINGS), "ga", population=8, folder=tmp_path)
-    evolution.run(generations=2, executor="threads:1")
+    evolution.run(generations=2)
     champion = kiks.Champion.load(tmp_path / "champion.toml")
     assert (champion.robot, champion.timing) == (robots[0], TIMINGS[0])
 

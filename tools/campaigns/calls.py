@@ -21,6 +21,7 @@ from tools.campaigns.runner import Campaign, Play, judge
 import kiks
 from kiks.clock.thinking import parse_thinking
 from kiks.control.controller_kinds import ControllerKind
+from kiks.learn.evaluation import evaluate
 from kiks.learn.gymnasium_envs import KheperaEnv, KheperaVectorEnv
 from kiks.model.arena import Ball, Cylinder, Lamp, Pose
 from kiks.model.project import Project, ProjectRobot
@@ -182,7 +183,8 @@ def _functions(rng: random.Random) -> Subject:
         {"seconds": 0.01}),
         "drive": (kiks.drive, {"port": sim.port(2), "controller": _controller(), "parameters": [0.1] * 18,
         "seconds": 0.2, "period_s": 0.1, "baud": 9600}),
-        "executor_for": (kiks.executor_for, {"where": "threads:1", "work": _task()}),
+        "evaluate": (evaluate, {"work": _task(), "candidates": np.zeros((1, 18)), "seeds": np.array([1]),
+        "executor": None}),
         "parse_thinking": (parse_thinking, {"text": "none"}),
     }  # fmt: skip
     return Subject(calls, lambda: drive(sim))
@@ -297,7 +299,7 @@ def _learning(rng: random.Random) -> Subject:
     good = {
         "task": task, "algorithm": "ga", "seed": 1, "population": 4, "folder": None, "values": np.arange(4.0),
         "generations": 1, "each": None,
-        "executor": "threads:1", "seconds": 0.5, "candidates": np.zeros((1, 18)), "seeds": np.array([1]),
+        "executor": None, "seconds": 0.5, "candidates": np.zeros((1, 18)), "seeds": np.array([1]),
         "threads": 1, "measure": "contacts",
         "low": 0.0, "high": 1.0, "cells": 10, "period_s": 0.1, "baud": 9600, "think_s": 0.01, "path": "champion.toml",
         "arena": _box(),

@@ -221,7 +221,7 @@ _EVOLVE = """
 import sys, kiks
 task = kiks.tasks.avoid(seconds=1.0, worlds=3)
 evolution = kiks.Evolution(task, "ga", population=8, seed=3, folder=sys.argv[1])
-evolution.run(generations=10**6, executor=sys.argv[2], each=lambda each: print(len(each.generations), flush=True))
+evolution.run(generations=10**6, each=lambda each: print(len(each.generations), flush=True))
 """
 
 
@@ -229,7 +229,7 @@ def _kill_evolution(rng: random.Random) -> None:
     """Kill an evolution, twice; what it has told stays, and it goes on to the bit."""
     with tempfile.TemporaryDirectory(prefix="kiks-torture-") as folder:
         for _ in "12":
-            with _evolving(folder, "threads:1") as process:
+            with _evolving(folder) as process:
                 assert process.stdout is not None
                 told = int([process.stdout.readline() for _ in range(rng.randint(1, 5))][-1])
                 time.sleep(rng.uniform(0.0, 0.1))
@@ -241,33 +241,14 @@ def _kill_evolution(rng: random.Random) -> None:
         _check_evolution(again)
 
 
-def _kill_worker(rng: random.Random) -> None:
-    """Kill a worker process of an evolution; the others do its work, and nothing is lost."""
-    with tempfile.TemporaryDirectory(prefix="kiks-torture-") as folder:
-        with _evolving(folder, "processes:2") as process:
-            assert process.stdout is not None
-            process.stdout.readline()
-            time.sleep(rng.uniform(0.0, 0.1))
-            children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text(encoding="ascii").split()
-            if children:
-                with suppress(ProcessLookupError):
-                    os.kill(int(rng.choice(children)), signal.SIGKILL)
-            lines = [process.stdout.readline() for _ in range(3)]
-            process.kill()
-        if not all(lines):
-            raise Broken("death", "an evolution ends with its worker", "worker")
-        task = kiks.tasks.avoid(seconds=1.0, worlds=3)
-        _check_evolution(kiks.Evolution(task, "ga", population=8, seed=3, folder=folder))
-
-
-def _evolving(folder: str, executor: str) -> subprocess.Popen[str]:
-    return subprocess.Popen([sys.executable, "-c", _EVOLVE, folder, executor], stdout=subprocess.PIPE, text=True)
+def _evolving(folder: str) -> subprocess.Popen[str]:
+    return subprocess.Popen([sys.executable, "-c", _EVOLVE, folder], stdout=subprocess.PIPE, text=True)
 
 
 def _check_evolution(found: kiks.Evolution) -> None:
     """Check that an interrupted evolution has the same generations as an uninterrupted one."""
     whole = kiks.Evolution(found.task, "ga", population=8, seed=3)
-    whole.run(generations=len(found.generations), executor="threads:1")
+    whole.run(generations=len(found.generations))
     for one, other in zip(found.generations, whole.generations, strict=True):
         if one.candidates.tobytes() != other.candidates.tobytes() or one.values.tobytes() != other.values.tobytes():
             raise Broken("lost", "an evolution that was killed goes on otherwise", "evolution")
@@ -494,7 +475,6 @@ SCENES: dict[str, tuple[Callable[[random.Random], None], int, float]] = {
     "write_nowhere": (_write_nowhere, 100, 30.0),
     "no_descriptors": (_no_descriptors, 300, 60.0),
     "kill_evolution": (_kill_evolution, 6, 100.0),
-    "kill_worker": (_kill_worker, 4, 100.0),
     "kill_client": (_kill_client, 4, 100.0),
     "kill_server": (_kill_server, 4, 100.0),
     "kill_session": (_kill_session, 4, 100.0),

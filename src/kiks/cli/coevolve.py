@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from concurrent.futures import Executor
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -31,7 +33,7 @@ def coevolve(
     population: int | None,
     generations: int | None,
     seconds: float | None,
-    where: str,
+    executor: Executor | None,
 ) -> None:
     """Evolve both sides of a contest, hold the tournament, and write champions, log and pictures.
 
@@ -43,7 +45,7 @@ def coevolve(
         population: Number of candidates of each side; that of the contest if None.
         generations: Number of generations; that of the contest if None and `seconds` is None.
         seconds: Begin no generation later than this [s].
-        where: Where candidates are evaluated.
+        executor: Evaluates candidates; this computer if None.
     """
     from kiks.cli.evolution_progress import progress_of
     from kiks.learn.coevolution import Coevolution
@@ -54,22 +56,22 @@ def coevolve(
     until = contest.generations if generations is None and seconds is None else generations
     end_as_with_ctrl_c()
     try:
-        with progress_of(coevolution, until, seconds) as progress:
-            coevolution.run(generations=until, seconds=seconds, executor=where, each=progress.each)
+        with executor or nullcontext(), progress_of(coevolution, until, seconds) as progress:
+            coevolution.run(generations=until, seconds=seconds, executor=executor, each=progress.each)
         if coevolution.generations:
-            _finish(coevolution, folder, where)
+            _finish(coevolution, folder)
     except KeyboardInterrupt:
         typer.echo(f"Stopped after generation {len(coevolution.generations)}; the same command continues.")
         raise typer.Exit(130) from None
 
 
-def _finish(coevolution: Coevolution, folder: Path, where: str) -> None:
+def _finish(coevolution: Coevolution, folder: Path) -> None:
     """Hold the tournament, save its best champions and the pictures, and print who won when."""
     from kiks.learn.coevolution_plot import save_fitness_plot, save_tournament_plot
 
     save_fitness_plot(coevolution, folder / "fitness.png")
     every = -(-len(coevolution.generations) // TOURNAMENT_MAX)
-    tournament = coevolution.master_tournament(every=every, executor=where)
+    tournament = coevolution.master_tournament(every=every)
     tournament.save(folder / "tournament.parquet")
     save_tournament_plot(tournament, folder / "tournament.png")
     for side, name in enumerate(tournament.sides):

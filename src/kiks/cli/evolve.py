@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import Executor
 from contextlib import ExitStack
 from importlib import import_module
 from pathlib import Path
@@ -21,7 +22,6 @@ from kiks.learn.algorithm_name import AlgorithmName
 
 if TYPE_CHECKING:
     from kiks.control.controller import Controller
-    from kiks.learn.evaluation import Executor
     from kiks.learn.evolution import Evolution
     from kiks.learn.results import Result
     from kiks.learn.task import Task
@@ -52,7 +52,7 @@ def evolve(
         int | None,
         typer.Option(help="Evolve so many times, with seeds from --seed on, each in a folder of its own.", min=1),
     ] = None,
-    ray: Annotated[
+    cluster: Annotated[
         str | None,
         typer.Option(help="Evaluate on a Ray cluster: its address, auto, or local; on all cores here if left out."),
     ] = None,
@@ -90,7 +90,7 @@ def evolve(
             population=population,
             generations=generations,
             seconds=seconds,
-            where="threads" if ray is None else _ray(ray),
+            executor=None if cluster is None else cluster_executor(cluster),
         )
         return
     if seeds is not None:
@@ -101,15 +101,14 @@ def evolve(
     folder = out or Path(f"kiks-evolve-{chosen.name}")
     until = chosen.generations if generations is None and seconds is None else generations
     from kiks.learn.evolution import Evolution
-    from kiks.learn.executors import executor_for
     from kiks.learn.results import seed_folder
 
     results: list[Result] = []
+    executor: Executor | None = None
     # Needed at the end in any case, and after Ctrl-C there is only a second.
     import_module("matplotlib.backends.backend_agg")
     end_as_with_ctrl_c()
     with ExitStack() as stack:
-        executor: Executor | None = None
         for number in [seed] if seeds is None else range(seed, seed + seeds):
             home = folder if seeds is None else seed_folder(folder, number)
             evolution: Evolution | None = None
@@ -119,9 +118,8 @@ def evolve(
                     typer.echo(f"Seed {number}:")
                 if evolution.generations:
                     typer.echo(f"Continuing after generation {len(evolution.generations)} in {home}.")
-                executor = executor or stack.enter_context(
-                    executor_for("threads" if ray is None else _ray(ray), chosen)
-                )
+                if cluster is not None and executor is None:
+                    executor = stack.enter_context(cluster_executor(cluster))
                 with progress_of(evolution, until, seconds) as progress:
                     evolution.run(
                         generations=until,
@@ -218,6 +216,8 @@ def _controller(kind: ControllerKind, task: Task) -> Controller:
     return from_recipe(recipe)
 
 
-def _ray(address: str) -> str:
-    """Return the place for --ray."""
-    return "ray" if address == "local" else f"ray:{address}"
+def cluster_executor(address: str) -> Executor:
+    """Return the executor for --cluster."""
+    from kiks.learn.ray_executor import RayExecutor
+
+    return RayExecutor(None if address == "local" else address)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pickle
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields, replace
+from functools import lru_cache
 from typing import Any, Self
 
 import numpy as np
@@ -38,11 +39,7 @@ class InWorlds:
     """Least distance between the edges of two robots at a random start [mm]."""
 
     def __reduce__(self: Any) -> tuple[Any, ...]:
-        # Functions are pickled by value: a worker on another computer does not have the user's file.
-        from numba import cloudpickle
-
-        dumps: Any = cloudpickle.dumps
-        return _unpickled, (type(self), dumps({each.name: getattr(self, each.name) for each in fields(self)}))
+        return _unpickled, (type(self), _pickled(self))
 
     def with_changes(self, **changes: Any) -> Self:
         """Return a copy with some arguments changed."""
@@ -73,17 +70,15 @@ class InWorlds:
         poses = {seed: spread_starts(self.arenas, self.worlds, seed=seed, robots=self.robots, **given) for seed in seen}
         return np.concatenate([poses[seed] for seed in seeds.tolist()])
 
-    def prepare(self: Any) -> None:
-        """Compile what users have written."""
-        self.evaluate(np.zeros((1, self.parameter_count)), np.zeros(1, np.int64), 1, seconds=SECONDS_MIN)
-
-    def evaluate(self: Any, candidates: Floats, seeds: Integers, threads: int, seconds: float | None = None) -> Floats:
+    def evaluate(
+        self: Any, candidates: Floats, seeds: Integers, threads: int | None = None, seconds: float | None = None
+    ) -> Floats:
         """Return the values of candidates; a candidate of a contest is a pair.
 
         Args:
             candidates: Parameters [candidate, parameter].
             seeds: A seed for each [candidate]: of its worlds and its starts.
-            threads: Number of threads.
+            threads: Number of threads; the number of cores if left out.
             seconds: Time for which they drive [s], if not that of the task.
 
         Returns:
@@ -97,8 +92,19 @@ class InWorlds:
         return np.concatenate([np.empty((0, len(self.value_names))), *values])
 
 
+@lru_cache(maxsize=4)
+def _pickled(work: Any) -> bytes:
+    """Return the arguments of a task. Functions are pickled by value: other computers do not have the user's file."""
+    from numba import cloudpickle
+
+    dumps: Any = cloudpickle.dumps
+    pickled: bytes = dumps({each.name: getattr(work, each.name) for each in fields(work)})
+    return pickled
+
+
+@lru_cache(maxsize=4)
 def _unpickled(kind: type[Any], pickled: bytes) -> Any:
-    """Return a record of a kind."""
+    """Return a record of a kind: the same for the same bytes, so that a worker compiles its functions once."""
     return kind(**pickle.loads(pickled))
 
 

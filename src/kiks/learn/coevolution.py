@@ -9,6 +9,7 @@ Queen! Competition in co-evolutionary robotics, Genetic Programming 1997).
 from __future__ import annotations
 
 from collections.abc import Callable
+from concurrent.futures import Executor
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
@@ -21,9 +22,9 @@ from kiks.errors import ParameterError, shown
 from kiks.learn.algorithms import make_algorithm
 from kiks.learn.champion import Champion
 from kiks.learn.contest import Contest
-from kiks.learn.evaluation import Executor
+from kiks.learn.evaluation import evaluate
 from kiks.learn.evolution_log import LOG, Folder, Generation, Identity, write_table
-from kiks.learn.generation_loop import opened, run_generations, seed_for
+from kiks.learn.generation_loop import run_generations, seed_for
 from kiks.model.array_checks import check_numbers
 from kiks.model.checks import check_count, check_kind
 from kiks.version import __version__
@@ -217,7 +218,7 @@ class Coevolution:
         *,
         generations: int | None = None,
         seconds: float | None = None,
-        executor: Executor | str = "threads",
+        executor: Executor | None = None,
         each: Callable[[Coevolution], Any] | None = None,
     ) -> tuple[Champion, Champion]:
         """Evolve.
@@ -225,7 +226,7 @@ class Coevolution:
         Args:
             generations: Total number of generations, including earlier ones.
             seconds: No generation begins later than this [s of the wall clock].
-            executor: An open executor, or where to evaluate: see `kiks.learn.executors.executor_for`.
+            executor: Evaluates candidates, such as a `ThreadPoolExecutor`; the cores of this computer do if left out.
             each: Called after each generation.
 
         Returns:
@@ -311,7 +312,7 @@ class Coevolution:
         )
 
     def master_tournament(
-        self, *, trials: int = TRIALS, every: int = 1, executor: Executor | str = "threads"
+        self, *, trials: int = TRIALS, every: int = 1, executor: Executor | None = None
     ) -> Tournament:
         """Let the champion of each generation meet the champions of all generations of the other side.
 
@@ -319,7 +320,7 @@ class Coevolution:
             trials: Number of contests of each pair. In each trial all champions have the same starts, a different one
                 with each opponent.
             every: Take only each so-many-th generation, the last one included.
-            executor: An open executor, or where to evaluate: see `kiks.learn.executors.executor_for`.
+            executor: Evaluates candidates, such as a `ThreadPoolExecutor`; the cores of this computer do if left out.
 
         Raises:
             WorkError: If the contest cannot be evaluated.
@@ -334,11 +335,10 @@ class Coevolution:
         pairs = np.concatenate([np.repeat(first, size, axis=0), np.tile(second, (size, 1))], axis=1)
         scores = np.zeros((2, size, size))
         starts = latin_square(size, seed_for(self.seed, _SQUARE_SEED)).ravel()
-        with opened(executor, self.contest) as evaluator:
-            for trial in range(trials):
-                numbers = range(trial * size, (trial + 1) * size)
-                seeds = np.array([seed_for(self.seed, TOURNAMENT_SEED, number) for number in numbers], np.int64)
-                scores += evaluator.evaluate(pairs, seeds[starts])[:, :2].T.reshape(2, size, size)
+        for trial in range(trials):
+            numbers = range(trial * size, (trial + 1) * size)
+            seeds = np.array([seed_for(self.seed, TOURNAMENT_SEED, number) for number in numbers], np.int64)
+            scores += evaluate(self.contest, pairs, seeds[starts], executor)[:, :2].T.reshape(2, size, size)
         return Tournament(self.contest.side_names, chosen + 1, scores / trials)
 
     # ---- folders ----

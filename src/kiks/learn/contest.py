@@ -69,7 +69,7 @@ class Side:
 
 @record
 class Contest(InWorlds):
-    """A contest of two sides: a `kiks.learn.evaluation.Evaluation` of pairs.
+    """A contest of two sides: which evaluates pairs.
 
     A candidate of the evaluation is a pair: the parameters of the first side's controller, then those of the second
     side's. In each world the robots of the first side come first.
@@ -172,7 +172,7 @@ class Contest(InWorlds):
         """Return the fingerprint of each argument on which values depend, by its name, as `Task.digest` does."""
         return digest_of(self, sides=[vars(side) | {"robot": RobotSpec.load(side.robot)} for side in self.sides])
 
-    def _evaluate(self, pairs: Floats, seeds: Integers, threads: int, seconds: float) -> Floats:
+    def _evaluate(self, pairs: Floats, seeds: Integers, threads: int | None, seconds: float) -> Floats:
         if pairs.shape[1] != self.parameter_count:
             counts = " and ".join(f"{side.parameter_count} of the {side.name}" for side in self.sides)
             raise ParameterError(

@@ -1,45 +1,98 @@
-"""The interfaces of evaluations and executors, and a worker: the same in this process and on another computer."""
+"""Evaluates the candidates of a task: on all cores of this computer, or by any executor, with the same values.
+
+An executor is an object with `submit`, as in `concurrent.futures`: threads, Dask, mpi4py, loky, or a Ray cluster
+(`kiks.learn.ray_executor`). A generation is cut into chunks. They do not show in results, because the values of a
+candidate follow from its parameters and its seed alone.
+"""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Callable
-from dataclasses import dataclass
-from time import perf_counter
-from traceback import format_exception
-from typing import Any, Protocol, Self
+from concurrent.futures import Executor, Future
+from functools import lru_cache
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kiks.errors import ParameterError, WorkError
+from kiks.errors import KiksError, ParameterError, WorkError, shown
+from kiks.learn.fingerprint import differing
+from kiks.version import __version__
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
+CHUNK_MIN, CHUNKS_MAX = 4, 256
+"""Fewest candidates of a chunk, as sending one takes a millisecond or two; and most chunks of a generation."""
 
-class Evaluation(Protocol):
-    """Evaluates candidates: an object with two methods, which a cluster must be able to pickle.
 
-    The values of a candidate must follow from its parameters and its seed alone, not from its neighbours in the call
-    nor from the count of threads: then an evolution has the same bits wherever it runs.
-    """
+class Work(Protocol):
+    """What evaluates candidates: a task. An executor of other processes must be able to pickle it."""
 
-    def prepare(self) -> None:
-        """Do costly work that each worker needs once: compile kernels, build arenas."""
-
-    def evaluate(self, candidates: Floats, seeds: Integers, threads: int) -> Floats:
-        """Return the values of candidates.
-
-        Args:
-            candidates: Parameters [candidate, parameter]; a copy, of at least one candidate.
-            seeds: A seed for each [candidate].
-            threads: How many threads it may use.
-
-        Returns:
-            Values [candidate, value].
-        """
+    def evaluate(self, candidates: Floats, seeds: Integers, threads: int | None = None) -> Floats:
+        """Return the values of candidates [candidate, parameter] with their seeds, float64 [candidate, value]."""
         ...
+
+    def __hash__(self) -> int: ...
+
+    def digest(self) -> dict[str, str]:
+        """Return a fingerprint of each argument on which values depend, by its name."""
+        ...
+
+
+def evaluate(work: Work, candidates: Floats, seeds: Integers, executor: Executor | None = None) -> Floats:
+    """Return the values of candidates.
+
+    Args:
+        work: A task.
+        candidates: Parameters, float64 [candidate, parameter].
+        seeds: A seed for each, int64 [candidate].
+        executor: Evaluates them, each chunk with one thread. Left out, the cores of this computer do.
+
+    Returns:
+        Values, float64 [candidate, value], in the order of the candidates: the same to the bit wherever they come from.
+
+    Raises:
+        WorkError: If the task raises, or a worker is lost and the executor does not repeat its chunk.
+
+    Example:
+        >>> import kiks
+        >>> from concurrent.futures import ThreadPoolExecutor
+        >>> task, candidates, seeds = kiks.tasks.avoid(seconds=1), np.ones((9, 18)), np.arange(9)
+        >>> with ThreadPoolExecutor(2) as threads:
+        ...     bool((evaluate(task, candidates, seeds, threads) == evaluate(task, candidates, seeds)).all())
+        True
+    """
+    candidates, seeds = check_candidates(candidates, seeds)
+    if executor is not None and not callable(getattr(executor, "submit", None)):
+        raise ParameterError(
+            f"executor must have submit() as those of concurrent.futures have, but it was {shown(executor)}. "
+            "ThreadPoolExecutor(2) is one; left out, all cores of this computer evaluate."
+        )
+    count = len(candidates)
+    size = max(count, 1) if executor is None else max(CHUNK_MIN, -(-count // CHUNKS_MAX))
+    parts = [slice(first, first + size) for first in range(0, max(count, 1), size)]
+    futures: list[Future[Floats]] = []
+    values: list[Floats] = []
+    try:
+        if executor is None:
+            return work.evaluate(candidates, seeds)
+        here = _identity(work)
+        futures += [executor.submit(_evaluate_chunk, work, here, candidates[part], seeds[part]) for part in parts]
+        for future in futures:
+            values.append(future.result())
+        return np.concatenate(values)
+    except Exception as raised:
+        error = getattr(raised, "cause", None) or raised  # Ray wraps what a worker raises
+        if isinstance(error, KiksError):
+            raise error from None
+        part, text = parts[len(values)], " ".join(str(error).split())
+        raise WorkError(
+            f"Cannot evaluate candidates {part.start} to {min(part.stop, count) - 1}: {type(error).__name__}: {text}. "
+            "Evaluate them alone, in one process, to see why."
+        ) from raised
+    finally:
+        for future in futures:
+            future.cancel()
 
 
 def check_candidates(candidates: object, seeds: object) -> tuple[Floats, Integers]:
@@ -70,149 +123,21 @@ def _array(values: object) -> NDArray[Any]:
         return np.empty(0, object)
 
 
-@dataclass(frozen=True)
-class Ready:
-    """A worker's answer: it is ready for candidates."""
+def _evaluate_chunk(work: Work, there: dict[str, str], candidates: Floats, seeds: Integers) -> Floats:
+    """Return the values of a chunk, in a worker; refuse the work of a program whose modules differ from those here."""
+    if names := differing(there, _identity(work)):
+        raise ParameterError(
+            f"all computers must have the same KiKS and the same modules of yours, but on one these differ: {names}. "
+            "Install the same on all."
+        )
+    return work.evaluate(candidates, seeds, 1)
 
 
-@dataclass(frozen=True)
-class Values:
-    """A worker's answer: the values of its candidates.
-
-    Attributes:
-        values: [candidate, value].
-        duration_s: How long the evaluation took [s of the wall clock].
-    """
-
-    values: Floats
-    duration_s: float
+def _identity(work: Work) -> dict[str, str]:
+    """Return what must be the same where a candidate is evaluated."""
+    return {"KiKS": __version__} | _digest_of(work)
 
 
-@dataclass(frozen=True)
-class Raised:
-    """A worker's answer: the work raised.
-
-    Attributes:
-        what: Type and message of the exception.
-        traceback: Its traceback, as text.
-    """
-
-    what: str
-    traceback: str
-
-    @classmethod
-    def of(cls, error: BaseException) -> Raised:
-        """Return an exception as an answer."""
-        return cls(f"{type(error).__name__}: {error}", "".join(format_exception(error)))
-
-
-@dataclass(frozen=True)
-class Lost:
-    """Stands for an answer: the worker has ended.
-
-    Attributes:
-        how: How it ended; continues a sentence that begins with "the worker".
-    """
-
-    how: str
-
-
-Answer = Ready | Values | Raised | Lost
-
-
-class Worker:
-    """Prepares an evaluation once, then evaluates chunks.
-
-    Args:
-        load: Returns the evaluation; called once.
-        threads: Number of threads that an evaluation may use.
-    """
-
-    def __init__(self, load: Callable[[], Evaluation], *, threads: int) -> None:
-        self._load = load
-        self._threads = threads
-
-    def prepare(self) -> Ready | Raised:
-        """Load and prepare the evaluation."""
-        try:
-            self._work = self._load()
-            self._work.prepare()
-        except Exception as error:
-            return Raised.of(error)
-        return Ready()
-
-    def evaluate(self, candidates: Floats, seeds: Integers) -> Values | Raised:
-        """Evaluate a chunk: candidates [candidate, parameter] with their seeds [candidate].
-
-        The evaluation gets copies, because Ray's shared memory must not be written to.
-        """
-        try:
-            start_s = perf_counter()
-            values = self._work.evaluate(candidates.copy(), seeds.copy(), self._threads)
-            duration_s = perf_counter() - start_s
-            if not isinstance(values, np.ndarray) or values.ndim != 2 or len(values) != len(candidates):
-                given = f"shape {values.shape}" if isinstance(values, np.ndarray) else repr(values)
-                raise ValueError(
-                    f"evaluate() must return an array [candidate, value] for {len(candidates)} candidates, but it was"
-                    f" {given}."
-                )
-            return Values(values.astype(np.float64, casting="safe"), duration_s)
-        except Exception as error:
-            return Raised.of(error)
-
-
-class Executor(ABC):
-    """Evaluates candidates, generation by generation: in a `with` statement, called by one thread."""
-
-    def __init__(self) -> None:
-        self._is_open = False
-
-    def __enter__(self) -> Self:
-        """Open it.
-
-        Raises:
-            WorkError: If the work raises when it is prepared; on a cluster the first evaluation raises this.
-        """
-        self._open()
-        self._is_open = True
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._is_open = False
-        self._close()
-
-    def evaluate(self, candidates: Floats, seeds: Integers) -> Floats:
-        """Return the values of candidates.
-
-        Args:
-            candidates: Parameters [candidate, parameter].
-            seeds: A seed for each [candidate].
-
-        Returns:
-            Values [candidate, value], in the order of the candidates; [0, 0] if there are none.
-
-        Raises:
-            WorkError: If the work raises, too many workers are lost, or the executor is not open.
-        """
-        if not self._is_open:
-            raise WorkError(
-                "An executor must be open, but it is closed. Use it inside `with executor_for(...) as executor:`."
-            )
-        candidates, seeds = check_candidates(candidates, seeds)
-        return self._evaluate(candidates, seeds) if len(candidates) else np.empty((0, 0))
-
-    @abstractmethod
-    def _open(self) -> None: ...
-
-    @abstractmethod
-    def _close(self) -> None: ...
-
-    @abstractmethod
-    def _evaluate(self, candidates: Floats, seeds: Integers) -> Floats: ...
-
-
-def work_error(where: str, raised: Raised) -> WorkError:
-    """Return the error for work that raised in `where`, with the worker's traceback as a note."""
-    error = WorkError(f"Evaluation must not raise, but its {where} raised {raised.what}")
-    error.add_note(f"In the worker:\n{raised.traceback}")
-    return error
+@lru_cache(maxsize=4)
+def _digest_of(work: Work) -> dict[str, str]:
+    return work.digest()

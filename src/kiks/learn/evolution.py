@@ -14,6 +14,7 @@ finals (`kiks.learn.finals`), with the best elites of such an algorithm. The win
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from concurrent.futures import Executor
 from functools import partial
 from pathlib import Path
 from time import perf_counter
@@ -26,11 +27,11 @@ from kiks.errors import ParameterError
 from kiks.learn.algorithms import Algorithm, make_algorithm
 from kiks.learn.archive import CHAMPION, Archive
 from kiks.learn.champion import Champion
-from kiks.learn.evaluation import Executor
+from kiks.learn.evaluation import evaluate
 from kiks.learn.evolution_log import Folder, Generation, Identity
 from kiks.learn.finals import Contender, Finals, finalists_of
 from kiks.learn.fingerprint import fingerprints
-from kiks.learn.generation_loop import opened, run_generations, seed_for
+from kiks.learn.generation_loop import run_generations, seed_for
 from kiks.learn.task import Task
 from kiks.model.array_checks import check_numbers
 from kiks.model.checks import check_count, check_kind
@@ -72,9 +73,7 @@ class Evolution:
     Example:
         >>> import kiks
         >>> evolution = kiks.Evolution(kiks.tasks.avoid(seconds=2), "ga", seed=1, population=8)
-        >>> with kiks.executor_for("threads", evolution.task) as executor:
-        ...     candidates = evolution.ask()
-        ...     evolution.tell(executor.evaluate(candidates, evolution.seeds))
+        >>> evolution.tell(evolution.task.evaluate(evolution.ask(), evolution.seeds))
         >>> evolution.champion.generation
         1
     """
@@ -228,7 +227,7 @@ class Evolution:
         *,
         generations: int | None = None,
         seconds: float | None = None,
-        executor: Executor | str = "threads",
+        executor: Executor | None = None,
         each: Callable[[Evolution], Any] | None = None,
         each_round: Callable[[Finals], Any] | None = None,
     ) -> Champion:
@@ -237,7 +236,7 @@ class Evolution:
         Args:
             generations: Total number of generations, including earlier ones.
             seconds: No generation begins later than this [s of the wall clock].
-            executor: An open executor, or where to evaluate: see `kiks.learn.executors.executor_for`.
+            executor: Evaluates candidates, such as a `ThreadPoolExecutor`; the cores of this computer do if left out.
             each: Called after each generation.
             each_round: Called before each round of the finals.
 
@@ -252,14 +251,14 @@ class Evolution:
         return self.champion
 
     def hold_finals(
-        self, executor: Executor | str = "threads", *, each_round: Callable[[Finals], Any] | None = None
+        self, executor: Executor | None = None, *, each_round: Callable[[Finals], Any] | None = None
     ) -> Champion:
         """Hold the finals, unless they were held after this generation; `run` does so at its end.
 
         A single rival, or none, has no finals.
 
         Args:
-            executor: An open executor, or where to evaluate: see `kiks.learn.executors.executor_for`.
+            executor: Evaluates candidates, such as a `ThreadPoolExecutor`; the cores of this computer do if left out.
             each_round: Called before each round.
 
         Returns:
@@ -270,11 +269,10 @@ class Evolution:
         """
         finals = None if self.finals else self._new_finals()
         if finals is not None:
-            with opened(executor, self.task) as evaluator:
-                while not finals.is_over:
-                    if each_round is not None:
-                        each_round(finals)
-                    finals.tell(evaluator.evaluate(finals.ask(), finals.seeds))
+            while not finals.is_over:
+                if each_round is not None:
+                    each_round(finals)
+                finals.tell(evaluate(self.task, finals.ask(), finals.seeds, executor))
             finals.seconds = self._now_s()
             if self._folder is not None:
                 self._folder.save_finals(len(self.generations) - 1, finals)

@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
 from time import perf_counter
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kiks.errors import ParameterError, shown
-from kiks.learn.evaluation import Evaluation, Executor
-from kiks.learn.executors import executor_for
+from kiks.errors import ParameterError
+from kiks.learn.evaluation import Work, evaluate
 from kiks.model.checks import check_number
 
 LOG_EVERY_S = 10.0
 """Time between two writes of the log [s]; each writes the whole log."""
 
 
-class Named(Evaluation, Protocol):
-    """An evaluation with a name."""
+class Named(Work, Protocol):
+    """A task with a name."""
 
     @property
     def name(self) -> str:
@@ -75,9 +74,9 @@ def run_generations(
     *,
     generations: int | None,
     seconds: float | None,
-    executor: Executor | str,
+    executor: Executor | None,
     each: Callable[[Some], Any] | None,
-    finish: Callable[[Executor], Any] | None = None,
+    finish: Callable[[Executor | None], Any] | None = None,
 ) -> None:
     """Evolve.
 
@@ -85,9 +84,9 @@ def run_generations(
         evolution: The evolution.
         generations: Total number of generations, including earlier ones.
         seconds: No generation begins later than this [s of the wall clock].
-        executor: An open executor, or where to evaluate: see `kiks.learn.executors.executor_for`.
+        executor: Evaluates candidates, such as a `ThreadPoolExecutor`; the cores of this computer do if left out.
         each: Called after each generation.
-        finish: Called with the open executor after the last generation, unless the run is interrupted.
+        finish: Called with the executor after the last generation, unless the run is interrupted.
 
     Raises:
         WorkError: If candidates cannot be evaluated.
@@ -97,42 +96,21 @@ def run_generations(
     for name, value in (("generations", generations), ("seconds", seconds)):
         if value is not None:
             check_number(name, value, 0)
-    with opened(executor, evolution.work) as evaluator:
-        begin_s, logged_s = perf_counter(), -np.inf
-        try:
-            while (generations is None or len(evolution.generations) < generations) and (
-                seconds is None or perf_counter() - begin_s < seconds
-            ):
-                evolution.tell(evaluator.evaluate(evolution.ask(), evolution.seeds))
-                if perf_counter() - logged_s > LOG_EVERY_S:
-                    evolution.save_log()
-                    logged_s = perf_counter()
-                if each is not None:
-                    each(evolution)
-            if finish is not None:
-                finish(evaluator)
-        finally:
-            evolution.save_log()
-
-
-@contextmanager
-def opened(executor: Executor | str, work: Evaluation) -> Iterator[Executor]:
-    """Return an open executor as it is; of a place, an executor there, which closes at the end.
-
-    Args:
-        executor: An open executor, or where to evaluate: see `kiks.learn.executors.executor_for`.
-        work: Evaluates candidates.
-
-    Raises:
-        WorkError: If the work raises when it is prepared.
-    """
-    if isinstance(executor, str):
-        with executor_for(executor, work) as here:
-            yield here
-    elif isinstance(executor, Executor):
-        yield executor
-    else:
-        raise ParameterError(f"executor must be an Executor or a text such as 'threads', but it was {shown(executor)}.")
+    begin_s, logged_s = perf_counter(), -np.inf
+    try:
+        while (generations is None or len(evolution.generations) < generations) and (
+            seconds is None or perf_counter() - begin_s < seconds
+        ):
+            evolution.tell(evaluate(evolution.work, evolution.ask(), evolution.seeds, executor))
+            if perf_counter() - logged_s > LOG_EVERY_S:
+                evolution.save_log()
+                logged_s = perf_counter()
+            if each is not None:
+                each(evolution)
+        if finish is not None:
+            finish(executor)
+    finally:
+        evolution.save_log()
 
 
 def seed_for(seed: int, purpose: int, number: int = 0) -> int:

@@ -78,7 +78,7 @@ class Axis:
 
 @record
 class Task(InWorlds):
-    """A task for which controllers are evolved: a `kiks.learn.evaluation.Evaluation`.
+    """A task for which controllers are evolved: see `evaluate`.
 
     A candidate is the parameters of a controller. It drives in `worlds` worlds, which the arenas share evenly. The
     measures, averaged over a world's robots, become one number, its fitness.
@@ -225,7 +225,7 @@ class Task(InWorlds):
 
     # ---- evaluation ----
 
-    def _evaluate(self, candidates: Floats, seeds: Integers, threads: int, seconds: float) -> Floats:
+    def _evaluate(self, candidates: Floats, seeds: Integers, threads: int | None, seconds: float) -> Floats:
         count = len(candidates)
         world_seeds = (seeds[:, None] + np.arange(self.worlds)).ravel()
         starts = self.start_poses(seeds)
