@@ -2,7 +2,7 @@
 
 Run: python benchmarks/record.py [--json]. `record.slowdown_percent` compares the demo `follow` at full acceleration
 with and without a recording, in turn in one process; each figure is a median. `record.seek_s` is the longest of twenty
-jumps in a recording of an hour, `record.back_ms` what a picture costs that is played backwards in real time.
+jumps in a recording of an hour, `record.back_ms` what a step back of 40 ms costs.
 `record.film_pictures_per_s` is the pictures of 1280 x 720 of an MP4 per second of processor time: those that one core
 makes, with drawing and encoding.
 """

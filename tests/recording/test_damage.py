@@ -20,7 +20,6 @@ from tests.at_length import share
 from tools.campaigns.recordings import Parts, many_entries, many_parts, sound, sound_parts, use
 
 import kiks
-from kiks.engine.state import ROBOT
 from kiks.errors import KiksError, ParameterError
 from kiks.export.film import save_film
 from kiks.recording import motion
@@ -276,9 +275,9 @@ def test_replies_that_are_no_readings_are_none(reply: bytes, file: Path) -> None
     "block",
     [
         b"\0" * 16,
-        np.array([2**32 - 1] * 4, "<u4").tobytes(),
-        np.array([1, 1, 10**6, 0], "<u4").tobytes() + bytes(10**6),
-        np.array([1, 1, motion.KEPT_BYTES, 0], "<u4").tobytes() + b"\xff" * (8 + motion.KEPT_BYTES),
+        np.array([2**32 - 1] * 3, "<u4").tobytes(),
+        np.array([1, 10**6, 0], "<u4").tobytes() + bytes(10**6),
+        np.array([1, 1, 0], "<u4").tobytes() + b"\xff" * (8 + motion.ROBOT_BYTES),
     ],
 )
 def test_motion_that_is_none_is_refused(block: bytes, file: Path) -> None:
@@ -349,44 +348,11 @@ def test_a_chunk_has_messages_and_what_they_need_alone(more: bytes, file: Path) 
     assert "whole records" in refused(file)
 
 
-def test_records_may_lack_fields(file: Path) -> None:
+def test_a_recording_with_other_fields_names_the_version_that_reads_it(file: Path) -> None:
     parts = sound_parts()
-    layout = json.loads(parts.attachments["layout.json"])
-    layout["robot"]["fields"] = [field for field in layout["robot"]["fields"] if field["name"] not in ("trail", "led")]
-    attachments = {**parts.attachments, "layout.json": json.dumps(layout).encode()}
-    replace(parts, attachments=attachments).save(file)
-    recording = kiks.Recording(file)
-    assert len(recording.table("poses"))
-
-
-def test_a_run_of_other_fields_is_checked_by_those_that_both_have(file: Path) -> None:
-    parts = sound_parts()
-    layout = json.loads(parts.attachments["layout.json"])
-    layout["robot"]["fields"] = [field for field in layout["robot"]["fields"] if field["name"] != "led"]
-    older = replace(parts, attachments={**parts.attachments, "layout.json": json.dumps(layout).encode()})
-    older.save(file)
-    checked = check_recording(kiks.Recording(file).log)
-    assert checked.differs_ns is None
-    assert checked.equal_count > 1
-    last_ns = max(entry.time_ns for rows, _ in parts.blocks for entry in rows if entry.kind == Kind.CHECK)
-    place = ROBOT.fields["forwards_mm"][1]
-
-    def changed(entry: Entry) -> Entry:
-        head, line, records = entry.data.partition(b"\n")
-        return entry._replace(data=head + line + records[:place] + bytes(8) + records[place + 8 :])
-
-    older.with_entry(lambda entry: entry.kind == Kind.CHECK and entry.time_ns == last_ns, changed).save(file)
-    assert check_recording(kiks.Recording(file).log).differs_ns == last_ns
-
-
-@pytest.mark.parametrize("kind", ["<i3", "|99", "<f99999999999", "|u2", "O", "<i16"])
-def test_layouts_are_of_numbers(kind: str, file: Path) -> None:
-    parts = sound_parts()
-    layout = json.loads(parts.attachments["layout.json"])
-    layout["robot"]["fields"][0]["type"] = kind
-    attachments = {**parts.attachments, "layout.json": json.dumps(layout).encode()}
-    replace(parts, attachments=attachments).save(file)
-    refused(file)
+    replace(parts, told={**parts.told, "layout": "other", "kiks": "9.9"}).save(file)
+    assert "Read it with that version" in refused(file)
+    assert "KiKS 9.9" in refused(file)
 
 
 # ---- memory ----

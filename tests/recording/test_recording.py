@@ -72,9 +72,7 @@ def check_jumps(recording: Recording, state_hash: str) -> None:
     rng, log = np.random.default_rng(1), recording.log
     replay = recording.replay()
     times_ns = rng.integers(log.begin_ns, log.end_ns, 10, endpoint=True).tolist()
-    # Steps back, too, which may begin at places that it has kept.
-    for time_ns in [each - back * 70_000_000 for each in times_ns for back in (0, 1, 2)]:
-        time_ns = max(time_ns, log.begin_ns)
+    for time_ns in times_ns:
         there = Replay(log, time_ns)
         if not replay.go_to(time_ns):
             assert there.sim.robot_count < replay.sim.robot_count or has_fewer_turrets(there.sim, replay.sim)
@@ -372,16 +370,16 @@ def test_foxglove_opens_it(tmp_path: Path) -> None:
         sim.run(3.0)
         recorder.mark("a note")
         sim.run(1.0)
+    foxglove.write_foxglove(Recording(tmp_path / "run.mcap"), tmp_path / "out.mcap")
     counts: dict[str, int] = {}
-    with (tmp_path / "run.mcap").open("rb") as file:
+    with (tmp_path / "out.mcap").open("rb") as file:
         for schema, channel, message in make_reader(file, validate_crcs=True).iter_messages():
             counts[channel.topic] = counts.get(channel.topic, 0) + 1
-            if schema is not None:
-                assert schema.name.startswith("foxglove.")
-                jsonschema.validate(json.loads(message.data), json.loads(schema.data))
-                assert message.log_time <= sim.now_ns
-    assert counts[foxglove.POSES.name] >= 2
-    assert {topic.name for topic in foxglove.TOPICS} <= set(counts)
+            assert schema is not None
+            assert schema.name.startswith("foxglove.")
+            jsonschema.validate(json.loads(message.data), json.loads(schema.data))
+            assert message.log_time <= sim.now_ns
+    assert counts == {"/walls": 1, "/scene": 1, "/tf": 41, "/log": 1}
 
 
 def test_mistakes_get_a_clear_error(tmp_path: Path) -> None:
@@ -487,7 +485,7 @@ def test_the_first_chunk_leaves_the_reserve_too(tmp_path: Path, monkeypatch: pyt
 
     def disk_usage(folder: Path) -> SimpleNamespace:
         used = sum(each.stat().st_size for each in folder.iterdir())
-        return SimpleNamespace(total=3 << 20, used=used, free=(160 << 10) + len(before) - used)
+        return SimpleNamespace(total=3 << 20, used=used, free=(154 << 10) + len(before) - used)
 
     monkeypatch.setattr("shutil.disk_usage", disk_usage)
     sim = Simulation()

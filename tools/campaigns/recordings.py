@@ -104,9 +104,9 @@ def _seen_with(motion: bytes, name: str, value: float) -> bytes:
     """Return a block of motion with a field of its records set to a number."""
     data, offset = bytearray(motion), 0
     while offset + motion_block._HEAD.size <= len(data):
-        looks, robots, _, bodies = motion_block._HEAD.unpack_from(data, offset)
-        offset += motion_block._HEAD.size + looks * 8
-        for kind, count in ((motion_block._KEPT, looks * robots), (BODY, looks * bodies)):
+        samples, robots, bodies = motion_block._HEAD.unpack_from(data, offset)
+        offset += motion_block._HEAD.size + samples * 8
+        for kind, count in ((motion_block.WRITTEN, samples * robots), (BODY, samples * bodies)):
             if offset + count * kind.itemsize > len(data):
                 return motion
             records: Any = np.frombuffer(data, kind, count, offset)
@@ -235,7 +235,7 @@ def _motion(rng: random.Random, parts: Parts) -> Parts:
 
 def _seen(rng: random.Random, parts: Parts) -> Parts:
     """Return parts with a number in the motion set to another."""
-    kind: Any = motion_block._KEPT if rng.random() < 0.6 else BODY
+    kind: Any = motion_block.WRITTEN if rng.random() < 0.6 else BODY
     return parts.with_motion(
         rng.choice(kind.names), float(rng.choice([n for n in NUMBERS if not isinstance(n, int) or abs(n) < 2**1000]))
     )
@@ -249,8 +249,8 @@ def _program(rng: random.Random, parts: Parts) -> Parts:
 
 
 def many_parts(parts: Parts) -> Parts:
-    """Return parts with a motion of millions of empty looks, which a few kilobytes hold."""
-    empty = np.array([1, 0, motion_block.KEPT_BYTES, 0], "<u4").tobytes() + bytes(8)
+    """Return parts with a motion of millions of empty samples, which a few kilobytes hold."""
+    empty = np.array([1, 0, 0], "<u4").tobytes() + bytes(8)
     return replace(parts, blocks=[*parts.blocks[:-1], (parts.blocks[-1][0], empty * 2_000_000)])
 
 

@@ -91,7 +91,7 @@ class RunFrames:
     def _compare(self, checkpoint: Entry) -> None:
         self.state_hash = checkpoint.data[:HASH_LENGTH].decode("ascii", "replace")
         self.checkpoint_count += 1
-        if is_same(self._log, checkpoint, self._replay.sim):
+        if is_same(checkpoint, self._replay.sim):
             self.equal_count += 1
         else:
             self._is_other = True

@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from kiks.recording.entries import Entry
 from kiks.recording.log import HASH_LENGTH, RecordedLog
-from kiks.recording.motion import Motion, MotionWatcher, decode, encode, ticks_of
+from kiks.recording.motion import Motion, MotionWatcher, decode, ticks_of
 from kiks.recording.replay import Replay
-from kiks.sim.saved_state import Layout
 from kiks.sim.simulation import Simulation
 
 
@@ -34,9 +33,6 @@ class Checked:
 def check_recording(log: RecordedLog) -> Checked:
     """Make a recorded run again, and compare the state at each checkpoint.
 
-    If the records of that version of KiKS had other fields, their hash says nothing: then the fields are compared that
-    both have.
-
     Args:
         log: The log of the recording.
     """
@@ -44,7 +40,7 @@ def check_recording(log: RecordedLog) -> Checked:
     differing: list[int] = []
 
     def compare(checkpoint: Entry) -> None:
-        if not is_same(log, checkpoint, replay.sim):
+        if not is_same(checkpoint, replay.sim):
             differing.append(checkpoint.time_ns)
         elif not differing:
             equal.append(checkpoint.time_ns)
@@ -58,22 +54,9 @@ def check_recording(log: RecordedLog) -> Checked:
     return Checked(len(equal), differing[0], _first_tick(log, first_ns, differing[0]))
 
 
-def is_same(log: RecordedLog, checkpoint: Entry, sim: Simulation) -> bool:
-    """Return whether a simulation is in the recorded state."""
-    if log.layout == Layout():
-        return sim.state_hash().encode() == checkpoint.data[:HASH_LENGTH]
-    _, saved = log.state_of(checkpoint)
-    state = sim.world.state
-    pairs = ((saved.robots, state.robots, log.layout.robot), (saved.bodies, state.bodies, log.layout.body))
-    return all(
-        recorded.shape == present.shape
-        and all(
-            np.array_equal(recorded[name], present[name])
-            for name in present.dtype.names or ()
-            if name in (layout.names or ()) and layout[name] == present.dtype[name]
-        )
-        for recorded, present, layout in pairs
-    )
+def is_same(checkpoint: Entry, sim: Simulation) -> bool:
+    """Return whether a simulation is in the state of a checkpoint."""
+    return sim.state_hash().encode() == checkpoint.data[:HASH_LENGTH]
 
 
 def _first_tick(log: RecordedLog, begin_ns: int, end_ns: int) -> int | None:
@@ -84,7 +67,7 @@ def _first_tick(log: RecordedLog, begin_ns: int, end_ns: int) -> int | None:
     replay.sim.world.watch(watcher)
     while replay.sim.now_ns < end_ns and replay.advance():
         pass
-    found = _by_tick(decode(encode(looks := watcher.take()), Layout(), "replay", len(looks)))
+    found = _by_tick(decode(block := watcher.take(), "replay", len(block)))
     recorded = _by_tick(log.motion())
     ticks = sorted(tick for tick in found.keys() & recorded.keys() if tick > begin_tick)
     return next((tick for tick in ticks if not np.array_equal(found[tick], recorded[tick])), None)

@@ -66,7 +66,7 @@ class EventReader:
                 self._has_begun = True
 
     def _of_motion(self) -> Iterator[Event]:
-        """Yield an event for each robot that has begun to touch something between two looks."""
+        """Yield an event for each robot that has begun to touch something between two samples."""
         for motion in self._log.motion_of(self._block):
             records: Any = motion.robots
             counts: NDArray[np.int64] = records["contact_count"].astype(np.int64)
@@ -74,5 +74,5 @@ class EventReader:
             known = min(len(self._contacts), counts.shape[1])
             before[0, :known] = self._contacts[:known]
             self._contacts = counts[-1]
-            for look, robot in np.argwhere(np.diff(counts, axis=0, prepend=before) > 0).tolist():
-                yield Event(s_from_ns(int(motion.ticks[look]) * TICK_NS), robot + 1, "contact", "")
+            for sample, robot in np.argwhere(np.diff(counts, axis=0, prepend=before) > 0).tolist():
+                yield Event(s_from_ns(int(motion.ticks[sample]) * TICK_NS), robot + 1, "contact", "")

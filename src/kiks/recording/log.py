@@ -15,17 +15,18 @@ from kiks.recording.entries import Columns, Entry
 from kiks.recording.mcap_file import McapReader, Topic
 from kiks.recording.motion import Motion
 from kiks.recording.motion import decode as decode_motion
-from kiks.recording.recorder import LOG, MOTION
+from kiks.recording.recorder import LINES_MAX, LOG, MOTION
 from kiks.sim.run_log import LAST_INPUT, Kind
-from kiks.sim.saved_state import Layout, SavedState, Setup
+from kiks.sim.saved_state import LAYOUT, SavedState, Setup
 from kiks.units import s_from_ns
+from kiks.version import __version__
 
 HASH_LENGTH = 16
 """Characters of a hash, before the state of a checkpoint."""
 
 ENTRY_BYTES, PART_BYTES = 1, 64
-"""Fewest bytes of a chunk, packed as it is, for each entry, and for each time that things come or go: a recording of
-KiKS has four times as many, and work is in proportion to the size of a file."""
+"""Fewest bytes of a chunk, packed as it is, for each entry beyond `LINES_MAX`, and for each time that things come or
+go: a recording of KiKS has four times as many, and work is in proportion to the size of a file."""
 
 BLOCKS_KEPT = 4
 """Blocks of the log that are kept when they were read."""
@@ -46,19 +47,22 @@ class RecordedLog:
 
     Attributes:
         reader: Reads the file.
-        layout: The layout of the records in it.
     """
 
     def __init__(self, file: str | Path) -> None:
         self.reader = reader = McapReader(file)
         self._setups: dict[int, Setup] = {}
         self._blocks: OrderedDict[int, Columns] = OrderedDict()
-        if "layout.json" not in reader.attachments or "setup/0.json" not in reader.attachments or not reader.chunks:
+        if "setup/0.json" not in reader.attachments or not reader.chunks:
             raise ParameterError(
                 f"{reader.what} must be a recording of KiKS, but it is another MCAP file, or the run was killed at its "
                 "very beginning. `--record FILE` makes one."
             )
-        self.layout = Layout.from_bytes(reader.attachments["layout.json"], reader.what)
+        if reader.told.get("layout") != LAYOUT:
+            raise ParameterError(
+                f"Cannot read {reader.what}: KiKS {reader.told.get('kiks', '?')} recorded it with other fields than "
+                f"KiKS {__version__} has. Read it with that version."
+            )
 
     @property
     def begin_ns(self) -> int:
@@ -84,7 +88,7 @@ class RecordedLog:
     def motion_of(self, block: int) -> Iterator[Motion]:
         """Yield those records of a block."""
         data, parts_max = self._part(block, MOTION), self._most(block, PART_BYTES)
-        yield from decode_motion(data, self.layout, self.reader.what, parts_max)
+        yield from decode_motion(data, self.reader.what, parts_max)
 
     def entries(self) -> Iterator[Entry]:
         """Yield all entries of the log."""
@@ -144,7 +148,7 @@ class RecordedLog:
         """Return the setup and the state of an entry."""
         setup = self.setup(entry.number)
         data = entry.data[HASH_LENGTH:] if entry.kind == Kind.CHECK else entry.data
-        saved = SavedState.from_bytes(data, setup, self.layout, f"{self.reader.what}: state")
+        saved = SavedState.from_bytes(data, setup, f"{self.reader.what}: state")
         if saved.now_ns != entry.time_ns:
             raise self.damaged(f"a state of {s_from_ns(saved.now_ns):.3f} s is at {s_from_ns(entry.time_ns):.3f} s")
         return setup, saved
@@ -153,7 +157,7 @@ class RecordedLog:
         """Return a block of the log."""
         if number not in self._blocks:
             columns = Columns.of_block(self._part(number, LOG), self.reader.what)
-            if not 0 < len(columns.kind) <= self._most(number, ENTRY_BYTES):
+            if not 0 < len(columns.kind) <= self._most(number, ENTRY_BYTES) + LINES_MAX:
                 raise self.damaged(f"a part has {len(columns.kind)} entries")
             self._blocks[number] = columns
             if len(self._blocks) > BLOCKS_KEPT:

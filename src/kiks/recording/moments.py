@@ -123,9 +123,9 @@ def _ticks(log: RecordedLog, first_block: int) -> Iterator[Tick]:
         for motion in log.motion_of(block):
             ticks = ticks_of(motion, last_tick)
             last_tick = int(motion.ticks[-1])
-            rows = zip(ticks.ticks.tolist(), ticks.poses, ticks.places, ticks.looks.tolist(), strict=True)
-            for number, poses, places, look in rows:
-                yield Tick(number, poses, places, motion.robots[look], motion.bodies[look])
+            rows = zip(ticks.ticks.tolist(), ticks.poses, ticks.places, ticks.samples.tolist(), strict=True)
+            for number, poses, places, sample in rows:
+                yield Tick(number, poses, places, motion.robots[sample], motion.bodies[sample])
 
 
 def _between(now: Tick, later: Tick | None, time_ns: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

@@ -18,13 +18,12 @@ from kiks.ending import postponing_endings
 from kiks.errors import ParameterError
 from kiks.model.atomic_files import path_of
 from kiks.model.checks import check_kind
-from kiks.recording import foxglove, motion
 from kiks.recording.entries import block_of
 from kiks.recording.mcap_file import McapFile, Topic
 from kiks.recording.motion import MotionWatcher
 from kiks.sim.read_completion import NEVER_NS
 from kiks.sim.run_log import ACT, CHECK, MARK, STATE, TEXT, Clock, NotedEntry
-from kiks.sim.saved_state import Layout, Setup, TurretOfUser, state_bytes
+from kiks.sim.saved_state import LAYOUT, Setup, TurretOfUser, state_bytes
 from kiks.sim.simulation import Simulation
 from kiks.units import NS_PER_S, s_from_ns
 from kiks.version import __version__
@@ -93,7 +92,7 @@ class RunRecorder:
         self.path = path_of(path, "a recording's file").absolute()
         self.gives_way: bool = gives_way
         self._sim, self._world, self._loop = sim, sim.world, sim.loop
-        self._file = McapFile(path, (LOG, MOTION, *foxglove.TOPICS))
+        self._file = McapFile(path, (LOG, MOTION))
         self._error: ParameterError | None = None
         self.clock: Clock = self._world
         # In one list: to keep a tuple for each entry would make Python's garbage collection slow.
@@ -103,18 +102,15 @@ class RunRecorder:
         self._chunk_ns = sim.now_ns
         self._setup: tuple[Any, ...] = ()
         self._setup_count = 0
-        self._drawn: tuple[int, bytes] = (0, b"")
-        self._messages: list[tuple[Topic, int, bytes]] = []
         self._lines: deque[tuple[int, int, str]] = deque(maxlen=LINES_MAX)
         with sim.lock:
             sim.sync()
             self._motion = MotionWatcher(self._world.state)
             self.next_ns = (sim.now_ns // CHECK_NS + 1) * CHECK_NS
-            self._file.attach("layout.json", Layout().to_bytes(), "application/json")
             for name, text in (programs or {}).items():
                 self._file.attach(PROGRAMS + name, text.encode(), "text/x-python")
-            told = {"kiks": __version__, "thinking": sim.thinking, "arena": sim.arena.name, **(about or {})}
-            self._file.describe("run", told)
+            told = {"kiks": __version__, "layout": LAYOUT, "thinking": sim.thinking, "arena": sim.arena.name}
+            self._file.describe("run", {**told, **(about or {})})
             self.note_state()
             self._began = self._world.now_ns, self._world.change_count
             sim.world.watch(self._motion)
@@ -206,11 +202,6 @@ class RunRecorder:
         data = state_bytes(sim)
         self.note((STATE, world.now_ns, 0, self._setup_count - 1, 0, data))
         self._waiting_bytes += len(data)
-        drawn = sim.robot_count, world.state.bodies["number"].tobytes()
-        if drawn != self._drawn:
-            self._drawn = drawn
-            scene = foxglove.scene(world.specs, world.state.bodies[0], world.now_ns)
-            self._messages.append((foxglove.SCENE, world.now_ns, scene))
 
     def _note_setup(self) -> None:
         sim, now_ns = self._sim, self._world.now_ns
@@ -220,7 +211,6 @@ class RunRecorder:
         for wire, turrets in zip(sim.wires, setup.turrets, strict=True):
             has_own = any(isinstance(turret, TurretOfUser) for turret in turrets)
             wire.recorder = _OwnTurretRecorder(self) if has_own else self
-        self._messages.append((foxglove.WALLS, now_ns, foxglove.walls(sim.arena, now_ns)))
 
     # ---- what people and programs say ----
 
@@ -236,9 +226,7 @@ class RunRecorder:
                 if self._error is None:
                     raise ParameterError("a recording must be open to be marked, but this one is closed.")
                 return
-            now_ns = self._world.now_ns
-            self.note((MARK, now_ns, 0, 0, 0, note.encode()))
-            self._messages.append((foxglove.TEXT, now_ns, foxglove.text("bookmark", note, now_ns)))
+            self.note((MARK, self._world.now_ns, 0, 0, 0, note.encode()))
 
     # ---- the file ----
 
@@ -255,7 +243,7 @@ class RunRecorder:
         data = state_bytes(self._sim)
         state_hash = self._world.state.hash().encode()
         self.note((CHECK, self._world.now_ns, 0, self._setup_count - 1, 0, state_hash + data))
-        # Motion has 25 looks in this time.
+        # Motion has 25 samples in this time.
         self._waiting_bytes += 25 * len(data)
 
     def _write_chunk(self) -> None:
@@ -263,15 +251,12 @@ class RunRecorder:
         while self._lines:
             now_ns, robot, line = self._lines.popleft()
             self.note((TEXT, now_ns, robot, 0, 0, line.encode("utf-8", "replace")))
-            self._messages.append((foxglove.TEXT, now_ns, foxglove.text(f"robot {robot + 1}", line, now_ns)))
-        looks = self._motion.take()
-        messages, self._messages = self._messages, []
         entries = block_of(self._entries)
         self._entries.clear()
-        blocks = [(LOG, self._chunk_ns, entries), (MOTION, self._chunk_ns, motion.encode(looks))]
+        blocks = [(LOG, self._chunk_ns, entries), (MOTION, self._chunk_ns, self._motion.take())]
         self._chunk_ns = self._world.now_ns
         has_begun = (self._world.now_ns, self._world.change_count) != self._began
-        self._file.write(blocks + messages + foxglove.poses(looks), keeps_earlier=not has_begun)
+        self._file.write(blocks, keeps_earlier=not has_begun)
         self._waiting_bytes = 0
         self._chunk_at_s = monotonic() + CHUNK_S
         if self._file.has_failed or self._file.is_disk_full:

@@ -6,7 +6,6 @@ It can be looked at, made to pass at any speed, and let go on without the record
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -17,16 +16,10 @@ from kiks.recording.recorder import CHECK_NS
 from kiks.sim.port import BAUD_MAX, BAUD_MIN
 from kiks.sim.read_completion import NEVER_NS
 from kiks.sim.run_log import Kind
-from kiks.sim.saved_state import Layout, SavedState, Setup, restore_state, state_bytes
+from kiks.sim.saved_state import SavedState, Setup, restore_state
 from kiks.sim.simulation import Simulation
 from kiks.sim.wire import Wire, ignore_reply
-from kiks.units import NS_PER_S, s_from_ns
-
-KEPT_NS = NS_PER_S // 10
-"""Simulated time between two places that a replay keeps on its way [ns]."""
-
-KEPT_COUNT = 32
-"""How many places a replay keeps: those of the last seconds that it was sent to."""
+from kiks.units import s_from_ns
 
 
 class Place(NamedTuple):
@@ -68,7 +61,6 @@ class Replay:
         self._on_check = on_check
         self.next_ns = NEVER_NS
         self._next: Entry | None = None
-        self._kept: OrderedDict[int, Place] = OrderedDict()
         place = self._recorded_before(time_ns)
         self.sim = place.setup.simulation(place.saved.poses)
         self._begin(place)
@@ -87,18 +79,14 @@ class Replay:
         """
         sim = self.sim
         if not 0 <= time_ns - sim.now_ns <= CHECK_NS:
-            # Places between two checkpoints make steps back cheap.
-            place = self._kept.get(time_ns // KEPT_NS) or self._recorded_before(time_ns)
+            place = self._recorded_before(time_ns)
             if not self._is_part_of(place.setup):
                 return False
             place.setup.bring(sim, place.saved.poses)
             self._begin(place)
             for wire in sim.wires:
                 wire.restart_log(sim.now_ns)
-        while sim.now_ns < time_ns:
-            sim.advance_to(min((sim.now_ns // KEPT_NS + 1) * KEPT_NS, time_ns))
-            if sim.now_ns % KEPT_NS == 0:
-                self._keep()
+        sim.advance_to(time_ns)
         return True
 
     def _recorded_before(self, time_ns: int) -> Place:
@@ -112,15 +100,6 @@ class Replay:
         restore_state(self.sim, place.saved)
         self._row, self._row_ns, self._setup = place.row, place.row_ns, place.setup
         self._find_next()
-
-    def _keep(self) -> None:
-        """Keep the present place, if it is new."""
-        number = self.sim.now_ns // KEPT_NS
-        if number not in self._kept:
-            saved = SavedState.from_bytes(state_bytes(self.sim), self._setup, Layout(), "a place of a replay")
-            self._kept[number] = Place(self._row, self._row_ns, self._setup, saved)
-            if len(self._kept) > KEPT_COUNT:
-                self._kept.popitem(last=False)
 
     def _is_part_of(self, setup: Setup) -> bool:
         """Return whether a setup has all robots and turrets of the simulation."""

@@ -7,6 +7,7 @@ bit.
 
 from __future__ import annotations
 
+import hashlib
 import json
 from dataclasses import dataclass, replace
 from typing import Annotated, Any
@@ -235,13 +236,12 @@ class SavedState:
         return np.column_stack([robots["x_mm"], robots["y_mm"], robots["heading_rad"]])
 
     @classmethod
-    def from_bytes(cls, data: bytes, setup: Setup, layout: Layout, what: str) -> SavedState:
+    def from_bytes(cls, data: bytes, setup: Setup, what: str) -> SavedState:
         """Read what `state_bytes` returned.
 
         Args:
             data: The bytes.
             setup: That of the world.
-            layout: That of the records.
             what: What messages call them.
         """
         line, _, rest = data.partition(b"\n")
@@ -252,8 +252,8 @@ class SavedState:
                 dict(zip(fields, each, strict=False)) if isinstance(each, list) else each for each in wires
             ]
         head = check(_Head, values, what)
-        robots_end = head.robots * layout.robot.itemsize
-        bodies_end = robots_end + head.bodies * layout.body.itemsize
+        robots_end = head.robots * ROBOT.itemsize
+        bodies_end = robots_end + head.bodies * BODY.itemsize
         is_whole = len(rest) == bodies_end + head.lamps * 32
         if not (is_whole and head.robots == len(head.wires) == len(setup.specs)):
             raise ParameterError(
@@ -263,8 +263,8 @@ class SavedState:
         saved = cls(
             head.now_ns,
             head.tick_count,
-            layout.robots(rest[:robots_end])[None],
-            layout.bodies(rest[robots_end:bodies_end])[None],
+            np.frombuffer(rest[:robots_end], ROBOT)[None],
+            np.frombuffer(rest[robots_end:bodies_end], BODY)[None],
             np.frombuffer(rest[bodies_end:]).reshape(-1, 4),
             head.body_count,
             tuple(SavedWire(**vars(each)) for each in head.wires),
@@ -321,93 +321,8 @@ def restore_state(sim: Simulation, saved: SavedState) -> None:
 
 # ---- records in files ----
 
-
-@dataclass(frozen=True)
-class Layout:
-    """The fields of the records in a file, which may be of another version.
-
-    Attributes:
-        robot: The type of a robot's record.
-        body: The type of a body's record.
-    """
-
-    robot: np.dtype[np.void] = ROBOT
-    body: np.dtype[np.void] = BODY
-
-    def to_bytes(self) -> bytes:
-        """Return it as JSON."""
-        return json.dumps({"robot": _fields(self.robot), "body": _fields(self.body)}).encode()
-
-    @classmethod
-    def from_bytes(cls, data: bytes, what: str) -> Layout:
-        """Read what `to_bytes` returned."""
-        own = cls()
-        if data == own.to_bytes():
-            return own
-        file = check(_LayoutFile, parse_json(data, what), what)
-        return cls(_type_of(file.robot, what), _type_of(file.body, what))
-
-    def robots(self, data: bytes) -> NDArray[np.void]:
-        """Return the records of robots in bytes: those of this version."""
-        return converted(np.frombuffer(data, self.robot), ROBOT)
-
-    def bodies(self, data: bytes) -> NDArray[np.void]:
-        """Return the records of bodies in bytes: those of this version."""
-        return converted(np.frombuffer(data, self.body), BODY)
-
-
-@record
-class _FieldFile:
-    name: Text
-    type: Annotated[str, Field(pattern=r"^<?[iuf|][0-9]+$|^\|u1$")]
-    shape: Annotated[tuple[Annotated[Whole, Field(ge=1, le=4096)], ...], Field(max_length=2)]
-    offset: Annotated[Whole, Field(ge=0, le=65536)]
-
-
-@record
-class _RecordFile:
-    size: Annotated[Whole, Field(ge=1, le=65536)]
-    fields: Annotated[tuple[_FieldFile, ...], Field(min_length=1, max_length=1000)]
-
-
-@record
-class _LayoutFile:
-    robot: _RecordFile
-    body: _RecordFile
-
-
-def _fields(kind: np.dtype[np.void]) -> dict[str, Any]:
-    rows = []
-    fields: Any = kind.fields
-    for name, (part, offset, *_) in fields.items():
-        rows.append({"name": name, "type": part.base.str, "shape": list(part.shape), "offset": offset})
-    return {"size": kind.itemsize, "fields": rows}
-
-
-def _type_of(file: _RecordFile, what: str) -> np.dtype[np.void]:
-    try:
-        return np.dtype(
-            {
-                "names": [each.name for each in file.fields],
-                "formats": [(each.type, each.shape) for each in file.fields],
-                "offsets": [each.offset for each in file.fields],
-                "itemsize": file.size,
-            }
-        )
-    except (TypeError, ValueError) as error:
-        raise ParameterError(f"{what} must describe records, but numpy says: {error}. Is the file damaged?") from None
-
-
-def converted(records: NDArray[np.void], kind: np.dtype[np.void]) -> NDArray[np.void]:
-    """Return records with the fields of another type that they have, and zeros for those that they have not."""
-    if records.dtype == kind:
-        return records
-    own = np.zeros(len(records), kind)
-    for name in set(kind.names or ()) & set(records.dtype.names or ()):
-        if own[name].shape == records[name].shape:
-            own[name] = records[name]
-    return own
-
+LAYOUT = hashlib.sha256(repr([kind.descr for kind in (ROBOT, BODY)]).encode()).hexdigest()[:16]
+"""What the fields of the records are, as a text: files with another one are of another version."""
 
 _NUMBER_MAX = 1e12
 """Largest magnitude of a number in a record, far beyond any that a run reaches."""
