@@ -246,7 +246,9 @@ def test_only_a_changed_syntax_tree_of_the_sources_has_a_folder_of_its_own(tmp_p
     syntax = code_cache._syntax(source)
     assert code_cache._syntax(source.replace(b"number", b"sum") + b"# a comment") == syntax
     assert code_cache._syntax(source.replace(b"X = 1", b"X = 2")) != syntax
-    assert code_cache._syntax(source.replace(b"a + X", b"X + a")) != syntax
+    changed = source.replace(b"a + X", b"X + a")
+    assert code_cache._syntax(changed) != syntax
+    assert code_cache._syntax(changed, True) == code_cache._syntax(source, True)
     digest = code_cache._syntax_digest()
     (known,) = (tmp_path / "cache" / "kiks").glob("sources-*")
     assert known.read_bytes() == digest

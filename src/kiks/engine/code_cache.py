@@ -41,7 +41,7 @@ KERNEL_FOLDERS = ("engine", "control", "batch")
 """Folders beside one another whose files hold kernels."""
 
 CONSTANT_FILES = ("units.py", "model/*.py", "firmware/k213.py")
-"""Other files of the package from which kernels have constants."""
+"""Other files of the package, from which kernels have constants only."""
 
 SHIPPED = Path(__file__).parent / "compiled"
 """Folder of what a wheel brings (`make wheel`), with a folder for each version; most installations have none."""
@@ -158,15 +158,18 @@ def _syntax_digest() -> bytes:
     digest of the sources' bytes.
     """
     package = Path(__file__).parent.parent
-    globs = (*(f"{folder}/**/*.py" for folder in KERNEL_FOLDERS), *CONSTANT_FILES)
-    sources = {path.relative_to(package).parts: path.read_bytes() for each in globs for path in package.glob(each)}
-    sources = dict(sorted(sources.items()))
+    globs = dict.fromkeys(CONSTANT_FILES, True) | dict.fromkeys((f"{each}/**/*.py" for each in KERNEL_FOLDERS), False)
+    sources = sorted(
+        (path.relative_to(package).parts, has_constants_only, path.read_bytes())
+        for each, has_constants_only in globs.items()
+        for path in package.glob(each)
+    )
     name = f"sources-{_digest(repr(sources).encode())[:32].decode()}"
     for file in (root / name for root in (SHIPPED, *_roots())):
         with _IfAllowed():
             if _is_believed(file.parent) and _is_safe(file.lstat()) and _DIGEST.fullmatch(digest := file.read_bytes()):
                 return digest
-    digest = _digest("".join(map(_syntax, sources.values())).encode())
+    digest = _digest("".join(_syntax(source, only) for _, only, source in sources).encode())
     for root in _roots():
         with contextlib.suppress(ParameterError), _IfAllowed():
             _make_own(root)
@@ -174,9 +177,11 @@ def _syntax_digest() -> bytes:
     return digest
 
 
-def _syntax(source: bytes) -> str:
-    """Return the syntax tree of a source as text, without docstrings and places."""
+def _syntax(source: bytes, has_constants_only: bool = False) -> str:
+    """Return the syntax tree of a source, or of its constants, as text without docstrings and places."""
     tree = ast.parse(source)
+    if has_constants_only:
+        tree.body = [each for each in tree.body if isinstance(each, ast.Assign)]
     for node in ast.walk(tree):
         if isinstance(body := getattr(node, "body", None), list):
             node.body = [each for each in body if not _is_text(each)]  # type: ignore[attr-defined]

@@ -94,6 +94,11 @@ class Battle(Turret):
         """Convert a distance from the robot's centre to one from its front [mm]."""
         return max(int(distance_mm - self.site.spec.body.radius_mm), 0)
 
+    def status(self) -> str:
+        """Return its energy and the hits since the last query."""
+        hits = int(self.site.record["battle_hits"])
+        return f"energy {self.energy:.1f} of {self.most:g} points, hit {hits} times since the last query"
+
     def shapes(self) -> Sequence[Shape]:
         """Return a barrel, and a ring whose brightness shows the energy."""
         red = 60 + int(195.0 * self.energy / self.most)

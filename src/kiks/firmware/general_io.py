@@ -74,6 +74,10 @@ class GeneralIO(Turret):
         with self.site.lock:
             self.site.record["analog_inputs"][channel - CHANNELS[0]] = int(counts + 0.5)
 
+    def status(self) -> str:
+        """Return its wires."""
+        return f"inputs {self.inputs:08b}, outputs {self.outputs:08b}"
+
     def shapes(self) -> Sequence[Shape]:
         """Return a board, and a red dot for each output that is high."""
         board = Shape(((-20.0, -18.0), (20.0, -18.0), (20.0, 18.0), (-20.0, 18.0)), "#207040")

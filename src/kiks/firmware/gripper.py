@@ -86,6 +86,11 @@ class Gripper(Turret):
         record["arm"] = record["arm_target"] = ARM_START
         record["jaws"], record["is_closing"] = JAWS_MAX, 0
 
+    def status(self) -> str:
+        """Return what it holds."""
+        body = self.site.held_body()
+        return "holds nothing" if body is None else f"holds body {body['number']}, or has it between its jaws"
+
     def shapes(self) -> Sequence[Shape]:
         """Return two jaws, drawn as short as the arm's slope makes them from above."""
         record = self.site.record

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.engine.state import PIXEL_COUNT, ROBOT
-from kiks.firmware.turret import Orders, Shape, Turret
+from kiks.firmware.turret import Orders, Shape, Site, Turret
+from kiks.units import s_from_ns
 
 NUMBER = 2
 """Its turret number (khepera-protocol.md 10.1)."""
@@ -108,15 +109,13 @@ class K213(Turret):
     What it remembers (reading period, last picture) stands in the robot's record, so that it is part of every snapshot
     and hash of the state. A reset of the robot sets the period to that of the power-on; the picture stays.
 
-    Args:
-        take: Takes a picture of what the robot sees at a time [ns], which is the present one.
-        record: The robot's record of `kiks.engine.state.ROBOT`; one of its own if left out.
-
     Attributes:
-        record: The record; another one when the state's arrays were replaced.
+        take: Takes a picture of what the robot sees at a time [ns], which is the present one; whoever fits it sets it.
+        record: The robot's record of `kiks.engine.state.ROBOT`; another one when the state's arrays were replaced.
 
     Example:
-        >>> camera = K213(lambda time_ns: (list(range(64)), 300))
+        >>> camera = K213()
+        >>> camera.take = lambda time_ns: (list(range(64)), 300)
         >>> camera.look(0)
         >>> camera.order("Q", (60,)), camera.order("L", ()), camera.order("X", ())
         ((56, 57, 58, 59, 60, 61, 62, 63), (1, 44), None)
@@ -126,11 +125,20 @@ class K213(Turret):
     name = "K213 linear vision"
     orders = _ORDERS
 
-    def __init__(self, take: Callable[[int], Picture], record: Any = None) -> None:
-        self._take = take
-        self.record = np.zeros(1, ROBOT)[0] if record is None else record
-        self.record["camera_period"] = 0
-        self.record["camera_taken_ns"] = -1
+    take: Callable[[int], Picture]
+
+    def __init__(self) -> None:
+        self._begin(np.zeros(1, ROBOT)[0])
+
+    def fit(self, site: Site) -> None:
+        """Fit the camera to a robot; it has taken no picture yet."""
+        super().fit(site)
+        self._begin(site.record)
+
+    def _begin(self, record: Any) -> None:
+        self.record = record
+        record["camera_period"] = 0
+        record["camera_taken_ns"] = -1
 
     @property
     def period_ns(self) -> int:
@@ -159,12 +167,19 @@ class K213(Turret):
 
     def look(self, instant_ns: int) -> None:
         """Take a picture."""
-        self.record["camera_pixels"], self.record["camera_light"] = self._take(instant_ns)
+        self.record["camera_pixels"], self.record["camera_light"] = self.take(instant_ns)
         self.record["camera_taken_ns"] = instant_ns
 
     def set_period(self, code: int) -> None:
         """Set the reading period to that of a code of order U."""
         self.record["camera_period"] = code
+
+    def status(self) -> str:
+        """Return its reading period and what it took last."""
+        return (
+            f"a picture every {1000 * s_from_ns(self.period_ns):g} ms, the last one at "
+            f"{s_from_ns(self.taken_ns):.3f} s, light level {self.light}"
+        )
 
     def shapes(self) -> Sequence[Shape]:
         """Return a box with a lens that looks ahead."""

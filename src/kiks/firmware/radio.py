@@ -125,6 +125,20 @@ class Radio(Turret):
         is_speaking = record["radio_attempt"] != 0 and int(record["radio_starts_ns"]) < end_ns
         return not (record["radio_from"] or has_spoken or is_speaking)
 
+    def status(self) -> str:
+        """Return what it sends and what waits to be read."""
+        record = self.site.record
+        if attempt := int(record["radio_attempt"]):
+            text = f"sends to robot {record['radio_to']}, attempt {attempt} of {ATTEMPTS}"
+        elif record["radio_has_failed"]:
+            text = f"its last message, to robot {record['radio_to']}, was lost"
+        else:
+            text = "silent"
+        if sender := int(record["radio_from"]):
+            data = " ".join(map(str, record["radio_from_data"][: int(record["radio_from_length"])].tolist()))
+            text += f"; a message from robot {sender} waits to be read: {data or 'empty'}"
+        return text
+
     def shapes(self) -> Sequence[Shape]:
         """Return an aerial, red while a message is on its way."""
         return (Shape(((-15.0, 15.0),), "#e03020" if self.site.record["radio_attempt"] else "#303030", 3.0),)

@@ -158,6 +158,10 @@ class Turret:
         entry = self.orders.get(letter)
         return entry[1](self, *values) if entry is not None and len(values) == entry[0] else None
 
+    def status(self) -> str:
+        """Return its present state in a line, for a person at the desk."""
+        return "a user-defined turret"
+
     def shapes(self) -> Sequence[Shape]:
         """Return its present drawing."""
         return ()

@@ -43,12 +43,10 @@ from kiks.model.data_file import (
 from kiks.model.raster_text import box_keys_of, raster_of_text, raster_text
 from kiks.model.robot import Baud, Brightness, Response, robot_names
 from kiks.model.thinking_policy import split_thinking
+from kiks.model.turrets import TURRETS
 
 FILE_BYTES_MAX = 96 << 20
 """Most bytes of a project file."""
-
-TURRETS = ("k213", "gripper", "radio", "io", "battle")
-"""Turrets of a project's robots (docs/turrets.md)."""
 
 FASTEST = "fastest"
 """Value in a file for no speed limit."""
@@ -109,7 +107,7 @@ class ProjectRobot:
     """
 
     kind: Annotated[Text, AfterValidator(_check_kind)] = "khepera"
-    turrets: Annotated[tuple[Annotated[str, OneOf(TURRETS)], ...], AfterValidator(_check_differ)] = ()
+    turrets: Annotated[tuple[Annotated[str, OneOf(tuple(TURRETS))], ...], AfterValidator(_check_differ)] = ()
     name: Text = ""
     program: Annotated[Text, AfterValidator(_check_program)] | None = None
     arguments: Annotated[tuple[Text, ...], Field(max_length=100)] = ()

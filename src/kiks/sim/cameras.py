@@ -28,13 +28,10 @@ class Cameras:
     def __bool__(self) -> bool:
         return bool(self._fitted)
 
-    def camera(self, index: int) -> K213:
-        """Return a new camera for a robot."""
-        return K213(partial(self._take, index), self._world.state.robots[0, index])
-
     def fit(self, index: int, camera: K213) -> None:
         """Let a robot's camera take its pictures from now on, and the first at once."""
         self._fitted[index] = camera
+        camera.take = partial(self._take, index)
         camera.look(self._world.now_ns)
 
     def take_state(self) -> None:

@@ -28,9 +28,10 @@ from kiks.model.checks import CLOCK_END_NS, ROBOTS_MAX
 from kiks.model.data_file import Switch, Text, Whole, check, parse_json, parse_toml, record
 from kiks.model.project import Project, ProjectRobot
 from kiks.model.robot import Baud, RobotSpec, robot_toml
+from kiks.model.turrets import TURRETS
 from kiks.sim.free_space import FreeSpace
 from kiks.sim.simulation import Simulation
-from kiks.sim.turret_host import NAMES, name_of
+from kiks.sim.turret_host import name_of
 from kiks.sim.wire import SavedWire
 from kiks.sim.world import World
 from kiks.units import TICK_NS
@@ -127,9 +128,10 @@ class Setup:
                 f"{what} must name a kind and turrets for each robot, but it does not. Is the file damaged?"
             )
         for name in (each for of_one in file.turrets for each in of_one if isinstance(each, str)):
-            if name not in NAMES:
+            if name not in TURRETS:
+                turrets = ", ".join(TURRETS)
                 raise ParameterError(
-                    f"{what} must have turrets of {', '.join(NAMES)}, but one was {shown(name)}. Is it of a newer KiKS?"
+                    f"{what} must have turrets of {turrets}, but one was {shown(name)}. Is it of a newer KiKS?"
                 )
         return cls(arena, tuple(kinds[kind] for kind in file.robots), file.turrets, file.seed)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from importlib import import_module
 from typing import Any
 
 from kiks.engine.physics.gripper import find_object
@@ -11,22 +12,16 @@ from kiks.engine.scalar_math import uniform
 from kiks.engine.sensing.range_finder import probe
 from kiks.engine.state import MEMORY_COUNT
 from kiks.errors import ParameterError, nearest, shown
-from kiks.firmware.battle import Battle
 from kiks.firmware.general_io import GeneralIO
-from kiks.firmware.gripper import Gripper
 from kiks.firmware.k213 import K213
 from kiks.firmware.khepera import Firmware
 from kiks.firmware.radio import Radio, deliver
 from kiks.firmware.turret import AnyTurret, Met, Turret
 from kiks.model.checks import check_count, check_heading
 from kiks.model.robot import RobotSpec
+from kiks.model.turrets import TURRETS
 from kiks.sim.cameras import Cameras
 from kiks.sim.world import World
-
-KINDS: dict[str, type[Turret]] = {"gripper": Gripper, "radio": Radio, "io": GeneralIO, "battle": Battle}
-
-NAMES = ("k213", *KINDS)
-"""What `Simulation.fit` takes by name."""
 
 STREAM_TURRET = 1000
 """Random streams from here on are the turrets', each its number farther."""
@@ -62,7 +57,7 @@ class Turrets:
             turret: Its name, or one of a user's own.
         """
         firmware = self._firmwares[index]
-        fitted = named(turret, lambda: self.cameras.camera(index))
+        fitted = named(turret)
         there = [each for each in firmware.fitted if each.number == fitted.number]
         if there:
             raise ParameterError(
@@ -193,23 +188,18 @@ class RobotSite:
         return {robot: each for robot, fitted in found for each in fitted if isinstance(each, kind)}
 
 
-def named(turret: object, camera: Callable[[], Turret]) -> Turret:
-    """Return a turret of a name, or what is one already.
-
-    Args:
-        turret: The name or the turret.
-        camera: Makes a K213.
-    """
+def named(turret: object) -> Turret:
+    """Return a turret of a name, or what is one already."""
     if isinstance(turret, str):
-        if turret == "k213":
-            return camera()
-        if turret not in KINDS:
+        if turret not in TURRETS:
             raise ParameterError(
-                f"turret must be one of {', '.join(map(repr, NAMES))} or an object of your own, but it was "
+                f"turret must be one of {', '.join(map(repr, TURRETS))} or an object of your own, but it was "
                 f"{shown(turret)}."
-                f"{nearest(turret, NAMES)} docs/turrets.md says how to make one."
+                f"{nearest(turret, TURRETS)} docs/turrets.md says how to make one."
             )
-        return KINDS[turret]()
+        module, _, name = TURRETS[turret].rpartition(".")
+        made: Turret = getattr(import_module(module), name)()
+        return made
     if not isinstance(turret, Turret):
         raise ParameterError(
             f"turret must be a name or a kiks.firmware.turret.Turret, but it was {shown(turret)}. Inherit from Turret: "
@@ -222,9 +212,8 @@ def named(turret: object, camera: Callable[[], Turret]) -> Turret:
 
 def name_of(turret: Turret) -> str | None:
     """Return the name that `Simulation.fit` takes for a turret; None for one of a user's own."""
-    if type(turret) is K213:
-        return "k213"
-    return next((name for name, kind in KINDS.items() if type(turret) is kind), None)
+    kind = f"{type(turret).__module__}.{type(turret).__qualname__}"
+    return next((name for name, known in TURRETS.items() if kind == known), None)
 
 
 def _check(turret: Turret) -> None:

@@ -11,8 +11,9 @@ from pydantic import BeforeValidator, Field
 from kiks.model.arena import Arena
 from kiks.model.checks import ROBOTS_MAX
 from kiks.model.data_file import Number, OneOf, Rule, Switch, Text, Whole, check, record
-from kiks.model.project import TURRETS, Project, ProjectRobot, Seed, ThinkingPolicy
+from kiks.model.project import Project, ProjectRobot, Seed, ThinkingPolicy
 from kiks.model.robot import Brightness, Response, RobotSpec
+from kiks.model.turrets import TURRETS
 from kiks.toolbox.old_constants import NUMBER as _NUMBER
 from kiks.toolbox.old_constants import SWITCH, OldConstants
 
@@ -54,7 +55,7 @@ class Settings(OldConstants):
     response: Response | None = None
     noise: Annotated[Switch, SWITCH, Rule("0 or 1")] = True
     turrets: Annotated[
-        tuple[Annotated[str, OneOf(TURRETS)], ...], Field(max_length=len(TURRETS)), BeforeValidator(_words)
+        tuple[Annotated[str, OneOf(tuple(TURRETS))], ...], Field(max_length=len(TURRETS)), BeforeValidator(_words)
     ] = ("k213", "radio", "battle")
     wall: Annotated[Brightness, _NUMBER] = 255
     ball: Annotated[Brightness, _NUMBER] | None = None

@@ -12,55 +12,15 @@ from kiks.desk.panels.explanation_drawing import draw_rays
 from kiks.desk.panels.monitor_view import MonitorView, Reading
 from kiks.desk.panels.widgets import icon_button, named, told
 from kiks.desk.server.desk import Desk
-from kiks.firmware.battle import Battle
-from kiks.firmware.general_io import GeneralIO
-from kiks.firmware.gripper import Gripper
-from kiks.firmware.k213 import K213
-from kiks.firmware.radio import ATTEMPTS, Radio
 from kiks.firmware.turret import Turret
 from kiks.sim.explanation import Explanation, LightExplanation
 from kiks.sim.simulation import Simulation
-from kiks.units import s_from_ns
 
 
 def describe_turret(turret: Turret) -> str:
     """Return a one-line status of a turret; the caller holds the simulation's lock."""
     number = f" (turret {turret.number})" if turret.number >= 0 else ""
-    return f"{turret.name}{number}: {_state_of(turret)}"
-
-
-def _state_of(turret: Turret) -> str:
-    if isinstance(turret, Radio):
-        return _radio(turret)
-    if isinstance(turret, Battle):
-        hits = int(turret.site.record["battle_hits"])
-        return f"energy {turret.energy:.1f} of {turret.most:g} points, hit {hits} times since the last query"
-    if isinstance(turret, Gripper):
-        body = turret.site.held_body()
-        return "holds nothing" if body is None else f"holds body {body['number']}, or has it between its jaws"
-    if isinstance(turret, GeneralIO):
-        return f"inputs {turret.inputs:08b}, outputs {turret.outputs:08b}"
-    if isinstance(turret, K213):
-        return (
-            f"a picture every {1000 * s_from_ns(turret.period_ns):g} ms, the last one at "
-            f"{s_from_ns(turret.taken_ns):.3f} s, light level {turret.light}"
-        )
-    return "a user-defined turret"
-
-
-def _radio(radio: Radio) -> str:
-    record = radio.site.record
-    parts = []
-    if attempt := int(record["radio_attempt"]):
-        parts.append(f"sends to robot {record['radio_to']}, attempt {attempt} of {ATTEMPTS}")
-    elif record["radio_has_failed"]:
-        parts.append(f"its last message, to robot {record['radio_to']}, was lost")
-    else:
-        parts.append("silent")
-    if sender := int(record["radio_from"]):
-        data = " ".join(str(byte) for byte in record["radio_from_data"][: int(record["radio_from_length"])].tolist())
-        parts.append(f"a message from robot {sender} waits to be read: {data or 'empty'}")
-    return "; ".join(parts)
+    return f"{turret.name}{number}: {turret.status()}"
 
 
 AGAIN_S = 0.5

@@ -10,9 +10,10 @@ from nicegui import ui
 from kiks.desk.panels.widgets import told, with_props
 from kiks.desk.server.desk import Desk
 from kiks.errors import ParameterError
-from kiks.model.project import TURRETS, ProjectRobot
+from kiks.model.project import ProjectRobot
 from kiks.model.robot import RobotSpec, robot_names
 from kiks.model.thinking_policy import split_thinking
+from kiks.model.turrets import TURRETS
 
 POLICIES = {
     "none": "none: computing takes no time",
