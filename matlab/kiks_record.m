@@ -5,8 +5,8 @@ function kiks_record(file)
 %   how robots move, and what people change. The name must end in .mcap; an existing file is replaced. The recording
 %   ends with the world, with the session, and when another one begins. The world is the same with and without it.
 %
-%   kiks_record('') ends it. Outside of Octave, `kiks replay run.mcap` shows the run again, and `kiks plot`, `kiks film`
-%   and `kiks page` make figures, a film and a page of it.
+%   kiks_record('') ends it. Outside of Octave, `kiks replay run.mcap` shows the run again, and `kiks export run.mcap
+%   run.mp4` makes a film of it.
 %
 %   Example:
 %     kiks, kiks_record('run.mcap'), ref = kiks_kopen; kSetSpeed(ref, 5, 5), kiks_pause(2), kiks_quit

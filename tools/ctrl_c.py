@@ -81,7 +81,7 @@ KINDS = {
     "serve": Kind("serve --no-pty --tcp 0 --thinking live --speed 100", STOPPED),
     "evolve": Kind("evolve avoid --out OUT", "the same command continues"),
     "demo": Kind("demo --seconds 86400 --picture OUT/picture.png", "It was interrupted"),
-    "film": Kind("film --force long.mcap OUT/film.mp4", "kiks: stopped."),
+    "film": Kind("export --force long.mcap OUT/film.mp4", "kiks: stopped."),
 }
 
 

@@ -64,14 +64,14 @@ def show_match(
 
 def _play(match: Match, players: list[Command], picture: Path, record: Path | None) -> None:
     """Play the match to the end, print the result, and draw it."""
-    from kiks.export.pictures import save_picture
+    from kiks.export.pictures import save_image
 
     end_as_with_ctrl_c()
     start_s = perf_counter()
     with recorded(match, record=record, programs=[each.program for each in players]):
         doubt = play(match, players, say=lambda text: typer.echo(f"kiks: {text}", err=True))
     speedup = match.time_s / (perf_counter() - start_s)
-    save_picture(draw_match(match), picture)
+    save_image(draw_match(match), picture)
     left_count, right_count = match.report.score()
     typer.echo(
         f"soccer: left {left_count}, right {right_count}   {match.time_s:.1f} s   {speedup:.0f} x real time   "

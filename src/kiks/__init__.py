@@ -24,12 +24,11 @@ from kiks import upwards
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)  # the names of __init__.pyi
 
 upwards.load_arena_file.provide("kiks.model.arena_formats", "load_arena_file")
-upwards.draw_arena.provide("kiks.export.pictures", "arena_for_notebook")
-upwards.draw_simulation.provide("kiks.export.pictures", "simulation_for_notebook")
-upwards.draw_recording.provide("kiks.export.figures", "recording_for_notebook")
+upwards.draw_for_notebook.provide("kiks.export.notebook", "for_notebook")
 upwards.record_simulation.provide("kiks.recording.recorder", "RunRecorder")
 upwards.plot_simulation.provide("kiks.export.figures", "figure_of_run")
 upwards.plot_recordings.provide("kiks.export.figures", "figure_of")
+upwards.export_recording.provide("kiks.export.kinds", "export")
 upwards.show_in_browser.provide("kiks.desk.server.show", "show")
 
 if "kiks.ports.pyserial" not in serial.protocol_handler_packages:

@@ -37,14 +37,8 @@ class Hook:
 load_arena_file = Hook()
 """Reads an arena from a file by its suffix."""
 
-draw_arena = Hook()
-"""Draws an arena for a notebook."""
-
-draw_simulation = Hook()
-"""Draws a simulation for a notebook."""
-
-draw_recording = Hook()
-"""Draws the figures of a recording for a notebook."""
+draw_for_notebook = Hook()
+"""Draws an arena, a simulation, or the figures of a recording for a notebook."""
 
 show_in_browser = Hook()
 """Opens a simulation on a desk."""
@@ -57,3 +51,6 @@ plot_simulation = Hook()
 
 plot_recordings = Hook()
 """Draws figures of recordings."""
+
+export_recording = Hook()
+"""Writes a film, a picture, figures, a photo, a table or a page of a recording."""

@@ -40,7 +40,7 @@ def state_of(text: str) -> str:
 
 
 @pytest.mark.parametrize(
-    "command", ["desk", "demo", "run", "replay", "plot", "table", "serve", "monitor", "calibrate", "fit", "warmup"]
+    "command", ["desk", "demo", "run", "replay", "export", "serve", "monitor", "calibrate", "fit", "warmup"]
 )
 def test_every_command_has_help_with_an_example(command: str) -> None:
     result = kiks(command, "--help")
@@ -187,11 +187,7 @@ NO_RESULTS = {
     ("compare", "second"),
     ("info", "file"),
     ("replay", "file"),
-    ("film", "file"),
-    ("photo", "file"),
-    ("page", "file"),
-    ("plot", "files"),
-    ("table", "file"),
+    ("export", "files"),
     ("serve", "link"),
     ("session", "listen"),
 }
@@ -205,12 +201,8 @@ RESULTS = {
     ("run", "record"): ("run", "--record", "PLACE", WANDER),
     ("serve", "record"): ("serve", "--record", "PLACE"),
     ("desk", "record"): ("desk", "--record", "PLACE"),
-    ("film", "out"): ("film", "run.mcap", "PLACE"),
-    ("photo", "out"): ("photo", "run.mcap", "PLACE"),
-    ("page", "out"): ("page", "run.mcap", "PLACE"),
+    ("export", "out"): ("export", "run.mcap", "PLACE"),
     ("evolve", "record"): ("evolve", "--record", "PLACE"),
-    ("plot", "out"): ("plot", "run.mcap", "--out", "PLACE"),
-    ("table", "out"): ("table", "run.mcap", "PLACE"),
     ("run", "csv"): ("run", "--csv", "PLACE", WANDER),
     ("fit", "robot"): ("fit", "wall.sam", "--robot", "PLACE"),
     ("calibrate", "out"): ("calibrate", "--port", "kiks://1", "--out", "PLACE"),

@@ -23,12 +23,12 @@ WANDER = str(PROGRAMS / "wander.py")
 
 COMMANDS = {
     "run": ("run", "--record", "OUT/run.mcap", WANDER, WANDER),
-    "plot": ("plot", "OUT/sound.mcap", "--out", "OUT/plot.png"),
+    "figures": ("export", "OUT/sound.mcap", "OUT/plot.png", "--kind", "figures"),
     "desk": ("desk", "--port", "0", "--no-browser"),
     "replay": ("replay", "--check", "OUT/sound.mcap"),
-    "page": ("page", "OUT/sound.mcap", "OUT/page.html"),
-    "film": ("film", "OUT/sound.mcap", "OUT/film.gif"),
-    "table": ("table", "OUT/sound.mcap", "OUT/poses.csv"),
+    "page": ("export", "OUT/sound.mcap", "OUT/page.html"),
+    "film": ("export", "OUT/sound.mcap", "OUT/film.gif"),
+    "table": ("export", "OUT/sound.mcap", "OUT/poses.csv"),
     "demo": ("demo", "clean", "--seconds", "1", "--picture", "OUT/clean.png"),
     "evolve": ("evolve", "--generations", "1", "--population", "4", "--out", "OUT/evolved"),
     "evolve on Ray": (

@@ -1,4 +1,4 @@
-"""`--record` of the commands, `kiks replay --check` and `kiks table`: runs of foreign programs are made again."""
+"""`--record` of the commands, `kiks replay --check` and `kiks export`: runs of foreign programs are made again."""
 
 from __future__ import annotations
 
@@ -56,9 +56,9 @@ def test_programs_are_recorded_with_their_texts(robots: int, tmp_path: Path) -> 
         assert [float(row["time_s"]) for row in lines] == pytest.approx(steps_s, abs=0.06)
     assert AGAIN in forked.run("replay", "--check", "run.mcap", cwd=tmp_path).stdout
     for file in ("readings.csv", "readings.parquet"):
-        told = forked.run("table", "run.mcap", file, "--table", "readings", "--robot", "1", cwd=tmp_path)
-        assert told.stdout.startswith("40 rows"), told.stderr
-    told = forked.run("page", "run.mcap", "--title", "Exercise 3", "--robot", str(robots), cwd=tmp_path)
+        told = forked.run("export", "run.mcap", file, "--table", "readings", "--robot", "1", cwd=tmp_path)
+        assert told.stdout == f"Table: {file}, 0.0 MB\n", told.stderr
+    told = forked.run("export", "run.mcap", "run.html", "--title", "Exercise 3", "--robot", str(robots), cwd=tmp_path)
     assert told.stdout.startswith("Page: run.html"), told.stderr
     page = (tmp_path / "run.html").read_text()
     assert "<h1>Exercise 3</h1>" in page
@@ -100,10 +100,9 @@ def test_mistakes_end_in_one_clear_line(tmp_path: Path) -> None:
     for words, told in (
         (("replay", "none.mcap"), "no such file"),
         (("replay", "text.mcap", "--check"), "must be an MCAP file"),
-        (("table", "text.mcap", "out.csv"), "must be an MCAP file"),
-        (("table", "text.mcap", "out.xlsx"), "must end in .csv or .parquet"),
-        (("page", "text.mcap"), "must be an MCAP file"),
-        (("page", "text.mcap", "none/page.html"), "OUT must go to a file that can be written"),
+        (("export", "text.mcap", "out.csv"), "must be an MCAP file"),
+        (("export", "text.mcap", "out.xlsx"), "OUT must end in .mp4 or .gif or"),
+        (("export", "text.mcap", "none/page.html"), "OUT must go to a file that can be written"),
         (("run", "--record", "run.txt", str(PROGRAMS / "drive.py")), "--record must end in .mcap"),
     ):
         result = forked.run(*words, cwd=tmp_path)

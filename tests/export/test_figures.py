@@ -12,7 +12,7 @@ from tests.at_length import cases
 
 import kiks
 from kiks import Arena, Khepera, ParameterError, Recording
-from kiks.export.figures import NO_ROBOT, PANELS, ROWS, figure_of, panels_of, save_plot
+from kiks.export.figures import NO_ROBOT, PANELS, ROWS, figure_of, panels_of, save_figures
 from kiks.recording.analysis import odometry, time_shares
 from kiks.recording.recorder import RunRecorder
 from kiks.sim.simulation import Simulation
@@ -100,7 +100,7 @@ def test_a_dollar_in_a_name_is_a_dollar(recording: Recording, tmp_path: Path) ->
     assert DOLLARS in figure.axes[0].get_title()
     # It is drawn where the figure is shown, after all settings for drawing it.
     figure.savefig(tmp_path / "figure.png")
-    save_plot([Recording(tmp_path / "run.mcap")], tmp_path / "figure.svg")
+    save_figures([Recording(tmp_path / "run.mcap")], tmp_path / "figure.svg")
 
 
 def test_a_run_without_a_robot_has_the_arena_and_says_so(recording: Recording, tmp_path: Path) -> None:
@@ -112,7 +112,7 @@ def test_a_run_without_a_robot_has_the_arena_and_says_so(recording: Recording, t
     figure = figure_of([none, recording])
     said = [[text.get_text() for text in axes.texts] for axes in figure.axes[: 2 * len(ROWS) : 2]]
     assert said == [[]] + [[NO_ROBOT]] * (len(ROWS) - 1)
-    save_plot([none], tmp_path / "none.png")
+    save_figures([none], tmp_path / "none.png")
 
 
 def test_a_figure_has_a_column_for_each_recording(recording: Recording) -> None:
@@ -131,14 +131,14 @@ def test_a_figure_has_a_column_for_each_recording(recording: Recording) -> None:
 def test_the_same_recording_gives_the_same_picture(ending: str, recording: Recording, tmp_path: Path) -> None:
     files = [tmp_path / f"{name}.{ending}" for name in ("one", "two")]
     for file in files:
-        save_plot([recording], file)
+        save_figures([recording], file)
     assert files[0].read_bytes() == files[1].read_bytes()
     assert files[0].stat().st_size > 10_000
 
 
 def test_mistakes_get_a_clear_error(recording: Recording, tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match="robot must be a whole number from 1 to 1"):
-        save_plot([recording], tmp_path / "plot.png", robot=2)
+        save_figures([recording], tmp_path / "plot.png", robot=2)
     with pytest.raises(ParameterError, match=r"must end in .png or .svg or .pdf"):
-        save_plot([recording], tmp_path / "plot.gif")
+        save_figures([recording], tmp_path / "plot.gif")
     assert kiks.Recording(recording.log.reader.path).title == recording.title

@@ -13,7 +13,7 @@ from PIL import Image, ImageSequence
 from tests.model.test_atomic_files import full_disk
 
 from kiks import Arena, Khepera, ParameterError, Recording, Simulation
-from kiks.cli.film import film
+from kiks.cli import app
 from kiks.export import film as film_of_recording
 from kiks.export.film import save_film
 from kiks.export.sheet import robot_colour
@@ -193,23 +193,21 @@ def test_the_same_recording_gives_the_same_film(recording: Recording, tmp_path: 
 
 
 def test_pictures_are_counted(recording: Recording, tmp_path: Path) -> None:
-    told: list[tuple[int, int]] = []
-    count = save_film(
-        recording, tmp_path / "film.mp4", size=(64, 64), fps=5, on_picture=lambda *words: told.append(words)
-    )
-    assert told == [(number, count) for number in range(1, count + 1)]
+    told: list[float] = []
+    count = save_film(recording, tmp_path / "film.mp4", size=(64, 64), fps=5, on_progress=told.append)
+    assert told == [number / count for number in range(1, count + 1)]
 
 
 def test_an_interrupted_film_leaves_the_earlier_file(recording: Recording, tmp_path: Path) -> None:
     file = tmp_path / "film.mp4"
     file.write_bytes(b"earlier")
 
-    def interrupt(done: int, count: int) -> None:
-        if done == 3:
+    def interrupt(share: float) -> None:
+        if share > 0.1:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        save_film(recording, file, size=(64, 64), on_picture=interrupt)
+        save_film(recording, file, size=(64, 64), on_progress=interrupt)
     assert file.read_bytes() == b"earlier"
     assert list(tmp_path.iterdir()) == [file]
 
@@ -251,6 +249,7 @@ def mistakes() -> Iterator[tuple[str, dict[str, object], str]]:
     yield "film.mp4", {"speed": 0}, "speed must be from 0.001 to 1000"
     yield "film.mp4", {"view": ["top"]}, "view must be one of 'top', '3d'"
     yield "film.mp4", {"robot": 2}, "robot must be a whole number from 1 to 1, but it was 2"
+    yield "film.mp4", {"robot": 1, "is_plain": True}, "robot must be left out of a plain film, but it was 1"
     yield "film.mp4", {"follow": 2}, "follow must be a whole number from 1 to 1, but it was 2"
     yield "film.mp4", {"zoom": 2}, "zoom must be left out where no robot is followed"
     yield "film.mp4", {"zoom": 0.5, "follow": 1}, "zoom must be from 1 to 20"
@@ -281,15 +280,16 @@ def test_a_film_without_end_is_refused(recording: Recording, tmp_path: Path, mon
 
 
 def test_the_command(recording: Recording, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    film(recording.log.reader.path, tmp_path / "film.mp4", size="200x100", start=1.0, end=2.0)
-    assert capsys.readouterr().out == f"Film: {tmp_path}/film.mp4   26 pictures, 1.0 s\n"
+    words = ["export", str(recording.log.reader.path), str(tmp_path / "film.mp4")]
+    app([*words, "--size", "200x100", "--start", "1", "--end", "2"], standalone_mode=False)
+    assert capsys.readouterr().out == f"Film: {tmp_path}/film.mp4, 0.0 MB\n"
     seen = pictures(tmp_path / "film.mp4")
     assert len(seen) == 26
     assert seen[0].shape == (100, 200, 3)
     np.testing.assert_allclose(seen[0][0, 0], OUTSIDE, atol=4)
     for size in ("200", "x", "axb", "-1x5", "1280x720x3"):
         with pytest.raises(ParameterError, match="--size must be a width and a height like 1280x720"):
-            film(recording.log.reader.path, tmp_path / "film.mp4", size=size)
+            app([*words, "--size", size], standalone_mode=False)
 
 
 def test_colours_that_a_gif_has_are_those_of_the_picture(recording: Recording, tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import pytest
 
 import kiks
 from kiks.errors import ParameterError
-from kiks.export.pictures import Trace, draw_simulation, save_picture
+from kiks.export.pictures import Picture, save_image
 from kiks.model.arena import Pose
 
 FLOOR = (246, 243, 236)
@@ -30,7 +30,7 @@ def pixel(image, x_mm: float, y_mm: float) -> tuple[int, int, int]:
 
 
 def test_everything_is_where_it_is() -> None:
-    image = draw_simulation(world())
+    image = Picture.of_simulation(world()).image()
     assert image.size == (800, 600)
     assert pixel(image, 200, 50) == FLOOR
     assert max(pixel(image, 4, 150)) < 200  # a wall
@@ -51,7 +51,7 @@ def test_stripes_stand_around_a_robot() -> None:
     robot = kiks.RobotSpec.load("khepera").with_changes(body__stripe_count=2)
     sim = kiks.Simulation(kiks.Arena.box(300, 300), robot=robot)
     sim.place(1, 150, 150, math.pi / 2)
-    image, rim_mm = draw_simulation(sim), robot.body.radius_mm - 1.5
+    image, rim_mm = Picture.of_simulation(sim).image(), robot.body.radius_mm - 1.5
     black, white = (
         {
             pixel(image, 150 - rim_mm * math.sin(angle), 150 + rim_mm * math.cos(angle))
@@ -63,14 +63,14 @@ def test_stripes_stand_around_a_robot() -> None:
     assert min(map(min, white)) > 230
 
 
-def test_a_trace_shows_where_everything_was() -> None:
+def test_trails_show_where_everything_was() -> None:
     sim = world()
-    trace = Trace(sim)
-    before = pixel(draw_simulation(sim), 200, 190)
+    sim.record_paths()
+    before = pixel(Picture.of_simulation(sim).image(), 200, 190)
     sim.place(1, 200, 100, 0.0)
     sim.move_body(2, 200, 160)
     sim.run(0.2)
-    image = draw_simulation(sim, trace)
+    image = Picture.of_simulation(sim, has_trails=True).image()
     assert before == FLOOR
     assert pixel(image, 200, 190) != FLOOR  # the cylinder's path
     assert pixel(image, 150, 100) != FLOOR  # the robot's
@@ -80,16 +80,16 @@ def test_a_trace_shows_where_everything_was() -> None:
 
 def test_what_came_later_or_went_is_no_trouble() -> None:
     sim = world()
-    trace = Trace(sim)
+    sim.record_paths()
     sim.remove_body(1)
     sim.add_ball(200, 50)
     sim.lamps[:, 3] = 0
-    assert draw_simulation(sim, trace).size == (800, 600)
+    assert Picture.of_simulation(sim, has_trails=True).image().size == (800, 600)
     sim.run(0.2)
-    assert draw_simulation(sim, trace).size == (800, 600)
+    assert Picture.of_simulation(sim, has_trails=True).image().size == (800, 600)
 
 
 @pytest.mark.parametrize("name", ["no/such/folder/x.png", "x.nothing"])
 def test_a_picture_that_cannot_be_written_says_so(name: str, tmp_path) -> None:
     with pytest.raises(ParameterError, match=r"a picture must (go to a file|end in .png)"):
-        save_picture(draw_simulation(world()), tmp_path / name)
+        save_image(Picture.of_simulation(world()).image(), tmp_path / name)

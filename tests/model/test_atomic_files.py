@@ -16,7 +16,7 @@ import kiks
 from kiks.clock.thinking import save_thinking
 from kiks.control.controllers import linear
 from kiks.errors import ParameterError
-from kiks.export.pictures import check_picture, draw_world, save_picture
+from kiks.export.pictures import Picture, check_picture, save_image
 from kiks.learn.champion import Champion
 from kiks.model.arena import Arena
 from kiks.model.arena_file import save_arena
@@ -45,7 +45,7 @@ def champion(path: Path) -> None:
 
 def picture(path: Path) -> None:
     empty = np.zeros((0, 4))
-    save_picture(draw_world(ROOM, empty, kiks.Simulation(ROOM).bodies(), np.zeros((0, 3)), []), path)
+    save_image(Picture(ROOM, empty, kiks.Simulation(ROOM).bodies(), np.zeros((0, 3)), []).image(), path)
 
 
 WRITERS: dict[str, Callable[[Path], object]] = {

@@ -447,8 +447,8 @@ def _interrupt(rng: random.Random) -> None:
 
 _HAND_IN = (
     ("run", "--record", "../own.mcap", "../drive.py", "../drive.py"), ("replay", "--check", "../run.mcap"),
-    ("plot", "../run.mcap", "--out", "../plot.png"), ("page", "../run.mcap", "../page.html"),
-    ("film", "../run.mcap", "../film.gif"), ("table", "../run.mcap", "../table.csv"), ("warmup",),
+    ("export", "../run.mcap", "../plot.png", "--kind", "figures"), ("export", "../run.mcap", "../page.html"),
+    ("export", "../run.mcap", "../film.gif"), ("export", "../run.mcap", "../table.csv"), ("warmup",),
     ("demo", "clean", "--seconds", "1", "--picture", "../clean.png"), ("arena", "maze", "../maze.toml"),
     ("evolve", "--generations", "1", "--population", "4", "--out", "../evolved"),
 )  # fmt: skip

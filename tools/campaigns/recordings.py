@@ -18,7 +18,7 @@ from tools.campaigns.hostile import NUMBERS, mutated, mutated_text
 
 import kiks
 from kiks.engine.state import BODY, ROBOT
-from kiks.export.figures import save_plot
+from kiks.export.figures import save_figures
 from kiks.export.film import save_film
 from kiks.export.page import save_page
 from kiks.recording import motion as motion_block
@@ -285,7 +285,7 @@ def use(path: Path) -> None:
     attempt(lambda: repr(recording) and recording.programs and recording.project.to_bytes())
     # The same file is always shown in the same way: each takes as long as all the rest.
     shows = (
-        lambda: save_plot([recording], path.with_suffix(".svg")),
+        lambda: save_figures([recording], path.with_suffix(".svg")),
         lambda: save_page(recording, path.with_suffix(".html")),
         lambda: save_film(recording, path.with_suffix(".gif"), size=(160, 120), fps=4),
     )

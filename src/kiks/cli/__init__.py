@@ -13,13 +13,13 @@ from kiks.cli.demo import demo
 from kiks.cli.desk import desk
 from kiks.cli.drive import drive
 from kiks.cli.evolve import evolve
-from kiks.cli.film import film, photo
+from kiks.cli.export import export
 from kiks.cli.fit import fit
 from kiks.cli.matlab import matlab
 from kiks.cli.monitor import monitor
 from kiks.cli.options import show_log, with_options
 from kiks.cli.outputs import Command
-from kiks.cli.replay import page, plot, replay, table
+from kiks.cli.replay import replay
 from kiks.cli.run import RunCommand, run
 from kiks.cli.schema import schema
 from kiks.cli.serve import serve
@@ -45,11 +45,7 @@ for _command in (
     evolve,
     compare,
     replay,
-    film,
-    photo,
-    plot,
-    page,
-    table,
+    export,
     serve,
     matlab,
     session,

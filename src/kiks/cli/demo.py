@@ -197,11 +197,11 @@ def _run(scene: Scene, behaviour: str, total_s: float, picture: Path) -> None:
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn
 
-    from kiks.export.pictures import Trace, save_simulation
+    from kiks.export.pictures import Picture
 
     end_as_with_ctrl_c()
     sim = scene.sim
-    trace = Trace(sim, scene.slice_s)
+    sim.record_paths(scene.slice_s)
     working_s = told_s = 0.0
 
     def report() -> str:
@@ -222,6 +222,6 @@ def _run(scene: Scene, behaviour: str, total_s: float, picture: Path) -> None:
         except KeyboardInterrupt:
             say(f"{behaviour}: {report().strip()}. It was interrupted.")
             raise
-    save_simulation(sim, picture, trace)
+    Picture.of_simulation(sim, has_trails=True).save(picture)
     typer.echo(f"{behaviour}: {report().strip()}")
     typer.echo(f"Picture: {picture}   Seed {sim.seed}, state {sim.state_hash()}: the same on every computer.")

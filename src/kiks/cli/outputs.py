@@ -24,8 +24,8 @@ PICTURES = (".png", ".svg", ".pdf", ".jpg")
 # fmt: off
 BEGINNINGS = {
     "": rb"\d+\n", ".csv": rb"time_s,", ".gif": rb"GIF8", ".html": rb"<!DOCTYPE html>", ".jpg": rb"\xff\xd8",
-    ".mcap": rb"\x89MCAP0", ".mp4": rb"....ftyp", ".parquet": rb"PAR1", ".pdf": rb"%PDF", ".png": rb"\x89PNG",
-    ".svg": rb"<\?xml|<svg", ".webp": rb"RIFF....WEBP",
+    ".mat": rb"MATLAB 5.0", ".mcap": rb"\x89MCAP0", ".mp4": rb"....ftyp", ".parquet": rb"PAR1", ".pdf": rb"%PDF",
+    ".png": rb"\x89PNG", ".svg": rb"<\?xml|<svg", ".webp": rb"RIFF....WEBP",
 }
 # fmt: on
 """How files begin that one of the same kind may replace, by their endings; thinking times have none. Others, such as

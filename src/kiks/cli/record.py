@@ -81,10 +81,10 @@ def recorded(
             texts = {f"{number}-{path.name}": _text_of(path) for number, path in enumerate(programs, 1)}
             at_the_end.enter_context(RunRecorder(sim, record, programs=texts, about={"command": _command_line()}))
         if picture is not None:
-            from kiks.export.pictures import Trace, save_simulation
+            from kiks.export.pictures import Picture
 
-            trace = Trace(sim, points_max=max(POINTS_MAX // max(sim.robot_count, 1), LEAST_POINTS_MAX))
-            at_the_end.callback(save_simulation, sim, picture, trace)
+            sim.record_paths(points_max=max(POINTS_MAX // max(sim.robot_count, 1), LEAST_POINTS_MAX))
+            at_the_end.callback(lambda: Picture.of_simulation(sim, has_trails=True).save(picture))
         if csv is not None:
             file = GrowingFile(csv, "--csv")
             at_the_end.callback(file.close)

@@ -41,7 +41,7 @@ PANELS = {"paths": 0.0, "places": 0.0, "readings": 2.6, "speeds": 2.6, "time": 1
 """The rows, and how high each is where it stands alone [inches]; 0 for as high as the arena makes it."""
 
 
-def save_plot(recordings: Sequence[Recording], path: str | Path, *, robot: int = 1) -> None:
+def save_figures(recordings: Sequence[Recording], path: str | Path, *, robot: int = 1) -> None:
     """Draw recordings side by side: paths, where robots were, readings, speeds, and where the time went.
 
     Args:
@@ -49,13 +49,13 @@ def save_plot(recordings: Sequence[Recording], path: str | Path, *, robot: int =
         path: The picture's file, .png, .svg or .pdf.
         robot: Number of the robot whose readings, speeds and time are drawn; a run without a robot has paths alone.
     """
-    kind = ending_of(path, "a plot", TYPES)[1:]
-    replace_file(path, _file_of(figure_of(recordings, robot=robot), kind), "a plot")
+    kind = ending_of(path, "figures", TYPES)[1:]
+    replace_file(path, file_of(figure_of(recordings, robot=robot), kind), "figures")
 
 
 def save_figure(figure: Any, path: str | Path) -> None:
     """Write a figure, whose texts become plain, as a PNG."""
-    replace_file(path, _file_of(_with_plain_texts(figure), "png", 110), "the picture")
+    replace_file(path, file_of(_with_plain_texts(figure), "png", 110), "the picture")
 
 
 def _with_plain_texts(figure: Any) -> Any:
@@ -68,7 +68,7 @@ def _with_plain_texts(figure: Any) -> Any:
 
 
 def panels_of(recording: Recording, *, robot: int = 1) -> dict[str, bytes]:
-    """Return what `save_plot` draws of one recording as single pictures, by the names of `PANELS`, in SVG."""
+    """Return what `save_figures` draws of one recording as single pictures, by the names of `PANELS`, in SVG."""
     from matplotlib.figure import Figure
 
     pictures = {}
@@ -82,16 +82,11 @@ def panels_of(recording: Recording, *, robot: int = 1) -> dict[str, bytes]:
             legend = axes.get_legend()
             if legend is not None:
                 legend.set_in_layout(True)  # no other axes need the same width
-        pictures[name] = _file_of(_with_plain_texts(figure), "svg")
+        pictures[name] = file_of(_with_plain_texts(figure), "svg")
     return pictures
 
 
-def recording_for_notebook(recording: Recording) -> tuple[bytes, dict[str, int]]:
-    """Return the figures of a recording as a PNG, and how wide a notebook shows it."""
-    return _file_of(figure_of([recording]), "png"), {"width": round(COLUMN_INCHES * 96)}
-
-
-def _file_of(figure: Any, kind: str, dots_per_inch: int = DOTS_PER_INCH) -> bytes:
+def file_of(figure: Any, kind: str, dots_per_inch: int = DOTS_PER_INCH) -> bytes:
     """Return the file of a figure. Without dates and random names, the same recording gives the same file."""
     from matplotlib import rc_context
 
@@ -103,7 +98,7 @@ def _file_of(figure: Any, kind: str, dots_per_inch: int = DOTS_PER_INCH) -> byte
 
 
 def figure_of(recordings: Sequence[Recording], *, robot: int = 1) -> Any:
-    """Return the figure of `save_plot`, a `matplotlib.figure.Figure`."""
+    """Return the figure of `save_figures`, a `matplotlib.figure.Figure`."""
     from matplotlib.figure import Figure
     from matplotlib.layout_engine import ConstrainedLayoutEngine
 

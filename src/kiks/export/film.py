@@ -56,7 +56,7 @@ def save_film(
     zoom: float | None = None,
     view: str = "top",
     is_plain: bool = False,
-    on_picture: Callable[[int, int], object] = lambda done, count: None,
+    on_progress: Callable[[float], object] = lambda share: None,
 ) -> int:
     """Make a film of a recording: the world from above with trails, and what a robot reads beside it.
 
@@ -72,8 +72,8 @@ def save_film(
         follow: Number of the robot that stays in the middle; if left out, the whole arena is seen.
         zoom: How much larger the arena is than one that is seen as a whole; 3 if left out, with `follow` alone.
         view: 'top', from above, or '3d', in space; that needs VTK.
-        is_plain: Whether the world is alone, without trails, clock and readings.
-        on_picture: Called after each picture with the number of pictures done and of all.
+        is_plain: Whether the world is alone, without trails, clock and readings; then `robot` is left out.
+        on_progress: Called after each picture with the share that is done.
 
     Returns:
         The number of pictures.
@@ -97,6 +97,8 @@ def save_film(
     if view not in tuple(VIEWS):
         raise ParameterError(f"view must be one of {', '.join(map(repr, VIEWS))}, but it was {shown(view)}.")
     follow, zoom = checked_follow(recording, follow, zoom)
+    if is_plain and robot is not None:
+        raise ParameterError(f"robot must be left out of a plain film, but it was {shown(robot)}.")
     # Without robots, nothing is read.
     robot = follow or 1 if robot is None else recording.check_robot(robot)
     times_ns = _times_ns(recording, start_s, end_s, speed / fps)
@@ -118,7 +120,7 @@ def save_film(
     with file_beside(path, "a film") as beside, VideoFile(beside, ending, (width, height), fps, samples) as film:
         for number, picture in enumerate(pictures(times_ns), 1):
             film.add(picture)
-            on_picture(number, len(times_ns))
+            on_progress(number / len(times_ns))
     return len(times_ns)
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from kiks.engine.state import BALL
 from kiks.errors import library
 from kiks.export.film import SIZE, checked_follow, checked_size
-from kiks.export.pictures import check_picture, save_picture
+from kiks.export.pictures import check_picture, save_image
 from kiks.export.sheet import FLOOR, INK, Colour, robot_colour, tint
 from kiks.export.solid_stage import (
     CHASSIS_MM,
@@ -56,7 +56,7 @@ def save_photo(
 
     Args:
         recording: The recording.
-        path: The picture's file, .png, .jpg or another of `kiks.export.pictures.save_picture`.
+        path: The picture's file, .png or .jpg.
         time_s: When [s]; the end of the recording if left out.
         size: Width and height [pixels].
         follow: Number of the robot in the middle; if left out, the whole arena is seen.
@@ -78,7 +78,7 @@ def save_photo(
     scene.aim(size, None if follow is None else follow - 1, zoom, samples)
     bitmap = mitsuba.Bitmap(mitsuba.render(mitsuba.load_dict(scene.parts)))
     pixels = bitmap.convert(mitsuba.Bitmap.PixelFormat.RGB, mitsuba.Struct.Type.UInt8, srgb_gamma=True)
-    save_picture(Image.fromarray(np.array(pixels)), path)
+    save_image(Image.fromarray(np.array(pixels)), path)
 
 
 class _Scene:

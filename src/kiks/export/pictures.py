@@ -1,12 +1,13 @@
-"""Pictures of a run, from above: walls, lamps, robots, balls and cylinders, where they began, and their paths."""
+"""Pictures of a world from above: walls, lamps, robots, balls and cylinders, where they began, and their paths."""
 
 from __future__ import annotations
 
 from base64 import b64encode
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,10 @@ from kiks.model.arena import Arena, Ball
 from kiks.model.atomic_files import check_writable, ending_of, replace_file
 from kiks.model.robot import RobotSpec
 from kiks.model.robot_parts import Body
+from kiks.recording.moments import moments
+from kiks.recording.recording import Recording
 from kiks.sim.simulation import Simulation
+from kiks.units import NS_PER_S
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -25,155 +29,157 @@ if TYPE_CHECKING:
 PICTURES = {".png": "PNG", ".svg": "SVG", ".pdf": "PDF", ".jpg": "JPEG"}
 """The types of pictures by their endings."""
 
+POINT_NS, POINTS_MAX = NS_PER_S // 10, 20_000
+"""Time between two points of a path [ns], and the most points of a path: of a longer run they lie farther apart."""
+
 _LONGEST_SIDE = 1200
 _PAGE_INCHES = 7.0
+_BODY_PATH_MM = 2.4
 
 
-class Trace:
-    """The way of a simulation to where it stands: the paths of robots, and places of balls and cylinders.
+class Trails(NamedTuple):
+    """The paths of robots and bodies, from where they began to where they are.
 
-    Args:
-        sim: The simulation; from now on it records the paths of its robots.
-        every_s: Time between two points of a path [s], whole hundredths.
-        points_max: Most points of a path; on a longer way fewer are kept. None for all.
+    Attributes:
+        robots: Of each robot, its points: x_mm, y_mm and perhaps more.
+        bodies: Of each ball and cylinder by its number, its points: x_mm, y_mm.
     """
 
-    def __init__(self, sim: Simulation, every_s: float = 0.1, *, points_max: int | None = None) -> None:
-        self.sim = sim
-        self.sim.record_paths(every_s, points_max=points_max)
-
-    def paths(self) -> list[list[Sequence[float]]]:
-        """Return the poses of each robot on its way to where it is: x_mm, y_mm, heading_rad."""
-        ways = zip(self.sim.paths()[:, :, 1:], self.sim.poses().tolist(), strict=True)
-        return [[*way[np.isfinite(way[:, 0])].tolist(), pose] for way, pose in ways]
-
-    def bodies(self) -> dict[int, list[Place]]:
-        """Return the places of each ball and cylinder on its way to where it is, by its number: x_mm, y_mm."""
-        ways = self.sim.body_paths()
-        for body in self.sim.bodies():
-            ways.setdefault(int(body["number"]), []).append((float(body["x_mm"]), float(body["y_mm"])))
-        return ways
+    robots: Sequence[Sequence[Sequence[float]]]
+    bodies: Mapping[int, Sequence[Place]]
 
 
-def draw_simulation(sim: Simulation, trace: Trace | None = None) -> Image:
-    """Return a picture of a simulation as it stands.
+@dataclass(frozen=True)
+class Picture:
+    """What a picture shows.
 
-    Args:
-        sim: The simulation.
-        trace: The way there: paths are drawn, and faintly what stood where at the beginning.
-
-    Example:
-        >>> sim = Simulation(Arena.box(300, 200))
-        >>> draw_simulation(sim).size
-        (600, 400)
-    """
-    robots = [spec.body for spec in sim.specs]
-    return draw_world(sim.arena, sim.lamps, sim.bodies(), sim.poses(), robots, trace)
-
-
-def draw_world(
-    arena: Arena,
-    lamps: NDArray[np.float64],
-    bodies: NDArray[np.void],
-    poses: NDArray[np.float64],
-    robots: Sequence[Body],
-    trace: Trace | None = None,
-    *,
-    longest_side: int = _LONGEST_SIDE,
-) -> Image:
-    """Return a picture of what stands in an arena.
-
-    Args:
+    Attributes:
         arena: The arena.
         lamps: x_mm, y_mm, power_w, and 1 for on or 0 for off, float64 [lamp, 4].
         bodies: Records of `kiks.engine.state.BODY`, shape [body].
         poses: Of the robots: x_mm, y_mm, heading_rad, float64 [robot, 3].
         robots: The robots' shapes.
-        trace: The way there: paths are drawn, and faintly what stood where at the beginning.
-        longest_side: Most pixels of a side.
+        trails: The paths that are drawn, with faint rings where they begin; None for none.
+
+    Example:
+        >>> Picture.of_simulation(Simulation(Arena.box(300, 200))).image().size
+        (600, 400)
     """
-    from PIL import Image
 
-    sheet = _sheet_of(arena, longest_side)
-    _draw(sheet, lamps, bodies, poses, robots, trace)
-    width, height = sheet.image.size
-    return sheet.image.resize((width // FINER, height // FINER), Image.Resampling.LANCZOS)
+    arena: Arena
+    lamps: NDArray[np.float64]
+    bodies: NDArray[np.void]
+    poses: NDArray[np.float64]
+    robots: Sequence[Body]
+    trails: Trails | None = None
+
+    @classmethod
+    def of_simulation(cls, sim: Simulation, *, has_trails: bool = False) -> Picture:
+        """Return the picture of a simulation as it stands.
+
+        Args:
+            sim: The simulation.
+            has_trails: Whether it shows the paths since `sim.record_paths`.
+        """
+        bodies, poses = sim.bodies(), sim.poses()
+        trails = None
+        if has_trails:
+            paths = zip(sim.paths()[:, :, 1:], poses.tolist(), strict=True)
+            places = sim.body_paths()
+            for body in bodies:
+                places.setdefault(int(body["number"]), []).append((float(body["x_mm"]), float(body["y_mm"])))
+            trails = Trails([[*path[np.isfinite(path[:, 0])].tolist(), pose] for path, pose in paths], places)
+        return cls(sim.arena, sim.lamps, bodies, poses, [spec.body for spec in sim.specs], trails)
+
+    @classmethod
+    def of_arena(cls, arena: Arena) -> Picture:
+        """Return the picture of an arena with its lamps, balls and cylinders, and a Khepera at each start."""
+        bodies = np.zeros(len(arena.bodies), BODY)
+        for record, body in zip(bodies, arena.bodies, strict=True):
+            record["x_mm"], record["y_mm"], record["radius_mm"] = body.x_mm, body.y_mm, body.radius_mm
+            record["brightness"], record["what"] = body.brightness, BALL if isinstance(body, Ball) else CYLINDER
+        lamps, starts = (np.array(rows, np.float64) for rows in (arena.lamps, arena.starts))
+        robots = [RobotSpec.load("khepera").body] * len(starts)
+        return cls(arena, lamps.reshape(-1, 4), bodies, starts.reshape(-1, 3), robots)
+
+    @classmethod
+    def of_recording(cls, recording: Recording, time_ns: int) -> Picture:
+        """Return the picture of a recorded world at a time [ns], with the paths up to it."""
+        begin_ns = recording.log.begin_ns
+        step_ns = max(POINT_NS, (time_ns - begin_ns) // POINTS_MAX)
+        paths: list[list[Sequence[float]]] = []
+        places: dict[int, list[Place]] = {}
+        for moment in moments(recording.log, [*range(begin_ns, time_ns, step_ns), time_ns]):
+            paths += [[] for _ in range(len(moment.poses) - len(paths))]
+            for path, pose in zip(paths, moment.poses.tolist(), strict=False):
+                path.append(pose)
+            for number, x_mm, y_mm in moment.bodies[["number", "x_mm", "y_mm"]].tolist():
+                places.setdefault(number, []).append((x_mm, y_mm))
+        robots = [spec.body for spec in moment.setup.specs]
+        return cls(moment.setup.arena, moment.lamps, moment.bodies, moment.poses, robots, Trails(paths, places))
+
+    def image(self, *, longest_side: int = _LONGEST_SIDE) -> Image:
+        """Return it in pixels, of which a side has at most so many."""
+        from PIL import Image
+
+        sheet = self._sheet(longest_side)
+        width, height = sheet.image.size
+        return sheet.image.resize((width // FINER, height // FINER), Image.Resampling.LANCZOS)
+
+    def save(self, path: str | Path) -> None:
+        """Write it to a file: with lines that stay sharp if it ends in .svg, else in pixels."""
+        if _type_of(path) != "SVG":
+            save_image(self.image(), path)
+            return
+        sheet = self._sheet(_LONGEST_SIDE, pen := _SvgPen())
+        replace_file(path, _svg(sheet.image, pen.elements, finer=FINER), "a picture")
+
+    def for_notebook(self) -> tuple[bytes, dict[str, int]]:
+        """Return it as a PNG, and at which size a notebook shows it: half, so it is sharp on any screen."""
+        image, pixels = self.image(), BytesIO()
+        image.save(pixels, "PNG")
+        return pixels.getvalue(), {"width": image.width // 2, "height": image.height // 2}
+
+    def _sheet(self, longest_side: int, pen: _SvgPen | None = None) -> Sheet:
+        """Return a sheet with all of it."""
+        arena, count = self.arena, len(self.poses)
+        scale = FINER * min(longest_side / max(arena.width_mm, arena.height_mm), 2.0)
+        size = (max(round(arena.width_mm * scale), FINER), max(round(arena.height_mm * scale), FINER))
+        sheet = Sheet(wall_picture(arena, size), scale, 0.0, arena.height_mm, pen)
+        for x_mm, y_mm, power_w, is_on in self.lamps.tolist():
+            sheet.lamp((x_mm, y_mm), power_w, is_on=bool(is_on))
+        if self.trails is not None:
+            for index, (robot, path) in enumerate(zip(self.robots, self.trails.robots, strict=False)):
+                colours = (path_colour(index, count, k / max(len(path) - 1, 1)) for k in range(len(path)))
+                sheet.path(path, colours, path_mm(count))
+                sheet.ring(path[0][:2], robot.radius_mm, (*robot_colour(index, count), 90))
+            for body in self.bodies:
+                places = self.trails.bodies[int(body["number"])]
+                sheet.line(places, (*tint(body), 200), _BODY_PATH_MM)
+                sheet.ring(places[0], float(body["radius_mm"]), (*tint(body), 190))
+        for body in self.bodies:
+            sheet.body(body)
+        for index, (pose, robot) in enumerate(zip(self.poses.tolist(), self.robots, strict=False)):
+            sheet.robot(pose, robot, robot_colour(index, count), str(index + 1))
+        return sheet
 
 
-def draw_arena(arena: Arena) -> Image:
-    """Return a picture of an arena and what it says of lamps, balls and cylinders, with a Khepera at each start."""
-    bodies = np.zeros(len(arena.bodies), BODY)
-    for record, body in zip(bodies, arena.bodies, strict=True):
-        record["x_mm"], record["y_mm"], record["radius_mm"] = body.x_mm, body.y_mm, body.radius_mm
-        record["brightness"], record["what"] = body.brightness, BALL if isinstance(body, Ball) else CYLINDER
-    lamps, starts = np.array(arena.lamps, np.float64).reshape(-1, 4), np.array(arena.starts, np.float64).reshape(-1, 3)
-    return draw_world(arena, lamps, bodies, starts, [RobotSpec.load("khepera").body] * len(starts))
-
-
-def simulation_for_notebook(sim: Simulation) -> tuple[bytes, dict[str, int]]:
-    """Return a picture of a simulation as it stands, as `png_for_notebook` does."""
-    with sim.lock:
-        image = draw_simulation(sim)
-    return png_for_notebook(image)
-
-
-def arena_for_notebook(arena: Arena) -> tuple[bytes, dict[str, int]]:
-    """Return a picture of an arena, as `png_for_notebook` does."""
-    return png_for_notebook(draw_arena(arena))
-
-
-def png_for_notebook(image: Image) -> tuple[bytes, dict[str, int]]:
-    """Return a picture as a PNG, and at which size a notebook shows it: half, so it is sharp on any screen."""
-    pixels = BytesIO()
-    image.save(pixels, "PNG")
-    return pixels.getvalue(), {"width": image.width // 2, "height": image.height // 2}
-
-
-def save_simulation(sim: Simulation, path: str | Path, trace: Trace | None = None) -> None:
-    """Draw a simulation as it stands into a file: with lines that stay sharp if it ends in .svg, else in pixels.
+def save_picture(recording: Recording, path: str | Path, *, time_s: float | None = None) -> None:
+    """Draw a recorded world from above, with the paths of all that moved.
 
     Args:
-        sim: The simulation.
-        path: The file; its type follows from the ending.
-        trace: The way there, as for `draw_simulation`.
+        recording: The recording.
+        path: The picture's file; .svg has lines that stay sharp.
+        time_s: When [s]; the end of the recording if left out.
     """
-    if _picture_type(path) != "SVG":
-        save_picture(draw_simulation(sim, trace), path)
-        return
-    sheet = _sheet_of(sim.arena, _LONGEST_SIDE, of_lines := _SvgPen())
-    _draw(sheet, sim.lamps, sim.bodies(), sim.poses(), [spec.body for spec in sim.specs], trace)
-    replace_file(path, _svg(sheet.image, of_lines.elements, finer=FINER), "a picture")
+    _type_of(path)
+    time_ns = recording.log.end_ns if time_s is None else recording.time_ns(time_s)
+    Picture.of_recording(recording, time_ns).save(path)
 
 
-def _draw(
-    sheet: Sheet,
-    lamps: NDArray[np.float64],
-    bodies: NDArray[np.void],
-    poses: NDArray[np.float64],
-    robots: Sequence[Body],
-    trace: Trace | None,
-) -> None:
-    """Draw what stands in an arena on a sheet."""
-    for x_mm, y_mm, power_w, is_on in lamps.tolist():
-        sheet.lamp((x_mm, y_mm), power_w, is_on=bool(is_on))
-    if trace is not None:
-        places_of = trace.bodies()
-        for index, (robot, path) in enumerate(zip(robots, trace.paths(), strict=True)):
-            sheet.path(path, _colours(index, len(poses), len(path)), path_mm(len(poses)))
-            sheet.ring(path[0][:2], robot.radius_mm, (*robot_colour(index, len(poses)), 90))
-        for body in bodies:
-            places = places_of[int(body["number"])]
-            sheet.line(places, (*tint(body), 200), 2.4)
-            sheet.ring(places[0], float(body["radius_mm"]), (*tint(body), 190))
-    for body in bodies:
-        sheet.body(body)
-    for index, pose in enumerate(poses.tolist()):
-        sheet.robot(pose, robots[index], robot_colour(index, len(poses)), str(index + 1))
-
-
-def save_picture(image: Image, path: str | Path) -> None:
-    """Write a picture; the type follows from the ending."""
-    pixels, kind = BytesIO(), _picture_type(path)
+def save_image(image: Image, path: str | Path) -> None:
+    """Write an image; the type follows from the ending."""
+    pixels, kind = BytesIO(), _type_of(path)
     if kind == "SVG":
         replace_file(path, _svg(image, []), "a picture")
         return
@@ -183,25 +189,13 @@ def save_picture(image: Image, path: str | Path) -> None:
 
 
 def check_picture(path: str | Path) -> None:
-    """Raise, before the run that is drawn, what `save_picture` would raise."""
-    _picture_type(path)
+    """Raise, before the run that is drawn, what `save_image` would raise."""
+    _type_of(path)
     check_writable(path, "a picture")
 
 
-def _picture_type(path: str | Path) -> str:
+def _type_of(path: str | Path) -> str:
     return PICTURES[ending_of(path, "a picture", PICTURES)]
-
-
-def _colours(index: int, robot_count: int, count: int) -> Iterable[Colour]:
-    """Return the colours along a path."""
-    return (path_colour(index, robot_count, k / max(count - 1, 1)) for k in range(count))
-
-
-def _sheet_of(arena: Arena, longest_side: int, pen: _SvgPen | None = None) -> Sheet:
-    """Return a sheet with an arena, of which no side has more than so many pixels."""
-    scale = FINER * min(longest_side / max(arena.width_mm, arena.height_mm), 2.0)
-    size = (max(round(arena.width_mm * scale), FINER), max(round(arena.height_mm * scale), FINER))
-    return Sheet(wall_picture(arena, size), scale, 0.0, arena.height_mm, pen)
 
 
 class _SvgPen:
@@ -268,6 +262,3 @@ def _svg(image: Image, elements: Sequence[str], *, finer: int = 1) -> str:
         "</svg>",
     ]
     return "\n".join(lines) + "\n"
-
-
-__all__ = ["Trace", "check_picture", "draw_arena", "draw_simulation", "draw_world", "save_picture", "save_simulation"]

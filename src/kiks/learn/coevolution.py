@@ -19,11 +19,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kiks.errors import ParameterError, shown
+from kiks.export.tables import write_parquet
 from kiks.learn.algorithms import make_algorithm
 from kiks.learn.champion import Champion
 from kiks.learn.contest import Contest
 from kiks.learn.evaluation import evaluate
-from kiks.learn.evolution_log import LOG, Folder, Generation, Identity, write_table
+from kiks.learn.evolution_log import LOG, Folder, Generation, Identity
 from kiks.learn.generation_loop import run_generations, seed_for
 from kiks.model.array_checks import check_numbers
 from kiks.model.checks import check_count, check_kind
@@ -72,7 +73,7 @@ class Tournament:
         places = np.meshgrid(self.generations, self.generations, indexing="ij")
         columns = {f"{side}_generation": place.ravel() for side, place in zip(self.sides, places, strict=True)}
         columns |= {side: scores.ravel() for side, scores in zip(self.sides, self.scores, strict=True)}
-        write_table(columns, path, "the tournament")
+        write_parquet(columns, path, "the tournament")
 
 
 class Coevolution:
@@ -256,7 +257,7 @@ class Coevolution:
         columns |= {name: table[:, number] for number, name in enumerate(self.contest.value_names)}
         columns["seconds"] = np.repeat([each.seconds for each in self.generations], self.population)
         columns["contests"] = np.repeat(counts * 2 * self.population * self.opponents, self.population)
-        write_table(columns, path, "the log")
+        write_parquet(columns, path, "the log")
 
     # ---- results ----
 

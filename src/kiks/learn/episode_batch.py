@@ -14,7 +14,7 @@ from kiks.batch.initial_state import random_starts
 from kiks.control.measures import contacts, path_mm
 from kiks.control.senses import SENSES
 from kiks.errors import ParameterError
-from kiks.export.pictures import draw_world
+from kiks.export.pictures import Picture
 from kiks.learn.env_specs import EnvSpec
 from kiks.model.robot import RobotSpec
 
@@ -157,8 +157,8 @@ class Episodes:
         robots = [self._body] * batch.robot_count
         bodies: Any = batch.state.bodies[world]
         arena = batch.arenas[batch.arena_indices[world]]
-        drawn = draw_world(arena, batch.lamps[world], bodies, batch.poses[world], robots, longest_side=PICTURE_SIDE_PX)
-        return np.asarray(drawn)
+        picture = Picture(arena, batch.lamps[world], bodies, batch.poses[world], robots)
+        return np.asarray(picture.image(longest_side=PICTURE_SIDE_PX))
 
     # ---- inside ----
 

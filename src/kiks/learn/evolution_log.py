@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from kiks.errors import ParameterError, library, shown
+from kiks.errors import ParameterError, shown
+from kiks.export.tables import write_parquet
 from kiks.learn.finals import Finals
 from kiks.learn.fingerprint import differing, tell_unseen
 from kiks.model.array_checks import Numbers, read_arrays
@@ -245,7 +246,7 @@ class Folder:
         columns["champion_fitness"] = per_candidate([each.champion_fitness for each in generations])
         columns["seconds"] = per_candidate([each.seconds for each in generations])
         columns["evaluations"] = per_candidate(np.cumsum(counts).tolist()).astype(np.int64)
-        write_table(columns, self.path / LOG, "the log")
+        write_parquet(columns, self.path / LOG, "the log")
 
     def _file(self, number: int) -> Path:
         return self.path / GENERATIONS / f"{number + 1:06}.npz"
@@ -258,11 +259,3 @@ def _save_arrays(file: Path, arrays: Mapping[str, Any], seconds: float, what: st
     buffer = io.BytesIO()
     np.savez(buffer, **arrays, seconds=np.float64(seconds))
     replace_file(file, buffer.getvalue(), what)
-
-
-def write_table(columns: Mapping[str, NDArray[Any]], path: str | Path, what: str) -> None:
-    """Write a Parquet file."""
-    pyarrow, parquet = library("pyarrow"), library("pyarrow.parquet")
-    buffer = io.BytesIO()
-    parquet.write_table(pyarrow.table(dict(columns)), buffer)
-    replace_file(path, buffer.getvalue(), what)

@@ -109,7 +109,7 @@ class Arena:
 
     def _repr_png_(self) -> tuple[bytes, dict[str, int]]:
         """Return a picture, which notebooks show."""
-        picture: tuple[bytes, dict[str, int]] = upwards.draw_arena(self)
+        picture: tuple[bytes, dict[str, int]] = upwards.draw_for_notebook(self)
         return picture
 
     def __reduce__(self) -> tuple[Any, ...]:

@@ -61,7 +61,7 @@ class Recording:
 
     def _repr_png_(self) -> tuple[bytes, dict[str, int]] | None:
         """Return its figures, which notebooks show; nothing without Matplotlib."""
-        picture: tuple[bytes, dict[str, int]] | None = upwards.draw_recording(self)
+        picture: tuple[bytes, dict[str, int]] | None = upwards.draw_for_notebook(self)
         return picture
 
     # ---- what ran ----
@@ -179,6 +179,16 @@ class Recording:
             A Matplotlib figure, which notebooks show.
         """
         return upwards.plot_recordings([self], robot=robot)
+
+    def export(self, path: str | Path, *, kind: str | None = None, **options: Any) -> None:
+        """Write a film, a picture, figures, a photo, a table or a page of it: see `kiks.export.kinds.export`.
+
+        Args:
+            path: The file, whose ending says what it becomes.
+            kind: Which kind, where the ending leaves a choice.
+            options: Those of the kind.
+        """
+        upwards.export_recording(self, path, kind=kind, **options)
 
     def time_ns(self, time_s: float, name: str = "time_s") -> int:
         """Return a time of the recording [ns].

@@ -36,7 +36,7 @@ from kiks.sim.turret_host import Turrets
 from kiks.sim.wire import Wire
 from kiks.sim.world import World
 from kiks.units import ns_from_s, s_from_ns
-from kiks.upwards import draw_simulation, plot_simulation, record_simulation, show_in_browser
+from kiks.upwards import draw_for_notebook, plot_simulation, record_simulation, show_in_browser
 
 
 class Simulation:
@@ -137,7 +137,7 @@ class Simulation:
 
     def _repr_png_(self) -> tuple[bytes, dict[str, int]]:
         """Return a picture of it as it stands, which notebooks show."""
-        picture: tuple[bytes, dict[str, int]] = draw_simulation(self)
+        picture: tuple[bytes, dict[str, int]] = draw_for_notebook(self)
         return picture
 
     @contextmanager

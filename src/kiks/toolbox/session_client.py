@@ -190,7 +190,7 @@ class SessionClient:
         self.session.clients.remove(self)
         if self.film is not None:
             try:
-                self.film.save(lambda done, count: None)
+                self.film.save(lambda share: None)
             except KiksError as error:
                 _log.warning("%s", error)
 
@@ -342,11 +342,11 @@ class SessionClient:
     def save_film(self) -> int:
         """Make the file of the film; return the number of its pictures, 0 without a film."""
         film, self.film = self.film, None
-        return 0 if film is None else film.save(lambda done, count: self._check_pending())
+        return 0 if film is None else film.save(lambda share: self._check_pending())
 
     def _check_pending(self) -> None:
         if self._pending.is_cancelled:
-            raise LinkError("the film must be waited for, but the program was interrupted: it is lost.")
+            raise LinkError("The program was interrupted; the film was discarded.")
 
     # ---- time ----
 

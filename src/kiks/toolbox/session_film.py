@@ -38,14 +38,14 @@ class SessionFilm:
         """End the film with the present state."""
         self._recorder.close()
 
-    def save(self, on_picture: Callable[[int, int], object]) -> int:
+    def save(self, on_progress: Callable[[float], object]) -> int:
         """Make the film, and return the number of its pictures.
 
         Args:
-            on_picture: See `save_film`.
+            on_progress: See `save_film`.
         """
         try:
             self.stop()
-            return save_film(Recording(self._recording), self._path, robot=self._robot, on_picture=on_picture)
+            return save_film(Recording(self._recording), self._path, robot=self._robot, on_progress=on_progress)
         finally:
             self._folder.delete()

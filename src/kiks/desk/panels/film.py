@@ -106,14 +106,14 @@ class FilmDialog:
                 # What is shown is rounded.
                 end_s=min(end_s, s_from_ns(recording.log.end_ns)),
                 follow=follow,
-                on_picture=self._show,
+                on_progress=self._show,
             )
             return path.read_bytes()
 
-    def _show(self, done: int, count: int) -> None:
-        self._done = done / count
+    def _show(self, share: float) -> None:
+        self._done = share
         if self._is_given_up:
-            raise ParameterError("The dialog must stay open until the film is made, but it was closed: there is none.")
+            raise ParameterError("The dialog was closed; the film was discarded.")
 
     def _give_up(self) -> None:
         self._is_given_up = not self._dialog.value

@@ -1,0 +1,96 @@
+"""`kiks export`: a recording becomes a film, a picture, figures, a photo, a table or a page."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from kiks.cli.engine_start import ready_engine
+from kiks.cli.options import progress_bar
+from kiks.cli.outputs import leave_out, output
+from kiks.errors import ParameterError, shown
+from kiks.export.kinds import ENDINGS, KINDS, kind_of, options_of
+from kiks.export.kinds import export as write_export
+
+
+def _size(value: str | None) -> Any:
+    """Return width and height of 1280x720."""
+    if value is None:
+        return None
+    words = re.fullmatch(r"([0-9]{1,5})x([0-9]{1,5})", value)
+    if words is None:
+        raise ParameterError(f"--size must be a width and a height like 1280x720, but it was {shown(value)}.")
+    return int(words[1]), int(words[2])
+
+
+def export(
+    context: typer.Context,
+    files: Annotated[
+        list[Path], typer.Argument(help="A recording (.mcap); figures may be of several.", metavar="RECORDING...")
+    ],
+    out: Annotated[
+        Path,
+        typer.Argument(
+            help=f"The file, whose ending says what it becomes: {', '.join(ENDINGS)}.", callback=output(*ENDINGS)
+        ),
+    ],
+    kind: Annotated[
+        str | None, typer.Option(help=f"{', '.join(KINDS)}; by the ending if left out, a picture of a .png.")
+    ] = None,
+    size: Annotated[
+        str | None, typer.Option(help="Film, photo: width and height [pixels]; 1280x720 if left out.", callback=_size)
+    ] = None,
+    fps: Annotated[int | None, typer.Option(help="Film: pictures per second; 25 if left out.")] = None,
+    speed: Annotated[
+        float | None, typer.Option(help="Film: simulated seconds per second of it; 1 if left out.")
+    ] = None,
+    start_s: Annotated[float | None, typer.Option("--start", help="Film: its beginning [s of simulated time].")] = None,
+    end_s: Annotated[float | None, typer.Option("--end", help="Film: its end [s of simulated time].")] = None,
+    time_s: Annotated[
+        float | None, typer.Option("--time", help="Picture, photo: when [s of simulated time]; the end if left out.")
+    ] = None,
+    follow: Annotated[int | None, typer.Option(help="Film, photo: the robot that stays in the middle.")] = None,
+    zoom: Annotated[
+        float | None, typer.Option(help="With --follow: how much larger the arena is than a whole one; 3 if left out.")
+    ] = None,
+    view: Annotated[str | None, typer.Option(help="Film: top, or 3d, in space; top if left out.")] = None,
+    is_plain: Annotated[
+        bool | None, typer.Option("--plain", help="Film: the world alone, without trails, clock and readings.")
+    ] = None,
+    samples: Annotated[
+        int | None, typer.Option(help="Photo: rays through a pixel; more are slower and less grainy; 48 if left out.")
+    ] = None,
+    table: Annotated[
+        str | None, typer.Option(help="Table: poses, wheels, readings, wire or events; poses if left out.")
+    ] = None,
+    robot: Annotated[
+        int | None, typer.Option(help="Film, figures, page: the robot whose readings they show. Table: of it alone.")
+    ] = None,
+    title: Annotated[str | None, typer.Option(help="Page: its title; the programs' names if left out.")] = None,
+) -> None:
+    """Make a film, a picture, figures, a photo, a table or a page of a recording.
+
+    The ending of OUT says which. A picture shows the world from above with all paths. Figures show paths and odometry,
+    where robots were, readings, speeds, and where the milliseconds went. A photo has light and shadows, and needs
+    Mitsuba. A page is one HTML file to hand in: a player, figures, numbers, programs, and how to run it again; any
+    browser opens it without a network.
+
+    Example: kiks export run.mcap run.mp4 --speed 4 --follow 1
+    """
+    from kiks.recording.recording import Recording
+
+    kind = kind_of(out, kind)
+    known = options_of(kind)
+    options = {name: value for name, value in context.params.items() if name not in ("files", "out", "kind")}
+    leave_out(context, f"of a {kind}", *(options.keys() - known))
+    given = {name: value for name, value in options.items() if value is not None}
+    if kind == "page":
+        ready_engine()
+    with progress_bar(out.name) as show:
+        if "on_progress" in known:
+            given["on_progress"] = show
+        write_export([Recording(file) for file in files], out, kind=kind, **given)
+    typer.echo(f"{kind.capitalize()}: {out}, {out.stat().st_size / 1e6:.1f} MB")

@@ -1,0 +1,74 @@
+"""Tables in files: of recordings, and of any columns."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kiks.errors import library
+from kiks.model.atomic_files import ending_of, replace_file
+from kiks.recording.recording import Recording
+
+Columns = Mapping[str, NDArray[Any]]
+
+
+def save_table(recording: Recording, path: str | Path, *, table: str = "poses", robot: int | None = None) -> None:
+    """Write a table of a recording.
+
+    Args:
+        recording: The recording.
+        path: The file: .csv, .parquet, or .mat for Octave and MATLAB.
+        table: Which: see `kiks.Recording.table`.
+        robot: Of this robot alone; of all if left out.
+    """
+    write = _WRITERS[ending_of(path, "a table", _WRITERS)]
+    rows = recording.table(table, robot)
+    columns: dict[str, NDArray[Any]] = {}
+    for name in rows.dtype.names or ():
+        values = rows[name]
+        if values.dtype.kind == "S":
+            values = np.array(
+                [each.decode("latin-1").encode("unicode_escape").decode() for each in values.tolist()], "U"
+            )
+        columns |= {name: values} if values.ndim == 1 else {f"{name}_{k}": values[:, k] for k in range(values.shape[1])}
+    write(columns, path, "a table")
+
+
+def write_parquet(columns: Columns, path: str | Path, what: str) -> None:
+    """Write columns of equal length as a Parquet file.
+
+    Args:
+        columns: The columns by name.
+        path: The file.
+        what: Its name in messages.
+    """
+    pyarrow, parquet = library("pyarrow"), library("pyarrow.parquet")
+    buffer = io.BytesIO()
+    parquet.write_table(pyarrow.table(dict(columns)), buffer)
+    replace_file(path, buffer.getvalue(), what)
+
+
+def _write_csv(columns: Columns, path: str | Path, what: str) -> None:
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows(zip(*(values.tolist() for values in columns.values()), strict=True))
+    replace_file(path, text.getvalue(), what)
+
+
+def _write_mat(columns: Columns, path: str | Path, what: str) -> None:
+    from scipy.io import savemat
+
+    buffer = io.BytesIO()
+    texts = {name: values.astype(object) for name, values in columns.items() if values.dtype.kind == "U"}
+    savemat(buffer, {**columns, **texts}, oned_as="column", do_compression=True)
+    replace_file(path, buffer.getvalue(), what)
+
+
+_WRITERS = {".csv": _write_csv, ".parquet": write_parquet, ".mat": _write_mat}

@@ -1,0 +1,89 @@
+"""`export` makes of a recording what the ending of a file's name says."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+from scipy.io import loadmat
+
+from kiks import Arena, Khepera, ParameterError, Recording, Simulation
+from kiks.export.kinds import ENDINGS, KINDS, kind_of, options_of
+from kiks.export.pictures import Picture
+
+
+@pytest.fixture(scope="module")
+def world() -> Simulation:
+    """A robot that has driven around, a ball that rolls, and a second robot that came later."""
+    sim = Simulation(Arena.box(400, 300), seed=3)
+    sim.place(1, 100, 80, 0.3)
+    sim.add_ball(300, 220)
+    sim.add_lamp(60, 240)
+    return sim
+
+
+@pytest.fixture(scope="module")
+def recording(world: Simulation, tmp_path_factory: pytest.TempPathFactory) -> Recording:
+    file = tmp_path_factory.mktemp("recording") / "run.mcap"
+    world.record_paths()
+    with world.record(file):
+        robot = Khepera(world.port(1))
+        robot.set_speed(9, 5)
+        robot.proximity()
+        world.run(2.0)
+        world.move_body(1, 300, 220, speed_mm_s=100.0)
+        world.add_robot()
+        world.run(1.0)
+    return Recording(file)
+
+
+def test_a_picture_of_a_recording_is_that_of_its_world(world: Simulation, recording: Recording, tmp_path: Path) -> None:
+    recording.export(tmp_path / "run.png")
+    with Image.open(tmp_path / "run.png") as image:
+        seen = np.asarray(image).astype(int)
+    wanted = np.asarray(Picture.of_simulation(world, has_trails=True).image()).astype(int)
+    assert (np.abs(seen - wanted).max(axis=-1) > 8).mean() < 0.001
+    recording.export(tmp_path / "early.png", time_s=1.0)
+    recording.export(tmp_path / "run.svg")
+    assert (tmp_path / "early.png").read_bytes() != (tmp_path / "run.png").read_bytes()
+    assert "<polyline" in (tmp_path / "run.svg").read_text()
+
+
+def test_tables_are_the_same_in_each_kind_of_file(recording: Recording, tmp_path: Path) -> None:
+    for name in ("poses", "wire", "events"):
+        wanted = recording.table(name, 1)
+        for ending in (".csv", ".parquet", ".mat"):
+            recording.export(tmp_path / f"{name}{ending}", table=name, robot=1)
+        found = loadmat(tmp_path / f"{name}.mat")
+        np.testing.assert_array_equal(found["time_s"][:, 0], wanted["time_s"])
+        lines = (tmp_path / f"{name}.csv").read_text().splitlines()
+        assert len(lines) == 1 + len(wanted)
+        assert lines[0].split(",") == [column for column in found if not column.startswith("__")]
+    assert loadmat(tmp_path / "wire.mat")["data"][0, 0][0] == r"D,9,5\n"
+
+
+def test_each_ending_has_a_kind_whose_options_are_those_of_its_function() -> None:
+    assert {kind_of(f"run{ending}") for ending in ENDINGS} == KINDS.keys() - {"figures", "photo"}
+    assert options_of("picture") == ["time_s"]
+    assert kind_of("run.PNG", "photo") == "photo"
+
+
+def test_mistakes_get_a_clear_error(recording: Recording, tmp_path: Path) -> None:
+    for name, options, words in (
+        ("run.doc", {}, "the file must end in .mp4 or"),
+        ("run.png", {"fps": 5}, "fps must be left out of a picture, but it was 5"),
+        ("run.mp4", {"robo": 5}, "Did you mean 'robot'?"),
+        ("run.mp4", {"kind": "photo"}, "a photo must end in .png or .jpg"),
+        ("run.png", {"kind": "foto"}, "kind must be one of 'film', .* Did you mean 'photo'?"),
+        ("run.png", {"time_s": 9}, "time_s must be from 0 to 3"),
+        ("run.csv", {"table": "pose"}, "Did you mean 'poses'?"),
+    ):
+        with pytest.raises(ParameterError, match=words):
+            recording.export(tmp_path / name, **options)
+    from kiks.export.kinds import export
+
+    with pytest.raises(ParameterError, match="a picture must be of one recording, but there are 2"):
+        export([recording, recording], tmp_path / "run.png")
+    assert not list(tmp_path.iterdir())
