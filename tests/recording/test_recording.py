@@ -19,10 +19,10 @@ import kiks
 from kiks import Arena, Khepera, ParameterError, Recording, Simulation
 from kiks.clock.gate import Gate
 from kiks.demos.scenes import SCENES
+from kiks.export import foxglove
 from kiks.firmware.general_io import GeneralIO
 from kiks.firmware.turret import Orders, Turret
 from kiks.model.arena import Lamp
-from kiks.recording import foxglove
 from kiks.recording.check import Checked, check_recording
 from kiks.recording.events import EventReader
 from kiks.recording.log import RecordedLog
@@ -370,7 +370,7 @@ def test_foxglove_opens_it(tmp_path: Path) -> None:
         sim.run(3.0)
         recorder.mark("a note")
         sim.run(1.0)
-    foxglove.write_foxglove(Recording(tmp_path / "run.mcap"), tmp_path / "out.mcap")
+    foxglove.save_foxglove(Recording(tmp_path / "run.mcap"), tmp_path / "out.mcap")
     counts: dict[str, int] = {}
     with (tmp_path / "out.mcap").open("rb") as file:
         for schema, channel, message in make_reader(file, validate_crcs=True).iter_messages():

@@ -1,7 +1,7 @@
 """What a recording becomes: one table, by the ending of a file's name.
 
-A kind is a function of a recording and a path, which writes the file. Its keyword arguments are the kind's options, so a
-new kind is a row in this table.
+A kind is a function of a recording and a path, which writes the file. Its keyword arguments are the kind's options, so
+a new kind is a row in this table.
 """
 
 from __future__ import annotations
@@ -40,6 +40,7 @@ KINDS = {
     "photo": Kind("photo", "save_photo", (".png", ".jpg")),
     "table": Kind("tables", "save_table", (".csv", ".parquet", ".mat")),
     "page": Kind("page", "save_page", (".html",)),
+    "foxglove": Kind("foxglove", "save_foxglove", (".mcap",)),
 }
 """All kinds; of several with one ending, the first is the usual one."""
 

@@ -86,8 +86,8 @@ _LEVEL_INFO, _TYPE_UINT8, _ALL = 2, 1, 1
 _STILL = {"position": {"x": 0.0, "y": 0.0, "z": 0.0}, "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}}
 
 
-def write_foxglove(
-    recording: Recording, path: str | Path, on_progress: Callable[[float], None] = lambda share: None
+def save_foxglove(
+    recording: Recording, path: str | Path, *, on_progress: Callable[[float], None] = lambda share: None
 ) -> None:
     """Write a recording as an MCAP file that Foxglove shows.
 
