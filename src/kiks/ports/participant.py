@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import socket
-from abc import abstractmethod
 from collections import deque
 
 from kiks.clock.serial_timing import BACKLOG_LIMIT
@@ -26,6 +25,8 @@ _log = logging.getLogger("kiks.run")
 class ProgramParticipant(Participant):
     """A program that sends requests, each with the simulated time at which it is made.
 
+    This class serves a program in a thread of this process, whose end is `LocalConnection`.
+
     Args:
         name: Its name in messages.
         rank: Its number, from 1.
@@ -37,7 +38,12 @@ class ProgramParticipant(Participant):
     Attributes:
         is_silenced: Whether it was disconnected because it was silent.
         is_stopped: Whether a person has stopped it; then its robots stop when it has left.
+        is_closed: Whether the connection is closed.
+        answer: The last answer to a program in a thread; None until it is there.
     """
+
+    answer: Answer | None = None
+    is_closed = False
 
     def __init__(
         self, name: str, rank: int, robot: int, sim: Simulation, scheduler: ProgramScheduler, names: PortNames
@@ -58,13 +64,13 @@ class ProgramParticipant(Participant):
         self._ticket = 0
         self._has_been_warned = False
 
-    @abstractmethod
     def close(self) -> None:
         """Close the connection."""
+        self.is_closed = True
 
-    @abstractmethod
     def reply(self, answer: Answer) -> None:
-        """Send an answer to the program."""
+        """Hand an answer over to the program."""
+        self.answer = answer
 
     # ---- requests ----
 
@@ -358,23 +364,3 @@ class RemoteParticipant(ProgramParticipant):
             pass
         except OSError:
             self._unsent.clear()
-
-
-class LocalParticipant(ProgramParticipant):
-    """A program in a thread of this process; its end is `LocalConnection`.
-
-    Attributes:
-        answer: The last answer; None until it is there.
-        is_closed: Whether the world has ended.
-    """
-
-    answer: Answer | None = None
-    is_closed = False
-
-    def close(self) -> None:
-        """Mark the connection as closed."""
-        self.is_closed = True
-
-    def reply(self, answer: Answer) -> None:
-        """Store the answer."""
-        self.answer = answer

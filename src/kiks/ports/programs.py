@@ -17,7 +17,7 @@ from kiks.ending import INTERRUPTED, noting_endings
 from kiks.errors import KiksError, ParameterError
 from kiks.ports.file_descriptors import opening
 from kiks.ports.messages import LATE, PUNCTUAL
-from kiks.ports.participant import LocalParticipant, RemoteParticipant
+from kiks.ports.participant import ProgramParticipant, RemoteParticipant
 from kiks.ports.port_names import PortNames
 from kiks.ports.program_process import AnyProgram, Command, Labels, OutputLine, Permission, Process, chance_seed
 from kiks.ports.program_scheduler import PATIENCE_S, START_PATIENCE_S, VISIT_PATIENCE_S, ProgramScheduler
@@ -146,7 +146,7 @@ class Programs:
         self.sim = sim
         self.permission: Permission = AnyProgram()
         self.handles: list[Handle] = []
-        self._visitors: list[LocalParticipant] = []
+        self._visitors: list[ProgramParticipant] = []
         self._is_moving = False
         self._moved = threading.Condition(sim.lock)
         self._say, self._thinking, self._record = say, thinking, record
@@ -234,7 +234,7 @@ class Programs:
         self._wake()
         return handle
 
-    def admit(self, name: str, rank: int) -> LocalParticipant:
+    def admit(self, name: str, rank: int) -> ProgramParticipant:
         """Add a program in a thread of this process; it takes part from its first request on.
 
         Args:
@@ -243,7 +243,7 @@ class Programs:
         """
         with self.sim.lock:
             self._check_open(name)
-            participant = LocalParticipant(name, rank, 0, self.sim, self._scheduler, self._names)
+            participant = ProgramParticipant(name, rank, 0, self.sim, self._scheduler, self._names)
             participant.is_waited_for = False
             self._scheduler.join(participant)
             self._visitors = [each for each in self._visitors if not each.has_left] + [participant]

@@ -1,5 +1,7 @@
 """The line to a robot in a shared world: the program's end of the connection whose other end is `participant.py`.
 
+The connection is a socket from another process, or `local_link.py` from a thread of the same one.
+
 The program keeps its own time: thinking, sleeping and polling need no message. Only requests that need the world make a
 round trip.
 """
@@ -29,12 +31,13 @@ class Connection(ABC):
     """The connection to the world, and the program's time.
 
     Args:
+        lock: Held while it is used.
         is_late: Whether the world may have begun already: then the program's time begins when it first needs it.
         end_ns: Where the time of the world ends [ns], and with it the program.
     """
 
-    def __init__(self, *, is_late: bool = False, end_ns: int = NEVER_NS) -> None:
-        self.lock = OwnLock()
+    def __init__(self, lock: AbstractContextManager[Any], *, is_late: bool = False, end_ns: int = NEVER_NS) -> None:
+        self.lock = lock
         self._now_ns = 0
         self._needs_time = is_late
         self._end_ns = end_ns
@@ -120,7 +123,7 @@ class SocketConnection(Connection):
     """
 
     def __init__(self, connection: socket.socket, *, is_late: bool = False, end_ns: int = NEVER_NS) -> None:
-        super().__init__(is_late=is_late, end_ns=end_ns)
+        super().__init__(OwnLock(), is_late=is_late, end_ns=end_ns)
         self._socket = connection
         self._received = bytearray()
 

@@ -15,7 +15,8 @@ from typing import TypeVar
 from kiks.clock.program_clock import ProgramClock
 from kiks.errors import KiksError, LinkError, ParameterError
 from kiks.model.arena import Arena
-from kiks.ports.local_link import AwaitedAnswer, LocalConnection, PendingAnswer, SharedLine
+from kiks.ports.local_link import AwaitedAnswer, LocalConnection, PendingAnswer
+from kiks.ports.remote_link import RemoteLine
 from kiks.sim.port import VirtualPort
 from kiks.sim.simulation import Simulation
 from kiks.toolbox.own_turrets import OwnTurret, TurretOrder, turret_of
@@ -159,7 +160,7 @@ class SessionClient:
             if turret not in sim.wires[robot - 1].firmware.turrets:
                 sim.fit(robot, OwnTurret(turret, name))
         self.session.trace(for_new_port=True)
-        port = VirtualPort(SharedLine(connection, sim, robot), self._program)
+        port = VirtualPort(RemoteLine(connection, robot), self._program)
         port.baudrate = baud
         port.claim(f"{self.name}, port {-number}")
         port.timeout = ANSWER_S
@@ -377,6 +378,7 @@ class SessionClient:
         if not self.ports:
             raise LinkError("a port must be open for simulated time to pass, but none is. Call kiks_kopen first.")
         self.opened(next(iter(self.ports))).port.sleep(seconds)
+        self._meet()
 
     def live(self, time_ns: int) -> bool:
         """Let time pass [ns] while the program thinks; return whether it did."""
