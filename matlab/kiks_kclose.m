@@ -25,7 +25,6 @@ if nargin > 0 && ~isempty(ref)
 end
 open_ports('remove', number);
 if simulator('--is-running', [])
-    film('stop', number);
     simulator(sprintf('close %d', number));
     film('save', number);
 end

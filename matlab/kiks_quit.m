@@ -16,7 +16,6 @@ poll_desk('end');
 pulse_mm('forget');
 global_value('KIKS_SESSIONACTIVE', []);
 if simulator('--is-running', [])
-    film('stop', 0);
     film('save', 0);
     goes_on = is_shared();
     simulator('--end', []);

@@ -22,11 +22,10 @@ cellfun(@simulator, settings, 'UniformOutput', false);
 if is_new
     film('forget', 0);
 end
-film('stop', 0);
+film('save', 0);
 for move = regexp(unescaped(simulator(world)), '[^\n]+', 'match')
     warn('kiks:arena', '%s', move{1});
 end
-film('save', 0);
 % The ports belonged to the old world.
 open_ports('remove', 0);
 pulse_mm('forget');

@@ -2,11 +2,8 @@ function film(what, number, name)
 % film  The film that kiks_recordmovie has asked for.
 %
 %   film('begin', number, name)  films from now on if there is a name and no film is made; number: port's
-%   film('stop', number)         ends the film that began with this port, 0: with any, at this time
-%   film('save', number)         makes its file, and forgets its name
+%   film('save', number)         ends the film that began with this port, 0: with any, and makes its file
 %   film('forget', number)       the simulator's process has ended, and its film with it
-%
-%   After a film has been stopped, time may pass in the world until it is saved.
 
 persistent port file
 switch what
@@ -16,12 +13,8 @@ switch what
             simulator(sprintf('film %d %s', number, escaped(file)));
             port = number;
         end
-    case 'stop'
-        if is_meant(port, number)
-            simulator('film_stop');
-        end
     case 'save'
-        if is_meant(port, number)
+        if ~isempty(port) && any(number == [0 port])
             port = [];
             global KIKS_MOVIENAME
             KIKS_MOVIENAME = '';
@@ -35,10 +28,6 @@ switch what
     case 'forget'
         port = [];
 end
-end
-
-function yes = is_meant(port, number)
-yes = ~isempty(port) && any(number == [0 port]);
 end
 
 function file = movie_file(name)

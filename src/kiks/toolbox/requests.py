@@ -209,11 +209,6 @@ def _film(client: SessionClient, words: str) -> str:
     return ""
 
 
-def _film_stop(client: SessionClient, words: str) -> str:
-    client.stop_film()
-    return ""
-
-
 def _reset(client: SessionClient, words: str) -> str:
     client.do(lambda sim: None)
     client.session.reset()
@@ -297,7 +292,6 @@ REQUESTS: dict[str, Act] = {
     "reset": _reset,
     "record": _record,
     "film": _film,
-    "film_stop": _film_stop,
     "film_save": lambda client, words: str(client.save_film()),
     "state": lambda client, words: client.do(lambda sim: sim.state_hash()),
     "open": _open,

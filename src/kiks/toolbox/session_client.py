@@ -8,6 +8,7 @@ import re
 import time
 from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
@@ -332,22 +333,19 @@ class SessionClient:
             raise ParameterError("a program must make one film at a time, but it makes one. Call kiks_kclose first.")
         self.film = self.do(lambda sim: SessionFilm(sim, path, robot))
 
-    def stop_film(self) -> None:
-        """End the film at the program's time, if there is one."""
-        film = self.film
-        if film is not None and self._sim is self.session.world:
-            self.do(lambda sim: film.stop())
-        elif film is not None:
-            film.stop()
-
     def save_film(self) -> int:
-        """Make the file of the film; return the number of its pictures, 0 without a film."""
+        """End the film at the program's time and make it; return the number of its pictures, 0 without a film."""
         film, self.film = self.film, None
-        return 0 if film is None else film.save(lambda share: self._check_pending())
+        if film is None:
+            return 0
+        with suppress(LinkError):  # the world may have been replaced
+            self.do(lambda sim: None)
 
-    def _check_pending(self) -> None:
-        if self._pending.is_cancelled:
-            raise LinkError("The program was interrupted; the film was discarded.")
+        def check_pending(share: float) -> None:
+            if self._pending.is_cancelled:
+                raise LinkError("The program was interrupted; the film was discarded.")
+
+        return film.save(check_pending)
 
     # ---- time ----
 

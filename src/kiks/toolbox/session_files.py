@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import contextlib
-import fcntl
 import os
 import socket
-import stat
+from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
-from typing import NamedTuple
+from typing import BinaryIO, NamedTuple
 
 from kiks.errors import LinkError, shown
+from kiks.model.atomic_files import lock, locked_file
 from kiks.ports.pty import default_folder
 from kiks.version import __version__
 
@@ -79,7 +79,7 @@ class SessionFile:
     def __init__(self, address: SessionAddress) -> None:
         self._address = address
         self._path = default_folder() / f"{_PREFIX}{address.number}"
-        self._file = -1
+        self._file: BinaryIO | None = None
 
     def open(self) -> None:
         """Write the file, unless it exists.
@@ -87,17 +87,17 @@ class SessionFile:
         Raises:
             LinkError: If it cannot be written.
         """
-        if self._file < 0:
+        if self._file is None:
             # An earlier process of this number may have left its file behind.
             self._path.unlink(missing_ok=True)
             self._file = _create(self._path, self._address)
 
     def close(self) -> None:
         """Remove the file if it exists."""
-        if self._file >= 0:
+        if self._file is not None:
             self._path.unlink(missing_ok=True)
-            os.close(self._file)
-            self._file = -1
+            self._file.close()
+            self._file = None
 
 
 def find_session(number: int) -> SessionAddress:
@@ -109,7 +109,7 @@ def find_session(number: int) -> SessionAddress:
     Raises:
         LinkError: If there is none.
     """
-    sessions = [address for path in _newest_first(default_folder()) if (address := _read(path)) is not None]
+    sessions = list(_addresses(default_folder()))
     for address in sessions:
         if number in (0, address.number):
             return address
@@ -127,28 +127,23 @@ def write_session_file(address: SessionAddress, path: Path) -> None:
         LinkError: If the file exists or cannot be written.
     """
     beside = path.with_name(f".{path.name}-{os.getpid()}")
-    os.close(_create(beside, address))
-    try:
-        # A link fails if the file exists, and a reader never sees a part of the file.
-        os.link(beside, path)
-    except OSError as error:
-        raise _not_new(path, error) from None
-    finally:
-        beside.unlink(missing_ok=True)
+    with _create(beside, address):
+        try:
+            # A link fails if the file exists, and a reader never sees a part of the file.
+            os.link(beside, path)
+        except OSError as error:
+            raise _not_new(path, error) from None
+        finally:
+            beside.unlink(missing_ok=True)
 
 
-def _create(path: Path, address: SessionAddress) -> int:
-    """Write a new file, lock it and return its descriptor."""
+def _create(path: Path, address: SessionAddress) -> BinaryIO:
+    """Write a new file, and lock it as long as it is open."""
     try:
-        file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW, 0o600)
+        file = locked_file(path, os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW, 0o600)
+        file.write(address.line().encode("ascii"))
+        file.flush()
     except OSError as error:
-        raise _not_new(path, error) from None
-    try:
-        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        os.write(file, address.line().encode("ascii"))
-    except OSError as error:
-        os.close(file)
-        path.unlink(missing_ok=True)
         raise _not_new(path, error) from None
     return file
 
@@ -157,31 +152,21 @@ def _not_new(path: Path, error: OSError) -> LinkError:
     return LinkError(f"{shown(str(path))} must be a new file that can be written, but it is not ({error.strerror}).")
 
 
-def _newest_first(folder: Path) -> list[Path]:
+def _addresses(folder: Path) -> Iterator[SessionAddress]:
+    """Yield the addresses in the locked files, the newest first; delete files without a lock.
+
+    The folder is this user's alone, and so are the files in it.
+    """
     times = {}
     for path in folder.glob(f"{_PREFIX}*"):
-        with contextlib.suppress(OSError):
+        with suppress(OSError):
             times[path] = path.lstat().st_mtime_ns
-    return sorted(times, key=times.__getitem__, reverse=True)
-
-
-def _read(path: Path) -> SessionAddress | None:
-    """Return the address in a locked session file; delete one without a lock, and ignore any other file."""
-    try:
-        file = os.open(path, os.O_RDONLY | os.O_NOFOLLOW | os.O_NONBLOCK)
-    except OSError:
-        return None
-    try:
-        found = os.fstat(file)
-        if not stat.S_ISREG(found.st_mode) or found.st_uid != os.getuid() or found.st_mode & 0o077:
-            return None
-        try:
-            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
-        except BlockingIOError:
-            return SessionAddress.parse(os.read(file, FILE_MAX))
-        path.unlink(missing_ok=True)
-    except OSError:
-        return None
-    finally:
-        os.close(file)
-    return None
+    for path in sorted(times, key=times.__getitem__, reverse=True):
+        with suppress(OSError), open(os.open(path, os.O_RDWR | os.O_NOFOLLOW | os.O_NONBLOCK), "rb") as file:
+            try:
+                if lock(file.fileno(), path):
+                    path.unlink()
+            except BlockingIOError:
+                address = SessionAddress.parse(file.read(FILE_MAX))
+                if address is not None:
+                    yield address

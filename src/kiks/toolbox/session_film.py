@@ -34,18 +34,14 @@ class SessionFilm:
             self._folder.delete()
             raise
 
-    def stop(self) -> None:
-        """End the film with the present state."""
-        self._recorder.close()
-
     def save(self, on_progress: Callable[[float], object]) -> int:
-        """Make the film, and return the number of its pictures.
+        """End the film with the present state, make it, and return the number of its pictures.
 
         Args:
             on_progress: See `save_film`.
         """
         try:
-            self.stop()
+            self._recorder.close()
             return save_film(Recording(self._recording), self._path, robot=self._robot, on_progress=on_progress)
         finally:
             self._folder.delete()
