@@ -20,7 +20,7 @@ from tools.campaigns.runner import Campaign, Play, judge
 
 import kiks
 from kiks.clock.thinking import parse_thinking
-from kiks.control.controller_kinds import ControllerKind
+from kiks.control.controllers import KINDS
 from kiks.learn.evaluation import evaluate
 from kiks.learn.gymnasium_envs import KheperaEnv, KheperaVectorEnv
 from kiks.model.arena import Ball, Cylinder, Lamp, Pose
@@ -256,7 +256,7 @@ def _control(rng: random.Random) -> Subject:
         "counts": 300.0,
     }  # fmt: skip
     found = {}
-    wanted = (*ControllerKind, "random_parameters", "from_recipe", "recipe_for")
+    wanted = (*KINDS, "random_parameters", "from_recipe", "recipe_for")
     wanted += ("coverage", "gathered", "goal_mm", "near_light_share", "reached_s", "wall_following")
     for name in wanted:
         call = getattr(kiks.controllers, name, None) or getattr(kiks.measures, name)

@@ -16,8 +16,8 @@ from kiks.cli.evolution_progress import progress_of
 from kiks.cli.options import Seed, written_folder
 from kiks.cli.outputs import leave_out
 from kiks.cli.record import RecordFile, recorded
-from kiks.control.controller_kinds import ControllerKind
 from kiks.ending import end_as_with_ctrl_c
+from kiks.errors import ParameterError, nearest, shown
 from kiks.learn.algorithm_name import AlgorithmName
 
 if TYPE_CHECKING:
@@ -45,7 +45,8 @@ def evolve(
     ] = None,
     algorithm: Annotated[AlgorithmName | None, typer.Option(help="The task's own if left out.")] = None,
     controller: Annotated[
-        ControllerKind | None, typer.Option(help="The controller to evolve; the task's own if left out.")
+        str | None,
+        typer.Option(metavar="KIND", help="Kind of the controller, such as mlp; the task's own if left out."),
     ] = None,
     seed: Seed = 0,
     seeds: Annotated[
@@ -203,15 +204,19 @@ def _tell_seeds(results: Sequence[Result], folder: Path) -> None:
     typer.echo(f"Picture: {picture}   Summary: {folder / SUMMARY}")
 
 
-def _controller(kind: ControllerKind, task: Task) -> Controller:
+def _controller(kind: str, task: Task) -> Controller:
     """Return a controller of a kind with the senses and the speed limit of a task's own."""
-    from kiks.control.controllers import from_recipe
+    from kiks.control.controllers import KINDS, from_recipe
     from kiks.learn.ready_tasks import SPEED_LIMIT
 
+    if kind not in KINDS:
+        raise ParameterError(
+            f"--controller must be one of {', '.join(KINDS)}, but it was {shown(kind)}.{nearest(kind, KINDS)}"
+        )
     own = task.controller
     limit = (own.recipe or {}).get("speed_limit", SPEED_LIMIT)
-    recipe: dict[str, Any] = {"kind": str(kind), "senses": list(own.senses), "speed_limit": limit}
-    if kind is ControllerKind.CTRNN:
+    recipe: dict[str, Any] = {"kind": kind, "senses": list(own.senses), "speed_limit": limit}
+    if kind == "ctrnn":
         recipe["period_s"] = task.timings[0].period_s
     return from_recipe(recipe)
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kiks.control.compiled_function import RETURNS, Compiled, explained
-from kiks.control.controller_spec import recipe_of
+from kiks.control.recipes import recipe_of
 from kiks.control.senses import check_senses, reading_count
 from kiks.engine.compiling import entry, kernel
 from kiks.engine.physics.motor import SPEED_MAX

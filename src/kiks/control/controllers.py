@@ -4,51 +4,102 @@ Parameters are numbers of about 1: normally distributed around 0 with a deviatio
 `N` inputs are those of the senses, in the order of `senses`: eight of proximity, as shares of 1023 counts, and eight of
 ambient light, (500 - counts) / 500: about 0 in the dark, nearly 1 beside a lamp. Speeds go out as shares of
 `speed_limit`. Matrices are [input, unit], row by row. The same arguments return the same controller.
+
+Each function declares a kind once: its annotations check arguments in calls and in files, and it returns the function
+of the controller, how many numbers that remembers, and how many parameters it has. Numba compiles that function with
+the arguments and all counts as constants.
 """
 
 from __future__ import annotations
 
 import functools
-import itertools
+import inspect
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Annotated, Any, ParamSpec, TypeAlias, Union, cast
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import BeforeValidator, Discriminator, Field, Tag
 
-from kiks.control import neural_nets
+from kiks.control.arguments import record_of
 from kiks.control.controller import Controller
-from kiks.control.controller_kinds import ControllerKind
-from kiks.control.controller_spec import (
-    PERIOD_S,
-    SHAPES,
-    SPEED_LIMIT,
-    TIME_CONSTANT_S,
-    Ctrnn,
-    Elman,
-    Gru,
-    InFile,
-    InModule,
-    Linear,
-    Mlp,
-    Plastic,
-    Policy,
-    Recipe,
-    Shape,
-    find,
-    relative_to,
+from kiks.control.neural_nets import (
+    GAIN,
+    PLASTIC_GAIN,
+    add_products,
+    cut,
+    do_layer,
+    exact_tanh,
+    exponential_between,
+    feed_forward,
+    layer_size,
+    learnt,
+    logistic,
+    rectified,
+    senses_as_inputs,
 )
-from kiks.control.senses import reading_count
+from kiks.control.recipes import InFile, InModule, find, relative_to
+from kiks.control.senses import check_senses, reading_count
 from kiks.engine.numbers import tanh
+from kiks.engine.simd.stack_arrays import stack_floats
 from kiks.errors import ParameterError, shown
 from kiks.model.checks import check_count, check_kind
-from kiks.model.data_file import adapter, check
+from kiks.model.data_file import Number, OneOf, Rule, Switch, Whole, adapter, check
+
+SPEED_LIMIT = 10.0
+"""Default speed of an output of 1 [pulses/10 ms]: 80 mm/s."""
+
+LAYERS_MAX, UNITS_MAX = 8, 512
+"""Most hidden layers, and most units in one: scratch lies on the stack, and learners take 400 by default at most."""
+
+PLASTIC_NEURONS_MAX = 64
+"""Most neurons of a plastic network: each world keeps the weights of all their synapses."""
+
+Units = Annotated[Whole, Field(ge=1, le=UNITS_MAX)]
+if TYPE_CHECKING:
+    Senses: TypeAlias = str | Sequence[str]
+    Layers: TypeAlias = Sequence[int]
+    Recipe: TypeAlias = Any
+else:
+    Senses = Annotated[tuple[str, ...], BeforeValidator(check_senses), Field(min_length=1)]
+    Layers = Annotated[tuple[Units, ...], Field(max_length=LAYERS_MAX, description="One for each hidden layer.")]
+SpeedLimit = Annotated[Number, Field(ge=0, le=127, description="Speed of an output of 1 [pulses/10 ms].")]
+
+Made = tuple[Any, int, int]
+"""The function of a controller, how many numbers it remembers, and how many parameters it has."""
+
+_Arguments = ParamSpec("_Arguments")
+
+KINDS: dict[str, tuple[Any, Callable[[Any], Controller]]] = {}
+"""Of each kind of controllers that come with KiKS: the record of its arguments, and what makes one of these."""
 
 
-def linear(
-    *, senses: Sequence[str] = ("proximity",), speed_limit: float = SPEED_LIMIT, feedback: bool = False
-) -> Controller:
+def kind(function: Callable[_Arguments, Made]) -> Callable[_Arguments, Controller]:
+    """Make of a declaration a function that returns controllers, and a kind of recipes."""
+    name, signature, declared = function.__name__, inspect.signature(function), cast(Callable[..., Made], function)
+    arguments = record_of(function, kind=name)
+
+    @functools.lru_cache(maxsize=1024)
+    def make(given: Any) -> Controller:
+        values = dict(vars(given))
+        del values["kind"]
+        decide, memory, parameters = declared(**values)
+        decide.__name__ = decide.__qualname__ = name
+        recipe = adapter(arguments).dump_python(given, mode="json")
+        return Controller(decide, senses=given.senses, memory=memory, parameters=parameters, recipe=recipe)
+
+    @functools.wraps(function)
+    def call(*args: _Arguments.args, **named: _Arguments.kwargs) -> Controller:
+        return make(arguments(**signature.bind(*args, **named).arguments))
+
+    call.__signature__ = signature.replace(return_annotation=Controller)  # type: ignore[attr-defined]
+    KINDS[name] = arguments, make
+    return call
+
+
+@kind
+def linear(*, senses: Senses = ("proximity",), speed_limit: SpeedLimit = SPEED_LIMIT, feedback: Switch = False) -> Made:
     """Return a Braitenberg vehicle: each wheel a weighted sum of the sensors, cut to +-1.
 
     Parameters: 2 biases, a matrix [N, 2]; with feedback [N + 2, 2], the last two inputs being the last outputs.
@@ -63,16 +114,17 @@ def linear(
         >>> kiks.controllers.linear().parameter_count
         18
     """
-    return _made(ControllerKind.LINEAR, senses=senses, speed_limit=speed_limit, feedback=feedback)
+    return feed_forward((), senses, speed_limit, has_feedback=feedback, squash=cut)
 
 
+@kind
 def mlp(
     *,
-    hidden: Sequence[int] = (6,),
-    senses: Sequence[str] = ("proximity",),
-    speed_limit: float = SPEED_LIMIT,
-    feedback: bool = False,
-) -> Controller:
+    hidden: Layers = (6,),
+    senses: Senses = ("proximity",),
+    speed_limit: SpeedLimit = SPEED_LIMIT,
+    feedback: Switch = False,
+) -> Made:
     """Return a network of layers of tanh units.
 
     Parameters, for each layer: a bias for each unit, a matrix [input, unit]. The last layer are the wheels.
@@ -90,10 +142,11 @@ def mlp(
         >>> kiks.controllers.mlp(hidden=(6,)).parameter_count
         68
     """
-    return _made(ControllerKind.MLP, hidden=hidden, senses=senses, speed_limit=speed_limit, feedback=feedback)
+    return feed_forward(hidden, senses, speed_limit, has_feedback=feedback)
 
 
-def elman(*, units: int = 4, senses: Sequence[str] = ("proximity",), speed_limit: float = SPEED_LIMIT) -> Controller:
+@kind
+def elman(*, units: Units = 4, senses: Senses = ("proximity",), speed_limit: SpeedLimit = SPEED_LIMIT) -> Made:
     """Return hidden units h that feed back to themselves and a layer of tanh from them to the wheels.
 
     h becomes tanh(units of the inputs s and of h); the last h is the context (Elman, Finding structure in time,
@@ -111,17 +164,34 @@ def elman(*, units: int = 4, senses: Sequence[str] = ("proximity",), speed_limit
         >>> kiks.controllers.elman(units=4).parameter_count
         62
     """
-    return _made(ControllerKind.ELMAN, units=units, senses=senses, speed_limit=speed_limit)
+    sense_count, take_senses = reading_count(senses), senses_as_inputs(senses)
+    input_count = sense_count + units
+    wheels_first = layer_size(input_count, units)
+
+    def decide(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
+        inputs, fresh, outputs = stack_floats(input_count), stack_floats(units), stack_floats(2)
+        take_senses(sensors, inputs)
+        for k in range(units):
+            inputs[sense_count + k] = memory[k]
+        do_layer(inputs, input_count, parameters, 0, fresh, units)
+        for k in range(units):
+            memory[k] = tanh(fresh[k])
+        do_layer(memory, units, parameters, wheels_first, outputs, 2)
+        for wheel in range(2):
+            wheels[wheel] = speed_limit * tanh(outputs[wheel])
+
+    return decide, units, wheels_first + layer_size(units, 2)
 
 
+@kind
 def ctrnn(
     *,
-    neurons: int = 6,
-    period_s: float = PERIOD_S,
-    time_constant_s: float = TIME_CONSTANT_S,
-    senses: Sequence[str] = ("proximity",),
-    speed_limit: float = SPEED_LIMIT,
-) -> Controller:
+    neurons: Annotated[Whole, Field(ge=2, le=UNITS_MAX, description="The first two are the wheels.")] = 6,
+    period_s: Annotated[Number, Field(ge=0.001, le=10, description="Time that passes in a call.")] = 0.1,
+    time_constant_s: Annotated[Number, Field(ge=0.001, le=1000, description="Of a parameter of 0.")] = 0.4,
+    senses: Senses = ("proximity",),
+    speed_limit: SpeedLimit = SPEED_LIMIT,
+) -> Made:
     """Return a continuous-time recurrent neural network; its first two neurons are the wheels.
 
     The state y of a neuron follows T dy/dt = -y + sum of w f(y' + b') over all neurons + sum of v s over the inputs, f
@@ -138,17 +208,40 @@ def ctrnn(
         senses: Its senses, of 'proximity', 'ambient' and 'camera'.
         speed_limit: The highest speed [pulses/10 ms].
     """
-    return _made(
-        ControllerKind.CTRNN,
-        neurons=neurons,
-        period_s=period_s,
-        time_constant_s=time_constant_s,
-        senses=senses,
-        speed_limit=speed_limit,
-    )
+    sense_count, take_senses = reading_count(senses), senses_as_inputs(senses)
+    bias_first, senses_first = neurons, 2 * neurons
+    neurons_first = senses_first + sense_count * neurons
+    periods = period_s / time_constant_s
+
+    def decide(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
+        inputs, rates = stack_floats(sense_count), stack_floats(neurons)
+        driven, active, towards = stack_floats(neurons), stack_floats(neurons), stack_floats(neurons)
+        fastest = 0.0
+        for k in range(neurons):
+            rates[k] = periods * exponential_between(-parameters[k])
+            driven[k] = 0.0
+        for k in range(neurons):
+            fastest = max(fastest, rates[k])
+        take_senses(sensors, inputs)
+        add_products(inputs, sense_count, parameters, senses_first, driven, neurons)
+        # Steps of at most half of the shortest time constant neither swing nor run away.
+        step_count = max(int(np.ceil(2.0 * fastest)), 1)
+        share = 1.0 / step_count
+        for _ in range(step_count):
+            for k in range(neurons):
+                active[k] = logistic(memory[k] + GAIN * parameters[bias_first + k])
+                towards[k] = driven[k]
+            add_products(active, neurons, parameters, neurons_first, towards, neurons)
+            for k in range(neurons):
+                memory[k] += share * rates[k] * (GAIN * towards[k] - memory[k])
+        for wheel in range(2):
+            wheels[wheel] = speed_limit * tanh(0.5 * (memory[wheel] + GAIN * parameters[bias_first + wheel]))
+
+    return decide, neurons, neurons_first + neurons * neurons
 
 
-def gru(*, units: int = 4, senses: Sequence[str] = ("proximity",), speed_limit: float = SPEED_LIMIT) -> Controller:
+@kind
+def gru(*, units: Units = 4, senses: Senses = ("proximity",), speed_limit: SpeedLimit = SPEED_LIMIT) -> Made:
     """Return gated recurrent units h and a layer of tanh from them to the wheels.
 
     z and r are logistic units of the inputs s and of h; then h becomes z h + (1 - z) tanh(units of s and of r h)
@@ -162,16 +255,44 @@ def gru(*, units: int = 4, senses: Sequence[str] = ("proximity",), speed_limit: 
         senses: Its senses, of 'proximity', 'ambient' and 'camera'.
         speed_limit: The highest speed [pulses/10 ms].
     """
-    return _made(ControllerKind.GRU, units=units, senses=senses, speed_limit=speed_limit)
+    sense_count, take_senses = reading_count(senses), senses_as_inputs(senses)
+    input_count, gate_count = sense_count + units, 2 * units
+    units_first = layer_size(input_count, gate_count)
+    wheels_first = units_first + layer_size(input_count, units)
+
+    def decide(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
+        inputs, outputs = stack_floats(input_count), stack_floats(2)
+        gates, fresh = stack_floats(gate_count), stack_floats(units)
+        take_senses(sensors, inputs)
+        for k in range(units):
+            inputs[sense_count + k] = memory[k]
+        do_layer(inputs, input_count, parameters, 0, gates, gate_count)
+        for k in range(gate_count):
+            gates[k] = logistic(gates[k])
+        for k in range(units):
+            inputs[sense_count + k] *= gates[units + k]
+        do_layer(inputs, input_count, parameters, units_first, fresh, units)
+        for k in range(units):
+            memory[k] = gates[k] * memory[k] + (1.0 - gates[k]) * tanh(fresh[k])
+        do_layer(memory, units, parameters, wheels_first, outputs, 2)
+        for wheel in range(2):
+            wheels[wheel] = speed_limit * tanh(outputs[wheel])
+
+    return decide, units, wheels_first + layer_size(units, 2)
 
 
+@kind
 def plastic(
     *,
-    neurons: int = 3,
-    per: str = "synapse",
-    senses: Sequence[str] = ("proximity",),
-    speed_limit: float = SPEED_LIMIT,
-) -> Controller:
+    neurons: Annotated[Whole, Field(ge=2, le=PLASTIC_NEURONS_MAX, description="The first two are the wheels.")] = 3,
+    per: Annotated[
+        str,
+        OneOf(("synapse", "neuron")),
+        Field(description="What has a rule, a sign and a learning rate of its own."),
+    ] = "synapse",
+    senses: Senses = ("proximity",),
+    speed_limit: SpeedLimit = SPEED_LIMIT,
+) -> Made:
     """Return neurons whose weights change by Hebbian rules while the robot drives; the first two are the wheels.
 
     Parameters say how weights change, and no parameter is a weight (Floreano and Mondada, Evolution of plastic
@@ -204,17 +325,59 @@ def plastic(
         >>> [kiks.controllers.plastic(per=each).parameter_count for each in ("synapse", "neuron")]
         [108, 21]
     """
-    return _made(ControllerKind.PLASTIC, neurons=neurons, per=per, senses=senses, speed_limit=speed_limit)
+    sense_count, take_senses = reading_count(senses), senses_as_inputs(senses)
+    sender_count = sense_count + neurons + 1
+    synapse_count = sender_count * neurons
+    # A rate stands `row` further on for the next sender, and each table `size` behind the one before.
+    row, size = (neurons, synapse_count) if per == "synapse" else (0, neurons)
+    signs_first, sign_row, sign_column = (0, neurons, 1) if per == "synapse" else (0, 1, 0)
+    rates_first = 0 if per == "synapse" else sender_count
+    first_bits, second_bits = rates_first + size, rates_first + 2 * size
+
+    # The memory holds the activity of each neuron, then the weights, [sender, neuron].
+    def decide(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
+        senders, totals = stack_floats(sender_count), stack_floats(neurons)
+        take_senses(sensors, senders)
+        for k in range(sense_count):
+            senders[k] = min(max(0.0, senders[k]), 1.0)
+        for k in range(neurons):
+            senders[sense_count + k] = memory[k]
+            totals[k] = 0.0
+        senders[sender_count - 1] = 1.0
+        for sender in range(sender_count):
+            for k in range(neurons):
+                excites = parameters[signs_first + sender * sign_row + k * sign_column] > 0.0
+                given = senders[sender] * memory[neurons + sender * neurons + k]
+                totals[k] += given if excites else -given
+        for k in range(neurons):
+            memory[k] = logistic(PLASTIC_GAIN * totals[k])
+        for sender in range(sender_count):
+            for k in range(neurons):
+                own, rule = neurons + sender * neurons + k, sender * row + k
+                rate = abs(parameters[rates_first + rule])
+                change = learnt(
+                    memory[own],
+                    senders[sender],
+                    memory[k],
+                    parameters[first_bits + rule] > 0.0,
+                    parameters[second_bits + rule] > 0.0,
+                )
+                memory[own] += rate / (1.0 + rate) * change
+        for wheel in range(2):
+            wheels[wheel] = speed_limit * (2.0 * memory[wheel] - 1.0)
+
+    return decide, neurons + synapse_count, rates_first + 3 * size
 
 
+@kind
 def policy(
     *,
-    hidden: Sequence[int] = (16, 16),
-    activation: str = "tanh",
-    output: str = "clip",
-    senses: Sequence[str] = ("proximity",),
-    speed_limit: float = SPEED_LIMIT,
-) -> Controller:
+    hidden: Layers = (16, 16),
+    activation: Annotated[str, OneOf(("tanh", "relu")), Field(description="Of hidden units.")] = "tanh",
+    output: Annotated[str, OneOf(("clip", "tanh")), Field(description="What keeps outputs within +-1.")] = "clip",
+    senses: Senses = ("proximity",),
+    speed_limit: SpeedLimit = SPEED_LIMIT,
+) -> Made:
     """Return the network of a policy that PyTorch or another library learnt; `kiks.champion_of_policy` fills it.
 
     It is an `mlp` with a choice of functions, and with the tanh of a mathematical library to the last digits, where
@@ -232,14 +395,33 @@ def policy(
         >>> kiks.controllers.policy(hidden=(64, 64)).parameter_count
         4866
     """
-    return _made(
-        ControllerKind.POLICY,
-        hidden=hidden,
-        activation=activation,
-        output=output,
-        senses=senses,
-        speed_limit=speed_limit,
+    return feed_forward(
+        hidden,
+        senses,
+        speed_limit,
+        activation=exact_tanh if activation == "tanh" else rectified,
+        squash=exact_tanh if output == "tanh" else cut,
     )
+
+
+# ---- controllers in files ----
+
+
+def _tag(given: Any) -> str | None:
+    """Return the kind of a recipe."""
+    if not isinstance(given, Mapping):
+        return None
+    return str(given["kind"]) if "kind" in given else next((key for key in ("function", "file") if key in given), None)
+
+
+if not TYPE_CHECKING:
+    _RECORDS = {name: arguments for name, (arguments, _) in KINDS.items()} | {"function": InModule, "file": InFile}
+    Recipe = Annotated[
+        Union[tuple(Annotated[each, Tag(tag)] for tag, each in _RECORDS.items())],  # noqa: UP007
+        Discriminator(_tag),
+        Rule(f"a table with a kind ({', '.join(KINDS)}), or a function, or a file and a name"),
+    ]
+    """The recipe of a controller in a file."""
 
 
 def from_recipe(recipe: Mapping[str, Any], folder: str | Path = ".") -> Controller:
@@ -256,20 +438,13 @@ def from_recipe(recipe: Mapping[str, Any], folder: str | Path = ".") -> Controll
         >>> kiks.controllers.from_recipe({"kind": "gru", "units": 3}) is kiks.controllers.gru(units=3)
         True
     """
-    return controller_of(check_recipe(recipe), folder)
-
-
-def check_recipe(recipe: object) -> Recipe:
-    """Return the recipe of a table; nothing that it names is run."""
-    model: Any = Recipe
-    made: Recipe = check(model, recipe, "the recipe")
-    return made
+    return controller_of(check(Recipe, recipe, "the recipe"), folder)
 
 
 def controller_of(recipe: Recipe, folder: str | Path) -> Controller:
-    """Return the controller of a recipe in a file of a folder. A user's own module or file is run."""
+    """Return the controller of a checked recipe of a file in a folder. A user's own module or file is run."""
     if not isinstance(recipe, InModule | InFile):
-        return _shaped(recipe)
+        return KINDS[recipe.kind][1](recipe)
     found = find(recipe, folder)
     if not isinstance(found, Controller):
         raise ParameterError(
@@ -301,95 +476,3 @@ def random_parameters(controller: Controller, count: int, *, seed: int) -> NDArr
         )
     check_count("seed", seed, most=2**63 - 1)
     return np.random.default_rng(seed).standard_normal((check_count("count", count), controller.parameter_count))
-
-
-# ---- one object for the same arguments: what is compiled for it is compiled once ----
-
-
-def _made(kind: ControllerKind, **arguments: Any) -> Controller:
-    shape: Any = SHAPES[kind]
-    return _shaped(shape(kind=str(kind), **arguments))
-
-
-@functools.lru_cache(maxsize=1024)
-def _shaped(recipe: Shape) -> Controller:
-    decide, memory, size = _FUNCTIONS[type(recipe)](recipe, reading_count(recipe.senses))
-    decide.__name__ = decide.__qualname__ = recipe.kind
-    model: Any = type(recipe)
-    said = adapter(model).dump_python(recipe, mode="json")
-    return Controller(decide, senses=recipe.senses, memory=memory, parameters=size, recipe=said)
-
-
-# Each returns the function of a controller, and how many numbers of memory and how many parameters it has.
-
-
-def _layered(recipe: Linear | Mlp, sense_count: int) -> tuple[Any, int, int]:
-    memory = 2 * recipe.feedback
-    hidden = recipe.hidden if isinstance(recipe, Mlp) else ()
-    counts = (sense_count + memory, *hidden, 2)
-    decide = neural_nets.feed_forward(
-        counts,
-        recipe.senses,
-        has_feedback=recipe.feedback,
-        squash=neural_nets.cut if isinstance(recipe, Linear) else tanh,
-        speed_limit=recipe.speed_limit,
-    )
-    return decide, memory, _layers_size(counts)
-
-
-def _layers_size(counts: tuple[int, ...]) -> int:
-    return sum(neural_nets.layer_size(*pair) for pair in itertools.pairwise(counts))
-
-
-def _learnt(recipe: Policy, sense_count: int) -> tuple[Any, int, int]:
-    counts = (sense_count, *recipe.hidden, 2)
-    decide = neural_nets.feed_forward(
-        counts,
-        recipe.senses,
-        activation=neural_nets.exact_tanh if recipe.activation == "tanh" else neural_nets.rectified,
-        squash=neural_nets.exact_tanh if recipe.output == "tanh" else neural_nets.cut,
-        speed_limit=recipe.speed_limit,
-    )
-    return decide, 0, _layers_size(counts)
-
-
-def _simple_recurrent(recipe: Elman, sense_count: int) -> tuple[Any, int, int]:
-    size = neural_nets.layer_size(sense_count + recipe.units, recipe.units) + neural_nets.layer_size(recipe.units, 2)
-    decide = neural_nets.simple_recurrent(recipe.senses, recipe.units, speed_limit=recipe.speed_limit)
-    return decide, recipe.units, size
-
-
-def _continuous(recipe: Ctrnn, sense_count: int) -> tuple[Any, int, int]:
-    decide = neural_nets.continuous(
-        recipe.senses,
-        recipe.neurons,
-        period_s=recipe.period_s,
-        time_constant_s=recipe.time_constant_s,
-        speed_limit=recipe.speed_limit,
-    )
-    return decide, recipe.neurons, recipe.neurons * (2 + sense_count + recipe.neurons)
-
-
-def _gated(recipe: Gru, sense_count: int) -> tuple[Any, int, int]:
-    size = 3 * neural_nets.layer_size(sense_count + recipe.units, recipe.units)
-    decide = neural_nets.gated(recipe.senses, recipe.units, speed_limit=recipe.speed_limit)
-    return decide, recipe.units, size + neural_nets.layer_size(recipe.units, 2)
-
-
-def _plastic(recipe: Plastic, sense_count: int) -> tuple[Any, int, int]:
-    is_per_synapse = recipe.per == "synapse"
-    decide = neural_nets.plastic(
-        recipe.senses, recipe.neurons, is_per_synapse=is_per_synapse, speed_limit=recipe.speed_limit
-    )
-    return decide, *neural_nets.plastic_size(sense_count, recipe.neurons, is_per_synapse=is_per_synapse)
-
-
-_FUNCTIONS: dict[type[Shape], Callable[[Any, int], tuple[Any, int, int]]] = {
-    Linear: _layered,
-    Mlp: _layered,
-    Elman: _simple_recurrent,
-    Ctrnn: _continuous,
-    Gru: _gated,
-    Plastic: _plastic,
-    Policy: _learnt,
-}

@@ -1,22 +1,25 @@
 """The measures that come with KiKS: distances, performance and places of a robot.
 
-Speeds are those that were sent, in pulses/10 ms; 1 pulse/10 ms is 8 mm/s. A mean is one over control steps. Functions
-in brackets return the same measure for the same arguments.
+Speeds are those that were sent, in pulses/10 ms; 1 pulse/10 ms is 8 mm/s. A mean is one over control steps. A measure
+with arguments is a function that returns it, the same one for the same arguments.
 """
 
 from __future__ import annotations
 
 import functools
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
+from kiks.control.arguments import made_once
 from kiks.control.measure import Measure, measure
 from kiks.engine.compiling import kernel
-from kiks.errors import ParameterError, shown
+from kiks.errors import ParameterError
 from kiks.model.arena import Arena
-from kiks.model.checks import check_number
+from kiks.model.checks import check_kind, check_number
+from kiks.model.data_file import Number, OneOf
 
 FULL_SPEED = 10.0
 """Speed that counts as 1 [pulses/10 ms]: 80 mm/s, at which Floreano and Mondada's robot drove at most."""
@@ -43,6 +46,14 @@ FULL_COUNT = 1023.0
 """Proximity that counts as 1 (khepera-protocol.md 8.4)."""
 
 PLACE_LIMIT_MM, SQUARE_LIMIT = 1e6, 1_000_000
+
+SIDE_SENSORS = {"left": 0, "right": 5}
+"""The sensor on each side, counted clockwise from the left (khepera-protocol.md 8.4)."""
+
+Side = Annotated[str, OneOf(tuple(SIDE_SENSORS))]
+Counts = Annotated[Number, Field(ge=1, le=FULL_COUNT)]
+Place = Annotated[Number, Field(ge=-PLACE_LIMIT_MM, le=PLACE_LIMIT_MM)]
+Radius = Annotated[Number, Field(ge=0, le=PLACE_LIMIT_MM)]
 
 _BITS = 52
 """Yes-or-no answers in a note, which holds whole numbers up to 2^53."""
@@ -134,7 +145,8 @@ def avoidance(moment: Any, notes: Any) -> None:
     notes[1] += 1.0
 
 
-def wall_following(side: str = "left", *, counts: float = 50.0) -> Measure:
+@made_once
+def wall_following(side: Side = "left", *, counts: Counts = 50.0) -> Measure:
     """Mean of m k w: it gets along a wall on that side, and keeps it.
 
     m is how far it is from where it was in the last two seconds, as in `roaming`, and 1 from 30 mm/s on. k grows from
@@ -146,11 +158,8 @@ def wall_following(side: str = "left", *, counts: float = 50.0) -> Measure:
         side: 'left' or 'right'.
         counts: Proximity of the sensor on that side from which on a wall is at its side.
     """
-    return _wall_following(_side_sensor(side), _wall_counts(counts))
+    sensor = SIDE_SENSORS[side]
 
-
-@functools.lru_cache(maxsize=256)
-def _wall_following(sensor: int, counts: float) -> Measure:
     @measure(notes=6, result=mean, senses=("proximity",))
     def wall_following(moment: Any, notes: Any) -> None:
         away_mm = moved_lately_mm(moment, notes)
@@ -167,18 +176,16 @@ def _wall_following(sensor: int, counts: float) -> Measure:
     return wall_following
 
 
-def beside_wall_share(side: str = "left", *, counts: float = 50.0) -> Measure:
+@made_once
+def beside_wall_share(side: Side = "left", *, counts: Counts = 50.0) -> Measure:
     """Share of control steps in which a wall was at its side.
 
     Args:
         side: 'left' or 'right'.
         counts: Proximity of the sensor on that side from which on a wall is at its side.
     """
-    return _beside_wall_share(_side_sensor(side), _wall_counts(counts))
+    sensor = SIDE_SENSORS[side]
 
-
-@functools.lru_cache(maxsize=256)
-def _beside_wall_share(sensor: int, counts: float) -> Measure:
     @measure(notes=2, result=mean, senses=("proximity",))
     def beside_wall_share(moment: Any, notes: Any) -> None:
         notes[0] += 1.0 if moment.sensors[sensor] >= counts else 0.0
@@ -209,8 +216,7 @@ def coverage(arena: Arena, *, square_mm: float = 100.0) -> Measure:
         arena: The arena; squares that are all wall count, too.
         square_mm: Edge of a square [mm].
     """
-    if not isinstance(arena, Arena):
-        raise ParameterError(f"arena must be a kiks.Arena, but it was {shown(arena)}.")
+    check_kind("arena", arena, Arena)
     edge_mm = check_number("square_mm", square_mm, 1, PLACE_LIMIT_MM)
     columns, rows = int(np.ceil(arena.width_mm / edge_mm)), int(np.ceil(arena.height_mm / edge_mm))
     if columns * rows > SQUARE_LIMIT:
@@ -237,13 +243,10 @@ def _coverage(columns: int, rows: int, edge_mm: float) -> Measure:
     return coverage
 
 
-def goal_mm(x_mm: float, y_mm: float) -> Measure:
+@made_once
+def goal_mm(x_mm: Place, y_mm: Place) -> Measure:
     """How far it is from a place [mm]."""
-    return _goal_mm(_place("x_mm", x_mm), _place("y_mm", y_mm))
 
-
-@functools.lru_cache(maxsize=256)
-def _goal_mm(x_mm: float, y_mm: float) -> Measure:
     @measure
     def goal_mm(moment: Any, notes: Any) -> None:
         notes[0] = distance_mm(moment, x_mm, y_mm)
@@ -251,13 +254,10 @@ def _goal_mm(x_mm: float, y_mm: float) -> Measure:
     return goal_mm
 
 
-def closest_mm(x_mm: float, y_mm: float) -> Measure:
+@made_once
+def closest_mm(x_mm: Place, y_mm: Place) -> Measure:
     """How near it has come to a place, at best [mm]."""
-    return _closest_mm(_place("x_mm", x_mm), _place("y_mm", y_mm))
 
-
-@functools.lru_cache(maxsize=256)
-def _closest_mm(x_mm: float, y_mm: float) -> Measure:
     @measure(notes=2)
     def closest_mm(moment: Any, notes: Any) -> None:
         away_mm = distance_mm(moment, x_mm, y_mm)
@@ -267,13 +267,10 @@ def _closest_mm(x_mm: float, y_mm: float) -> Measure:
     return closest_mm
 
 
-def reached_s(x_mm: float, y_mm: float, *, radius_mm: float = 50.0) -> Measure:
+@made_once
+def reached_s(x_mm: Place, y_mm: Place, *, radius_mm: Radius = 50.0) -> Measure:
     """When it first came within a radius of a place [s]; if it never did, how long it has tried."""
-    return _reached_s(_place("x_mm", x_mm), _place("y_mm", y_mm), _radius(radius_mm))
 
-
-@functools.lru_cache(maxsize=256)
-def _reached_s(x_mm: float, y_mm: float, radius_mm: float) -> Measure:
     @measure(notes=2)
     def reached_s(moment: Any, notes: Any) -> None:
         if notes[1] == 0.0:
@@ -283,7 +280,8 @@ def _reached_s(x_mm: float, y_mm: float, radius_mm: float) -> Measure:
     return reached_s
 
 
-def escaped_share(*, radius_mm: float = 57.0) -> Measure:
+@made_once
+def escaped_share(*, radius_mm: Radius = 57.0) -> Measure:
     """Share of control steps before another robot's middle first came within a radius of its own; 1 if none did.
 
     The middles of two Kheperas that touch are 55 mm apart. Control steps see where robots are: Kheperas that pass each
@@ -292,11 +290,7 @@ def escaped_share(*, radius_mm: float = 57.0) -> Measure:
     Args:
         radius_mm: The radius [mm].
     """
-    return _escaped_share(_radius(radius_mm))
 
-
-@functools.lru_cache(maxsize=256)
-def _escaped_share(radius_mm: float) -> Measure:
     @measure(notes=3, result=mean)
     def escaped_share(moment: Any, notes: Any) -> None:
         for other in range(moment.poses.shape[0]):
@@ -330,13 +324,10 @@ def light_approach(moment: Any, notes: Any) -> None:
     notes[1] += 1.0
 
 
-def light_stay_s(radius_mm: float = 100.0) -> Measure:
+@made_once
+def light_stay_s(radius_mm: Radius = 100.0) -> Measure:
     """How long it has been within a radius of a lamp that burns, without a break until the end [s]; 0 if it is not."""
-    return _light_stay_s(_radius(radius_mm))
 
-
-@functools.lru_cache(maxsize=256)
-def _light_stay_s(radius_mm: float) -> Measure:
     @measure
     def light_stay_s(moment: Any, notes: Any) -> None:
         notes[0] = notes[0] + moment.period_s if nearest_lamp_mm(moment) <= radius_mm else 0.0
@@ -344,13 +335,10 @@ def _light_stay_s(radius_mm: float) -> Measure:
     return light_stay_s
 
 
-def near_light_share(radius_mm: float = 100.0) -> Measure:
+@made_once
+def near_light_share(radius_mm: Radius = 100.0) -> Measure:
     """Share of control steps in which it was within a radius of a lamp that burns."""
-    return _near_light_share(_radius(radius_mm))
 
-
-@functools.lru_cache(maxsize=256)
-def _near_light_share(radius_mm: float) -> Measure:
     @measure(notes=2, result=mean)
     def near_light_share(moment: Any, notes: Any) -> None:
         notes[0] += 1.0 if nearest_lamp_mm(moment) <= radius_mm else 0.0
@@ -359,13 +347,10 @@ def _near_light_share(radius_mm: float) -> Measure:
     return near_light_share
 
 
-def gathered(x_mm: float, y_mm: float, *, radius_mm: float = 150.0) -> Measure:
+@made_once
+def gathered(x_mm: Place, y_mm: Place, *, radius_mm: Radius = 150.0) -> Measure:
     """How many balls and cylinders have their middle within a radius of a place."""
-    return _gathered(_place("x_mm", x_mm), _place("y_mm", y_mm), _radius(radius_mm))
 
-
-@functools.lru_cache(maxsize=256)
-def _gathered(x_mm: float, y_mm: float, radius_mm: float) -> Measure:
     @measure
     def gathered(moment: Any, notes: Any) -> None:
         notes[0] = 0.0
@@ -376,13 +361,10 @@ def _gathered(x_mm: float, y_mm: float, radius_mm: float) -> Measure:
     return gathered
 
 
-def largest_group(radius_mm: float = 100.0) -> Measure:
+@made_once
+def largest_group(radius_mm: Radius = 100.0) -> Measure:
     """Largest number of balls and cylinders that have their middles within a radius of one of them, itself included."""
-    return _largest_group(_radius(radius_mm))
 
-
-@functools.lru_cache(maxsize=256)
-def _largest_group(radius_mm: float) -> Measure:
     @measure
     def largest_group(moment: Any, notes: Any) -> None:
         notes[0] = 0.0
@@ -482,21 +464,3 @@ def from_lamp_mm(moment: Any, x_mm: Any, y_mm: Any) -> Any:
             across, up = x_mm - moment.lamps[lamp, 0], y_mm - moment.lamps[lamp, 1]
             nearest = min(nearest, np.sqrt(across * across + up * up))
     return nearest
-
-
-def _side_sensor(side: object) -> int:
-    if not isinstance(side, str) or side not in ("left", "right"):
-        raise ParameterError(f"side must be 'left' or 'right', but it was {shown(side)}.")
-    return 0 if side == "left" else 5
-
-
-def _wall_counts(counts: object) -> float:
-    return check_number("counts", counts, 1, FULL_COUNT)
-
-
-def _place(name: str, value: object) -> float:
-    return check_number(name, value, -PLACE_LIMIT_MM, PLACE_LIMIT_MM)
-
-
-def _radius(value: object) -> float:
-    return check_number("radius_mm", value, 0, PLACE_LIMIT_MM)

@@ -10,9 +10,9 @@ Parameters of a layer are a matrix [1 + input, unit] row by row: first the biase
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
-
-import numpy as np
 
 from kiks.control.senses import SENSES, reading_count
 from kiks.engine.compiling import inlined, kernel
@@ -82,7 +82,7 @@ def do_layer(inputs: Any, input_count: Any, parameters: Any, first: Any, units: 
     add_products(inputs, input_count, parameters, first + unit_count, units, unit_count)
 
 
-def senses_as_inputs(senses: tuple[str, ...]) -> Any:
+def senses_as_inputs(senses: Sequence[str]) -> Any:
     """Return a kernel `(sensors, inputs)` that writes the counts of senses as inputs.
 
     Proximity and greys of the camera are shares of the largest reading. Ambient counts fall in light, so their inputs
@@ -141,26 +141,28 @@ def layers(counts: tuple[int, ...], activation: Any, first: int = 0) -> Any:
 
 
 def feed_forward(
-    counts: tuple[int, ...],
-    senses: tuple[str, ...],
+    hidden: Sequence[int],
+    senses: Sequence[str],
+    speed_limit: float,
     *,
     has_feedback: bool = False,
     activation: Any = tanh,
     squash: Any = tanh,
-    speed_limit: float,
-) -> Any:
-    """Return the function of a controller: layers from the senses, and its last speeds if so wanted, to the wheels.
+) -> tuple[Any, int, int]:
+    """Return the function of a controller whose layers lead from the senses to the wheels, its memory and parameters.
 
     Args:
-        counts: Inputs, units of each hidden layer, 2.
+        hidden: Units of each hidden layer.
         senses: The senses of the inputs.
+        speed_limit: The speed of an output of 1 [pulses/10 ms].
         has_feedback: Whether the last two inputs are the last outputs, from the memory.
         activation: Kernel of hidden units.
         squash: Kernel that keeps outputs within +-1.
-        speed_limit: The speed of an output of 1 [pulses/10 ms].
     """
-    input_count, memory_count, net = counts[0], 2 * has_feedback, layers(counts, activation)
-    sense_count, take_senses = input_count - memory_count, senses_as_inputs(senses)
+    sense_count, memory_count, take_senses = reading_count(senses), 2 * has_feedback, senses_as_inputs(senses)
+    input_count = sense_count + memory_count
+    counts = (input_count, *hidden, 2)
+    net = layers(counts, activation)
 
     def decide(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
         inputs, outputs = stack_floats(input_count), stack_floats(2)
@@ -174,92 +176,7 @@ def feed_forward(
             if has_feedback:
                 memory[wheel] = output
 
-    return decide
-
-
-def simple_recurrent(senses: tuple[str, ...], unit_count: int, *, speed_limit: float) -> Any:
-    """Return the function of a controller: units that feed back to themselves; see `kiks.controllers.elman`."""
-    sense_count, take_senses = reading_count(senses), senses_as_inputs(senses)
-    input_count = sense_count + unit_count
-    wheels_first = layer_size(input_count, unit_count)
-
-    def decide(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
-        inputs, fresh, outputs = stack_floats(input_count), stack_floats(unit_count), stack_floats(2)
-        take_senses(sensors, inputs)
-        for k in range(unit_count):
-            inputs[sense_count + k] = memory[k]
-        do_layer(inputs, input_count, parameters, 0, fresh, unit_count)
-        for k in range(unit_count):
-            memory[k] = tanh(fresh[k])
-        do_layer(memory, unit_count, parameters, wheels_first, outputs, 2)
-        for wheel in range(2):
-            wheels[wheel] = speed_limit * tanh(outputs[wheel])
-
-    return decide
-
-
-def continuous(
-    senses: tuple[str, ...], neuron_count: int, *, period_s: float, time_constant_s: float, speed_limit: float
-) -> Any:
-    """Return the function of a controller: a continuous-time recurrent network; see `kiks.controllers.ctrnn`."""
-    sense_count, take_senses = reading_count(senses), senses_as_inputs(senses)
-    bias_first, senses_first = neuron_count, 2 * neuron_count
-    neurons_first = senses_first + sense_count * neuron_count
-    periods = period_s / time_constant_s
-
-    def decide(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
-        inputs, rates = stack_floats(sense_count), stack_floats(neuron_count)
-        driven, active, towards = stack_floats(neuron_count), stack_floats(neuron_count), stack_floats(neuron_count)
-        fastest = 0.0
-        for k in range(neuron_count):
-            rates[k] = periods * exponential_between(-parameters[k])
-            driven[k] = 0.0
-        for k in range(neuron_count):
-            fastest = max(fastest, rates[k])
-        take_senses(sensors, inputs)
-        add_products(inputs, sense_count, parameters, senses_first, driven, neuron_count)
-        # Steps of at most half of the shortest time constant neither swing nor run away.
-        step_count = max(int(np.ceil(2.0 * fastest)), 1)
-        share = 1.0 / step_count
-        for _ in range(step_count):
-            for k in range(neuron_count):
-                active[k] = logistic(memory[k] + GAIN * parameters[bias_first + k])
-                towards[k] = driven[k]
-            add_products(active, neuron_count, parameters, neurons_first, towards, neuron_count)
-            for k in range(neuron_count):
-                memory[k] += share * rates[k] * (GAIN * towards[k] - memory[k])
-        for wheel in range(2):
-            wheels[wheel] = speed_limit * tanh(0.5 * (memory[wheel] + GAIN * parameters[bias_first + wheel]))
-
-    return decide
-
-
-def gated(senses: tuple[str, ...], unit_count: int, *, speed_limit: float) -> Any:
-    """Return the function of a controller: gated recurrent units; see `kiks.controllers.gru`."""
-    sense_count, take_senses = reading_count(senses), senses_as_inputs(senses)
-    input_count, gate_count = sense_count + unit_count, 2 * unit_count
-    units_first = layer_size(input_count, gate_count)
-    wheels_first = units_first + layer_size(input_count, unit_count)
-
-    def decide(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
-        inputs, outputs = stack_floats(input_count), stack_floats(2)
-        gates, fresh = stack_floats(gate_count), stack_floats(unit_count)
-        take_senses(sensors, inputs)
-        for k in range(unit_count):
-            inputs[sense_count + k] = memory[k]
-        do_layer(inputs, input_count, parameters, 0, gates, gate_count)
-        for k in range(gate_count):
-            gates[k] = logistic(gates[k])
-        for k in range(unit_count):
-            inputs[sense_count + k] *= gates[unit_count + k]
-        do_layer(inputs, input_count, parameters, units_first, fresh, unit_count)
-        for k in range(unit_count):
-            memory[k] = gates[k] * memory[k] + (1.0 - gates[k]) * tanh(fresh[k])
-        do_layer(memory, unit_count, parameters, wheels_first, outputs, 2)
-        for wheel in range(2):
-            wheels[wheel] = speed_limit * tanh(outputs[wheel])
-
-    return decide
+    return decide, memory_count, sum(layer_size(*pair) for pair in pairwise(counts))
 
 
 @kernel
@@ -274,58 +191,3 @@ def learnt(weight: Any, before: Any, after: Any, first_bit: Any, second_bit: Any
         return before * (after - weight)
     alike = tanh(4.0 * (1.0 - abs(before - after)) - 2.0)
     return ((1.0 - weight) if alike > 0.0 else weight) * alike
-
-
-def plastic(senses: tuple[str, ...], neuron_count: int, *, is_per_synapse: bool, speed_limit: float) -> Any:
-    """Return the function of a controller: neurons whose weights change; see `kiks.controllers.plastic`.
-
-    The memory holds the activity of each neuron, then the weights, [sender, neuron].
-    """
-    sense_count, take_senses = reading_count(senses), senses_as_inputs(senses)
-    sender_count = sense_count + neuron_count + 1
-    synapse_count = sender_count * neuron_count
-    # A rate stands `row` further on for the next sender, and each table `size` behind the one before.
-    row, size = (neuron_count, synapse_count) if is_per_synapse else (0, neuron_count)
-    signs_first, sign_row, sign_column = (0, neuron_count, 1) if is_per_synapse else (0, 1, 0)
-    rates_first = 0 if is_per_synapse else sender_count
-    first_bits, second_bits = rates_first + size, rates_first + 2 * size
-
-    def decide(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
-        senders, totals = stack_floats(sender_count), stack_floats(neuron_count)
-        take_senses(sensors, senders)
-        for k in range(sense_count):
-            senders[k] = min(max(0.0, senders[k]), 1.0)
-        for k in range(neuron_count):
-            senders[sense_count + k] = memory[k]
-            totals[k] = 0.0
-        senders[sender_count - 1] = 1.0
-        for sender in range(sender_count):
-            for k in range(neuron_count):
-                excites = parameters[signs_first + sender * sign_row + k * sign_column] > 0.0
-                given = senders[sender] * memory[neuron_count + sender * neuron_count + k]
-                totals[k] += given if excites else -given
-        for k in range(neuron_count):
-            memory[k] = logistic(PLASTIC_GAIN * totals[k])
-        for sender in range(sender_count):
-            for k in range(neuron_count):
-                own, rule = neuron_count + sender * neuron_count + k, sender * row + k
-                rate = abs(parameters[rates_first + rule])
-                change = learnt(
-                    memory[own],
-                    senders[sender],
-                    memory[k],
-                    parameters[first_bits + rule] > 0.0,
-                    parameters[second_bits + rule] > 0.0,
-                )
-                memory[own] += rate / (1.0 + rate) * change
-        for wheel in range(2):
-            wheels[wheel] = speed_limit * (2.0 * memory[wheel] - 1.0)
-
-    return decide
-
-
-def plastic_size(sense_count: int, neuron_count: int, *, is_per_synapse: bool) -> tuple[int, int]:
-    """Return how many numbers of memory and how many parameters a plastic network has."""
-    sender_count = sense_count + neuron_count + 1
-    synapse_count = sender_count * neuron_count
-    return neuron_count + synapse_count, 3 * synapse_count if is_per_synapse else sender_count + 3 * neuron_count

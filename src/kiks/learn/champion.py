@@ -15,8 +15,7 @@ from kiks.batch.loop_timing import Baud, Timing
 from kiks.client.drive import Driver, drive
 from kiks.client.port import Port
 from kiks.control.controller import Controller
-from kiks.control.controller_spec import Recipe
-from kiks.control.controllers import controller_of, recipe_for
+from kiks.control.controllers import Recipe, controller_of, recipe_for
 from kiks.learn.fingerprint import fingerprints
 from kiks.model.arena import Arena
 from kiks.model.arena_file import quoted

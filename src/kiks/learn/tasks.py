@@ -11,8 +11,8 @@ from pydantic import Field
 from kiks.batch.initial_state import Starts
 from kiks.batch.loop_timing import Milliseconds
 from kiks.control.controller import Controller
-from kiks.control.controller_spec import Recipe, module_in
-from kiks.control.controllers import controller_of
+from kiks.control.controllers import Recipe, controller_of
+from kiks.control.recipes import module_in
 from kiks.errors import KiksError, ParameterError, nearest, shown
 from kiks.learn.ready_contests import CONTESTS, football, pursuit
 from kiks.learn.ready_tasks import TASKS, avoid, disperse, follow, gather, light, maze

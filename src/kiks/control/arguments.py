@@ -1,0 +1,44 @@
+"""Functions that say by their annotations what their arguments must be: all controllers and measures with arguments.
+
+A declaration stands once: the call checks by it, and so does a file that names the function and its arguments.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from functools import lru_cache, wraps
+from typing import Any, Literal, ParamSpec, TypeVar, cast, get_type_hints
+
+from kiks.model.data_file import record
+
+_Arguments = ParamSpec("_Arguments")
+_Made = TypeVar("_Made")
+
+
+def record_of(function: Callable[..., Any], **constants: Any) -> Any:
+    """Return the record (`kiks.model.data_file`) of a function's arguments, which has its name.
+
+    Args:
+        function: The function.
+        constants: Further fields that stand first, each with its only value.
+    """
+    hints: dict[str, Any] = {name: Literal[value] for name, value in constants.items()}
+    hints |= get_type_hints(function, include_extras=True)
+    del hints["return"]
+    given = inspect.signature(function).parameters.values()
+    defaults = constants | {each.name: each.default for each in given if each.default is not each.empty}
+    described = f"Arguments of `{function.__module__}.{function.__name__}`."
+    return record(type(function.__name__, (), {"__doc__": described, "__annotations__": hints, **defaults}))
+
+
+def made_once(function: Callable[_Arguments, _Made]) -> Callable[_Arguments, _Made]:
+    """Check the arguments of a function by its annotations, and return the same object for the same ones."""
+    arguments, signature = record_of(function), inspect.signature(function)
+    make = lru_cache(maxsize=256)(lambda given: cast(Callable[..., _Made], function)(**vars(given)))
+
+    @wraps(function)
+    def call(*args: _Arguments.args, **named: _Arguments.kwargs) -> _Made:
+        return make(arguments(**signature.bind(*args, **named).arguments))
+
+    return call
