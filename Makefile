@@ -63,6 +63,7 @@ system:
 lint: setup
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	git ls-files -z | xargs -0 $(BIN)/codespell
 	$(BIN)/mh_lint --brief matlab
 	$(BIN)/mh_style --brief matlab
 
