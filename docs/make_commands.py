@@ -106,7 +106,7 @@ def command(row: Command) -> Iterator[str]:
     if row.limits:
         yield f"* Units and limits: {row.limits}"
     yield ""
-    yield from example(EXAMPLES[row.letter])
+    yield from example(EXAMPLES.get(row.letter, (",".join((row.letter, *("1" for _ in row.parameters))),)))
 
 
 def lines() -> Iterator[str]:
