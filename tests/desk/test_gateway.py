@@ -239,7 +239,7 @@ def test_a_seek_shows_the_past_and_all_browsers_are_told(shown: Shown) -> None:
         one.say("grab", what="robot", index=0)
         while not (isinstance(heard := one.hear(), dict) and heard["kind"] == "error"):
             pass
-        assert "this is its past" in heard["text"]
+        assert "which cannot be changed" in heard["text"]
     assert shown.desk.present.sim is sim
     assert sim.now_ns == 2_000_000_000
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-import shutil
+import os
 import threading
 from collections.abc import Callable, Coroutine, Iterator
 from contextlib import contextmanager
@@ -16,12 +16,14 @@ from tests.guard import GUARD_S
 
 from kiks import Arena, Khepera, Recording, Simulation
 from kiks.desk.server.desk import Desk
+from kiks.desk.server.marks import Mark, next_mark
 from kiks.desk.server.show import Driver
-from kiks.desk.server.timeline import Mark, next_mark
 from kiks.errors import LinkError, ParameterError
 from kiks.model.project import Project
 from kiks.ports.program_process import Command
+from kiks.recording.check import check_recording
 from kiks.recording.mcap_file import McapReader, Room
+from kiks.recording.ring import Ring
 from kiks.sim.from_project import simulation_of
 from kiks.units import NS_PER_S
 
@@ -186,8 +188,7 @@ def test_backwards_shows_what_was(tmp_path: Path) -> None:
         times = list(seen)
         assert times == sorted(times, reverse=True)
         assert len(times) > 3
-        desk.looking._timeline.flush()
-        recording = Recording(desk.looking._timeline.parts[-1].file)
+        recording = run(desk.looking.recording())
         for time_ns, poses in seen.items():
             np.testing.assert_array_equal(recording.world_at(time_ns / 1e9).poses(), poses)
 
@@ -215,57 +216,58 @@ def test_the_past_cannot_be_changed(tmp_path: Path) -> None:
         run(desk.looking.look_at(0))
         assert desk.present.hands.are_empty
         for act in (desk.grab("hand", "robot", 0), desk.mark(), desk.reset(), desk.change(lambda sim: None)):
-            with pytest.raises(ParameterError, match=r"this is its past\. Press 'Back to now'"):
+            with pytest.raises(ParameterError, match=r"at the past, which cannot be changed\. Press 'Back to now'"):
                 run(act)
 
 
 def test_without_a_past_a_desk_says_so() -> None:
     desk = Desk(make_sim())
-    with pytest.raises(LinkError, match="must be recorded"):
+    with pytest.raises(LinkError, match="this world is not recorded"):
         run(desk.looking.look_at(0))
-    with pytest.raises(LinkError, match="must be recorded"):
+    with pytest.raises(LinkError, match="this world is not recorded"):
         run(desk.looking.go_back())
     desk.close()
 
 
-def test_a_recording_of_the_user_takes_the_place_of_the_desks_own(tmp_path: Path) -> None:
+def test_a_recording_of_the_user_goes_on_beside_the_past(tmp_path: Path) -> None:
     sim, hashes = make_sim(), {}
     with desk_of(sim) as desk:
         drive(sim, 1.0, hashes)
-        with sim.record(tmp_path / "run.mcap"):
-            run(desk.looking.tend())
+        with sim.record(tmp_path / "run.mcap"), sim.record(tmp_path / "other.mcap"):
             drive(sim, 1.0, hashes)
             run(desk.looking.look_at(next(iter(hashes))))
             run(desk.looking.back_to_now())
-        run(desk.looking.tend())
         drive(sim, 1.0, hashes)
         for time_ns in list(hashes)[::9]:
             run(desk.looking.look_at(time_ns))
             assert state_of(desk) == (time_ns, hashes[time_ns])
-        assert len(desk.looking._timeline.parts) == 3
-    assert Recording(tmp_path / "run.mcap").is_whole
+        assert "change" not in {mark.kind for mark in desk.looking.marks}
+    recording = Recording(tmp_path / "run.mcap")
+    assert recording.is_whole
+    assert check_recording(recording.log).differs_ns is None
+    assert 0.9 < recording.duration_s < 1.1
+    assert Recording(tmp_path / "other.mcap").table("poses").tolist() == recording.table("poses").tolist()
 
 
-def test_a_long_past_is_kept_in_parts_and_the_oldest_goes(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_of_a_long_past_the_oldest_goes(monkeypatch: pytest.MonkeyPatch) -> None:
     few_bytes(monkeypatch, 80_000)
     sim, hashes = make_sim(), {}
     with desk_of(sim) as desk:
-        for _ in range(8):
+        for _ in range(20):
             drive(sim, 1.0, hashes)
+            assert file_bytes(desk) <= 80_000
             run(desk.looking.tend())
-            assert sum(part.own_bytes for part in desk.looking._timeline.parts) <= 80_000
-        assert len(desk.looking._timeline.parts) > 1
         (message,) = told(desk)
         assert "The time bar now begins at" in message
         assert "--record FILE" in message
         span = desk.looking.span
         assert span is not None
-        assert span.begin_ns > NS_PER_S
+        assert NS_PER_S < span.begin_ns < span.end_ns - NS_PER_S
         assert span.end_ns == sim.now_ns
+        assert all(mark.time_s >= span.begin_ns / 1e9 for mark in desk.looking.marks)
         run(desk.pause())
         run(desk.looking.look_at(0))
         assert desk.sim.now_ns == span.begin_ns
-        # Forwards and backwards across the parts.
         run(desk.go_on())
         until(lambda: desk.is_paused)
         assert state_of(desk) == (sim.now_ns, sim.state_hash())
@@ -276,69 +278,63 @@ def test_a_long_past_is_kept_in_parts_and_the_oldest_goes(monkeypatch: pytest.Mo
         for time_ns in [each for each in hashes if each >= span.begin_ns][::11]:
             run(desk.looking.look_at(time_ns))
             assert state_of(desk) == (time_ns, hashes[time_ns])
+        recording = run(desk.looking.recording())
+        assert check_recording(recording.log).differs_ns is None
+        assert recording.table("poses")["time_s"].max() == pytest.approx(sim.time_s, abs=0.02)
+
+
+def file_bytes(desk: Desk) -> int:
+    ring = desk.looking._source
+    assert isinstance(ring, Ring)
+    return os.fstat(ring._file).st_size
 
 
 def few_bytes(monkeypatch: pytest.MonkeyPatch, bytes_max: int) -> None:
     """Let temporary recordings have few bytes, and write each checkpoint at once."""
     monkeypatch.setattr("kiks.recording.recorder.CHUNK_S", 0.0)
-    monkeypatch.setattr("kiks.desk.server.timeline.BYTES_MIN", 1000)
-    monkeypatch.setattr("kiks.desk.server.timeline.BYTES_MAX", bytes_max)
+    monkeypatch.setattr("kiks.recording.ring.BYTES_MIN", 1000)
+    monkeypatch.setattr("kiks.recording.ring.BYTES_MAX", bytes_max)
 
 
 def test_the_past_takes_half_of_what_others_leave_of_the_disk(monkeypatch: pytest.MonkeyPatch) -> None:
     few_bytes(monkeypatch, 10**9)
     reserve_bytes, others_leave = 10**6, 160_000
     sim, alone = make_sim(), make_sim()
-    with desk_of(sim) as desk:
-        parts = lambda: desk.looking._timeline.parts  # noqa: E731
 
-        def room(_folder: Path) -> Room:
-            return Room(reserve_bytes + others_leave - sum(part.own_bytes for part in parts()), reserve_bytes)
+    def room(_folder: Path) -> Room:
+        return Room(reserve_bytes + others_leave - (file_bytes(desk) if desk.looking._source else 0), reserve_bytes)
 
-        monkeypatch.setattr("kiks.desk.server.timeline.room_of", room)
-        for _ in range(6):
-            drive(sim, 1.0)
-            run(desk.looking.tend())
-            assert sum(part.own_bytes for part in parts()) <= others_leave / 2
-        (message,) = told(desk)
-        assert "The time bar now begins at" in message
-        # Another program fills the disk: the latest recording stays, and the world goes on.
-        others_leave, now_ns = 0, sim.now_ns
-        run(desk.looking.tend())
-        (_, message) = told(desk)
-        assert message.startswith("The past can be kept no longer")
-        assert "Free some space and start the world over" in message
-        assert sim.loop.recorder is None
-        assert len(parts()) == 1
+    monkeypatch.setattr("kiks.recording.ring.room_of", room)
+    desk = Desk(sim, speed=None)
+    desk.keep_past()
+    for _ in range(15):
         drive(sim, 1.0)
-        run(desk.looking.tend())
-        assert len(told(desk)) == 2
-        for _ in range(7):
-            drive(alone, 1.0)
-        run(desk.looking.look_at(10**15))
-        assert desk.sim.now_ns == now_ns
-        run(desk.looking.back_to_now())
-        assert sim.state_hash() == alone.state_hash()
-
-
-def test_a_past_whose_files_are_gone_is_no_more(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As programs that clean up temporary files may leave it."""
-    few_bytes(monkeypatch, 10_000)
-    sim = make_sim()
-    with desk_of(sim) as desk:
-        drive(sim, 2.0)
-        shutil.rmtree(desk.looking._timeline.parts[0].file.parent)
-        run(desk.looking.tend())
-        (message,) = told(desk)
-        assert message.startswith("The past can be kept no longer")
+        assert file_bytes(desk) <= others_leave / 2
+    (message,) = told(desk)
+    assert "The time bar now begins at" in message
+    # Another program takes some of it, and then all: what was recorded stays, and the world goes on.
+    others_leave = 80_000
+    for _ in range(20):
         drive(sim, 1.0)
-        run(desk.looking.tend())
-        assert len(told(desk)) == 1
-        assert sim.loop.recorder is None
+    assert file_bytes(desk) <= others_leave / 2
+    others_leave, now_ns = 0, sim.now_ns
+    for _ in range(3):
+        drive(sim, 1.0)
+    (_, message) = told(desk)
+    assert message.startswith("Cannot record the past any longer")
+    assert "Free some space and start the world over" in message
+    assert sim.loop.recorder is None
+    for _ in range(38):
+        drive(alone, 1.0)
+    run(desk.looking.look_at(10**15))
+    assert abs(desk.sim.now_ns - now_ns) <= NS_PER_S
+    run(desk.looking.back_to_now())
+    assert sim.state_hash() == alone.state_hash()
+    desk.close()
 
 
 def test_a_desk_without_space_says_so_and_records_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("kiks.desk.server.timeline.room_of", lambda _folder: Room(140 << 20, 128 << 20))
+    monkeypatch.setattr("kiks.recording.ring.room_of", lambda _folder: Room(140 << 20, 128 << 20))
     sim = make_sim()
     with desk_of(sim) as desk:
         (message,) = told(desk)
@@ -359,7 +355,7 @@ def test_when_the_file_of_the_user_is_full_the_desk_records_on(tmp_path: Path, m
             drive(sim, 1.5, hashes)
         run(desk.looking.tend())
         drive(sim, 1.0, hashes)
-        for time_ns in [each for each in hashes if each < 2 * NS_PER_S or each > 3.2 * NS_PER_S][::9]:
+        for time_ns in list(hashes)[::9]:
             run(desk.looking.look_at(time_ns))
             assert state_of(desk) == (time_ns, hashes[time_ns])
         with pytest.raises(ParameterError, match="has ended at 2"):
@@ -410,7 +406,7 @@ def test_a_recording_is_shown_played_and_begun_again_at_its_end(tmp_path: Path) 
         run(desk.set_speed(0.001))
         run(desk.go_on())
         assert desk.sim.now_ns < NS_PER_S
-        with pytest.raises(LinkError, match="gone on from"):
+        with pytest.raises(LinkError, match="shows a recording only"):
             run(desk.looking.back_to_now())
 
 
@@ -508,60 +504,13 @@ def with_programs(folder: Path) -> Iterator[Desk]:
     desk.close()
 
 
-@pytest.mark.slow
-def test_programs_run_again_up_to_a_time(tmp_path: Path) -> None:
-    with with_programs(tmp_path) as desk:
-        first = desk.sim
-        until(lambda: first.now_ns > 2 * NS_PER_S)
-        run(desk.looking.look_at(1_234_500_000))
-        there = state_of(desk)
-        assert desk.why_not_again() == ""
-        run(desk.run_again_to_here())
-        assert desk.past is None
-        again = desk.sim
-        assert again is not first
-        until(lambda: again.now_ns == 1_234_500_000)
-        until(lambda: any("the same run, to the bit" in text for text in told(desk)))
-        assert state_of(desk) == there
-        assert desk.is_paused
-        # The program is at work, and goes on.
-        assert desk.programs.handles[0].is_running
-        run(desk.go_on())
-        until(lambda: again.now_ns > 2 * NS_PER_S)
-        # From a branch, the programs cannot run again, but from before it.
-        run(desk.looking.look_at(NS_PER_S))
-        run(desk.go_on_from_here())
-        assert not desk.programs.handles
-        run(desk.go_on())
-        until(lambda: desk.sim.now_ns > 2 * NS_PER_S)
-        run(desk.looking.look_at(1_500_000_000))
-        with pytest.raises(ParameterError, match="no program of this desk began with this part"):
-            run(desk.run_again_to_here())
-        run(desk.looking.look_at(500_000_000))
-        assert desk.why_not_again() == ""
-
-
-@pytest.mark.slow
-def test_a_run_that_was_changed_by_hand_is_not_the_same_again(tmp_path: Path) -> None:
-    with with_programs(tmp_path) as desk:
-        first = desk.sim
-        until(lambda: first.now_ns > NS_PER_S)
-        run(desk.do(lambda sim: sim.place(1, 100, 300, 1.0)))
-        changed_ns = first.now_ns
-        until(lambda: first.now_ns > changed_ns + NS_PER_S)
-        run(desk.looking.look_at(changed_ns + NS_PER_S // 2))
-        run(desk.run_again_to_here())
-        until(lambda: any("not the run that was recorded" in text for text in told(desk)))
-
-
 def test_another_world_has_another_past(tmp_path: Path) -> None:
     with with_programs(tmp_path) as desk:
         first = desk.sim
         until(lambda: first.now_ns > NS_PER_S)
-        file = desk.looking._timeline.parts[0].file
         run(desk.start_over())
         assert desk.sim is not first
-        assert not file.exists()
+        assert first.loop.recorder is None
         until(lambda: desk.sim.now_ns > NS_PER_S)
         assert not desk.is_paused
         run(desk.looking.look_at(NS_PER_S // 2))
@@ -577,14 +526,22 @@ def test_a_desk_that_holds_the_world_of_another_program_has_no_branches() -> Non
     with desk_of(sim) as desk:
         drive(sim, 0.3)
         run(desk.looking.look_at(0))
-        for act in (desk.go_on_from_here, desk.run_again_to_here):
-            with pytest.raises(LinkError, match="must be this desk's own"):
-                run(act())
-        assert desk.why_not_again()
+        with pytest.raises(LinkError, match="this desk's own"):
+            run(desk.go_on_from_here())
 
 
-def test_temporary_recordings_are_deleted() -> None:
-    with desk_of(make_sim()) as desk:
-        folder = desk.looking._timeline.parts[0].file.parent
-        assert folder.exists()
-    assert not folder.exists()
+def test_robots_that_came_are_gone_before_they_came() -> None:
+    sim = make_sim()
+    with desk_of(sim, owns_world=True) as desk:
+        drive(sim, 1.0)
+        sim.add_robot()
+        drive(sim, 1.0)
+        run(desk.looking.look_at(1_500_000_000))
+        assert desk.sim.robot_count == 3
+        run(desk.looking.look_at(NS_PER_S // 2))
+        assert desk.sim.robot_count == 2
+        run(desk.set_speed(None))
+        run(desk.looking.look_at(10**15))
+        run(desk.looking.go_back())
+        until(lambda: desk.is_paused)
+        assert (desk.sim.now_ns, desk.sim.robot_count) == (0, 2)

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import expect
 from tests.at_length import at_length
-from tests.desk.test_looking_back import drive, make_project
-from tests.desk.visitor import Visitor, open_desk
+from tests.desk.test_looking_back import drive
+from tests.desk.visitor import Visitor
 from tests.desk.visits import NewPage
 
 from kiks import Khepera, Recording, Simulation
@@ -120,8 +120,7 @@ def test_a_person_goes_on_from_a_recording(replay: Visitor) -> None:
     at_time(visitor, 1.0, 0.05)
     poses, time_s = visitor.sim.poses(), visitor.sim.time_s
     visitor.at("go-on-from-here").click()
-    expect(visitor.at("branch-words")).to_contain_text("Not here")
-    expect(visitor.at("branch-by-programs")).to_be_disabled()
+    expect(visitor.at("branch-words")).to_contain_text("have hung up")
     visitor.picture("go_on_from_a_recording")
     scene = visitor.answer("kiksDesk.scene().scene")
     visitor.at("branch-by-hand").click()
@@ -162,7 +161,7 @@ def test_a_living_world_is_looked_back_at_and_goes_on(visitor: Visitor, new_page
     visitor.drag_refused()
     visitor.at("console").fill("D,0,0")
     visitor.at("console").press("Enter")
-    visitor.told("this is its past")
+    visitor.told("which cannot be changed")
     other = Visitor(new_page(), visitor.shown)
     expect(other.at("bar-state")).to_have_text("Past")
     other.at("back-long").click()
@@ -174,30 +173,3 @@ def test_a_living_world_is_looked_back_at_and_goes_on(visitor: Visitor, new_page
     assert visitor.sim is present
     visitor.until(lambda: present.now_ns > now_ns)
     visitor.pause()
-
-
-@at_length
-def test_programs_run_again_up_to_a_time(new_page: NewPage, tmp_path: Path) -> None:
-    project, commands = make_project(tmp_path)
-    shown = open_desk(tmp_path, project, commands)
-    visitor = Visitor(new_page(1024, 768), shown)
-    try:
-        first = visitor.sim
-        visitor.until(lambda: first.now_ns > 1_500_000_000)
-        visitor.page.keyboard.press("Shift+J")
-        expect(visitor.at("bar-state")).to_have_text("Past")
-        time_ns, pose = visitor.sim.now_ns, visitor.sim.pose(1)
-        visitor.at("go-on-from-here").click()
-        expect(visitor.at("branch-words")).to_contain_text("runs round.py again")
-        visitor.picture("go_on_with_programs")
-        visitor.at("branch-by-programs").click()
-        visitor.told("the same run, to the bit")
-        assert visitor.sim is not first
-        assert (visitor.sim.now_ns, visitor.sim.pose(1)) == (time_ns, pose)
-        assert visitor.desk.is_paused
-        visitor.picture("programs_ran_again")
-        visitor.page.keyboard.press("Space")
-        visitor.until(lambda: visitor.sim.now_ns > time_ns)
-    finally:
-        visitor.page.close()
-        shown.close()

@@ -171,7 +171,7 @@ class Visitor:
         """Try to drag robot 1, and wait for the message that the past stays as it was."""
         x_mm, y_mm, _ = self.sim.pose(1)
         self.pull((x_mm, y_mm), (x_mm + 40, y_mm))
-        expect(self.at("arena-notice")).to_contain_text("this is its past")
+        expect(self.at("arena-notice")).to_contain_text("which cannot be changed")
         self.page.mouse.up()
 
     def write(self, text: str) -> None:

@@ -388,19 +388,22 @@ def test_a_file_takes_no_more_memory_than_its_size_allows(tail: Callable[[], byt
         resource.setrlimit(resource.RLIMIT_AS, before)
 
 
+def _with_setup(parts: Parts, changes: dict[str, object]) -> Parts:
+    (name,) = (each for each in parts.attachments if each.startswith("setup/"))
+    setup = json.loads(parts.attachments[name]) | changes
+    return replace(parts, attachments={**parts.attachments, name: json.dumps(setup).encode()})
+
+
 def test_an_arena_of_gigabytes_is_refused(file: Path) -> None:
     parts = sound_parts()
-    setup = json.loads(parts.attachments["setup/0.json"])
-    setup["arena"] = "kiks = 1\n[walls]\nsize_mm = [1000000, 1000000]\n"
-    replace(parts, attachments={**parts.attachments, "setup/0.json": json.dumps(setup).encode()}).save(file)
+    _with_setup(parts, {"arena": "kiks = 1\n[walls]\nsize_mm = [1000000, 1000000]\n"}).save(file)
     refused(file)
 
 
 @pytest.mark.parametrize(("name", "value"), [("robots", [0] * 10**6), ("robots", [5]), ("turrets", [["k999"], []])])
 def test_setups_are_of_what_there_is(name: str, value: object, file: Path) -> None:
     parts = sound_parts()
-    setup = json.loads(parts.attachments["setup/0.json"]) | {name: value}
-    replace(parts, attachments={**parts.attachments, "setup/0.json": json.dumps(setup).encode()}).save(file)
+    _with_setup(parts, {name: value}).save(file)
     refused(file)
 
 

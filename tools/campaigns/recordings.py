@@ -25,8 +25,8 @@ from kiks.recording import motion as motion_block
 from kiks.recording.check import check_recording
 from kiks.recording.entries import Columns, Entry, block_of
 from kiks.recording.log import HASH_LENGTH
-from kiks.recording.mcap_file import McapFile, McapReader
-from kiks.recording.recorder import LOG, MOTION, PROGRAMS, RunRecorder
+from kiks.recording.mcap_file import LOG, MOTION, McapFile, McapReader
+from kiks.recording.recorder import PROGRAMS, RunRecorder
 from kiks.recording.tables import TABLES
 from kiks.sim.run_log import Kind
 

@@ -16,7 +16,7 @@ from kiks.errors import ParameterError
 from kiks.model.arena import Arena
 from kiks.model.atomic_files import ending_of, replace_file
 from kiks.recording.analysis import odometry, time_shares
-from kiks.recording.recorder import RunRecorder
+from kiks.recording.recorder import RunRecorder, RunWriter
 from kiks.recording.recording import Recording
 from kiks.recording.tables import Table
 from kiks.sim.simulation import Simulation
@@ -116,13 +116,15 @@ def figure_of(recordings: Sequence[Recording], *, robot: int = 1) -> Any:
 
 def figure_of_run(sim: Simulation, *, robot: int = 1) -> Any:
     """Return the figure of a run that is being recorded; see `figure_of`."""
-    recorder = sim.loop.recorder
-    if not isinstance(recorder, RunRecorder):
+    writer = sim.loop.recorder
+    stores = writer.stores if isinstance(writer, RunWriter) else ()
+    recorders = [store for store in stores if isinstance(store, RunRecorder)]
+    if not recorders:
         raise ParameterError(
             f"{sim} must be recorded while it is plotted, but it is not. Begin with: with sim.record('run.mcap'):"
         )
-    recorder.flush()
-    return figure_of([Recording(recorder.path)], robot=robot)
+    recorders[-1].flush()
+    return figure_of([Recording(recorders[-1].path)], robot=robot)
 
 
 def _drawings(recording: Recording, robot: int) -> dict[str, Callable[[Any], None]]:

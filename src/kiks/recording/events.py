@@ -31,7 +31,7 @@ class Event(NamedTuple):
 
 
 class EventReader:
-    """Reads the events of a recording, which may grow meanwhile.
+    """Reads the events of a recording that may grow.
 
     Args:
         log: The log of the recording.
@@ -39,14 +39,16 @@ class EventReader:
 
     def __init__(self, log: RecordedLog) -> None:
         self._log = log
-        self._block = 0
+        self._block = log.blocks.start
         self._has_begun = False
         self._contacts: NDArray[np.int64] = np.zeros(0, np.int64)
 
     def read(self) -> list[Event]:
         """Return the events since the last call, in their order."""
         events: list[Event] = []
-        while self._block < self._log.block_count:
+        blocks = self._log.blocks
+        self._block = max(self._block, blocks.start)
+        while self._block < blocks.stop:
             # Both of one block at once: an error leaves no half of it behind.
             events += sorted([*self._of_entries(), *self._of_motion()], key=lambda event: event.time_s)
             self._block += 1
@@ -59,9 +61,9 @@ class EventReader:
                 yield Event(time_s, entry.robot + 1, "output", entry.data.decode("utf-8", "replace"))
             elif entry.kind == Kind.MARK:
                 yield Event(time_s, 0, "bookmark", entry.data.decode("utf-8", "replace"))
-            elif entry.kind == Kind.STATE:
+            elif entry.kind in (Kind.STATE, Kind.CHECK):
                 # The first state is the beginning.
-                if self._has_begun:
+                if self._has_begun and entry.kind == Kind.STATE:
                     yield Event(time_s, 0, "change", "")
                 self._has_begun = True
 

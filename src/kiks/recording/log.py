@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kiks.errors import ParameterError
-from kiks.recording.entries import Columns, Entry
-from kiks.recording.mcap_file import McapReader, Topic
+from kiks.recording.entries import Columns, Entry, block_of
+from kiks.recording.mcap_file import FoundChunk
 from kiks.recording.motion import Motion
 from kiks.recording.motion import decode as decode_motion
-from kiks.recording.recorder import LINES_MAX, LOG, MOTION
+from kiks.recording.recorder import LINES_MAX
 from kiks.sim.run_log import LAST_INPUT, Kind
-from kiks.sim.saved_state import LAYOUT, SavedState, Setup
-from kiks.units import s_from_ns
+from kiks.sim.saved_state import LAYOUT, SavedState, Setup, setup_name
+from kiks.units import TICK_NS, s_from_ns
 from kiks.version import __version__
 
 HASH_LENGTH = 16
@@ -39,78 +39,109 @@ class Row(NamedTuple):
     row: int
 
 
+class Source(Protocol):
+    """Where a recording is read from: a file, or the past of a desk."""
+
+    @property
+    def what(self) -> str:
+        """What messages call it."""
+
+    @property
+    def path(self) -> Path:
+        """The file, or what stands for its name."""
+
+    @property
+    def told(self) -> Mapping[str, str]:
+        """What it says of the run."""
+
+    @property
+    def attachments(self) -> Mapping[str, bytes]:
+        """Names and contents of the files that belong to the run."""
+
+    @property
+    def blocks(self) -> range:
+        """The numbers of its chunks."""
+
+    def chunk(self, block: int) -> FoundChunk:
+        """Return where a chunk is, by its number."""
+
+    def read(self, block: int) -> tuple[bytes, bytes]:
+        """Return log and motion of a chunk; nothing for what it has not."""
+
+
 class RecordedLog:
-    """The log of a recording.
+    """The log of a recording, for one thread at a time.
 
     Args:
-        file: The file.
+        reader: Reads the recording.
 
     Attributes:
-        reader: Reads the file.
+        reader: As above.
     """
 
-    def __init__(self, file: str | Path) -> None:
-        self.reader = reader = McapReader(file)
+    def __init__(self, reader: Source) -> None:
+        self.reader = reader
         self._setups: dict[int, Setup] = {}
         self._blocks: OrderedDict[int, Columns] = OrderedDict()
-        if "setup/0.json" not in reader.attachments or not reader.chunks:
+        if "layout" not in reader.told or not reader.blocks:
             raise ParameterError(
                 f"{reader.what} must be a recording of KiKS, but it is another MCAP file, or the run was killed at its "
                 "very beginning. `--record FILE` makes one."
             )
-        if reader.told.get("layout") != LAYOUT:
+        if reader.told["layout"] != LAYOUT:
             raise ParameterError(
                 f"Cannot read {reader.what}: KiKS {reader.told.get('kiks', '?')} recorded it with other fields than "
                 f"KiKS {__version__} has. Read it with that version."
             )
 
     @property
+    def blocks(self) -> range:
+        """The numbers of its blocks."""
+        return self.reader.blocks
+
+    @property
     def begin_ns(self) -> int:
-        """When it begins [ns]."""
-        return int(self._block(0).time_ns[0])
+        """When it begins [ns]: at its first state."""
+        columns = self._block(self.blocks.start)
+        times_ns = columns.time_ns[_is_state(columns)]
+        return int(times_ns[0] if len(times_ns) else columns.time_ns[0])
 
     @property
     def end_ns(self) -> int:
         """When it ends [ns]: at its last checkpoint."""
-        columns = self._block(len(self.reader.chunks) - 1)
-        return int(columns.time_ns[_is_input(columns)].max(initial=columns.time_ns[0]))
-
-    @property
-    def block_count(self) -> int:
-        """Number of blocks that have been found."""
-        return len(self.reader.chunks)
+        columns = self._block(self.blocks[-1])
+        return int(columns.time_ns[columns.kind <= LAST_INPUT].max(initial=columns.time_ns[0]))
 
     def motion(self) -> Iterator[Motion]:
         """Yield the records of robots and bodies, after every third or fourth tick."""
-        for block in range(self.block_count):
+        for block in self.blocks:
             yield from self.motion_of(block)
 
     def motion_of(self, block: int) -> Iterator[Motion]:
         """Yield those records of a block."""
-        data, parts_max = self._part(block, MOTION), self._most(block, PART_BYTES)
-        yield from decode_motion(data, self.reader.what, parts_max)
+        yield from decode_motion(self.reader.read(block)[1], self.reader.what, self._most(block, PART_BYTES))
 
     def entries(self) -> Iterator[Entry]:
         """Yield all entries of the log."""
-        for block in range(self.block_count):
+        for block in self.blocks:
             yield from self.entries_of(block)
 
     def entries_of(self, block: int) -> Sequence[Entry]:
         """Return the entries of a block."""
         return self._block(block).entries()
 
-    def find_more(self) -> None:
-        """Find what a run that goes on has written since."""
-        self.reader.find_more()
+    def until(self, block: int, time_ns: int) -> tuple[bytes, bytes]:
+        """Return log and motion of a block, as bytes, up to a time [ns]."""
+        log = block_of([value for entry in self.entries_of(block) if entry.time_ns <= time_ns for value in entry])
+        return log, b"".join(motion.until(-(-time_ns // TICK_NS)) for motion in self.motion_of(block))
 
     def row_before(self, time_ns: int) -> Row:
         """Return the place of the last checkpoint at or before a time [ns], or of the first state."""
-        chunks = self.reader.chunks
-        last = max((number for number, chunk in enumerate(chunks) if chunk.begin_ns <= time_ns), default=0)
-        for block in range(last, -1, -1):
+        blocks, begin_ns = self.blocks, self.begin_ns
+        last = max((block for block in blocks if self.reader.chunk(block).begin_ns <= time_ns), default=blocks.start)
+        for block in range(last, blocks.start - 1, -1):
             columns = self._block(block)
-            is_state = (columns.kind == Kind.CHECK) | (columns.kind == Kind.STATE)
-            rows = np.flatnonzero(is_state & (columns.time_ns <= max(time_ns, self.begin_ns)))
+            rows = np.flatnonzero(_is_state(columns) & (columns.time_ns <= max(time_ns, begin_ns)))
             if len(rows):
                 return Row(block, int(rows[-1]))
         raise self.damaged("it has no state")
@@ -126,7 +157,7 @@ class RecordedLog:
             Its place, the entry, and whether robots acted between it and the place.
         """
         has_acted, begin = False, row.row + 1
-        for block in range(row.block, len(self.reader.chunks)):
+        for block in range(row.block, self.blocks.stop):
             kinds = self._block(block).kind
             for next_row in range(begin, len(kinds)):
                 if kinds[next_row] <= LAST_INPUT:
@@ -138,7 +169,7 @@ class RecordedLog:
     def setup(self, number: int) -> Setup:
         """Return a setup by its number."""
         if number not in self._setups:
-            name = f"setup/{number}.json"
+            name = setup_name(number)
             if name not in self.reader.attachments:
                 raise self.damaged(f"it has no {name}")
             self._setups[number] = Setup.from_bytes(self.reader.attachments[name], f"{self.reader.what}: {name}")
@@ -156,7 +187,7 @@ class RecordedLog:
     def _block(self, number: int) -> Columns:
         """Return a block of the log."""
         if number not in self._blocks:
-            columns = Columns.of_block(self._part(number, LOG), self.reader.what)
+            columns = Columns.of_block(self.reader.read(number)[0], self.reader.what)
             if not 0 < len(columns.kind) <= self._most(number, ENTRY_BYTES) + LINES_MAX:
                 raise self.damaged(f"a part has {len(columns.kind)} entries")
             self._blocks[number] = columns
@@ -166,17 +197,13 @@ class RecordedLog:
 
     def _most(self, number: int, bytes_each: int) -> int:
         """Return how many things there may be in a chunk."""
-        return 16 + self.reader.chunks[number].length // bytes_each
-
-    def _part(self, number: int, topic: Topic) -> bytes:
-        """Return the part of a chunk that belongs to a topic; nothing if it has none."""
-        messages = self.reader.messages(self.reader.chunks[number])
-        return next((data for name, _, data in messages if name == topic.name), b"")
+        return 16 + self.reader.chunk(number).length // bytes_each
 
     def damaged(self, why: str) -> ParameterError:
         """Return the error that says why it is not whole."""
         return ParameterError(f"{self.reader.what} must be whole, but {why}. Take another copy of it.")
 
 
-def _is_input(columns: Columns) -> NDArray[np.bool_]:
-    return columns.kind <= LAST_INPUT
+def _is_state(columns: Columns) -> NDArray[np.bool_]:
+    is_state: NDArray[np.bool_] = (columns.kind == Kind.CHECK) | (columns.kind == Kind.STATE)
+    return is_state

@@ -89,6 +89,10 @@ class Topic(NamedTuple):
     schema_text: str = ""
 
 
+LOG = Topic("/kiks/log", "kiks")
+MOTION = Topic("/kiks/motion", "kiks")
+
+
 class McapFile:
     """A file that grows chunk by chunk, while no other recording does there.
 
@@ -224,8 +228,8 @@ class McapReader:
         with self._open() as stream:
             if stream.read(len(_MAGIC)) != _MAGIC:
                 raise ParameterError(f"{self.what} must be an MCAP file, but it is none. `--record FILE` makes one.")
-        self._offset = len(_MAGIC)
-        self.find_more()
+            self._offset = len(_MAGIC)
+            self._find_all(stream)
 
     def _open(self) -> BinaryIO:
         try:
@@ -233,23 +237,21 @@ class McapReader:
         except OSError as error:
             raise ParameterError(f"{self.what} must be readable, but: {error}. Check its rights.") from None
 
-    def find_more(self) -> None:
-        """Find the records that were written since the last call."""
-        with self._open() as stream:
-            size = os.fstat(stream.fileno()).st_size
-            while not self.is_whole and self._offset + _HEAD.size <= size:
-                stream.seek(self._offset)
-                opcode, length = _HEAD.unpack(stream.read(_HEAD.size))
-                end = self._offset + _HEAD.size + length
-                if end > size:
-                    return  # what a crash has cut off
-                if length > RECORD_BYTES_MAX:
-                    raise ParameterError(
-                        f"{self.what} must have records of at most {RECORD_BYTES_MAX >> 20} MiB, but one has {length} "
-                        "bytes. Is the file damaged?"
-                    )
-                self._find(stream, opcode, length)
-                self._offset = end
+    def _find_all(self, stream: BinaryIO) -> None:
+        size = os.fstat(stream.fileno()).st_size
+        while not self.is_whole and self._offset + _HEAD.size <= size:
+            stream.seek(self._offset)
+            opcode, length = _HEAD.unpack(stream.read(_HEAD.size))
+            end = self._offset + _HEAD.size + length
+            if end > size:
+                return  # what a crash has cut off
+            if length > RECORD_BYTES_MAX:
+                raise ParameterError(
+                    f"{self.what} must have records of at most {RECORD_BYTES_MAX >> 20} MiB, but one has {length} "
+                    "bytes. Is the file damaged?"
+                )
+            self._find(stream, opcode, length)
+            self._offset = end
 
     def _find(self, stream: BinaryIO, opcode: int, length: int) -> None:
         if opcode == Opcode.CHUNK and length >= _CHUNK_HEAD.size:
@@ -268,6 +270,20 @@ class McapReader:
                     self.told |= record.metadata
         elif opcode == Opcode.DATA_END:
             self.is_whole = True
+
+    @property
+    def blocks(self) -> range:
+        """The numbers of its chunks."""
+        return range(len(self.chunks))
+
+    def chunk(self, block: int) -> FoundChunk:
+        """Return where a chunk is, by its number."""
+        return self.chunks[block]
+
+    def read(self, block: int) -> tuple[bytes, bytes]:
+        """Return log and motion of a chunk; nothing for what it has not."""
+        parts = {name: data for name, _, data in self.messages(self.chunks[block])}
+        return parts.get(LOG.name, b""), parts.get(MOTION.name, b"")
 
     def messages(self, chunk: FoundChunk) -> Iterator[tuple[str, int, bytes]]:
         """Yield topic, time [ns] and data of each message of a chunk."""

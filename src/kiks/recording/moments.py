@@ -1,4 +1,4 @@
-"""What a recording tells of moments: walls, lamps, robots, balls and cylinders, and what programs read last."""
+"""A recorded run at given times: walls, lamps, robots, balls and cylinders, and what programs read last."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Tick(NamedTuple):
 
 
 class Moment(NamedTuple):
-    """What a recording tells of an instant.
+    """A recorded run at a time.
 
     Attributes:
         time_ns: When [ns].
@@ -65,15 +65,15 @@ class Moment(NamedTuple):
 
 
 def moments(log: RecordedLog, times_ns: Sequence[int]) -> Iterator[Moment]:
-    """Yield what a recording tells of instants.
+    """Yield the recorded state at each time.
 
     Args:
         log: The log of the recording.
-        times_ns: The instants [ns], at least one, in their order, within the recording.
+        times_ns: The times [ns], at least one, in their order, within the recording.
     """
-    block, told = log.row_before(times_ns[0]).block, _Told()
+    block, latest = log.row_before(times_ns[0]).block, _Latest()
     # The last tick before a block may stand in the one before.
-    ticks, entries = _ticks(log, max(block - 1, 0)), _entries(log, block)
+    ticks, entries = _ticks(log, max(block - 1, log.blocks.start)), _entries(log, block)
     now, later, entry = next(ticks, None), next(ticks, None), next(entries, None)
     if now is None:
         raise log.damaged("it has no motion")
@@ -83,26 +83,26 @@ def moments(log: RecordedLog, times_ns: Sequence[int]) -> Iterator[Moment]:
             passed.append(later)
             now, later = later, next(ticks, None)
         while entry is not None and entry.time_ns <= time_ns:
-            told.take(log, entry)
+            latest.add(log, entry)
             entry = next(entries, None)
-        if told.setup is None:
+        if latest.setup is None:
             raise log.damaged("it has no state")
         poses, places = _between(now, later, time_ns)
         bodies: Any = now.bodies.copy()
         bodies["x_mm"], bodies["y_mm"] = places.T
         before = passed if number else ()
-        yield Moment(time_ns, told.setup, told.lamps, poses, now.robots, bodies, told.readings, before)
+        yield Moment(time_ns, latest.setup, latest.lamps, poses, now.robots, bodies, latest.readings, before)
 
 
-class _Told:
-    """What the entries up to an instant have told."""
+class _Latest:
+    """The latest of what entries say."""
 
     def __init__(self) -> None:
         self.setup: Setup | None = None
         self.lamps = np.zeros((0, 4))
         self.readings: dict[int, Sequence[int]] = {}
 
-    def take(self, log: RecordedLog, entry: Entry) -> None:
+    def add(self, log: RecordedLog, entry: Entry) -> None:
         if entry.kind in (Kind.STATE, Kind.CHECK):
             self.setup, saved = log.state_of(entry)
             self.lamps = saved.lamps
@@ -112,14 +112,14 @@ class _Told:
 
 def _entries(log: RecordedLog, first_block: int) -> Iterator[Entry]:
     """Yield the entries from a block on."""
-    for block in range(first_block, log.block_count):
+    for block in range(first_block, log.blocks.stop):
         yield from log.entries_of(block)
 
 
 def _ticks(log: RecordedLog, first_block: int) -> Iterator[Tick]:
     """Yield the ticks from a block on."""
     last_tick = -1
-    for block in range(first_block, log.block_count):
+    for block in range(first_block, log.blocks.stop):
         for motion in log.motion_of(block):
             ticks = ticks_of(motion, last_tick)
             last_tick = int(motion.ticks[-1])
@@ -148,6 +148,6 @@ def _between(now: Tick, later: Tick | None, time_ns: int) -> tuple[NDArray[np.fl
 
 
 def leapt(before: NDArray[np.float64], after: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Return which of the things at places or poses [thing, ...] a hand has moved to others."""
+    """Return which things, at places or poses [thing, ...], a hand has moved."""
     ways_mm: NDArray[np.float64] = np.hypot(*(after - before)[:, :2].T)
     return ways_mm > LEAP_MM

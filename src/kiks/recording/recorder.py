@@ -1,7 +1,8 @@
 """Records a run while it goes on: its inputs, a checkpoint each second, and the motion.
 
-The recorder only reads. It looks at the state where the run stops anyway or may stop without a difference, so that a
-run is the same with it, to the bit.
+A writer only reads the simulation. It reads the state where the run stops anyway or may stop without a difference, so
+that a run is the same with it, to the bit. Each simulation has one writer at most, which writes into one store or more:
+files, and the past of a desk.
 """
 
 from __future__ import annotations
@@ -12,26 +13,23 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from time import monotonic
 from types import TracebackType
-from typing import Any
+from typing import Any, Protocol
 
 from kiks.ending import postponing_endings
 from kiks.errors import ParameterError
 from kiks.model.atomic_files import path_of
 from kiks.model.checks import check_kind
 from kiks.recording.entries import block_of
-from kiks.recording.mcap_file import McapFile, Topic
+from kiks.recording.mcap_file import LOG, MOTION, McapFile
 from kiks.recording.motion import MotionWatcher
 from kiks.sim.read_completion import NEVER_NS
 from kiks.sim.run_log import ACT, CHECK, MARK, STATE, TEXT, Clock, NotedEntry
-from kiks.sim.saved_state import LAYOUT, Setup, TurretOfUser, state_bytes
+from kiks.sim.saved_state import LAYOUT, Setup, TurretOfUser, setup_number, state_bytes
 from kiks.sim.simulation import Simulation
 from kiks.units import NS_PER_S, s_from_ns
 from kiks.version import __version__
 
 _log = logging.getLogger("kiks.recording")
-
-LOG = Topic("/kiks/log", "kiks")
-MOTION = Topic("/kiks/motion", "kiks")
 
 CHECK_NS = NS_PER_S
 """Simulated time between two checkpoints [ns]."""
@@ -53,135 +51,97 @@ WAITING_BYTES_MAX = 16 << 20
 """Most bytes of states that wait for a chunk."""
 
 
-class RunRecorder:
-    """Records a simulation from now on, as a `kiks.sim.event_loop.Recorder`; `close`, or the end of `with`, ends it.
+class Store(Protocol):
+    """Where a run is written."""
 
-    An earlier recording in the file stays there until time passes or something changes: a run that fails at its start
-    costs none. It ends by itself, with a warning, when only the reserve of the disk is left or the file cannot be
-    written. The run goes on, and the recording can be read up to there.
+    def attach(self, name: str, data: bytes) -> None:
+        """Write a file that belongs to the run."""
+
+    def write(self, begin_ns: int, log: bytes, motion: bytes) -> bool:
+        """Write a chunk.
+
+        Args:
+            begin_ns: Its time [ns].
+            log: Of `block_of`.
+            motion: Of `MotionWatcher.take`.
+
+        Returns:
+            Whether the next chunk can be written, too; else the store has ended.
+        """
+
+
+class RunWriter:
+    """Writes a run into stores from now on, as a `kiks.sim.event_loop.Recorder`, until the last store is removed.
 
     Args:
-        sim: The simulation.
-        path: The file, which ends in .mcap.
-        programs: Texts of the programs that drive its robots, by name.
-        about: What else belongs to the run, such as the command that started it.
-        gives_way: Whether it ends when another recording of the simulation begins; else that one is refused.
+        sim: The simulation, which has no other writer.
 
     Attributes:
-        path: The file.
         next_ns: When the next checkpoint is due [ns].
         note: Takes an entry.
         clock: The world's.
         change_count: Of the world, when its changes were noted last.
+        stores: Where it writes.
     """
 
-    def __init__(
-        self,
-        sim: Simulation,
-        path: str | Path,
-        *,
-        programs: Mapping[str, str] | None = None,
-        about: Mapping[str, str] | None = None,
-        gives_way: bool = False,
-    ) -> None:
-        earlier = sim.loop.recorder
-        if isinstance(earlier, RunRecorder) and earlier.gives_way:
-            earlier.close()
-        elif earlier is not None:
-            raise ParameterError(f"{sim} must not be recorded yet, but it is. End that recording first.")
-        self.path = path_of(path, "a recording's file").absolute()
-        self.gives_way: bool = gives_way
-        self._sim, self._world, self._loop = sim, sim.world, sim.loop
-        self._file = McapFile(path, (LOG, MOTION))
-        self._error: ParameterError | None = None
+    @classmethod
+    def of(cls, sim: Simulation) -> RunWriter:
+        """Return the writer of a simulation, a new one if it has none."""
+        with sim.lock:
+            writer = sim.loop.recorder
+            return writer if isinstance(writer, RunWriter) else cls(sim)
+
+    def __init__(self, sim: Simulation) -> None:
+        self._sim, self._world = sim, sim.world
+        self.stores: tuple[Store, ...] = ()
         self.clock: Clock = self._world
-        # In one list: to keep a tuple for each entry would make Python's garbage collection slow.
+        # In one list: a tuple for each entry would make Python's garbage collection slow.
         self._entries: list[int | bytes] = []
         self.note: Callable[[NotedEntry], object] = self._entries.extend
         self._waiting_bytes = 0
         self._chunk_ns = sim.now_ns
+        self._chunk_at_s = 0.0
         self._setup: tuple[Any, ...] = ()
-        self._setup_count = 0
+        self._setup_name, self._setup_bytes, self._setup_number = "", b"", 0
         self._lines: deque[tuple[int, int, str]] = deque(maxlen=LINES_MAX)
-        with sim.lock:
-            sim.sync()
-            self._motion = MotionWatcher(self._world.state)
-            self.next_ns = (sim.now_ns // CHECK_NS + 1) * CHECK_NS
-            for name, text in (programs or {}).items():
-                self._file.attach(PROGRAMS + name, text.encode(), "text/x-python")
-            told = {"kiks": __version__, "layout": LAYOUT, "thinking": sim.thinking, "arena": sim.arena.name}
-            self._file.describe("run", {**told, **(about or {})})
-            self.note_state()
-            self._began = self._world.now_ns, self._world.change_count
-            sim.world.watch(self._motion)
-            self._loop.recorder = self
+        sim.sync()
+        self._motion = MotionWatcher(self._world.state)
+        self.next_ns = (sim.now_ns // CHECK_NS + 1) * CHECK_NS
+        self.note_state()
+        sim.world.watch(self._motion)
+        sim.loop.recorder = self
+
+    def add(self, store: Store) -> None:
+        """Write into one more store, from now on."""
+        with self._sim.lock:
+            if self.stores:
+                # A chunk that begins with a state, which is the first one of the new store.
+                self.flush()
+                self._note_check()
+                self._motion.look(self._world.state)
+            store.attach(self._setup_name, self._setup_bytes)
+            self.stores = (*self.stores, store)
             self._write_chunk()
-            if not (self._is_on or self._file.is_in_place):
-                self.close()  # which tells why
 
-    def __enter__(self) -> RunRecorder:
-        """Return itself."""
-        return self
+    def remove(self, store: Store) -> None:
+        """Write no more into a store."""
+        with self._sim.lock:
+            self.stores = tuple(each for each in self.stores if each is not store)
+            if not self.stores and self._sim.loop.recorder is self:
+                self._sim.loop.recorder = None
+                self.next_ns = NEVER_NS
+                for wire in self._sim.wires:
+                    wire.recorder = None
+                self._world.unwatch(self._motion)
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        """End the recording."""
-        self.close()
-
-    def close(self) -> None:
-        """End the recording with the present state."""
+    def flush(self) -> None:
+        """Write all that has happened up to now, with the present state."""
         with self._sim.lock, postponing_endings():
-            self.flush(is_asked=False)
-            if self._is_on:
-                self._end()
-                if not (self._error or self._file.is_in_place):
-                    _log.warning("nothing has happened, so that %r keeps the recording of before.", str(self.path))
-            error, self._error = self._error, None
-        if error is not None:
-            raise error
-
-    @property
-    def _is_on(self) -> bool:
-        return self._loop.recorder is self
-
-    def _end(self) -> None:
-        """Let the run go on without it, and end the file."""
-        self._loop.recorder = None
-        self.next_ns = NEVER_NS
-        for wire in self._sim.wires:
-            wire.recorder = None
-        self._world.unwatch(self._motion)
-        try:
-            self._file.close()
-        except ParameterError as error:
-            self._error = error
-
-    def _end_by_itself(self, *, has_begun: bool) -> None:
-        self._end()
-        if self._error is None:
-            end = f"has ended at {s_from_ns(self._world.now_ns):.1f} s, and is whole up to there"
-            self._error = ParameterError(
-                f"a recording must leave some of its disk free, but that of {str(self.path)!r} is almost full: the "
-                f"recording {end if has_begun else 'cannot begin'}. Free some space, or choose another place."
-            )
-        if not self.gives_way and (has_begun or self._file.is_in_place):
-            _log.warning("%s", self._error)
-
-    def flush(self, *, is_asked: bool = True) -> None:
-        """Write all that has happened up to now, with the present state, so that a reader of the file finds it.
-
-        Args:
-            is_asked: Whether an earlier recording goes even if nothing has happened.
-        """
-        with self._sim.lock, postponing_endings():
-            if self._is_on:
+            if self.stores:
                 self.note_changes()
                 self._note_check()
                 self._motion.look(self._world.state)
                 self._write_chunk()
-                if is_asked:
-                    self._file.take_place()
 
     # ---- from outside ----
 
@@ -200,15 +160,16 @@ class RunRecorder:
             self._setup = setup
             self._note_setup()
         data = state_bytes(sim)
-        self.note((STATE, world.now_ns, 0, self._setup_count - 1, 0, data))
+        self.note((STATE, world.now_ns, 0, self._setup_number, 0, data))
         self._waiting_bytes += len(data)
 
     def _note_setup(self) -> None:
-        sim, now_ns = self._sim, self._world.now_ns
-        setup = Setup.of(sim)
-        self._file.attach(f"setup/{self._setup_count}.json", setup.to_bytes(), "application/json", now_ns)
-        self._setup_count += 1
-        for wire, turrets in zip(sim.wires, setup.turrets, strict=True):
+        setup = Setup.of(self._sim)
+        self._setup_bytes = setup.to_bytes()
+        self._setup_number, self._setup_name = setup_number(self._setup_bytes)
+        for store in self.stores:
+            store.attach(self._setup_name, self._setup_bytes)
+        for wire, turrets in zip(self._sim.wires, setup.turrets, strict=True):
             has_own = any(isinstance(turret, TurretOfUser) for turret in turrets)
             wire.recorder = _OwnTurretRecorder(self) if has_own else self
 
@@ -219,16 +180,10 @@ class RunRecorder:
         self._lines.append((self._world.now_ns, robot, line[:LINE_CHARACTERS_MAX]))
 
     def mark(self, note: str) -> None:
-        """Set a bookmark at this time."""
-        check_kind("note", note, str)
-        with self._sim.lock:
-            if not self._is_on:
-                if self._error is None:
-                    raise ParameterError("a recording must be open to be marked, but this one is closed.")
-                return
-            self.note((MARK, self._world.now_ns, 0, 0, 0, note.encode()))
+        """Set a bookmark at this time; the caller holds the lock."""
+        self.note((MARK, self._world.now_ns, 0, 0, 0, note.encode()))
 
-    # ---- the file ----
+    # ---- chunks ----
 
     def check(self) -> None:
         """Note the state, after all events up to `next_ns`, and choose a later `next_ns`."""
@@ -242,7 +197,7 @@ class RunRecorder:
     def _note_check(self) -> None:
         data = state_bytes(self._sim)
         state_hash = self._world.state.hash().encode()
-        self.note((CHECK, self._world.now_ns, 0, self._setup_count - 1, 0, state_hash + data))
+        self.note((CHECK, self._world.now_ns, 0, self._setup_number, 0, state_hash + data))
         # Motion has 25 samples in this time.
         self._waiting_bytes += 25 * len(data)
 
@@ -251,26 +206,24 @@ class RunRecorder:
         while self._lines:
             now_ns, robot, line = self._lines.popleft()
             self.note((TEXT, now_ns, robot, 0, 0, line.encode("utf-8", "replace")))
-        entries = block_of(self._entries)
+        log, motion = block_of(self._entries), self._motion.take()
         self._entries.clear()
-        blocks = [(LOG, self._chunk_ns, entries), (MOTION, self._chunk_ns, self._motion.take())]
-        self._chunk_ns = self._world.now_ns
-        has_begun = (self._world.now_ns, self._world.change_count) != self._began
-        self._file.write(blocks, keeps_earlier=not has_begun)
+        begin_ns, self._chunk_ns = self._chunk_ns, self._world.now_ns
+        for store in self.stores:
+            if not store.write(begin_ns, log, motion):
+                self.remove(store)
         self._waiting_bytes = 0
         self._chunk_at_s = monotonic() + CHUNK_S
-        if self._file.has_failed or self._file.is_disk_full:
-            self._end_by_itself(has_begun=has_begun)
 
 
 class _OwnTurretRecorder:
-    """Takes entries of a robot with a turret of a user's own: no replay can know what that does.
+    """Notes the state after each action of a robot with a custom turret, too, as a replay cannot run that.
 
     Args:
-        recorder: Takes them all.
+        recorder: Takes all entries.
     """
 
-    def __init__(self, recorder: RunRecorder) -> None:
+    def __init__(self, recorder: RunWriter) -> None:
         self._recorder = recorder
         self.clock: Clock = recorder.clock
         self.note: Callable[[NotedEntry], object] = self._note
@@ -279,3 +232,123 @@ class _OwnTurretRecorder:
         self._recorder.note(entry)
         if entry[0] == ACT:
             self._recorder.note_state()
+
+
+def description_of(sim: Simulation) -> dict[str, str]:
+    """Return what a recording says of itself: the version, its records' fields, the policy of thinking, the arena."""
+    return {"kiks": __version__, "layout": LAYOUT, "thinking": sim.thinking, "arena": sim.arena.name}
+
+
+class RunRecorder:
+    """Records a simulation into a file from now on; `close`, or the end of `with`, ends it.
+
+    An earlier recording in the file stays there until time passes or something changes: a run that fails at its start
+    costs none. It ends by itself, with a warning, when only the reserve of the disk is left or the file cannot be
+    written. The run goes on, and the recording can be read up to there.
+
+    Args:
+        sim: The simulation.
+        path: The file, which ends in .mcap.
+        programs: Texts of the programs that drive its robots, by name.
+        about: What else belongs to the run, such as the command that started it.
+
+    Attributes:
+        path: The file.
+    """
+
+    def __init__(
+        self,
+        sim: Simulation,
+        path: str | Path,
+        *,
+        programs: Mapping[str, str] | None = None,
+        about: Mapping[str, str] | None = None,
+    ) -> None:
+        self.path = path_of(path, "a recording's file").absolute()
+        self._sim = sim
+        self._file = McapFile(path, (LOG, MOTION))
+        self._is_open = True
+        self._error: ParameterError | None = None
+        for name, text in (programs or {}).items():
+            self._file.attach(PROGRAMS + name, text.encode(), "text/x-python")
+        self._file.describe("run", {**description_of(sim), **(about or {})})
+        with sim.lock:
+            self._began = sim.now_ns, sim.world.change_count
+            self._writer = RunWriter.of(sim)
+            self._writer.add(self)
+            if not (self._is_open or self._file.is_in_place):
+                self.close()  # which says why
+
+    def __enter__(self) -> RunRecorder:
+        """Return itself."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """End the recording."""
+        self.close()
+
+    def close(self) -> None:
+        """End the recording with the present state."""
+        with self._sim.lock, postponing_endings():
+            if self._is_open:
+                self._writer.flush()
+            if self._is_open:
+                self._end()
+                if not (self._error or self._file.is_in_place):
+                    _log.warning("nothing has happened, so that %r keeps the recording of before.", str(self.path))
+            error, self._error = self._error, None
+        if error is not None:
+            raise error
+
+    def flush(self) -> None:
+        """Write all that has happened up to now, with the present state, so that a reader of the file finds it."""
+        with self._sim.lock:
+            if self._is_open:
+                self._writer.flush()
+                self._file.take_place()
+
+    def say(self, robot: int, line: str) -> None:
+        """Note a line that the program of a robot's index has printed; from any thread, which waits for nothing."""
+        self._writer.say(robot, line)
+
+    def mark(self, note: str) -> None:
+        """Set a bookmark at this time."""
+        check_kind("note", note, str)
+        with self._sim.lock:
+            if self._is_open:
+                self._writer.mark(note)
+            elif self._error is None:
+                raise ParameterError("Cannot set a bookmark: the recording is closed. Record again.")
+
+    # ---- as a store ----
+
+    def attach(self, name: str, data: bytes) -> None:
+        """Write a file that belongs to the run."""
+        self._file.attach(name, data, "application/json", self._sim.now_ns)
+
+    def write(self, begin_ns: int, log: bytes, motion: bytes) -> bool:
+        """Write a chunk; see `Store`."""
+        has_begun = (self._sim.now_ns, self._sim.world.change_count) != self._began
+        self._file.write([(LOG, begin_ns, log), (MOTION, begin_ns, motion)], keeps_earlier=not has_begun)
+        if self._file.has_failed or self._file.is_disk_full:
+            self._end()
+            if self._error is None:
+                end = f"has ended at {s_from_ns(self._sim.now_ns):.1f} s, and is whole up to there"
+                self._error = ParameterError(
+                    f"a recording must leave some of its disk free, but that of {str(self.path)!r} is almost full: the "
+                    f"recording {end if has_begun else 'cannot begin'}. Free some space, or choose another place."
+                )
+            if has_begun or self._file.is_in_place:
+                _log.warning("%s", self._error)
+        return self._is_open
+
+    def _end(self) -> None:
+        """Let the run go on without it, and end the file."""
+        self._is_open = False
+        self._writer.remove(self)
+        try:
+            self._file.close()
+        except ParameterError as error:
+            self._error = error

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
@@ -16,7 +15,8 @@ from kiks.errors import ParameterError, nearest, shown
 from kiks.model.checks import check_count, check_number
 from kiks.model.project import Project
 from kiks.recording import tables
-from kiks.recording.log import RecordedLog
+from kiks.recording.log import RecordedLog, Source
+from kiks.recording.mcap_file import McapReader
 from kiks.recording.recorder import PROGRAMS
 from kiks.recording.replay import Replay
 from kiks.sim.from_project import project_of
@@ -31,7 +31,7 @@ class Recording:
     A recording whose run was killed, or goes on, ends with its last whole chunk.
 
     Args:
-        file: The file that `--record` or `sim.record` wrote.
+        source: The file that `--record` or `sim.record` wrote, or what reads a recording.
 
     Attributes:
         log: All that was recorded, entry by entry.
@@ -51,8 +51,8 @@ class Recording:
         True
     """
 
-    def __init__(self, file: str | Path) -> None:
-        self.log = RecordedLog(file)
+    def __init__(self, source: str | Path | Source) -> None:
+        self.log = RecordedLog(McapReader(source) if isinstance(source, str | Path) else source)
         self._reader = self.log.reader
         self.about: Mapping[str, str] = self._reader.told
 
@@ -69,7 +69,7 @@ class Recording:
     @property
     def is_whole(self) -> bool:
         """Whether the run that wrote it came to its end."""
-        return self._reader.is_whole
+        return not isinstance(self._reader, McapReader) or self._reader.is_whole
 
     @cached_property
     def programs(self) -> dict[str, str]:
@@ -86,7 +86,10 @@ class Recording:
     @cached_property
     def setup(self) -> Setup:
         """The arena, the kinds of its robots and their turrets at the beginning."""
-        return self.log.setup(0)
+        return self._setup_at(self.log.begin_ns)
+
+    def _setup_at(self, time_ns: int) -> Setup:
+        return self.log.setup(self.log.entry(self.log.row_before(time_ns)).number)
 
     @property
     def title(self) -> str:
@@ -102,10 +105,7 @@ class Recording:
     @property
     def robots(self) -> range:
         """Numbers of the robots that it has in the end."""
-        last = max(
-            int(name[6:-5]) for name in self._reader.attachments if re.fullmatch(r"setup/[0-9]{1,9}\.json", name)
-        )
-        return range(1, len(self.log.setup(last).specs) + 1)
+        return range(1, len(self._setup_at(self.log.end_ns).specs) + 1)
 
     def check_robot(self, robot: object, advice: str = "", name: str = "robot") -> int:
         """Return the number of a robot.

@@ -7,6 +7,7 @@ It can be looked at, made to pass at any speed, and let go on without the record
 from __future__ import annotations
 
 from collections.abc import Callable
+from threading import RLock
 from typing import NamedTuple
 
 from kiks.model.checks import CLOCK_END_NS
@@ -45,6 +46,7 @@ class Replay:
         log: The log of a recording.
         time_ns: Where it begins [ns].
         on_check: Called with each checkpoint that has been reached.
+        lock: That of a simulation whose place this one takes; a new one if left out.
 
     Attributes:
         sim: The simulation.
@@ -56,13 +58,15 @@ class Replay:
         log: RecordedLog,
         time_ns: int = 0,
         on_check: Callable[[Entry], None] = lambda checkpoint: None,
+        *,
+        lock: RLock | None = None,
     ) -> None:
         self._log = log
         self._on_check = on_check
         self.next_ns = NEVER_NS
         self._next: Entry | None = None
         place = self._recorded_before(time_ns)
-        self.sim = place.setup.simulation(place.saved.poses)
+        self.sim = place.setup.simulation(place.saved.poses, lock)
         self._begin(place)
         self.sim.loop.supervisor = self
         self.sim.advance_to(time_ns)
@@ -82,7 +86,7 @@ class Replay:
             place = self._recorded_before(time_ns)
             if not self._is_part_of(place.setup):
                 return False
-            place.setup.bring(sim, place.saved.poses)
+            place.setup.extend(sim, place.saved.poses)
             self._begin(place)
             for wire in sim.wires:
                 wire.restart_log(sim.now_ns)
@@ -159,7 +163,7 @@ class Replay:
                 self._on_check(entry)
             case Kind.STATE:
                 self._setup, saved = self._log.state_of(entry)
-                self._setup.bring(sim, saved.poses)
+                self._setup.extend(sim, saved.poses)
                 restore_state(sim, saved)
 
     def _apply_to(self, wire: Wire, entry: Entry) -> None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 from dataclasses import dataclass, replace
+from threading import RLock
 from typing import Annotated, Any
 
 import numpy as np
@@ -135,18 +136,19 @@ class Setup:
                 )
         return cls(arena, tuple(kinds[kind] for kind in file.robots), file.turrets, file.seed)
 
-    def simulation(self, poses: NDArray[np.float64]) -> Simulation:
+    def simulation(self, poses: NDArray[np.float64], lock: RLock | None = None) -> Simulation:
         """Return a simulation of this setup.
 
         Args:
             poses: Where its robots are, whatever is there, float64 [robot, 3].
+            lock: See `World`.
         """
-        sim = Simulation.of_world(World(self.arena, self.specs, self.seed, poses))
-        self.bring(sim, poses)
+        sim = Simulation.of_world(World(self.arena, self.specs, self.seed, poses, lock))
+        self.extend(sim, poses)
         return sim
 
-    def bring(self, sim: Simulation, poses: NDArray[np.float64]) -> None:
-        """Bring what this setup has more than that of a simulation, and its walls.
+    def extend(self, sim: Simulation, poses: NDArray[np.float64]) -> None:
+        """Add missing robots and turrets to a simulation, and set its walls.
 
         Args:
             sim: A simulation of an earlier setup of the same run.
@@ -170,6 +172,17 @@ class Setup:
             ProjectRobot(turrets=tuple(name for name in turrets if isinstance(name, str))) for turrets in self.turrets
         )
         return Project(self.arena, robots, seed=self.seed)
+
+
+def setup_name(number: int) -> str:
+    """Return the name of the file of a setup."""
+    return f"setup/{number:014x}.json"
+
+
+def setup_number(data: bytes) -> tuple[int, str]:
+    """Return the number of the bytes of a setup, a digest of them, and the name of its file."""
+    number = int.from_bytes(hashlib.sha256(data).digest()[:7])
+    return number, setup_name(number)
 
 
 def _described(turret: Turret) -> str | TurretOfUser:

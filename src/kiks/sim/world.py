@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from threading import RLock
 from typing import Any
 
 import numpy as np
@@ -46,6 +47,7 @@ class World:
         specs: What each robot is.
         seed: Seed of all random numbers.
         poses: Where robots are, float64 [robot, 3], whatever is there; where they start in the arena if left out.
+        lock: That of a world whose place this one takes; a new one if left out.
 
     Attributes:
         lock: Held by every thread that reads or changes the world.
@@ -62,9 +64,14 @@ class World:
     """
 
     def __init__(
-        self, arena: Arena, specs: Sequence[RobotSpec], seed: int, poses: NDArray[np.float64] | None = None
+        self,
+        arena: Arena,
+        specs: Sequence[RobotSpec],
+        seed: int,
+        poses: NDArray[np.float64] | None = None,
+        lock: RLock | None = None,
     ) -> None:
-        self.lock = OwnLock()
+        self.lock = OwnLock() if lock is None else lock
         self.now_ns = 0
         self.seed = seed
         self.specs = list(specs)

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 from pathlib import Path
 
 from kiks.export.film import check_film, save_film
 from kiks.model.atomic_files import check_writable
-from kiks.recording.recorder import RunRecorder
+from kiks.recording.recorder import RunWriter
 from kiks.recording.recording import Recording
-from kiks.recording.temporary_folder import TemporaryFolder
+from kiks.recording.ring import Ring
 from kiks.sim.simulation import Simulation
+
+_log = logging.getLogger("kiks.film")
 
 
 class SessionFilm:
@@ -26,13 +29,9 @@ class SessionFilm:
         check_film(path)
         check_writable(path, "a film")
         self._path, self._robot = path, robot
-        self._folder = TemporaryFolder()
-        self._recording = self._folder.path / "run.mcap"
-        try:
-            self._recorder = RunRecorder(sim, self._recording)
-        except BaseException:
-            self._folder.delete()
-            raise
+        self._ring = Ring(sim, _log.warning)
+        self._writer = RunWriter.of(sim)
+        self._writer.add(self._ring)
 
     def save(self, on_progress: Callable[[float], object]) -> int:
         """End the film with the present state, make it, and return the number of its pictures.
@@ -40,8 +39,7 @@ class SessionFilm:
         Args:
             on_progress: See `save_film`.
         """
-        try:
-            self._recorder.close()
-            return save_film(Recording(self._recording), self._path, robot=self._robot, on_progress=on_progress)
-        finally:
-            self._folder.delete()
+        if self._ring in self._writer.stores:
+            self._writer.flush()
+            self._writer.remove(self._ring)
+        return save_film(Recording(self._ring), self._path, robot=self._robot, on_progress=on_progress)

@@ -58,7 +58,7 @@ class FilmDialog:
     async def open(self) -> None:
         """Show it, with the last seconds before the shown time chosen."""
         library("av", "film")
-        log = Recording(await self._desk.looking.file()).log
+        log = (await self._desk.looking.recording()).log
         begin_s, now_s = s_from_ns(log.begin_ns), self._desk.sim.time_s
         # At the beginning of a recording the next seconds are more than the last ones.
         start_s = max(begin_s, now_s - LAST_S)
@@ -79,22 +79,25 @@ class FilmDialog:
                 f"A film must be at most {LENGTH_MAX_S:g} s long, but it would be {length_s:g} s. "
                 "Choose less of the run, or more times real time."
             )
-        file = await self._desk.looking.file()
+        recording = await self._desk.looking.recording()
         name = f"kiks-film{self._kind.value}"
         self._done, self._is_given_up = 0.0, False
         self._make_button.disable()
         self._timer.activate()
         try:
-            data = await asyncio.to_thread(self._film, file, name, start_s, end_s, speed, self._follow.value or None)
+            data = await asyncio.to_thread(
+                self._film, recording, name, start_s, end_s, speed, self._follow.value or None
+            )
         finally:
             self._timer.deactivate()
             self._bar.set_value(0.0)
             self._make_button.enable()
         ui.download.content(data, name)
 
-    def _film(self, file: Path, name: str, start_s: float, end_s: float, speed: float, follow: int | None) -> bytes:
+    def _film(
+        self, recording: Recording, name: str, start_s: float, end_s: float, speed: float, follow: int | None
+    ) -> bytes:
         """Make a film, in a thread of its own, and return its file."""
-        recording = Recording(file)
         with tempfile.TemporaryDirectory(prefix="kiks-film-") as folder:
             path = Path(folder, name)
             save_film(

@@ -25,18 +25,9 @@ HAPPENING_S = 0.02
 
 NOT_OWN = "Another program owns this world, so it cannot be replaced here"
 
-INTRO = (
-    "The world lives on from this moment. Time is paused first, so that you can change something: drag a robot, draw a "
-    "wall, start another program."
-)
-BY_HAND = (
-    "The programs that drove the robots have hung up. Each robot carries on with its last command, until you type a "
-    "command or start a program."
-)
-BY_PROGRAMS = (
-    "KiKS starts the world over with the same seed and runs {programs} again, at full speed up to this moment. Then "
-    "time is paused, and the programs go on with all that they remember. What people changed by hand is not repeated; "
-    "a message tells whether the run is the same."
+GO_ON = (
+    "Time is paused first, so that you can change something: drag a robot, draw a wall, start a program. The programs "
+    "that drove the robots have hung up, and each robot carries on with its last command."
 )
 
 
@@ -159,35 +150,20 @@ class TimeBar:
 
     def _build_dialog(self) -> None:
         self._title = ui.label().classes("text-h6").props('role="heading" aria-level="2"')
-        self._intro = ui.label().classes("text-body2")
-        with ui.card().props("flat bordered").classes("w-full gap-2"):
-            ui.label("With the robots in your hands").classes("text-subtitle1 text-weight-medium")
-            ui.label(BY_HAND).classes("text-body2")
-            go = ui.button("Go on", icon="pan_tool", on_click=self._go_on).mark("branch-by-hand")
-            go.props("no-caps unelevated color=primary data-testid=branch-by-hand")
-        with ui.card().props("flat bordered").classes("w-full gap-2"):
-            ui.label("With the programs run again").classes("text-subtitle1 text-weight-medium")
-            self._again_words = ui.label().classes("text-body2").props("data-testid=branch-words")
-            self._again = ui.button("Run again", icon="replay", on_click=self._run_again).mark("branch-by-programs")
-            self._again.props("no-caps unelevated color=primary data-testid=branch-by-programs")
+        self._words = ui.label().classes("text-body2").props("data-testid=branch-words")
         with ui.row().classes("w-full justify-end"):
             ui.button("Cancel", on_click=self._dialog.close).props("flat no-caps data-testid=branch-cancel")
+            go = ui.button("Go on", icon="call_split", on_click=self._go_on).mark("branch-by-hand")
+            go.props("no-caps unelevated color=primary data-testid=branch-by-hand")
 
     @told
     async def _ask(self) -> None:
-        """Say what going on does, and ask how."""
+        """Say what going on does, and ask whether to."""
         desk = self._desk
         await desk.pause()
         self._title.text = f"Go on from {clock_text(desk.sim.time_s)}"
         end = clock_text(desk.present.sim.time_s)
-        self._intro.text = f"{INTRO} The run that has come to {end} ends." if desk.looking.has_present else INTRO
-        reason, run = desk.why_not_again(), desk.looking.run
-        self._again.set_enabled(not reason)
-        if reason or run is None:
-            self._again_words.text = f"Not here: {reason}."
-        else:
-            names = ", ".join(command.name for command in run.commands if command is not None)
-            self._again_words.text = BY_PROGRAMS.format(programs=names)
+        self._words.text = f"The run that has come to {end} ends. {GO_ON}" if desk.looking.has_present else GO_ON
         self._dialog.open()
 
     @told
@@ -196,12 +172,6 @@ class TimeBar:
         await self._desk.go_on_from_here()
         self.refresh()
         ui.notify("The world is yours. Change something, then press space to let time pass.")
-
-    @told
-    async def _run_again(self) -> None:
-        self._dialog.close()
-        await self._desk.run_again_to_here()
-        self.refresh()
 
 
 def _long_button(text: str, icon: str, name: str, act: Callable[[], Awaitable[None]]) -> ui.button:

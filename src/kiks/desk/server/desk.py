@@ -12,13 +12,11 @@ from pathlib import Path
 from typing import TypeVar
 
 from kiks.clock.gate import Gate
-from kiks.desk.server.comparison import Comparison, Instant
 from kiks.desk.server.desk_world import DeskWorld, Speedometer
 from kiks.desk.server.looking_back import LookingBack
 from kiks.desk.server.outside_programs import OutsidePrograms, PlainPrograms
 from kiks.desk.server.player import Player
 from kiks.desk.server.scripts import EXAMPLES
-from kiks.desk.server.timeline import Run
 from kiks.errors import KiksError, LinkError, ParameterError
 from kiks.model.arena import Arena
 from kiks.model.project import Project, ProjectRobot
@@ -116,20 +114,12 @@ class Desk:
         programs.permission = self._permission()
         if self._has_begun:
             programs.begin()
-        if is_branch:
-            self.looking.branch(sim)
-        else:
-            self.looking.begin(sim, self._run(sim))
+        self.looking.begin(sim, is_branch=is_branch)
         self.present, self.programs = world, programs
         self._mark = sim.checkpoint()
         sim.gate = world.gate
         self.looking.stop()
         self.tell()
-
-    def _run(self, sim: Simulation) -> Run | None:
-        """Return how a world begins, if its programs can run again."""
-        is_own = self.owns_world and sim.now_ns == 0 and self.has_beginners
-        return Run(self.project, self._commands) if is_own else None
 
     @property
     def past(self) -> Player | None:
@@ -164,7 +154,7 @@ class Desk:
     def keep_past(self) -> None:
         """Record the world from now on, and each later one, so that people can look back."""
         with self.present.sim.lock:
-            self.looking.keep(self._run(self.present.sim))
+            self.looking.keep()
 
     @property
     def has_beginners(self) -> bool:
@@ -246,8 +236,8 @@ class Desk:
         if self.past is not None:
             back = "'Back to now' or " if self.looking.has_present else ""
             raise ParameterError(
-                f"the world must be the present one to be changed, but this is its past. Press {back}'Go on from here' "
-                "below the arena first."
+                f"You are looking at the past, which cannot be changed. Press {back}'Go on from here' below the arena "
+                "first."
             )
 
     # ---- another world ----
@@ -268,17 +258,14 @@ class Desk:
         """
         await self._put(self.project, self._commands)
 
-    async def _put(self, project: Project, commands: Sequence[Command | None], until: Instant | None = None) -> None:
-        """Begin the world of a project; up to an instant, if there is one, at full speed."""
+    async def _put(self, project: Project, commands: Sequence[Command | None]) -> None:
+        """Begin the world of a project."""
         self._check_owns()
         sim = await asyncio.to_thread(simulation_of, project, self.folder)
         old, before = self.present, (self.project, self._commands)
         was_paused = old.is_paused
         world = DeskWorld(sim, old.gate.speed)
-        if until is not None:
-            sim.loop.supervisor = Comparison(sim, until, self.say)
-            world.gate.pause(until.time_ns)
-        elif was_paused and self.past is None:
+        if was_paused and self.past is None:
             world.pause()
         self.project, self._commands = project, self._permitted(commands)
         # Its recording ends without a wait for the thread that moves it.
@@ -364,7 +351,9 @@ class Desk:
         Raises:
             LinkError: If the world cannot be replaced, or the present is shown.
         """
-        past = self._past_to_leave()
+        self._check_owns()
+        if (past := self.past) is None:
+            raise LinkError("Cannot go on from the past: the present is shown. Move the time bar back first.")
         sim = await past.do(lambda _: past.let_go())
         world = DeskWorld(sim, self.present.gate.speed)
         world.pause()
@@ -375,39 +364,6 @@ class Desk:
         except KiksError:
             self.looking.stop()
             raise
-
-    async def run_again_to_here(self) -> None:
-        """Begin the world of the past again with its programs, at full speed up to the time that is shown.
-
-        Raises:
-            LinkError: If the world cannot be replaced, or the present is shown.
-        """
-        past = self._past_to_leave()
-        if reason := self.why_not_again():
-            raise ParameterError(f"programs must be able to run again, but {reason}.")
-        run = self.looking.run
-        assert run is not None
-        until = await past.do(lambda sim: Instant(sim.now_ns, sim.state_hash()))
-        await self._put(run.project, run.commands, until)
-
-    def why_not_again(self) -> str:
-        """Return why the programs cannot run again up to the time that is shown; empty if they can."""
-        run = self.looking.run
-        if not self.owns_world:
-            return "a program outside holds this world"
-        if not self.looking.has_present:
-            return "a recording keeps what programs have sent, not how they were started"
-        if run is None:
-            return "no program of this desk began with this part of the run"
-        if run.project.thinking.startswith("live"):
-            return "their thinking is live: it takes real time, so no run is like another"
-        return ""
-
-    def _past_to_leave(self) -> Player:
-        self._check_owns()
-        if self.past is None:
-            raise LinkError("the past must be shown to go on from there. Move the time bar back first.")
-        return self.past
 
     # ---- checkpoints ----
 

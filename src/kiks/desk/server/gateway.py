@@ -16,7 +16,7 @@ from typing import Any
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from kiks.desk.server.desk import Desk
-from kiks.desk.server.timeline import Mark, thinned
+from kiks.desk.server.marks import Mark, thinned
 from kiks.errors import KiksError, ParameterError
 from kiks.export.frames import arena_picture, describe_scene, describe_shapes, pack_frame, scene_key
 from kiks.model.checks import SECONDS_MAX

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import asyncio
-import threading
 from collections.abc import Callable
 from concurrent.futures import TimeoutError as NotYet
 from contextlib import suppress
 from pathlib import Path
 
 from kiks.desk.server.desk_world import DeskWorld, Speedometer
+from kiks.desk.server.marks import Mark, MarkReader, next_mark
 from kiks.desk.server.player import Player, Span
-from kiks.desk.server.timeline import Mark, Run, Timeline, next_mark
 from kiks.errors import KiksError, LinkError, ParameterError
+from kiks.recording.log import RecordedLog, Source
+from kiks.recording.mcap_file import McapReader
+from kiks.recording.recorder import RunWriter
+from kiks.recording.recording import Recording
+from kiks.recording.ring import Ring
 from kiks.sim.simulation import Simulation
 from kiks.units import ns_from_s
 
@@ -40,60 +44,67 @@ class LookingBack:
         self.has_present = True
         self.marks: list[Mark] = []
         self._present, self._say = present, say
-        self._timeline = Timeline()
+        # The recording of what led to the present, and while a world is recorded what writes it.
+        self._source: Source | None = None
+        self._log: RecordedLog | None = None
+        self._writer: RunWriter | None = None
+        self._reader: MarkReader | None = None
         self._keeps = False
         self._was_running = False
         self._wanted_ns: int | None = None
         self._turn = asyncio.Lock()
-        self._switching = threading.Lock()
 
     # ---- what is recorded; with the lock of the present world ----
 
-    def keep(self, run: Run | None) -> None:
-        """Record the present world and all later ones, unless a recording is shown.
-
-        Args:
-            run: How the present one began, if its programs can run again.
-        """
+    def keep(self) -> None:
+        """Record the present world and all later ones, unless a recording is shown."""
         self._keeps = True
         if self.has_present:
-            self.begin(self._present().sim, run)
+            self.begin(self._present().sim)
 
-    def begin(self, sim: Simulation, run: Run | None) -> None:
-        """Forget the past, as another world begins, and record that if worlds are recorded.
+    def begin(self, sim: Simulation, *, is_branch: bool = False) -> None:
+        """Record another world, if worlds are recorded.
 
         Args:
             sim: The world.
-            run: How it began, if its programs can run again.
+            is_branch: Whether it goes on from a time of the past, which is kept up to there; else it is forgotten.
         """
-        if self._keeps:
-            self._try(lambda: self._timeline.begin(sim, run))
-
-    def branch(self, sim: Simulation) -> None:
-        """Keep what was before the present time of a world, which goes on from there, and record that."""
-        if self._keeps:
-            self._try(lambda: self._timeline.branch(sim))
-
-    def _try(self, record: Callable[[], object]) -> None:
+        before = self._source if is_branch else None
+        self._forget()
+        if not self._keeps:
+            return
         try:
-            record()
+            ring = Ring(sim, self._say)
+            if before is not None:
+                ring.copy(RecordedLog(before), sim.now_ns)
+            self._writer = RunWriter.of(sim)
+            self._writer.add(ring)
+            self._use(ring)
         except (KiksError, OSError) as error:
             self._say(f"People cannot look back at this run: {error}")
 
+    def _use(self, source: Source) -> None:
+        # Each thread reads with a log of its own.
+        self._source, self._log, self._reader = source, RecordedLog(source), MarkReader(RecordedLog(source))
+
+    def _forget(self) -> None:
+        if self._writer is not None and isinstance(self._source, Ring):
+            self._writer.remove(self._source)
+        self._source = self._log = self._writer = self._reader = None
+
     def show_recording(self, file: Path, time_ns: int) -> None:
         """Show a recording from a time on [ns]; the present world stands still until a person goes on from there."""
-        self._timeline.open(file)
-        self.marks = self._timeline.read()
+        self._use(McapReader(file))
+        assert self._reader is not None
+        self.marks = self._reader.read()
         self._present().pause()
         self.has_present = False
-        self.past = self._player_at(time_ns, None)
-        self.past.start()
+        self._show(time_ns)
 
     def stop(self) -> None:
         """Show the present, which is another world now."""
-        with self._switching:
-            past, self.past = self.past, None
-            self.has_present = True
+        past, self.past = self.past, None
+        self.has_present = True
         if past is not None:
             past.end()
 
@@ -103,39 +114,33 @@ class LookingBack:
         self._keeps = False
         # The world may be in a long step; then its thread ends the recording.
         with suppress(NotYet):
-            self._present().gate.ask(self._timeline.close).result(CLOSE_S)
+            self._present().gate.ask(self._forget).result(CLOSE_S)
 
     # ---- the span and the marks ----
 
     @property
     def span(self) -> Span | None:
         """From when to when the past goes; None if there is none."""
-        return self._timeline.span(self._present().sim.now_ns)
+        if self.past is not None:
+            return self.past.span
+        return None if self._log is None else Span(self._log.begin_ns, self._present().sim.now_ns)
 
-    @property
-    def run(self) -> Run | None:
-        """How the run that is shown began, if its programs can run again."""
-        past = self.past
-        return None if past is None else self._timeline.run_at(past.sim.now_ns)
-
-    async def file(self) -> Path:
-        """Return the file of the recording of the time that is shown, with all that has happened up to now."""
-        await self.tend()
-        present = self._present()
-        await present.do(lambda _: self._timeline.flush())
-        if not self._timeline.parts:
-            raise ParameterError("the world must be recorded, but its past could not be kept. Is the disk full?")
-        return self._timeline.part_at((self.past or present).sim.now_ns).file
+    async def recording(self) -> Recording:
+        """Return the recording of what led to the present, with all that has happened up to now."""
+        await self._present().do(lambda _: self._flush())
+        if self._source is None:
+            raise ParameterError("Cannot read what happened: the world is not recorded. Is the disk full?")
+        return Recording(self._source)
 
     async def tend(self) -> None:
-        """Keep the recording going, and read what has happened; called about once a second."""
-        present = self._present()
-        if self._keeps and self.has_present and self.past is None:
-            told = await present.do(self._timeline.tend)
-            if told:
-                self._say(told)
-        with suppress(KiksError):  # a replay tells people of it
-            self.marks = await asyncio.to_thread(self._timeline.read)
+        """Read what has happened; called about once a second."""
+        if self._reader is not None:
+            with suppress(KiksError):  # a replay tells people of it
+                self.marks = await asyncio.to_thread(self._reader.read)
+
+    def _flush(self) -> None:
+        if self._writer is not None:
+            self._writer.flush()
 
     # ---- where people look ----
 
@@ -154,55 +159,33 @@ class LookingBack:
                 await self._look_at(wanted_ns)
 
     async def _look_at(self, time_ns: int) -> None:
-        present, past = self._present(), self.past
-        if self.span is None:
-            raise LinkError("a world must be recorded for people to look back, but this one is not. Start it over.")
-        if past is None:
+        if self._source is None:
+            raise LinkError("Cannot look back: this world is not recorded. Start it over.")
+        if (past := self.past) is None:
+            present = self._present()
             await present.do(lambda _: self._stop_present(present))
-        span = self.span
-        assert span is not None
-        time_ns = min(max(time_ns, span.begin_ns), span.end_ns)
-        if past is not None and await asyncio.to_thread(past.seek, time_ns):
+            await asyncio.to_thread(self._show, time_ns)
+        else:
+            await asyncio.to_thread(past.seek, time_ns)
             past.meter = Speedometer()
-            return
-        player = await asyncio.to_thread(self._player_at, time_ns, past)
-        if self._present() is present:
-            self._show(player, past)
 
     def _stop_present(self, present: DeskWorld) -> None:
         self._was_running = not present.is_paused
         present.drop_all()
         present.pause()
-        self._timeline.flush()
+        self._flush()
 
-    def _player_at(self, time_ns: int, before: Player | None) -> Player:
-        present = self._present()
-        replay, span = self._timeline.replay_at(time_ns, present.sim.now_ns)
-        player = Player(replay, span, speed=(before or present).gate.speed, leave=self._leave, say=self._say)
-        if before is not None:
-            player.go_like(before)
-        return player
-
-    def _show(self, player: Player, before: Player | None) -> bool:
-        """Show another part of the past, unless something else is shown by now; return whether it is shown."""
-        with self._switching:
-            if self.past is not before:
-                return False
-            self.past = player
-        player.start()
-        if before is not None:
-            before.end()
-        return True
-
-    def _leave(self, player: Player, time_ns: int) -> bool:
-        """Show a time with another player, as this one cannot; return whether there is such a time."""
-        at_ns: int | None = time_ns
-        if time_ns >= player.span.end_ns:
-            at_ns = self._timeline.begin_after(time_ns, self._present().sim.now_ns)
-        span = self.span
-        if at_ns is None or span is None or at_ns < span.begin_ns:
-            return False
-        return self._show(self._player_at(at_ns, player), player)
+    def _show(self, time_ns: int) -> None:
+        """Begin to show the past at a time [ns]."""
+        source, present = self._source, self._present()
+        assert source is not None
+        log = RecordedLog(source)
+        span = Span(log.begin_ns, log.end_ns)
+        time_ns = min(max(time_ns, span.begin_ns), span.end_ns)
+        past = Player(log, time_ns, span, speed=present.gate.speed, say=self._say)
+        if self._present() is present:
+            self.past = past
+            past.start()
 
     async def go_back(self) -> None:
         """Play the past backwards.
@@ -247,12 +230,12 @@ class LookingBack:
 
     async def turn_at_the_end(self) -> None:
         """Where the past ends, show the present, or the beginning of a recording."""
-        past, span = self.past, self.span
-        if past is not None and span is not None and past.sim.now_ns >= span.end_ns:
+        past = self.past
+        if past is not None and past.sim.now_ns >= past.span.end_ns:
             if self.has_present:
                 await self.back_to_now()
             else:
-                await self.look_at(span.begin_ns)
+                await self.look_at(past.span.begin_ns)
 
     async def back_to_now(self) -> None:
         """Show the present again; it goes on if it did before.
@@ -261,7 +244,7 @@ class LookingBack:
             LinkError: If there is none.
         """
         if not self.has_present:
-            raise LinkError("a recording must be gone on from before it has a present. Press 'Go on from here' first.")
+            raise LinkError("This desk shows a recording only. Press 'Go on from here' first.")
         async with self._turn:
             if self.past is None:
                 return

@@ -1,7 +1,7 @@
 """The player: shows the past of a world on a desk, forwards at any speed, backwards, and from any time on.
 
-The past is a living simulation that recorded inputs move, so readings, rays and lines are there as ever. The player's
-own thread moves it: the thread that moves the present world waits at its gate meanwhile.
+The past is a simulation that recorded inputs move, so readings, rays and lines are there as ever. The player's own
+thread moves it: the thread that moves the present world waits at its gate meanwhile.
 """
 
 from __future__ import annotations
@@ -15,8 +15,9 @@ from typing import NamedTuple
 from kiks.clock.gate import LAG_NS
 from kiks.desk.server.desk_world import DeskWorld
 from kiks.errors import KiksError
-from kiks.recording.recorder import CHECK_NS
+from kiks.recording.log import RecordedLog
 from kiks.recording.replay import Replay
+from kiks.sim.drag import Drags
 from kiks.sim.simulation import Simulation
 from kiks.units import NS_PER_S
 
@@ -24,17 +25,13 @@ PERIOD_S = 0.01
 """Real time between two movements [s]."""
 
 IDLE_S = 0.05
-"""Real time between two looks whether it shall move, while it stands [s]."""
+"""Polling period while paused [s]."""
 
 SLICE_NS = NS_PER_S // 50
 """Longest slice of real time that is caught up at once, and of simulated time at full speed [ns]."""
 
 BACK_SPEED_MAX = 100.0
 """Highest speed backwards [simulated seconds per real second], full speed among them."""
-
-SMOOTH_BACK_SPEED = 10.0
-"""Up to this speed, each picture backwards is of its own instant; beyond it, of a whole second, where the recording
-has a checkpoint."""
 
 
 class Span(NamedTuple):
@@ -45,36 +42,29 @@ class Span(NamedTuple):
 
 
 class Player(DeskWorld):
-    """A part of the past of a world, played.
+    """The past of a world, played.
 
     Args:
-        replay: The part.
+        log: Its recording.
+        time_ns: Where it begins to be played [ns].
         span: From when to when it goes.
         speed: Simulated seconds per real second; None for full speed.
-        leave: Called in the player's thread with the player, locked, and a time that it cannot show, when it would go
-            there by itself [ns]; returns whether another player shows it now.
         say: Called with a message for people.
 
     Attributes:
-        replay: The part.
         span: From when to when it goes.
         is_backwards: Whether it is played backwards.
     """
 
     def __init__(
-        self,
-        replay: Replay,
-        span: Span,
-        *,
-        speed: float | None,
-        leave: Callable[[Player, int], bool],
-        say: Callable[[str], None],
+        self, log: RecordedLog, time_ns: int, span: Span, *, speed: float | None, say: Callable[[str], None]
     ) -> None:
-        super().__init__(replay.sim, speed)
-        self.replay = replay
+        self._log = log
+        self._replay = Replay(log, time_ns)
+        super().__init__(self._replay.sim, speed)
         self.span = span
         self.is_backwards = False
-        self._leave, self._say = leave, say
+        self._say = say
         self._is_over = False
         self._changed = threading.Condition(self.sim.lock)
         self._thread = threading.Thread(target=self._run, name="kiks player", daemon=True)
@@ -92,7 +82,7 @@ class Player(DeskWorld):
     def let_go(self) -> Simulation:
         """Leave the world alone and return it: it goes on without the recording. The caller holds the lock."""
         self.end()
-        return self.replay.let_go()
+        return self._replay.let_go()
 
     # ---- how it goes; between two events ----
 
@@ -117,24 +107,11 @@ class Player(DeskWorld):
         self._back_ns, self._back_wall_ns = self.sim.now_ns, time.monotonic_ns()
         self.is_backwards = True
 
-    def go_like(self, other: Player) -> None:
-        """Go on as another player does."""
-        if other.is_backwards:
-            self.go_back()
-        elif not other.is_paused:
-            self.go_on()
-
     # ---- another time ----
 
-    def seek(self, time_ns: int) -> bool:
-        """Go to a time [ns]; from any thread, which waits for it.
-
-        Returns:
-            Whether this player can show it; else nothing has changed.
-        """
-        if not self.span.begin_ns <= time_ns <= self.span.end_ns:
-            return False
-        future = self.gate.ask(lambda: self._seek(time_ns))
+    def seek(self, time_ns: int) -> None:
+        """Go to a time [ns], or where the past begins or ends; from any thread, which waits for it."""
+        future = self.gate.ask(lambda: self._seek(min(max(time_ns, self.span.begin_ns), self.span.end_ns)))
         while True:
             try:
                 return future.result(IDLE_S)
@@ -142,16 +119,21 @@ class Player(DeskWorld):
                 # The thread that moves the world has ended just now.
                 self.gate.serve()
 
-    def _seek(self, time_ns: int) -> bool:
-        if not self.replay.go_to(time_ns):
-            return False
+    def _seek(self, time_ns: int) -> None:
+        self._show(time_ns)
         if self.is_backwards:
             self.go_back()
         elif self.gate.is_paused:
             self.gate.pause(time_ns)
         else:
             self.gate.set_speed(self.gate.speed, time_ns)
-        return True
+
+    def _show(self, time_ns: int) -> None:
+        """Show the world at a time [ns]."""
+        if not self._replay.go_to(time_ns):
+            self._replay = Replay(self._log, time_ns, lock=self.sim.world.lock)
+            self.sim = self._replay.sim
+            self.hands = Drags(self.sim)
 
     # ---- the thread ----
 
@@ -174,7 +156,7 @@ class Player(DeskWorld):
             return self._move_back()
         now_ns, pace = self.sim.now_ns, self.gate.pace
         if now_ns >= self.span.end_ns:
-            if pace.now_ns() > now_ns and not self._leave(self, now_ns):
+            if pace.now_ns() > now_ns:
                 self.pause()
             return IDLE_S
         speed = 1.0 if pace.speed is None else pace.speed
@@ -188,13 +170,10 @@ class Player(DeskWorld):
 
     def _move_back(self) -> float:
         wall_ns = time.monotonic_ns()
-        passed_ns = min(wall_ns - self._back_wall_ns, LAG_NS)
+        passed_ns, self._back_wall_ns = min(wall_ns - self._back_wall_ns, LAG_NS), wall_ns
         speed = min(self.gate.speed or BACK_SPEED_MAX, BACK_SPEED_MAX)
-        self._back_wall_ns = wall_ns
-        self._back_ns -= round(passed_ns * speed)
-        time_ns = self._back_ns if speed <= SMOOTH_BACK_SPEED else self._back_ns // CHECK_NS * CHECK_NS
-        at_ns = max(time_ns, self.span.begin_ns)
-        is_shown = at_ns == self.sim.now_ns or self.replay.go_to(at_ns)
-        if (time_ns < at_ns or not is_shown) and not self._leave(self, time_ns if is_shown else at_ns):
+        self._back_ns = max(self._back_ns - round(passed_ns * speed), self.span.begin_ns)
+        self._show(self._back_ns)
+        if self._back_ns == self.span.begin_ns:
             self.pause()
         return 2 * PERIOD_S
