@@ -242,13 +242,17 @@ def test_concurrent_writes_of_programs_are_all_kept() -> None:
 
 
 def test_only_a_changed_syntax_tree_of_the_sources_has_a_folder_of_its_own(tmp_path: Path) -> None:
-    source = b'"""A file."""\nX = 1\n"""A number."""\ndef f(a):\n    """Return a number."""\n    return a + X\n'
-    syntax = code_cache._syntax(source)
-    assert code_cache._syntax(source.replace(b"number", b"sum") + b"# a comment") == syntax
-    assert code_cache._syntax(source.replace(b"X = 1", b"X = 2")) != syntax
-    changed = source.replace(b"a + X", b"X + a")
-    assert code_cache._syntax(changed) != syntax
-    assert code_cache._syntax(changed, True) == code_cache._syntax(source, True)
+    kernels = b'"""A file."""\nfrom kiks.units import X\ndef f(a):\n    """Return a number."""\n    return a + X\n'
+    constants = b'"""Units."""\nY = 2\nX = 1 + Y\n"""A number."""\nZ = 3\n'
+
+    def syntax(kernels: bytes, constants: bytes) -> str:
+        return code_cache._syntax({"kiks.engine.f": kernels, "kiks.units": constants})
+
+    whole = syntax(kernels, constants)
+    assert syntax(kernels.replace(b"number", b"sum") + b"# a comment", constants + b"def g(): pass\n") == whole
+    assert syntax(kernels, constants.replace(b"Z = 3", b"Z = 4")) == whole
+    assert syntax(kernels, constants.replace(b"Y = 2", b"Y = 3")) != whole
+    assert syntax(kernels.replace(b"a + X", b"X + a"), constants) != whole
     digest = code_cache._syntax_digest()
     (known,) = (tmp_path / "cache" / "kiks").glob("sources-*")
     assert known.read_bytes() == digest

@@ -40,8 +40,8 @@ from kiks.model.atomic_files import replace_file
 KERNEL_FOLDERS = ("engine", "control", "batch")
 """Folders beside one another whose files hold kernels."""
 
-CONSTANT_FILES = ("units.py", "model/*.py", "firmware/k213.py")
-"""Other files of the package, from which kernels have constants only."""
+CONSTANT_FILES = ("units.py", "model/*.py", "firmware/*.py")
+"""Other files of the package, in which kernels find constants."""
 
 SHIPPED = Path(__file__).parent / "compiled"
 """Folder of what a wheel brings (`make wheel`), with a folder for each version; most installations have none."""
@@ -158,18 +158,15 @@ def _syntax_digest() -> bytes:
     digest of the sources' bytes.
     """
     package = Path(__file__).parent.parent
-    globs = dict.fromkeys(CONSTANT_FILES, True) | dict.fromkeys((f"{each}/**/*.py" for each in KERNEL_FOLDERS), False)
-    sources = sorted(
-        (path.relative_to(package).parts, has_constants_only, path.read_bytes())
-        for each, has_constants_only in globs.items()
-        for path in package.glob(each)
-    )
+    globs = (*(f"{folder}/**/*.py" for folder in KERNEL_FOLDERS), *CONSTANT_FILES)
+    paths = [path for each in globs for path in sorted(package.glob(each))]
+    sources = {".".join(path.relative_to(package.parent).with_suffix("").parts): path.read_bytes() for path in paths}
     name = f"sources-{_digest(repr(sources).encode())[:32].decode()}"
     for file in (root / name for root in (SHIPPED, *_roots())):
         with _IfAllowed():
             if _is_believed(file.parent) and _is_safe(file.lstat()) and _DIGEST.fullmatch(digest := file.read_bytes()):
                 return digest
-    digest = _digest("".join(_syntax(source, only) for _, only, source in sources).encode())
+    digest = _digest(_syntax(sources).encode())
     for root in _roots():
         with contextlib.suppress(ParameterError), _IfAllowed():
             _make_own(root)
@@ -177,15 +174,37 @@ def _syntax_digest() -> bytes:
     return digest
 
 
-def _syntax(source: bytes, has_constants_only: bool = False) -> str:
-    """Return the syntax tree of a source, or of its constants, as text without docstrings and places."""
-    tree = ast.parse(source)
-    if has_constants_only:
-        tree.body = [each for each in tree.body if isinstance(each, ast.Assign)]
-    for node in ast.walk(tree):
+def _syntax(sources: dict[str, bytes]) -> str:
+    """Return what kernels are compiled from as text: syntax trees without docstrings and places.
+
+    Args:
+        sources: Those of the kernels and of their constants, by the names of their modules.
+    """
+    trees = {name: ast.parse(source) for name, source in sources.items()}
+    found: dict[tuple[str, str], ast.stmt] = {}
+
+    def find(module: str, name: str) -> None:
+        """Find the constant of a module, and those that it is made of."""
+        for statement in trees[module].body if module in trees and (module, name) not in found else ():
+            if isinstance(statement, ast.ImportFrom) and name in (each.name for each in statement.names):
+                find(statement.module or "", name)
+            elif isinstance(statement, ast.Assign) and name in _names(*statement.targets):
+                found[module, name] = statement
+                for other in _names(statement.value):
+                    find(module, other)
+
+    kernels = [tree for name, tree in trees.items() if name.split(".")[1] in KERNEL_FOLDERS]
+    for node in (node for tree in kernels for node in ast.walk(tree)):
+        if isinstance(node, ast.ImportFrom):
+            for each in node.names:
+                find(node.module or "", each.name)
         if isinstance(body := getattr(node, "body", None), list):
             node.body = [each for each in body if not _is_text(each)]  # type: ignore[attr-defined]
-    return ast.dump(tree)
+    return "".join(map(ast.dump, [*kernels, *(found[key] for key in sorted(found))]))
+
+
+def _names(*trees: ast.AST) -> set[str]:
+    return {node.id for tree in trees for node in ast.walk(tree) if isinstance(node, ast.Name)}
 
 
 def _is_text(statement: ast.stmt) -> bool:
