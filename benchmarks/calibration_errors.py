@@ -19,9 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 import kiks
-from kiks.calibration.calibrate import calibrate
-from kiks.calibration.placements import Instruction, SimPlacements
-from kiks.calibration.wall_fit import WallModel
+from kiks.fit.calibrate import calibrate
+from kiks.fit.placements import Instruction, SimPlacements
+from kiks.fit.robot_fit import predict
+from kiks.fit.samples import Samples
 
 SEEDS = range(8)
 
@@ -50,13 +51,10 @@ def half_distances_mm(spec: kiks.RobotSpec, hidden: kiks.RobotSpec) -> list[floa
     Both stand so that the hidden one's sensor looks straight at it. For a Khepera the half is 512 counts.
     """
     gaps_mm = np.arange(0.5, spec.proximity.range_mm, 0.25)
-    distances = []
-    for sensor, direction_deg in enumerate(hidden.proximity.direction_deg):
-        headings_rad = np.full(len(gaps_mm), -math.radians(direction_deg))
-        half = WallModel(hidden).readings(hidden, gaps_mm[:1], headings_rad[:1])[0, sensor] / 2
-        counts = WallModel(spec).readings(spec, gaps_mm, headings_rad)[:, sensor]
-        distances.append(float(np.interp(-half, -counts, gaps_mm)))
-    return distances
+    angle_deg = np.tile(-np.array(hidden.proximity.direction_deg), (len(gaps_mm), 1))
+    wall = Samples("wall", math.inf, gaps_mm, angle_deg, np.zeros((*angle_deg.shape, 8), np.int64))
+    readings, halves = (np.diagonal(predict(each, wall), axis1=1, axis2=2) for each in (spec, hidden))
+    return [float(np.interp(-halves[0, i] / 2, -readings[:, i], gaps_mm)) for i in range(8)]
 
 
 class ByHand(SimPlacements):
@@ -66,11 +64,12 @@ class ByHand(SimPlacements):
         super().__init__(sim)
         self.rng = random.Random(1000 + seed)
 
-    def place(self, instruction: Instruction) -> float:
+    def place(self, instruction: Instruction) -> float | None:
         """Put the robot about there and return the gap that it should have [mm]."""
         self.skew_rad = math.radians(self.rng.uniform(-8, 8))
-        beside_mm = self.rng.uniform(-0.5, 0.5) if instruction.gap_mm else 0.0
-        super().place(replace(instruction, gap_mm=instruction.gap_mm + beside_mm))
+        if instruction.gap_mm is None:
+            return super().place(instruction)
+        super().place(replace(instruction, gap_mm=instruction.gap_mm + self.rng.uniform(-0.5, 0.5)))
         return instruction.gap_mm
 
 

@@ -29,7 +29,6 @@ LAYERS = [
     "ports",
     "script",
     "client",
-    "calibration",
     "batch",
     "export",
     "learn",
@@ -42,7 +41,7 @@ LAYERS = [
 
 # What of the standard library only some layers may touch.
 CLOCKS = {"time", "datetime"}
-MAY_SEE_THE_WALL_CLOCK = {"clock", "recording", "script", "client", "calibration", "learn", "desk", "toolbox", "cli"}
+MAY_SEE_THE_WALL_CLOCK = {"clock", "recording", "script", "client", "learn", "desk", "toolbox", "cli"}
 RANDOM = {"random", "secrets"}
 MAY_HAVE_SECRETS = {"desk", "toolbox"}
 

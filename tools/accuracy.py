@@ -88,7 +88,7 @@ def _train(tables: Mapping[str, Samples], file: Path, starts: int, seed: int) ->
     from rich.table import Table
     from tools.sensors import train_networks
 
-    from kiks.fit.reflection import find_rigs
+    from kiks.fit.robot_fit import find_rigs
     from kiks.model.robot import RobotSpec
 
     halves = [[table.at_angles(slice(first, None, 2)) for table in tables.values()] for first in (0, 1)]

@@ -29,7 +29,7 @@ from typer.testing import CliRunner
 
 from kiks.cli.fit import fit, parse_file
 from kiks.errors import ParameterError
-from kiks.fit.reflection import active_pairs, fit_reflection
+from kiks.fit.robot_fit import active_pairs, fit_robot
 from kiks.fit.samples import RIG_OFFSET_DEG, Samples
 from kiks.model.robot import RobotSpec
 
@@ -103,7 +103,7 @@ def test_the_robot_of_the_file_is_the_one_that_is_found(card):
     """The constants of the robot's file are a minimum of the fit, or as good as one."""
     learn = [table.at_angles(HALVES["even"]) for table in card.tables.values()]
     base = RobotSpec.load("khepera")
-    found = fit_reflection(learn, base)
+    found = fit_robot(learn, base)
     moved = [rig.moved(table) for rig, table in zip(found.rigs, learn, strict=True)]
     best, kept = (np.abs(np.subtract(*active_pairs(spec, moved))).mean() for spec in (found.spec, base))
     assert kept == pytest.approx(best, abs=1.5)

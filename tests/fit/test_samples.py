@@ -13,7 +13,6 @@ from tools.sensors.train_networks import PLACES
 from kiks.engine.sensing.rays import walls_of
 from kiks.errors import ParameterError
 from kiks.fit.samples import (
-    BODY_RADIUS_MM,
     MAXIMUM_COUNTS,
     RIG_OFFSET_DEG,
     Fan,
@@ -24,6 +23,7 @@ from kiks.fit.samples import (
     nearnesses,
 )
 from kiks.model.arena import Arena
+from kiks.model.thesis_networks import BODY_RADIUS_MM
 
 ROW = "0 1 2 3 4 5 6 1023"
 GOOD = f"8 2 3 5 2\nTURN 0\n{ROW}\n{ROW}\nTURN 1\n{ROW}\n{ROW}\nTURN 2\n{ROW}\n9 9 9 9 9 9 9 9\n"

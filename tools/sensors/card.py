@@ -3,7 +3,7 @@
 Only active cells count, those with a measured reading between 20 and 1000: below is noise, above saturation. Models and
 poses were fitted to angles with an even index at most; those with an odd one, the held-out half, were never seen.
 
-Every figure is given for two sets of poses, the same for all models: those found for the rig (`kiks.fit.reflection`)
+Every figure is given for two sets of poses, the same for all models: those found for the rig (`kiks.fit.robot_fit`)
 and, with `told` in its name, those of the tables.
 """
 
@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from tools.sensors.models import MODELS
 
 from kiks.errors import ParameterError
-from kiks.fit.reflection import Rig, active_pairs, find_rigs, fit_reflection
+from kiks.fit.robot_fit import Rig, active_pairs, find_rigs, fit_robot
 from kiks.fit.samples import ACTIVE_COUNTS, MAXIMUM_COUNTS, Floats, Samples, is_active, load_samples
 from kiks.model.robot import SENSOR_COUNT, RobotSpec
 
@@ -198,7 +198,7 @@ def _unseen(tables: Mapping[str, Samples]) -> dict[str, dict[str, Score]]:
     scores: dict[str, dict[str, Score]] = {FOUND: {}, TOLD: {}}
     for name, table in tables.items():
         others = [other.at_angles(HALVES["even"]) for each, other in tables.items() if each != name]
-        spec = fit_reflection(others, base.with_changes(**alike)).spec
+        spec = fit_robot(others, base.with_changes(**alike)).spec
         (rig,) = find_rigs([table.at_angles(HALVES["even"])], spec)
         for poses, samples in ((FOUND, rig.moved(table)), (TOLD, table)):
             answers, readings = active_pairs(spec, [samples.at_angles(HALVES[HELD_OUT])])

@@ -13,9 +13,9 @@ import numpy as np
 from tools.sensors.train_networks import PLACES, fan_of
 
 from kiks.engine.sensing import thesis_networks
-from kiks.fit.samples import BODY_RADIUS_MM, MAXIMUM_COUNTS, Fan, Floats, Samples, nearnesses, ray_lengths_mm
+from kiks.fit.samples import MAXIMUM_COUNTS, Fan, Floats, Samples, nearnesses, ray_lengths_mm
 from kiks.model.robot import SENSOR_COUNT
-from kiks.model.thesis_networks import NetworkResponse
+from kiks.model.thesis_networks import BODY_RADIUS_MM, NetworkResponse
 
 Model = Callable[[Samples], Floats]
 

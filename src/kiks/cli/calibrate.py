@@ -13,8 +13,8 @@ from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import ParameterError
 
 if TYPE_CHECKING:
-    from kiks.calibration.placements import Instruction, Placements
     from kiks.client.khepera import Khepera
+    from kiks.fit.placements import Instruction, Placements
 
 REPEAT_MAX_MM = 2000.0
 
@@ -39,8 +39,8 @@ def calibrate(
     Example: kiks calibrate --port /dev/ttyUSB0 --out mine.toml
     """
     ready_engine()
-    from kiks.calibration.calibrate import calibrate as measure
     from kiks.client.khepera import Khepera
+    from kiks.fit.calibrate import calibrate as measure
     from kiks.model.robot import RobotSpec, save_robot
 
     kind = RobotSpec.load(base)
@@ -71,16 +71,14 @@ class TerminalPlacements:
         self.asks = asks
         self.count = 0
 
-    def place(self, instruction: Instruction) -> float:
+    def place(self, instruction: Instruction) -> float | None:
         """Print an instruction and wait; return the gap that the person enters, by default the marked one [mm]."""
         from dataclasses import replace
-
-        from kiks.calibration.placements import Place
 
         self.count += 1
         typer.echo(f"\n{self.count}. {instruction.text}")
         gap_mm = instruction.gap_mm
-        if self.asks and instruction.place is Place.WALL:
+        if self.asks and gap_mm is not None:
             gap_mm = _ask_gap("   Gap between wall and rim in mm; Enter when it stands there", gap_mm)
         elif self.asks:
             typer.prompt("   Enter when it stands there", default="", show_default=False)
@@ -107,7 +105,7 @@ def _ask_gap(question: str, default_mm: float) -> float:
 
 def hand_of(robot: Khepera) -> Placements | None:
     """Return the object that can move the robot: None unless it is simulated in this process."""
-    from kiks.calibration.placements import SimPlacements
+    from kiks.fit.placements import SimPlacements
     from kiks.sim.simulation import SimPort
 
     port = robot.port

@@ -35,7 +35,7 @@ def fit(
     from rich.console import Console
 
     from kiks.cli.engine_start import ready_engine
-    from kiks.fit.reflection import active_pairs, fit_reflection
+    from kiks.fit.robot_fit import active_pairs, fit_robot
     from kiks.fit.samples import load_samples
     from kiks.model.robot import RobotSpec, save_robot
 
@@ -43,7 +43,7 @@ def fit(
     ready_engine()
     end_as_with_ctrl_c()
     with Console().status("fitting"):
-        found = fit_reflection([table.at_angles(slice(0, None, 2)) for table in tables], RobotSpec.load("khepera"))
+        found = fit_robot([table.at_angles(slice(0, None, 2)) for table in tables], RobotSpec.load("khepera"))
     test = [rig.moved(table.at_angles(slice(1, None, 2))) for rig, table in zip(found.rigs, tables, strict=True)]
     answers, readings = active_pairs(found.spec, test)
     if len(answers):

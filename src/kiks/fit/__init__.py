@@ -1,1 +1,1 @@
-"""From measured samples to the sensors' response: readers of samples, and the fit."""
+"""From readings of a real robot to a simulated one like it: samples, how a robot collects its own, and the fit."""

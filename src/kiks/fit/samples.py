@@ -30,11 +30,9 @@ from kiks.model.atomic_files import path_of
 from kiks.model.data_file import COORDINATE_MAX, read_file
 from kiks.model.raster import is_number
 from kiks.model.robot import SENSOR_COUNT
+from kiks.model.thesis_networks import BODY_RADIUS_MM
 
 Floats = NDArray[np.float64]
-
-BODY_RADIUS_MM = 27.5
-"""Radius of the robot from whose rim gaps were measured [mm]."""
 
 RIG_OFFSET_DEG = 2.0
 """How far the robot was turned to the right on its rig [deg]: its sensors say 1.5 to 3 (README of the samples)."""
@@ -112,7 +110,7 @@ class Fan:
         return cls(origin, np.radians(np.add.outer(np.array(direction_deg), np.array(offsets_deg))), range_mm)
 
 
-def meet(samples: Samples, fan: Fan) -> tuple[Floats, Floats]:
+def meet(samples: Samples, fan: Fan, body_radius_mm: float = BODY_RADIUS_MM) -> tuple[Floats, Floats]:
     """Return how far each ray goes before it meets the object, at most the fan's range [mm], and how it meets it.
 
     Geometry: a ray from p in the unit direction u meets the wall n.x = D after t = (D - n.p) / (n.u), and the disc with
@@ -125,7 +123,7 @@ def meet(samples: Samples, fan: Fan) -> tuple[Floats, Floats]:
     towards = -np.radians(samples.angle_deg)
     normal = np.stack([np.cos(towards), np.sin(towards)], axis=-1)  # [gaps, angles, 2]
     ray = np.stack([np.cos(fan.direction_rad), np.sin(fan.direction_rad)], axis=-1)  # [8, rays, 2]
-    rim_mm = BODY_RADIUS_MM + samples.gap_mm
+    rim_mm = body_radius_mm + samples.gap_mm
     with np.errstate(divide="ignore", invalid="ignore"):
         if math.isinf(samples.radius_mm):
             before_mm = rim_mm[:, None, None] - normal @ fan.origin_mm.T  # [gaps, angles, 8]

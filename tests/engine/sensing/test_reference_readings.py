@@ -8,7 +8,7 @@ from tools.sensors.models import MAXIMUM_COUNTS
 
 from kiks.engine.parameters import pack
 from kiks.engine.sensing.responses import respond_all
-from kiks.engine.sensing.thesis_networks import pack_networks, respond_networks
+from kiks.engine.sensing.thesis_networks import networks_for, pack_networks, respond_networks
 from kiks.model.robot import RobotSpec
 from kiks.model.thesis_networks import NetworkResponse
 
@@ -56,7 +56,7 @@ def reflection():
     """Each ray taken to meet its surface squarely, as the patterns do not tell."""
     counts = np.empty((len(PATTERNS), 8))
     cosines = np.where(INVERTED_MM > 0.0, 1.0, 0.0)
-    respond_all(pack(RobotSpec.load("khepera")), 50.0 - INVERTED_MM, cosines, counts)
+    respond_all(networks_for(), pack(RobotSpec.load("khepera")), 50.0 - INVERTED_MM, cosines, counts)
     return counts
 
 

@@ -15,7 +15,7 @@ import pytest
 from tests.at_length import share
 
 import kiks
-from kiks.fit.reflection import predict
+from kiks.fit.robot_fit import predict
 from kiks.fit.samples import Samples
 from kiks.model.arena import PAD, Arena
 from kiks.model.raster import unpack_faces

@@ -104,10 +104,11 @@ def respond(networks: Any, parameters: Any, sensor: Any, lengths_mm: Any, cosine
 
 
 @entry
-def respond_all(kinds: Any, lengths_mm: Any, cosines: Any, out: Any) -> Any:
-    """Write the expected counts above the baseline for white surfaces, for a robot without networks.
+def respond_all(networks: Any, kinds: Any, lengths_mm: Any, cosines: Any, out: Any) -> Any:
+    """Write the expected counts above the baseline for white surfaces.
 
     Args:
+        networks: What the response needs of the thesis's networks (`networks_for`).
         kinds: Records of `PARAMETERS`, shape [1].
         lengths_mm: Lengths of rays [mm], shape [samples, 8, 7].
         cosines: Cosines of the angles of incidence, 0 for a ray without a hit, shape [samples, 8, 7].
@@ -120,4 +121,4 @@ def respond_all(kinds: Any, lengths_mm: Any, cosines: Any, out: Any) -> Any:
             for ray in range(RAY_COUNT):
                 padded_mm[ray], padded[ray] = lengths_mm[sample, sensor, ray], cosines[sample, sensor, ray]
             shades = choose(load(padded) > 0.0, 255.0, 0.0)
-            out[sample, sensor] = reflection_count(kinds[0], sensor, load(padded_mm), load(padded), shades)
+            out[sample, sensor] = respond(networks, kinds[0], sensor, load(padded_mm), load(padded), shades)

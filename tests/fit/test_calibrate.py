@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,13 +14,14 @@ from tests.at_length import at_length
 from typer.testing import CliRunner
 
 import kiks
-from kiks.calibration import wall_fit
-from kiks.calibration.calibrate import Calibration, calibrate, checked_gaps, default_gaps_mm
-from kiks.calibration.measurements import CalibrationError, Run, processing_ms, rest, spin
-from kiks.calibration.placements import Instruction, Place, SimPlacements
 from kiks.cli.calibrate import calibrate as command
 from kiks.cli.calibrate import parse_gaps
 from kiks.cli.outputs import Command
+from kiks.fit.calibrate import Calibration, calibrate, checked_gaps, default_gaps_mm, one_turn_deg
+from kiks.fit.measurements import CalibrationError, processing_ms, rest
+from kiks.fit.placements import Instruction, SimPlacements
+from kiks.fit.robot_fit import DIRECTION, predict
+from kiks.fit.samples import Samples
 from kiks.model.robot import robot_toml, save_robot
 from kiks.sim.simulation import SimPort
 
@@ -33,8 +35,8 @@ KHEPERA_II = kiks.RobotSpec.load("khepera_ii")
 def idle(spec: kiks.RobotSpec) -> tuple[list[float], float]:
     """Return the mean reading of each sensor in the open [counts], and the share of zeros in all readings."""
     sim = kiks.Simulation(robot=spec, seed=5)
-    SimPlacements(sim).place(Instruction(Place.FREE, ""))
-    counts = rest(kiks.Khepera(sim.port(1)), 300).counts
+    SimPlacements(sim).place(Instruction(""))
+    counts = rest(kiks.Khepera(sim.port(1)), 300)
     return counts.mean(axis=0).tolist(), float((counts == 0).mean())
 
 
@@ -64,9 +66,9 @@ def test_calibration_finds_hidden_parameters(base: kiks.RobotSpec, seed: int) ->
     hidden = hidden_robot(seed, base)
     found = measured(hidden, base, seed=seed, skew_rad=math.radians(6 * (-1) ** seed))
     check(found.spec, hidden)
-    error = found.fit.uncertainty
-    assert error[:8].max() < 2.0
-    assert error[16:].max() < 0.005
+    assert found.fit.deviations[DIRECTION].max() < 2.0
+    assert found.pulse_deviation_mm < 0.005 * hidden.body.pulse_mm
+    assert found.wheel_base_deviation_mm < 0.005 * hidden.body.wheel_base_mm
 
 
 @at_length
@@ -81,7 +83,7 @@ def test_response_with_directions_of_its_own_is_rejected(response: str) -> None:
     placements = SimPlacements(kiks.Simulation())
     base = BASE.with_changes(proximity__response=response)
     with pytest.raises(
-        kiks.ParameterError, match=f"the response of the --base must be one of .* but it was '{response}'"
+        kiks.ParameterError, match=f"must have the response 'reflection' or 'curve', but 'Khepera' has '{response}'"
     ):
         calibrate(kiks.Khepera(placements.sim.port(1)), placements, base)
 
@@ -151,10 +153,10 @@ class Misplaced(SimPlacements):
         self.errors_mm = errors_mm
         self.findings: list[str] = []
 
-    def place(self, instruction: Instruction) -> float:
-        error_mm = self.errors_mm.get(instruction.gap_mm, 0.0)
-        super().place(Instruction(instruction.place, instruction.text, instruction.gap_mm + error_mm))
-        return instruction.gap_mm
+    def place(self, instruction: Instruction) -> float | None:
+        gap_mm = instruction.gap_mm
+        super().place(instruction if gap_mm is None else Instruction("", gap_mm + self.errors_mm.get(gap_mm, 0.0)))
+        return gap_mm
 
     def wants_repeat(self, finding: str, *, is_good: bool) -> bool:
         self.findings.append(finding)
@@ -185,7 +187,7 @@ def test_wall_out_of_sight_raises_after_all_attempts() -> None:
 
 def test_error_for_a_run_up_without_a_wall() -> None:
     class Backwards(Misplaced):
-        def place(self, instruction: Instruction) -> float:
+        def place(self, instruction: Instruction) -> float | None:
             gap_mm = super().place(instruction)
             if gap_mm == 200:
                 self.sim.place(1, 250.0, 500.0, -math.pi / 2)
@@ -199,8 +201,8 @@ def test_error_for_a_run_up_without_a_wall() -> None:
 
 def test_error_for_an_obstacle_in_the_open() -> None:
     class Cornered(Misplaced):
-        def place(self, instruction: Instruction) -> float:
-            return super().place(Instruction(Place.WALL, "", instruction.gap_mm or 5.0))
+        def place(self, instruction: Instruction) -> float | None:
+            return super().place(Instruction("", instruction.gap_mm or 5.0))
 
     assert "the sensors must read little in the open, but sensor" in failure(Cornered(kiks.Simulation(), {}))
 
@@ -279,33 +281,13 @@ def test_processing_time_excludes_the_time_on_the_line(baud: int) -> None:
     assert processing_ms(kiks.Khepera(port), baud) == pytest.approx(3.5, abs=0.01)
 
 
-def test_odometry_follows_a_spin() -> None:
-    sim = kiks.Simulation()
-    sim.place(1, 250.0, 300.0, 0.0)
-    run = spin(kiks.Khepera(sim.port(1)), sim.spec, 100.0, -0.75)
-    gaps_mm, headings_rad = wall_fit.odometry(run, sim.spec, 0.0)
-    assert gaps_mm == pytest.approx(np.full(len(gaps_mm), 100.0), abs=0.5)
-    assert headings_rad[-1] == pytest.approx(-1.5 * math.pi, abs=0.1)
-    turned_rad = run.turned_pulses() * sim.spec.body.pulse_mm / sim.spec.body.wheel_base_mm
-    assert turned_rad == pytest.approx(sim.pose(1)[2], abs=0.01)
-
-
-def test_unknowns_and_robot_convert_into_each_other() -> None:
-    spec = hidden_robot(4, BASE)
-    unknowns = wall_fit.unknowns_of(BASE, spec)
-    assert wall_fit.unknowns_of(BASE, wall_fit.apply_unknowns(BASE, unknowns)) == pytest.approx(unknowns)
-    unknowns[-1] = 1.0
-    with pytest.raises(CalibrationError, match="Name the right kind with --base"):
-        wall_fit.apply_unknowns(BASE, unknowns)
-
-
-def test_guessed_heading_is_close_to_the_true_one() -> None:
-    model = wall_fit.WallModel(BASE)
-    headings_rad = np.linspace(0.4, 0.4 + 2 * math.pi, 100)
-    turned = (headings_rad - 0.4) * BASE.body.wheel_base_mm / BASE.body.pulse_mm / 2
-    counts = model.readings(BASE, np.full(100, 10.0), headings_rad)
-    run = Run(10.0, np.stack((-turned, turned), axis=1), counts, (0, 0))
-    assert wall_fit.guess_heading_rad(model, BASE, run) == pytest.approx(0.4, abs=0.1)
+@pytest.mark.parametrize("turn_deg", [330.0, 372.5])
+def test_the_wheel_base_is_guessed_from_readings_that_repeat(turn_deg: float) -> None:
+    angle_deg = np.linspace(7.0, 900.0, 90)
+    empty = Samples("wall", math.inf, np.array([10.0]), angle_deg[None], np.zeros((1, 90, 8), np.int64))
+    counts = np.rint(predict(BASE, empty)).astype(np.int64)
+    by_counters = angle_deg * turn_deg / 360.0
+    assert one_turn_deg(replace(empty, angle_deg=by_counters[None], counts=counts)) == pytest.approx(turn_deg, abs=1.0)
 
 
 def test_gaps_are_checked() -> None:
@@ -322,7 +304,7 @@ def test_gaps_are_checked() -> None:
 def test_error_for_an_arena_without_room() -> None:
     placements = SimPlacements(kiks.Simulation(kiks.Arena.box(300, 300)))
     with pytest.raises(kiks.ParameterError, match="the arena must have room for a robot 500 mm below"):
-        placements.place(Instruction(Place.WALL, "", 500.0))
+        placements.place(Instruction("", 500.0))
 
 
 @pytest.mark.parametrize("name", ["khepera", "khepera_ii"])

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from kiks.errors import ParameterError
-from kiks.fit.reflection import Rig, find_rigs, fit_reflection, predict
+from kiks.fit.robot_fit import Rig, find_rigs, fit_robot, predict
 from kiks.fit.samples import Samples
 from kiks.model.robot import RobotSpec
 
@@ -51,7 +51,7 @@ def made_up():
 @pytest.mark.slow
 def test_a_robot_and_its_rig_are_found(made_up):
     spec, rigs, tables = made_up
-    found = fit_reflection(tables, BASE)
+    found = fit_robot(tables, BASE)
     assert np.subtract(found.spec.proximity.direction_deg, spec.proximity.direction_deg) == pytest.approx(0, abs=2.5)
     for table, before, after in zip(tables, rigs, found.rigs, strict=True):
         saw = ((table.counts > 20) & (table.counts < 1000)).any(axis=(1, 2))
@@ -74,7 +74,7 @@ def test_a_rig_moves_poses_and_nothing_else():
     ones = np.ones(len(GAPS_MM))
     moved = Rig(0.5 * ones, 2.0 * ones, 3.6 * ones).moved(table)
     assert moved.gap_mm.tolist() == (GAPS_MM + 0.5).tolist()
-    assert moved.angle_deg[0, [0, 22]].tolist() == pytest.approx([2.0 - 1.8, 176 + 2.0 + 3.6 * (176 / 360 - 0.5)])
+    assert moved.angle_deg[0, [0, 22, 44]].tolist() == pytest.approx([2.0 - 1.76, 176 + 2.0, 352 + 2.0 + 1.76])
     assert moved.counts is table.counts
     exact = Rig.exact(len(GAPS_MM)).moved(table)
     assert np.array_equal(exact.angle_deg, table.angle_deg)
@@ -83,6 +83,6 @@ def test_a_rig_moves_poses_and_nothing_else():
 def test_what_cannot_be_fitted_is_said():
     empty = Samples("wall", math.inf, GAPS_MM, ANGLES_DEG, np.zeros((*ANGLES_DEG.shape, 8), np.int64))
     with pytest.raises(ParameterError, match="readings between 20 and 1000, but there are none"):
-        fit_reflection([empty], BASE)
+        fit_robot([empty], BASE)
     with pytest.raises(ParameterError, match="must have the response 'reflection', but 'Khepera' has 'thesis'"):
-        fit_reflection([empty], RobotSpec.load("khepera", response="thesis"))
+        fit_robot([empty], RobotSpec.load("khepera", response="thesis"))
