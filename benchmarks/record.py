@@ -16,8 +16,9 @@ import time
 from pathlib import Path
 from statistics import median
 
-import kiks
 from calibration import calibration_loops_per_s, report
+
+import kiks
 from kiks.demos.follow import Follow
 from kiks.export.film import save_film
 
