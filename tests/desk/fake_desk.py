@@ -13,6 +13,7 @@ import json
 import math
 import struct
 import sys
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,8 @@ from PIL import Image
 from tests.desk.announced import serve
 
 from kiks.desk.panels.arena_view import ArenaView, Pick, Stroke, Tool
+from kiks.export.looks import robot_hue, robot_shapes
+from kiks.model.robot import RobotSpec
 
 WIDTH_MM, HEIGHT_MM = 900, 600
 REACH_MM = 60.0
@@ -89,21 +92,25 @@ class World:
 
     def scene_message(self) -> str:
         robots = []
+        body = RobotSpec.load("khepera").body
         for k in range(len(self.robots)):
             is_special = k < 2
             shapes = [{"points": [[-10, -12], [14, -12], [14, 12], [-10, 12]], "colour": "#303030", "radius_mm": 0}]
             shapes.append({"points": [[16, 0]], "colour": "#5080c0", "radius_mm": 5})
+            striped = replace(body, stripe_count=2) if k == 1 else body
+            parts = [asdict(part) for part in robot_shapes(striped)]
             robots.append(
                 {
                     "name": str(k + 1), "kind": "Khepera", "radius_mm": 27.5, "wheel_base_mm": 53, "reach_mm": REACH_MM,
+                    "hue": robot_hue(k), "parts": parts,
                     "white_stripes_rad": [[0.8, 2.4], [3.9, 5.5]] if k == 1 else [],
                     "sensors": [sensor(degrees) for degrees in SENSOR_DEG], "has_gripper": k == 1,
                     "turrets": ["K213 vision"] if is_special else [], "shapes": shapes if k == 0 else [],
                 }
             )  # fmt: skip
         bodies = [
-            {"number": 1, "what": "ball", "radius_mm": 20, "brightness": 200},
-            {"number": 2, "what": "cylinder", "radius_mm": 14, "brightness": 200},
+            {"number": 1, "what": "ball", "radius_mm": 20, "colour": [245, 130, 40]},
+            {"number": 2, "what": "cylinder", "radius_mm": 14, "colour": [176, 122, 70]},
         ]
         sizes = {
             "width_mm": WIDTH_MM,

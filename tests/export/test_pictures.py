@@ -9,6 +9,7 @@ import pytest
 
 import kiks
 from kiks.errors import ParameterError
+from kiks.export.looks import robot_colour
 from kiks.export.pictures import Picture, save_image
 from kiks.model.arena import Pose
 
@@ -41,10 +42,9 @@ def test_everything_is_where_it_is() -> None:
     assert pixel(image, 300, 280)[2] < FLOOR[2]  # its light
     assert min(pixel(image, 121, 100)) > 240  # noses: one points right, the other up
     assert min(pixel(image, 300, 121)) > 240
-    one, other = pixel(image, 100, 120), pixel(image, 320, 107)
-    assert max(one) < 200
-    assert max(other) < 200
-    assert one != other
+    for index, x_mm in enumerate((100, 300)):
+        assert pixel(image, x_mm + 6, 106) == pytest.approx(robot_colour(index), abs=3)  # beside its number
+        assert pixel(image, x_mm + 18.7, 118.7) == pytest.approx(robot_colour(index), abs=60)  # its ring
 
 
 def test_stripes_stand_around_a_robot() -> None:

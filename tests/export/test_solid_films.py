@@ -14,7 +14,7 @@ from PIL import Image, ImageSequence
 
 from kiks import Arena, Khepera, ParameterError, Recording, RobotSpec, Simulation
 from kiks.export.film import save_film
-from kiks.export.sheet import robot_colour
+from kiks.export.looks import robot_colour
 from kiks.export.solid_stage import CELLS_MAX, wall_boxes
 from kiks.model.arena import Pose
 
@@ -53,7 +53,7 @@ def place_of(picture: Pixels, colour: tuple[int, ...]) -> tuple[float, float]:
 
 def test_things_are_where_they_are(recording: Recording, tmp_path: Path) -> None:
     first, *_, last = filmed(recording, tmp_path)
-    driving, standing = robot_colour(0, 2), robot_colour(1, 2)
+    driving, standing = robot_colour(0), robot_colour(1)
     (column, row), (_, row_above) = place_of(first, driving), place_of(first, standing)
     assert row_above < row - 20  # what is up in the arena is far away
     assert column < 130
@@ -68,7 +68,7 @@ def test_things_are_where_they_are(recording: Recording, tmp_path: Path) -> None
 
 def test_the_followed_robot_stays_in_the_middle(recording: Recording, tmp_path: Path) -> None:
     for picture in filmed(recording, tmp_path, follow=1):
-        column, row = place_of(picture, robot_colour(0, 2))
+        column, row = place_of(picture, robot_colour(0))
         assert column == pytest.approx(160, abs=12)
         assert row == pytest.approx(120, abs=25)
 

@@ -10,7 +10,7 @@ import pytest
 from tests.at_length import at_length
 from tests.matlab.octave import needs_octave, run
 
-from kiks.export.sheet import robot_colour
+from kiks.export.looks import robot_colour
 
 pytestmark = [needs_octave, pytest.mark.slow]
 
@@ -24,7 +24,7 @@ def pictures(file: Path) -> list[np.ndarray]:
 
 def robot_column(picture: np.ndarray) -> float:
     """Return where the robot is, as a share of the picture's width."""
-    is_robot = np.abs(picture.astype(int) - robot_colour(0, 1)).max(axis=-1) < 30
+    is_robot = np.abs(picture.astype(int) - robot_colour(0)).max(axis=-1) < 30
     is_robot[:, 1030:] = False  # what stands beside the world has its colour, too
     return float(np.nonzero(is_robot)[1].mean()) / picture.shape[1]
 

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from kiks.errors import ParameterError
+from kiks.export.looks import css, robot_colour
 from kiks.model.arena import Arena
 from kiks.model.atomic_files import ending_of, replace_file
 from kiks.recording.analysis import odometry, time_shares
@@ -166,7 +167,7 @@ def _draw_paths(axes: Any, recording: Recording, poses: Table, wheels: Table) ->
     _draw_arena(axes, setup.arena)
     for number in recording.robots:
         path, counts = poses[poses["robot"] == number], wheels[wheels["robot"] == number]
-        colour = f"C{(number - 1) % 10}"
+        colour = css(robot_colour(number - 1))
         axes.plot(path["x_mm"], path["y_mm"], color=colour, linewidth=1.2, label=f"robot {number}")
         axes.plot(path["x_mm"][:1], path["y_mm"][:1], "o", color=colour, markersize=4)
         if len(recording.robots) == len(setup.specs) == 1:

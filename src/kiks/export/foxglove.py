@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from kiks.export.looks import Colour, body_colour, robot_colour
 from kiks.model.arena import Arena
 from kiks.recording.events import EventReader
 from kiks.recording.mcap_file import McapFile, Topic
@@ -169,22 +170,26 @@ def _scene(moment: Moment) -> bytes:
             "shaft_diameter": 0.004,
             "head_length": radius_m * 0.4,
             "head_diameter": 0.012,
-            "color": {"r": 1.0, "g": 0.6, "b": 0.1, "a": 1.0},
+            "color": dict.fromkeys("rgba", 1.0),
         }
-        entities.append(_disc(f"robot {number}", radius_m, 0.25, moment.time_ns) | {"arrows": [arrow]})
+        entities.append(
+            _disc(f"robot {number}", radius_m, robot_colour(number - 1), moment.time_ns) | {"arrows": [arrow]}
+        )
     for body in moment.bodies:
-        entities.append(_disc(f"body {body['number']}", float(body["radius_mm"]) / 1000, 0.9, moment.time_ns))
+        entities.append(
+            _disc(f"body {body['number']}", float(body["radius_mm"]) / 1000, body_colour(body), moment.time_ns)
+        )
     deletion = {"timestamp": _time(moment.time_ns), "type": _ALL, "id": ""}
     return json.dumps({"deletions": [deletion], "entities": entities}).encode()
 
 
-def _disc(name: str, radius_m: float, grey: float, time_ns: int) -> dict[str, Any]:
+def _disc(name: str, radius_m: float, colour: Colour, time_ns: int) -> dict[str, Any]:
     disc = {
         "pose": {**_STILL, "position": {"x": 0.0, "y": 0.0, "z": HEIGHT_M / 2}},
         "size": {"x": 2 * radius_m, "y": 2 * radius_m, "z": HEIGHT_M},
         "bottom_scale": 1.0,
         "top_scale": 1.0,
-        "color": {"r": grey, "g": grey, "b": grey, "a": 1.0},
+        "color": {**dict(zip("rgb", (part / 255 for part in colour), strict=True)), "a": 1.0},
     }
     entity = {"timestamp": _time(time_ns), "frame_id": name, "id": name, "lifetime": _time(0)}
     return {**entity, "frame_locked": True, "cylinders": [disc]}

@@ -19,8 +19,10 @@ from numpy.typing import NDArray
 
 from kiks.engine.parameters import AHEAD, RAY_COUNT
 from kiks.engine.state import BALL, MODE_POSITION, MODE_SPEED, PIXEL_COUNT
+from kiks.export.looks import body_colour, robot_hue, robot_shapes
 from kiks.firmware.gripper import Gripper
 from kiks.firmware.k213 import K213
+from kiks.firmware.turret import Shape
 from kiks.model.arena import PAD, Arena
 from kiks.model.robot import SENSOR_COUNT
 from kiks.sim.simulation import Simulation
@@ -194,7 +196,7 @@ def describe_scene(sim: Simulation, scene: int, names: Sequence[str] | None = No
                 "number": int(body["number"]),
                 "what": "ball" if body["what"] == BALL else "cylinder",
                 "radius_mm": float(body["radius_mm"]),
-                "brightness": int(body["brightness"]),
+                "colour": body_colour(body),
             }
             for body in sim.bodies()
         ],
@@ -212,6 +214,8 @@ def _describe_robot(sim: Simulation, index: int, name: str) -> dict[str, Any]:
         "kind": spec.name,
         "radius_mm": spec.body.radius_mm,
         "wheel_base_mm": spec.body.wheel_base_mm,
+        "hue": robot_hue(index),
+        "parts": [_shape(shape) for shape in robot_shapes(spec.body)],
         "white_stripes_rad": np.round(spec.body.white_stripes_rad, 5).tolist(),
         "reach_mm": float(parameters["reach_mm"]),
         "sensors": [
@@ -237,11 +241,15 @@ def describe_shapes(sim: Simulation) -> dict[str, Any]:
 def _shapes(sim: Simulation, index: int) -> list[dict[str, Any]]:
     """Return the shapes of a robot's turrets; frames contain those of a gripper."""
     return [
-        {"points": [list(point) for point in shape.points], "colour": shape.colour, "radius_mm": shape.radius_mm}
+        _shape(shape)
         for turret in sim.turrets(index + 1)
         if not isinstance(turret, Gripper)
         for shape in turret.shapes()
     ]
+
+
+def _shape(shape: Shape) -> dict[str, Any]:
+    return {"points": [list(point) for point in shape.points], "colour": shape.colour, "radius_mm": shape.radius_mm}
 
 
 def arena_picture(arena: Arena) -> bytes:

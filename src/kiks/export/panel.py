@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from kiks.export.sheet import INK, Colour, font, mixed, robot_colour
+from kiks.export.looks import Colour, robot_colour
+from kiks.export.sheet import INK, font, mixed
 from kiks.export.stage import Pixels
 from kiks.model.robot import SENSOR_COUNT
 from kiks.recording.moments import Moment
@@ -71,7 +72,7 @@ class Panel:
         self._pen = ImageDraw.Draw(image)
         self._text(_LEFT, 46, time, 42)
         if self._robot < len(moment.poses):
-            self._box(_LEFT, 122, _LEFT + 18, 140, robot_colour(self._robot, len(moment.poses)))
+            self._box(_LEFT, 122, _LEFT + 18, 140, robot_colour(self._robot))
             self._draw_counts(moment.readings.get(self._robot, ()))
             robot: Any = moment.robots[self._robot]
             speeds = robot["measured_speed"].tolist()

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from kiks.engine.state import BALL
 from kiks.errors import library
 from kiks.export.film import SIZE, checked_follow, checked_size
+from kiks.export.looks import Colour, body_colour, robot_colour
 from kiks.export.pictures import check_picture, save_image
-from kiks.export.sheet import FLOOR, INK, Colour, robot_colour, tint
+from kiks.export.sheet import FLOOR, INK
 from kiks.export.solid_stage import (
     CHASSIS_MM,
     CYLINDER_MM,
@@ -116,7 +117,7 @@ class _Scene:
         for body in moment.bodies:
             self._add_body(body)
         for index, (pose, spec) in enumerate(zip(moment.poses.tolist(), moment.setup.specs, strict=False)):
-            self._add_robot(pose, spec.body, robot_colour(index, len(moment.poses)), str(index + 1))
+            self._add_robot(pose, spec.body, index)
 
     def aim(self, size: tuple[int, int], follow: int | None, zoom: float, samples: int) -> None:
         """Put the camera up."""
@@ -150,15 +151,15 @@ class _Scene:
         place, radius_mm = (float(body["x_mm"]), float(body["y_mm"])), float(body["radius_mm"])
         low_mm = ROBOT_MM if body["is_lifted"] else 0.0
         if body["what"] == BALL:
-            shine = {"type": "plastic", "diffuse_reflectance": {"type": "rgb", "value": _linear(tint(body))}}
+            shine = {"type": "plastic", "diffuse_reflectance": {"type": "rgb", "value": _linear(body_colour(body))}}
             self._add("sphere", center=(*place, low_mm + radius_mm), radius=radius_mm, bsdf=shine)
         else:
-            self._add_upright(place, radius_mm, low_mm, low_mm + CYLINDER_MM, tint(body))
+            self._add_upright(place, radius_mm, low_mm, low_mm + CYLINDER_MM, body_colour(body))
 
-    def _add_robot(self, pose: list[float], body: Body, colour: Colour, name: str) -> None:
+    def _add_robot(self, pose: list[float], body: Body, index: int) -> None:
         x_mm, y_mm, heading_rad = pose
         radius_mm = body.radius_mm
-        self._add_upright((x_mm, y_mm), 0.97 * radius_mm, CHASSIS_MM, ROBOT_MM, colour)
+        self._add_upright((x_mm, y_mm), 0.97 * radius_mm, CHASSIS_MM, ROBOT_MM, robot_colour(index))
         if body.stripe_count:
             stripes = self._bitmap(np.repeat(stripe_greys(body)[np.newaxis, :, np.newaxis], 3, axis=2))
             paint = {"type": "diffuse", "reflectance": stripes | {"filter_type": "nearest"}}
@@ -175,7 +176,7 @@ class _Scene:
             self._add("cylinder", to_world=axle.scale((wheel_mm, wheel_mm, width_mm)), bsdf=_two_sided(INK))
             rim = axle.translate((0.0, 0.0, width_mm)).scale((wheel_mm, wheel_mm, 1.0))
             self._add("disk", to_world=rim, bsdf=_two_sided(INK))
-        top = robot_top(body, colour, name)[::-1]  # row 0 of a bitmap is at the bottom
+        top = robot_top(body, index)[::-1]  # row 0 of a bitmap is at the bottom
         place = self._place().translate((x_mm, y_mm, ROBOT_MM + 0.3)).rotate((0, 0, 1), math.degrees(heading_rad))
         paint = {"type": "diffuse", "reflectance": self._bitmap(top[..., :3])}
         mask = {"type": "mask", "opacity": self._bitmap(top[..., 3:]), "nested": {"type": "twosided", "paint": paint}}

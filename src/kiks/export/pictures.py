@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.engine.state import BALL, BODY, CYLINDER
-from kiks.export.sheet import FINER, Colour, Place, Sheet, path_colour, path_mm, robot_colour, tint, wall_picture
+from kiks.export.looks import Colour, body_colour, robot_colour
+from kiks.export.sheet import FINER, Place, Sheet, path_colour, path_mm, wall_picture
 from kiks.model.arena import Arena, Ball
 from kiks.model.atomic_files import check_writable, ending_of, replace_file
 from kiks.model.robot import RobotSpec
@@ -152,15 +153,15 @@ class Picture:
             for index, (robot, path) in enumerate(zip(self.robots, self.trails.robots, strict=False)):
                 colours = (path_colour(index, count, k / max(len(path) - 1, 1)) for k in range(len(path)))
                 sheet.path(path, colours, path_mm(count))
-                sheet.ring(path[0][:2], robot.radius_mm, (*robot_colour(index, count), 90))
+                sheet.ring(path[0][:2], robot.radius_mm, (*robot_colour(index), 90))
             for body in self.bodies:
                 places = self.trails.bodies[int(body["number"])]
-                sheet.line(places, (*tint(body), 200), _BODY_PATH_MM)
-                sheet.ring(places[0], float(body["radius_mm"]), (*tint(body), 190))
+                sheet.line(places, (*body_colour(body), 200), _BODY_PATH_MM)
+                sheet.ring(places[0], float(body["radius_mm"]), (*body_colour(body), 190))
         for body in self.bodies:
             sheet.body(body)
         for index, (pose, robot) in enumerate(zip(self.poses.tolist(), self.robots, strict=False)):
-            sheet.robot(pose, robot, robot_colour(index, count), str(index + 1))
+            sheet.robot(pose, robot, index)
         return sheet
 
 

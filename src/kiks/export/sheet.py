@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import colorsys
 import math
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from kiks.engine.state import BALL
+from kiks.export.looks import Colour, body_colour, robot_colour, robot_shapes
 from kiks.model.arena import PAD, Arena
 from kiks.model.robot_parts import Body
 
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from PIL.Image import Image
     from PIL.ImageFont import FreeTypeFont, ImageFont
 
-Colour = tuple[int, ...]
 Place = tuple[float, float]
 
 FINER = 2
@@ -28,28 +27,14 @@ FINER = 2
 LAMP_MM = 18.0
 """How far a lamp reaches without its light [mm]."""
 
-STRIPES_MM = 3.0
-"""How wide stripes around a robot are seen from above [mm]."""
+NAME_SHARE = 0.42
+"""Radius of the disc with a robot's number, as a share of the robot's."""
 
-ROUND_RAD = 0.05
-"""Largest angle between two corners of a drawn arc [rad]."""
+FLOOR, INK, WHITE = (246, 243, 236), (30, 34, 40), (255, 255, 255)
 
-FLOOR, INK, BLACK, WHITE = (246, 243, 236), (30, 34, 40), (0, 0, 0), (255, 255, 255)
-
-_ONE_ROBOT = (38, 84, 60)
 _PATH_BEGIN, _PATH_END = (66, 135, 245), (220, 60, 60)
-_BALL, _CYLINDER = (245, 130, 40), (172, 118, 66)
 _LIGHT = (255, 205, 40)
 _LAMP_OFF = (165, 160, 150)
-_GOLDEN = 0.618034  # hues that differ by this share of the circle stay apart, however many there are
-
-
-def robot_colour(index: int, robot_count: int) -> Colour:
-    """Return the colour of a robot: one has a green of its own, of several each another hue."""
-    if robot_count == 1:
-        return _ONE_ROBOT
-    red, green, blue = colorsys.hls_to_rgb((0.6 + index * _GOLDEN) % 1.0, 0.36, 0.72)
-    return round(255 * red), round(255 * green), round(255 * blue)
 
 
 def path_colour(index: int, robot_count: int, share: float) -> Colour:
@@ -57,7 +42,7 @@ def path_colour(index: int, robot_count: int, share: float) -> Colour:
     begin: Colour = (*_PATH_BEGIN, 170)
     end: Colour = (*_PATH_END, 200)
     if robot_count > 1:
-        begin, end = ((*robot_colour(index, robot_count), opacity) for opacity in (90, 200))
+        begin, end = ((*robot_colour(index), opacity) for opacity in (90, 200))
     return mixed(begin, end, share)
 
 
@@ -69,13 +54,6 @@ def mixed(begin: Colour, end: Colour, share: float) -> Colour:
 def path_mm(robot_count: int) -> float:
     """Return the width of a path [mm]."""
     return 1.2 if robot_count == 1 else 1.6
-
-
-def tint(body: Any) -> Colour:
-    """Return the colour of a body: that of its kind, and the darker, the less light it sends back."""
-    full = _BALL if body["what"] == BALL else _CYLINDER
-    share = 0.35 + 0.65 * min(int(body["brightness"]) / 190, 1.0)
-    return tuple(round(part * share) for part in full)
 
 
 def lamp_reach_mm(power_w: float) -> float:
@@ -168,35 +146,32 @@ class Sheet:
     def body(self, body: Any) -> None:
         """Draw a ball with a glint, or a cylinder with its rim, by its record of `kiks.engine.state.BODY`."""
         place, radius_mm = (float(body["x_mm"]), float(body["y_mm"])), float(body["radius_mm"])
-        self.disc(place, radius_mm, tint(body), outline=INK, width=self.pixels(1.2))
+        self.disc(place, radius_mm, body_colour(body), outline=INK, width=self.pixels(1.2))
         if body["what"] == BALL:
             self.disc((place[0] - radius_mm / 3, place[1] + radius_mm / 3), radius_mm / 4, (*WHITE, 170))
         else:
             self.disc(place, 0.62 * radius_mm, None, outline=(*WHITE, 110), width=self.pixels(1.2))
 
-    def robot(self, pose: Sequence[float], body: Body, colour: Colour, name: str) -> None:
-        """Draw a robot from above: stripes, two wheels, a nose that shows its heading, and its number."""
-        x_mm, y_mm, heading = pose
-        radius_mm = body.radius_mm
-        ahead, aside = (math.cos(heading), math.sin(heading)), (-math.sin(heading), math.cos(heading))
+    def robot(self, pose: Sequence[float], body: Body, index: int) -> None:
+        """Draw a robot from above, with its number on a disc of its colour."""
+        x_mm, y_mm, heading_rad = pose
+        cosine, sine = math.cos(heading_rad), math.sin(heading_rad)
+        own = robot_colour(index)
+        for points, colour, radius_mm in _shapes(body):
+            places = [(x_mm + x * cosine - y * sine, y_mm + x * sine + y * cosine) for x, y in points]
+            if len(places) == 1:
+                self.disc(places[0], radius_mm, colour or own)
+            else:
+                self.pen.polygon([self.point(place) for place in places], fill=colour or own)
+        self.disc((x_mm, y_mm), NAME_SHARE * body.radius_mm, own)
+        letters = font(max(0.6 * body.radius_mm * self.scale, 8.0))
+        at = self.point((x_mm, y_mm))
+        self.pen.text(at, str(index + 1), fill=WHITE, font=letters, anchor="mm", stroke_width=1, stroke_fill=WHITE)
 
-        def at(forwards: float, sideways: float) -> Place:
-            """Return the pixel of a place on the robot, in radii."""
-            along_mm, across_mm = forwards * radius_mm, sideways * radius_mm
-            x = x_mm + along_mm * ahead[0] + across_mm * aside[0]
-            return self.point((x, y_mm + along_mm * ahead[1] + across_mm * aside[1]))
 
-        self.disc((x_mm, y_mm), radius_mm, colour, outline=INK, width=self.pixels(1.0))
-        if body.stripe_count:
-            self.disc((x_mm, y_mm), radius_mm, BLACK)
-            for begin, end in body.white_stripes_rad:
-                angles_rad = np.linspace(begin, end, 2 + int((end - begin) / ROUND_RAD)).tolist()
-                rim = [at(math.cos(angle), math.sin(angle)) for angle in angles_rad]
-                self.pen.polygon([at(0.0, 0.0), *rim], fill=WHITE)
-            self.disc((x_mm, y_mm), radius_mm - STRIPES_MM, colour)
-        for side in (-1, 1):
-            wheel = [at(0.35, 0.92 * side), at(0.35, 0.72 * side), at(-0.35, 0.72 * side), at(-0.35, 0.92 * side)]
-            self.pen.polygon(wheel, fill=INK)
-        self.pen.polygon([at(0.98, 0.0), at(0.5, 0.42), at(0.5, -0.42)], fill=WHITE)
-        letters = font(max(radius_mm * self.scale * 0.72, 8.0))
-        self.pen.text(at(-0.16, 0.0), name, fill=WHITE, font=letters, anchor="mm", stroke_width=1, stroke_fill=WHITE)
+@lru_cache(64)
+def _shapes(body: Body) -> list[tuple[Sequence[Place], Colour | None, float]]:
+    """Return points, colour and radius of a robot's shapes; without a colour those in that of the robot."""
+    return [
+        (shape.points, tuple(bytes.fromhex(shape.colour[1:])) or None, shape.radius_mm) for shape in robot_shapes(body)
+    ]

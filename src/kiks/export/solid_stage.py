@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from kiks.engine.state import BALL
 from kiks.errors import library
-from kiks.export.sheet import INK, Colour, robot_colour, tint
+from kiks.export.looks import Colour, body_colour, robot_colour
+from kiks.export.sheet import INK
 from kiks.export.stage import OUTSIDE, Canvas, Ground, Pixels
 from kiks.model.arena import Arena
 from kiks.model.robot_parts import Body
@@ -127,22 +128,19 @@ class SolidStage:
             for actor in self._robots:
                 self._renderer.RemoveActor(actor)
             specs = moment.setup.specs
-            self._robots = [
-                self._robot(spec.body, robot_colour(index, count), str(index + 1))
-                for index, spec in zip(range(count), specs, strict=False)
-            ]
+            self._robots = [self._robot(spec.body, index) for index, spec in zip(range(count), specs, strict=False)]
             for actor in self._robots:
                 self._renderer.AddActor(actor)
         for actor, (x_mm, y_mm, heading_rad) in zip(self._robots, moment.poses.tolist(), strict=False):
             actor.SetPosition(x_mm, y_mm, 0.0)
             actor.SetOrientation(0.0, 0.0, math.degrees(heading_rad))
 
-    def _robot(self, shape: Body, colour: Colour, name: str) -> Any:
+    def _robot(self, shape: Body, index: int) -> Any:
         """Return a robot at the origin that heads along x."""
         vtk, radius_mm = self._vtk, shape.radius_mm
         robot = vtk.vtkAssembly()
         wheel_mm = 0.5 * ROBOT_MM
-        body = self._upright(0.97 * radius_mm, ROBOT_MM - CHASSIS_MM, colour)
+        body = self._upright(0.97 * radius_mm, ROBOT_MM - CHASSIS_MM, robot_colour(index))
         if shape.stripe_count:
             self._paint_stripes(body, shape)
         body.SetPosition(0.0, 0.0, (CHASSIS_MM + ROBOT_MM) / 2)
@@ -156,7 +154,7 @@ class SolidStage:
             set_corner(corner[0] * radius_mm, corner[1] * radius_mm, ROBOT_MM + 0.5)
         texture = vtk.vtkTexture()
         texture.InterpolateOn()
-        texture.SetInputData(self._image(robot_top(shape, colour, name)))
+        texture.SetInputData(self._image(robot_top(shape, index)))
         part = self._actor(top)
         part.SetTexture(texture)
         part.GetProperty().LightingOff()
@@ -180,8 +178,8 @@ class SolidStage:
         for body in moment.bodies:
             number, radius_mm, is_ball = int(body["number"]), float(body["radius_mm"]), body["what"] == BALL
             if number not in self._bodies:
-                actor = self._actor(self._sphere(radius_mm), tint(body)) if is_ball else None
-                self._bodies[number] = actor or self._upright(radius_mm, CYLINDER_MM, tint(body))
+                actor = self._actor(self._sphere(radius_mm), body_colour(body)) if is_ball else None
+                self._bodies[number] = actor or self._upright(radius_mm, CYLINDER_MM, body_colour(body))
                 self._renderer.AddActor(self._bodies[number])
             height_mm = ROBOT_MM if body["is_lifted"] else 0.0
             middle_mm = radius_mm if is_ball else CYLINDER_MM / 2
@@ -278,13 +276,13 @@ def stripe_greys(body: Body) -> NDArray[np.uint8]:
     return np.where(is_white, 255, 0).astype(np.uint8)
 
 
-def robot_top(body: Body, colour: Colour, name: str) -> Pixels:
+def robot_top(body: Body, index: int) -> Pixels:
     """Return how a robot that heads to the right looks from above, with a fourth part that says where it is."""
     radius_mm = body.radius_mm
     scale = TOP_PIXELS / (2 * radius_mm)
     canvas = Canvas(np.zeros((TOP_PIXELS, TOP_PIXELS, 3), np.uint8), scale, -radius_mm, radius_mm)
     with canvas.patch([(0.0, 0.0)], radius_mm) as sheet:
-        sheet.robot((0.0, 0.0, 0.0), body, colour, name)
+        sheet.robot((0.0, 0.0, 0.0), body, index)
     rows, columns = np.indices((TOP_PIXELS, TOP_PIXELS)) - (TOP_PIXELS - 1) / 2
     return np.dstack([canvas.pixels, np.uint8(255) * (np.hypot(rows, columns) < TOP_PIXELS / 2 - 1)])
 

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.errors import ParameterError
+from kiks.export.looks import body_colour
 from kiks.export.sheet import (
     FINER,
     FLOOR,
@@ -25,8 +26,6 @@ from kiks.export.sheet import (
     mixed,
     path_colour,
     path_mm,
-    robot_colour,
-    tint,
     wall_picture,
 )
 from kiks.model.arena import Arena
@@ -159,7 +158,7 @@ class Ground:
                 elif way_mm > least_mm:
                     lines.setdefault(key, [self._ends[key]]).append(place)
                     self._ends[key] = place
-        tints = {int(body["number"]): tint(body) for body in moment.bodies}
+        tints = {int(body["number"]): body_colour(body) for body in moment.bodies}
         for (what, number), line in lines.items():
             if what == "robot":
                 colour, width_mm = path_colour(number, len(moment.poses), share), path_mm(len(moment.poses))
@@ -203,7 +202,7 @@ class Stage:
                 sheet.body(body)
         for index, (pose, spec) in enumerate(zip(moment.poses.tolist(), moment.setup.specs, strict=False)):
             with view.patch([pose[:2]], spec.body.radius_mm) as sheet:
-                sheet.robot(pose, spec.body, robot_colour(index, len(moment.poses)), str(index + 1))
+                sheet.robot(pose, spec.body, index)
 
     def _view(self, moment: Moment, picture: Pixels) -> Canvas:
         """Return a canvas of the picture, with what the camera sees of the base."""

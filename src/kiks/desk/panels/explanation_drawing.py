@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from html import escape
 
+from kiks.export.looks import BALL_COLOUR, CYLINDER_COLOUR, css, robot_colour
 from kiks.sim.explanation import Explanation, SeenRay
 
 WIDTH, HEIGHT = 360, 236
 _EYE = (180.0, 206.0)
 _REACH = 150.0
-_COLOURS = {"wall": "#8a6d3b", "robot": "#2f9e44", "ball": "#f08c00", "cylinder": "#c77d3c"}
+_COLOURS = {"wall": "#8a6d3b", "ball": css(BALL_COLOUR), "cylinder": css(CYLINDER_COLOUR)}
 _RANGES_MM = (6.0, 15.0, 30.0, 60.0)
 _THIN, _THICK = 1.5, 6.0
 
@@ -72,7 +73,8 @@ def _ray(number: int, ray: SeenRay, turn_deg: float, reach_mm: float, share: flo
     if is_nothing:
         drawn = line + '"currentColor" stroke-width="1" stroke-dasharray="3 4" opacity=".5"/>'
     else:
-        colour = _COLOURS[ray.met.split()[0]]
+        what, _, met = ray.met.partition(" ")
+        colour = css(robot_colour(int(met) - 1)) if what == "robot" else _COLOURS[what]
         drawn = line + f'"{colour}" stroke-width="{_THIN + share * (_THICK - _THIN):.1f}" stroke-linecap="round"/>'
         drawn += _surface(ray, turn_deg, x, y, colour)
     at_x, at_y = _point(turn_deg, _REACH + 18.0)

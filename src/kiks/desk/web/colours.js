@@ -1,4 +1,4 @@
-/* All colours of both views, light and dark. Each robot has its own hue, so that people can tell many robots apart. */
+/* All colours of both views, light and dark; those of robots, balls and cylinders come with the scene. */
 
 const LIGHT = {
   outside: "#c9ced6", floor: [226, 222, 211], floorEdge: "#6f6a60", wallEdge: [92, 88, 80], shade: 0.16,
@@ -43,21 +43,9 @@ export function rgba([red, green, blue], alpha = 1) {
   return `rgba(${red},${green},${blue},${alpha})`;
 }
 
-/** The colour of a robot's number and trail: hues that differ by the golden ratio stay distinct for any number
-    of robots. */
-export function robotHue(index) {
-  return (212 + 222.5 * index) % 360;
-}
-
-export function robotColour(index, isDark, alpha = 1) {
-  return `hsla(${robotHue(index)},${isDark ? 80 : 72}%,${isDark ? 66 : 40}%,${alpha})`;
-}
-
-/** Balls are orange and cylinders wooden; a body that reflects less light is darker. */
-export function bodyColour(body) {
-  const share = 0.4 + 0.6 * Math.min(body.brightness / 190, 1);
-  const full = body.what === "ball" ? [245, 130, 40] : [176, 122, 70];
-  return full.map((part) => Math.round(part * share));
+/** The colour of a robot's ring and trail, by its hue. */
+export function robotColour(hue, isDark, alpha = 1) {
+  return `hsla(${hue},${isDark ? 80 : 72}%,${isDark ? 66 : 40}%,${alpha})`;
 }
 
 /** A lamp's light [red, green, blue]. */

@@ -27,7 +27,7 @@ export function paintLargeRobot(context, width, height, ratio, look, scene, fram
   paintFans(context, at, known, robot, frame.rays(index), chosen, isDark);
   paintLeaders(context, at, width, height, known, isDark);
   context.setTransform(0, -scale * ratio, -scale * ratio, 0, middle[0] * ratio, middle[1] * ratio);
-  paintRobot(context, look, robot, null, index, scale, known.has_gripper, isDark);
+  paintRobot(context, look, robot, scale, isDark);
   context.setTransform(ratio, 0, 0, ratio, 0, 0);
   if (robot.isTouching) {
     context.strokeStyle = isDark ? "#ff5a4d" : "#e0261b";

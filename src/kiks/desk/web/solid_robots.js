@@ -3,7 +3,7 @@
 
 import { THREE } from "nicegui-scene";
 import { arc, board, box, column, empty, merge, plate } from "./solid_parts.js";
-import { readingBucket, READING_COLOURS, robotHue } from "./colours.js";
+import { readingBucket, READING_COLOURS } from "./colours.js";
 import { armAngle, jawsOf, PIVOT_MM } from "./gripper.js";
 
 /** Heights above the floor [mm]. */
@@ -32,9 +32,8 @@ export class SolidRobots {
     this._caps = this._many(merge(board(9, 1.2, "#ffffff", 0, 14)), new THREE.MeshLambertMaterial(), count);
     this._sensors = this._many(box(5, 7, 8), new THREE.MeshLambertMaterial(), 8 * count);
     this._leds = this._many(new THREE.OctahedronGeometry(2.4), new THREE.MeshBasicMaterial(), 2 * count);
-    scene.robots.forEach((_, index) =>
-      this._caps.setColorAt(index, this._tint.setHSL(robotHue(index) / 360, 0.72, 0.42)));
-    this._tops = scene.robots.map((robot, index) => this._top(robot, index));
+    scene.robots.forEach(({ hue }, index) => this._caps.setColorAt(index, this._tint.setHSL(hue / 360, 0.72, 0.42)));
+    this._tops = scene.robots.map((robot) => this._top(robot));
     this._grippers = scene.robots.map((robot) => (robot.has_gripper ? this._gripper(robot) : null));
     this.setShapes(scene);
   }
@@ -55,9 +54,9 @@ export class SolidRobots {
   }
 
   /** The parts of a single robot: turrets, stripes and a name. */
-  _top(robot, index) {
+  _top(robot) {
     const top = new THREE.Group(), turrets = new THREE.Mesh(new THREE.BufferGeometry(), this._material);
-    const name = nameSprite(robot.name, index);
+    const name = nameSprite(robot);
     name.position.z = topOf(robot) + 30;
     top.add(turrets, name);
     if (robot.white_stripes_rad.length) top.add(new THREE.Mesh(stripesOf(robot), this._material));
@@ -186,12 +185,12 @@ function turretGeometry(robot) {
   return parts.length ? merge(parts) : new THREE.BufferGeometry();
 }
 
-function nameSprite(name, index) {
+function nameSprite({ name, hue }) {
   const canvas = document.createElement("canvas"), context = canvas.getContext("2d");
   context.font = "700 44px system-ui, sans-serif";
   canvas.width = Math.ceil(context.measureText(name).width) + 40;
   canvas.height = 60;
-  context.fillStyle = `hsla(${robotHue(index)},72%,34%,.92)`;
+  context.fillStyle = `hsla(${hue},72%,34%,.92)`;
   context.roundRect(2, 2, canvas.width - 4, 56, 26);
   context.fill();
   context.font = "700 44px system-ui, sans-serif";

@@ -1,7 +1,7 @@
 /* Balls, cylinders, lamps and rays in three dimensions. */
 
 import { THREE } from "nicegui-scene";
-import { bodyColour, LAMPLIGHT, readingBucket, READING_COLOURS } from "./colours.js";
+import { LAMPLIGHT, readingBucket, READING_COLOURS } from "./colours.js";
 import { NO_HIT, RAY_UNIT_MM, RAYS_PER_ROBOT, RAYS_PER_SENSOR, SENSORS } from "./frame.js";
 import { column, empty } from "./solid_parts.js";
 
@@ -34,7 +34,7 @@ export class SolidThings {
     this._cylinders = new THREE.InstancedMesh(column(1, 1, 24), material(), count);
     const tint = new THREE.Color();
     scene.bodies.forEach((body, index) => {
-      const [red, green, blue] = bodyColour(body);
+      const [red, green, blue] = body.colour;
       tint.setRGB(red / 255, green / 255, blue / 255);
       for (const mesh of [this._balls, this._cylinders]) mesh.setColorAt(index, tint);
     });

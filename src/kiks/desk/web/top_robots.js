@@ -1,6 +1,6 @@
 /* Robots seen from above: a Khepera's board, wheels, sensors, lamps, turrets and gripper. */
 
-import { readingBucket, READING_COLOURS, rgba, robotColour, robotHue } from "./colours.js";
+import { readingBucket, READING_COLOURS, rgba, robotColour } from "./colours.js";
 import { aheadOf, jawsOf } from "./gripper.js";
 
 /** Where the two lamps (LED 0, LED 1) are on the board [mm]. */
@@ -9,44 +9,20 @@ const LED_RADIUS_MM = 1.9;
 /** A robot smaller than this on the screen is drawn without its small parts [pixels]. */
 const SMALL_PX = 7;
 const STRIP_PX = [64, 9];
-/** How wide stripes around the body are drawn [mm]. */
-const STRIPES_MM = 3;
 
-/** The parts of a robot that never change, as paths in its own frame. */
+/** The parts of a robot that never change, as paths in its own frame; the last one is the nose. */
 export class RobotLook {
-  constructor(robot) {
-    const radius_mm = robot.radius_mm, base = robot.wheel_base_mm / 2;
-    this.radius_mm = radius_mm;
+  constructor({ radius_mm, hue, parts, sensors, shapes, has_gripper }) {
+    Object.assign(this, { radius_mm, hue, hasGripper: has_gripper });
     this.body = disc(0, 0, radius_mm);
-    this.rim = disc(0, 0, radius_mm - STRIPES_MM / 2);
-    this.stripes = robot.white_stripes_rad.length ? arcs(robot.white_stripes_rad, radius_mm - STRIPES_MM / 2) : null;
-    this.wheels = new Path2D();
-    this.treads = new Path2D();
-    for (const side of [-1, 1]) {
-      this.wheels.roundRect(-8, side * (base - 1.5) - 2.4, 16, 4.8, 1.2);
-      for (let x = -6; x <= 6; x += 3) {
-        this.treads.moveTo(x, side * (base - 1.5) - 2);
-        this.treads.lineTo(x, side * (base - 1.5) + 2);
-      }
-    }
-    this.chips = new Path2D();
-    this.chips.roundRect(-17, -6, 11, 12, 0.8);
-    this.chips.roundRect(-6, 12.5, 14, 5, 0.6);
-    this.chips.roundRect(-6, -17.5, 14, 5, 0.6);
-    this.pins = new Path2D();
-    for (let x = -11; x <= 11; x += 2.75) for (const y of [-20.6, 20.6]) this.pins.rect(x - 0.6, y - 0.6, 1.2, 1.2);
-    this.nose = new Path2D();
-    this.nose.moveTo(radius_mm - 3.5, 0);
-    this.nose.lineTo(radius_mm - 11, 5.5);
-    this.nose.lineTo(radius_mm - 9, 0);
-    this.nose.lineTo(radius_mm - 11, -5.5);
-    this.nose.closePath();
-    this.sensors = robot.sensors.map((sensor) => sensorPath(sensor, radius_mm));
-    this.setShapes(robot.shapes);
+    this.parts = parts.map(partOf);
+    this.nose = this.parts.pop();
+    this.sensors = sensors.map((sensor) => sensorPath(sensor, radius_mm));
+    this.setShapes(shapes);
   }
 
   setShapes(shapes) {
-    this.shapes = (shapes ?? []).map((shape) => ({ path: shapePath(shape), colour: shape.colour }));
+    this.shapes = (shapes ?? []).map(partOf);
   }
 }
 
@@ -56,14 +32,8 @@ function disc(x, y, radius) {
   return path;
 }
 
-/** Parts of a circle, [from, to] in radians each. */
-function arcs(parts, radius) {
-  const path = new Path2D();
-  for (const [from, to] of parts) {
-    path.moveTo(radius * Math.cos(from), radius * Math.sin(from));
-    path.arc(0, 0, radius, from, to);
-  }
-  return path;
+function partOf(shape) {
+  return { path: shapePath(shape), colour: shape.colour };
 }
 
 function shapePath({ points, radius_mm }) {
@@ -87,41 +57,25 @@ function sensorPath({ x_mm, y_mm, angle_rad }, radius_mm) {
   return path;
 }
 
-/** Draw one robot. `place(context, pose)` makes the context take the robot's own millimetres. */
-export function paintRobot(context, look, robot, pose, index, scale, hasGripper, isDark) {
-  const isSmall = look.radius_mm * scale < SMALL_PX;
-  context.fillStyle = "#22643f";
-  context.fill(look.body);
-  context.strokeStyle = robotColour(index, isDark);
-  context.lineWidth = isSmall ? 4 : 2.2;
-  context.stroke(look.body);
-  if (look.stripes) {
-    context.lineWidth = STRIPES_MM;
-    context.strokeStyle = "#000000";
-    context.stroke(look.rim);
-    context.strokeStyle = "#ffffff";
-    context.stroke(look.stripes);
-  }
-  context.fillStyle = "#17191c";
-  context.fill(look.wheels);
-  if (!isSmall) {
-    context.strokeStyle = "#5a6068";
-    context.lineWidth = 0.5;
-    context.stroke(look.treads);
-    context.fillStyle = "#d7b45a";
-    context.fill(look.pins);
-    context.fillStyle = "#10231a";
-    context.fill(look.chips);
-    for (const { path, colour } of look.shapes) {
-      context.fillStyle = colour;
-      context.fill(path);
-    }
+/** Draw one robot; the context takes the robot's own millimetres. A part without a colour has the robot's. */
+export function paintRobot(context, look, robot, scale, isDark) {
+  const isSmall = look.radius_mm * scale < SMALL_PX, own = robotColour(look.hue, isDark);
+  const paint = ({ path, colour }) => {
+    context.fillStyle = colour || own;
+    context.fill(path);
+  };
+  look.parts.forEach(paint);
+  if (isSmall) {
+    context.strokeStyle = own;
+    context.lineWidth = 4;
+    context.stroke(look.body);
+  } else {
+    look.shapes.forEach(paint);
     paintSensors(context, look, robot.proximity);
     paintLeds(context, robot.leds);
   }
-  if (hasGripper) paintGripper(context, robot, look.radius_mm);
-  context.fillStyle = "#ffffff";
-  context.fill(look.nose);
+  if (look.hasGripper) paintGripper(context, robot, look.radius_mm);
+  paint(look.nose);
 }
 
 function paintSensors(context, look, proximity) {
@@ -161,7 +115,7 @@ function paintGripper(context, robot, radius_mm) {
 }
 
 /** Write a robot's name on it, or below it when it is long or the robot small; `context` takes CSS pixels. */
-export function paintName(context, name, index, x, y, radius_px, colours) {
+export function paintName(context, { name, hue }, x, y, radius_px, colours) {
   const isInside = name.length <= 2 && radius_px >= 11;
   context.textAlign = "center";
   context.textBaseline = "middle";
@@ -169,7 +123,7 @@ export function paintName(context, name, index, x, y, radius_px, colours) {
     const size = Math.max(9, 0.6 * radius_px) / (name.length === 2 ? 1.15 : 1);
     context.beginPath();
     context.arc(x, y, 0.42 * radius_px, 0, 2 * Math.PI);
-    context.fillStyle = `hsl(${robotHue(index)},72%,36%)`;
+    context.fillStyle = `hsl(${hue},72%,36%)`;
     context.fill();
     context.font = `700 ${size}px system-ui, sans-serif`;
     context.fillStyle = "#ffffff";

@@ -1,7 +1,7 @@
 /* The arena from above on a canvas. Static parts (floor, walls, grid, trails) are drawn off screen, and
    again only when the view, the scene or the light changes; each picture then draws what moves over it. */
 
-import { bodyColour, LAMPLIGHT, palette, rgba, robotColour } from "./colours.js";
+import { LAMPLIGHT, palette, rgba, robotColour } from "./colours.js";
 import { Floor } from "./floor.js";
 import { paintMarks } from "./top_marks.js";
 import { paintRays, paintView } from "./top_rays.js";
@@ -107,7 +107,7 @@ export class TopView {
       this._drawn = [];
       this._still_key = key;
     }
-    const colourOf = (index) => robotColour(index, this._isDark, 0.55);
+    const colourOf = (index) => robotColour(this.feed.scene.robots[index].hue, this._isDark, 0.55);
     if (show.trails) this._drawn = this.trails.paint(context, viewport, this._drawn, colourOf);
   }
 
@@ -145,14 +145,14 @@ export class TopView {
       if (show.contacts && robot.isTouching) this._drawTouch(context, x, y, scene.robots[index].radius_mm * scale);
       context.save();
       context.transform(scale * cosine, -scale * sine, -scale * sine, -scale * cosine, x, y);
-      paintRobot(context, this._looks[index], robot, pose, index, scale, scene.robots[index].has_gripper, this._isDark);
+      paintRobot(context, this._looks[index], robot, scale, this._isDark);
       context.restore();
     });
     paint(true);
     poses.forEach((pose, index) => {
       const [x, y] = viewport.toScreen(pose.x_mm, pose.y_mm), radius = scene.robots[index].radius_mm * scale;
       if (cameras[index]) paintCamera(context, cameras[index], x, y, radius, colours);
-      if (show.names) paintName(context, scene.robots[index].name, index, x, y, radius, colours);
+      if (show.names) paintName(context, scene.robots[index], x, y, radius, colours);
     });
     for (let index = 0; index < frame.lamp_count; index++) this._drawLamp(context, frame.lamp(index));
   }
@@ -160,7 +160,7 @@ export class TopView {
   _drawBody(context, body, place) {
     const [x, y] = this.viewport.toScreen(place.x_mm, place.y_mm);
     const radius = Math.max(2, body.radius_mm * this.viewport.scale);
-    const rgb = bodyColour(body), grow = place.isLifted ? 1.12 : 1;
+    const rgb = body.colour, grow = place.isLifted ? 1.12 : 1;
     context.beginPath();
     context.arc(x, y, radius * grow, 0, 2 * Math.PI);
     context.fillStyle = rgba(rgb);
