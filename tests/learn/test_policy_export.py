@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
@@ -24,13 +23,6 @@ FUNCTIONS: dict[str, Any] = {"tanh": np.tanh, "relu": lambda x: np.maximum(x, 0)
 SQUASHES: dict[str, Any] = {"tanh": np.tanh, "clip": lambda x: np.clip(x, -1, 1)}
 
 
-class Linear:
-    """A layer as PyTorch has it."""
-
-    def __init__(self, weight: Trace, bias: Trace | None) -> None:
-        self.weight, self.bias = weight, bias
-
-
 class Tanh:
     """An activation as PyTorch has it."""
 
@@ -39,22 +31,8 @@ class ReLU:
     """Another."""
 
 
-class LayerNorm:
-    """A module that no controller has."""
-
-
-class Sequential:
-    """Modules in a row, as PyTorch has them."""
-
-    def __init__(self, modules: list[Any]) -> None:
-        self.modules = modules
-
-    def __iter__(self) -> Iterator[Any]:
-        return iter(self.modules)
-
-    def state_dict(self) -> dict[str, Any]:
-        layers = {k: each for k, each in enumerate(self) if isinstance(each, Linear)}
-        return {f"{k}.{name}": getattr(each, name) for k, each in layers.items() for name in ("weight", "bias")}
+class ELU:
+    """One that no controller has."""
 
 
 def network(counts: tuple[int, ...], seed: int = 1) -> list[Layer]:
@@ -120,36 +98,56 @@ def test_light_before_proximity_is_the_same_network() -> None:
     assert_equal_outputs(champion, layers, spec, "tanh", "clip")
 
 
-def of_torch(layers: list[Layer], activation: type = Tanh, *last: type) -> Sequential:
-    parts = [module for layer in layers for module in (Linear(*layer), activation())]
-    return Sequential([*parts[:-1], *(each() for each in last)])
+def state_dict(layers: list[Layer], names: tuple[str, ...] = ("0", "2", "4")) -> dict[str, Trace]:
+    """Return layers as PyTorch names the numbers of a network."""
+    return {
+        f"{name}.{part}": numbers
+        for name, layer in zip(names, layers, strict=True)
+        for part, numbers in zip(("weight", "bias"), layer, strict=True)
+    }
 
 
-def algorithm(**policy: Any) -> SimpleNamespace:
+def algorithm(state: dict[str, Trace], activation: type, **more: Any) -> SimpleNamespace:
     """Return a model of Stable-Baselines3, as far as it is looked at."""
-    box = SimpleNamespace(low=-np.ones(2), high=np.ones(2))
-    return SimpleNamespace(policy=SimpleNamespace(action_space=box, use_sde=False, **policy))
+    usual = {"action_space": SimpleNamespace(low=-np.ones(2), high=np.ones(2)), "use_sde": False}
+    parts = {"state_dict": lambda: state, "activation_fn": activation, "squash_output": True} | usual | more
+    return SimpleNamespace(policy=SimpleNamespace(**parts))
 
 
 LAYERS = network((8, 4, 3, 2))
+CRITIC = state_dict(network((10, 4, 3, 1)), ("critic.qf0.0", "critic.qf0.2", "critic.qf0.4"))
+PPO = algorithm(
+    {"log_std": np.zeros(2)}
+    | state_dict(LAYERS[:2], ("mlp_extractor.policy_net.0", "mlp_extractor.policy_net.2"))
+    | state_dict(network((8, 4)), ("mlp_extractor.value_net.0",))
+    | state_dict(LAYERS[2:], ("action_net",))
+    | state_dict(network((4, 1)), ("value_net",)),
+    Tanh,
+    squash_output=False,
+)
 FORMS: dict[str, tuple[Any, str, str]] = {
-    "sequential": (of_torch(LAYERS), "tanh", "clip"),
-    "sequential that ends in tanh": (of_torch(LAYERS, ReLU, Tanh), "relu", "tanh"),
-    "nested": (Sequential([Sequential(of_torch(LAYERS).modules[:3]), *of_torch(LAYERS).modules[3:]]), "tanh", "clip"),
-    "ppo": (
-        algorithm(
-            mlp_extractor=SimpleNamespace(policy_net=of_torch(LAYERS, Tanh, Tanh).modules[:4]),
-            action_net=Linear(*LAYERS[-1]),
-        ),
-        "tanh",
-        "clip",
-    ),
+    "ppo": (PPO, "tanh", "clip"),
+    "policy of ppo": (PPO.policy, "tanh", "clip"),
     "sac": (
-        algorithm(actor=SimpleNamespace(latent_pi=of_torch(LAYERS, ReLU).modules[:4], mu=Linear(*LAYERS[-1]))),
+        algorithm(
+            state_dict(LAYERS, ("actor.latent_pi.0", "actor.latent_pi.2", "actor.mu"))
+            | state_dict(network((3, 2)), ("actor.log_std",))
+            | CRITIC,
+            ReLU,
+        ),
         "relu",
         "tanh",
     ),
-    "td3": (algorithm(actor=SimpleNamespace(mu=of_torch(LAYERS, ReLU, Tanh))), "relu", "tanh"),
+    "td3": (
+        algorithm(
+            state_dict(LAYERS, ("actor.mu.0", "actor.mu.2", "actor.mu.4"))
+            | state_dict(LAYERS, ("actor_target.mu.0", "actor_target.mu.2", "actor_target.mu.4"))
+            | CRITIC,
+            ReLU,
+        ),
+        "relu",
+        "tanh",
+    ),
 }
 
 
@@ -164,7 +162,7 @@ def test_forms_of_a_policy(form: str) -> None:
 
 
 def test_a_state_dict_is_the_same_champion() -> None:
-    state = of_torch(LAYERS).state_dict()
+    state = state_dict(LAYERS)
     one, other = (kiks.champion_of_policy(given, "Avoid", activation="tanh") for given in (state, LAYERS))
     assert one.parameters == other.parameters
     assert one.controller is other.controller
@@ -198,8 +196,8 @@ def test_the_champion_drives_the_episode_of_the_policy(tmp_path: Path) -> None:
     assert np.hypot(*(batch.poses[0, 0, :2] - start[:2])) > 10.0
 
 
-def test_exploration_and_changed_spaces_are_refused() -> None:
-    policy = FORMS["ppo"][0].policy
+def test_exploration_changed_spaces_and_other_functions_are_refused() -> None:
+    policy = PPO.policy
     wide = SimpleNamespace(low=-3 * np.ones(2), high=3 * np.ones(2))
     normalizing = SimpleNamespace(
         policy=policy, get_vec_normalize_env=lambda: SimpleNamespace(norm_obs=True, norm_reward=True)
@@ -208,6 +206,7 @@ def test_exploration_and_changed_spaces_are_refused() -> None:
         (SimpleNamespace(policy=SimpleNamespace(**vars(policy) | {"use_sde": True})), "it explores by use_sde"),
         (SimpleNamespace(**vars(policy) | {"action_space": wide}), "must have actions from -1 to 1"),
         (normalizing, "a VecNormalize changes them"),
+        (algorithm({}, ELU), "Tanh or ReLU, but it has 'ELU'"),
     ):
         with pytest.raises(kiks.ParameterError, match=message):
             kiks.champion_of_policy(changed, "Avoid")
@@ -216,8 +215,8 @@ def test_exploration_and_changed_spaces_are_refused() -> None:
 @pytest.mark.parametrize(
     ("policy", "message"),
     [
-        (None, "policy must be a torch.nn.Sequential, .* but it was None"),
-        ("model.zip", "policy must be a torch.nn.Sequential, .* but it was 'model.zip'"),
+        (None, "policy must be a model or a policy .* but it was None"),
+        ("model.zip", "policy must be a model or a policy .* but it was 'model.zip'"),
         ([], "but it had no layer"),
         ([np.zeros((2, 8))], "a member of the list was"),
         ([(np.zeros((2, 8)), np.zeros(3))], r"the biases of layer 1 must be numbers of the shape \[2\]"),
@@ -228,13 +227,9 @@ def test_exploration_and_changed_spaces_are_refused() -> None:
         ([("ab", np.zeros(2))], "the weights of layer 1 must be finite numbers, but they were 'ab'"),
         (LAYERS, "activation must be 'tanh' or 'relu', but it was left out"),
         (network((8, 513, 2)), "activation must be"),
-        ({"log_std": np.zeros(2)}, "it has 'log_std'. Give the part that maps observations to actions"),
-        ({3: np.zeros(2)}, "policy must be a torch.nn.Sequential"),
-        (Sequential([Linear(*LAYERS[0]), LayerNorm()]), "but it has 'LayerNorm'. Learn with others"),
-        (Sequential([Linear(*LAYERS[0]), Linear(*LAYERS[1])]), "the same function, Tanh or ReLU, after each"),
-        (Sequential([Tanh(), Linear(*LAYERS[0])]), "the same function, Tanh or ReLU, after each"),
-        (of_torch(LAYERS, Tanh, ReLU), "the same function, Tanh or ReLU, after each"),
-        (of_torch(LAYERS, Tanh, Tanh, Tanh), "the same function, Tanh or ReLU, after each"),
+        ({"scale": np.zeros(2)}, "it has 'scale'. Give the part that maps observations to actions"),
+        ({"0.weight": np.zeros(2)}, "the weights of layer 1 must be numbers of the shape"),
+        ({3: np.zeros(2)}, "policy must be a model or a policy"),
     ],
 )
 def test_what_is_no_policy_is_an_error(policy: Any, message: str) -> None:
@@ -246,15 +241,15 @@ def test_what_is_no_policy_is_an_error(policy: Any, message: str) -> None:
     ("options", "message"),
     [
         ({"activation": "relu"}, "activation must be 'tanh', as the policy has it, but it was 'relu'"),
-        ({"output": "hard"}, "output must be one of 'clip', 'tanh', but it was 'hard'"),
-        ({"output": ["clip"]}, "output must be"),
+        ({"output": "hard"}, "output must be 'clip', as the policy has it, but it was 'hard'"),
+        ({"policy": LAYERS, "activation": "relu", "output": ["clip"]}, "output must be"),
         ({"spec": "Avoit"}, "Did you mean 'Avoid'"),
         ({"spec": "Light"}, "with 16 inputs"),
     ],
 )
 def test_options_that_do_not_fit_are_errors(options: dict[str, Any], message: str) -> None:
     with pytest.raises(kiks.ParameterError, match=message):
-        kiks.champion_of_policy(of_torch(LAYERS), **{"spec": "Avoid"} | options)
+        kiks.champion_of_policy(**{"policy": PPO, "spec": "Avoid"} | options)
 
 
 def test_a_policy_of_too_many_units_is_an_error() -> None:
@@ -268,13 +263,11 @@ def test_networks_of_pytorch() -> None:
         model = torch.nn.Sequential(
             torch.nn.Linear(8, 64), activation(), torch.nn.Linear(64, 64), activation(), torch.nn.Linear(64, 2)
         )
-        champion = kiks.champion_of_policy(model, "Avoid")
+        champion = kiks.champion_of_policy(model.state_dict(), "Avoid", activation=name)
         sensors = counts_of(env_spec_of("Avoid"))
         with torch.no_grad():
             expected = model(torch.tensor(sensors / 1023, dtype=torch.float32)).numpy().clip(-1, 1)
         np.testing.assert_allclose(speeds_of(champion, sensors), expected, atol=1e-6)
-        state = kiks.champion_of_policy(model.state_dict(), "Avoid", activation=name)
-        assert state.parameters == champion.parameters
 
 
 @pytest.mark.parametrize("name", ["PPO", "A2C", "SAC", "TD3"])

@@ -1,7 +1,7 @@
 """A policy that another library learnt becomes a champion: its network is a compiled controller from then on.
 
-The policy may be of PyTorch, such as one of Stable-Baselines3, but nothing here imports it: a layer is what has a
-`weight` and a `bias`, and functions are known by the names of their classes.
+Nothing here imports PyTorch or that library: names and shapes in a `state_dict` show the layers, and a policy of
+Stable-Baselines3 says which functions are between them.
 
 An environment shows a policy counts as shares of 1023. Controllers take proximity so too, but light as
 (500 - counts) / 500 (`kiks.controllers`). Both are linear in the counts, so the first layer absorbs the difference.
@@ -9,8 +9,8 @@ An environment shows a policy counts as shares of 1023. Controllers take proximi
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+import re
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -30,22 +30,13 @@ Layer = tuple[Floats, Floats]
 FUNCTIONS = {"Tanh": "tanh", "ReLU": "relu"}
 """Classes of PyTorch whose functions a controller has, by name."""
 
-PASSING = ("Flatten", "Identity", "Dropout")
-"""Classes of PyTorch that leave numbers as they are once a network has learnt."""
+NOT_ACTING = re.compile(r"((mlp_extractor\.)?value_net|(actor\.)?log_std|actor_target|critic|critic_target)\b")
+"""What a policy of Stable-Baselines3 has beside the way from observations to actions."""
 
 ACCEPTED = (
-    "a torch.nn.Sequential, a model or a policy of Stable-Baselines3, a state_dict, or a list of pairs of arrays, "
-    "(weights [unit, input], biases [unit])"
+    "a model or a policy of Stable-Baselines3, a state_dict, or a list of pairs of arrays, (weights [unit, input], "
+    "biases [unit])"
 )
-
-
-@dataclass(frozen=True)
-class _Network:
-    """Layers, and as far as the policy says so, the functions of hidden units and of the outputs."""
-
-    layers: list[tuple[Any, Any]]
-    activation: str | None = None
-    output: str | None = None
 
 
 def champion_of_policy(
@@ -64,12 +55,13 @@ def champion_of_policy(
     take the file.
 
     Args:
-        policy: A `torch.nn.Sequential`; a model or a policy of Stable-Baselines3 (PPO, A2C, SAC, TD3, DDPG); a
-            `state_dict` whose names end in `weight` and `bias`; or a list of pairs of arrays, weights [unit, input] and
-            biases [unit]. The first layer comes first.
+        policy: A model or a policy of Stable-Baselines3 (PPO, A2C, SAC, TD3, DDPG); the `state_dict` of linear layers
+            in PyTorch; or a list of pairs of arrays, weights [unit, input] and biases [unit]. The first layer comes
+            first.
         spec: The environment in which it learnt: an `EnvSpec` or the name of one, such as 'Avoid'.
-        activation: The function of hidden units, 'tanh' or 'relu'; not needed if the policy says it.
-        output: What keeps the actions within +-1, 'clip' or 'tanh'; if neither this nor the policy says it, 'clip'.
+        activation: The function of hidden units, 'tanh' or 'relu'; a policy of Stable-Baselines3 says it itself.
+        output: What keeps the actions within +-1, 'clip' or 'tanh'; a policy of Stable-Baselines3 says it itself, for
+            others it is 'clip' if left out.
         robot: The kind of robot that it drove.
 
     Example:
@@ -81,18 +73,18 @@ def champion_of_policy(
         ('policy', (0.5, 0.5))
     """
     spec = env_spec_of(spec)
-    network = _network_of(policy)
-    layers = _checked(network.layers, spec)
-    chosen = _chosen("activation", activation, network.activation)
-    if chosen is None and len(layers) > 1:
+    pairs, own_activation, own_output = _network_of(policy)
+    layers = _checked(pairs, spec)
+    activation = _chosen("activation", activation, own_activation)
+    if activation is None and len(layers) > 1:
         raise ParameterError(
             "activation must be 'tanh' or 'relu', but it was left out and the policy does not say which. "
             "Give the function of its hidden units."
         )
     controller = controllers.policy(
         hidden=[len(biases) for _, biases in layers[:-1]],
-        activation=chosen or "tanh",
-        output=_chosen("output", output, network.output) or "clip",
+        activation=activation or "tanh",
+        output=_chosen("output", output, own_output) or "clip",
         senses=spec.senses,
         speed_limit=spec.speed_limit,
     )
@@ -111,28 +103,23 @@ def champion_of_policy(
 # ---- what a policy consists of ----
 
 
-def _network_of(policy: Any) -> _Network:
-    """Return the network of a policy, of whatever sort it is."""
-    if isinstance(policy, Mapping):
-        return _Network(_pairs_of(policy))
+def _network_of(policy: Any) -> tuple[list[tuple[Any, Any]], str | None, str | None]:
+    """Return the layers of a policy; the functions of hidden units and of outputs, None if it does not say which."""
     if isinstance(policy, list | tuple):
-        return _Network([_pair(each) for each in policy])
-    _check_is_unchanged(policy)
+        return [_pair(each) for each in policy], None, None
+    if isinstance(policy, Mapping):
+        return _layers_in(policy), None, None
     module = getattr(policy, "policy", policy)  # the policy of a learning algorithm
-    if hasattr(module, "mlp_extractor") and hasattr(module, "action_net"):
-        return _of_modules([*_parts(module.mlp_extractor.policy_net), module.action_net])
-    actor: Any = getattr(module, "actor", None)
-    if hasattr(actor, "latent_pi") and hasattr(actor, "mu"):
-        network = _of_modules([*_parts(actor.latent_pi), actor.mu])
-        return _Network(network.layers, network.activation, "tanh")
-    if hasattr(actor, "mu"):
-        return _of_modules(_parts(actor.mu))
-    if hasattr(module, "state_dict"):
-        return _of_modules(_parts(module)) if isinstance(module, Iterable) else _Network(_pairs_of(module.state_dict()))
-    raise ParameterError(f"policy must be {ACCEPTED}, but it was {shown(policy)}.")
+    if not all(hasattr(module, name) for name in ("state_dict", "activation_fn", "squash_output")):
+        raise ParameterError(f"policy must be {ACCEPTED}, but it was {shown(policy)}.")
+    _check_is_unchanged(policy, module)
+    name = module.activation_fn.__name__
+    if name not in FUNCTIONS:
+        raise ParameterError(f"policy must have hidden units of Tanh or ReLU, but it has {shown(name)}.")
+    return _layers_in(module.state_dict()), FUNCTIONS[name], "tanh" if module.squash_output else "clip"
 
 
-def _check_is_unchanged(policy: Any) -> None:
+def _check_is_unchanged(policy: Any, module: Any) -> None:
     """Refuse a model of Stable-Baselines3 that sees or does something else than what the environment has."""
     normalizing = getattr(policy, "get_vec_normalize_env", lambda: None)()
     if normalizing is not None and normalizing.norm_obs:
@@ -140,7 +127,6 @@ def _check_is_unchanged(policy: Any) -> None:
             "policy must see the observations of the environment, but a VecNormalize changes them. Learn without it, "
             "or with norm_obs=False: observations are from 0 to 1 as they are."
         )
-    module = getattr(policy, "policy", policy)
     if getattr(module, "use_sde", False):
         raise ParameterError(
             "policy must have actions that depend on the observation alone, but it explores by use_sde. "
@@ -154,60 +140,20 @@ def _check_is_unchanged(policy: Any) -> None:
         )
 
 
-def _parts(module: Any) -> list[Any]:
-    """Return the modules in a `torch.nn.Sequential` one by one, also of those inside it."""
-    parts: list[Any] = []
-    for each in module:
-        parts += _parts(each) if isinstance(each, Iterable) else [each]
-    return parts
-
-
-def _of_modules(modules: Sequence[Any]) -> _Network:
-    """Return the network of modules of PyTorch in their order."""
-    layers: list[tuple[Any, Any]] = []
-    between: list[str] = []
-    for module in modules:
-        name = type(module).__name__
-        if name == "Linear":
-            if len(between) != len(layers):
-                raise _refused_order()
-            layers.append((module.weight, module.bias))
-        elif name in FUNCTIONS:
-            between.append(FUNCTIONS[name])
-            if len(between) != len(layers):
-                raise _refused_order()
-        elif name not in PASSING:
-            raise ParameterError(
-                f"policy must consist of linear layers, Tanh and ReLU, but it has {shown(name)}. Learn with others."
-            )
-    last = between[len(layers) - 1 :]
-    inner = set(between[: len(layers) - 1])
-    if last == ["relu"] or len(inner) > 1:
-        raise _refused_order()
-    return _Network(layers, inner.pop() if inner else None, "tanh" if last else None)
-
-
-def _refused_order() -> ParameterError:
-    return ParameterError(
-        "policy must have the same function, Tanh or ReLU, after each linear layer but the last, and Tanh or none "
-        "after that, but it has others. Learn with such a network."
-    )
-
-
-def _pairs_of(state: Mapping[str, Any]) -> list[tuple[Any, Any]]:
-    """Return the layers in a state_dict."""
-    names = list(state)
-    if not all(isinstance(name, str) for name in names):
+def _layers_in(state: Mapping[str, Any]) -> list[tuple[Any, Any]]:
+    """Return weights and biases of the layers in a state_dict, which lead from observations to actions."""
+    if not all(isinstance(name, str) for name in state):
         raise ParameterError(f"policy must be {ACCEPTED}, but it was {shown(state)}.")
-    layers = [name[: -len("weight")] for name in names if name.endswith("weight")]
+    acting = {name: numbers for name, numbers in state.items() if not NOT_ACTING.match(name)}
+    layers = [name.removesuffix("weight") for name in acting if name.endswith("weight")]
     known = {layer + part for layer in layers for part in ("weight", "bias")}
-    other = next((name for name in names if name not in known), None)
+    other = next((name for name in acting if name not in known), None)
     if other is not None:
         raise ParameterError(
             f"policy must have a state_dict of weights and biases of linear layers alone, but it has {shown(other)}. "
             "Give the part that maps observations to actions."
         )
-    return [(state[layer + "weight"], state.get(layer + "bias")) for layer in layers]
+    return [(acting[layer + "weight"], acting.get(layer + "bias")) for layer in layers]
 
 
 def _pair(given: Any) -> tuple[Any, Any]:
