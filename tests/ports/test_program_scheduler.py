@@ -33,8 +33,8 @@ class FakeWorld:
 
     def __init__(self) -> None:
         self.now_ns = 0
+        self.loop = self.world = self
         self.wires = ()
-        self.loop = self
         self.log: Log = []
         self.answered: set[int] = set()
         self._events: list[tuple[int, int]] = []

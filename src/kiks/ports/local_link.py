@@ -73,7 +73,7 @@ class LocalConnection(Connection):
             self._participant.is_waited_for = not self._is_resting
             self._participant.add_request(request)
             # Other programs may wait for this alone.
-            if self._programs.is_shared and request.kind is Kind.REACHED:
+            if self._programs.is_shared and request.kind == Kind.REACHED:
                 self._programs.move()
 
     def _wait(self, ticket: int) -> Answer:

@@ -5,14 +5,15 @@ from __future__ import annotations
 import logging
 import socket
 from collections import deque
+from typing import Any
 
 from kiks.clock.serial_timing import BACKLOG_LIMIT
 from kiks.errors import KiksError
-from kiks.ports.messages import ASKING, RECEIVE_SIZE, Answer, Kind, Request, take_requests, unpack_reads
+from kiks.ports.messages import ASKING, RECEIVE_SIZE, Answer, Kind, Request, packed, take_messages
 from kiks.ports.port_names import PortNames
 from kiks.ports.program_scheduler import Participant, ProgramScheduler
 from kiks.sim.local_line import claim
-from kiks.sim.read_completion import NEVER_NS, end_of_read, end_of_wait, is_complete, never_ends
+from kiks.sim.read_completion import NEVER_NS, Read, end_of_read, end_of_wait, is_complete, never_ends
 from kiks.sim.simulation import Simulation
 from kiks.units import NS_PER_S
 
@@ -97,7 +98,7 @@ class ProgramParticipant(Participant):
             self.is_waited_for = not self.is_silenced
             self.acts_from_ns = self._world.now_ns
         self.patience.renew()
-        if request.kind is Kind.REACHED and not self._requests and not self.waits:
+        if request.kind == Kind.REACHED and not self._requests and not self.waits:
             self._note_thinking(request)
             self.acts_from_ns = max(self.acts_from_ns, request.at_ns)
         else:
@@ -143,46 +144,41 @@ class ProgramParticipant(Participant):
         try:
             self._execute(request)
         except KiksError as error:
-            self._answer(at_ns, is_good=False, data=str(error).encode())
+            self._answer(at_ns, error=str(error))
 
     def check_wait(self) -> None:
         """Answer a read, or a wait for several reads, if its end is known."""
         request = self._pending_read
         if request is None:
             return
-        if request.kind is Kind.WAIT:
+        if request.kind == Kind.WAIT:
             self._check_wait_for_all(request)
             return
         wire = self._wires[request.robot - 1]
-        deadline_ns = NEVER_NS if request.second < 0 else self.acts_from_ns + request.second
-        end = end_of_read(
-            wire,
-            None if request.first < 0 else request.first,
-            request.data or None,
-            deadline_ns,
-            self.acts_from_ns + request.third,
-        )
+        size, terminator, timeout_ns, poll_ns = request.arguments
+        deadline_ns = NEVER_NS if timeout_ns is None else self.acts_from_ns + timeout_ns
+        end = end_of_read(wire, size, terminator, deadline_ns, self.acts_from_ns + poll_ns)
         if end is None:
             return
         self._pending_read = None
         self.waits = False
         end_ns, count = end
         if end_ns == NEVER_NS:
-            self._answer(self.acts_from_ns, is_good=False, data=str(never_ends(request.robot)).encode())
+            self._answer(self.acts_from_ns, error=str(never_ends(request.robot)))
         else:
-            end_ns = max(end_ns, self.acts_from_ns)
             data = wire.line.take(count)
-            self._answer(end_ns, robot=request.robot, number=wire.line.taken_ns, data=data)
+            self._answer(max(end_ns, self.acts_from_ns), (data, wire.line.taken_ns), robot=request.robot)
 
     def _check_wait_for_all(self, request: Request) -> None:
-        wires, reads = self._wires, unpack_reads(request.data)
-        end_ns, is_known = end_of_wait(wires, reads, NEVER_NS if request.second < 0 else request.second)
+        wires, (reads, until_ns) = self._wires, request.arguments
+        reads = [Read(*read) for read in reads]
+        end_ns, is_known = end_of_wait(wires, reads, until_ns)
         if not is_known:
             return
         self._pending_read = None
         self.waits = False
         now_ns = self.acts_from_ns if end_ns == NEVER_NS else max(end_ns, self.acts_from_ns)
-        self._answer(now_ns, data=bytes(is_complete(wires[read.robot - 1], read, now_ns) for read in reads))
+        self._answer(now_ns, [is_complete(wires[read.robot - 1], read, now_ns) for read in reads])
 
     def _warn_of_backlog(self, robot: int) -> None:
         """Log that the program sends faster than the line carries, once."""
@@ -205,55 +201,53 @@ class ProgramParticipant(Participant):
 
     def _execute(self, request: Request) -> None:
         """Execute a request, at the instant at which the program acts."""
-        at_ns, kind, robot = self.acts_from_ns, request.kind, request.robot
-        if kind is Kind.END:
+        at_ns, kind = self.acts_from_ns, request.kind
+        if kind in (Kind.READ, Kind.WAIT):
+            self._pending_read = request
+            self.waits = True
+            self.check_wait()
+        elif kind == Kind.END:
             self._end()
-        elif kind is Kind.MEET:
+        elif kind == Kind.MEET:
             self._answer(at_ns)
-        elif kind is Kind.WAIT:
-            self._pending_read = request
-            self.waits = True
-            self.check_wait()
-        elif kind is Kind.FIND:
-            self._answer(at_ns, number=self._names.robot(request.data.decode(), self.robot))
-        elif kind is not Kind.REACHED:
-            self._use_line(request, robot, at_ns)
+        elif kind == Kind.FIND:
+            self._answer(at_ns, self._names.robot(request.arguments[0], self.robot))
+        elif kind != Kind.REACHED:
+            result = self._use_line(kind, request.robot, at_ns, *request.arguments)
+            if kind in ASKING:
+                self._answer(at_ns, result, robot=request.robot)
 
-    def _use_line(self, request: Request, robot: int, at_ns: int) -> None:
-        """Execute a request that concerns a robot's line."""
-        wire, kind = self._wires[robot - 1], request.kind
+    def _use_line(self, kind: int, robot: int, at_ns: int, argument: Any = None) -> object:
+        """Execute a request that concerns a robot's line, and return its result."""
+        wire = self._wires[robot - 1]
         line = wire.line
-        if kind is Kind.SEND:
-            wire.send(request.data, at_ns)
-        elif kind is Kind.READ:
-            self._pending_read = request
-            self.waits = True
-            self.check_wait()
-        elif kind is Kind.COUNT:
-            self._answer(at_ns, robot=robot, number=line.arrived_count(at_ns))
-        elif kind is Kind.DROP:
+        if kind == Kind.SEND:
+            wire.send(argument, at_ns)
+        elif kind == Kind.COUNT:
+            return line.arrived_count(at_ns)
+        elif kind == Kind.DROP:
             line.take(line.arrived_count(at_ns))
-        elif kind is Kind.SENT:
-            self._answer(at_ns, robot=robot, number=max(at_ns, line.sending_until_ns))
-        elif kind is Kind.ROOM:
-            room_ns = line.room_ns(request.first)
+        elif kind == Kind.SENT:
+            return max(at_ns, line.sending_until_ns)
+        elif kind == Kind.ROOM:
+            room_ns = line.room_ns(argument)
             if room_ns > at_ns:
                 self._warn_of_backlog(robot)
-            self._answer(at_ns, robot=robot, number=room_ns)
-        elif kind is Kind.SET_BAUD:
-            wire.set_baud(request.first)
-        elif kind is Kind.BAUD:
-            self._answer(at_ns, robot=robot, number=line.baud)
-        elif kind is Kind.CLAIM:
-            claim(wire, robot, request.data.decode())
+            return room_ns
+        elif kind == Kind.SET_BAUD:
+            wire.set_baud(argument)
+        elif kind == Kind.BAUD:
+            return line.baud
+        elif kind == Kind.CLAIM:
+            claim(wire, robot, argument)
             self._robots.add(robot)
             self._used.add(robot)
-            self._answer(at_ns, robot=robot)
-        elif kind is Kind.HANG_UP:
-            if request.first:
+        elif kind == Kind.HANG_UP:
+            if argument:
                 wire.holder = None
                 self._robots.discard(robot)
             wire.hang_up()
+        return None
 
     def _end(self) -> None:
         """Release the robots of the program, which has left, and close the connection."""
@@ -277,14 +271,14 @@ class ProgramParticipant(Participant):
             # Without another program nothing else would let the time pass that the wheels take to stop.
             self._scheduler.note_seen(now_ns + STOPPING_NS)
 
-    def _answer(self, now_ns: int, *, robot: int = 0, number: int = 0, is_good: bool = True, data: bytes = b"") -> None:
+    def _answer(self, now_ns: int, result: object = None, *, robot: int = 0, error: str = "") -> None:
         """Answer a request, so the program goes on."""
         ahead_count = 0
         if robot:
             line = self._wires[robot - 1].line
             ahead_count = max(-((now_ns - line.sending_until_ns) // line.character_ns), 0)
         self.acts_from_ns = now_ns
-        self.reply(Answer(self._ticket, is_good, now_ns, number, ahead_count, data))
+        self.reply(Answer(self._ticket, now_ns, result, ahead_count, error))
 
 
 class RemoteParticipant(ProgramParticipant):
@@ -342,13 +336,13 @@ class RemoteParticipant(ProgramParticipant):
             self.leave()
             return False
         self._received += received
-        for request in take_requests(self._received):
-            self.add_request(request)
+        for fields in take_messages(self._received):
+            self.add_request(Request(*fields))
         return True
 
     def reply(self, answer: Answer) -> None:
         """Send an answer; bytes that the program does not take yet wait."""
-        self._unsent += answer.pack()
+        self._unsent += packed(answer)
         self.flush()
 
     @property

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import select
 import selectors
@@ -21,6 +22,7 @@ from kiks.errors import KiksError, ParameterError, shown
 from kiks.model.atomic_files import program_in
 from kiks.model.project import Project
 from kiks.ports.hash_seed import HASH_SEED, VARIABLE
+from kiks.ports.messages import Start
 from kiks.sim.ring_buffer import RingBuffer
 
 OUTPUT_LIMIT = 1000
@@ -135,8 +137,8 @@ class Process:
     (`child_main.py`), so that thread must live as long.
 
     Args:
-        arguments: Arguments of `kiks.script.child_main` before the program.
-        command: The program.
+        name: Name of the program for people.
+        start: What `kiks.script.child_main` gets.
         connection: Its end of the socket.
         keeps_output: Whether to keep its output. Such a program has no keyboard, and a process group of its own: its
             child processes end with it. Otherwise it has the terminal.
@@ -150,8 +152,8 @@ class Process:
 
     def __init__(
         self,
-        arguments: Sequence[str],
-        command: Command,
+        name: str,
+        start: Start,
         connection: socket.socket,
         *,
         keeps_output: bool,
@@ -166,8 +168,7 @@ class Process:
         self._is_over = threading.Event()
         has_started = threading.Event()
         failures: list[OSError] = []
-        words = ["-m", "kiks.script.child_main", str(connection.fileno()), *arguments]
-        line = python_line(*words, command.module, str(command.program), *command.arguments)
+        line = python_line("-m", "kiks.script.child_main", str(connection.fileno()), json.dumps(start))
 
         def run() -> None:
             # The process inherits it, and so hears Ctrl-C only when it has loaded (`child_main.py`): Python's own start
@@ -183,12 +184,10 @@ class Process:
                 has_started.set()
             self._wait_for_end(self._popen)
 
-        threading.Thread(target=run, name=f"kiks: {command.name}", daemon=True).start()
+        threading.Thread(target=run, name=f"kiks: {name}", daemon=True).start()
         has_started.wait()
         if failures:
-            raise KiksError(
-                f"a program must be able to start, but {command.name} was not: {failures[0]}. End other programs."
-            )
+            raise KiksError(f"Cannot start {name}: {failures[0]}. End other programs.")
 
     @property
     def code(self) -> int | None:

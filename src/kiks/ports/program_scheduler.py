@@ -195,10 +195,10 @@ class ProgramScheduler:
                 break
         else:
             return 0.0
-        if self.participants:
+        if self.participants and self._seen_ns > self._loop.world.now_ns:
             horizon_ns = min((participant.acts_from_ns for participant in self._thinking()), default=NEVER_NS)
             self._loop.advance_to(min(self._seen_ns, horizon_ns))
-        return self._check_patience(holders)
+        return self._check_patience(holders) if len(self.participants) > 1 else None
 
     def finish(self) -> None:
         """Advance the world to its end after the last program has left: commands under way still act."""

@@ -16,7 +16,7 @@ from kiks.clock.thinking import parse_thinking
 from kiks.ending import INTERRUPTED, noting_endings
 from kiks.errors import KiksError, ParameterError
 from kiks.ports.file_descriptors import opening
-from kiks.ports.messages import LATE, PUNCTUAL
+from kiks.ports.messages import Start
 from kiks.ports.participant import ProgramParticipant, RemoteParticipant
 from kiks.ports.port_names import PortNames
 from kiks.ports.program_process import AnyProgram, Command, Labels, OutputLine, Permission, Process, chance_seed
@@ -399,20 +399,22 @@ class Programs:
         here, there = socket.socketpair()
         participant = RemoteParticipant(here, name, number, robot, self.sim, self._scheduler, self._names)
         handle = Handle(command, participant)
-        lateness = LATE if self._scheduler.has_begun else PUNCTUAL
-        record = f"{self._record}{self._suffix(number)}" if self._record is not None else ""
+        start = Start(
+            is_late=self._scheduler.has_begun,
+            end_ns=self.sim.loop.end_ns,
+            thinking=self._policy(number),
+            record=f"{self._record}{self._suffix(number)}" if self._record is not None else "",
+            offered=self._names.offered(),
+            seed=chance_seed(self.sim.seed, robot),
+            module=command.module,
+            program=str(command.program),
+            arguments=list(command.arguments),
+        )
         with there:
             try:
                 handle.process = Process(
-                    [
-                        lateness,
-                        str(self.sim.loop.end_ns),
-                        self._policy(number),
-                        record,
-                        " ".join(self._names.offered()),
-                        chance_seed(self.sim.seed, robot),
-                    ],
-                    command,
+                    command.name,
+                    start,
                     there,
                     keeps_output=self._keeps_output,
                     writer=None if self._labels is None else self._labels.writer(number, command.name),

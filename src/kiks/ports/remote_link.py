@@ -19,7 +19,7 @@ from typing import Any
 from kiks.clock.own_lock import OwnLock
 from kiks.clock.serial_timing import BACKLOG_LIMIT
 from kiks.errors import LinkError
-from kiks.ports.messages import RECEIVE_SIZE, WINDOW, Answer, Kind, Request, pack_reads, take_answer
+from kiks.ports.messages import RECEIVE_SIZE, WINDOW, Answer, Kind, Request, packed, take_messages
 from kiks.sim.read_completion import NEVER_NS, Read
 from kiks.units import TICK_NS
 
@@ -81,33 +81,32 @@ class Connection(ABC):
         self._thought_ns += time_ns
         self.pass_to(now_ns + time_ns)
 
-    def tell(self, kind: Kind, robot: int = 0, *, first: int = 0, data: bytes = b"") -> None:
+    def tell(self, kind: int, robot: int = 0, *arguments: Any) -> None:
         """Send a request without waiting for an answer."""
-        self._send(Request(kind, robot, self._now_ns, 0, first, 0, 0, self._thought_ns, data))
+        self._send(kind, robot, 0, arguments)
         self._unanswered_count += 1
         if self._unanswered_count >= WINDOW:
             self.ask(Kind.MEET)
 
-    def ask(
-        self, kind: Kind, robot: int = 0, *, first: int = 0, second: int = 0, third: int = 0, data: bytes = b""
-    ) -> Answer:
+    def ask(self, kind: int, robot: int = 0, *arguments: Any) -> Answer:
         """Send a request and wait for the answer.
 
         Raises:
             LinkError: If the answer is an error.
         """
         # The answer to a request that Ctrl-C has interrupted may still come, with another ticket.
-        self._ticket = (self._ticket + 1) % (1 << 32)
-        self._send(Request(kind, robot, self._now_ns, self._ticket, first, second, third, self._thought_ns, data))
+        self._ticket += 1
+        self._send(kind, robot, self._ticket, arguments)
         answer = self._wait(self._ticket)
         self._unanswered_count = 0
         self._now_ns = self._told_ns = answer.now_ns
         self._needs_time = False
-        if not answer.is_good:
-            raise LinkError(answer.data.decode())
+        if answer.error:
+            raise LinkError(answer.error)
         return answer
 
-    def _send(self, request: Request) -> None:
+    def _send(self, kind: int, robot: int, ticket: int, arguments: tuple[Any, ...]) -> None:
+        request = Request(kind, robot, self._now_ns, ticket, self._thought_ns, arguments)
         self._told_ns = self._now_ns
         self._thought_ns = 0
         self._transmit(request)
@@ -129,7 +128,7 @@ class SocketConnection(Connection):
 
     def _transmit(self, request: Request) -> None:
         try:
-            self._socket.sendall(request.pack())
+            self._socket.sendall(packed(request))
         except OSError:
             # While it exits, Python clears objects in any order: a port may be closed after this socket.
             if not sys.is_finalizing():
@@ -138,7 +137,8 @@ class SocketConnection(Connection):
     def _wait(self, ticket: int) -> Answer:
         while True:
             self._receive()
-            while (answer := take_answer(self._received)) is not None:
+            for fields in take_messages(self._received):
+                answer = Answer(*fields)
                 if answer.ticket == ticket:
                     return answer
 
@@ -186,7 +186,7 @@ class RemoteLine:
         """Put characters on the line, if it has room for them and some more; see `Line.send`."""
         if self.room_ns(len(data) + spare) > self.now_ns:
             return False
-        self._connection.tell(Kind.SEND, self._robot, data=data)
+        self._connection.tell(Kind.SEND, self._robot, data)
         self._ahead_count += len(data)
         return True
 
@@ -196,15 +196,9 @@ class RemoteLine:
         Raises:
             LinkError: If it could wait for ever.
         """
-        answer = self._ask(
-            Kind.READ,
-            first=-1 if size is None else size,
-            second=-1 if timeout_ns is None else timeout_ns,
-            third=poll_ns,
-            data=terminator or b"",
-        )
-        self._taken_ns = answer.number
-        return answer.data
+        data: bytes
+        data, self._taken_ns = self._ask(Kind.READ, size, terminator, timeout_ns, poll_ns)
+        return data
 
     @property
     def taken_ns(self) -> int:
@@ -213,15 +207,15 @@ class RemoteLine:
 
     def arrived_count(self) -> int:
         """Return the number of characters that have arrived and were not read."""
-        return self._ask(Kind.COUNT).number
+        return int(self._ask(Kind.COUNT))
 
     def sent_ns(self) -> int:
         """Return the time at which all characters will have been sent [ns]."""
-        return self._ask(Kind.SENT).number
+        return int(self._ask(Kind.SENT))
 
     def room_ns(self, count: int) -> int:
         """Return when the line has room for some characters [ns]; a time that is over: it has."""
-        return 0 if self._ahead_count + count <= BACKLOG_LIMIT else self._ask(Kind.ROOM, first=count).number
+        return 0 if self._ahead_count + count <= BACKLOG_LIMIT else int(self._ask(Kind.ROOM, count))
 
     def wait_for_room(self, until_ns: int) -> None:
         """Let time pass up to a time [ns]."""
@@ -232,8 +226,8 @@ class RemoteLine:
 
     def wait_for(self, reads: Sequence[Read], until_ns: int) -> list[bool]:
         """Let time pass until one of several reads is complete; see `Line.wait_for`."""
-        second = -1 if until_ns >= NEVER_NS else until_ns
-        return [bool(flag) for flag in self._connection.ask(Kind.WAIT, second=second, data=pack_reads(reads)).data]
+        flags: list[bool] = self._connection.ask(Kind.WAIT, 0, [tuple(read) for read in reads], until_ns).result
+        return flags
 
     def drop_arrived(self) -> None:
         """Drop the characters that have arrived and were not read."""
@@ -242,11 +236,11 @@ class RemoteLine:
     @property
     def baud(self) -> int:
         """Speed of the line [bit/s]."""
-        return self._ask(Kind.BAUD).number
+        return int(self._ask(Kind.BAUD))
 
     def set_baud(self, baud: int) -> None:
         """Set both ends to a speed [bit/s]."""
-        self._connection.tell(Kind.SET_BAUD, self._robot, first=baud)
+        self._connection.tell(Kind.SET_BAUD, self._robot, baud)
 
     def claim(self, holder: str) -> None:
         """Take the line exclusively.
@@ -254,18 +248,18 @@ class RemoteLine:
         Raises:
             LinkError: If another program holds it.
         """
-        self._ask(Kind.CLAIM, data=holder.encode())
+        self._ask(Kind.CLAIM, holder)
         self._is_claimed = True
 
     def hang_up(self) -> None:
         """Release the line and drop unread characters."""
-        self._connection.tell(Kind.HANG_UP, self._robot, first=self._is_claimed)
+        self._connection.tell(Kind.HANG_UP, self._robot, self._is_claimed)
         self._is_claimed = False
 
-    def _ask(self, kind: Kind, *, first: int = 0, second: int = 0, third: int = 0, data: bytes = b"") -> Answer:
-        answer = self._connection.ask(kind, self._robot, first=first, second=second, third=third, data=data)
+    def _ask(self, kind: int, *arguments: Any) -> Any:
+        answer = self._connection.ask(kind, self._robot, *arguments)
         self._ahead_count = answer.ahead_count
-        return answer
+        return answer.result
 
 
 def _end() -> None:
