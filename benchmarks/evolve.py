@@ -83,7 +83,7 @@ def coevolutions(seeds: range) -> list[tuple[str, float, str]]:
     contest, wholes_s = kiks.tasks.pursuit(), []
     for seed in seeds:
         start_s = time.perf_counter()
-        coevolution = kiks.Coevolution(contest, seed=seed)
+        coevolution = kiks.Evolution(contest, seed=seed)
         coevolution.run(generations=contest.generations)
         wholes_s.append(time.perf_counter() - start_s)
         tournament = coevolution.master_tournament()

@@ -31,13 +31,11 @@ from .errors import (
 from .learn import tasks as tasks
 from .learn.archive import Archive as Archive
 from .learn.champion import Champion as Champion
-from .learn.coevolution import Coevolution as Coevolution
-from .learn.contest import Contest as Contest
-from .learn.contest import Side as Side
 from .learn.evolution import Evolution as Evolution
 from .learn.exam import Exam as Exam
 from .learn.policy_export import champion_of_policy as champion_of_policy
 from .learn.task import Axis as Axis
+from .learn.task import Side as Side
 from .learn.task import Task as Task
 from .model.arena import Arena as Arena
 from .model.robot import RobotSpec as RobotSpec

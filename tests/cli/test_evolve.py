@@ -48,7 +48,7 @@ def test_a_run_leaves_its_files_and_goes_on(folder: Path) -> None:
     assert recording.programs == {"1-champion.toml": (folder / "champion.toml").read_text()}
     with pytest.raises(KiksError, match="--record must be left out with --seeds"):
         kiks(*words, "--seeds", 2, "--record", folder / "run.mcap")
-    assert re.search(r"\nFinals: [23] candidates, \d+ evaluations\n", said)
+    assert re.search(r"\nFinals: [23] candidates in [12] rounds\n", said)
     assert re.search(r"\nExam: (not )?solved, \d+ of 20 starts \(got around", said)
     assert re.search(r"\nWith ten imperfect robots: \d+ of 200 starts\n", said)
     again = kiks(*words).output
@@ -78,23 +78,23 @@ def test_the_tasks_are_listed() -> None:
 
 @at_length
 def test_two_sides_evolve_and_are_shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from kiks.learn.ready_contests import CONTESTS, pursuit
+    from kiks.learn.ready_tasks import TASKS, pursuit
 
-    monkeypatch.setitem(CONTESTS, "pursuit", lambda: pursuit(seconds=2.0))
+    monkeypatch.setitem(TASKS, "pursuit", lambda *given: pursuit(*given, seconds=2.0))
     folder = tmp_path / "out"
     words = ("evolve", "pursuit", "--seed", 1, "--population", 4, "--out", folder, "--generations")
     said = kiks(*words, 2).output
     assert re.search(r"\nGeneration 1: predator [01]\.\d\d   prey [01]\.\d\d   (the \w+ won|a tie)\n", said)
     assert re.search(r"\nBest against all generations: predator of generation [12] \(.*\), prey of generation", said)
     names = {path.name for path in folder.iterdir()}
-    pictures = {"fitness.png", "tournament.png", "tournament.parquet"}
+    pictures = {"fitness.png", "tournament.png", "tournament.parquet", "result.json"}
     assert names == pictures | {"predator.toml", "prey.toml", "log.parquet", "generations", "evolution.json"}
     assert "Continuing after generation 2" in kiks(*words, 3).output
     shown = kiks("demo", folder, "--seconds", 3, "--picture", tmp_path / "shown.png").output
     assert re.search("predator and prey (have not touched|touched after)", shown)
     assert (tmp_path / "shown.png").exists()
-    with pytest.raises(KiksError, match="--controller must be left out with pursuit"):
-        kiks("evolve", "pursuit", "--controller", "gru")
+    with pytest.raises(KiksError, match="--record must be left out with pursuit, which has two sides"):
+        kiks("evolve", "pursuit", "--record", tmp_path / "run.mcap")
     with pytest.raises(KiksError, match=r"champion.toml' must exist"):
         kiks("demo", tmp_path)
 

@@ -18,7 +18,7 @@ from tests.at_length import cases
 import kiks
 from kiks import ParameterError
 from kiks.learn.algorithm_name import AlgorithmName
-from kiks.learn.candidate_worlds import cautious_mean
+from kiks.learn.experiment import cautious_mean
 
 pytestmark = pytest.mark.slow
 
@@ -219,7 +219,7 @@ def test_an_object_with_ask_and_tell_is_an_algorithm(tmp_path: Path) -> None:
     own = Own()
     evolution = kiks.Evolution(small(), own, folder=tmp_path)
     evolution.run(generations=3)
-    assert evolution.algorithm is own
+    assert evolution.algorithms == [own]
     assert (evolution.population, evolution.champion.algorithm) == (8, "Own")
     for (fitness, shape), generation in zip(own.told, evolution.generations, strict=True):
         assert (fitness, shape) == (generation.fitness.tolist(), (8, 2))

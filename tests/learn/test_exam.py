@@ -9,7 +9,6 @@ import pytest
 
 import kiks
 from kiks.errors import ParameterError
-from kiks.learn.candidate_worlds import spread_starts
 from kiks.learn.exam import EXAM_SEED, PASS_SHARE, ExamResult
 from kiks.model.arena import Pose
 
@@ -26,7 +25,7 @@ SLOW = kiks.Champion(ahead, (1, 1))
 
 def exam_of(solved=lambda values: values["path_mm"] > 100, **changes):
     return kiks.Exam(
-        [ROOM], [kiks.measures.path_mm, kiks.measures.contacts], solved, **{"count": 4, "seconds": 5} | changes
+        [ROOM], [kiks.measures.path_mm, kiks.measures.contacts], solved, **{"worlds": 4, "seconds": 5} | changes
     )
 
 
@@ -34,7 +33,7 @@ def test_a_start_is_what_happens_on_a_serial_line():
     champion = kiks.Champion(kiks.controllers.linear(speed_limit=8.0), tuple(np.linspace(-3, 3, 18).tolist()))
     exam = exam_of(seconds=20)
     examined = exam.examine(champion)
-    poses = spread_starts(exam.arenas, exam.count, seed=EXAM_SEED, radius_mm=27.5)[:, 0]
+    poses = exam.random_starts(EXAM_SEED, robots=1, radius_mm=27.5)[:, 0]
     for start, pose in enumerate(poses.tolist()):
         sim, ports = champion.simulation(replace(ROOM, starts=(Pose(*pose),)), seed=EXAM_SEED + start)
         champion.drive(ports, seconds=exam.seconds)
@@ -47,7 +46,7 @@ def test_a_start_is_what_happens_on_a_serial_line():
 def test_starts_take_the_arenas_in_turn():
     far_mm = kiks.measures.final_x_mm
     arenas = [kiks.Arena.box(200, 200), kiks.Arena.box(2000, 200)]
-    exam = kiks.Exam(arenas, [far_mm], lambda values: values["final_x_mm"] > 200, count=40, seconds=0.1)
+    exam = kiks.Exam(arenas, [far_mm], lambda values: values["final_x_mm"] > 200, worlds=40, seconds=0.1)
     solved = exam.examine(SLOW).solved
     assert not solved[::2].any()
     assert solved[1::2].sum() > 10
@@ -63,8 +62,11 @@ def test_the_text_says_whether_the_exam_is_passed(solved, word):
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: exam_of(count=0), "count must be"),
-        (lambda: kiks.Exam([ROOM, ROOM], [kiks.measures.path_mm], lambda values: values, count=3), "a multiple of the"),
+        (lambda: exam_of(worlds=0), "worlds must be"),
+        (
+            lambda: kiks.Exam([ROOM, ROOM], [kiks.measures.path_mm], lambda values: values, worlds=3),
+            "a multiple of the",
+        ),
         (
             lambda: exam_of(lambda values: values["path_mm"]).examine(kiks.Champion(ahead, (1, 1))),
             "a bool for each of 4",
@@ -80,13 +82,13 @@ def test_wrong_exams_are_errors(make, message):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", list(kiks.tasks.TASKS))
+@pytest.mark.parametrize("name", [name for name in kiks.tasks.TASKS if kiks.tasks.load(name).exam])
 def test_neither_standing_still_nor_chance_passes(name):
     task = kiks.tasks.load(name)
     trained = [(each.brightness.tobytes(), each.cylinders) for each in task.arenas]
     seen = [(each.brightness.tobytes(), each.cylinders) in trained for each in task.exam.arenas]
     assert any(seen) == name.startswith("maze")
-    exam = replace(task.exam, count=len(task.exam.arenas))
+    exam = replace(task.exam, worlds=len(task.exam.arenas))
     rng = np.random.default_rng(1)
     for scale in (0.0, 1.0, 3.0):
         parameters = (scale * rng.standard_normal(task.parameter_count)).tolist()

@@ -7,6 +7,7 @@ import subprocess
 import sys
 from collections import Counter
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,9 +20,9 @@ from tests.at_length import at_length, cases
 import kiks
 from kiks import ParameterError
 from kiks.learn.algorithm_name import AlgorithmName
-from kiks.learn.finals import FINALISTS, FINALS_SEED, SHARE, Contender, Finals, finalists_of
-from kiks.learn.generation_loop import seed_for
+from kiks.learn.finals import FINALISTS, SHARE, Contender, Finals, hold_finals, rounds_of
 from kiks.learn.results import result_of
+from kiks.learn.seeds import FINALS, seed_for
 
 pytestmark = pytest.mark.slow
 
@@ -53,7 +54,7 @@ def finals_of(evolution: kiks.Evolution) -> Finals:
 def outcome(evolution: kiks.Evolution) -> tuple[Any, ...]:
     """Return all that finals decide, to the bit."""
     champion, finals = evolution.champion, finals_of(evolution)
-    told = tuple(part.tobytes() for part in finals.evaluated)
+    told = finals.numbers.tobytes(), finals.seeds.tobytes(), finals.values.tobytes()
     return finals.finalists, told, champion.parameters, champion.fitness, champion.measures, champion.generation
 
 
@@ -81,7 +82,7 @@ def slow_winner(count: int, evaluations: int, seed: int, noise: float) -> tuple[
     for turn in range(len(sizes)):
         for number in left:
             for world in range(begin, begin + each * 2**turn):
-                world_seed = seed_for(seed, FINALS_SEED, world)
+                world_seed = seed_for(seed, FINALS, world)
                 seen[number].append(noisy(np.array([[float(number), 1.0]]), [world_seed], noise)[0])
         begin += each * 2**turn
         ranked = sorted(left, key=lambda number: (-np.mean([values[0] for values in seen[number]]), number))
@@ -92,53 +93,37 @@ def slow_winner(count: int, evaluations: int, seed: int, noise: float) -> tuple[
 
 @given(st.integers(2, 40), st.integers(0, 2000), st.integers(0, 99), st.sampled_from([0.0, 1.0, 10.0]))
 def test_the_winner_is_that_of_a_slow_count(count: int, evaluations: int, seed: int, noise: float) -> None:
-    finals = Finals(contenders(count), seed, evaluations, 2)
-    driven = 0
-    while not finals.is_over:
-        asked, seeds = finals.ask(), finals.seeds
-        driven += len(asked)
-        finals.tell(noisy(asked, seeds, noise))
+    finals = hold_finals(contenders(count), seed, evaluations, partial(noisy, noise=noise))
     winner, means = slow_winner(count, evaluations, seed, noise)
     assert finals.winner == winner
     assert finals.means(winner).tolist() == pytest.approx(means)
-    assert driven == finals.evaluation_count <= max(SHARE * evaluations, sum(finals.sizes) * 2 ** len(finals.sizes))
+    sizes, worlds = rounds_of(count, evaluations)
+    driven = sum(size * each for size, each in zip(sizes, worlds, strict=True))
+    assert driven == len(finals.values) <= max(SHARE * evaluations, sum(sizes) * 2 ** len(sizes))
 
 
 def test_all_that_are_left_drive_in_the_same_new_worlds() -> None:
-    finals = Finals(contenders(16), 5, 2880, 2)
-    assert (finals.sizes, finals.worlds) == ([16, 8, 4, 2], [4, 8, 16, 32])
+    assert rounds_of(16, 2880) == ([16, 8, 4, 2], [4, 8, 16, 32])
     known: set[int] = set()
-    for size, count in zip(finals.sizes, finals.worlds, strict=True):
-        asked, seeds = finals.ask(), finals.seeds
+    rounds = iter(zip((16, 8, 4, 2), (4, 8, 16, 32), strict=True))
+
+    def values(asked: Any, seeds: Any) -> Any:
+        size, count = next(rounds)
         assert Counter(asked[:, 0].tolist()) == dict.fromkeys(range(16 - size, 16), count)
         of_finalist = [seeds[asked[:, 0] == number].tolist() for number in range(16 - size, 16)]
         assert all(each == of_finalist[0] for each in of_finalist)
         assert len({*of_finalist[0]} - known) == count
-        known |= {*of_finalist[0]}
-        finals.tell(np.column_stack([asked[:, 0], asked[:, 0]]))
-    assert (finals.winner, finals.is_over) == (15, True)
+        known.update(of_finalist[0])
+        return asked
 
-
-def test_of_equal_finalists_the_first_wins() -> None:
-    finals = Finals(contenders(7), 1, 0, 1)
-    while not finals.is_over:
-        finals.tell(np.zeros((len(finals.ask()), 1)))
-    assert finals.winner == 0
-
-
-def test_wrong_values_are_errors() -> None:
-    finals = Finals(contenders(4), 1, 0, 2)
-    for values in (np.zeros((4, 1)), np.zeros((3, 2)), np.full((4, 2), np.nan)):
-        with pytest.raises(ParameterError, match="values must be"):
-            finals.tell(values)
-    assert finals.round == 0
+    assert hold_finals(contenders(16), 5, 2880, values).winner == 15
+    assert hold_finals(contenders(7), 1, 0, lambda asked, _: np.zeros((len(asked), 1))).winner == 0
 
 
 def test_each_finalist_is_there_once() -> None:
-    rivals = [Contender((float(number // 2),), number) for number in range(60)]
-    assert finalists_of(rivals) == rivals[: 2 * FINALISTS : 2]
-    elites = [Contender((float(number),), 99) for number in range(14, 60)]
-    assert finalists_of(rivals, elites) == rivals[: 2 * FINALISTS : 2] + elites[2:FINALISTS]
+    evolution = evolution_of()
+    evolution._tried = {Contender((float(number // 2),), number): -number for number in range(60)}
+    assert [each.generation for each in evolution._finalists()] == [*range(0, 2 * FINALISTS, 2)]
 
 
 # ---- evolutions ----
@@ -191,7 +176,7 @@ def test_a_rival_that_was_lucky_in_its_trials_loses() -> None:
     assert evolution.champion.generation == best + 1
     assert before[-1].fitness > 50 > evolution.champion.fitness
     finals = finals_of(evolution)
-    numbers, seeds, told = finals.evaluated
+    numbers, seeds, told = finals.numbers, finals.seeds, finals.values
     assert evolution.champion.fitness == told[numbers == finals.winner, 0].mean()
     assert not trials & set(seeds.tolist())
     assert not {seed for each in evolution.generations for seed in each.seeds.tolist()} & set(seeds.tolist())
@@ -200,7 +185,7 @@ def test_a_rival_that_was_lucky_in_its_trials_loses() -> None:
 def test_chunks_and_batches_do_not_matter(monkeypatch: pytest.MonkeyPatch) -> None:
     first = outcome(run())
     assert outcome(run(executor=ThreadPoolExecutor(2))) == first
-    monkeypatch.setattr("kiks.learn.candidate_worlds.BATCH_WORLDS_MAX", 6)
+    monkeypatch.setattr("kiks.learn.task.BATCH_WORLDS_MAX", 6)
     assert outcome(run()) == first
 
 
@@ -229,8 +214,8 @@ def test_the_finals_of_a_complete_folder_are_not_held_again(tmp_path: Path) -> N
 
 KILLED = """
 import os, signal, sys, kiks
-def kill(finals):
-    if finals.round == 1:
+def kill(number, sizes):
+    if number == 1:
         os.kill(os.getpid(), signal.SIGKILL)
 task = kiks.tasks.avoid(seconds=1.0, worlds=3)
 evolution = kiks.Evolution(task, "cma", population=8, seed=3, folder=sys.argv[1])
@@ -252,7 +237,7 @@ def test_finals_in_which_the_process_was_killed_are_held_again(tmp_path: Path) -
 
 @pytest.mark.parametrize("when", cases(["each", "each_round"]))
 def test_an_interrupted_evolution_holds_no_finals(when: str, tmp_path: Path) -> None:
-    def interrupt(state: Any) -> None:
+    def interrupt(state: Any, *_: Any) -> None:
         if when == "each_round" or len(state.generations) == 5:
             raise KeyboardInterrupt
 
@@ -301,8 +286,8 @@ def test_finals_after_ask_and_tell() -> None:
     for _ in range(6):
         evolution.tell(evolution.task.evaluate(evolution.ask(), evolution.seeds))
     rounds: list[int] = []
-    champion = evolution.hold_finals(each_round=lambda finals: rounds.append(len(finals.ask())))
-    assert sum(rounds) == finals_of(evolution).evaluation_count
+    champion = evolution.hold_finals(each_round=lambda number, sizes: rounds.append(sizes[number]))
+    assert rounds == rounds_of(len(finals_of(evolution).finalists), 0)[0]
     assert champion.parameters == evolution.champion.parameters == run().champion.parameters
     evolution.tell(np.zeros(len(evolution.ask())))
     assert evolution.finals is None
@@ -314,7 +299,7 @@ def test_the_error_names_a_broken_file_of_finals(tmp_path: Path) -> None:
     file = tmp_path / "generations/000006_finals.npz"
     with np.load(file) as saved:
         good = dict(saved)
-    assert good["seed"].tolist() == finals_of(whole).evaluated[1].tolist()
+    assert good["seed"].tolist() == finals_of(whole).seeds.tolist()
     again = small().evaluate(good["finalists"][good["finalist"]], good["seed"], 1)
     assert again.tolist() == good["values"].tolist()
     wrong: list[dict[str, Any]] = [
@@ -322,6 +307,7 @@ def test_the_error_names_a_broken_file_of_finals(tmp_path: Path) -> None:
         {"values": np.full_like(good["values"], np.nan)},
         {"finalists": good["finalists"][:-1]},
         {"seconds": np.float64(-1)},
+        {"finalist": good["finalist"] + 1},
     ]
     for change in wrong:
         np.savez(file, **good | change)

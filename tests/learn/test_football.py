@@ -13,7 +13,6 @@ import kiks
 from kiks.control.controller import Controller
 from kiks.demos.contest import ENDS, ContestScene
 from kiks.learn.football import GOAL_REWARD, ball_ahead, ball_gain, goals, kick_offs
-from kiks.learn.ready_contests import CONTESTS
 from kiks.learn.tasks import football
 from kiks.model import pitch
 from kiks.model.arena import Arena, Ball, Pose
@@ -71,14 +70,14 @@ def test_arenas_without_a_ball_have_no_goals() -> None:
 
 
 def test_one_side_gains_what_the_other_loses() -> None:
-    contest = football(seconds=5.0)
-    size = sum(side.parameter_count for side in contest.sides)
-    pairs = 2.0 * np.random.default_rng(1).standard_normal((40, size))
-    values = contest.evaluate(pairs, np.arange(40), 2)
-    np.testing.assert_allclose(values[:, 0] + values[:, 1], 0.0, atol=1e-12)
+    task = football(seconds=5.0)
+    pairs = 2.0 * np.random.default_rng(1).standard_normal((40, task.parameter_count))
+    values = task.evaluate(pairs, np.arange(40), 2)
+    np.testing.assert_allclose(values[:, 0] + values[:, 4], 0.0, atol=1e-12)
     assert np.abs(values[:, 0]).max() > 0.05
-    still = tuple(replace(side, controller=Controller(_stand, parameters=1)) for side in contest.sides)
-    stood = contest.with_changes(sides=still).evaluate(np.zeros((1, 2)), np.zeros(1, np.int64), 1)
+    still = Controller(_stand, parameters=1)
+    other = replace(task.sides[1], controller=still)
+    stood = task.with_changes(controller=still, against=other).evaluate(np.zeros((1, 2)), np.zeros(1, np.int64), 1)
     np.testing.assert_array_equal(stood, 0.0)
 
 
@@ -87,9 +86,9 @@ def _stand(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
 
 
 def test_champions_play_in_a_demonstration_until_a_goal(tmp_path: Path) -> None:
-    assert set(ENDS) == set(CONTESTS)
-    coevolution = kiks.Coevolution(football(seconds=1.0), seed=1, population=4, opponents=1, folder=tmp_path)
-    coevolution.run(generations=1)
+    assert set(ENDS) == {name for name in kiks.tasks.TASKS if kiks.tasks.load(name).against}
+    evolution = kiks.Evolution(football(seconds=1.0), seed=1, population=4, opponents=1, folder=tmp_path)
+    evolution.run(generations=1)
     scene = ContestScene(tmp_path, seed=1)
     assert scene.run(1.0) == "no goal"
     scene = ContestScene(tmp_path, before_goal(0))

@@ -12,6 +12,7 @@ import pytest
 
 import kiks
 from kiks import ParameterError
+from kiks.learn.baselines import Baselines
 from kiks.learn.evolution_log import Folder, Identity
 from kiks.learn.results import (
     RESULT,
@@ -43,11 +44,10 @@ RESULTS = [
         fitness=0.1 * seed,
         generation=2,
         seconds=3.0 + seed,
-        standing=0.0,
-        random=0.01,
         generations=3,
         evaluations=(8, 24, 40),
         champion_fitness=(0.0, 0.05 * seed, 0.1 * seed),
+        baselines=Baselines(0.0, 0.01),
         exam=ExamScore(17 + seed, 20, 160, 200, "Exam"),
     )
     for seed in range(4)
@@ -186,12 +186,6 @@ def test_evolutions_of_one_folder_have_the_same_controller_and_exam(tmp_path: Pa
             load_results(tmp_path / name)
 
 
-def test_a_contest_is_not_called_unfinished(tmp_path: Path) -> None:
-    kiks.Coevolution(kiks.tasks.pursuit(seconds=0.5), population=4, folder=tmp_path)
-    with pytest.raises(ParameterError, match="must hold evolutions of one controller, but it holds a contest"):
-        load_results(tmp_path)
-
-
 @pytest.mark.slow
 def test_pictures_are_png_files(tmp_path: Path) -> None:
     without = [replace(each, exam=None) for each in RESULTS]
@@ -214,7 +208,7 @@ def test_the_result_of_an_evolution(tmp_path: Path) -> None:
     result.save(tmp_path)
     assert load_results(tmp_path) == [result]
     assert evolution.finals is not None
-    assert (result.generations, result.evaluations) == (3, (24, 40, 40 + evolution.finals.evaluation_count))
+    assert (result.generations, result.evaluations) == (3, (24, 40, 40 + len(evolution.finals.values)))
     assert result.seconds == evolution.finals.seconds > evolution.generations[-1].seconds
     assert result.fitness == result.champion_fitness[-1] == evolution.champion.fitness
     assert result.exam is not None

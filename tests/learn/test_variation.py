@@ -46,7 +46,8 @@ def test_worlds_take_all_combinations_in_turn(kinds: int, timings: int, arenas: 
         worlds=arenas * kinds * timings,
     )
     for seed in (0, 2**62 - 1):
-        kind, timing = task._turns(np.array([seed]))
+        turns, timing = task._turns(np.array([seed]))
+        kind = turns % kinds
         arena = np.arange(task.worlds) % arenas
         found = set(zip(arena.tolist(), kind.tolist(), timing.tolist(), strict=True))
         assert len(found) == arenas * kinds * timings
@@ -55,10 +56,10 @@ def test_worlds_take_all_combinations_in_turn(kinds: int, timings: int, arenas: 
 def test_a_world_is_what_a_task_of_its_robot_and_timing_alone_would_have() -> None:
     robots = family(KHEPERA, 2, seed=3)
     task = task_of(robot=robots, timing=TIMINGS)
-    kinds, timings = task._turns(np.array([7]))
+    turns, timings = task._turns(np.array([7]))
     for world in range(task.worlds):
         one = lambda values, world=world: values["path_mm"][:, world]  # noqa: E731
-        alone = task_of(robot=robots[kinds[world]], timing=TIMINGS[timings[world]], fitness=one)
+        alone = task_of(robot=robots[turns[world] % 2], timing=TIMINGS[timings[world]], fitness=one)
         assert values_of(task.with_changes(fitness=one), (7,))[0, 0] == values_of(alone, (7,))[0, 0]
 
 
@@ -109,7 +110,7 @@ def ahead(sensors, memory, parameters, wheels):
 
 def exam_of() -> kiks.Exam:
     measures = [kiks.measures.path_mm]
-    return kiks.Exam([kiks.Arena.box(400, 400)], measures, lambda values: values["path_mm"] > 30, count=4, seconds=2)
+    return kiks.Exam([kiks.Arena.box(400, 400)], measures, lambda values: values["path_mm"] > 30, worlds=4, seconds=2)
 
 
 def test_an_exam_with_imperfect_robots_is_that_with_each_of_them() -> None:

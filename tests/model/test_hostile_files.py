@@ -13,6 +13,7 @@ import pytest
 import kiks
 from kiks.clock.thinking import parse_thinking, save_thinking
 from kiks.errors import SHOWN_MAX, KiksError
+from kiks.learn.baselines import Baselines
 from kiks.learn.evolution_log import Folder, Identity
 from kiks.learn.results import ExamScore, Result, load_result
 from kiks.model.project import Project
@@ -39,14 +40,18 @@ def result(path: Path) -> None:
         "fitness": 0.5,
         "generation": 1,
         "seconds": 2.0,
-        "standing": 0.0,
-        "random": 0.1,
         "population": 8,
         "seed": 3,
     }
     names = dict.fromkeys(("task", "algorithm", "controller", "kiks"), "name")
     Result(
-        result=1, **names, task_digest={"fitness": "0123"}, **costs, **curve, exam=ExamScore(1, 20, 2, 200, "Exam")
+        result=1,
+        **names,
+        task_digest={"fitness": "0123"},
+        **costs,
+        **curve,
+        baselines=Baselines(0.0, 0.1),
+        exam=ExamScore(1, 20, 2, 200, "Exam"),
     ).save(path.parent)
 
 

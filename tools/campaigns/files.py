@@ -36,7 +36,8 @@ from kiks.clock.thinking import parse_thinking
 from kiks.demos.contest import ContestScene
 from kiks.desk.server.folder import decode
 from kiks.fit.samples import load_samples, nearnesses
-from kiks.learn.archive import ARCHIVE, CHAMPION
+from kiks.learn.archive import ARCHIVE
+from kiks.learn.evolution_log import CHAMPION
 from kiks.learn.individual import individual_of
 from kiks.learn.results import RESULT, result_of
 from kiks.model.arena import Arena, Ball, Cylinder, Lamp, Pose
@@ -197,12 +198,12 @@ def _contest(path: Path) -> None:
     scene.sim.state_hash()
 
 
-def _coevolution(path: Path) -> None:
+def _sides(path: Path) -> None:
     folder = path.parent if path.name == "evolution.json" else path.parents[1]
-    coevolution = kiks.Coevolution(_pursuit(), seed=3, population=4, opponents=1, folder=folder)
-    coevolution.ask()
-    if coevolution.generations:
-        coevolution.champion(0)._text({}, {})
+    evolution = kiks.Evolution(_pursuit(), seed=3, population=4, opponents=1, folder=folder)
+    evolution.ask()
+    if evolution.generations:
+        evolution.champion._text({}, {})
 
 
 def _network(path: Path) -> None:
@@ -265,7 +266,7 @@ def _task() -> kiks.Task:
 
 
 @cache
-def _pursuit() -> kiks.Contest:
+def _pursuit() -> kiks.Task:
     return kiks.tasks.pursuit(seconds=1.0)
 
 
@@ -296,9 +297,9 @@ def _with_finals() -> Mapping[str, bytes]:
 def _coevolved() -> Mapping[str, bytes]:
     """Return the files of a co-evolution of one generation, by name."""
     with tempfile.TemporaryDirectory() as folder:
-        coevolution = kiks.Coevolution(_pursuit(), seed=3, population=4, opponents=1, folder=folder)
-        coevolution.tell(np.zeros((8, len(_pursuit().value_names))))
-        coevolution.save_log()
+        evolution = kiks.Evolution(_pursuit(), seed=3, population=4, opponents=1, folder=folder)
+        evolution.tell(np.zeros((8, len(_pursuit().value_names))))
+        evolution.save_log()
         return _files_in(folder)
 
 
@@ -425,8 +426,8 @@ def _kinds() -> Iterator[Kind]:
     yield replace(archive, strange=(partial(strange_parquet, *archive.sound),))
     yield _among("result", evolved, RESULT, _result, "json")
     yield _among("contest", coevolved, "prey.toml", _contest, "toml")
-    yield _among("coevolution", coevolved, _IDENTITY, _coevolution, "json")
-    yield _among("pairs", coevolved, _GENERATION, _coevolution)
+    yield _among("sides", coevolved, _IDENTITY, _sides, "json")
+    yield _among("pairs", coevolved, _GENERATION, _sides)
 
     yield Kind("recording", "own.mcap", [recordings.sound()], recordings.use, strange=(recordings.strange_recording,))
 

@@ -174,8 +174,9 @@ def _individual(folder: str, generation: int, rank: int, world: int, task: str |
 
 def _champion(path: Path, at: str | None) -> Champion:
     """Return the champion of a file or of a folder; with `at`, the elite there of the folder's archive."""
-    from kiks.learn.archive import CHAMPION, Archive
+    from kiks.learn.archive import Archive
     from kiks.learn.champion import Champion
+    from kiks.learn.evolution_log import CHAMPION
 
     if at is None:
         return Champion.load(path / CHAMPION if path.is_dir() else path)

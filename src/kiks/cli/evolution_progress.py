@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 if TYPE_CHECKING:
-    from kiks.learn.finals import Finals
-    from kiks.learn.generation_loop import Evolving
+    from kiks.learn.evolution import Evolution
 
 EVERY_S = 5.0
 """Time between lines where there is no terminal [s]."""
@@ -27,12 +26,12 @@ class Progress:
         each_round: Called before each round of its finals.
     """
 
-    each: Callable[[Evolving], Any]
-    each_round: Callable[[Finals], Any]
+    each: Callable[[Evolution], Any]
+    each_round: Callable[[int, list[int]], Any]
 
 
 @contextmanager
-def progress_of(evolution: Evolving, generations: int | None, seconds: float | None) -> Iterator[Progress]:
+def progress_of(evolution: Evolution, generations: int | None, seconds: float | None) -> Iterator[Progress]:
     """Return functions that show how far an evolution is."""
     from rich.console import Console
 
@@ -63,32 +62,31 @@ def progress_of(evolution: Evolving, generations: int | None, seconds: float | N
         from rich.progress import BarColumn, TextColumn
         from rich.progress import Progress as Bars
 
-        name, bar_width = evolution.work.name, min(20, console.width // 6)
+        name, bar_width = evolution.task.name, min(20, console.width // 6)
         columns = (TextColumn(name), BarColumn(bar_width), TextColumn("{task.description}"))
         with Bars(*columns, console=console, transient=True) as bars:
             bar = bars.add_task("preparing", total=1.0)
 
-            def show(_: Evolving) -> None:
+            def show(_: Evolution) -> None:
                 said = text(console.width - len(name) - bar_width - 2)
                 bars.update(bar, completed=done_and_left()[0], description=said)
 
-            def show_round(finals: Finals) -> None:
-                said = f"finals: {finals.sizes[finals.round]} candidates"
-                bars.update(bar, completed=finals.round / len(finals.sizes), description=said)
+            def show_round(number: int, sizes: list[int]) -> None:
+                bars.update(bar, completed=number / len(sizes), description=f"finals: {sizes[number]} candidates")
 
             yield Progress(show, show_round)
         return
     told_s = [-EVERY_S]
 
-    def tell(_: Evolving) -> None:
+    def tell(_: Evolution) -> None:
         said = text()
         if perf_counter() - told_s[0] > EVERY_S or done_and_left()[0] >= 1:
             told_s[0] = perf_counter()
             typer.echo(said)
 
-    def tell_round(finals: Finals) -> None:
-        if not finals.round:
-            typer.echo(f"Finals: {len(finals.finalists)} candidates, {finals.evaluation_count} evaluations")
+    def tell_round(number: int, sizes: list[int]) -> None:
+        if not number:
+            typer.echo(f"Finals: {sizes[0]} candidates in {len(sizes)} rounds")
 
     yield Progress(tell, tell_round)
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
 from contextlib import ExitStack
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
+import numpy as np
 import typer
 
 from kiks.cli.engine_start import ready_batch, ready_engine
@@ -23,8 +24,12 @@ from kiks.learn.algorithm_name import AlgorithmName
 if TYPE_CHECKING:
     from kiks.control.controller import Controller
     from kiks.learn.evolution import Evolution
+    from kiks.learn.finals import Tournament
     from kiks.learn.results import Result
     from kiks.learn.task import Task
+
+PERIODS = 5
+"""Number of periods of an evolution of two sides whose winners are listed."""
 
 
 def evolve(
@@ -65,7 +70,7 @@ def evolve(
     After Ctrl-C or a kill, the same command continues the evolution. With --seeds 10, ten evolutions run one after the
     other; a table, seeds.png and summary.json show their results. In pursuit, predator and prey evolve against each
     other, in football two players: predator.toml and prey.toml, or left.toml and right.toml, are the champions, and
-    tournament.png tells which of them progressed. --record keeps the champion's drive from the first start of its exam.
+    tournament.png shows which of them progressed. --record keeps the champion's drive from the first start of its exam.
 
     Example: kiks evolve avoid --seed 1 --out runs/avoid
     """
@@ -75,30 +80,15 @@ def evolve(
         leave_out(context, "with --list", *(set(context.params) - {"list_"}))
         for name in tasks.TASKS:
             typer.echo(f"{name:10} {tasks.load(name).about}")
-        for name, make in tasks.CONTESTS.items():
-            typer.echo(f"{name:10} {make().about}")
         return
     ready_batch()
-    if task in tasks.CONTESTS:
-        from kiks.cli.coevolve import coevolve
-
-        leave_out(context, f"with {task}", "controller", "seeds", "record")
-        coevolve(
-            tasks.CONTESTS[task](),
-            str(algorithm or AlgorithmName.GA),
-            out or Path(f"kiks-evolve-{task}"),
-            seed=seed,
-            population=population,
-            generations=generations,
-            seconds=seconds,
-            executor=None if cluster is None else cluster_executor(cluster),
-        )
-        return
     if seeds is not None:
         leave_out(context, "with --seeds", "record")
     chosen = tasks.load(task)
     if controller is not None:
         chosen = tasks.load(task, _controller(controller, chosen))
+    if chosen.against:
+        leave_out(context, f"with {chosen.name}, which has two sides", "record")
     folder = out or Path(f"kiks-evolve-{chosen.name}")
     until = chosen.generations if generations is None and seconds is None else generations
     from kiks.learn.evolution import Evolution
@@ -120,7 +110,7 @@ def evolve(
                 if evolution.generations:
                     typer.echo(f"Continuing after generation {len(evolution.generations)} in {home}.")
                 if cluster is not None and executor is None:
-                    executor = stack.enter_context(cluster_executor(cluster))
+                    executor = stack.enter_context(_cluster_executor(cluster))
                 with progress_of(evolution, until, seconds) as progress:
                     evolution.run(
                         generations=until,
@@ -140,16 +130,19 @@ def evolve(
 
 
 def _finish(evolution: Evolution, folder: Path) -> Result:
-    """Save result and picture of an evolution that has come to its end, print the result, and return it."""
-    from kiks.learn.baselines import Baselines
-    from kiks.learn.evolution_plot import save_plot
+    """Save result and pictures of an evolution that has come to its end, print the result, and return it."""
+    from kiks.learn.evolution_plot import save_plot, save_tournament_plot
     from kiks.learn.results import load_result, result_of
 
     result = load_result(folder)
     if result is None:
         result = result_of(evolution)
         result.save(folder)
-    save_plot(evolution, folder / "fitness.png", Baselines(result.standing, result.random))
+    save_plot(evolution, folder / "fitness.png", result.baselines)
+    if (tournament := evolution.tournament) is not None:
+        save_tournament_plot(tournament, folder / "tournament.png")
+        for line in winners_of(tournament):
+            typer.echo(line)
     _tell_champion(evolution, folder)
     if (exam := result.exam) is not None:
         typer.echo(exam.text)
@@ -157,10 +150,26 @@ def _finish(evolution: Evolution, folder: Path) -> Result:
     return result
 
 
+def winners_of(tournament: Tournament) -> Iterator[str]:
+    """Yield a line for each period of an evolution: the fitness of its champions against each other, and the winner.
+
+    The winner is the side with the higher fitness.
+    """
+    count = len(tournament.generations)
+    for period in np.array_split(np.arange(count), min(PERIODS, count)):
+        first, last = tournament.generations[period[[0, -1]]].tolist()
+        of_sides = tournament.scores[:, period[0] : period[-1] + 1, period[0] : period[-1] + 1].mean(axis=(1, 2))
+        figures = "   ".join(f"{name} {mean:.2f}" for name, mean in zip(tournament.sides, of_sides, strict=True))
+        is_tie = of_sides[0] == of_sides[1]
+        verdict = "a tie" if is_tie else f"the {tournament.sides[int(of_sides.argmax())]} won"
+        numbers = f"Generation {first}" if first == last else f"Generations {first} to {last}"
+        yield f"{numbers}: {figures}   {verdict}"
+
+
 def _record(evolution: Evolution, folder: Path, file: Path) -> None:
     """Record the champion in its world, which is the first start of the exam, for as long as an exam takes."""
     ready_engine()
-    from kiks.learn.archive import CHAMPION
+    from kiks.learn.evolution_log import CHAMPION
 
     exam, champion = evolution.task.exam, evolution.champion
     sim, ports = champion.simulation()
@@ -180,15 +189,23 @@ def _stop(evolution: Evolution | None, folder: Path) -> NoReturn:
 
 
 def _tell_champion(evolution: Evolution, folder: Path) -> None:
-    """Print what the champion achieved in the finals, or on trial before them, and where it is."""
-    champion = evolution.champion
-    figures = ", ".join(f"{name} {value:.4g}" for name, value in champion.measures.items())
-    typer.echo(f"Champion of generation {champion.generation}: fitness {champion.fitness:.4f}   {figures}")
+    """Print what the champions achieved in the finals, or on trial before them, and where they are."""
+    if (tournament := evolution.tournament) is not None:
+        best = [
+            f"{name} of generation {generation} ({means.max():.2f})"
+            for name, generation, means in zip(tournament.sides, tournament.best, tournament.means, strict=True)
+        ]
+        typer.echo(f"Best against all generations: {', '.join(best)}")
+    elif not evolution.task.against:
+        champion = evolution.champion
+        figures = ", ".join(f"{name} {value:.4g}" for name, value in champion.measures.items())
+        typer.echo(f"Champion of generation {champion.generation}: fitness {champion.fitness:.4f}   {figures}")
     if (archive := evolution.archive) is not None:
         filled = f"{len(archive.elites)} of {archive.cell_count} cells ({100 * archive.coverage:.1f} %)"
         names = ", ".join(axis.measure for axis in archive.axes)
         typer.echo(f"Archive by {names}: {filled}, QD score {archive.qd_score:.4g}   One of them: kiks demo --at")
-    typer.echo(f"Folder: {folder}   See it drive: kiks demo {folder / 'champion.toml'}")
+    shown = folder if evolution.task.against else folder / "champion.toml"
+    typer.echo(f"Folder: {folder}   See it drive: kiks demo {shown}")
 
 
 def _tell_seeds(results: Sequence[Result], folder: Path) -> None:
@@ -221,7 +238,7 @@ def _controller(kind: str, task: Task) -> Controller:
     return from_recipe(recipe)
 
 
-def cluster_executor(address: str) -> Executor:
+def _cluster_executor(address: str) -> Executor:
     """Return the executor for --cluster."""
     from kiks.learn.ray_executor import RayExecutor
 

@@ -16,7 +16,7 @@ from kiks.demos.scene import Scene
 from kiks.errors import ParameterError
 from kiks.learn import tasks
 from kiks.learn.champion import Champion
-from kiks.learn.contest import Contest
+from kiks.learn.task import Task
 from kiks.model import pitch
 from kiks.model.arena import Arena, Pose
 from kiks.sim.simulation import Simulation
@@ -114,15 +114,14 @@ ENDS: dict[str, tuple[Callable[[ContestScene], str], str]] = {
 """Of each contest: what says how it ended, or nothing while it goes on, and what is said if it does not end."""
 
 
-def _load(folder: Path) -> tuple[Contest, list[Champion]]:
+def _load(folder: Path) -> tuple[Task, list[Champion]]:
     """Return the contest of a folder, and the champion of each side."""
-    for contest in (make() for make in tasks.CONTESTS.values()):
-        files = [folder / f"{name}.toml" for name in contest.side_names]
+    found = [tasks.load(name) for name in ENDS]
+    for task in found:
+        files = [folder / f"{side.name}.toml" for side in task.sides]
         if all(file.is_file() for file in files):
-            return contest, [Champion.load(file) for file in files]
-    wanted = ", or ".join(
-        " and ".join(f"{name}.toml" for name in make().side_names) for make in tasks.CONTESTS.values()
-    )
+            return task, [Champion.load(file) for file in files]
+    wanted = ", or ".join(" and ".join(f"{side.name}.toml" for side in task.sides) for task in found)
     raise ParameterError(
-        f"the folder {str(folder)!r} must have {wanted}, but has not. `kiks evolve` of a contest makes one."
+        f"the folder {str(folder)!r} must have {wanted}, but has not. `kiks evolve` of a task of two sides makes one."
     )

@@ -19,6 +19,7 @@ from pydantic import Field
 
 from kiks.errors import ParameterError, library, shown
 from kiks.learn.champion import Champion
+from kiks.learn.evolution_log import Folder
 from kiks.learn.task import Axis
 from kiks.model.array_checks import Numbers, check_array
 from kiks.model.atomic_files import path_of, replace_file
@@ -27,8 +28,8 @@ from kiks.model.data_file import Text, check, one_line, parse_json, read_file, r
 
 Floats = NDArray[np.float64]
 
-ARCHIVE, CHAMPION = "archive.parquet", "champion.toml"
-"""Names in the folder of an evolution."""
+ARCHIVE = "archive.parquet"
+"""Name in the folder of an evolution, of two sides after the name of the side."""
 
 FILE_BYTES_MAX = 256 << 20
 """Largest size of an archive's file [byte]."""
@@ -194,8 +195,8 @@ class Archive:
 
     # ---- files ----
 
-    def save(self, folder: str | Path) -> None:
-        """Write `archive.parquet` into a folder, with a row for each elite."""
+    def save(self, folder: str | Path, side: str = "") -> None:
+        """Write `archive.parquet`, or that of a side of two, into a folder, with a row for each elite."""
         pyarrow, parquet = library("pyarrow"), library("pyarrow.parquet")
         elites = self.elites
         columns: dict[str, Any] = {"generation": np.array([elite.generation for elite in elites], np.int64)}
@@ -210,15 +211,21 @@ class Archive:
         buffer = io.BytesIO()
         # Columns without compression take no more memory than the file has bytes.
         parquet.write_table(table, buffer, compression="none", use_dictionary=False)
-        replace_file(path_of(folder, "folder") / ARCHIVE, buffer.getvalue(), "the archive")
+        replace_file(_file(path_of(folder, "folder"), side), buffer.getvalue(), "the archive")
 
     @classmethod
-    def load(cls, folder: str | Path) -> Archive:
-        """Read the archive in the folder of an evolution, and its champion. The champion's controller may run code."""
-        folder = path_of(folder, "folder")
-        what = f"Archive {str(folder / ARCHIVE)!r}"
-        data = read_file(folder / ARCHIVE, what, bytes_max=FILE_BYTES_MAX)
-        champion = Champion.load(folder / CHAMPION)
+    def load(cls, folder: str | Path, side: str = "") -> Archive:
+        """Read the archive in the folder of an evolution, and its champion. The champion's controller may run code.
+
+        Args:
+            folder: The folder.
+            side: Name of the side, if there are two.
+        """
+        home = Folder(folder)
+        file = _file(home.path, side)
+        what = f"Archive {str(file)!r}"
+        data = read_file(file, what, bytes_max=FILE_BYTES_MAX)
+        champion = Champion.load(home.champion_file(side))
         try:
             head, columns = _read(data, len(champion.parameters))
             archive = cls(head.axes, head.values, champion)
@@ -231,6 +238,10 @@ class Archive:
             row = slice(number, number + 1)
             archive.add(candidates[row], values[row], generation)
         return archive
+
+
+def _file(folder: Path, side: str) -> Path:
+    return folder / (f"{side}_{ARCHIVE}" if side else ARCHIVE)
 
 
 def _read(data: bytes, parameter_count: int) -> tuple[_Head, dict[str, NDArray[Any]]]:

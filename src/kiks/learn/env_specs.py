@@ -19,7 +19,7 @@ from kiks.control.senses import check_senses, reading_count
 from kiks.engine.physics.motor import SPEED_MAX
 from kiks.errors import ParameterError, nearest, shown
 from kiks.learn import football as game
-from kiks.learn import ready_contests, ready_tasks
+from kiks.learn import ready_tasks
 from kiks.learn.task import Task
 from kiks.model.arena import Arena, Cylinder, Pose
 from kiks.model.checks import check_kind, check_number
@@ -152,15 +152,15 @@ def maze() -> EnvSpec:
 
 def football() -> EnvSpec:
     """Bring the ball into the goal of the other side."""
-    contest = ready_contests.football()
+    task = ready_tasks.football()
     return EnvSpec(
         "Football",
-        contest.arenas,
+        task.arenas,
         game.ball_gain,
         game.is_goal,
         ("proximity", "camera"),
-        speed_limit=ready_contests.PLAYER_SPEED,
-        timing=contest.timing,
+        speed_limit=ready_tasks.PLAYER_SPEED,
+        timing=task.timings[0],
     )
 
 

@@ -7,44 +7,54 @@ whole evolution, and no generation trains in them. The best rival there is the c
 An algorithm that looks for many behaviours prefers none. Then the rivals are the elites of the archive that were not
 tried yet, the fittest first.
 
-The best of many rivals may have been lucky in its trials, too. So at the end of a run, the best rivals drive in the
-finals (`kiks.learn.finals`), with the best elites of such an algorithm. The winner is the champion.
+The two sides of a task evolve against each other: two populations, each with an algorithm of its own. Each candidate
+meets champions of the other side, those of the last generations, and its fitness is its mean over these meetings.
+
+At the end of a run the best candidates drive in the finals (`kiks.learn.finals`), which decide about the champions.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Executor
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from time import perf_counter
 from typing import Any, TypeGuard
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from kiks.errors import ParameterError
+from kiks.errors import ParameterError, shown
+from kiks.learn import seeds
 from kiks.learn.algorithms import Algorithm, make_algorithm
-from kiks.learn.archive import CHAMPION, Archive
+from kiks.learn.archive import Archive
 from kiks.learn.champion import Champion
-from kiks.learn.evaluation import evaluate
+from kiks.learn.evaluation import Floats, Integers, evaluate
 from kiks.learn.evolution_log import Folder, Generation, Identity
-from kiks.learn.finals import Contender, Finals, finalists_of
+from kiks.learn.finals import FINALISTS, Contender, Finals, Tournament, hold_finals, hold_tournament, rounds_of
 from kiks.learn.fingerprint import fingerprints
-from kiks.learn.generation_loop import run_generations, seed_for
+from kiks.learn.seeds import seed_for
 from kiks.learn.task import Task
 from kiks.model.array_checks import check_numbers
-from kiks.model.checks import check_count, check_kind
+from kiks.model.checks import check_count, check_kind, check_number
 from kiks.version import __version__
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
+LOG_EVERY_S = 10.0
+"""Time between two writes of the log [s]; each writes the whole log."""
 
 TRIALS = 8
 """Trials of a rival, each in as many worlds as a candidate of the population gets."""
 
-_ALGORITHM_SEED, WORLDS_SEED, TRIAL_SEED, BASELINE_SEED = range(4)
-"""Purposes of seeds."""
+OPPONENTS = 10
+"""Default number of opponents of a candidate (Floreano and Nolfi 1997)."""
+
+MEETINGS = 2
+"""Default number of evaluations of each pair in the tournament."""
+
+TOURNAMENT_MAX = 100
+"""Most champions of a side in the tournament of a run; of a longer evolution, champions at equal intervals."""
 
 
 class Evolution:
@@ -53,22 +63,25 @@ class Evolution:
     Args:
         task: The task.
         algorithm: 'cma' (CMA-ES) or 'ga' (a genetic algorithm); for many different behaviours 'map-elites', 'cma-me'
-            or 'novelty'. The task's own if left out. Or an object with `ask()`, which returns candidates, float64
-            [candidate, parameter], each time as many, and `tell(fitness, behaviours)`, float64 [candidate] and
-            [candidate, axis]. It may have `favourite()`, which returns the parameters that it considers best; else
-            these are the best of the last generation.
+            or 'novelty'. The task's own if left out. Or, for a task of one side, an object with `ask()`, which returns
+            candidates, float64 [candidate, parameter], each time as many, and `tell(fitness, behaviours)`, float64
+            [candidate] and [candidate, axis]. It may have `favourite()`, which returns the parameters that it considers
+            best; else these are the best of the last generation.
         seed: Seed of all random numbers: the same seed gives the same evolution, with any number of workers.
-        population: Number of candidates in a generation; the task's own if left out, or as many as `ask` returns, if
-            the algorithm is an object.
-        folder: Folder of its generations, its champion, its archive and its log. If it holds generations of the same
+        population: Number of candidates of a side in a generation; the task's own if left out, or as many as `ask`
+            returns, if the algorithm is an object.
+        opponents: Number of opponents of each candidate in a task of two sides: champions of the last generations, in
+            turn if there are fewer; in the first generation, candidates of the other side.
+        folder: Folder of its generations, its champions, its archive and its log. If it holds generations of the same
             evolution, the evolution continues after them, as if it had never stopped. Left out, nothing is written.
 
     Attributes:
         task: The task.
-        algorithm: The state of the algorithm.
-        archive: The best candidate of each cell of a map along the task's axes; None if it has no axes.
-        generations: The generations with their values, in order.
-        finals: The finals, if they were held after the last generation; else None.
+        algorithms: The state of each side's algorithm.
+        archives: For each side, the best candidate of each cell of a map along the task's axes; none without axes.
+        generations: The generations with their values, in order. Two sides stand side by side in a row.
+        finals: The finals of one side, if they were held after the last generation; else None.
+        tournament: The master tournament of two sides, if it was held after the last generation; else None.
 
     Example:
         >>> import kiks
@@ -76,6 +89,11 @@ class Evolution:
         >>> evolution.tell(evolution.task.evaluate(evolution.ask(), evolution.seeds))
         >>> evolution.champion.generation
         1
+        >>> evolution = kiks.Evolution(kiks.tasks.pursuit(seconds=2), seed=1, population=4, opponents=2)
+        >>> _ = evolution.run(generations=2)
+        >>> predator, prey = evolution.champions
+        >>> evolution.tournament.scores.shape
+        (2, 2, 2)
     """
 
     def __init__(
@@ -85,85 +103,152 @@ class Evolution:
         *,
         seed: int = 0,
         population: int | None = None,
+        opponents: int = OPPONENTS,
         folder: str | Path | None = None,
     ) -> None:
         self.task = check_kind("task", task, Task, "kiks.tasks.load() returns one.")
         self.seed = check_count("seed", seed, most=2**63 - 1)
+        self.opponents = check_count("opponents", opponents, 1, 1000) if task.against else 1
         self.generations: list[Generation] = []
         self.finals: Finals | None = None
-        self._asked: Floats | None = None
-        self.algorithm: Algorithm
-        if is_algorithm(algorithm):
-            self.name, self.algorithm = type(algorithm).__name__, algorithm
-            self._asked = self._candidates(None if population is None else check_count("population", population, 1))
-            self.population = len(self._asked)
+        self.tournament: Tournament | None = None
+        self.algorithms: list[Algorithm]
+        self._own: list[Floats] = []  # the candidates of each side that were asked for
+        self._first_purpose = seeds.TWO_SIDES if task.against else 0
+        if is_algorithm(algorithm) and not task.against:
+            self.name, self.algorithms = type(algorithm).__name__, [algorithm]
+            self._own = [self._candidates(0, None if population is None else check_count("population", population, 1))]
+            self.population = len(self._own[0])
         else:
             name = task.algorithm if algorithm is None else algorithm
-            self.name = str(check_kind("algorithm", name, str, "Or give an object with ask and tell."))
+            advice = "" if task.against else "Or give an object with ask and tell."
+            self.name = str(check_kind("algorithm", name, str, advice))
             self.population = check_count("population", task.population if population is None else population, 4)
-            self.algorithm = make_algorithm(
-                self.name,
-                task.parameter_count,
-                self.population,
-                seed_for(self.seed, _ALGORITHM_SEED),
-                task.axes,
-                task.spread,
-            )
-        self._trial_seeds = [seed_for(self.seed, TRIAL_SEED, number) for number in range(TRIALS)]
+            purpose = seeds.ALGORITHM + self._first_purpose
+            self.algorithms = [
+                make_algorithm(
+                    self.name,
+                    side.parameter_count,
+                    self.population,
+                    seed_for(self.seed, purpose, number),
+                    task.axes,
+                    task.spread,
+                )
+                for number, side in enumerate(task.sides)
+            ]
+        self._trial_seeds = [seed_for(self.seed, seeds.TRIALS, number) for number in range(TRIALS)]
+        self._favourites: list[list[Contender]] = [[] for _ in task.sides]
         self._rival: Contender | None = None
         self._tried: dict[Contender, float] = {}  # mean fitness of their trials
         self._tries_elites = False
         self._best: Champion | None = None
-        self._world = task.world()
-        unknown = self._champion(Contender((0.0,) * task.parameter_count, 0), np.zeros(len(task.value_names)))
-        self.archive = Archive(task.axes, task.value_names, unknown) if task.axes else None
+        self._world = None if task.against else task.world()
+        self._names = ("fitness", *task.measure_names)
+        unknown = np.zeros(len(self._names))
+        self.archives = [
+            Archive(task.axes, self._names, self._champion(side, Contender((0.0,) * each.parameter_count, 0), unknown))
+            for side, each in enumerate(task.sides)
+            if task.axes
+        ]
         self._earlier_s, self._start_s = 0.0, perf_counter()
         self._folder = None if folder is None else Folder(folder)
         if self._folder is not None:
             self._resume(self._folder)
+
+    @property
+    def archive(self) -> Archive | None:
+        """The archive of the first side; None if the task has no axes."""
+        return self.archives[0] if self.archives else None
 
     # ---- ask and tell ----
 
     def ask(self) -> Floats:
         """Return the candidates of the next generation, float64 [candidate, parameter]; the same until `tell`.
 
-        After the population come the trials of the last generation's rival, if there is one.
+        After the population of one side come the trials of the last generation's rival, if there is one. Of two sides
+        it returns pairs: for each candidate of the first side one with each opponent, then the same for the second.
         """
-        if self._asked is None:
-            asked = self._candidates(self.population)
-            if self._rival is not None:
-                asked = np.concatenate([asked, np.tile(self._rival.parameters, (TRIALS, 1))])
-            self._asked = asked
-        return self._asked.copy()
+        own = self._populations()
+        rows = []
+        for side in range(len(own)):
+            parts = [
+                np.repeat(each, self.opponents, axis=0)
+                if other == side
+                else np.tile(self._opponents_from(other), (self.population, 1))
+                for other, each in enumerate(own)
+            ]
+            rows.append(np.concatenate(parts, axis=1))
+        return np.concatenate([*rows, *self._trials()])
 
-    def _candidates(self, count: int | None) -> Floats:
-        """Return candidates of the algorithm, a copy.
+    def _populations(self) -> list[Floats]:
+        """Return the candidates of each side, float64 [candidate, parameter] each."""
+        self._own = self._own or [self._candidates(side, self.population) for side in range(len(self.algorithms))]
+        return self._own
+
+    def _trials(self) -> list[Floats]:
+        """Return the rows of the trials, if there is a rival."""
+        return [] if self._rival is None else [np.tile(self._rival.parameters, (TRIALS, 1))]
+
+    def _rows(self) -> Floats:
+        """Return the candidates as they are saved: the sides side by side, then the trials."""
+        return np.concatenate([np.concatenate(self._populations(), axis=1), *self._trials()])
+
+    def _candidates(self, side: int, count: int | None) -> Floats:
+        """Return candidates of an algorithm, a copy.
 
         Args:
+            side: Number of the side.
             count: Number of candidates; any from 1 if None.
         """
-        candidates = check_numbers("candidates of ask()", self.algorithm.ask(), (count, self.task.parameter_count))
+        shape = (count, self.task.sides[side].parameter_count)
+        candidates = check_numbers("candidates of ask()", self.algorithms[side].ask(), shape)
         if not len(candidates):
             raise ParameterError("candidates of ask() must be at least one, but there were none.")
         return candidates
+
+    def _opponents_from(self, side: int) -> Floats:
+        """Return the opponents that a side provides, float64 [opponent, parameter]."""
+        latest = [each.parameters for each in self._favourites[side][-self.opponents :][::-1]]
+        candidates = latest or self._populations()[side].tolist()
+        return np.array([candidates[number % len(candidates)] for number in range(self.opponents)])
 
     @property
     def seeds(self) -> Integers:
         """Seeds of the worlds of the candidates that `ask` returns, int64 [candidate].
 
-        All candidates of a population drive in the same worlds, so their fitness can be compared.
+        All candidates of a population drive in the same worlds, or with the same opponent in the same worlds, so that
+        their fitness can be compared.
         """
-        seeds = [seed_for(self.seed, WORLDS_SEED, len(self.generations))] * self.population
-        return np.array(seeds + ([] if self._rival is None else self._trial_seeds), np.int64)
+        purpose, begin = seeds.WORLDS + self._first_purpose, len(self.generations) * self.opponents
+        drawn = [seed_for(self.seed, purpose, begin + number) for number in range(self.opponents)]
+        drawn *= self.population * len(self.algorithms)
+        return np.array(drawn + ([] if self._rival is None else self._trial_seeds), np.int64)
 
     def tell(self, values: ArrayLike) -> None:
         """Take the values of the candidates of `ask`.
 
         Args:
-            values: Fitness, then the measures, float64 [candidate, 1 + measure], as `Task.evaluate` returns them; or
-                fitness alone, float64 [candidate]. More is better.
+            values: Fitness, then the measures, float64 [candidate, value], as `Task.evaluate` returns them; or, of one
+                side, fitness alone, float64 [candidate]. More is better.
         """
-        self._tell(values, self._now_s())
+        if not self._own:
+            raise ParameterError("ask() must come before each tell(), but it did not.")
+        given = check_numbers("values", values)
+        given = given[:, None] if given.ndim == 1 else given
+        sides, value_count = len(self.algorithms), len(self.task.value_names)
+        pairs = sides * self.population * self.opponents
+        count = pairs + sum(map(len, self._trials()))
+        widths = {value_count} if self.task.against else {1, value_count}
+        if given.ndim != 2 or len(given) != count or given.shape[1] not in widths:
+            raise ParameterError(
+                f"values must be numbers [candidate] or [candidate, value], here ({count},) or {(count, value_count)}, "
+                f"but their shape was {given.shape}."
+            )
+        # Of each side, the mean over the opponents of its own candidates.
+        means = given[:pairs].reshape(sides, self.population, self.opponents, -1).mean(axis=2)
+        width = given.shape[1] // sides
+        own = [means[side, :, side * width : (side + 1) * width] for side in range(sides)]
+        self._tell(np.concatenate([np.concatenate(own, axis=1), given[pairs:]]), self._now_s())
         if self._folder is not None:
             self._folder.save(len(self.generations) - 1, self.generations[-1])
 
@@ -171,52 +256,62 @@ class Evolution:
         """Return the time since the evolution began [s of the wall clock]."""
         return self._earlier_s + perf_counter() - self._start_s
 
-    def _tell(self, values: ArrayLike, seconds: float) -> None:
-        if self._asked is None:
-            raise ParameterError("ask() must come before each tell(), but it did not.")
-        given = check_numbers("values", values)
-        given = given[:, None] if given.ndim == 1 else given
-        count, value_count = len(self._asked), len(self.task.value_names)
-        if given.ndim != 2 or len(given) != count or given.shape[1] not in (1, value_count):
-            raise ParameterError(
-                f"values must be numbers [candidate] or [candidate, value], here ({count},) or {(count, value_count)}, "
-                f"but their shape was {given.shape}."
-            )
-        fitness, trials = given[: self.population, 0], given[self.population :]
+    def _tell(self, values: Floats, seconds: float) -> None:
+        """Take the values of the rows that are saved, float64 [row, value]."""
+        number, asked, seeds_there = len(self.generations) + 1, self._rows(), self.seeds
+        trials = values[self.population :]
         if self._rival is not None:
             means = trials.mean(axis=0)
             self._tried[self._rival] = float(means[0])
             if self._best is None or means[0] > self._best.fitness:
-                self._best = self._champion(self._rival, means)
+                self._best = self._champion(0, self._rival, means)
+        evaluations = len(seeds_there)
+        if self.task.against:
+            seeds_there = np.full(self.population, seeds_there[0])
         best_fitness = np.nan if self._best is None else self._best.fitness
-        generation = Generation(self._asked, given, self.seeds, self.population, best_fitness, seconds)
-        behaviours = np.zeros((self.population, 0))
-        if given.shape[1] == value_count:
-            columns = [self.task.value_names.index(axis.measure) for axis in self.task.axes]
-            behaviours = given[: self.population, columns]
-        self.algorithm.tell(fitness.copy(), behaviours)
-        if self.archive is not None and given.shape[1] == value_count:
-            self.archive.add(self._asked[: self.population], given[: self.population], len(self.generations) + 1)
-        self._rival = self._next_rival(self._asked[int(fitness.argmax())])
+        generation = Generation(asked, values, seeds_there, self.population, evaluations, best_fitness, seconds)
+        parts = np.split(values[: self.population], len(self.algorithms), axis=1)
+        for side, (algorithm, own, part) in enumerate(zip(self.algorithms, self._own, parts, strict=True)):
+            behaviours = np.zeros((self.population, 0))
+            if part.shape[1] == len(self._names):
+                behaviours = part[:, [self._names.index(axis.measure) for axis in self.task.axes]]
+            algorithm.tell(part[:, 0].copy(), behaviours)
+            if self.archives and part.shape[1] == len(self._names):
+                self.archives[side].add(own, part, number)
+            best = Contender(tuple(asked[int(part[:, 0].argmax()), self._columns(side)].tolist()), number)
+            favourite = self._favourite(side, best)
+            self._favourites[side].append(favourite or best)
+            self._tries_elites = favourite is None and bool(self.archives)
+            if not self.task.against:
+                untried = (elite for elite in self._elites() if elite not in self._tried)
+                self._rival = next(untried, None) if self._tries_elites else favourite or best
         self.generations.append(generation)
-        self._asked = self.finals = None
+        self._own, self.finals, self.tournament = [], None, None
 
-    def _next_rival(self, best: Floats) -> Contender | None:
-        """Return the candidate to try next; None if all elites were tried.
+    def _columns(self, side: int) -> slice:
+        """Return the columns of the parameters of a side."""
+        first = self.task.sides[0].parameter_count
+        return slice(0, first) if side == 0 else slice(first, None)
+
+    def _favourite(self, side: int, best: Contender) -> Contender | None:
+        """Return the candidate that an algorithm considers best; None if it prefers none.
 
         Args:
+            side: Number of the side.
             best: The best candidate of the generation, for an algorithm that does not say what it prefers.
         """
-        favourite: Any = getattr(self.algorithm, "favourite", None)
-        preferred = best if favourite is None else favourite()
-        self._tries_elites = preferred is None and self.archive is not None
-        if self._tries_elites:
-            return next((elite for elite in self._elites() if elite not in self._tried), None)
-        preferred = check_numbers("parameters of favourite()", preferred, (self.task.parameter_count,))
-        return Contender(tuple(preferred.tolist()), len(self.generations) + 1)
+        favourite: Any = getattr(self.algorithms[side], "favourite", None)
+        if favourite is None:
+            return best
+        preferred = favourite()
+        if preferred is None and self.archives:
+            return None
+        shape = (self.task.sides[side].parameter_count,)
+        preferred = check_numbers("parameters of favourite()", preferred, shape)
+        return Contender(tuple(preferred.tolist()), best.generation)
 
     def _elites(self) -> Iterator[Contender]:
-        """Yield the elites of the archive, the best first."""
+        """Yield the elites of the first side's archive, the best first."""
         if self.archive is not None:
             yield from (Contender(each.parameters, each.generation) for each in self.archive.best_first())
 
@@ -229,7 +324,7 @@ class Evolution:
         seconds: float | None = None,
         executor: Executor | None = None,
         each: Callable[[Evolution], Any] | None = None,
-        each_round: Callable[[Finals], Any] | None = None,
+        each_round: Callable[[int, list[int]], Any] | None = None,
     ) -> Champion:
         """Evolve, and hold the finals.
 
@@ -238,109 +333,184 @@ class Evolution:
             seconds: No generation begins later than this [s of the wall clock].
             executor: Evaluates candidates, such as a `ThreadPoolExecutor`; the cores of this computer do if left out.
             each: Called after each generation.
-            each_round: Called before each round of the finals.
+            each_round: As for `hold_finals`.
 
         Returns:
-            The champion.
+            The champion, of two sides that of the first; `champions` has both.
 
         Raises:
             WorkError: If the task cannot be evaluated.
         """
-        finish = partial(self.hold_finals, each_round=each_round)
-        run_generations(self, generations=generations, seconds=seconds, executor=executor, each=each, finish=finish)
+        if generations is None and seconds is None:
+            raise ParameterError("generations or seconds must be given, but neither was: the run would never end.")
+        for name, value in (("generations", generations), ("seconds", seconds)):
+            if value is not None:
+                check_number(name, value, 0)
+        begin_s, logged_s = perf_counter(), -np.inf
+        try:
+            while (generations is None or len(self.generations) < generations) and (
+                seconds is None or perf_counter() - begin_s < seconds
+            ):
+                self.tell(evaluate(self.task, self.ask(), self.seeds, executor))
+                if perf_counter() - logged_s > LOG_EVERY_S:
+                    self.save_log()
+                    logged_s = perf_counter()
+                if each is not None:
+                    each(self)
+            if self.generations:
+                self.hold_finals(executor, each_round=each_round)
+        finally:
+            self.save_log()
         return self.champion
 
     def hold_finals(
-        self, executor: Executor | None = None, *, each_round: Callable[[Finals], Any] | None = None
+        self, executor: Executor | None = None, *, each_round: Callable[[int, list[int]], Any] | None = None
     ) -> Champion:
         """Hold the finals, unless they were held after this generation; `run` does so at its end.
 
-        A single rival, or none, has no finals.
+        A single rival, or none, has no finals. Those of two sides are a master tournament.
 
         Args:
-            executor: Evaluates candidates, such as a `ThreadPoolExecutor`; the cores of this computer do if left out.
-            each_round: Called before each round.
+            executor: As for `run`.
+            each_round: Called before each round with its number, from 0, and the number of candidates in each round.
 
         Returns:
-            The champion.
+            The champion, of two sides that of the first.
 
         Raises:
             WorkError: If the task cannot be evaluated.
         """
-        finals = None if self.finals else self._new_finals()
-        if finals is not None:
-            while not finals.is_over:
-                if each_round is not None:
-                    each_round(finals)
-                finals.tell(evaluate(self.task, finals.ask(), finals.seeds, executor))
-            finals.seconds = self._now_s()
+        if self.task.against:
+            every = max(1, -(-len(self.generations) // TOURNAMENT_MAX))
+            self.tournament = self.tournament or self.master_tournament(every=every, executor=executor)
+        elif self.finals is None and len(finalists := self._finalists()) > 1:
+            work = partial(evaluate, self.task, executor=executor)
+            held = hold_finals(finalists, self.seed, self._evaluation_count, work, each_round)
+            self.finals = replace(held, seconds=self._now_s())
             if self._folder is not None:
-                self._folder.save_finals(len(self.generations) - 1, finals)
-            self.finals = finals
+                self._folder.save_finals(len(self.generations) - 1, self.finals)
         return self.champion
 
-    def _new_finals(self) -> Finals | None:
-        """Return finals before their first round; None if there are too few finalists."""
+    def _finalists(self) -> list[Contender]:
+        """Return the finalists, each once: the first of the rivals, the best first, then the first of the elites."""
         rivals = sorted(self._tried, key=lambda each: -self._tried[each])
-        finalists = finalists_of(rivals, self._elites() if self._tries_elites else ())
-        if len(finalists) < 2:
-            return None
-        evaluations = sum(len(each.values) for each in self.generations)
-        return Finals(finalists, self.seed, evaluations, len(self.task.value_names))
+        elites = self._elites() if self._tries_elites else ()
+        return different([*different(rivals)[:FINALISTS], *different(elites)[:FINALISTS]])
+
+    @property
+    def _evaluation_count(self) -> int:
+        return sum(each.evaluations for each in self.generations)
+
+    def master_tournament(
+        self, *, trials: int = MEETINGS, every: int = 1, executor: Executor | None = None
+    ) -> Tournament:
+        """Let the champion of each generation meet the champions of all generations of the other side.
+
+        Args:
+            trials: Number of evaluations of each pair.
+            every: Take only each so-many-th generation, the last one included.
+            executor: As for `run`.
+
+        Raises:
+            WorkError: If the task cannot be evaluated.
+        """
+        trials, every = check_count("trials", trials, 1, 10_000), check_count("every", every, 1)
+        if not self.task.against:
+            raise ParameterError(f"a tournament must have two sides, but the task {shown(self.task.name)} has one.")
+        if not self.generations:
+            raise ParameterError("tell() must be called for a generation before a tournament, but it was not.")
+        chosen = np.arange(len(self.generations) - 1, -1, -every)[::-1]
+        champions = [np.array([each.parameters for each in of_side])[chosen] for of_side in self._favourites]
+        scores = hold_tournament(champions, self.seed, trials, partial(evaluate, self.task, executor=executor))
+        first, second = (side.name for side in self.task.sides)
+        return Tournament((first, second), chosen + 1, scores)
 
     def save_log(self) -> None:
-        """Write the champion, the archive and the log into the folder, if there is one."""
+        """Write the champions, the archives and the log into the folder, if there is one."""
         if self._folder is not None and self.generations:
-            self.champion.save(self._folder.path / CHAMPION)
-            if self.archive is not None:
-                self.archive.save(self._folder.path)
+            for side, champion in zip(self.task.sides, self.champions, strict=True):
+                champion.save(self._folder.champion_file(side.name))
+            for side, archive in zip(self.task.sides, self.archives, strict=False):
+                archive.save(self._folder.path, side.name)
             self._folder.save_log(self.generations, self.task.value_names)
+            if self.tournament is not None:
+                self._folder.save_tournament(self.tournament)
 
     # ---- results ----
 
     @property
-    def work(self) -> Task:
-        """The task."""
-        return self.task
-
-    @property
     def figures(self) -> dict[str, float]:
-        """What the last generation achieved: best fitness, that of the champion, mean fitness."""
-        fitness = self.generations[-1].fitness
-        return {"best": fitness.max(), "champion": self.champion.fitness, "mean": fitness.mean()}
+        """Best, champion's and mean fitness of the last generation; of two sides, best and mean of each."""
+        last = self.generations[-1]
+        if not self.task.against:
+            return {"best": last.fitness.max(), "champion": self.champion.fitness, "mean": last.fitness.mean()}
+        fitness = {side.name: last.fitness_of(number) for number, side in enumerate(self.task.sides)}
+        best = {f"best {name}": each.max() for name, each in fitness.items()}
+        return best | {f"mean {name}": each.mean() for name, each in fitness.items()}
 
     @property
     def driven_s(self) -> float:
         """Total time for which the robots of the last generation drove [s]."""
-        return len(self.generations[-1].values) * self.task.driven_s
+        return self.generations[-1].evaluations * self.task.driven_s
+
+    @property
+    def champions(self) -> tuple[Champion, ...]:
+        """The champion of each side.
+
+        Of one side: the winner of the finals; before these, the best rival; before the first trial, the best candidate.
+        Of two sides: the best of the tournament; before it, those of the last generation.
+        """
+        if self.task.against:
+            best = (None, None) if self.tournament is None else self.tournament.best
+            return tuple(self.champion_of(side, generation) for side, generation in enumerate(best))
+        if self.finals is not None:
+            winner = self.finals.winner
+            return (self._champion(0, self.finals.finalists[winner], self.finals.means(winner)),)
+        return (self.champion_of() if self._best is None else self._best,)
 
     @property
     def champion(self) -> Champion:
-        """The winner of the finals; before these, the best rival; before the first trial, the best candidate."""
-        if self.finals is not None:
-            winner = self.finals.winner
-            return self._champion(self.finals.finalists[winner], self.finals.means(winner))
-        if self._best is not None:
-            return self._best
+        """The champion of the first side, see `champions`."""
+        return self.champions[0]
+
+    def champion_of(self, side: int | str = 0, generation: int | None = None) -> Champion:
+        """Return the champion of a side in a generation: the candidate that the algorithm considers best.
+
+        Its fitness and its measures are those of the best candidate of its generation.
+
+        Args:
+            side: Number or name of the side.
+            generation: Number of the generation, from 1; the last one if left out.
+        """
+        names = [each.name for each in self.task.sides]
+        if not isinstance(side, int | str) or side not in (*range(len(names)), *names):
+            raise ParameterError(f"side must be 0, 1 or one of {', '.join(names)}, but it was {shown(side)}.")
         if not self.generations:
             raise ParameterError("tell() must be called for a generation before there is a champion, but it was not.")
-        first = self.generations[-1]
-        best = int(first.fitness.argmax())
-        contender = Contender(tuple(first.candidates[best].tolist()), len(self.generations))
-        return self._champion(contender, first.values[best])
+        count = len(self.generations)
+        index = names.index(side) if isinstance(side, str) else side
+        number = check_count("generation", count if generation is None else generation, 1, count) - 1
+        held = self.generations[number]
+        best = int(held.fitness_of(index).argmax())
+        values = np.split(held.values, len(names), axis=1)[index][best]
+        contender = self._favourites[index][number]
+        if not self.task.against:
+            contender = Contender(tuple(held.candidates[best].tolist()), number + 1)
+        return self._champion(index, contender, values)
 
-    def _champion(self, contender: Contender, values: Floats) -> Champion:
-        task, named = self.task, dict(zip(self.task.value_names, values.tolist(), strict=False))
+    def _champion(self, side: int, contender: Contender, values: Floats) -> Champion:
+        task, own = self.task, self.task.sides[side]
+        named = dict(zip(self._names, values.tolist(), strict=False))
         return Champion(
-            controller=task.controller,
+            controller=own.controller,
             parameters=contender.parameters,
             task=task.name,
-            fitness=float(values[0]),
-            measures={name: named[name] for name in task.measure_names if name in named},
+            fitness=named.pop("fitness"),
+            measures=named,
             generation=contender.generation,
             algorithm=self.name,
             seed=self.seed,
-            robot=task.kinds[0],
+            robot=own.robot[0] if isinstance(own.robot, tuple) else own.robot,
             timing=task.timings[0],
             world=self._world,
         )
@@ -350,20 +520,27 @@ class Evolution:
     def _resume(self, folder: Folder) -> None:
         """Take the generations of the folder."""
         task = self.task
-        controller = task.controller.name
-        digest = task.digest() | fingerprints({"algorithm": type(self.algorithm)})
+        controllers = " and ".join(side.controller.name for side in task.sides)
+        algorithm = f"{self.name}, {self.opponents} opponents" if task.against else self.name
+        digest = task.digest() | fingerprints({"algorithm": type(self.algorithms[0])})
         folder.check_identity(
-            Identity(task.name, self.name, self.seed, self.population, controller, digest, __version__, task.file)
+            Identity(task.name, algorithm, self.seed, self.population, controllers, digest, __version__, task.file)
         )
-        for values, seconds in folder.saved_generations(self.ask, len(task.value_names)):
+        for values, seconds in folder.saved_generations(self._rows, len(task.value_names)):
             self._tell(values, seconds)
         self._earlier_s = self.generations[-1].seconds if self.generations else 0.0
-        finals = self._new_finals()
-        saved = None if finals is None else folder.saved_finals(len(self.generations) - 1, finals)
-        if finals is not None and saved is not None:
-            values, finals.seconds = saved
-            finals.tell_all(values)
-            self.finals = finals
+        if len(finalists := self._finalists()) > 1:
+            sizes, worlds = rounds_of(len(finalists), self._evaluation_count)
+            count = sum(size * each for size, each in zip(sizes, worlds, strict=True))
+            self.finals = folder.saved_finals(len(self.generations) - 1, finalists, count, len(task.value_names))
+
+
+def different(contenders: Iterable[Contender]) -> list[Contender]:
+    """Return the contenders without those whose parameters an earlier one has."""
+    found: dict[tuple[float, ...], Contender] = {}
+    for each in contenders:
+        found.setdefault(each.parameters, each)
+    return list(found.values())
 
 
 def is_algorithm(algorithm: object) -> TypeGuard[Algorithm]:

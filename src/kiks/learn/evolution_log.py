@@ -20,7 +20,7 @@ from pydantic import Field
 
 from kiks.errors import ParameterError, shown
 from kiks.export.tables import write_parquet
-from kiks.learn.finals import Finals
+from kiks.learn.finals import Contender, Finals, Tournament
 from kiks.learn.fingerprint import differing, tell_unseen
 from kiks.model.array_checks import Numbers, read_arrays
 from kiks.model.atomic_files import make_folder, path_of, replace_file
@@ -33,7 +33,8 @@ Digest = Annotated[
     dict[Text, Text], Field(max_length=100), Rule("a table with a fingerprint of each argument of the task")
 ]
 
-IDENTITY, GENERATIONS, LOG = "evolution.json", "generations", "log.parquet"
+IDENTITY, GENERATIONS, LOG, CHAMPION = "evolution.json", "generations", "log.parquet", "champion.toml"
+TOURNAMENT = "tournament.parquet"
 """Names in the folder."""
 
 _ADVICE = "Remove the file, and those after it."
@@ -53,21 +54,19 @@ class Identity:
     kiks: Text
     task_file: Text = ""
 
-    @property
-    def is_contest(self) -> bool:
-        """Whether two sides evolve."""
-        return "sides" in self.task_digest
-
 
 @dataclass(frozen=True)
 class Generation:
     """A generation with its values.
 
     Attributes:
-        candidates: All evaluated candidates, float64 [candidate, parameter]: the population, then trials of a rival.
-        values: Their values, float64 [candidate, value]: fitness, then measures.
-        seeds: Seeds of their worlds, int64 [candidate]; in a co-evolution, those of their first contests.
-        population: Size of the population.
+        candidates: The candidates, float64 [candidate, parameter]: the population, of two sides the one beside the
+            other, then the trials of a rival.
+        values: Their values, float64 [candidate, value]: fitness, then measures; of two sides, one after the other,
+            each the mean over its opponents.
+        seeds: Seeds of their worlds, int64 [candidate]; of two sides, those with their first opponents.
+        population: Size of the population of a side.
+        evaluations: Number of evaluations.
         champion_fitness: Fitness of the best rival so far; NaN before the first.
         seconds: Time of its end [s of the wall clock, since the evolution began].
     """
@@ -76,13 +75,19 @@ class Generation:
     values: Floats
     seeds: Integers
     population: int
+    evaluations: int
     champion_fitness: float
     seconds: float
 
     @property
     def fitness(self) -> Floats:
-        """Fitness of the population, float64 [candidate]."""
-        return self.values[: self.population, 0]
+        """Fitness of the population, of two sides that of the first, float64 [candidate]."""
+        return self.fitness_of(0)
+
+    def fitness_of(self, side: int) -> Floats:
+        """Return the fitness of the population of a side, float64 [candidate]."""
+        second = self.values.shape[1] // 2
+        return self.values[: self.population, second if side else 0]
 
 
 def check_alike(
@@ -108,6 +113,10 @@ class Folder:
     def __init__(self, path: str | Path) -> None:
         self.path = path_of(path, "folder")
 
+    def champion_file(self, side: str = "") -> Path:
+        """Return the file of the champion, or of the champion of a side of two."""
+        return self.path / (f"{side}.toml" if side else CHAMPION)
+
     def identity(self) -> Identity:
         """Return the identity of the evolution in the folder."""
         file = self.path / IDENTITY
@@ -122,7 +131,7 @@ class Folder:
     def check_identity(self, identity: Identity) -> None:
         """Write the identity of an evolution into the folder, or compare it with the one that is there."""
         file = self.path / IDENTITY
-        if not file.exists() and (self.path / "champion.toml").exists():
+        if not file.exists() and (self.path / CHAMPION).exists():
             raise ParameterError(
                 f"the folder {str(self.path)!r} must hold an evolution or no champion.toml, but it holds one without "
                 f"{IDENTITY}, which would be replaced. Take a new folder."
@@ -192,38 +201,40 @@ class Folder:
         arrays = {"candidates": generation.candidates, "values": generation.values}
         _save_arrays(self._file(number), arrays, generation.seconds, "a generation")
 
-    def saved_finals(self, number: int, finals: Finals) -> tuple[Floats, float] | None:
-        """Return the values of saved finals, float64 [evaluation, value], and their seconds; None if there are none.
+    def saved_finals(
+        self, number: int, finalists: Sequence[Contender], evaluation_count: int, value_count: int
+    ) -> Finals | None:
+        """Return the finals that were held after a generation; None if there are none.
 
         Args:
-            number: Number of the generation after which they were held, from 0.
-            finals: Finals with the same finalists, before their first round.
+            number: Number of the generation, from 0.
+            finalists: The finalists of this evolution.
+            evaluation_count: Number of evaluations.
+            value_count: Number of values of a candidate.
         """
         file, what = self._finals_file(number), f"Finals {str(self._finals_file(number))!r}"
         if not file.exists():
             return None
-        finalists, count = finals.candidates, finals.evaluation_count
+        parameters = np.array([each.parameters for each in finalists])
+        whole: dict[str, Any] = {"is_whole": True, "advice": _FINALS_ADVICE}
         rules = {
-            "finalists": Numbers(finalists.shape, advice=_FINALS_ADVICE),
-            "values": Numbers((count, finals.value_count), advice=_FINALS_ADVICE),
+            "finalists": Numbers(parameters.shape, advice=_FINALS_ADVICE),
+            "finalist": Numbers((evaluation_count,), 0, len(finalists) - 1, **whole),
+            "seed": Numbers((evaluation_count,), **whole),
+            "values": Numbers((evaluation_count, value_count), advice=_FINALS_ADVICE),
             "seconds": Numbers((), low=0.0, advice=_FINALS_ADVICE),
         }
-        # Beside these the file holds the finalist and the seed of each evaluation.
-        numbers_max = finalists.size + count * (finals.value_count + 2) + 1
-        arrays = read_arrays(file, rules, what, numbers_max=numbers_max)
-        if not np.array_equal(finalists, arrays["finalists"]):
+        found = read_arrays(file, rules, what, numbers_max=parameters.size + evaluation_count * (value_count + 2) + 1)
+        numbers = found["finalist"].astype(np.int64)
+        if not np.array_equal(parameters, found["finalists"]) or len(np.unique(numbers)) < len(finalists):
             raise ParameterError(f"{what} must have the finalists of this evolution, but has others. {_FINALS_ADVICE}")
-        return arrays["values"], float(arrays["seconds"])
+        seeds = found["seed"].astype(np.int64)
+        return Finals(tuple(finalists), numbers, seeds, found["values"], float(found["seconds"]))
 
     def save_finals(self, number: int, finals: Finals) -> None:
-        """Save finals that are over.
-
-        Args:
-            number: Number of the generation after which they were held, from 0.
-            finals: The finals.
-        """
-        numbers, seeds, values = finals.evaluated
-        arrays: dict[str, Any] = {"finalists": finals.candidates, "finalist": numbers, "seed": seeds, "values": values}
+        """Save the finals that were held after a generation, whose number counts from 0."""
+        parameters = np.array([each.parameters for each in finals.finalists])
+        arrays = {"finalists": parameters, "finalist": finals.numbers, "seed": finals.seeds, "values": finals.values}
         _save_arrays(self._finals_file(number), arrays, finals.seconds, "finals")
 
     def save_log(self, generations: Sequence[Generation], value_names: Sequence[str]) -> None:
@@ -245,8 +256,16 @@ class Folder:
         columns |= {name: table[:, number] for number, name in enumerate(value_names[: table.shape[1]])}
         columns["champion_fitness"] = per_candidate([each.champion_fitness for each in generations])
         columns["seconds"] = per_candidate([each.seconds for each in generations])
-        columns["evaluations"] = per_candidate(np.cumsum(counts).tolist()).astype(np.int64)
+        evaluations = np.cumsum([each.evaluations for each in generations]).tolist()
+        columns["evaluations"] = per_candidate(evaluations).astype(np.int64)
         write_parquet(columns, self.path / LOG, "the log")
+
+    def save_tournament(self, tournament: Tournament) -> None:
+        """Save a tournament, a row for each pair: the generations of both sides, and the fitness of both."""
+        places = np.meshgrid(tournament.generations, tournament.generations, indexing="ij")
+        columns = {f"{side}_generation": place.ravel() for side, place in zip(tournament.sides, places, strict=True)}
+        columns |= {side: scores.ravel() for side, scores in zip(tournament.sides, tournament.scores, strict=True)}
+        write_parquet(columns, self.path / TOURNAMENT, "the tournament")
 
     def _file(self, number: int) -> Path:
         return self.path / GENERATIONS / f"{number + 1:06}.npz"

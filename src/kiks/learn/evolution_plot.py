@@ -1,4 +1,4 @@
-"""The picture of an evolution: its fitness over the generations, and its archive. Needs Matplotlib."""
+"""The pictures of an evolution: fitness over the generations, archives, the tournament. They need Matplotlib."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from kiks.learn.archive import Archive
 from kiks.learn.baselines import Baselines
 from kiks.learn.champion import Champion
 from kiks.learn.evolution import Evolution
+from kiks.learn.finals import Tournament
 from kiks.learn.task import Axis
 
 CHAMPION_MARK: dict[str, Any] = {
@@ -23,9 +24,12 @@ CHAMPION_MARK: dict[str, Any] = {
 }
 """How the champion is drawn."""
 
+COLOURS = ("tab:red", "tab:blue")
+"""Colours of two sides in the tournament."""
+
 
 def save_plot(evolution: Evolution, path: str | Path, baselines: Baselines | None = None) -> None:
-    """Draw best, quartiles and median of each generation, and the champion; and the archive, if the task has axes.
+    """Draw best, quartiles and median of each generation of a side, and the champion; and the archive, if there is one.
 
     Args:
         evolution: The evolution.
@@ -34,32 +38,38 @@ def save_plot(evolution: Evolution, path: str | Path, baselines: Baselines | Non
     """
     from matplotlib.figure import Figure
 
-    archive = evolution.archive
-    figure = Figure(figsize=(6.4 if archive is None else 12.0, 4.4), layout="constrained")
-    axes = figure.subplots(1, 1 if archive is None else 2, squeeze=False)[0]
-    _draw_fitness(axes[0], evolution, baselines)
-    if archive is not None:
-        _draw_archive(figure, axes[1], archive, evolution.champion)
+    sides, archives = evolution.task.sides, evolution.archives
+    count = len(sides) + len(archives)
+    figure = Figure(figsize=(6.4 if count == 1 else 6.0 * count, 4.4), layout="constrained")
+    axes = iter(figure.subplots(1, count, squeeze=False)[0])
+    for side in range(len(sides)):
+        _draw_fitness(next(axes), evolution, side, baselines)
+    for archive, champion in zip(archives, evolution.champions, strict=False):
+        _draw_archive(figure, next(axes), archive, champion)
     save_figure(figure, path)
 
 
-def _draw_fitness(axes: Any, evolution: Evolution, baselines: Baselines | None) -> None:
+def _draw_fitness(axes: Any, evolution: Evolution, side: int, baselines: Baselines | None) -> None:
     generations = evolution.generations
     numbers = np.arange(1, len(generations) + 1)
-    quartiles = np.array([np.percentile(each.fitness, (25, 50, 75, 100)) for each in generations]).reshape(-1, 4)
-    low, median, high, best = quartiles.T
+    quartiles = np.array([np.percentile(each.fitness_of(side), (25, 50, 75, 100)) for each in generations])
+    low, median, high, best = quartiles.reshape(-1, 4).T
     axes.fill_between(numbers, low, high, color="tab:blue", alpha=0.25, linewidth=0, label="middle half")
     axes.plot(numbers, median, color="tab:blue", label="median")
     axes.plot(numbers, best, color="tab:green", linewidth=1, label="best of the generation")
-    champions = [each.champion_fitness for each in generations]
-    axes.plot(numbers, champions, color="tab:red", drawstyle="steps-post", label="champion, on trial")
+    name, against = evolution.task.name, ""
+    if evolution.task.against:
+        name, against = evolution.task.sides[side].name, " against the opponents of the time"
+    else:
+        champions = [each.champion_fitness for each in generations]
+        axes.plot(numbers, champions, color="tab:red", drawstyle="steps-post", label="champion, on trial")
     if evolution.finals is not None:
         axes.plot(len(generations), evolution.champion.fitness, **CHAMPION_MARK, label="champion, in the finals")
     if baselines is not None:
         draw_baselines(axes, baselines)
     axes.set_xlabel("generation")
-    axes.set_ylabel("fitness")
-    axes.set_title(f"{evolution.task.name}: {evolution.name}, seed {evolution.seed}")
+    axes.set_ylabel(f"fitness{against}")
+    axes.set_title(f"{name}: {evolution.name}, seed {evolution.seed}")
     axes.grid(alpha=0.3)
     axes.legend(loc="best", fontsize="small")
 
@@ -100,3 +110,30 @@ def _draw_archive(figure: Any, axes: Any, archive: Archive, champion: Champion) 
 def _cell(axis: Axis) -> float:
     """Return how wide a cell of an axis is."""
     return (axis.high - axis.low) / axis.cells
+
+
+def save_tournament_plot(tournament: Tournament, path: str | Path) -> None:
+    """Draw the fitness of the first side in all pairs of champions as grey squares, and both sides' means."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(12.0, 4.8), layout="constrained")
+    squares, curves = figure.subplots(1, 2)
+    (first, second), generations = tournament.sides, tournament.generations
+    half = 0.5 * (generations[-1] - generations[0]) / max(len(generations) - 1, 1) or 0.5
+    extent = (generations[0] - half, generations[-1] + half) * 2
+    image = squares.imshow(
+        tournament.scores[0], origin="lower", extent=extent, interpolation="nearest", cmap="gray", aspect="equal"
+    )
+    squares.set_xlabel(f"generation of the {second}")
+    squares.set_ylabel(f"generation of the {first}")
+    squares.set_title("champions of all generations against each other")
+    figure.colorbar(image, ax=squares, label=f"fitness of the {first}")
+    for side, name in enumerate(tournament.sides):
+        best, means = tournament.best[side], tournament.means[side]
+        curves.plot(generations, means, color=COLOURS[side], label=name)
+        curves.plot([best], [means.max()], "o", color=COLOURS[side], label=f"best {name}: generation {best}")
+    curves.set_xlabel("generation of the champion")
+    curves.set_ylabel("mean fitness against all champions")
+    curves.grid(alpha=0.3)
+    curves.legend(loc="best", fontsize="small")
+    save_figure(figure, path)

@@ -19,9 +19,9 @@ from kiks.batch.batch import Batch
 from kiks.batch.initial_state import Arenas, Starts
 from kiks.control.measure import Measure
 from kiks.errors import ParameterError, shown
-from kiks.learn.candidate_worlds import check_even, spread_starts
 from kiks.learn.champion import Champion
 from kiks.learn.evaluation import Floats
+from kiks.learn.experiment import Experiment
 from kiks.model.arena import Arena
 from kiks.model.arena_objects import THINGS_MAX
 from kiks.model.checks import check_kind
@@ -74,7 +74,7 @@ class ExamResult:
 
 
 @record
-class Exam:
+class Exam(Experiment):
     """An exam for champions.
 
     Args:
@@ -83,7 +83,7 @@ class Exam:
         solved: Maps the measures, by name float64 [start], to whether each start is solved, bool [start].
         goal: What a solved start shows, in some words.
         seconds: Time for which the champion drives from each start [s].
-        count: Number of starts; a multiple of the number of arenas.
+        worlds: Number of starts; a multiple of the number of arenas.
         starts: 'random' for free places anywhere, or 'arena' for the start poses of the arenas: lone robots take those
             of an arena in turn, each with noise of its own.
 
@@ -93,7 +93,7 @@ class Exam:
         ... def ahead(sensors, memory, parameters, wheels):
         ...     wheels[:] = parameters
         >>> exam = Exam([kiks.Arena.box(900, 900)], [kiks.measures.path_mm], lambda values: values["path_mm"] > 30,
-        ...             goal="drove 30 mm", seconds=2, count=4)
+        ...             goal="drove 30 mm", seconds=2, worlds=4)
         >>> print(exam.examine(kiks.Champion(ahead, (3, 3))))
         Exam: solved, 4 of 4 starts (drove 30 mm)
     """
@@ -103,15 +103,12 @@ class Exam:
     solved: Solved
     goal: Text = ""
     seconds: Annotated[Number, Field(ge=1e-3, le=1e5)] = 180.0
-    count: Annotated[Whole, Field(ge=1, le=STARTS_MAX)] = 20
+    worlds: Annotated[Whole, Field(ge=1, le=STARTS_MAX)] = 20
     starts: Starts = "random"
 
     # Functions cannot be compared: an exam equals itself only.
     __eq__ = object.__eq__
     __hash__ = object.__hash__
-
-    def __post_init__(self) -> None:
-        check_even("count", self.count, self.arenas)
 
     def examine(self, champion: Champion, *, robots: int = 1, kinds: Sequence[RobotSpec] | None = None) -> ExamResult:
         """Let a champion drive from all starts, with the timing of its own control loop.
@@ -124,15 +121,14 @@ class Exam:
         """
         check_kind("champion", champion, Champion, "kiks.Champion.load() returns one.")
         named = specs_of(champion.robot if kinds is None else kinds, None, None)
-        count, poses = self.count * len(named), self._poses(champion.robot, robots)
+        count, poses = self.worlds * len(named), self._poses(champion.robot, robots)
         batch = Batch(
             self.arenas,
             count,
-            robot=[(each,) * robots for each in named for _ in range(self.count)],
+            robot=[(each,) * robots for each in named for _ in range(self.worlds)],
             robots=robots,
-            seed=np.tile(EXAM_SEED + np.arange(self.count), len(named)),
+            seed=np.tile(EXAM_SEED + np.arange(self.worlds), len(named)),
             starts=None if poses is None else np.tile(poses, (len(named), 1, 1)),
-            senses=champion.controller.senses,
             timing=champion.timing,
         )
         rollouts = batch.run(champion.controller, champion.parameters, seconds=self.seconds, measures=self.measures)
@@ -162,11 +158,11 @@ class Exam:
         """Return the start poses, float64 [start, robot, 3]; None for those that arenas give several robots."""
         if self.starts == "random":
             (spec,) = specs_of(robot, 1, None)
-            return spread_starts(self.arenas, self.count, seed=EXAM_SEED, radius_mm=spec.body.radius_mm, robots=robots)
+            return self.random_starts(EXAM_SEED, robots=robots, radius_mm=spec.body.radius_mm)
         if robots > 1 or not all(arena.starts for arena in self.arenas):
             return None
         places = [cycle(arena.starts) for arena in self.arenas]
-        return np.array([next(places[k % len(places)]) for k in range(self.count)])[:, None]
+        return np.array([next(places[k % len(places)]) for k in range(self.worlds)])[:, None]
 
 
 def imperfect_robots(champion: Champion) -> list[RobotSpec]:

@@ -1,34 +1,35 @@
-"""The finals of an evolution: its best candidates drive again, and the best of these becomes the champion.
+"""The finals of an evolution: after the last generation its best candidates drive again, and the best become champions.
 
 A candidate is known as good because it did well in a few worlds, where it may have been lucky. In the finals it drives
 in worlds that are new to all. They are held by successive halving: in each round those that are left drive in twice as
 many new worlds as in the round before, and the better half goes on. So each round costs the same, and most of the time
 goes to candidates that are hard to tell apart (Karnin, Koren and Somekh, Almost optimal exploration in multi-armed
 bandits, ICML 2013).
+
+The fitness of two sides is relative: it falls when the opponents become better. So their finals are a master
+tournament, in which the champion of each generation meets the champions of all generations of the other side (Floreano
+and Nolfi, God save the Red Queen! Competition in co-evolutionary robotics, Genetic Programming 1997).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
-from kiks.learn.generation_loop import seed_for
-from kiks.model.array_checks import check_numbers
+from kiks.learn import seeds
+from kiks.learn.evaluation import Floats, Integers
+from kiks.learn.seeds import seed_for
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
+Evaluate = Callable[[Floats, Integers], Floats]
 
 FINALISTS = 16
 """Most rivals in the finals, and most elites."""
 
 SHARE = 0.1
 """Evaluations of the finals, as a share of those of the evolution."""
-
-FINALS_SEED = 20
-"""Purpose of the seeds of their worlds; evolutions and co-evolutions have others."""
 
 
 @dataclass(frozen=True)
@@ -44,125 +45,144 @@ class Contender:
     generation: int
 
 
-def finalists_of(rivals: Iterable[Contender], elites: Iterable[Contender] = ()) -> list[Contender]:
-    """Return the finalists, each once: the first of the rivals, then the first of the elites.
-
-    Args:
-        rivals: Rivals, the best first.
-        elites: Elites of an archive, the best first.
-    """
-    return _different([*_different(rivals)[:FINALISTS], *_different(elites)[:FINALISTS]])
-
-
-def _different(contenders: Iterable[Contender]) -> list[Contender]:
-    """Return the contenders without those whose parameters an earlier one has."""
-    found: dict[tuple[float, ...], Contender] = {}
-    for each in contenders:
-        found.setdefault(each.parameters, each)
-    return list(found.values())
-
-
+@dataclass(frozen=True)
 class Finals:
-    """Finals: `ask`, evaluate with `seeds`, and `tell`, round by round until `is_over`.
-
-    Args:
-        finalists: At least two finalists; of equal ones, the first wins.
-        seed: Seed of the evolution.
-        evaluations: Number of evaluations of the evolution so far: the finals take a tenth of them, or as few as a
-            round needs.
-        value_count: Number of values of a candidate.
+    """Finals that were held.
 
     Attributes:
         finalists: The finalists.
-        candidates: Their parameters, float64 [finalist, parameter].
-        value_count: Number of values of a candidate.
-        sizes: Number of finalists in each round.
-        worlds: Number of new evaluations of each of them in each round.
+        numbers: Number of the finalist of each evaluation, int64 [evaluation].
+        seeds: Seed of each evaluation, int64 [evaluation].
+        values: Fitness, then the measures, float64 [evaluation, value].
         seconds: Time of their end [s of the wall clock, since the evolution began].
     """
 
-    def __init__(self, finalists: Sequence[Contender], seed: int, evaluations: int, value_count: int) -> None:
-        self.finalists = tuple(finalists)
-        self.sizes = [len(self.finalists)]
-        while self.sizes[-1] > 2:
-            self.sizes.append((self.sizes[-1] + 1) // 2)
-        cost = sum(size << number for number, size in enumerate(self.sizes))
-        first = max(int(SHARE * evaluations) // cost, 1)
-        self.worlds = [first << number for number in range(len(self.sizes))]
-        self.seconds = 0.0
-        self.value_count = value_count
-        self._seed = seed
-        self._left = list(range(len(self.finalists)))
-        none = np.zeros(0, np.int64)
-        self._told = [(none, none, np.zeros((0, value_count)))]
-        self.candidates = np.array([each.parameters for each in self.finalists])
-
-    @property
-    def evaluation_count(self) -> int:
-        """Number of evaluations in all rounds."""
-        return sum(size * count for size, count in zip(self.sizes, self.worlds, strict=True))
-
-    @property
-    def round(self) -> int:
-        """Number of the next round, from 0."""
-        return len(self._told) - 1
-
-    @property
-    def is_over(self) -> bool:
-        """Whether the winner is known."""
-        return self.round == len(self.sizes)
-
-    # ---- rounds ----
-
-    def ask(self) -> Floats:
-        """Return the candidates of the next round, float64 [candidate, parameter]: each so often as it drives."""
-        return self.candidates[self._of_evaluation()]
-
-    @property
-    def seeds(self) -> Integers:
-        """Seeds of the worlds of the candidates that `ask` returns, int64 [candidate]; the same for each finalist."""
-        begin, count = sum(self.worlds[: self.round]), self.worlds[self.round]
-        seeds = [seed_for(self._seed, FINALS_SEED, number) for number in range(begin, begin + count)]
-        return np.tile(np.array(seeds, np.int64), len(self._left))
-
-    def tell(self, values: ArrayLike) -> None:
-        """Take the values of the candidates of `ask`: the better half goes on.
-
-        Args:
-            values: Fitness, then the measures, float64 [candidate, 1 + measure].
-        """
-        numbers, seeds = self._of_evaluation(), self.seeds
-        given = check_numbers("values", values, (len(numbers), self.value_count))
-        self._told.append((numbers, seeds, given))
-        best_first = sorted(self._left, key=lambda finalist: -self.means(finalist)[0])
-        self._left = sorted(best_first[: (len(best_first) + 1) // 2])
-
-    def tell_all(self, values: Floats) -> None:
-        """Take the values of all rounds, float64 [evaluation, value], as `evaluated` returns them."""
-        while not self.is_over:
-            count = len(self._of_evaluation())
-            self.tell(values[:count])
-            values = values[count:]
-
-    def _of_evaluation(self) -> Integers:
-        """Return the number of the finalist of each evaluation in the next round, int64 [candidate]."""
-        return np.repeat(np.array(self._left, np.int64), self.worlds[self.round])
-
-    # ---- results ----
+    finalists: tuple[Contender, ...]
+    numbers: Integers
+    seeds: Integers
+    values: Floats
+    seconds: float = 0.0
 
     def means(self, finalist: int) -> Floats:
-        """Return the mean values of a finalist over all its evaluations so far, float64 [value]."""
-        numbers, _, values = self.evaluated
-        means: Floats = values[numbers == finalist].mean(axis=0)
+        """Return the mean values of a finalist over its evaluations, float64 [value]."""
+        means: Floats = self.values[self.numbers == finalist].mean(axis=0)
         return means
 
     @property
     def winner(self) -> int:
-        """Number of the finalist that won; before the end, of the first that is left."""
-        return self._left[0]
+        """Number of the finalist that won: the best of those that drove most often; of equal ones, the first."""
+        counts = np.bincount(self.numbers, minlength=len(self.finalists))
+        return max(range(len(self.finalists)), key=lambda number: (counts[number], self.means(number)[0]))
+
+
+def rounds_of(count: int, evaluations: int) -> tuple[list[int], list[int]]:
+    """Return the number of finalists in each round, and of new worlds in which each of them drives.
+
+    Args:
+        count: Number of finalists.
+        evaluations: Number of evaluations of the evolution: the finals take a tenth, or as few as a round needs.
+    """
+    sizes = [count]
+    while sizes[-1] > 2:
+        sizes.append((sizes[-1] + 1) // 2)
+    cost = sum(size << number for number, size in enumerate(sizes))
+    first = max(int(SHARE * evaluations) // cost, 1)
+    return sizes, [first << number for number in range(len(sizes))]
+
+
+def hold_finals(
+    finalists: Sequence[Contender],
+    seed: int,
+    evaluations: int,
+    evaluate: Evaluate,
+    each_round: Callable[[int, list[int]], Any] | None = None,
+) -> Finals:
+    """Hold finals by successive halving.
+
+    Args:
+        finalists: At least two finalists, all different.
+        seed: Seed of the evolution.
+        evaluations: Number of its evaluations so far.
+        evaluate: Returns the values [candidate, value] of candidates [candidate, parameter] with seeds [candidate].
+        each_round: Called before each round with its number and the numbers of finalists in all rounds.
+    """
+    sizes, worlds = rounds_of(len(finalists), evaluations)
+    parameters, left, begin = np.array([each.parameters for each in finalists]), list(range(len(finalists))), 0
+    finals = Finals(tuple(finalists), np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, 0)))
+    for number, count in enumerate(worlds):
+        if each_round is not None:
+            each_round(number, sizes)
+        drawn = [seed_for(seed, seeds.FINALS, world) for world in range(begin, begin + count)]
+        rows, of_rows = np.repeat(left, count), np.tile(np.array(drawn, np.int64), len(left))
+        values = evaluate(parameters[rows], of_rows)
+        finals = Finals(
+            finals.finalists,
+            np.concatenate([finals.numbers, rows]),
+            np.concatenate([finals.seeds, of_rows]),
+            np.concatenate([finals.values, values]) if begin else values,
+        )
+        begin += count
+        best_first = sorted(left, key=lambda finalist: -finals.means(finalist)[0])
+        left = sorted(best_first[: (len(left) + 1) // 2])
+    return finals
+
+
+# ---- two sides ----
+
+
+@dataclass(frozen=True)
+class Tournament:
+    """The master tournament: the champion of each generation against those of the other side.
+
+    Attributes:
+        sides: Names of the sides.
+        generations: Numbers of the generations, from 1, int64 [generation].
+        scores: Fitness of the sides, float64 [side, generation of the first side, generation of the second side].
+    """
+
+    sides: tuple[str, str]
+    generations: Integers
+    scores: Floats
 
     @property
-    def evaluated(self) -> tuple[Integers, Integers, Floats]:
-        """All evaluations so far: finalist and seed, int64 [evaluation], and values, float64 [evaluation, value]."""
-        numbers, seeds, values = zip(*self._told, strict=True)
-        return np.concatenate(numbers), np.concatenate(seeds), np.concatenate(values)
+    def means(self) -> Floats:
+        """Mean fitness of each champion against all champions of the other side, float64 [side, generation]."""
+        return np.stack([self.scores[0].mean(axis=1), self.scores[1].mean(axis=0)])
+
+    @property
+    def best(self) -> tuple[int, int]:
+        """The generation of each side whose champion has the highest mean."""
+        first, second = (int(self.generations[each.argmax()]) for each in self.means)
+        return first, second
+
+
+def hold_tournament(champions: Sequence[Floats], seed: int, trials: int, evaluate: Evaluate) -> Floats:
+    """Return the fitness of all pairs of champions, float64 [side, champion of the first, champion of the second side].
+
+    Args:
+        champions: Parameters of the champions of each side, float64 [champion, parameter] each, as many of both.
+        seed: Seed of the evolution.
+        trials: Number of evaluations of each pair. In each trial all champions have the same starts, a different one
+            with each opponent.
+        evaluate: As for `hold_finals`.
+    """
+    first, second = champions
+    size = len(first)
+    pairs = np.concatenate([np.repeat(first, size, axis=0), np.tile(second, (size, 1))], axis=1)
+    scores, starts = np.zeros((2, size, size)), latin_square(size, seed_for(seed, seeds.SQUARE)).ravel()
+    for trial in range(trials):
+        numbers = range(trial * size, (trial + 1) * size)
+        drawn = np.array([seed_for(seed, seeds.TOURNAMENT, number) for number in numbers], np.int64)
+        values = evaluate(pairs, drawn[starts])
+        scores += values.reshape(size, size, 2, -1)[:, :, :, 0].transpose(2, 0, 1)
+    return scores / trials
+
+
+def latin_square(size: int, seed: int) -> Integers:
+    """Return a square whose rows and columns hold each number from 0 to size - 1 once, int64 [row, column].
+
+    Rows and columns are shuffled: equal numbers form no lines, which would be seen in the tournament's picture.
+    """
+    rng = np.random.default_rng(seed)
+    square: Integers = (rng.permutation(size)[:, None] + rng.permutation(size)) % size
+    return square

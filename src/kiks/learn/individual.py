@@ -8,10 +8,10 @@ from pathlib import Path
 from kiks.errors import ParameterError, shown
 from kiks.learn import tasks
 from kiks.learn.champion import Champion
-from kiks.learn.evolution import TRIALS, WORLDS_SEED
+from kiks.learn.evolution import TRIALS
 from kiks.learn.evolution_log import Folder, Identity
 from kiks.learn.fingerprint import differing
-from kiks.learn.generation_loop import seed_for
+from kiks.learn.seeds import WORLDS, seed_for
 from kiks.learn.task import Task
 from kiks.model.checks import check_count
 
@@ -61,7 +61,7 @@ def individual_of(
     fitness = arrays["values"][: identity.population, 0]
     order = (-fitness).argsort(kind="stable")
     candidate = int(order[check_count("rank", rank, 1, identity.population) - 1])
-    seed = seed_for(identity.seed, WORLDS_SEED, number)
+    seed = seed_for(identity.seed, WORLDS, number)
     champion = found.individual(arrays["candidates"][candidate], seed, world)
     return Individual(champion, candidate, float(fitness[candidate]), found.seconds, identity.kiks)
 
@@ -86,7 +86,7 @@ def _task_of(folder: Folder, identity: Identity, given: Task | None) -> Task:
             "--task FILE."
         )
     if task.controller.name != identity.controller:
-        task = task.with_changes(controller=Champion.load(folder.path / "champion.toml").controller)
+        task = task.with_changes(controller=Champion.load(folder.champion_file()).controller)
     if names := differing(identity.task_digest, task.digest(), ("algorithm",)):
         raise ParameterError(
             f"{where} must be the one that was evolved, but it differs now in: {names}. Give a file with the earlier "

@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 from kiks.batch.loop_timing import Timing
 from kiks.control import controllers, measures
 from kiks.control.controller import Controller
-from kiks.learn.candidate_worlds import cautious_mean
+from kiks.learn import football as game
 from kiks.learn.exam import Exam
-from kiks.learn.task import Axis, Task
+from kiks.learn.experiment import cautious_mean
+from kiks.learn.task import Axis, Side, Task
 from kiks.model.arena import Arena, Pose
 from kiks.model.shipped import shipped_arena
 
@@ -424,6 +425,111 @@ def maze_solved(values: Values) -> NDArray[np.bool_]:
     return values["closest_mm"] <= GOAL_RADIUS_MM
 
 
+# ---- pursuit ----
+
+PURSUIT_MM = 470
+"""Side of the arena of `pursuit` [mm] (Floreano and Nolfi 1997)."""
+
+PREDATOR_SPEED, PREY_SPEED = 10.0, 20.0
+"""Highest speeds [pulses/10 ms], 80 and 160 mm/s: the prey is twice as fast (Floreano and Nolfi 1997)."""
+
+CAMERA_BAUD = 38400
+"""Speed of the lines [bit/s]: at 9600 a loop with a picture of the camera would take longer than 0.1 s."""
+
+PLAYER_SPEED = 20.0
+"""Highest speed of a football player [pulses/10 ms], 160 mm/s."""
+
+CAUGHT_MM = 57.0
+"""Distance of the middles at which the prey is caught [mm]: two Kheperas of 55 mm, and 2 mm between them."""
+
+PURSUIT_APART_MM = 100.0
+"""Least gap between predator and prey at the start [mm], beyond the range of the proximity sensors."""
+
+
+def predator_fitness(values: Values) -> Floats:
+    """Return the share of the time that is left after the prey was caught."""
+    return 1.0 - prey_fitness(values)
+
+
+def prey_fitness(values: Values) -> Floats:
+    """Return the share of the time for which the prey was not caught."""
+    escaped: Floats = values["escaped_share"].mean(axis=1)
+    return escaped
+
+
+def pursuit(controller: Controller | None = None, **changes: Any) -> Task:
+    """Return the task of two sides, a predator and a prey that is twice as fast (Floreano and Nolfi 1997).
+
+    Both have proximity sensors, the predator has the camera K213, too. The prey's fitness is the share of the time for
+    which it was not caught, the predator's is the rest. What the robots do after the first contact does not count.
+
+    Args:
+        controller: The controller of the predator; a perceptron with feedback if left out, as that of the prey.
+        changes: Other arguments of `Task`.
+    """
+    predator = controllers.mlp(hidden=(), senses=("proximity", "camera"), feedback=True, speed_limit=PREDATOR_SPEED)
+    prey = controllers.mlp(hidden=(), feedback=True, speed_limit=PREY_SPEED)
+    task = Task(
+        "pursuit",
+        (Arena.box(PURSUIT_MM, PURSUIT_MM),),
+        predator if controller is None else controller,
+        (measures.escaped_share(radius_mm=CAUGHT_MM), measures.path_mm, measures.contacts),
+        fitness=predator_fitness,
+        side="predator",
+        against=Side("prey", prey, prey_fitness),
+        seconds=25.0,
+        apart_mm=PURSUIT_APART_MM,
+        timing=Timing(baud=CAMERA_BAUD),
+        algorithm="ga",
+        generations=100,
+        population=100,
+        about="predator and prey, which evolve against each other",
+    )
+    return replace(task, **changes)
+
+
+# ---- football ----
+
+
+def football_fitness(values: Values) -> Floats:
+    """Return the mean of goals and of the ball's place, from -1 to 1; 0 if no robot touches the ball."""
+    scores: Floats = (values["goals"] + values["ball_ahead"]).mean(axis=1) / 2.0
+    return scores
+
+
+def football(controller: Controller | None = None, **changes: Any) -> Task:
+    """Return the task of two sides, football players on the pitch of `kiks demo soccer`.
+
+    Both have proximity sensors and the camera K213. Half of the fitness are goals, 1 for one of its own and -1 for one
+    of the other side; half is the mean place of the ball, from 1 at the goal line of the other side to -1 at its own.
+    What one side gains, the other loses. A game ends with the first goal.
+
+    Args:
+        controller: The controller of the left side; a perceptron with feedback if left out, as that of the right side.
+        changes: Other arguments of `Task`.
+    """
+    player = controllers.mlp(hidden=(), senses=("proximity", "camera"), feedback=True, speed_limit=PLAYER_SPEED)
+    arenas = game.kick_offs()
+    task = Task(
+        "football",
+        arenas,
+        player if controller is None else controller,
+        (game.goals, game.ball_ahead, measures.path_mm),
+        fitness=football_fitness,
+        side="left",
+        against=Side("right", player, football_fitness),
+        seconds=15.0,
+        worlds=len(arenas),
+        timing=Timing(baud=CAMERA_BAUD),
+        starts="arena",
+        algorithm="ga",
+        generations=100,
+        population=50,
+        about="two football players, which evolve against each other",
+    )
+    return replace(task, **changes)
+
+
 # ---- tasks by name ----
 
 TASKS: dict[str, Callable[..., Task]] = {
@@ -433,5 +539,7 @@ TASKS: dict[str, Callable[..., Task]] = {
     "gather": gather,
     "disperse": disperse,
     "maze": maze,
+    "pursuit": pursuit,
+    "football": football,
 }
 """The tasks that come with KiKS."""

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from kiks.errors import ParameterError
-from kiks.learn.baselines import baselines_of
+from kiks.learn.baselines import Baselines, baselines_of
 from kiks.learn.evolution import Evolution
 from kiks.learn.evolution_log import IDENTITY, Digest, Folder, check_alike
 from kiks.learn.exam import PASS_SHARE, imperfect_robots
@@ -78,15 +78,14 @@ class Result:
         population: Number of candidates in a generation.
         seed: The seed.
         kiks: Version of KiKS.
-        fitness: Fitness of the champion.
+        fitness: Fitness of the champion; of two sides that of the first, its mean in the tournament.
         generation: The generation that found it.
         seconds: Time of the evolution with its finals [s of the wall clock].
-        standing: Fitness of standing still.
-        random: Median fitness of random controllers.
         generations: Number of generations.
         evaluations: Number of evaluations until the end of each generation that has a champion, and of the finals, if
             there were any [step]. The first generation has none, because no rival was tried, unless it is the only one.
         champion_fitness: Fitness of the champion then [step].
+        baselines: Its baselines; None of two sides, whose fitness is relative.
         exam: The exam; None if the task has none.
     """
 
@@ -101,11 +100,10 @@ class Result:
     fitness: Number
     generation: _Count
     seconds: Annotated[Number, Field(ge=0)]
-    standing: Number
-    random: Number
     generations: _Count
     evaluations: Annotated[tuple[_Count, ...], Field(min_length=1, max_length=_GENERATIONS_MAX)]
     champion_fitness: Annotated[tuple[Number, ...], Field(min_length=1, max_length=_GENERATIONS_MAX)]
+    baselines: Baselines | None = None
     exam: ExamScore | None = None
 
     def __post_init__(self) -> None:
@@ -134,31 +132,31 @@ def result_of(evolution: Evolution) -> Result:
             imperfect_starts=len(imperfect),
             text=str(own)[:TEXT_MAX],
         )
-    baselines = baselines_of(task, evolution.seed)
-    generations, finals = evolution.generations, evolution.finals
-    evaluations = np.cumsum([len(each.values) for each in generations]).tolist()
-    first = min(1, len(generations) - 1)
-    fitness = [each.champion_fitness for each in generations[first:]] if first else [champion.fitness]
+    generations, finals, tournament = evolution.generations, evolution.finals, evolution.tournament
+    evaluations, fitness = np.cumsum([each.evaluations for each in generations]), [champion.fitness]
+    if tournament is not None:
+        evaluations, fitness = evaluations[tournament.generations - 1], tournament.means[0].tolist()
+    elif len(generations) > 1:
+        evaluations, fitness = evaluations[1:], [each.champion_fitness for each in generations[1:]]
     if finals is not None:
-        evaluations.append(evaluations[-1] + finals.evaluation_count)
+        evaluations = np.append(evaluations, evaluations[-1] + len(finals.values))
         fitness.append(champion.fitness)
     return Result(
         result=1,
         task=task.name,
         task_digest=task.digest(),
         algorithm=evolution.name,
-        controller=task.controller.name,
+        controller=" and ".join(side.controller.name for side in task.sides),
         population=evolution.population,
         seed=evolution.seed,
         kiks=__version__,
-        fitness=champion.fitness,
+        fitness=champion.fitness if tournament is None else tournament.means[0].max(),
         generation=champion.generation,
         seconds=(finals or generations[-1]).seconds,
-        standing=baselines.standing,
-        random=baselines.random,
         generations=len(generations),
-        evaluations=tuple(evaluations[first:]),
+        evaluations=tuple(evaluations.tolist()),
         champion_fitness=tuple(fitness),
+        baselines=None if task.against else baselines_of(task, evolution.seed),
         exam=score,
     )
 
@@ -194,11 +192,6 @@ def load_results(folder: str | Path) -> list[Result]:
     results = []
     for home in homes:
         result = load_result(home)
-        if result is None and Folder(home).identity().is_contest:
-            raise ParameterError(
-                f"{str(path)!r} must hold evolutions of one controller, but it holds a contest. Its own tournament "
-                "compares the sides."
-            )
         if result is None:
             raise ParameterError(
                 f"the evolution in {str(home)!r} must be finished, but it is not. The command that began it goes on."

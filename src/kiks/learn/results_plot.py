@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from kiks.export.figures import save_figure
-from kiks.learn.baselines import Baselines
 from kiks.learn.evolution_plot import draw_baselines
 from kiks.learn.exam import PASS_SHARE
 from kiks.learn.results import Result, curves, passed_count
@@ -36,7 +35,8 @@ def save_results_plot(groups: Mapping[str, Sequence[Result]], path: str | Path) 
     for (name, group), colour in zip(groups.items(), COLOURS, strict=False):
         _draw_curves(axes[0], name, group, colour)
     first = results[0]
-    draw_baselines(axes[0], Baselines(first.standing, first.random))
+    if first.baselines is not None:
+        draw_baselines(axes[0], first.baselines)
     axes[0].set_xlabel("evaluations")
     axes[0].set_ylabel("fitness of the champion")
     axes[0].set_title(first.task)

@@ -1,9 +1,11 @@
-"""A task: the worlds, measures and fitness for which a controller is evolved."""
+"""A task: the worlds, measures and fitness for which a controller is evolved, or two that meet in these worlds."""
 
 from __future__ import annotations
 
-from dataclasses import field, replace
-from typing import Annotated
+import pickle
+from dataclasses import field, fields, replace
+from functools import cached_property, lru_cache
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field
@@ -15,20 +17,13 @@ from kiks.control.controller import Controller
 from kiks.control.measure import Measure
 from kiks.errors import ParameterError, shown
 from kiks.learn.algorithm_name import AlgorithmName
-from kiks.learn.candidate_worlds import (
-    SECONDS_MAX,
-    SECONDS_MIN,
-    Fitness,
-    InWorlds,
-    check_even,
-    digest_of,
-    fitness_of,
-)
 from kiks.learn.champion import Champion
-from kiks.learn.evaluation import Floats, Integers
+from kiks.learn.evaluation import Floats, Integers, check_candidates
 from kiks.learn.exam import Exam, world_of
+from kiks.learn.experiment import CLEAR_MM, Experiment, Fitness, fitness_of
+from kiks.learn.fingerprint import fingerprints
 from kiks.model.arena import Pose
-from kiks.model.checks import ROBOTS_MAX, check_count
+from kiks.model.checks import ROBOTS_MAX, check_count, check_number
 from kiks.model.data_file import Number, OneOf, Rule, Text, Whole, record
 from kiks.model.project import Project, ProjectRobot
 from kiks.model.robot import RobotSpec, specs_of
@@ -43,12 +38,25 @@ the first candidates react sharply."""
 WORLDS_MAX, MEASURES_MAX = 100_000, 100
 """Largest number of worlds of a candidate, and of measures."""
 
+BATCH_WORLDS_MAX = 20_000
+"""Largest number of worlds in a batch: more need more memory and run no faster."""
+
+SECONDS_MIN, SECONDS_MAX = 1e-3, 1e6
+"""Shortest and longest time for which candidates drive [s]."""
+
+_UNCOUNTED = {"name", "side", "about", "file", "algorithm", "population", "generations"}
+"""Arguments on which no value depends."""
+
 Seconds = Annotated[Number, Field(ge=SECONDS_MIN, le=SECONDS_MAX)]
 
 Kind = Text | RobotSpec
 Kinds = Annotated[
     Kind | Annotated[tuple[Kind, ...], Field(min_length=1)],
     Rule("the name of a robot, a robot file or a kiks.RobotSpec, or a list of them"),
+]
+Evolvable = Annotated[Controller, Field(description="Write @kiks.controller(parameters=COUNT) over the function.")]
+SideName = Annotated[
+    Text, Field(pattern=r"^([^\W\d]\w{0,29})?$"), Rule("1 to 30 letters, digits and _, no digit first")
 ]
 Timings = Annotated[
     Timing | Annotated[tuple[Timing, ...], Field(min_length=1)], Rule("a kiks.Timing or a list of them")
@@ -77,11 +85,56 @@ class Axis:
 
 
 @record
-class Task(InWorlds):
-    """A task for which controllers are evolved: see `evaluate`.
+class Side:
+    """One side of a task: robots with one controller.
+
+    Args:
+        name: Its name, with which its champion's file and its columns in the log begin.
+        controller: The controller of its robots; it must state the number of its parameters.
+        fitness: Maps the measures of its robots, by name float64 [candidate, world], to its fitness, float64
+            [candidate]; more is better. Left out, it is `cautious_mean` of the first measure.
+        robot: Kind of its robots: a name, a robot file or a `RobotSpec`; or several, which worlds take in turn.
+        robots: Number of its robots in each world.
+    """
+
+    name: SideName
+    controller: Evolvable
+    fitness: Fitness | None = None
+    robot: Kinds = "khepera"
+    robots: Annotated[Whole, Field(ge=1, le=ROBOTS_MAX)] = 1
+
+    # Functions cannot be compared: a side equals itself only.
+    __eq__ = object.__eq__
+    __hash__ = object.__hash__
+
+    def __post_init__(self) -> None:
+        if not self.controller.parameter_count:
+            raise ParameterError(
+                f"a controller that evolves must state the number of its parameters, but {shown(self.controller)} does "
+                "not. Write @kiks.controller(parameters=COUNT) over the function."
+            )
+
+    @property
+    def parameter_count(self) -> int:
+        """Number of parameters of its controller."""
+        return self.controller.parameter_count or 0
+
+    @cached_property
+    def specs(self) -> tuple[RobotSpec, ...]:
+        """What the robots are that worlds take in turn."""
+        return tuple(specs_of(self.robot if isinstance(self.robot, tuple) else (self.robot,), None, None))
+
+
+@record
+class Task(Experiment):
+    """A task for which controllers are evolved.
 
     A candidate is the parameters of a controller. It drives in `worlds` worlds, which the arenas share evenly. The
     measures, averaged over a world's robots, become one number, its fitness.
+
+    A task with another side `against` evolves two controllers, which meet in these worlds. A candidate is then a pair:
+    the parameters of the first side's controller, followed by those of the other side's. The robots of the first side
+    come first in each world.
 
     Args:
         name: Its name.
@@ -96,13 +149,16 @@ class Task(InWorlds):
         robot: Kind of robot: a name, a robot file or a `RobotSpec`. Or several, such as a `family`: the worlds of a
             candidate take them in turn, each generation from another one on. Champions drive the first.
         robots: Number of robots in each world, all with the same controller.
+        against: The other side, which evolves as well; None if there is none.
+        side: Name of the first side, if there are two.
+        apart_mm: Least distance between the edges of two robots at a random start [mm].
         timing: Timing of the control loop; that of a program on a line of 9600 baud if left out. Or several, which
             the worlds take in turn like the robots.
         starts: 'random' for free places anywhere, or 'arena' for the starts of the arena.
         spread: Standard deviation of each parameter in the first generation.
         algorithm: The algorithm of an evolution, unless the user says otherwise.
         generations: How many generations an evolution has, unless the user says otherwise.
-        population: How many candidates a generation has, unless the user says otherwise.
+        population: How many candidates of a side a generation has, unless the user says otherwise.
         exam: The exam of its champions.
         about: A description in one line.
         file: The user's file that defines it.
@@ -116,11 +172,14 @@ class Task(InWorlds):
         >>> task.evaluate(np.array([[0.0, 0.0], [3.0, 3.0]]), np.zeros(2, np.int64), 1).round(1)
         array([[ 0. ,  0. ],
                [20.4, 20.4]])
+        >>> race = task.with_changes(side="left", against=Side("right", ahead))
+        >>> race.evaluate(np.array([[3.0, 3.0, 0.0, 0.0]]), np.zeros(1, np.int64), 1).round(1)
+        array([[20.4, 20.4,  0. ,  0. ]])
     """
 
     name: Text
     arenas: Arenas
-    controller: Annotated[Controller, Field(description="Write @kiks.controller(parameters=COUNT) over the function.")]
+    controller: Evolvable
     measures: Annotated[tuple[Measure, ...], Field(min_length=1, max_length=MEASURES_MAX)]
     fitness: Fitness | None = None
     seconds: Seconds = 30.0
@@ -128,6 +187,9 @@ class Task(InWorlds):
     axes: tuple[Axis, ...] = ()
     robot: Kinds = "khepera"
     robots: Annotated[Whole, Field(ge=1, le=ROBOTS_MAX)] = 1
+    against: Side | None = None
+    side: SideName = ""
+    apart_mm: Annotated[Number, Field(ge=0, le=1e6)] = CLEAR_MM
     timing: Timings = field(default_factory=Timing)
     starts: Starts = "random"
     spread: Annotated[Number, Field(gt=0, le=1000)] = SPREAD
@@ -143,30 +205,31 @@ class Task(InWorlds):
     __hash__ = object.__hash__
 
     def __post_init__(self) -> None:
-        if not self.controller.parameter_count:
-            raise ParameterError(
-                f"the controller of a task must state the number of its parameters, but {shown(self.controller)} does "
-                "not. Write @kiks.controller(parameters=COUNT) over the function."
-            )
-        check_even("worlds", self.worlds, self.arenas)
+        Experiment.__post_init__(self)
+        sides = [side.name for side in self.sides]
+        if self.against is not None and ("" in sides or sides[0] == sides[1]):
+            raise ParameterError(f"sides must have different names, but they were {shown(tuple(sides))}.")
         names = self.measure_names
-        if len(set(names)) != len(names):
-            raise ParameterError(f"measures must have different names, but they were {shown(names)}.")
         for axis in self.axes:
             if axis.measure not in names:
                 raise ParameterError(
                     f"an axis must name one of {', '.join(names)}, but it named {shown(axis.measure)}."
                 )
 
-    @property
-    def value_names(self) -> tuple[str, ...]:
-        """Names of the values of a candidate: fitness, then the measures."""
-        return ("fitness", *self.measure_names)
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _unpickled, (_pickled(self),)
+
+    @cached_property
+    def sides(self) -> tuple[Side, ...]:
+        """Its sides: one or two."""
+        first = Side(self.side, self.controller, self.fitness, self.robot, self.robots)
+        return (first,) if self.against is None else (first, self.against)
 
     @property
-    def kinds(self) -> tuple[Kind, ...]:
-        """The kinds of robots that worlds take in turn."""
-        return self.robot if isinstance(self.robot, tuple) else (self.robot,)
+    def value_names(self) -> tuple[str, ...]:
+        """Names of the values of a candidate: fitness, then the measures; of two sides, one after the other."""
+        names = ("fitness", *self.measure_names)
+        return names if self.against is None else tuple(f"{side.name}_{name}" for side in self.sides for name in names)
 
     @property
     def timings(self) -> tuple[Timing, ...]:
@@ -174,26 +237,53 @@ class Task(InWorlds):
         return self.timing if isinstance(self.timing, tuple) else (self.timing,)
 
     @property
-    def specs(self) -> tuple[RobotSpec, ...]:
-        """What the robots are that worlds take in turn."""
-        return tuple(specs_of(self.kinds, None, None))
+    def controllers(self) -> list[Controller]:
+        """The controller of each robot of a world."""
+        return [side.controller for side in self.sides for _ in range(side.robots)]
 
     @property
     def parameter_count(self) -> int:
         """Number of parameters of a candidate."""
-        return self.controller.parameter_count or 0
+        return sum(side.parameter_count for side in self.sides)
+
+    @property
+    def driven_s(self) -> float:
+        """Total time for which the robots of a candidate drive [s]."""
+        return float(self.worlds * len(self.controllers) * self.seconds)
+
+    def split(self, candidates: Floats) -> list[Floats]:
+        """Return the part of each side of candidates [..., parameter], float64 [..., parameter] each."""
+        return np.split(candidates, [self.sides[0].parameter_count], axis=-1)[: len(self.sides)]
+
+    def parameters_of(self, candidates: Floats) -> list[Floats]:
+        """Return the parameters of each robot of a world, float64 [..., parameter] of candidates [..., parameter]."""
+        parts = zip(self.sides, self.split(candidates), strict=True)
+        return [part for side, part in parts for _ in range(side.robots)]
+
+    def start_poses(self, seeds: Integers) -> Floats | None:
+        """Return the starts of candidates with such seeds, float64 [candidate and world, robot, 3].
+
+        They are the same for the same seed; None for those of the arena.
+        """
+        if self.starts == "arena":
+            return None
+        radius_mm = max(spec.body.radius_mm for side in self.sides for spec in side.specs)
+        given: dict[str, Any] = {"robots": len(self.controllers), "radius_mm": radius_mm, "apart_mm": self.apart_mm}
+        poses: dict[int, Floats] = {}
+        for seed in dict.fromkeys(seeds.tolist()):
+            poses[seed] = self.random_starts(seed, **given)
+        return np.concatenate([poses[seed] for seed in seeds.tolist()])
 
     def world(self) -> Project:
         """Return the world in which its champions are shown: that of their exam, or of training if there is none."""
         if self.exam is not None:
-            return self.exam.world(self.kinds[0], self.robots)
+            return self.exam.world(self.sides[0].specs[0], self.robots)
         poses = self.start_poses(np.zeros(1, np.int64))
-        return world_of(
-            self.arenas[0], None if poses is None else poses[:: len(self.arenas)].reshape(-1, 3), self.robots, 0
-        )
+        robots = len(self.controllers)
+        return world_of(self.arenas[0], None if poses is None else poses[:: len(self.arenas)].reshape(-1, 3), robots, 0)
 
     def individual(self, parameters: Floats, seed: int, world: int = 0) -> Champion:
-        """Return a candidate as a champion, whose world is one of those in which it is evaluated.
+        """Return a candidate of a task of one side as a champion, whose world is one of those of its evaluation.
 
         On a line, the world then takes the course that it takes in the evaluation, to the bit.
 
@@ -202,16 +292,19 @@ class Task(InWorlds):
             seed: Its seed.
             world: Number of the world, from 0.
         """
+        if self.against is not None:
+            raise ParameterError(f"the task must have one side, but {self.name} has two. Show its champions instead.")
         world, seeds = check_count("world", world, 0, self.worlds - 1), np.array([seed])
-        kinds, timings = self._turns(seeds)
+        turns, timings = self._turns(seeds)
         arena = self.arenas[world % len(self.arenas)]
         if (starts := self.start_poses(seeds)) is not None:
             arena = replace(arena, starts=tuple(Pose(*each) for each in starts[world].tolist()))
+        specs = self.sides[0].specs
         return Champion(
             controller=self.controller,
             parameters=tuple(parameters.tolist()),
             task=self.name,
-            robot=self.specs[kinds[world]],
+            robot=specs[turns[world] % len(specs)],
             timing=self.timings[timings[world]],
             world=Project(arena, robots=(ProjectRobot(),) * self.robots, seed=seed + world),
         )
@@ -221,44 +314,93 @@ class Task(InWorlds):
 
         They are the same in each process, in each folder and on each computer (`kiks.learn.fingerprint`).
         """
-        return digest_of(self, robot=self.specs, timing=self.timings)
+        counted = {each.name: getattr(self, each.name) for each in fields(self) if each.name not in _UNCOUNTED}
+        first, *others = (
+            {"controller": side.controller, "fitness": side.fitness, "robot": side.specs, "robots": side.robots}
+            for side in self.sides
+        )
+        return fingerprints(counted | first | {"timing": self.timings, "against": others})
 
     # ---- evaluation ----
 
+    def evaluate(
+        self, candidates: Floats, seeds: Integers, threads: int | None = None, seconds: float | None = None
+    ) -> Floats:
+        """Return the values of candidates.
+
+        Args:
+            candidates: Parameters [candidate, parameter].
+            seeds: A seed for each [candidate]: of its worlds and its starts.
+            threads: Number of threads; the number of cores if left out.
+            seconds: Time for which they drive [s], if not that of the task.
+
+        Returns:
+            The values that `value_names` lists, the measures averaged over worlds, float64 [candidate, value].
+        """
+        candidates, seeds = check_candidates(candidates, seeds)
+        if candidates.shape[1] != self.parameter_count:
+            counts = " and ".join(f"{side.parameter_count} of the {side.name}" for side in self.sides if side.name)
+            raise ParameterError(
+                f"a candidate must have {self.parameter_count} parameters{counts and f' ({counts})'}, but their number "
+                f"was {candidates.shape[1]}."
+            )
+        seconds = self.seconds if seconds is None else check_number("seconds", seconds, SECONDS_MIN, SECONDS_MAX)
+        size = max(1, BATCH_WORLDS_MAX // self.worlds)
+        parts = [slice(first, first + size) for first in range(0, len(candidates), size)]
+        values = [self._evaluate(candidates[part], seeds[part], threads, seconds) for part in parts]
+        return np.concatenate([np.empty((0, len(self.value_names))), *values])
+
     def _evaluate(self, candidates: Floats, seeds: Integers, threads: int | None, seconds: float) -> Floats:
-        count = len(candidates)
+        count, starts, (turns, timings) = len(candidates), self.start_poses(seeds), self._turns(seeds)
         world_seeds = (seeds[:, None] + np.arange(self.worlds)).ravel()
-        starts = self.start_poses(seeds)
-        specs, (kinds, timings) = self.specs, self._turns(seeds)
-        given = np.repeat(candidates, self.worlds, axis=0)
-        means = np.zeros((count * self.worlds, len(self.measures)))
+        given = self.parameters_of(np.repeat(candidates, self.worlds, axis=0))
+        robots = [side.specs for side in self.sides for _ in range(side.robots)]
+        is_one_kind = len({spec for specs in robots for spec in specs}) == 1
+        measured = np.zeros((len(turns), len(robots), len(self.measures)))
         for number in np.unique(timings).tolist():
             here = np.flatnonzero(timings == number)
-            each = [(specs[kind],) * self.robots for kind in kinds[here].tolist()]
+            each = [tuple(specs[turn % len(specs)] for specs in robots) for turn in turns[here].tolist()]
             batch = Batch(
                 self.arenas,
                 len(here),
-                robot=specs[0] if len(specs) == 1 else each,
-                robots=self.robots,
+                robot=robots[0][0] if is_one_kind else each,
+                robots=len(robots),
                 seed=world_seeds[here],
                 starts=None if starts is None else starts[here],
-                senses=self.controller.senses,
                 timing=self.timings[number],
                 threads=threads,
             )
-            driven = batch.run(self.controller, given[here], seconds=seconds, measures=self.measures)
-            means[here] = driven.values.mean(axis=1)
-        values = means.reshape(count, self.worlds, len(self.measures))
-        fitness = fitness_of(self.fitness, self.measure_names, values)
-        return np.column_stack([fitness, values.mean(axis=1)])
+            parameters = [part[here] for part in given]
+            measured[here] = batch.run(self.controllers, parameters, seconds=seconds, measures=self.measures).values
+        values = []
+        for side, part in zip(self.sides, np.split(measured, [self.robots], axis=1), strict=False):
+            means = part.mean(axis=1).reshape(count, self.worlds, len(self.measures))
+            values += [fitness_of(side.fitness, self.measure_names, means), means.mean(axis=1)]
+        return np.column_stack(values)
 
     def _turns(self, seeds: Integers) -> tuple[Integers, Integers]:
-        """Return the number of each world's robot and of its timing, int64 [world].
+        """Return the turn of each world's kinds of robots and the number of its timing, int64 [world].
 
         The arenas' turn comes round faster than the others': each arena gets all robots, each robot all timings. Worlds
         with the same timing are whole rounds of the arenas, as a batch takes them.
         """
         world = np.arange(self.worlds)
         turn = (seeds[:, None] % 2**32 + world // len(self.arenas)).ravel()
-        kinds = (turn + np.tile(world % len(self.arenas), len(seeds))) % len(self.kinds)
-        return kinds, turn // len(self.kinds) % len(self.timings)
+        kinds = max(len(side.specs) for side in self.sides)
+        return turn + np.tile(world % len(self.arenas), len(seeds)), turn // kinds % len(self.timings)
+
+
+@lru_cache(maxsize=4)
+def _pickled(task: Task) -> bytes:
+    """Return the arguments of a task. Functions are pickled by value: other computers do not have the user's file."""
+    from numba import cloudpickle
+
+    dumps: Any = cloudpickle.dumps
+    pickled: bytes = dumps({each.name: getattr(task, each.name) for each in fields(task)})
+    return pickled
+
+
+@lru_cache(maxsize=4)
+def _unpickled(pickled: bytes) -> Task:
+    """Return a task: the same for the same bytes, so that a worker compiles its functions once."""
+    return Task(**pickle.loads(pickled))

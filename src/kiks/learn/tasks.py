@@ -14,8 +14,7 @@ from kiks.control.controller import Controller
 from kiks.control.controllers import Recipe, controller_of
 from kiks.control.recipes import module_in
 from kiks.errors import KiksError, ParameterError, nearest, shown
-from kiks.learn.ready_contests import CONTESTS, football, pursuit
-from kiks.learn.ready_tasks import TASKS, avoid, disperse, follow, gather, light, maze
+from kiks.learn.ready_tasks import TASKS, avoid, disperse, follow, football, gather, light, maze, pursuit
 from kiks.learn.task import WORLDS_MAX, Seconds, Task
 from kiks.model.arena import Arena
 from kiks.model.atomic_files import inside, path_of
@@ -23,7 +22,7 @@ from kiks.model.checks import ROBOTS_MAX
 from kiks.model.data_file import OneOf, Rule, Text, Whole, check, parse_toml, read_file, record
 from kiks.model.robot import robot_names
 
-__all__ = ["CONTESTS", "TASKS", "avoid", "disperse", "follow", "football", "gather", "light", "load", "maze", "pursuit"]
+__all__ = ["TASKS", "avoid", "disperse", "follow", "football", "gather", "light", "load", "maze", "pursuit"]
 
 Name = Annotated[
     Text,
@@ -113,7 +112,8 @@ def _task_of(given: TaskFile, path: Path, controller: Controller | None) -> Task
     if given.arenas is not None:
         changes["arenas"] = tuple(Arena.load(inside(folder, each, "arenas")) for each in given.arenas)
     if given.exam is not None:
-        assert base.exam is not None
+        if base.exam is None:
+            raise ParameterError(f"exam must be left out, because {shown(given.base)} has none, but it was given.")
         changes["exam"] = replace(base.exam, arenas=(Arena.load(inside(folder, given.exam, "exam")),))
     if given.robot is not None:
         is_name = given.robot in robot_names()

@@ -1,0 +1,102 @@
+"""What a task and its exam have in common: arenas, measures and starts; and the fitness of measures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, Self
+
+import numpy as np
+
+from kiks.batch.initial_state import random_starts
+from kiks.control.measure import Measure
+from kiks.errors import ParameterError, shown
+from kiks.learn.evaluation import Floats
+from kiks.model.arena import Arena
+
+Fitness = Callable[[Mapping[str, Floats]], Floats]
+
+CLEAR_MM = 8.0
+"""Smallest gap between a random start and anything else [mm]."""
+
+
+class Experiment:
+    """The common base of tasks and exams: robots drive in worlds, which arenas share evenly, and are measured."""
+
+    arenas: tuple[Arena, ...]
+    measures: tuple[Measure, ...]
+    worlds: int
+
+    def __post_init__(self) -> None:
+        if self.worlds % len(self.arenas):
+            raise ParameterError(
+                f"worlds must be a multiple of the number of arenas, {len(self.arenas)}, but it was {self.worlds}."
+            )
+        names = self.measure_names
+        if len(set(names)) != len(names):
+            raise ParameterError(f"measures must have different names, but they were {shown(names)}.")
+
+    @property
+    def measure_names(self) -> tuple[str, ...]:
+        """Names of the measures."""
+        return tuple(each.name for each in self.measures)
+
+    def with_changes(self, **changes: Any) -> Self:
+        """Return a copy with some arguments changed."""
+        changed: Any = self
+        return replace(changed, **changes)  # type: ignore[no-any-return]
+
+    def random_starts(self, seed: int, *, robots: int, radius_mm: float, apart_mm: float = CLEAR_MM) -> Floats:
+        """Return random start poses in its worlds, float64 [world, robot, 3].
+
+        Args:
+            seed: Seed of the random generator.
+            robots: Number of robots in each world.
+            radius_mm: Radius of the largest robot [mm].
+            apart_mm: Least distance between the edges of two robots [mm].
+        """
+        given: dict[str, Any] = {"robots": robots, "radius_mm": radius_mm, "clear_mm": CLEAR_MM, "apart_mm": apart_mm}
+        count = self.worlds // len(self.arenas)
+        poses = [random_starts(arena, count, seed=seed, **given) for arena in self.arenas]
+        return np.stack(poses, axis=1).reshape(self.worlds, robots, 3)
+
+
+def fitness_of(fitness: Fitness | None, measure_names: Sequence[str], values: Floats) -> Floats:
+    """Return the fitness of candidates, float64 [candidate].
+
+    Args:
+        fitness: The fitness function; None for `cautious_mean` of the first measure.
+        measure_names: Names of the measures.
+        values: Values of the measures, float64 [candidate, world, measure].
+    """
+    for number, name in enumerate(measure_names):
+        if not np.isfinite(values[:, :, number]).all():
+            raise ParameterError(f"measures must be finite, but {shown(name)} was not. Check its divisions.")
+    named = {name: values[:, :, number] for number, name in enumerate(measure_names)}
+    result = cautious_mean(values[:, :, 0]) if fitness is None else fitness(named)
+    numbers = np.asarray(result, np.float64)
+    if numbers.shape != (len(values),) or not np.isfinite(numbers).all():
+        raise ParameterError(
+            f"fitness must return a finite number for each of {len(values)} candidates, but returned {shown(result)}. "
+            "The measures have the shape [candidate, world]: take a mean over axis 1."
+        )
+    return numbers
+
+
+def cautious_mean(scores: Floats, caution: float = 0.5) -> Floats:
+    """Return the mean of scores over worlds, weighted with the mean of the worse half.
+
+    The worse half shows how a controller does in worlds that do not suit it. Accidents count there, but no single one
+    decides, as it would in the worst world.
+
+    Args:
+        scores: [candidate, world].
+        caution: From 0, the mean, to 1, the mean of the worse half.
+
+    Example:
+        >>> cautious_mean(np.array([[1.0, 1.0, 0.0, 1.0]]))
+        array([0.625])
+    """
+    worse = np.sort(scores, axis=1)[:, : (scores.shape[1] + 1) // 2]
+    mean: Floats = (1 - caution) * scores.mean(axis=1) + caution * worse.mean(axis=1)
+    return mean

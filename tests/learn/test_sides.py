@@ -1,0 +1,307 @@
+"""Tasks of two sides: values of pairs depend on the pair and its seed alone, evolutions resume to the bit."""
+
+from __future__ import annotations
+
+import pickle
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from pyarrow import parquet
+
+import kiks
+from kiks import ParameterError
+from kiks.cli.evolve import winners_of
+from kiks.client.drive import Driver
+from kiks.learn.evolution_plot import save_tournament_plot
+from kiks.learn.finals import Tournament, latin_square
+from kiks.learn.fingerprint import differing
+from kiks.learn.ready_tasks import CAUGHT_MM, PREY_SPEED
+from kiks.learn.results import load_results, result_of
+from kiks.learn.seeds import SQUARE, TOURNAMENT, seed_for
+from kiks.model.arena import Pose
+
+pytestmark = pytest.mark.slow
+
+
+def small(**changes: Any) -> kiks.Task:
+    """Return a task that takes some milliseconds."""
+    return kiks.tasks.pursuit(**{"seconds": 2.0} | changes)
+
+
+def evolution_of(folder: Path | None = None, task: kiks.Task | None = None, **given: Any) -> kiks.Evolution:
+    return kiks.Evolution(task or small(), folder=folder, **{"seed": 3, "population": 6, "opponents": 3} | given)
+
+
+def run(folder: Path | None = None, executor: Any = None, generations: int = 4, **given: Any) -> kiks.Evolution:
+    evolution = evolution_of(folder, **given)
+    evolution.run(generations=generations, executor=executor)
+    return evolution
+
+
+def bytes_of(evolution: kiks.Evolution) -> bytes:
+    return b"".join(each.candidates.tobytes() + each.values.tobytes() for each in evolution.generations)
+
+
+def pairs_of(task: kiks.Task, count: int) -> np.ndarray[Any, np.dtype[np.float64]]:
+    return 3.0 * np.random.default_rng(1).standard_normal((count, task.parameter_count))
+
+
+# ---- tasks ----
+
+
+def test_values_of_pairs_depend_on_the_pair_and_its_seed_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    task = small(worlds=2)
+    pairs, seeds = pairs_of(task, 12), np.arange(12) // 3
+    whole = task.evaluate(pairs, seeds, 1)
+    assert len(np.unique(whole[:, 2])) > 6
+    np.testing.assert_array_equal(task.evaluate(pairs, seeds, 3), whole)
+    np.testing.assert_array_equal(task.evaluate(pairs[::-1].copy(), seeds[::-1].copy(), 1)[::-1], whole)
+    alone = [task.evaluate(pairs[k : k + 1], seeds[k : k + 1], 1)[0] for k in range(12)]
+    np.testing.assert_array_equal(alone, whole)
+    monkeypatch.setattr("kiks.learn.task.BATCH_WORLDS_MAX", 7)
+    np.testing.assert_array_equal(task.evaluate(pairs, seeds, 1), whole)
+    np.testing.assert_array_equal(pickle.loads(pickle.dumps(task)).evaluate(pairs, seeds, 1), whole)
+
+
+def test_the_fitness_of_pursuit_is_the_share_of_the_time() -> None:
+    task = small(seconds=20.0)
+    values = task.evaluate(pairs_of(task, 60), np.zeros(60, np.int64), 1)
+    named = dict(zip(task.value_names, values.T, strict=True))
+    np.testing.assert_allclose(named["predator_fitness"] + named["prey_fitness"], 1.0)
+    np.testing.assert_array_equal(named["predator_escaped_share"], named["prey_escaped_share"])
+    assert (named["prey_fitness"] == 1.0).any()
+    assert ((named["prey_fitness"] > 0.0) & (named["prey_fitness"] < 0.9)).any()
+    assert task.sides[1].controller.recipe["speed_limit"] == PREY_SPEED == 2 * 10.0  # type: ignore[index]
+
+
+def test_later_motion_does_not_count() -> None:
+    """Two robots that drive at each other score the same as two that part after their contact."""
+    room = replace(kiks.Arena.box(470, 470), starts=(Pose(135, 235, 0.0), Pose(335, 235, np.pi)))
+
+    @kiks.controller(parameters=1, memory=1)
+    def ahead_then(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
+        memory[0] += 1.0
+        wheels[:] = 10.0 if memory[0] < 20.0 else parameters[0]
+
+    _, prey = small().sides
+    prey = replace(prey, controller=ahead_then)
+    task = small(controller=ahead_then, against=prey, arenas=[room], starts="arena", seconds=6.0)
+    pairs = np.array([[10.0, 10.0], [-10.0, -3.0], [0.0, 0.0]])
+    values = task.evaluate(pairs, np.zeros(3, np.int64), 1)
+    assert len(set(values[:, 0].tolist())) == 1
+    # They close in at 160 mm/s, after the time of the first readings.
+    assert values[0, 4] == pytest.approx((200 - CAUGHT_MM) / 160 / 6.0, abs=0.03)
+
+
+def test_starts_are_apart_and_the_same_for_the_same_seed() -> None:
+    poses = small(worlds=2, apart_mm=100.0).start_poses(np.array([5, 6, 5]))
+    assert poses is not None
+    assert poses.shape == (6, 2, 3)
+    np.testing.assert_array_equal(poses[:2], poses[4:])
+    assert (poses[:2] != poses[2:4]).any()
+    assert (np.hypot(*(poses[:, 0, :2] - poses[:, 1, :2]).T) > 55 + 100).all()
+
+
+def test_a_pair_on_the_wire_equals_that_of_the_batch() -> None:
+    task, seed = small(seconds=5.0), 7
+    pair, timing = pairs_of(task, 1), task.timings[0]
+    starts = task.start_poses(np.array([seed]))
+    assert starts is not None
+    batch = kiks.Batch(task.arenas[0], 1, robots=2, seed=seed, starts=starts, timing=timing)
+    batch.run(task.controllers, task.parameters_of(pair), seconds=5.0)
+    room = replace(task.arenas[0], starts=tuple(Pose(*pose) for pose in starts[0].tolist()))
+    sim = kiks.Simulation(room, robots=2, seed=seed)
+    sim.fit(1, "k213")
+    ports = [sim.port(1), sim.port(2)]
+    for port in ports:
+        port.baudrate = timing.baud or 0
+    driver = Driver(ports, task.controllers, [each[0] for each in task.parameters_of(pair)])
+    while driver.begin_ns < 5e9:
+        driver.step()
+    assert sim.state_hash() == batch.state_hash(0)
+
+
+def test_sides_may_have_several_robots_of_different_kinds() -> None:
+    task = small(robots=2, robot="khepera_ii", apart_mm=20.0)
+    values = task.evaluate(pairs_of(task, 3), np.arange(3), 1)
+    assert values.shape == (3, len(task.value_names))
+    first, second = (values[:, task.value_names.index(f"{side.name}_path_mm")] for side in task.sides)
+    assert (first != second).all()
+    assert differing(task.digest(), small().digest()) == "robot, robots, apart_mm"
+
+
+def test_wrong_tasks_are_errors() -> None:
+    prey = small().sides[1]
+    for changes, message in (
+        ({"worlds": 3, "arenas": [kiks.Arena.box(500, 500)] * 2}, "worlds must be a multiple of the number of arenas"),
+        ({"measures": [kiks.measures.path_mm] * 2}, "must have different names"),
+        ({"apart_mm": -1.0}, "apart_mm must be"),
+        ({"side": "prey"}, "sides must have different names"),
+        ({"side": ""}, "sides must have different names"),
+    ):
+        with pytest.raises(ParameterError, match=message):
+            small(**changes)
+    with pytest.raises(ParameterError, match="name must be"):
+        kiks.Side("../prey", prey.controller)
+
+    @kiks.controller
+    def any_number(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
+        wheels[:] = 0.0
+
+    with pytest.raises(ParameterError, match="must state the number of its parameters"):
+        kiks.Side("prey", any_number)
+    with pytest.raises(ParameterError, match=r"must have 76 parameters \(54 of the predator and 22 of the prey\), but"):
+        small().evaluate(np.zeros((1, 43)), np.zeros(1, np.int64), 1)
+    with pytest.raises(ParameterError, match="fitness must return a finite number for each of 2 candidates"):
+        small(fitness=lambda values: values["path_mm"]).evaluate(np.zeros((2, 76)), np.zeros(2, np.int64), 1)
+    with pytest.raises(ParameterError, match="must have room for 2 robots"):
+        small(apart_mm=600.0).evaluate(np.zeros((1, 76)), np.zeros(1, np.int64), 1)
+
+
+# ---- evolution ----
+
+
+def test_the_same_seed_gives_the_same_evolution() -> None:
+    one, two, other = run(), run(executor=ThreadPoolExecutor(2)), run(seed=4)
+    assert bytes_of(one) == bytes_of(two) != bytes_of(other)
+    assert one.champions[1].parameters == two.champions[1].parameters
+
+
+def test_candidates_meet_the_champions_of_the_last_generations() -> None:
+    evolution = run()
+    pairs, size = evolution.ask(), evolution.task.sides[0].parameter_count
+    latest = [evolution.champion_of("prey", 4 - k).parameters for k in range(3)]
+    np.testing.assert_array_equal(pairs[:3, size:], latest)
+    assert (pairs[:3, :size] == pairs[0, :size]).all()
+    np.testing.assert_array_equal(pairs[18:21, :size], [evolution.champion_of(0, 4 - k).parameters for k in range(3)])
+    assert (evolution.seeds.reshape(-1, 3) == evolution.seeds[:3]).all()
+    assert len(set(evolution.seeds.tolist())) == 3
+
+
+def test_fitness_is_the_mean_over_the_opponents_of_a_candidate() -> None:
+    evolution = evolution_of(seed=1, population=4, opponents=2)
+    names = evolution.task.value_names
+    values = np.random.default_rng(1).uniform(0, 1, (len(evolution.ask()), len(names)))
+    evolution.tell(values)
+    told = evolution.generations[0].values
+    for candidate in range(4):
+        first = values[2 * candidate : 2 * candidate + 2].mean(axis=0)
+        second = values[8 + 2 * candidate : 10 + 2 * candidate].mean(axis=0)
+        for number, name in enumerate(names):
+            assert told[candidate, number] == (second if name.startswith("prey") else first)[number]
+    best = int(told[:, 4].argmax())
+    prey = evolution.champion_of("prey")
+    assert (prey.fitness, prey.measures["path_mm"]) == (told[best, 4], told[best, 6])
+    assert prey.parameters == tuple(evolution.generations[0].candidates[best, 54:])
+
+
+def test_a_resumed_evolution_equals_one_that_never_stopped(tmp_path: Path) -> None:
+    whole = run(tmp_path / "whole")
+    run(tmp_path / "part", generations=2)
+    assert bytes_of(run(tmp_path / "part")) == bytes_of(whole)
+    for name in ("predator.toml", "prey.toml", "tournament.parquet"):
+        assert (tmp_path / "part" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
+    log = parquet.read_table(tmp_path / "whole/log.parquet").to_pydict()
+    assert log["generation"] == [number for number in range(1, 5) for _ in range(6)]
+    assert log["prey_fitness"] == [value for each in whole.generations for value in each.fitness_of(1).tolist()]
+    assert log["evaluations"][-1] == 4 * 2 * 6 * 3
+    result_of(whole).save(tmp_path / "whole")
+    (result,) = load_results(tmp_path / "whole")
+    assert whole.tournament is not None
+    assert (result.fitness, result.baselines) == (whole.tournament.means[0].max(), None)
+    assert result.evaluations == (36, 72, 108, 144)
+    for given, message in (
+        ({"seed": 4}, "the same seed, but they have 3 and 4"),
+        ({"opponents": 4}, "they have 'ga, 3 opponents' and 'ga, 4 opponents'"),
+        ({"task": small(seconds=3.0)}, "but these differ: seconds"),
+    ):
+        with pytest.raises(ParameterError, match=message):
+            evolution_of(tmp_path / "whole", **given)
+
+
+def test_each_side_has_an_archive_along_the_axes(tmp_path: Path) -> None:
+    evolution = run(tmp_path, task=small(axes=(kiks.Axis("path_mm", 0, 100),)), algorithm="map-elites")
+    for archive, side in zip(evolution.archives, evolution.task.sides, strict=True):
+        assert 0 < len(archive.elites) == len(kiks.Archive.load(tmp_path, side.name).elites)
+        assert len(archive.elites[0].parameters) == side.parameter_count
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"task": "pursuit"}, "task must be"),
+        ({"algorithm": "cna"}, "Did you mean 'cma'"),
+        ({"algorithm": "map-elites"}, "must have axes"),
+        ({"population": 3}, "population must be a whole number from 4"),
+        ({"opponents": 0}, "opponents must be a whole number from 1"),
+    ],
+)
+def test_wrong_arguments_are_errors(given: dict[str, Any], message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
+        evolution_of(**given)
+
+
+def test_wrong_calls_are_errors() -> None:
+    evolution = evolution_of(population=4, opponents=2)
+    with pytest.raises(ParameterError, match="before there is a champion"):
+        evolution.champion_of("prey")
+    with pytest.raises(ParameterError, match="before a tournament"):
+        evolution.master_tournament()
+    evolution.ask()
+    with pytest.raises(ParameterError, match=r"here \(16,\) or \(16, 8\), but their shape was \(16, 1\)"):
+        evolution.tell(np.zeros(16))
+    evolution.tell(np.zeros((16, 8)))
+    with pytest.raises(ParameterError, match="side must be 0, 1 or one of predator, prey"):
+        evolution.champion_of("pray")
+    with pytest.raises(ParameterError, match="generation must be a whole number from 1 to 1"):
+        evolution.champion_of("prey", 2)
+    with pytest.raises(ParameterError, match="a tournament must have two sides, but the task 'avoid' has one"):
+        kiks.Evolution(kiks.tasks.avoid()).master_tournament()
+
+
+# ---- tournament ----
+
+
+def test_the_tournament_equals_a_loop_over_all_pairs() -> None:
+    evolution = run()
+    tournament = evolution.tournament
+    assert tournament is not None
+    assert [each.generation for each in evolution.champions] == [*tournament.best]
+    square = latin_square(4, seed_for(3, SQUARE))
+    for first in range(4):
+        for second in range(4):
+            pair = [
+                *evolution.champion_of("predator", first + 1).parameters,
+                *evolution.champion_of("prey", second + 1).parameters,
+            ]
+            numbers = [4 * trial + square[first, second] for trial in range(2)]
+            seeds = np.array([seed_for(3, TOURNAMENT, number) for number in numbers])
+            values = evolution.task.evaluate(np.array([pair, pair]), seeds, 1)[:, [0, 4]]
+            np.testing.assert_array_equal(tournament.scores[:, first, second], (values[0] + values[1]) / 2)
+    np.testing.assert_array_equal(tournament.generations, [1, 2, 3, 4])
+    some = evolution.master_tournament(trials=2, every=2)
+    np.testing.assert_array_equal(some.generations, [2, 4])
+    assert some.scores.shape == (2, 2, 2)
+
+
+def test_each_row_and_column_of_a_latin_square_holds_each_number_once() -> None:
+    square = latin_square(7, 1)
+    np.testing.assert_array_equal(np.sort(square, axis=0), np.tile(np.arange(7)[:, None], 7))
+    np.testing.assert_array_equal(np.sort(square, axis=1), np.tile(np.arange(7), (7, 1)))
+
+
+def test_a_tournament_knows_the_best_and_the_winner(tmp_path: Path) -> None:
+    scores = np.array([[0.9, 0.2], [0.8, 0.3]])
+    tournament = Tournament(("cat", "mouse"), np.array([1, 2]), np.stack([scores, 1 - scores]))
+    np.testing.assert_allclose(tournament.means, [[0.55, 0.55], [0.15, 0.75]])
+    assert tournament.best[1] == 2
+    assert list(winners_of(tournament)) == [
+        "Generation 1: cat 0.90   mouse 0.10   the cat won",
+        "Generation 2: cat 0.30   mouse 0.70   the mouse won",
+    ]
+    save_tournament_plot(tournament, tmp_path / "tournament.png")
+    assert (tmp_path / "tournament.png").read_bytes().startswith(b"\x89PNG")
