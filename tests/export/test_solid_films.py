@@ -15,7 +15,8 @@ from PIL import Image, ImageSequence
 from kiks import Arena, Khepera, ParameterError, Recording, RobotSpec, Simulation
 from kiks.export.film import save_film
 from kiks.export.looks import robot_colour
-from kiks.export.solid_stage import CELLS_MAX, wall_boxes
+from kiks.export.sheet import wall_grey
+from kiks.export.space import CELLS_MAX, walls
 from kiks.model.arena import Pose
 
 Pixels = NDArray[np.uint8]
@@ -95,17 +96,21 @@ def test_boxes_of_walls_cover_what_is_wall(name: str) -> None:
     arena = Arena.load(Path(__file__).parents[2] / "examples" / "arenas" / f"{name}.toml")
     cells = np.zeros_like(arena.brightness)
     step = -(-max(cells.shape) // CELLS_MAX)
-    for brightness, boxes in wall_boxes(arena).items():
+    for (grey, *_), boxes in walls(arena).items():
         for box in boxes:
-            left, right, low, high = (round(edge / arena.mm_per_cell) for edge in box)
+            ends = [
+                (middle - size / 2, middle + size / 2) for middle, size in zip(box.middle[:2], box.size, strict=False)
+            ]
+            (left, right), (low, high) = (tuple(round(edge / arena.mm_per_cell) for edge in pair) for pair in ends)
             assert not cells[low:high, left:right].any()  # no box lies in another one
-            cells[low:high, left:right] = brightness
-    assert (cells[arena.brightness > 0] >= arena.brightness[arena.brightness > 0]).all()
+            cells[low:high, left:right] = grey
+    assert (cells[arena.brightness > 0] >= wall_grey(arena.brightness[arena.brightness > 0].astype(int))).all()
     # A box begins at most a coarse cell before its wall.
     grown = np.zeros_like(cells)
+    greys = np.where(arena.brightness > 0, wall_grey(arena.brightness.astype(int)), 0)
     for down in range(-step, step + 1):
         for aside in range(-step, step + 1):
-            grown = np.maximum(grown, np.roll(arena.brightness, (down, aside), (0, 1)))
+            grown = np.maximum(grown, np.roll(greys, (down, aside), (0, 1)))
     assert (cells <= grown).all()
 
 

@@ -70,7 +70,7 @@ def save_film(
         end_s: Where it ends [s]; the end of the recording if left out.
         robot: Number of the robot whose readings are shown; the followed one, else 1, if left out.
         follow: Number of the robot that stays in the middle; if left out, the whole arena is seen.
-        zoom: How much larger the arena is than one that is seen as a whole; 3 if left out, with `follow` alone.
+        zoom: Magnification, 1 to 20, with `follow` alone; 1 fits the whole arena, 3 if left out.
         view: 'top', from above, or '3d', in space; that needs VTK.
         is_plain: Whether the world is alone, without trails, clock and readings; then `robot` is left out.
         on_progress: Called after each picture with the share that is done.

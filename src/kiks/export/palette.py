@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from kiks.export.stage import Pixels
 
 EXACT = 128
-"""The most frequent colours of the pictures are exactly there; so many they are."""
+"""Number of frequent colours kept exactly."""
 
 _CODE = np.array([1 << 16, 1 << 8, 1])
 """What red, green and blue count in the number of a colour."""

@@ -61,13 +61,17 @@ def lamp_reach_mm(power_w: float) -> float:
     return 90.0 * math.sqrt(power_w)
 
 
+def wall_grey(brightness: Any) -> Any:
+    """Return the grey of walls of a brightness: darker than they are, or a white wall would look like floor."""
+    return 40 + brightness * 150 // 255
+
+
 def wall_picture(arena: Arena, size: tuple[int, int]) -> Image:
     """Return a picture of the floor and the walls of an arena, of a size in pixels."""
     from PIL import Image
 
     cells = np.flipud(arena.surface[PAD:-PAD, PAD:-PAD])
-    # Walls are shown darker than they are: on paper a white wall would be taken for floor.
-    shade = (40 + cells.astype(np.uint16) * 150 // 255).astype(np.uint8)
+    shade = wall_grey(cells.astype(np.uint16)).astype(np.uint8)
     colours = np.where((cells == 0)[..., None], np.array(FLOOR, np.uint8), shade[..., None])
     return Image.fromarray(colours.astype(np.uint8), "RGB").resize(size, Image.Resampling.LANCZOS)
 

@@ -176,7 +176,7 @@ class Stage:
     Args:
         size: Width and height of the pictures.
         follow: Index of the robot that stays in the middle; None: the whole arena is seen.
-        zoom: How much larger the arena is than one that is seen as a whole.
+        zoom: Magnification; 1 fits the whole arena.
         has_trails: Whether robots, balls and cylinders leave trails.
     """
 
