@@ -132,7 +132,7 @@ def test_flipped_bytes_are_noticed_or_lie_elsewhere(file: Path) -> None:
 
 def test_a_flipped_byte_of_an_attachment_is_noticed(file: Path) -> None:
     data = sound()
-    place = data.index(b'"seed": 1') + len(b'"seed": ')
+    place = data.index(b"diameter_mm = 55.0") + len(b"diameter_mm = ")
     file.write_bytes(data[:place] + b"2" + data[place + 1 :])
     assert "whole attachments" in refused(file)
 
@@ -225,16 +225,27 @@ def _with_head(parts: Parts, change: Callable[[dict[str, object]], None]) -> Par
 
 @pytest.mark.parametrize(
     ("name", "value"),
-    [("robots", 3), ("robots", 10**9), ("bodies", 99_999), ("lamps", -1), ("tick_count", 2**62), ("now_ns", 10**18)],
+    [
+        ("robots", []),
+        ("robots", 2),
+        ("robots", [{}] * 2),
+        ("bodies", 99_999),
+        ("lamps", -1),
+        ("tick_count", 2**62),
+        ("now_ns", 10**18),
+        ("arena", "world/0.kiks"),
+        ("arena", "programs/1-cash$_$.py"),
+        ("seed", -1),
+    ],
 )
-def test_no_state_lies_about_itself(name: str, value: int, file: Path) -> None:
+def test_no_state_lies_about_itself(name: str, value: object, file: Path) -> None:
     _with_head(sound_parts(), lambda head: head.update({name: value})).save(file)
     refused(file)
 
 
 def test_lines_are_of_bytes(file: Path) -> None:
     def change(head: dict[str, object]) -> None:
-        head["wires"][0][4] = "\u20ac"  # type: ignore[index]
+        head["robots"][0]["wire"]["partial"] = "\u20ac"  # type: ignore[index]
 
     _with_head(sound_parts(), change).save(file)
     assert "partial" in refused(file)
@@ -248,7 +259,6 @@ def test_lines_are_of_bytes(file: Path) -> None:
     [
         (Kind.CHECK, {"time_ns": 2**62}),
         (Kind.CHECK, {"time_ns": 0}),
-        (Kind.CHECK, {"number": 1}),
         (Kind.SEND, {"time_ns": -5}),
         (Kind.SEND, {"number": -(2**63)}),
         (Kind.SEND, {"robot": 2**62}),
@@ -388,23 +398,26 @@ def test_a_file_takes_no_more_memory_than_its_size_allows(tail: Callable[[], byt
         resource.setrlimit(resource.RLIMIT_AS, before)
 
 
-def _with_setup(parts: Parts, changes: dict[str, object]) -> Parts:
-    (name,) = (each for each in parts.attachments if each.startswith("setup/"))
-    setup = json.loads(parts.attachments[name]) | changes
-    return replace(parts, attachments={**parts.attachments, name: json.dumps(setup).encode()})
-
-
 def test_an_arena_of_gigabytes_is_refused(file: Path) -> None:
     parts = sound_parts()
-    _with_setup(parts, {"arena": "kiks = 1\n[walls]\nsize_mm = [1000000, 1000000]\n"}).save(file)
+    (name,) = (each for each in parts.attachments if each.endswith(".kiks"))
+    arena = b"kiks = 1\n[walls]\nsize_mm = [1000000, 1000000]\n"
+    replace(parts, attachments={**parts.attachments, name: arena}).save(file)
     refused(file)
 
 
-@pytest.mark.parametrize(("name", "value"), [("robots", [0] * 10**6), ("robots", [5]), ("turrets", [["k999"], []])])
-def test_setups_are_of_what_there_is(name: str, value: object, file: Path) -> None:
-    parts = sound_parts()
-    _with_setup(parts, {name: value}).save(file)
+@pytest.mark.parametrize("changes", [{"kind": "world/0.toml"}, {"turrets": ["k999"]}, {"turrets": [{"number": 24}]}])
+def test_robots_are_of_what_there_is(changes: dict[str, object], file: Path) -> None:
+    _with_head(sound_parts(), lambda head: head["robots"][0].update(changes)).save(file)  # type: ignore[index]
     refused(file)
+
+
+def test_a_kind_of_robot_is_no_arena(file: Path) -> None:
+    def change(head: dict[str, object]) -> None:
+        head["arena"] = head["robots"][0]["kind"]  # type: ignore[index]
+
+    _with_head(sound_parts(), change).save(file)
+    assert "Robot" in refused(file) or "kiks must be 1" in refused(file)
 
 
 def test_a_table_of_texts_is_no_larger_than_memory(file: Path) -> None:

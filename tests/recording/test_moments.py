@@ -48,9 +48,9 @@ def test_they_are_those_of_the_run_made_again(recording: Recording) -> None:
         np.testing.assert_array_equal(moment.poses, replay.sim.poses()[: len(moment.poses)])
         places = replay.sim.look().places
         np.testing.assert_allclose(np.column_stack([moment.bodies["x_mm"], moment.bodies["y_mm"]]), places, atol=1e-9)
-        np.testing.assert_array_equal(moment.lamps, replay.sim.lamps)
-        np.testing.assert_array_equal(moment.setup.arena.brightness, replay.sim.arena.brightness)
-        assert len(moment.setup.specs) == replay.sim.robot_count
+        np.testing.assert_array_equal(moment.saved.lamps, replay.sim.lamps)
+        np.testing.assert_array_equal(moment.saved.arena.brightness, replay.sim.arena.brightness)
+        assert len(moment.saved.specs) == replay.sim.robot_count
 
 
 @pytest.mark.parametrize("start_s", [0.0, 0.995, 1.0, 1.0049, 2.0, 3.33])

@@ -9,7 +9,7 @@ import pytest
 from kiks.client.khepera import Khepera
 from kiks.engine import step
 from kiks.model.arena import Arena
-from kiks.sim.saved_state import SavedState, Setup, restore_state, state_bytes
+from kiks.sim.saved_state import SavedState, WorldFiles, state_bytes
 from kiks.sim.simulation import Simulation
 from kiks.units import NS_PER_S, TICK_NS
 
@@ -73,10 +73,9 @@ def test_slices_change_nothing() -> None:
 
 def test_after_a_step_back_in_time_little_is_due_as_well() -> None:
     sim = driving()
-    setup = Setup.of(sim)
-    saved = SavedState.from_bytes(state_bytes(sim), setup, "a state")
+    saved = SavedState.from_bytes(state_bytes(sim, files := WorldFiles()), files, "a state")
     sim.run(10 * HOUR_S)
-    restore_state(sim, saved)
+    saved.restore(sim)
     for _ in range(HOUR_S):
         sim.run(1)
         assert behind_ns(sim) <= sim.world.slice_ns

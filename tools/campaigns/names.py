@@ -15,9 +15,10 @@ from tools.campaigns.runner import Broken, Campaign, Play
 
 import kiks
 from kiks.desk.panels.page import Page
-from kiks.desk.server.desk import Desk, foreign_project
+from kiks.desk.server.desk import Desk
 from kiks.desk.server.live_editing import Editing
 from kiks.ports.program_process import Command
+from kiks.sim.from_project import described
 from kiks.sim.ring_buffer import RingBuffer
 
 CASES = 300
@@ -70,7 +71,7 @@ def _program(name: str, number: int, *, is_running: bool) -> Any:
 async def _elements(names: list[str]) -> list[tuple[str, list[str]]]:
     """Return tag and properties of all elements of a page on which things have some names."""
     sim = kiks.Simulation(kiks.Arena.box(300, 300), robots=2)
-    project = foreign_project(sim)
+    project = described(sim)
     robots = tuple(replace(robot, name=name) for robot, name in zip(project.robots, names, strict=False))
     project = replace(project, arena=replace(project.arena, name=names[0]), robots=robots)
     desk = Desk(sim, project=project, folder=Path(names[1]), may_run_programs=True)

@@ -91,8 +91,9 @@ def _set(entry: Entry, name: str, value: float) -> Entry:
     end = entry.data.index(b"\n", begin) + 1
     head = json.loads(entry.data[begin:end])
     records = bytearray(entry.data[end:])
-    robots: Any = np.frombuffer(records, ROBOT, head["robots"])
-    bodies: Any = np.frombuffer(records, BODY, head["bodies"], head["robots"] * ROBOT.itemsize)
+    robot_count = len(head["robots"])
+    robots: Any = np.frombuffer(records, ROBOT, robot_count)
+    bodies: Any = np.frombuffer(records, BODY, head["bodies"], robot_count * ROBOT.itemsize)
     with np.errstate(invalid="ignore"):
         for each in (robots, bodies):
             if name in each.dtype.names:

@@ -73,7 +73,7 @@ def panels_of(recording: Recording, *, robot: int = 1) -> dict[str, bytes]:
     from matplotlib.figure import Figure
 
     pictures = {}
-    arena = recording.setup.arena
+    arena = recording.start.arena
     arena_inches = min(max(0.75 * COLUMN_INCHES * arena.height_mm / arena.width_mm + 0.6, 2.0), COLUMN_INCHES)
     for name, draw in _drawings(recording, robot).items():
         size = (2 * COLUMN_INCHES, PANELS[name]) if PANELS[name] else (COLUMN_INCHES, arena_inches)
@@ -136,7 +136,7 @@ def _drawings(recording: Recording, robot: int) -> dict[str, Callable[[Any], Non
         return paths
     recording.check_robot(robot)
     return paths | {
-        "places": lambda axes: _draw_heat(axes, recording.setup.arena, poses),
+        "places": lambda axes: _draw_heat(axes, recording.start.arena, poses),
         "readings": lambda axes: _draw_readings(axes, recording.table("readings", robot)),
         "speeds": lambda axes: _draw_speeds(axes, wheels[wheels["robot"] == robot]),
         "time": lambda axes: _draw_time(axes, recording, robot),
@@ -163,7 +163,7 @@ def _draw_arena(axes: Any, arena: Arena) -> None:
 
 def _draw_paths(axes: Any, recording: Recording, poses: Table, wheels: Table) -> None:
     """Draw where robots drove, where their wheels say that they drove, and where they began to touch something."""
-    setup = recording.setup
+    setup = recording.start
     _draw_arena(axes, setup.arena)
     for number in recording.robots:
         path, counts = poses[poses["robot"] == number], wheels[wheels["robot"] == number]

@@ -115,10 +115,10 @@ def _of_moments(recording: Recording) -> Iterator[Message]:
     arena, drawn = None, None
     times_ns = range(recording.log.begin_ns, recording.log.end_ns + 1, PERIOD_NS)
     for moment in moments(recording.log, times_ns):
-        if moment.setup.arena is not arena:
-            arena = moment.setup.arena
+        if moment.saved.arena is not arena:
+            arena = moment.saved.arena
             yield WALLS, moment.time_ns, _walls(arena, moment.time_ns)
-        things = moment.setup.specs, moment.bodies["number"].tolist()
+        things = moment.saved.specs, moment.bodies["number"].tolist()
         if things != drawn:
             drawn = things
             yield SCENE, moment.time_ns, _scene(moment)
@@ -162,7 +162,7 @@ def _walls(arena: Arena, time_ns: int) -> bytes:
 def _scene(moment: Moment) -> bytes:
     """Return robots, balls and cylinders, each in a frame of its own that `_poses` moves."""
     entities = []
-    for number, spec in enumerate(moment.setup.specs, 1):
+    for number, spec in enumerate(moment.saved.specs, 1):
         radius_m = spec.body.radius_mm / 1000
         arrow = {
             "pose": {**_STILL, "position": {"x": 0.0, "y": 0.0, "z": HEIGHT_M}},

@@ -89,7 +89,7 @@ def contents_of(recording: Recording, frames: RunFrames, robot: int) -> dict[str
             _kinds(frames),
             f"arena {_arena(recording)}",
             clock_text(recording.duration_s),
-            f"seed {recording.setup.seed}",
+            f"seed {recording.start.seed}",
         ),
         "is_whole": recording.is_whole,
         "begin_s": s_from_ns(recording.log.begin_ns),
@@ -110,7 +110,7 @@ def contents_of(recording: Recording, frames: RunFrames, robot: int) -> dict[str
 
 
 def _arena(recording: Recording) -> str:
-    return recording.setup.arena.name or "an arena"
+    return recording.start.arena.name or "an arena"
 
 
 def _kinds(frames: RunFrames) -> str:
@@ -121,7 +121,7 @@ def _kinds(frames: RunFrames) -> str:
 
 def _facts(recording: Recording, frames: RunFrames) -> list[tuple[str, str]]:
     """Return what ran, as names and values."""
-    about, arena, sim = recording.about, recording.setup.arena, frames.first
+    about, arena, sim = recording.about, recording.start.arena, frames.first
     turrets = [
         f"{', '.join(turret.name for turret in sim.turrets(number))} on robot {number}"
         for number in range(1, sim.robot_count + 1)
@@ -137,7 +137,7 @@ def _facts(recording: Recording, frames: RunFrames) -> list[tuple[str, str]]:
         ("Robots", _kinds(frames)),
         ("Turrets", "; ".join(turrets)),
         ("Also in it", ", ".join(counted(count, what) for what, count in things.items())),
-        ("Seed", str(recording.setup.seed)),
+        ("Seed", str(recording.start.seed)),
         ("Thinking time", about.get("thinking", "")),
         ("State at the end", frames.state_hash),
         ("Made again for this page", made_again),

@@ -83,7 +83,7 @@ class _Scene:
 
     def __init__(self, mitsuba: Any, moment: Moment) -> None:
         self._mitsuba, self._moment = mitsuba, moment
-        arena, here = moment.setup.arena, self._here()
+        arena, here = moment.saved.arena, self._here()
         self.parts: dict[str, Any] = {
             "type": "scene",
             "integrator": {"type": "path", "max_depth": BOUNCES},
@@ -97,7 +97,7 @@ class _Scene:
         self._add("rectangle", to_world=ceiling, emitter=light)
         floor = here.translate((*middle, 0.0)).scale((*middle, 1.0))
         self._add("rectangle", to_world=floor, bsdf=_matt(FLOOR))
-        for x_mm, y_mm, power_w, is_on in moment.lamps.tolist():
+        for x_mm, y_mm, power_w, is_on in moment.saved.lamps.tolist():
             self._add_lamp(x_mm, y_mm, power_w, is_on=bool(is_on))
         for boxes in walls(arena).values():
             for box in boxes:

@@ -116,8 +116,8 @@ class Picture:
                 path.append(pose)
             for number, x_mm, y_mm in moment.bodies[["number", "x_mm", "y_mm"]].tolist():
                 places.setdefault(number, []).append((x_mm, y_mm))
-        robots = [spec.body for spec in moment.setup.specs]
-        return cls(moment.setup.arena, moment.lamps, moment.bodies, moment.poses, robots, Trails(paths, places))
+        robots = [spec.body for spec in moment.saved.specs]
+        return cls(moment.saved.arena, moment.saved.lamps, moment.bodies, moment.poses, robots, Trails(paths, places))
 
     def image(self, *, longest_side: int = _LONGEST_SIDE) -> Image:
         """Return it in pixels, of which a side has at most so many."""

@@ -57,7 +57,7 @@ class SolidStage:
 
     def draw(self, moment: Moment, share: float, picture: Pixels) -> None:
         """Draw a moment, as `kiks.export.stage.Stage.draw` does."""
-        arena = moment.setup.arena
+        arena = moment.saved.arena
         self._ground.draw(moment, share, GROUND_PIXELS / max(arena.width_mm, arena.height_mm))
         if arena is not self._arena:
             self._build(arena)

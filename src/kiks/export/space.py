@@ -78,7 +78,7 @@ class Thing(NamedTuple):
 def things(moment: Moment) -> Iterator[Thing]:
     """Yield all that moves."""
     for index, ((x_mm, y_mm, heading_rad), spec) in enumerate(
-        zip(moment.poses.tolist(), moment.setup.specs, strict=False)
+        zip(moment.poses.tolist(), moment.saved.specs, strict=False)
     ):
         yield Thing(("robot", index), _robot(spec.body, index), (x_mm, y_mm, 0.0), heading_rad)
     for body in moment.bodies:
@@ -168,7 +168,7 @@ def camera_places(moment: Moment, follow: int | None, zoom: float, aspect: float
         zoom: Magnification; 1 fits the whole arena.
         aspect: Width of the picture by its height.
     """
-    arena = moment.setup.arena
+    arena = moment.saved.arena
     x_mm, y_mm = arena.width_mm / 2, arena.height_mm / 2
     if follow is not None and follow < len(moment.poses):
         x_mm, y_mm = moment.poses[follow, :2].tolist()

@@ -114,14 +114,14 @@ class Ground:
             share: How much of the film is over, 0 to 1.
             scale: Pixels a millimetre; it changes with the arena alone.
         """
-        if moment.setup.arena is not self.arena or moment.lamps.tobytes() != self._lamps:
+        if moment.saved.arena is not self.arena or moment.saved.lamps.tobytes() != self._lamps:
             self._draw_still(moment, scale)
         if self._has_trails:
             self._leave_trails(moment, share)
 
     def _draw_still(self, moment: Moment, scale: float) -> None:
         """Draw walls and lamps; trails stay where they are."""
-        arena = moment.setup.arena
+        arena = moment.saved.arena
         size = max(round(arena.width_mm * scale), 1), max(round(arena.height_mm * scale), 1)
         if size[0] * size[1] > BASE_PIXELS_MAX:
             raise ParameterError(
@@ -129,7 +129,7 @@ class Ground:
                 "Zoom less, or make the film smaller."
             )
         clean = Canvas(np.array(wall_picture(arena, size)), scale, 0.0, arena.height_mm)
-        for x_mm, y_mm, power_w, is_on in moment.lamps.tolist():
+        for x_mm, y_mm, power_w, is_on in moment.saved.lamps.tolist():
             place, reach_mm = (x_mm, y_mm), max(lamp_reach_mm(power_w) if is_on else 0.0, LAMP_MM)
             with clean.patch([place], reach_mm) as sheet:
                 sheet.lamp(place, power_w, is_on=bool(is_on))
@@ -138,7 +138,7 @@ class Ground:
             is_trail = (self.canvas.pixels != self._clean).any(axis=-1)
             pixels[is_trail] = self.canvas.pixels[is_trail]
         self.canvas, self._clean = Canvas(pixels, scale, 0.0, arena.height_mm), clean.pixels
-        self.arena, self._lamps = arena, moment.lamps.tobytes()
+        self.arena, self._lamps = arena, moment.saved.lamps.tobytes()
 
     def _leave_trails(self, moment: Moment, share: float) -> None:
         """Let trails grow to where robots, balls and cylinders are."""
@@ -193,14 +193,14 @@ class Stage:
             share: How much of the film is over, 0 to 1.
             picture: Where it is drawn, of the size of the stage.
         """
-        arena, (width, height) = moment.setup.arena, self._size
+        arena, (width, height) = moment.saved.arena, self._size
         whole = min(width / arena.width_mm, height / arena.height_mm)
         self._ground.draw(moment, share, (1 - 2 * MARGIN) * whole * self._zoom)
         view = self._view(moment, picture)
         for body in moment.bodies:
             with view.patch([(float(body["x_mm"]), float(body["y_mm"]))], float(body["radius_mm"])) as sheet:
                 sheet.body(body)
-        for index, (pose, spec) in enumerate(zip(moment.poses.tolist(), moment.setup.specs, strict=False)):
+        for index, (pose, spec) in enumerate(zip(moment.poses.tolist(), moment.saved.specs, strict=False)):
             with view.patch([pose[:2]], spec.body.radius_mm) as sheet:
                 sheet.robot(pose, spec.body, index)
 

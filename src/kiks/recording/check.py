@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from kiks.recording.entries import Entry
 from kiks.recording.log import HASH_LENGTH, RecordedLog
-from kiks.recording.motion import Motion, MotionWatcher, decode, ticks_of
+from kiks.recording.moments import moments
 from kiks.recording.replay import Replay
 from kiks.sim.simulation import Simulation
+from kiks.units import TICK_NS
 
 
 @dataclass(frozen=True)
@@ -62,23 +61,9 @@ def is_same(checkpoint: Entry, sim: Simulation) -> bool:
 def _first_tick(log: RecordedLog, begin_ns: int, end_ns: int) -> int | None:
     """Return the first tick of a time after which a robot was elsewhere than recorded."""
     replay = Replay(log, begin_ns)
-    watcher = MotionWatcher(replay.sim.world.state)
-    begin_tick = replay.sim.world.state.tick_count
-    replay.sim.world.watch(watcher)
-    while replay.sim.now_ns < end_ns and replay.advance():
-        pass
-    found = _by_tick(decode(block := watcher.take(), "replay", len(block)))
-    recorded = _by_tick(log.motion())
-    ticks = sorted(tick for tick in found.keys() & recorded.keys() if tick > begin_tick)
-    return next((tick for tick in ticks if not np.array_equal(found[tick], recorded[tick])), None)
-
-
-def _by_tick(motions: Iterable[Motion]) -> dict[int, NDArray[np.float64]]:
-    """Return the poses after each tick."""
-    poses: dict[int, NDArray[np.float64]] = {}
-    last_tick = -1
-    for motion in motions:
-        ticks = ticks_of(motion, last_tick)
-        last_tick = int(motion.ticks[-1])
-        poses.update(zip(ticks.ticks.tolist(), ticks.poses, strict=True))
-    return poses
+    times_ns = range((begin_ns // TICK_NS + 1) * TICK_NS, end_ns + 1, TICK_NS)
+    for moment in moments(log, times_ns):
+        replay.sim.advance_to(moment.time_ns)
+        if not np.array_equal(replay.sim.poses(), moment.poses):
+            return moment.time_ns // TICK_NS
+    return None

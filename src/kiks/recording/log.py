@@ -17,7 +17,7 @@ from kiks.recording.motion import Motion
 from kiks.recording.motion import decode as decode_motion
 from kiks.recording.recorder import LINES_MAX
 from kiks.sim.run_log import LAST_INPUT, Kind
-from kiks.sim.saved_state import LAYOUT, SavedState, Setup, setup_name
+from kiks.sim.saved_state import LAYOUT, SavedState, WorldFiles
 from kiks.units import TICK_NS, s_from_ns
 from kiks.version import __version__
 
@@ -81,7 +81,7 @@ class RecordedLog:
 
     def __init__(self, reader: Source) -> None:
         self.reader = reader
-        self._setups: dict[int, Setup] = {}
+        self._files = WorldFiles(reader.attachments, reader.what)
         self._blocks: OrderedDict[int, Columns] = OrderedDict()
         if "layout" not in reader.told or not reader.blocks:
             raise ParameterError(
@@ -166,23 +166,17 @@ class RecordedLog:
             begin = 0
         return None
 
-    def setup(self, number: int) -> Setup:
-        """Return a setup by its number."""
-        if number not in self._setups:
-            name = setup_name(number)
-            if name not in self.reader.attachments:
-                raise self.damaged(f"it has no {name}")
-            self._setups[number] = Setup.from_bytes(self.reader.attachments[name], f"{self.reader.what}: {name}")
-        return self._setups[number]
-
-    def state_of(self, entry: Entry) -> tuple[Setup, SavedState]:
-        """Return the setup and the state of an entry."""
-        setup = self.setup(entry.number)
+    def state_of(self, entry: Entry) -> SavedState:
+        """Return the state of an entry."""
         data = entry.data[HASH_LENGTH:] if entry.kind == Kind.CHECK else entry.data
-        saved = SavedState.from_bytes(data, setup, f"{self.reader.what}: state")
+        saved = SavedState.from_bytes(data, self._files, f"{self.reader.what}: state")
         if saved.now_ns != entry.time_ns:
             raise self.damaged(f"a state of {s_from_ns(saved.now_ns):.3f} s is at {s_from_ns(entry.time_ns):.3f} s")
-        return setup, saved
+        return saved
+
+    def state_before(self, time_ns: int) -> SavedState:
+        """Return the last recorded state at or before a time [ns]."""
+        return self.state_of(self.entry(self.row_before(time_ns)))
 
     def _block(self, number: int) -> Columns:
         """Return a block of the log."""

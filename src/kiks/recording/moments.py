@@ -15,7 +15,7 @@ from kiks.recording.log import RecordedLog
 from kiks.recording.motion import ticks_of
 from kiks.recording.tables import reading_of
 from kiks.sim.run_log import Kind
-from kiks.sim.saved_state import Setup
+from kiks.sim.saved_state import SavedState
 from kiks.units import TICK_NS
 
 LEAP_MM = 50.0
@@ -45,8 +45,7 @@ class Moment(NamedTuple):
 
     Attributes:
         time_ns: When [ns].
-        setup: The walls and the kinds of robots.
-        lamps: x_mm, y_mm, power_w, and 1 for on or 0 for off; float64 [lamp, 4].
+        saved: The latest recorded state, with the walls and the kinds of robots.
         poses: Of robots: x_mm, y_mm, heading_rad; float64 [robot, 3].
         robots: The first fields of `ROBOT`, at most a tick before, [robot].
         bodies: Records of `BODY`, with their places at this instant, [body].
@@ -55,8 +54,7 @@ class Moment(NamedTuple):
     """
 
     time_ns: int
-    setup: Setup
-    lamps: NDArray[np.float64]
+    saved: SavedState
     poses: NDArray[np.float64]
     robots: NDArray[np.void]
     bodies: NDArray[np.void]
@@ -85,27 +83,25 @@ def moments(log: RecordedLog, times_ns: Sequence[int]) -> Iterator[Moment]:
         while entry is not None and entry.time_ns <= time_ns:
             latest.add(log, entry)
             entry = next(entries, None)
-        if latest.setup is None:
+        if latest.saved is None:
             raise log.damaged("it has no state")
         poses, places = _between(now, later, time_ns)
         bodies: Any = now.bodies.copy()
         bodies["x_mm"], bodies["y_mm"] = places.T
         before = passed if number else ()
-        yield Moment(time_ns, latest.setup, latest.lamps, poses, now.robots, bodies, latest.readings, before)
+        yield Moment(time_ns, latest.saved, poses, now.robots, bodies, latest.readings, before)
 
 
 class _Latest:
     """The latest of what entries say."""
 
     def __init__(self) -> None:
-        self.setup: Setup | None = None
-        self.lamps = np.zeros((0, 4))
+        self.saved: SavedState | None = None
         self.readings: dict[int, Sequence[int]] = {}
 
     def add(self, log: RecordedLog, entry: Entry) -> None:
         if entry.kind in (Kind.STATE, Kind.CHECK):
-            self.setup, saved = log.state_of(entry)
-            self.lamps = saved.lamps
+            self.saved = log.state_of(entry)
         elif (reading := reading_of(entry)) is not None and reading[0] == "N":
             self.readings[entry.robot] = reading[1]
 

@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from time import monotonic
 from types import TracebackType
-from typing import Any, Protocol
+from typing import Protocol
 
 from kiks.ending import postponing_endings
 from kiks.errors import ParameterError
@@ -24,8 +24,9 @@ from kiks.recording.mcap_file import LOG, MOTION, McapFile
 from kiks.recording.motion import MotionWatcher
 from kiks.sim.read_completion import NEVER_NS
 from kiks.sim.run_log import ACT, CHECK, MARK, STATE, TEXT, Clock, NotedEntry
-from kiks.sim.saved_state import LAYOUT, Setup, TurretOfUser, setup_number, state_bytes
+from kiks.sim.saved_state import LAYOUT, WorldFiles, state_bytes
 from kiks.sim.simulation import Simulation
+from kiks.sim.turret_host import name_of
 from kiks.units import NS_PER_S, s_from_ns
 from kiks.version import __version__
 
@@ -101,8 +102,7 @@ class RunWriter:
         self._waiting_bytes = 0
         self._chunk_ns = sim.now_ns
         self._chunk_at_s = 0.0
-        self._setup: tuple[Any, ...] = ()
-        self._setup_name, self._setup_bytes, self._setup_number = "", b"", 0
+        self._files = WorldFiles(on_new=self._attach)
         self._lines: deque[tuple[int, int, str]] = deque(maxlen=LINES_MAX)
         sim.sync()
         self._motion = MotionWatcher(self._world.state)
@@ -119,9 +119,14 @@ class RunWriter:
                 self.flush()
                 self._note_check()
                 self._motion.look(self._world.state)
-            store.attach(self._setup_name, self._setup_bytes)
+            for name, data in self._files.files.items():
+                store.attach(name, data)
             self.stores = (*self.stores, store)
             self._write_chunk()
+
+    def _attach(self, name: str, data: bytes) -> None:
+        for store in self.stores:
+            store.attach(name, data)
 
     def remove(self, store: Store) -> None:
         """Write no more into a store."""
@@ -155,23 +160,12 @@ class RunWriter:
         """Note all that the simulation is, as something was changed, or at the beginning."""
         sim, world = self._sim, self._world
         self.change_count, self._lamps = world.change_count, world.lamps.tobytes()
-        setup = (world.arena, *world.specs, *(turret for wire in sim.wires for turret in wire.firmware.fitted))
-        if len(setup) != len(self._setup) or any(a is not b for a, b in zip(setup, self._setup, strict=True)):
-            self._setup = setup
-            self._note_setup()
-        data = state_bytes(sim)
-        self.note((STATE, world.now_ns, 0, self._setup_number, 0, data))
-        self._waiting_bytes += len(data)
-
-    def _note_setup(self) -> None:
-        setup = Setup.of(self._sim)
-        self._setup_bytes = setup.to_bytes()
-        self._setup_number, self._setup_name = setup_number(self._setup_bytes)
-        for store in self.stores:
-            store.attach(self._setup_name, self._setup_bytes)
-        for wire, turrets in zip(self._sim.wires, setup.turrets, strict=True):
-            has_own = any(isinstance(turret, TurretOfUser) for turret in turrets)
+        for wire in sim.wires:
+            has_own = any(name_of(turret) is None for turret in wire.firmware.fitted)
             wire.recorder = _OwnTurretRecorder(self) if has_own else self
+        data = state_bytes(sim, self._files)
+        self.note((STATE, world.now_ns, 0, 0, 0, data))
+        self._waiting_bytes += len(data)
 
     # ---- what people and programs say ----
 
@@ -195,9 +189,9 @@ class RunWriter:
                 self._write_chunk()
 
     def _note_check(self) -> None:
-        data = state_bytes(self._sim)
+        data = state_bytes(self._sim, self._files)
         state_hash = self._world.state.hash().encode()
-        self.note((CHECK, self._world.now_ns, 0, self._setup_number, 0, state_hash + data))
+        self.note((CHECK, self._world.now_ns, 0, 0, 0, state_hash + data))
         # Motion has 25 samples in this time.
         self._waiting_bytes += 25 * len(data)
 

@@ -19,8 +19,8 @@ from kiks.recording.log import RecordedLog, Source
 from kiks.recording.mcap_file import McapReader
 from kiks.recording.recorder import PROGRAMS
 from kiks.recording.replay import Replay
-from kiks.sim.from_project import project_of
-from kiks.sim.saved_state import Setup
+from kiks.sim.from_project import described
+from kiks.sim.saved_state import SavedState
 from kiks.sim.simulation import Simulation
 from kiks.units import ns_from_s, s_from_ns
 
@@ -84,28 +84,24 @@ class Recording:
         return self.project_at(s_from_ns(self.log.begin_ns))
 
     @cached_property
-    def setup(self) -> Setup:
-        """The arena, the kinds of its robots and their turrets at the beginning."""
-        return self._setup_at(self.log.begin_ns)
-
-    def _setup_at(self, time_ns: int) -> Setup:
-        return self.log.setup(self.log.entry(self.log.row_before(time_ns)).number)
+    def start(self) -> SavedState:
+        """The state at the beginning, with the arena, the kinds of robots and the seed."""
+        return self.log.state_before(self.log.begin_ns)
 
     @property
     def title(self) -> str:
         """A line that says what ran."""
         what = ", ".join(self.programs) or self.about.get("arena", "")
-        return f"{what}, seed {self.setup.seed}, {self.duration_s:.1f} s"
+        return f"{what}, seed {self.start.seed}, {self.duration_s:.1f} s"
 
     def project_at(self, time_s: float) -> Project:
         """Return the world at a time as a project, with robots, bodies and lamps where they are then."""
-        sim = self.world_at(time_s)
-        return project_of(sim, Setup.of(sim).project())
+        return described(self.world_at(time_s))
 
     @property
     def robots(self) -> range:
         """Numbers of the robots that it has in the end."""
-        return range(1, len(self._setup_at(self.log.end_ns).specs) + 1)
+        return range(1, len(self.log.state_before(self.log.end_ns).specs) + 1)
 
     def check_robot(self, robot: object, advice: str = "", name: str = "robot") -> int:
         """Return the number of a robot.

@@ -17,7 +17,7 @@ from kiks.recording.recorder import CHECK_NS
 from kiks.sim.port import BAUD_MAX, BAUD_MIN
 from kiks.sim.read_completion import NEVER_NS
 from kiks.sim.run_log import Kind
-from kiks.sim.saved_state import SavedState, Setup, restore_state
+from kiks.sim.saved_state import SavedState
 from kiks.sim.simulation import Simulation
 from kiks.sim.wire import Wire, ignore_reply
 from kiks.units import s_from_ns
@@ -29,13 +29,11 @@ class Place(NamedTuple):
     Attributes:
         row: The last entry that was applied.
         row_ns: When that was [ns].
-        setup: What the world consists of.
-        saved: All that changes.
+        saved: The state after it.
     """
 
     row: Row
     row_ns: int
-    setup: Setup
     saved: SavedState
 
 
@@ -66,7 +64,7 @@ class Replay:
         self.next_ns = NEVER_NS
         self._next: Entry | None = None
         place = self._recorded_before(time_ns)
-        self.sim = place.setup.simulation(place.saved.poses, lock)
+        self.sim = place.saved.simulation(lock)
         self._begin(place)
         self.sim.loop.supervisor = self
         self.sim.advance_to(time_ns)
@@ -84,9 +82,8 @@ class Replay:
         sim = self.sim
         if not 0 <= time_ns - sim.now_ns <= CHECK_NS:
             place = self._recorded_before(time_ns)
-            if not self._is_part_of(place.setup):
+            if not place.saved.can_restore(sim):
                 return False
-            place.setup.extend(sim, place.saved.poses)
             self._begin(place)
             for wire in sim.wires:
                 wire.restart_log(sim.now_ns)
@@ -95,21 +92,15 @@ class Replay:
 
     def _recorded_before(self, time_ns: int) -> Place:
         row = self._log.row_before(time_ns)
-        setup, saved = self._log.state_of(self._log.entry(row))
+        saved = self._log.state_of(self._log.entry(row))
         if time_ns - saved.now_ns > CHECK_NS:
             raise self._log.damaged(f"a part is missing after {s_from_ns(saved.now_ns):.3f} s")
-        return Place(row, saved.now_ns, setup, saved)
+        return Place(row, saved.now_ns, saved)
 
     def _begin(self, place: Place) -> None:
-        restore_state(self.sim, place.saved)
-        self._row, self._row_ns, self._setup = place.row, place.row_ns, place.setup
+        place.saved.restore(self.sim)
+        self._row, self._row_ns = place.row, place.row_ns
         self._find_next()
-
-    def _is_part_of(self, setup: Setup) -> bool:
-        """Return whether a setup has all robots and turrets of the simulation."""
-        counts = [len(wire.firmware.fitted) for wire in self.sim.wires]
-        others = [len(turrets) for turrets in setup.turrets]
-        return len(counts) <= len(others) and all(a <= b for a, b in zip(counts, others, strict=False))
 
     def let_go(self) -> Simulation:
         """Return the simulation, which goes on without the recording from now on; its programs have hung up."""
@@ -162,9 +153,7 @@ class Replay:
                     each.line.forget()  # unread replies would fill the line
                 self._on_check(entry)
             case Kind.STATE:
-                self._setup, saved = self._log.state_of(entry)
-                self._setup.extend(sim, saved.poses)
-                restore_state(sim, saved)
+                self._log.state_of(entry).restore(sim)
 
     def _apply_to(self, wire: Wire, entry: Entry) -> None:
         match entry.kind:

@@ -13,9 +13,10 @@ from kiks.model.arena import Ball, Cylinder, Lamp, Pose
 from kiks.model.atomic_files import inside
 from kiks.model.free_disc import free_place
 from kiks.model.project import Project, ProjectRobot
-from kiks.model.robot import RobotSpec, specs_of
+from kiks.model.robot import RobotSpec, robot_names, specs_of
 from kiks.model.thinking_policy import split_thinking
 from kiks.sim.simulation import Simulation
+from kiks.sim.turret_host import name_of
 
 
 def simulation_of(
@@ -121,6 +122,22 @@ def project_of(sim: Simulation, project: Project) -> Project:
         project,
         arena=replace(arena, starts=kept, lamps=tuple(hung), balls=tuple(balls), cylinders=tuple(cylinders)),
     )
+
+
+def described(sim: Simulation) -> Project:
+    """Return a project of a simulation that was made without one, with everything where it is now.
+
+    Robots of an unknown kind become Kheperas; custom turrets are left out.
+    """
+    known = {RobotSpec.load(kind): kind for kind in robot_names()}
+    robots = tuple(
+        ProjectRobot(
+            kind=known.get(spec, "khepera"),
+            turrets=tuple(name for each in sim.turrets(number) if (name := name_of(each)) is not None),
+        )
+        for number, spec in enumerate(sim.specs, 1)
+    )
+    return project_of(sim, Project(sim.arena, robots=robots, seed=sim.seed, thinking=sim.thinking))
 
 
 def rounded_pose(x_mm: float, y_mm: float, heading_rad: float) -> Pose:

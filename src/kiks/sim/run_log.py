@@ -8,15 +8,15 @@ from typing import Protocol
 
 
 class Kind(IntEnum):
-    """What an entry tells.
+    """What an entry is.
 
     The first ones are the inputs, which make the run again. A state is what was changed in any other way than over a
     line, by a hand or a program: all that the simulation was after it. A check is the same at each whole second, so
     that a replay may begin there and can be compared.
     """
 
-    STATE = 0  # data: of `state_bytes`; number: of the setup
-    CHECK = 1  # data: 16 characters of the hash, then of `state_bytes`; number: of the setup
+    STATE = 0  # data: of `state_bytes`
+    CHECK = 1  # data: 16 characters of the hash, then of `state_bytes`
     SEND = 2  # data: characters for the robot; number, other: when they are sent, and when the first begins [ns]
     TYPE = 3  # the same, typed by a person, who gets the replies in place of the host
     HANG_UP = 4

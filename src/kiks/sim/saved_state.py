@@ -1,17 +1,16 @@
 """All that a simulation is at an instant, in a form that can be written, read and gone back to.
 
-A setup is what a world consists of: the arena, the kinds of robots, their turrets, the seed. A saved state is all that
-changes while it runs. Random numbers depend on the seed and the time alone. So both together have one future, to the
-bit.
+Random numbers depend on the seed and the time alone. So a saved state has one future, to the bit.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from threading import RLock
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,8 +25,8 @@ from kiks.firmware.receiver import LINE_LIMIT
 from kiks.firmware.turret import Turret
 from kiks.model.arena import Arena
 from kiks.model.checks import CLOCK_END_NS, ROBOTS_MAX
-from kiks.model.data_file import Switch, Text, Whole, check, parse_json, parse_toml, record
-from kiks.model.project import Project, ProjectRobot
+from kiks.model.data_file import OneOf, Switch, Text, Whole, check, parse_json, parse_toml, record
+from kiks.model.project import Project
 from kiks.model.robot import Baud, RobotSpec, robot_toml
 from kiks.model.turrets import TURRETS
 from kiks.sim.free_space import FreeSpace
@@ -39,11 +38,10 @@ from kiks.units import TICK_NS
 
 Instant = Annotated[Whole, Field(ge=-CLOCK_END_NS, le=2 * CLOCK_END_NS)]
 Count = Annotated[Whole, Field(ge=0, le=2**62)]
+Part = TypeVar("Part", Arena, RobotSpec)
+
 Line = Annotated[str, Field(max_length=LINE_LIMIT + 1, pattern=r"^[\x00-\xff]*$")]
 """Bytes of a line, as characters of Latin-1."""
-
-
-# ---- what a world consists of ----
 
 
 @record
@@ -64,146 +62,72 @@ class AbsentTurret(Turret):
         self.revision = (known.revision[0], known.revision[1])
 
 
-@record
-class _SetupFile:
-    """A setup as JSON holds it."""
+class WorldFiles:
+    """The arenas and the kinds of robots that saved states name: each is a file, named by a digest of it.
 
-    seed: Annotated[Whole, Field(ge=0, le=2**63 - 1)]
-    arena: str
-    kinds: Annotated[tuple[str, ...], Field(max_length=ROBOTS_MAX)]
-    robots: Annotated[tuple[Annotated[Whole, Field(ge=0)], ...], Field(max_length=ROBOTS_MAX)]
-    turrets: tuple[tuple[Text | TurretOfUser, ...], ...]
-
-
-@dataclass(frozen=True)
-class Setup:
-    """What a world consists of.
+    Args:
+        files: Contents of the files, by name.
+        what: What messages call them.
+        on_new: Called with name and content of each file that is added.
 
     Attributes:
-        arena: The walls alone.
-        specs: The kind of each robot.
-        turrets: For each robot its turrets: their names, or what is known of those of users.
-        seed: Seed of all random numbers.
+        files: As above.
     """
 
-    arena: Arena
-    specs: tuple[RobotSpec, ...]
-    turrets: tuple[tuple[str | TurretOfUser, ...], ...]
-    seed: int
+    def __init__(
+        self,
+        files: Mapping[str, bytes] | None = None,
+        what: str = "the files of a world",
+        on_new: Callable[[str, bytes], object] = lambda name, data: None,
+    ) -> None:
+        self.files = dict(files or {})
+        self._what, self._on_new = what, on_new
+        self._names: list[tuple[Arena | RobotSpec, str]] = []
+        self._parts: dict[str, Arena | RobotSpec] = {}
 
-    @classmethod
-    def of(cls, sim: Simulation) -> Setup:
-        """Return the setup of a simulation."""
-        walls = replace(sim.arena, starts=(), lamps=(), balls=(), cylinders=())
-        turrets = tuple(tuple(map(_described, wire.firmware.fitted)) for wire in sim.wires)
-        return cls(walls, tuple(sim.specs), turrets, sim.seed)
+    def name_of(self, part: Arena | RobotSpec) -> str:
+        """Return the name of the file of an arena, as far as it consists of walls, or of a kind of robot."""
+        # Arenas and kinds are compared by identity: they are large, and few.
+        name = next((name for known, name in self._names if known is part), None)
+        if name is None:
+            if isinstance(part, Arena):
+                walls = replace(part, starts=(), lamps=(), balls=(), cylinders=())
+                data, ending = Project(walls).to_bytes(), "kiks"
+            else:
+                data, ending = robot_toml(part).encode(), "toml"
+            name = f"world/{hashlib.sha256(data).hexdigest()[:16]}.{ending}"
+            self._names.append((part, name))
+            if name not in self.files:
+                self.files[name] = data
+                self._on_new(name, data)
+        return name
 
-    def to_bytes(self) -> bytes:
-        """Return it as JSON."""
-        kinds = list(dict.fromkeys(self.specs))
-        turrets = [[each if isinstance(each, str) else vars(each) for each in of_one] for of_one in self.turrets]
-        return json.dumps(
-            {
-                "seed": self.seed,
-                "arena": Project(self.arena).to_bytes().decode(),
-                "kinds": [robot_toml(kind) for kind in kinds],
-                "robots": [kinds.index(spec) for spec in self.specs],
-                "turrets": turrets,
-            },
-            default=vars,
-        ).encode()
+    def arena(self, name: str) -> Arena:
+        """Return the arena of a file."""
+        if name not in self._parts:
+            data, what = self._data(name)
+            self._parts[name] = Project.from_bytes(data, what=what).arena
+        return self._part(name, Arena)
 
-    @classmethod
-    def from_bytes(cls, data: bytes, what: str) -> Setup:
-        """Read what `to_bytes` returned.
+    def kind(self, name: str) -> RobotSpec:
+        """Return the kind of robot of a file."""
+        if name not in self._parts:
+            data, what = self._data(name)
+            self._parts[name] = check(RobotSpec, parse_toml(data, what), what)
+        return self._part(name, RobotSpec)
 
-        Args:
-            data: The bytes.
-            what: What messages call them.
-        """
-        file = check(_SetupFile, parse_json(data, what), what)
-        arena = Project.from_bytes(file.arena.encode(), what=what).arena
-        kinds = [check(RobotSpec, parse_toml(text.encode(), what), what) for text in file.kinds]
-        if not (max(file.robots, default=-1) < len(kinds) and len(file.turrets) == len(file.robots)):
+    def _data(self, name: str) -> tuple[bytes, str]:
+        if name not in self.files:
+            raise ParameterError(f"{self._what} must be whole, but it has no {shown(name)}. Take another copy of it.")
+        return self.files[name], f"{self._what}: {name}"
+
+    def _part(self, name: str, kind: type[Part]) -> Part:
+        part = self._parts[name]
+        if not isinstance(part, kind):
             raise ParameterError(
-                f"{what} must name a kind and turrets for each robot, but it does not. Is the file damaged?"
+                f"{self._what} must be whole, but {shown(name)} is of another kind. Take another copy."
             )
-        for name in (each for of_one in file.turrets for each in of_one if isinstance(each, str)):
-            if name not in TURRETS:
-                turrets = ", ".join(TURRETS)
-                raise ParameterError(
-                    f"{what} must have turrets of {turrets}, but one was {shown(name)}. Is it of a newer KiKS?"
-                )
-        return cls(arena, tuple(kinds[kind] for kind in file.robots), file.turrets, file.seed)
-
-    def simulation(self, poses: NDArray[np.float64], lock: RLock | None = None) -> Simulation:
-        """Return a simulation of this setup.
-
-        Args:
-            poses: Where its robots are, whatever is there, float64 [robot, 3].
-            lock: See `World`.
-        """
-        sim = Simulation.of_world(World(self.arena, self.specs, self.seed, poses, lock))
-        self.extend(sim, poses)
-        return sim
-
-    def extend(self, sim: Simulation, poses: NDArray[np.float64]) -> None:
-        """Add missing robots and turrets to a simulation, and set its walls.
-
-        Args:
-            sim: A simulation of an earlier setup of the same run.
-            poses: Where its robots are then, whatever is there, float64 [robot, 3].
-        """
-        with sim.lock:
-            # No robot may look from a place that the new walls do not have.
-            for index, pose in enumerate(poses[: sim.robot_count].tolist()):
-                sim.world.put_robot(index, *pose)
-            if sim.arena is not self.arena:
-                sim.world.take_walls(FreeSpace(self.arena, sim.specs, sim.world.state))
-            for spec, pose in zip(self.specs[sim.robot_count :], poses[sim.robot_count :].tolist(), strict=True):
-                sim.add_robot(spec, pose=pose)
-            for number, turrets in enumerate(self.turrets, 1):
-                for turret in turrets[len(sim.turrets(number)) :]:
-                    sim.fit(number, turret if isinstance(turret, str) else AbsentTurret(turret))
-
-    def project(self) -> Project:
-        """Return a project with these walls, robots and turrets; robots of users' own files become Kheperas."""
-        robots = tuple(
-            ProjectRobot(turrets=tuple(name for name in turrets if isinstance(name, str))) for turrets in self.turrets
-        )
-        return Project(self.arena, robots, seed=self.seed)
-
-
-def setup_name(number: int) -> str:
-    """Return the name of the file of a setup."""
-    return f"setup/{number:014x}.json"
-
-
-def setup_number(data: bytes) -> tuple[int, str]:
-    """Return the number of the bytes of a setup, a digest of them, and the name of its file."""
-    number = int.from_bytes(hashlib.sha256(data).digest()[:7])
-    return number, setup_name(number)
-
-
-def _described(turret: Turret) -> str | TurretOfUser:
-    name = name_of(turret)
-    return name or TurretOfUser(turret.number, turret.name, turret.revision, turret.memory_count)
-
-
-# ---- all that changes ----
-
-
-@record
-class _Head:
-    """What stands before the records in the bytes of a saved state."""
-
-    now_ns: Annotated[Whole, Field(ge=0, le=CLOCK_END_NS)]
-    tick_count: Count
-    robots: Annotated[Whole, Field(ge=0, le=ROBOTS_MAX)]
-    bodies: Annotated[Whole, Field(ge=0, le=100_000)]
-    lamps: Annotated[Whole, Field(ge=0, le=100_000)]
-    body_count: Count
-    wires: tuple[_WireFile, ...]
+        return part
 
 
 @record
@@ -220,29 +144,97 @@ class _WireFile:
     orphan_count: Count
 
 
+@record
+class _RobotFile:
+    """A robot in the head of a saved state."""
+
+    kind: Text
+    turrets: tuple[Annotated[str, OneOf(tuple(TURRETS))] | TurretOfUser, ...]
+    wire: _WireFile
+
+
+@record
+class _Head:
+    """What stands before the records in the bytes of a saved state."""
+
+    now_ns: Annotated[Whole, Field(ge=0, le=CLOCK_END_NS)]
+    tick_count: Count
+    seed: Annotated[Whole, Field(ge=0, le=2**63 - 1)]
+    arena: Text
+    robots: Annotated[tuple[_RobotFile, ...], Field(max_length=ROBOTS_MAX)]
+    bodies: Annotated[Whole, Field(ge=0, le=100_000)]
+    lamps: Annotated[Whole, Field(ge=0, le=100_000)]
+    body_count: Count
+
+
 @dataclass(frozen=True)
 class SavedState:
-    """All that changes in a simulation, at an instant at which its ticks are done.
+    """All that a simulation is, at an instant at which its ticks are done.
 
     Replies that a program has not read yet are not part of it.
 
     Attributes:
         now_ns: The time [ns].
         tick_count: Number of ticks done.
+        seed: Seed of all random numbers.
+        arena: The walls alone.
+        specs: The kind of each robot.
+        turrets: The turrets of each robot: names of built-in turrets, descriptions of custom ones.
+        wires: The robots' lines.
         robots: Records of `ROBOT`, shape [1, robot].
         bodies: Records of `BODY`, shape [1, body].
         lamps: float64 [lamp, 4].
-        body_count: Number of bodies that there ever were.
-        wires: The robots' lines.
+        body_count: Bodies created so far, i.e. the last number.
     """
 
     now_ns: int
     tick_count: int
+    seed: int
+    arena: Arena
+    specs: tuple[RobotSpec, ...]
+    turrets: tuple[tuple[str | TurretOfUser, ...], ...]
+    wires: tuple[SavedWire, ...]
     robots: NDArray[np.void]
     bodies: NDArray[np.void]
     lamps: NDArray[np.float64]
     body_count: int
-    wires: tuple[SavedWire, ...]
+
+    @classmethod
+    def from_bytes(cls, data: bytes, files: WorldFiles, what: str) -> SavedState:
+        """Read what `state_bytes` returned.
+
+        Args:
+            data: The bytes.
+            files: The files that it names.
+            what: What messages call them.
+        """
+        line, _, rest = data.partition(b"\n")
+        head = check(_Head, parse_json(line, what), what)
+        robots_end = len(head.robots) * ROBOT.itemsize
+        bodies_end = robots_end + head.bodies * BODY.itemsize
+        if len(rest) != bodies_end + head.lamps * 32:
+            raise ParameterError(
+                f"{what} must have the records of {len(head.robots)} robots, {head.bodies} bodies and {head.lamps} "
+                "lamps, but it has others. Is the file damaged?"
+            )
+        saved = cls(
+            head.now_ns,
+            head.tick_count,
+            head.seed,
+            files.arena(head.arena),
+            tuple(files.kind(robot.kind) for robot in head.robots),
+            tuple(robot.turrets for robot in head.robots),
+            tuple(SavedWire(**vars(robot.wire)) for robot in head.robots),
+            np.frombuffer(rest[:robots_end], ROBOT)[None],
+            np.frombuffer(rest[robots_end:bodies_end], BODY)[None],
+            np.frombuffer(rest[bodies_end:]).reshape(-1, 4),
+            head.body_count,
+        )
+        check_records(saved.robots, saved.bodies, (saved.arena.width_mm, saved.arena.height_mm), what)
+        ticks = -(-saved.now_ns // TICK_NS)
+        _check_range(np.array(saved.tick_count), ticks, ticks, f"tick_count of {what}")
+        _check_range(np.nan_to_num(saved.lamps), -_NUMBER_MAX, _NUMBER_MAX, f"lamps of {what}")
+        return saved
 
     @property
     def poses(self) -> NDArray[np.float64]:
@@ -250,88 +242,97 @@ class SavedState:
         robots: Any = self.robots[0]
         return np.column_stack([robots["x_mm"], robots["y_mm"], robots["heading_rad"]])
 
-    @classmethod
-    def from_bytes(cls, data: bytes, setup: Setup, what: str) -> SavedState:
-        """Read what `state_bytes` returned.
+    def simulation(self, lock: RLock | None = None) -> Simulation:
+        """Return a simulation in this state.
 
         Args:
-            data: The bytes.
-            setup: That of the world.
-            what: What messages call them.
+            lock: See `World`.
         """
-        line, _, rest = data.partition(b"\n")
-        values = parse_json(line, what)
-        if isinstance(values, dict) and isinstance(wires := values.get("wires"), list):
-            fields = SavedWire._fields
-            values["wires"] = [
-                dict(zip(fields, each, strict=False)) if isinstance(each, list) else each for each in wires
-            ]
-        head = check(_Head, values, what)
-        robots_end = head.robots * ROBOT.itemsize
-        bodies_end = robots_end + head.bodies * BODY.itemsize
-        is_whole = len(rest) == bodies_end + head.lamps * 32
-        if not (is_whole and head.robots == len(head.wires) == len(setup.specs)):
-            raise ParameterError(
-                f"{what} must have the records of {len(setup.specs)} robots, {head.bodies} bodies and {head.lamps} "
-                "lamps, but it has others. Is the file damaged?"
-            )
-        saved = cls(
-            head.now_ns,
-            head.tick_count,
-            np.frombuffer(rest[:robots_end], ROBOT)[None],
-            np.frombuffer(rest[robots_end:bodies_end], BODY)[None],
-            np.frombuffer(rest[bodies_end:]).reshape(-1, 4),
-            head.body_count,
-            tuple(SavedWire(**vars(each)) for each in head.wires),
-        )
-        check_records(saved.robots, saved.bodies, (setup.arena.width_mm, setup.arena.height_mm), what)
-        ticks = -(-saved.now_ns // TICK_NS)
-        _check_range(np.array(saved.tick_count), ticks, ticks, f"tick_count of {what}")
-        _check_range(np.nan_to_num(saved.lamps), -_NUMBER_MAX, _NUMBER_MAX, f"lamps of {what}")
-        return saved
+        sim = Simulation.of_world(World(self.arena, self.specs, self.seed, self.poses, lock))
+        self.restore(sim)
+        return sim
+
+    def can_restore(self, sim: Simulation) -> bool:
+        """Return whether this state has all robots and turrets of a simulation, which never loses any."""
+        counts = [len(wire.firmware.fitted) for wire in sim.wires]
+        others = [len(turrets) for turrets in self.turrets]
+        return len(counts) <= len(others) and all(a <= b for a, b in zip(counts, others, strict=False))
+
+    def restore(self, sim: Simulation) -> None:
+        """Take a simulation of the same run back, or on, to this state."""
+        with sim.lock:
+            if not self.can_restore(sim):
+                raise ParameterError(
+                    f"Cannot go back to a state of {len(self.specs)} robots: the simulation has {sim.robot_count}, or "
+                    "other turrets. Make another simulation of the state."
+                )
+            self._extend(sim)
+            world = sim.world
+            kinds = world.state.robots["kind"].copy()
+            world.state.robots[...] = self.robots
+            world.state.robots["kind"] = kinds
+            world.state.bodies = self.bodies.copy()
+            world.state.tick_count, world.now_ns = self.tick_count, self.now_ns
+            # In two steps, for a lamp may be nowhere: its numbers are none.
+            world.lamps = np.zeros_like(self.lamps)
+            world.lamps[...] = self.lamps
+            world.rebuild_scene()
+            sim.things.body_count = self.body_count
+            for wire, saved_wire in zip(sim.wires, self.wires, strict=True):
+                wire.restore(saved_wire)
+            world.note_change()
+
+    def _extend(self, sim: Simulation) -> None:
+        """Add missing robots and turrets, and set the walls."""
+        poses = self.poses
+        # No robot may look from a place that the new walls do not have.
+        for index, pose in enumerate(poses[: sim.robot_count].tolist()):
+            sim.world.put_robot(index, *pose)
+        if sim.arena is not self.arena:
+            sim.world.take_walls(FreeSpace(self.arena, sim.specs, sim.world.state))
+        for spec, pose in zip(self.specs[sim.robot_count :], poses[sim.robot_count :].tolist(), strict=True):
+            sim.add_robot(spec, pose=pose)
+        for number, turrets in enumerate(self.turrets, 1):
+            for turret in turrets[len(sim.turrets(number)) :]:
+                sim.fit(number, turret if isinstance(turret, str) else AbsentTurret(turret))
 
 
-def state_bytes(sim: Simulation) -> bytes:
-    """Return all that changes in a simulation, as it is now: a line of JSON, then the records."""
+def state_bytes(sim: Simulation, files: WorldFiles) -> bytes:
+    """Return all that a simulation is now: a line of JSON, then the records.
+
+    Args:
+        sim: The simulation.
+        files: Where the files are that this names.
+    """
     with sim.lock:
         sim.sync()
         world = sim.world
         state, lamps = world.state, world.lamps
+        robots = [
+            {
+                "kind": files.name_of(wire.firmware.spec),
+                "turrets": [name_of(turret) or _described(turret) for turret in wire.firmware.fitted],
+                "wire": wire.save()._asdict(),
+            }
+            for wire in sim.wires
+        ]
         head = {
             "now_ns": world.now_ns,
             "tick_count": state.tick_count,
-            "robots": state.robots.shape[1],
+            "seed": world.seed,
+            "arena": files.name_of(world.arena),
+            "robots": robots,
             "bodies": state.bodies.shape[1],
             "lamps": len(lamps),
             "body_count": sim.things.body_count,
-            "wires": [wire.save() for wire in sim.wires],
         }
         parts = json.dumps(head).encode(), b"\n", state.robots.tobytes(), state.bodies.tobytes(), lamps.tobytes()
         return b"".join(parts)
 
 
-def restore_state(sim: Simulation, saved: SavedState) -> None:
-    """Take a simulation back, or on, to a state of a simulation of the same setup."""
-    with sim.lock:
-        world = sim.world
-        if saved.robots.shape != world.state.robots.shape:
-            raise ParameterError(
-                f"the state must be of {world.robot_count} robots, but it was of {saved.robots.shape[1]}. Take one of "
-                "the same simulation."
-            )
-        kinds = world.state.robots["kind"].copy()
-        world.state.robots[...] = saved.robots
-        world.state.robots["kind"] = kinds
-        world.state.bodies = saved.bodies.copy()
-        world.state.tick_count, world.now_ns = saved.tick_count, saved.now_ns
-        # In two steps, for a lamp may be nowhere: its numbers are none.
-        world.lamps = np.zeros_like(saved.lamps)
-        world.lamps[...] = saved.lamps
-        world.rebuild_scene()
-        sim.things.body_count = saved.body_count
-        for wire, saved_wire in zip(sim.wires, saved.wires, strict=True):
-            wire.restore(saved_wire)
-        world.note_change()
+def _described(turret: Turret) -> dict[str, Any]:
+    known = TurretOfUser(turret.number, turret.name, turret.revision, turret.memory_count)
+    return vars(known)
 
 
 # ---- records in files ----

@@ -19,15 +19,13 @@ from kiks.desk.server.player import Player
 from kiks.desk.server.scripts import EXAMPLES
 from kiks.errors import KiksError, LinkError, ParameterError
 from kiks.model.arena import Arena
-from kiks.model.project import Project, ProjectRobot
-from kiks.model.robot import RobotSpec, robot_names
+from kiks.model.project import Project
 from kiks.ports.program_process import Command, Permission, commands_of
 from kiks.ports.programs import Programs
 from kiks.sim.drag import Drags
-from kiks.sim.from_project import project_of, simulation_of
+from kiks.sim.from_project import described, project_of, simulation_of
 from kiks.sim.ring_buffer import RingBuffer
 from kiks.sim.simulation import Simulation
-from kiks.sim.turret_host import name_of
 
 NEWS_LIMIT = 200
 """Number of messages to people that are kept."""
@@ -103,7 +101,7 @@ class Desk:
         self._commands = self._granted = list(commands)
         self._new_programs = new_programs or self._usual_programs
         self._retired: list[Programs] = []
-        self.project = foreign_project(sim) if project is None else project
+        self.project = described(sim) if project is None else project
         self._take(DeskWorld(sim, speed), self._commands)
 
     def _take(self, world: DeskWorld, commands: Sequence[Command | None], *, is_branch: bool = False) -> None:
@@ -358,7 +356,7 @@ class Desk:
         world = DeskWorld(sim, self.present.gate.speed)
         world.pause()
         if len(self.project.robots) != sim.robot_count:
-            self.project = foreign_project(sim)
+            self.project = described(sim)
         try:
             self._replace(world, (), is_branch=True)
         except KiksError:
@@ -440,19 +438,3 @@ class NewsHandler(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         """Show a log record."""
         self._desk.say(self.format(record))
-
-
-def foreign_project(sim: Simulation) -> Project:
-    """Return a project that describes a world built without one.
-
-    Robots of an unknown kind become Kheperas; turrets of unknown classes are left out.
-    """
-    known = {RobotSpec.load(kind): kind for kind in robot_names()}
-    robots = tuple(
-        ProjectRobot(
-            kind=known.get(spec, "khepera"),
-            turrets=tuple(name for each in sim.turrets(number) if (name := name_of(each)) is not None),
-        )
-        for number, spec in enumerate(sim.specs, 1)
-    )
-    return project_of(sim, Project(sim.arena, robots=robots, seed=sim.seed, thinking=sim.thinking))
