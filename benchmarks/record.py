@@ -2,7 +2,7 @@
 
 Run: python benchmarks/record.py [--json]. `record.slowdown_percent` compares the demo `follow` at full acceleration
 with and without a recording, in turn in one process; each figure is a median. `record.seek_s` is the longest of twenty
-jumps in a recording of an hour, `record.back_ms` what a step back of 40 ms costs.
+jumps in a recording of an hour.
 `record.film_pictures_per_s` is the pictures of 1280 x 720 of an MP4 per second of processor time: those that one core
 makes, with drawing and encoding.
 """
@@ -25,7 +25,6 @@ from kiks.export.film import save_film
 ARENA = Path(__file__).parent.parent / "examples" / "arenas" / "office.toml"
 SECONDS, ROUNDS, HOUR_S, JUMPS = 300.0, 15, 3600.0, 20
 FILM_S, FILMS = 40.0, 3
-PICTURES, PICTURE_S = 250, 0.04
 
 
 def run(seconds: float, file: Path | None) -> tuple[kiks.Simulation, float]:
@@ -72,18 +71,12 @@ def main() -> None:
             recording.world_at(rng.uniform(0.0, recording.duration_s))
             jumps_s.append(time.perf_counter() - start_s)
         films = [film_pictures_per_s(recording) for _ in range(FILMS)]
-        replay = recording.replay(HOUR_S / 2)
-        start_s = time.perf_counter()
-        for step in range(PICTURES):
-            replay.go_to(round((HOUR_S / 2 - step * PICTURE_S) * 1e9))
-        back_s = (time.perf_counter() - start_s) / PICTURES
     figures = [
         ("record.slowdown_percent", median(slower), "%"),
         ("record.us_without", 1e6 * median(alone_s) / SECONDS, "us a simulated second, without a recording"),
         ("record.kb_per_simulated_s", bytes_per_s / 1000, "kB"),
         ("record.seek_s", max(jumps_s), "s"),
         ("record.film_pictures_per_s", median(films), "1/s"),
-        ("record.back_ms", 1000 * back_s, "ms"),
         ("calibration.loops_per_s", calibration_loops_per_s(), "1/s"),
     ]
     report(figures, as_json=options.json)

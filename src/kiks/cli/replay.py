@@ -32,7 +32,7 @@ def replay(
     """Show a recorded run again on the desk, or check that it is the same again.
 
     The world on the desk is a living one: its sensors and lines can be watched as ever. The time bar below it goes to
-    any time, forwards and backwards, and to each event; from any time a person can go on without the recording.
+    any time and to each event; from any time a person can go on without the recording.
 
     Example: kiks replay run.mcap --check
     """

@@ -23,11 +23,8 @@ from kiks.recording.recorder import description_of
 from kiks.sim.simulation import Simulation
 from kiks.units import s_from_ns
 
-BYTES_MIN, BYTES_MAX = 8 << 20, 1 << 30
-"""Least and most bytes of the file."""
-
-FREE_SHARE = 0.5
-"""Largest share of the disk space that others leave."""
+BYTES_MAX = 256 << 20
+"""Most bytes of the file."""
 
 COPY_BYTES_MAX = 64 << 20
 """Most bytes of another recording that a ring begins with."""
@@ -65,7 +62,7 @@ class Ring:
         self._chunks: dict[int, FoundChunk] = {}
         self._next = self._end = 0
         self._has_dropped = False
-        self._bytes_max()  # an error if there is no room for it
+        _check_room()
 
     # ---- as a store ----
 
@@ -85,14 +82,12 @@ class Ring:
         return True
 
     def _append(self, begin_ns: int, data: bytes) -> None:
-        file, bytes_max = self._file, self._bytes_max()
-        if self._end + len(data) > bytes_max:
-            # What lies beyond is of the round before.
-            self._drop(self._end, 1 << 62)
-            os.ftruncate(file, self._end)
+        if self._end + len(data) > BYTES_MAX:
+            self._drop(self._end, BYTES_MAX)  # what is left of the round before
             self._end = 0
+        _check_room()
         has_dropped = self._drop(self._end, self._end + len(data))
-        if os.pwrite(file, data, self._end) < len(data):
+        if os.pwrite(self._file, data, self._end) < len(data):
             raise OSError("no space left")
         self._chunks[self._next] = FoundChunk(self._end, len(data), begin_ns)
         self._next += 1
@@ -101,7 +96,7 @@ class Ring:
             self._has_dropped = True
             self._say(
                 f"The time bar now begins at {s_from_ns(next(iter(self._chunks.values())).begin_ns):.0f} s: the past "
-                f"has at most {bytes_max >> 20} MiB. To keep a whole run, start KiKS with --record FILE."
+                f"has at most {BYTES_MAX >> 20} MiB. To keep a whole run, start KiKS with --record FILE."
             )
 
     def _drop(self, begin: int, end: int) -> bool:
@@ -110,20 +105,6 @@ class Ring:
         while self._chunks and begin <= self._chunks[oldest := next(iter(self._chunks))].offset < end:
             del self._chunks[oldest]
         return len(self._chunks) < count
-
-    def _bytes_max(self) -> int:
-        """Return how many bytes the file may have now."""
-        room = room_of(Path(tempfile.gettempdir()))
-        others_leave_bytes = room.free_bytes - room.reserve_bytes + os.fstat(self._file).st_size
-        bytes_max = min(BYTES_MAX, int(others_leave_bytes * FREE_SHARE))
-        if bytes_max < BYTES_MIN:
-            needed_bytes = room.reserve_bytes + int(BYTES_MIN / FREE_SHARE)
-            raise ParameterError(
-                f"the disk of the temporary folder must have {needed_bytes >> 20} MiB free, but it has "
-                f"{room.free_bytes >> 20} MiB. Free some space and start the world over, or start KiKS with TMPDIR set "
-                "to a folder on another disk."
-            )
-        return bytes_max
 
     def copy(self, log: RecordedLog, until_ns: int) -> None:
         """Write what another recording has up to a time [ns], or the last `COPY_BYTES_MAX` of that.
@@ -169,3 +150,13 @@ class Ring:
         data = lz4.frame.decompress(packed)
         middle = _HEAD.size + _HEAD.unpack_from(data)[0]
         return data[_HEAD.size : middle], data[middle:]
+
+
+def _check_room() -> None:
+    room = room_of(Path(tempfile.gettempdir()))
+    if room.is_too_small:
+        raise ParameterError(
+            f"the disk of the temporary folder must have {room.reserve_bytes >> 20} MiB free, but it has "
+            f"{room.free_bytes >> 20} MiB. Free some space and start the world over, or start KiKS with TMPDIR set to "
+            "a folder on another disk."
+        )

@@ -53,9 +53,6 @@ class TimeBar:
                 self._add("first_page", "Event before", "event-before", "u", lambda: self._jump(is_before=True))
                 self._add("keyboard_double_arrow_left", "1 s back", "back-long", "J", lambda: looking.move_by(-LONG_S))
                 self._add("keyboard_arrow_left", "0.1 s back", "back-short", "j", lambda: looking.move_by(-SHORT_S))
-                self._backwards = self._add(
-                    "play_arrow", "Play backwards", "play-backwards", "r", self._toggle_backwards
-                ).classes("desk-bar-backwards")
                 self._play = self._add("play_arrow", "Play", "play", "k", self._toggle)
                 self._onwards = [
                     self._add("keyboard_arrow_right", "0.1 s on", "on-short", "l", lambda: looking.move_by(SHORT_S)),
@@ -95,14 +92,9 @@ class TimeBar:
         self._bar.classes(add="is-past") if past else self._bar.classes(remove="is-past")
         self._state.text = "Now" if past is None else "Past" if has_present else "Recording"
         self._event.text = "" if past is None else self._happening(past.sim.time_s)
-        is_backwards = past is not None and past.is_backwards
-        for button, word, goes in (
-            (self._backwards, "Play backwards", is_backwards),
-            (self._play, "Play", not desk.is_paused and not is_backwards),
-        ):
-            word = "Pause" if goes else word
-            if button.props.get("aria-label") != word:
-                with_props(button, icon="pause" if goes else "play_arrow", aria_label=word)
+        word = "Play" if desk.is_paused else "Pause"
+        if self._play.props.get("aria-label") != word:
+            with_props(self._play, icon="play_arrow" if desk.is_paused else "pause", aria_label=word)
         for button in self._onwards:
             button.set_enabled(past is not None)
         self._now.set_visibility(past is not None and has_present)
@@ -120,14 +112,8 @@ class TimeBar:
 
     # ---- in the past ----
 
-    async def _toggle_backwards(self) -> None:
-        past = self._desk.past
-        await (self._desk.pause() if past is not None and past.is_backwards else self._desk.looking.go_back())
-
     async def _toggle(self) -> None:
-        past = self._desk.past
-        goes = not self._desk.is_paused and not (past is not None and past.is_backwards)
-        await (self._desk.pause() if goes else self._desk.go_on())
+        await (self._desk.go_on() if self._desk.is_paused else self._desk.pause())
 
     async def _jump(self, *, is_before: bool) -> None:
         mark = await self._desk.looking.jump(is_before=is_before)

@@ -189,7 +189,6 @@ class Gateway:
             "end_s": None if span is None or past is None else s_from_ns(span.end_ns),
             "is_past": past is not None,
             "has_present": looking.has_present,
-            "is_backwards": past is not None and past.is_backwards,
         }
         if looking.marks is not self._marks or state != self._bar_state:
             self._marks, self._bar_state = looking.marks, state

@@ -187,17 +187,6 @@ class LookingBack:
             self.past = past
             past.start()
 
-    async def go_back(self) -> None:
-        """Play the past backwards.
-
-        Raises:
-            LinkError: If there is no past.
-        """
-        if self.past is None:
-            await self.look_at(self._present().sim.now_ns)
-        if (past := self.past) is not None:
-            await past.do(lambda _: past.go_back())
-
     async def move_by(self, seconds: float) -> None:
         """Show the past so many seconds later, or earlier if negative; it stands still there.
 

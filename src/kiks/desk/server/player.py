@@ -1,4 +1,4 @@
-"""The player: shows the past of a world on a desk, forwards at any speed, backwards, and from any time on.
+"""The player: shows the past of a world on a desk, at any speed, and from any time on.
 
 The past is a simulation that recorded inputs move, so readings, rays and lines are there as ever. The player's own
 thread moves it: the thread that moves the present world waits at its gate meanwhile.
@@ -7,7 +7,6 @@ thread moves it: the thread that moves the present world waits at its gate meanw
 from __future__ import annotations
 
 import threading
-import time
 from collections.abc import Callable
 from concurrent.futures import TimeoutError as NotYet
 from typing import NamedTuple
@@ -30,9 +29,6 @@ IDLE_S = 0.05
 SLICE_NS = NS_PER_S // 50
 """Longest slice of real time that is caught up at once, and of simulated time at full speed [ns]."""
 
-BACK_SPEED_MAX = 100.0
-"""Highest speed backwards [simulated seconds per real second], full speed among them."""
-
 
 class Span(NamedTuple):
     """A span of simulated time [ns]."""
@@ -53,7 +49,6 @@ class Player(DeskWorld):
 
     Attributes:
         span: From when to when it goes.
-        is_backwards: Whether it is played backwards.
     """
 
     def __init__(
@@ -63,7 +58,6 @@ class Player(DeskWorld):
         self._replay = Replay(log, time_ns)
         super().__init__(self._replay.sim, speed)
         self.span = span
-        self.is_backwards = False
         self._say = say
         self._is_over = False
         self._changed = threading.Condition(self.sim.lock)
@@ -84,29 +78,6 @@ class Player(DeskWorld):
         self.end()
         return self._replay.let_go()
 
-    # ---- how it goes; between two events ----
-
-    @property
-    def is_paused(self) -> bool:
-        """Whether its time stands still."""
-        return self.gate.is_paused and not self.is_backwards
-
-    def pause(self) -> None:
-        """Pause its time."""
-        self.is_backwards = False
-        super().pause()
-
-    def go_on(self) -> None:
-        """Play on."""
-        self.pause()
-        super().go_on()
-
-    def go_back(self) -> None:
-        """Play backwards."""
-        self.pause()
-        self._back_ns, self._back_wall_ns = self.sim.now_ns, time.monotonic_ns()
-        self.is_backwards = True
-
     # ---- another time ----
 
     def seek(self, time_ns: int) -> None:
@@ -120,20 +91,15 @@ class Player(DeskWorld):
                 self.gate.serve()
 
     def _seek(self, time_ns: int) -> None:
-        self._show(time_ns)
-        if self.is_backwards:
-            self.go_back()
-        elif self.gate.is_paused:
-            self.gate.pause(time_ns)
-        else:
-            self.gate.set_speed(self.gate.speed, time_ns)
-
-    def _show(self, time_ns: int) -> None:
-        """Show the world at a time [ns]."""
         if not self._replay.go_to(time_ns):
+            # There were fewer robots or turrets then.
             self._replay = Replay(self._log, time_ns, lock=self.sim.world.lock)
             self.sim = self._replay.sim
             self.hands = Drags(self.sim)
+        if self.gate.is_paused:
+            self.gate.pause(time_ns)
+        else:
+            self.gate.set_speed(self.gate.speed, time_ns)
 
     # ---- the thread ----
 
@@ -152,8 +118,6 @@ class Player(DeskWorld):
 
     def _move(self) -> float:
         """Move the world as far as it shall be by now; return how long nothing more is to be done [s]."""
-        if self.is_backwards:
-            return self._move_back()
         now_ns, pace = self.sim.now_ns, self.gate.pace
         if now_ns >= self.span.end_ns:
             if pace.now_ns() > now_ns:
@@ -167,13 +131,3 @@ class Player(DeskWorld):
             pace.start(due_ns)
         self.sim.advance_to(due_ns)
         return 0.0
-
-    def _move_back(self) -> float:
-        wall_ns = time.monotonic_ns()
-        passed_ns, self._back_wall_ns = min(wall_ns - self._back_wall_ns, LAG_NS), wall_ns
-        speed = min(self.gate.speed or BACK_SPEED_MAX, BACK_SPEED_MAX)
-        self._back_ns = max(self._back_ns - round(passed_ns * speed), self.span.begin_ns)
-        self._show(self._back_ns)
-        if self._back_ns == self.span.begin_ns:
-            self.pause()
-        return 2 * PERIOD_S
