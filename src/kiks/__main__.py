@@ -4,18 +4,18 @@ import os
 import sys
 
 from kiks.ending import end_at_once
-from kiks.ports.hash_seed import HASH_SEED, VARIABLE
+from kiks.ports.environment_marks import HASH_SEED, SAFE_PATH
 
 
 def main() -> None:
     """Run the command."""
     words = sys.argv[1:]
-    if words[:1] == ["run"] and sys.orig_argv[-len(words) :] == words and VARIABLE not in os.environ:
+    if words[:1] == ["run"] and sys.orig_argv[-len(words) :] == words and not HASH_SEED.keys() & os.environ.keys():
         # This command runs a program in this process, and the order of its sets is settled when the process starts.
-        os.execve(sys.executable, [sys.executable, *sys.orig_argv[1:]], {**os.environ, VARIABLE: HASH_SEED})
+        os.execve(sys.executable, [sys.executable, *sys.orig_argv[1:]], os.environ | HASH_SEED)
     end_at_once()
     # The current folder may be a stranger's: processes that libraries start import nothing from it, either.
-    os.environ.setdefault("PYTHONSAFEPATH", "kiks")
+    os.environ.update(SAFE_PATH | os.environ)
     from kiks.cli import main as run_command
 
     run_command()

@@ -222,7 +222,7 @@ def test_lag_is_logged_once(caplog: pytest.LogCaptureFixture) -> None:
 
 
 def test_arguments_are_checked() -> None:
-    with pytest.raises(ParameterError, match=r"endpoints must be those of robots 1 to 1, but one was of robot 2"):
+    with pytest.raises(ParameterError, match=r"robot must be the number of an existing robot, but it was 2"):
         Server(fresh(), {2: []})
     with pytest.raises(ParameterError, match=r"thinking of a server must be 'live', 'none' or 'fixed:MS', but it was"):
         Server(fresh(), {1: []}, thinking="live:2")

@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import logging
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 
-from kiks.clock.patience import Patience
 from kiks.clock.serial_timing import BACKLOG_LIMIT
 from kiks.ports.live import IDLE_S, Link
 from kiks.ports.program_scheduler import Participant, ProgramScheduler
@@ -37,38 +36,16 @@ class Lockstep:
     Args:
         sim: The world.
         thinking_ns: Thinking time before each command [ns].
-        programs: Number of programs that begin together.
-        missing: Returns the names of the missing programs, for the log.
-        when_silent: What happens to a program that is silent while others wait: 'wait', 'drop' or 'ignore'.
-        patience_s: How long a program may be silent [s of real time].
-        new_patience: Makes patiences with another wall clock.
+        scheduler: Decides when each client acts.
     """
 
     forgets = False
 
-    def __init__(
-        self,
-        sim: Simulation,
-        thinking_ns: int,
-        *,
-        programs: int,
-        missing: Callable[[], str],
-        when_silent: str,
-        patience_s: float,
-        new_patience: Callable[[float], Patience],
-    ) -> None:
+    def __init__(self, sim: Simulation, thinking_ns: int, scheduler: ProgramScheduler) -> None:
         self._sim = sim
         self._thinking_ns = thinking_ns
         self._clients: dict[int, Client] = {}
-        self._scheduler = ProgramScheduler(
-            sim,
-            expected=programs,
-            missing=missing,
-            log=_log,
-            when_silent=when_silent,
-            patience_s=patience_s,
-            new_patience=new_patience,
-        )
+        self._scheduler = scheduler
 
     def start(self) -> None:
         """Do nothing: time passes with the first command."""

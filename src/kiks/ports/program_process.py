@@ -12,16 +12,17 @@ import socket
 import subprocess
 import sys
 import threading
+from abc import abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from importlib.machinery import ModuleSpec, PathFinder
 from pathlib import Path
-from typing import IO, Any, NamedTuple, Protocol
+from typing import IO, Any, NamedTuple
 
 from kiks.errors import KiksError, ParameterError, shown
 from kiks.model.atomic_files import program_in
 from kiks.model.project import Project
-from kiks.ports.hash_seed import HASH_SEED, VARIABLE
+from kiks.ports.environment_marks import HASH_SEED
 from kiks.ports.messages import Start
 from kiks.sim.ring_buffer import RingBuffer
 
@@ -209,7 +210,7 @@ class Process:
     # ---- inside ----
 
     def _start(self, line: list[str], connection: socket.socket) -> subprocess.Popen[bytes]:
-        environment = {VARIABLE: HASH_SEED, **os.environ}
+        environment = HASH_SEED | os.environ
         if self._writer is None:
             return subprocess.Popen(line, pass_fds=[connection.fileno()], env=environment)
         # Unbuffered: each line of output comes at once.
@@ -255,7 +256,7 @@ class Process:
                 os.killpg(popen.pid, number)
 
 
-class OutputWriter(Protocol):
+class OutputWriter:
     """Takes the output of a program, line by line.
 
     Attributes:
@@ -263,9 +264,10 @@ class OutputWriter(Protocol):
         pause_s: Pause after which `show_unfinished` is called [s of real time]; None for never.
     """
 
-    longest: int
-    pause_s: float | None
+    longest = 1 << 16
+    pause_s: float | None = None
 
+    @abstractmethod
     def take(self, lines: list[bytes], is_error: bool) -> None:
         """Take lines.
 
@@ -275,13 +277,13 @@ class OutputWriter(Protocol):
 
     def show_unfinished(self, text: bytes, is_error: bool) -> bool:
         """Take an unfinished line after a pause, such as a prompt; return whether it was taken."""
+        return False
 
 
-class _OutputKeeper:
-    """Keeps the newest lines, as an `OutputWriter`; it never waits for readers."""
+class _OutputKeeper(OutputWriter):
+    """Keeps the newest lines; it never waits for readers."""
 
     longest = LINE_LIMIT
-    pause_s: float | None = None
 
     def __init__(self, output: RingBuffer[OutputLine]) -> None:
         self._output = output
@@ -289,9 +291,6 @@ class _OutputKeeper:
     def take(self, lines: list[bytes], is_error: bool) -> None:
         skipped = max(len(lines) - OUTPUT_LIMIT, 0)
         self._output.add([_output_line(each, is_error) for each in lines[skipped:]], skipped=skipped)
-
-    def show_unfinished(self, text: bytes, is_error: bool) -> bool:
-        return False
 
 
 class Labels:
@@ -336,10 +335,8 @@ class Labels:
                     select.select([], [stream], [])
 
 
-class _LabelledWriter:
-    """Writes the output of one program, as an `OutputWriter`."""
-
-    longest = 1 << 16
+class _LabelledWriter(OutputWriter):
+    """Writes the output of one program."""
 
     def __init__(self, labels: Labels, number: int, label: str) -> None:
         self._labels = labels
@@ -409,21 +406,25 @@ class Permission:
     one of the folders, and starts only if that is allowed.
 
     Args:
-        granted: Programs that the person at the terminal has named.
+        granted: Programs that the person at the terminal has named; None for any.
         folders: Folders of other programs, with all below.
         may_start_others: Whether other programs may start.
     """
 
     def __init__(
-        self, granted: Iterable[Command | None] = (), *, folders: Sequence[Path] = (), may_start_others: bool = False
+        self,
+        granted: Iterable[Command | None] | None = (),
+        *,
+        folders: Sequence[Path] = (),
+        may_start_others: bool = False,
     ) -> None:
-        self._granted = [command for command in granted if command is not None]
+        self._granted = None if granted is None else list(granted)
         self._folders = [folder.resolve() for folder in folders]
         self.may_start_others = may_start_others
 
     def check(self, command: Command) -> None:
         """Check that a program may start."""
-        if command in self._granted:
+        if self._granted is None or command in self._granted:
             return
         name = command.name[:80]
         if not self.may_start_others:
@@ -437,10 +438,3 @@ class Permission:
                 program_in(folder, path.relative_to(folder).as_posix())
                 return
         raise ParameterError(f"{name!r} must lie in the desk's folder, but it is elsewhere. Copy it there.")
-
-
-class AnyProgram(Permission):
-    """The permission of the person at the terminal, and of a program that uses KiKS."""
-
-    def check(self, command: Command) -> None:
-        """Allow it to start."""

@@ -19,7 +19,7 @@ from kiks.ports.file_descriptors import opening
 from kiks.ports.messages import Start
 from kiks.ports.participant import ProgramParticipant, RemoteParticipant
 from kiks.ports.port_names import PortNames
-from kiks.ports.program_process import AnyProgram, Command, Labels, OutputLine, Permission, Process, chance_seed
+from kiks.ports.program_process import Command, Labels, OutputLine, Permission, Process, chance_seed
 from kiks.ports.program_scheduler import PATIENCE_S, START_PATIENCE_S, VISIT_PATIENCE_S, ProgramScheduler
 from kiks.sim.ring_buffer import RingBuffer
 from kiks.sim.simulation import Simulation
@@ -144,7 +144,7 @@ class Programs:
         labels: Labels | None = None,
     ) -> None:
         self.sim = sim
-        self.permission: Permission = AnyProgram()
+        self.permission = Permission(None)
         self.handles: list[Handle] = []
         self._visitors: list[ProgramParticipant] = []
         self._is_moving = False

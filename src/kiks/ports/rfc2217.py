@@ -8,6 +8,7 @@ from __future__ import annotations
 import logging
 import socket
 import struct
+from types import SimpleNamespace
 from typing import Any
 
 from kiks.ports.tcp import TcpChannel, TcpEndpoint
@@ -33,40 +34,25 @@ class Rfc2217Endpoint(TcpEndpoint):
         return None if connection is None else Rfc2217Channel(connection, self)
 
 
-class _Settings:
+class _Settings(SimpleNamespace):
     """The serial port that the protocol sets: it accepts all settings, and only the speed has an effect."""
 
     def __init__(self, channel: Rfc2217Channel) -> None:
+        super().__init__(baudrate=9600, bytesize=8, parity="N", stopbits=2)
+        vars(self).update(dict.fromkeys(("dtr", "rts", "cts", "dsr", "cd"), True))
+        vars(self).update(dict.fromkeys(("xonxoff", "rtscts", "break_condition", "ri"), False))
         self._channel = channel
-        self._baud = 9600
-        self.bytesize, self.parity, self.stopbits = 8, "N", 2
-        self.xonxoff = self.rtscts = self.break_condition = False
-        self.dtr = self.rts = self.cts = self.dsr = self.cd = True
-        self.ri = False
 
-    @property
-    def baudrate(self) -> int:
-        return self._baud
-
-    @baudrate.setter
-    def baudrate(self, baud: int) -> None:
-        self._baud = self._channel.baud = baud
+    def __setattr__(self, name: str, value: Any) -> None:
+        super().__setattr__(name, value)
+        if name == "baudrate":
+            self._channel.baud = value
 
     def reset_input_buffer(self) -> None:
         self._channel.forget()
 
     def reset_output_buffer(self) -> None:
         pass  # written characters are already on the line
-
-
-class _Answers:
-    """Sends the protocol's own messages, which are not escaped because they are no data."""
-
-    def __init__(self, channel: Rfc2217Channel) -> None:
-        self._channel = channel
-
-    def write(self, data: bytes) -> None:
-        TcpChannel.write(self._channel, bytes(data))
 
 
 class Rfc2217Channel(TcpChannel):
@@ -76,8 +62,9 @@ class Rfc2217Channel(TcpChannel):
         from serial import rfc2217
 
         super().__init__(connection, endpoint)
+        # The protocol's own messages are not escaped, because they are no data.
+        answers: Any = SimpleNamespace(write=lambda data: TcpChannel.write(self, bytes(data)))
         settings: Any = _Settings(self)
-        answers: Any = _Answers(self)
         self._manager: Any = rfc2217.PortManager(settings, answers)
 
     def read(self) -> bytes | None:

@@ -18,7 +18,7 @@ from kiks.errors import ParameterError, shown
 from kiks.ports.endpoint import Channel, Endpoint
 from kiks.ports.live import Link, Live, TimePolicy
 from kiks.ports.lockstep import Lockstep
-from kiks.ports.program_scheduler import PATIENCE_S
+from kiks.ports.program_scheduler import PATIENCE_S, ProgramScheduler
 from kiks.sim.port import BAUD_MAX, BAUD_MIN
 from kiks.sim.simulation import Simulation
 
@@ -66,16 +66,17 @@ class Server:
         if thinking == "live":
             self._timing = Live(sim, Pace(speed) if pace is None else pace)
         else:
-            self._timing = Lockstep(
+            scheduler = ProgramScheduler(
                 sim,
-                _fixed_ns(thinking),
-                programs=_check_programs(len(endpoints) if programs is None else programs, len(endpoints)),
+                expected=_check_programs(len(endpoints) if programs is None else programs, len(endpoints)),
                 missing=self._missing,
+                log=_log,
                 when_silent=when_silent,
                 patience_s=patience_s,
                 new_patience=new_patience,
             )
-        self._links = {robot: Link(robot, sim.wires[_index(sim, robot)]) for robot in endpoints}
+            self._timing = Lockstep(sim, _fixed_ns(thinking), scheduler)
+        self._links = {robot: Link(robot, sim.wires[sim.index_of(robot)]) for robot in endpoints}
         self._endpoints = {robot: list(each) for robot, each in endpoints.items()}
         self._selector = selectors.DefaultSelector()
         for link in self._links.values():
@@ -266,12 +267,3 @@ def _check_programs(programs: int, robots: int) -> int:
             f"{shown(programs)}. Each program has a robot of its own."
         )
     return programs
-
-
-def _index(sim: Simulation, robot: int) -> int:
-    if not isinstance(robot, int) or not 1 <= robot <= sim.robot_count:
-        raise ParameterError(
-            f"endpoints must be those of robots 1 to {sim.robot_count}, but one was of robot {shown(robot)}. Count "
-            "from 1."
-        )
-    return robot - 1

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 import threading
 import traceback
@@ -15,7 +14,7 @@ from weakref import WeakSet
 
 from kiks.clock.program_clock import ProgramClock
 from kiks.errors import KiksError
-from kiks.ports import hash_seed
+from kiks.ports import environment_marks
 from kiks.script import clocks, cpython, event_loops, locks, serial_ports, socket_waits, unsupported
 from kiks.script.chance import Chance
 from kiks.script.file_system import FileSystem
@@ -154,9 +153,7 @@ def run_program(
         ends.run()
         return code
 
-    hash_seed.hide()
-    if os.environ.get("PYTHONSAFEPATH") == "kiks":
-        del os.environ["PYTHONSAFEPATH"]  # what the program starts is as it is without KiKS
+    environment_marks.hide()
     hook_before = sys.excepthook
     sys.excepthook = lambda _kind, error, _trace: _print_program_trace(error)
     try:
