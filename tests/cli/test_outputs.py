@@ -109,7 +109,7 @@ SAME: dict[str, Callable[[Path, Path], object]] = {
         (("export", "INPUT", "PLACE"), "page.html"),
         (("export", "--kind", "figures", "other.mcap", "INPUT", "PLACE"), "plot.png"),
         (("run", "--record", "PLACE", "program.py", "INPUT"), "run.mcap"),
-        (("run", "--thinking", "replay:INPUT", "--csv", "PLACE", WANDER), "thoughts.csv"),
+        (("run", "--thinking", "replay:INPUT", "--export", "PLACE", WANDER), "thoughts.csv"),
         (("fit", "INPUT=12.5", "--robot", "PLACE"), "post.toml"),
         (("serve", "--arena", "INPUT", "--record", "PLACE"), "arena.mcap"),
         (("calibrate", "--port", "kiks://1", "--base", "INPUT", "--out", "PLACE"), "robot.toml"),
@@ -133,10 +133,10 @@ def test_no_output_is_an_input(
 
 @pytest.mark.parametrize("how", ["a link", "a hard link"])
 def test_two_outputs_are_two_files(how: str, tmp_path: Path) -> None:
-    (tmp_path / "run.csv").touch()
-    SAME[how](tmp_path / "run.csv", tmp_path / "run.mcap")
+    (tmp_path / "foxglove.mcap").touch()
+    SAME[how](tmp_path / "foxglove.mcap", tmp_path / "run.mcap")
     with pytest.raises(ParameterError, match="must be a file that the command does not need besides"):
-        told("run", "--csv", tmp_path / "run.csv", "--record", tmp_path / "run.mcap", WANDER)
+        told("run", "--export", tmp_path / "foxglove.mcap", "--record", tmp_path / "run.mcap", WANDER)
 
 
 def test_an_arena_is_replaced_with_force(tmp_path: Path) -> None:
@@ -152,8 +152,8 @@ def test_what_an_arena_or_a_project_names_is_an_input(tmp_path: Path) -> None:
         for place in ("maze.png", "sub/maze.png"):
             (tmp_path / place).parent.mkdir(exist_ok=True)
             with pytest.raises(ParameterError, match=re.escape(name)):
-                told("run", "--arena", tmp_path / name, "--picture", tmp_path / place, WANDER)
-        told("run", "--arena", tmp_path / name, "--picture", tmp_path / "amaze.png", WANDER)
+                told("run", "--arena", tmp_path / name, "--export", tmp_path / place, WANDER)
+        told("run", "--arena", tmp_path / name, "--export", tmp_path / "amaze.png", WANDER)
 
 
 def test_the_place_of_an_output_that_is_left_out_is_checked_too(
@@ -175,7 +175,7 @@ def test_the_place_of_an_output_that_is_left_out_is_checked_too(
     ("words", "option"),
     [
         (("run", "--seed", "1", "--seed", "2", WANDER), "--seed"),
-        (("run", "exercise.kiks", "--seed", "1", "--csv", "a.csv", "--seed", "1"), "--seed"),
+        (("run", "exercise.kiks", "--seed", "1", "--export", "a.csv", "--seed", "1"), "--seed"),
         (("demo", "--picture", "a.png", "--picture", "b.png"), "--picture"),
         (("export", "run.mcap", "run.html", "--title", "A", "--title", "B"), "--title"),
         (("serve", "--pty", "--no-pty"), "--pty"),

@@ -37,7 +37,7 @@ def run_champion(
     world: World,
     seconds: float,
     limits: Limits,
-    files: tuple[Path | None, Path | None, Path | None],
+    files: tuple[Path | None, Path | None],
     *,
     on_desk: bool,
     waits: bool,
@@ -53,7 +53,7 @@ def run_champion(
 
     def work() -> None:
         doubt = "it was interrupted"
-        with recorded(sim, *files, programs=[file]):
+        with recorded(sim, *files, [file]):
             try:
                 with limits.kept(sim, LimitReached.stop):
                     loop_count = champion.drive(ports, seconds=seconds)

@@ -1,49 +1,27 @@
-"""What is left of a run: a picture, a table, a recording, and a line for each robot."""
+"""What is left of a run: a recording, a file made of it, and a line for each robot."""
 
 from __future__ import annotations
 
-import math
 import shlex
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from kiks.cli.options import say
-from kiks.cli.outputs import PICTURES, output
+from kiks.cli.outputs import output
 from kiks.errors import counted
-from kiks.model.atomic_files import GrowingFile
+from kiks.export.kinds import ENDINGS
 
 if TYPE_CHECKING:
-    from kiks.engine.state import State
     from kiks.sim.simulation import Simulation
-
-TABLE_TICKS = 5
-"""Ticks of 10 ms between two rows of a robot in a table."""
-
-COLUMNS = ("time_s", "robot", "x_mm", "y_mm", "heading_deg", "driven_mm", "contacts")
 
 PROGRAM_CHARACTERS_MAX = 1 << 20
 """Most characters of a program's text in a recording."""
-
-POINTS_MAX, LEAST_POINTS_MAX = 200_000, 1000
-"""Most points of all paths of a picture together, but of each path at least so many."""
-
-
-Picture = Annotated[
-    Path | None,
-    typer.Option(
-        help="Draw the arena with the paths of all robots here: .png, .svg, .pdf or .jpg.", callback=output(*PICTURES)
-    ),
-]
-Table = Annotated[
-    Path | None,
-    typer.Option("--csv", help="Write here where each robot is every 50 ms: .csv.", callback=output(".csv")),
-]
-
 
 RecordFile = Annotated[
     Path | None,
@@ -55,44 +33,43 @@ RecordFile = Annotated[
 ]
 
 
+ExportFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--export",
+        help="Write this file of the run when it ends, as kiks export does: .png, .csv, .mp4, .html ...",
+        callback=output(*ENDINGS),
+    ),
+]
+
+
 @contextmanager
 def recorded(
-    sim: Simulation,
-    picture: Path | None = None,
-    csv: Path | None = None,
-    record: Path | None = None,
-    programs: Sequence[Path] = (),
+    sim: Simulation, record: Path | None = None, export: Path | None = None, programs: Sequence[Path] = ()
 ) -> Iterator[None]:
-    """Keep what happens in a world meanwhile, also if it is interrupted; the run is the same, to the bit.
+    """Record what happens in a world meanwhile, also if it is interrupted; the run is the same, to the bit.
 
     Args:
         sim: The world.
-        picture: File of the picture that is drawn at the end; none if None.
-        csv: File of the table; none if None.
         record: File of the recording; none if None.
+        export: File that is made of the recording at the end; none if None.
         programs: The programs that drive its robots, whose texts the recording keeps.
     """
-    # A program may go to another folder.
-    picture, csv, record = picture and picture.absolute(), csv and csv.absolute(), record and record.absolute()
+    if record is None and export is None:
+        yield
+        return
+    from kiks.recording.recorder import RunRecorder
+    from kiks.recording.recording import Recording
+
+    texts = {f"{number}-{path.name}": _text_of(path) for number, path in enumerate(programs, 1)}
     with ExitStack() as at_the_end:
-        if record is not None:
-            from kiks.recording.recorder import RunRecorder
-
-            texts = {f"{number}-{path.name}": _text_of(path) for number, path in enumerate(programs, 1)}
-            at_the_end.enter_context(RunRecorder(sim, record, programs=texts, about={"command": _command_line()}))
-        if picture is not None:
-            from kiks.export.pictures import Picture
-
-            sim.record_paths(points_max=max(POINTS_MAX // max(sim.robot_count, 1), LEAST_POINTS_MAX))
-            at_the_end.callback(lambda: Picture.of_simulation(sim, has_trails=True).save(picture))
-        if csv is not None:
-            file = GrowingFile(csv, "--csv")
-            at_the_end.callback(file.close)
-            rows = _Rows(file, sim.world.state)
-            sim.world.watch(rows)
-            at_the_end.callback(sim.world.unwatch, rows)
-            # The last ticks may not have been asked for yet.
-            at_the_end.callback(sim.sync)
+        if record is None:
+            record = Path(at_the_end.enter_context(TemporaryDirectory(prefix="kiks-")), "run.mcap")
+        file = record.absolute()  # a program may go to another folder
+        if export is not None:
+            path = export.absolute()
+            at_the_end.callback(lambda: Recording(file).export(path))
+        at_the_end.enter_context(RunRecorder(sim, file, programs=texts, about={"command": _command_line()}))
         yield
 
 
@@ -143,34 +120,6 @@ def _text_of(program: Path) -> str:
 
 def _command_line() -> str:
     return shlex.join(["kiks", *sys.argv[1:]])
-
-
-class _Rows:
-    """Writes a row for each robot after each period, as a `kiks.sim.paths.Watcher`.
-
-    Args:
-        file: Where they go.
-        state: The world, as it is at the first row.
-    """
-
-    def __init__(self, file: GrowingFile, state: State) -> None:
-        self._file = file
-        file.write(",".join(COLUMNS) + "\n")
-        self.look(state)
-
-    def look(self, state: State) -> None:
-        """Write a row for each robot."""
-        self.from_tick = self.due_tick = (state.tick_count // TABLE_TICKS + 1) * TABLE_TICKS
-        time_s = f"{state.tick_count / 100:.2f}"
-        robots: Any = state.robots[0]
-        driven_mm = (robots["forwards_mm"] + robots["backwards_mm"]).tolist()
-        places = zip(robots["x_mm"].tolist(), robots["y_mm"].tolist(), robots["heading_rad"].tolist(), strict=True)
-        rows = zip(places, driven_mm, robots["contact_count"].tolist(), strict=True)
-        lines = []
-        for number, ((x_mm, y_mm, heading_rad), way_mm, contacts) in enumerate(rows, 1):
-            heading_deg = math.degrees(heading_rad) % 360
-            lines.append(f"{time_s},{number},{x_mm:.3f},{y_mm:.3f},{heading_deg:.3f},{way_mm:.3f},{contacts}\n")
-        self._file.write("".join(lines))
 
 
 def tell_run(sim: Simulation, doubt: str = "") -> None:

@@ -15,7 +15,7 @@ from kiks.cli.limits import Limits, MaxWall, Seconds
 from kiks.cli.options import Silence, World, is_project, parse_words, say, show_log
 from kiks.cli.outputs import Command as CheckedCommand
 from kiks.cli.outputs import leave_out, output
-from kiks.cli.record import Picture, RecordFile, Table, noting_output, recorded, tell_run
+from kiks.cli.record import ExportFile, RecordFile, noting_output, recorded, tell_run
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import ParameterError, shown
 
@@ -80,9 +80,8 @@ def run(
     ] = None,
     seconds: Seconds = None,
     max_wall: MaxWall = None,
-    picture: Picture = None,
-    csv: Table = None,
     record: RecordFile = None,
+    export: ExportFile = None,
     desk: WithDesk = False,
     no_wait: NoWait = False,
 ) -> None:
@@ -110,7 +109,7 @@ def run(
                 f"a champion must drive all robots alone, but {shown(arguments[0])} follows it. Leave it out."
             )
         leave_out(context, "of a champion", "robot", "thinking", "map_", "save_thinking", "when_silent", "patience")
-        files = (picture, csv, record)
+        files = (record, export)
         seconds, limits = 60.0 if seconds is None else seconds, Limits(None, max_wall)
         run_champion(program, world, seconds, limits, files, on_desk=desk, waits=not no_wait)
         return
@@ -165,7 +164,7 @@ def run(
     )
     texts = [each.file for each in commands if each is not None]
     if desk:
-        with recorded(sim, picture, csv, record, texts):
+        with recorded(sim, record, export, texts):
             # If the command line has changed the kinds of robots, the desk derives the project from the simulation.
             told = None if world.robot else project
             _run_on_desk(
@@ -174,7 +173,7 @@ def run(
         return
     end_as_with_ctrl_c()
     code, doubt = 1, ""
-    with recorded(sim, picture, csv, record, texts):
+    with recorded(sim, record, export, texts):
         try:
             if len(commands) == 1 and commands[0] is not None:
                 code = _run_one(sim, commands[0], mapping, thoughts, limits)

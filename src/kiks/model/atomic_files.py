@@ -184,31 +184,6 @@ def _release(file: IO[bytes]) -> None:
         fcntl.flock(file, fcntl.LOCK_UN)
 
 
-class GrowingFile:
-    """A text file that grows beside the old one and replaces it when it is closed.
-
-    If the disk is full, `write` raises nothing: `close` does.
-
-    Args:
-        path: The file, as for `replace_file`.
-        what: Its name in messages.
-    """
-
-    def __init__(self, path: str | Path, what: str = "The file") -> None:
-        self._path, self._what = path, what
-        with writing(what, path):
-            self._beside = FileBeside(target_of(path_of(path, what)))
-
-    def write(self, text: str) -> None:
-        """Append text."""
-        self._beside.attempt(lambda: self._beside.file.write(text.encode()))
-
-    def close(self) -> None:
-        """Replace the old file."""
-        with writing(self._what, self._path), closing(self._beside):
-            self._beside.attempt(self._beside.take_place)
-
-
 @contextmanager
 def file_beside(path: str | Path, what: str) -> Iterator[Path]:
     """Yield the path of a file for a library to write, which replaces another when it is complete.

@@ -32,6 +32,7 @@ _WHEELS = np.dtype(
         ("right_speed", "i4"),
         ("is_touching", "?"),
         ("contacts", "i8"),
+        ("driven_mm", "f8"),
     ]
 )
 _READINGS = np.dtype([("time_s", "f8"), ("robot", "i4"), ("command", "U1"), ("counts", "i4", (8,))])
@@ -69,7 +70,8 @@ def wheels(log: RecordedLog) -> Table:
     """Return what wheels did, every 40 ms.
 
     Columns are encoder counts since the start [pulses], speeds that the program asked for and that the robot measured
-    [pulses/10 ms], whether it touches something, and how often it has begun to.
+    [pulses/10 ms], whether it touches something, how often it has begun to, and how far it has driven, forwards and
+    backwards together [mm].
     """
     parts = []
     for motion in log.motion():
@@ -81,6 +83,7 @@ def wheels(log: RecordedLog) -> Table:
             rows[f"{side}_setpoint"] = records["speed_setpoint"][:, :, wheel]
             rows[f"{side}_speed"] = records["measured_speed"][:, :, wheel]
         rows["is_touching"], rows["contacts"] = records["is_touching"] != 0, records["contact_count"]
+        rows["driven_mm"] = records["forwards_mm"] + records["backwards_mm"]
         parts.append(rows.ravel())
     return _joined(parts, _WHEELS)
 
