@@ -25,7 +25,7 @@ from kiks.recording import motion as motion_block
 from kiks.recording.check import check_recording
 from kiks.recording.entries import Columns, Entry, block_of
 from kiks.recording.log import HASH_LENGTH
-from kiks.recording.mcap_file import LOG, MOTION, McapFile, McapReader
+from kiks.recording.mcap_file import McapFile, McapReader
 from kiks.recording.recorder import PROGRAMS, RunRecorder
 from kiks.recording.tables import TABLES
 from kiks.sim.run_log import Kind
@@ -50,14 +50,14 @@ class Parts:
         """Return the parts of a recording."""
         reader = McapReader(path)
         parts = cls(dict(reader.attachments), dict(reader.told))
-        for chunk in reader.chunks:
-            data = {topic: data for topic, _, data in reader.messages(chunk)}
-            parts.blocks.append((list(Columns.of_block(data[LOG.name], "log").entries()), data[MOTION.name]))
+        for block in reader.blocks:
+            log, motion = reader.read(block)
+            parts.blocks.append((list(Columns.of_block(log, "log").entries()), motion))
         return parts
 
     def save(self, path: Path) -> None:
         """Write a recording of these parts."""
-        file = McapFile(path, (LOG, MOTION))
+        file = McapFile(path)
         for name, data in self.attachments.items():
             file.attach(name, data, "application/json")
         file.describe("run", self.told)
@@ -66,7 +66,7 @@ class Parts:
             if not isinstance(entries, bytes):
                 time_ns = min(max(entries[0].time_ns, 0), 2**63) if entries else 0
                 log = block_of([value for entry in entries for value in entry])
-            file.write([(LOG, time_ns, log), (MOTION, time_ns, motion)])
+            file.write(time_ns, log, motion)
         file.close()
 
     def with_entry(self, is_meant: Callable[[Entry], bool], change: Callable[[Entry], Entry]) -> Parts:

@@ -11,20 +11,23 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from mcap.writer import CompressionType, Writer
 
 from kiks.export.looks import Colour, body_colour, robot_colour
 from kiks.model.arena import Arena
+from kiks.model.atomic_files import ending_of, file_beside
 from kiks.recording.events import EventReader
-from kiks.recording.mcap_file import McapFile, Topic
+from kiks.recording.mcap_file import ENDING
 from kiks.recording.moments import Moment, moments
 from kiks.recording.recording import Recording
 from kiks.units import NS_PER_S, ns_from_s
+from kiks.version import __version__
 
 PERIOD_NS = NS_PER_S // 10
 """Simulated time between two poses [ns]. Foxglove draws robots between them, too."""
 
-CHUNK_MESSAGES = 1000
-"""Messages that are written as one chunk."""
+PROGRESS_MESSAGES = 1000
+"""Messages between two reports of the progress."""
 
 CELLS_MAX = 200
 """Most cells of the walls' picture in each direction."""
@@ -32,56 +35,8 @@ CELLS_MAX = 200
 HEIGHT_M = 0.03
 """Height of a robot in the picture [m]."""
 
-Message = tuple[Topic, int, bytes]
-"""Topic, time [ns] and data."""
-
-
-def _object(**properties: Any) -> dict[str, Any]:
-    return {"type": "object", "properties": properties}
-
-
-def _list(items: dict[str, Any]) -> dict[str, Any]:
-    return {"type": "array", "items": items}
-
-
-_NUMBER, _WHOLE, _TEXT, _YES_NO = ({"type": kind} for kind in ("number", "integer", "string", "boolean"))
-_TIME = _object(sec=_WHOLE, nsec=_WHOLE)
-_VECTOR = _object(x=_NUMBER, y=_NUMBER, z=_NUMBER)
-_TURN = _object(x=_NUMBER, y=_NUMBER, z=_NUMBER, w=_NUMBER)
-_POSE = _object(position=_VECTOR, orientation=_TURN)
-_COLOUR = _object(r=_NUMBER, g=_NUMBER, b=_NUMBER, a=_NUMBER)
-_BYTES = {"type": "string", "contentEncoding": "base64"}
-_FIELD = _object(name=_TEXT, offset=_WHOLE, type=_WHOLE)
-_DISC = _object(pose=_POSE, size=_VECTOR, bottom_scale=_NUMBER, top_scale=_NUMBER, color=_COLOUR)
-_ARROW = _object(
-    pose=_POSE, shaft_length=_NUMBER, shaft_diameter=_NUMBER, head_length=_NUMBER, head_diameter=_NUMBER, color=_COLOUR
-)
-_ENTITY = _object(
-    timestamp=_TIME, frame_id=_TEXT, id=_TEXT, lifetime=_TIME, frame_locked=_YES_NO, cylinders=_list(_DISC),
-    arrows=_list(_ARROW),
-)  # fmt: skip
-_TRANSFORM = _object(timestamp=_TIME, parent_frame_id=_TEXT, child_frame_id=_TEXT, translation=_VECTOR, rotation=_TURN)
-
-
-def _topic(name: str, schema: str, /, **properties: Any) -> Topic:
-    title = f"foxglove.{schema}"
-    return Topic(name, "json", title, json.dumps({"title": title, **_object(**properties)}))
-
-
-WALLS = _topic(
-    "/walls", "Grid", timestamp=_TIME, frame_id=_TEXT, pose=_POSE, column_count=_WHOLE,
-    cell_size=_object(x=_NUMBER, y=_NUMBER), row_stride=_WHOLE, cell_stride=_WHOLE, fields=_list(_FIELD), data=_BYTES,
-)  # fmt: skip
-SCENE = _topic(
-    "/scene",
-    "SceneUpdate",
-    deletions=_list(_object(timestamp=_TIME, type=_WHOLE, id=_TEXT)),
-    entities=_list(_ENTITY),
-)
-POSES = _topic("/tf", "FrameTransforms", transforms=_list(_TRANSFORM))
-TEXT = _topic("/log", "Log", timestamp=_TIME, level=_WHOLE, message=_TEXT, name=_TEXT, file=_TEXT, line=_WHOLE)
-
-TOPICS = (WALLS, SCENE, POSES, TEXT)
+Message = tuple[str, str, int, dict[str, Any]]
+"""Topic, schema, time [ns] and values."""
 
 _LEVEL_INFO, _TYPE_UINT8, _ALL = 2, 1, 1
 _STILL = {"position": {"x": 0.0, "y": 0.0, "z": 0.0}, "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}}
@@ -97,18 +52,42 @@ def save_foxglove(
         path: The file, which ends in .mcap.
         on_progress: Called now and then with the share that is done.
     """
+    ending_of(path, "a recording for Foxglove", (ENDING,))
     begin_ns, end_ns = recording.log.begin_ns, recording.log.end_ns
-    file, chunk = McapFile(path, TOPICS), []
-    try:
-        for message in merge(_of_moments(recording), _of_events(recording), key=lambda message: message[1]):
-            chunk.append(message)
-            if len(chunk) == CHUNK_MESSAGES:
-                file.write(chunk)
-                on_progress((message[1] - begin_ns) / max(end_ns - begin_ns, 1))
-                chunk = []
-        file.write(chunk)
-    finally:
-        file.close()
+    channels: dict[str, int] = {}
+    with file_beside(path, "a recording for Foxglove") as beside, beside.open("wb") as stream:
+        writer = Writer(stream, compression=CompressionType.LZ4)
+        writer.start(library=f"kiks {__version__}")
+        messages = merge(_of_moments(recording), _of_events(recording), key=lambda message: message[2])
+        for count, (topic, schema, time_ns, values) in enumerate(messages):
+            if topic not in channels:
+                text = json.dumps({"title": f"foxglove.{schema}", **_schema_of(values)})
+                number = writer.register_schema(f"foxglove.{schema}", "jsonschema", text.encode())
+                channels[topic] = writer.register_channel(topic, "json", number)
+            writer.add_message(channels[topic], time_ns, json.dumps(values).encode(), time_ns)
+            if count % PROGRESS_MESSAGES == 0:
+                on_progress((time_ns - begin_ns) / max(end_ns - begin_ns, 1))
+        writer.finish()  # type: ignore[no-untyped-call]
+
+
+def _schema_of(value: Any) -> dict[str, Any]:
+    """Return the JSON schema of the messages that have the form of an example.
+
+    Example:
+        >>> _schema_of({"x": 1.5, "names": ["a"]})["properties"]
+        {'x': {'type': 'number'}, 'names': {'type': 'array', 'items': {'type': 'string'}}}
+    """
+    if isinstance(value, dict):
+        return {"type": "object", "properties": {name: _schema_of(each) for name, each in value.items()}}
+    if isinstance(value, list):
+        return {"type": "array", "items": _schema_of(value[0]) if value else {"type": "object"}}
+    if isinstance(value, Base64):
+        return {"type": "string", "contentEncoding": "base64"}
+    return {"type": {bool: "boolean", int: "integer", float: "number", str: "string"}[type(value)]}
+
+
+class Base64(str):
+    """Bytes as text."""
 
 
 def _of_moments(recording: Recording) -> Iterator[Message]:
@@ -117,12 +96,12 @@ def _of_moments(recording: Recording) -> Iterator[Message]:
     for moment in moments(recording.log, times_ns):
         if moment.saved.arena is not arena:
             arena = moment.saved.arena
-            yield WALLS, moment.time_ns, _walls(arena, moment.time_ns)
+            yield "/walls", "Grid", moment.time_ns, _walls(arena, moment.time_ns)
         things = moment.saved.specs, moment.bodies["number"].tolist()
         if things != drawn:
             drawn = things
-            yield SCENE, moment.time_ns, _scene(moment)
-        yield POSES, moment.time_ns, _poses(moment)
+            yield "/scene", "SceneUpdate", moment.time_ns, _scene(moment)
+        yield "/tf", "FrameTransforms", moment.time_ns, _poses(moment)
 
 
 def _of_events(recording: Recording) -> Iterator[Message]:
@@ -130,14 +109,14 @@ def _of_events(recording: Recording) -> Iterator[Message]:
         if event.kind in ("output", "bookmark"):
             name, time_ns = (f"robot {event.robot}" if event.robot else "bookmark"), ns_from_s(event.time_s)
             line = {"level": _LEVEL_INFO, "message": event.text, "name": name, "file": "", "line": 0}
-            yield TEXT, time_ns, json.dumps({"timestamp": _time(time_ns), **line}).encode()
+            yield "/log", "Log", time_ns, {"timestamp": _time(time_ns), **line}
 
 
 def _time(time_ns: int) -> dict[str, int]:
     return {"sec": time_ns // NS_PER_S, "nsec": time_ns % NS_PER_S}
 
 
-def _walls(arena: Arena, time_ns: int) -> bytes:
+def _walls(arena: Arena, time_ns: int) -> dict[str, Any]:
     """Return the walls as a grid of brightness: 0 for the floor."""
     step = max(-(-max(arena.brightness.shape) // CELLS_MAX), 1)
     rows, columns = (-(-length // step) for length in arena.brightness.shape)
@@ -145,7 +124,7 @@ def _walls(arena: Arena, time_ns: int) -> bytes:
     padded[: arena.brightness.shape[0], : arena.brightness.shape[1]] = arena.brightness
     cells = padded.reshape(rows, step, columns, step).max(axis=(1, 3))
     cell_m = arena.mm_per_cell * step / 1000
-    values = {
+    return {
         "timestamp": _time(time_ns),
         "frame_id": "arena",
         "pose": _STILL,
@@ -154,12 +133,11 @@ def _walls(arena: Arena, time_ns: int) -> bytes:
         "row_stride": columns,
         "cell_stride": 1,
         "fields": [{"name": "brightness", "offset": 0, "type": _TYPE_UINT8}],
-        "data": base64.b64encode(np.ascontiguousarray(cells).tobytes()).decode(),
+        "data": Base64(base64.b64encode(np.ascontiguousarray(cells).tobytes()).decode()),
     }
-    return json.dumps(values).encode()
 
 
-def _scene(moment: Moment) -> bytes:
+def _scene(moment: Moment) -> dict[str, Any]:
     """Return robots, balls and cylinders, each in a frame of its own that `_poses` moves."""
     entities = []
     for number, spec in enumerate(moment.saved.specs, 1):
@@ -180,7 +158,7 @@ def _scene(moment: Moment) -> bytes:
             _disc(f"body {body['number']}", float(body["radius_mm"]) / 1000, body_colour(body), moment.time_ns)
         )
     deletion = {"timestamp": _time(moment.time_ns), "type": _ALL, "id": ""}
-    return json.dumps({"deletions": [deletion], "entities": entities}).encode()
+    return {"deletions": [deletion], "entities": entities}
 
 
 def _disc(name: str, radius_m: float, colour: Colour, time_ns: int) -> dict[str, Any]:
@@ -195,7 +173,7 @@ def _disc(name: str, radius_m: float, colour: Colour, time_ns: int) -> dict[str,
     return {**entity, "frame_locked": True, "cylinders": [disc]}
 
 
-def _poses(moment: Moment) -> bytes:
+def _poses(moment: Moment) -> dict[str, Any]:
     things = [(f"robot {number}", *pose) for number, pose in enumerate(moment.poses.tolist(), 1)]
     things += [(f"body {body['number']}", float(body["x_mm"]), float(body["y_mm"]), 0.0) for body in moment.bodies]
     transforms = [
@@ -203,9 +181,9 @@ def _poses(moment: Moment) -> bytes:
             "timestamp": _time(moment.time_ns),
             "parent_frame_id": "arena",
             "child_frame_id": name,
-            "translation": {"x": round(x_mm / 1000, 5), "y": round(y_mm / 1000, 5), "z": 0},
-            "rotation": {"x": 0, "y": 0, "z": math.sin(heading_rad / 2), "w": math.cos(heading_rad / 2)},
+            "translation": {"x": round(x_mm / 1000, 5), "y": round(y_mm / 1000, 5), "z": 0.0},
+            "rotation": {"x": 0.0, "y": 0.0, "z": math.sin(heading_rad / 2), "w": math.cos(heading_rad / 2)},
         }
         for name, x_mm, y_mm, heading_rad in things
     ]
-    return json.dumps({"transforms": transforms}).encode()
+    return {"transforms": transforms}

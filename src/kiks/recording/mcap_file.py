@@ -11,7 +11,7 @@ import os
 import shutil
 import struct
 import zlib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -73,24 +73,8 @@ def room_of(folder: Path) -> Room:
     return Room(disk.free, min(RESERVE_BYTES, int(disk.total * RESERVE_SHARE)))
 
 
-class Topic(NamedTuple):
-    """A channel of a recording.
-
-    Attributes:
-        name: What viewers call it.
-        encoding: Of its messages.
-        schema: Name of their schema; none if empty.
-        schema_text: The schema, as JSON.
-    """
-
-    name: str
-    encoding: str
-    schema: str = ""
-    schema_text: str = ""
-
-
-LOG = Topic("/kiks/log", "kiks")
-MOTION = Topic("/kiks/motion", "kiks")
+TOPICS = ("/kiks/log", "/kiks/motion")
+"""The channels of a recording; their numbers are 1 and 2."""
 
 
 class McapFile:
@@ -103,10 +87,9 @@ class McapFile:
 
     Args:
         path: The file.
-        topics: The channels.
     """
 
-    def __init__(self, path: str | Path, topics: Iterable[Topic]) -> None:
+    def __init__(self, path: str | Path) -> None:
         ending_of(path, "a recording's file", (ENDING,))
         self._path = path
         with writing("a recording", path):
@@ -122,7 +105,8 @@ class McapFile:
         self._do = self._beside.attempt
         self._writer = Writer(self._beside.file, chunk_size=RECORD_BYTES_MAX, compression=CompressionType.LZ4)
         self._do(lambda: self._writer.start(profile=PROFILE, library=f"kiks {__version__}"))
-        self._channels = {topic: self._channel(topic) for topic in topics}
+        for topic in TOPICS:
+            self._writer.register_channel(topic, "kiks", schema_id=0)
 
     @property
     def has_failed(self) -> bool:
@@ -155,27 +139,24 @@ class McapFile:
         """Write texts by name."""
         self._do(lambda: self._writer.add_metadata(name, dict(values)))
 
-    def write(self, messages: list[tuple[Topic, int, bytes]], *, keeps_earlier: bool = False) -> None:
-        """Write messages as one chunk, and take the place.
+    def write(self, begin_ns: int, log: bytes, motion: bytes, *, keeps_earlier: bool = False) -> None:
+        """Write a chunk, and take the place.
 
         Args:
-            messages: The topic of each, its time [ns] and its data.
+            begin_ns: Its time [ns].
+            log: A block of entries.
+            motion: A block of samples.
             keeps_earlier: Whether not to take that of an earlier file, or any on a full disk.
         """
 
         def add_all() -> None:
-            for topic, time_ns, data in messages:
-                self._writer.add_message(self._channels[topic], time_ns, data, time_ns)
+            for channel, data in enumerate((log, motion), 1):
+                self._writer.add_message(channel, begin_ns, data, begin_ns)
             self._writer.flush()  # type: ignore[no-untyped-call]
 
         self._do(add_all)
         if not (keeps_earlier and (self._beside.has_earlier or self.is_disk_full)):
             self.take_place()
-
-    def _channel(self, topic: Topic) -> int:
-        encoding = "jsonschema" if topic.schema else ""
-        schema = self._writer.register_schema(topic.schema, encoding, topic.schema_text.encode()) if encoding else 0
-        return self._writer.register_channel(topic.name, topic.encoding, schema)
 
     def close(self) -> None:
         """Write the index, and close the file; it goes if it never took its place."""
@@ -223,7 +204,6 @@ class McapReader:
         self.chunks: list[FoundChunk] = []
         self.attachments: dict[str, bytes] = {}
         self.told: dict[str, str] = {}
-        self._topics: dict[int, str] = {}
         self.is_whole = False
         with self._open() as stream:
             if stream.read(len(_MAGIC)) != _MAGIC:
@@ -282,20 +262,9 @@ class McapReader:
 
     def read(self, block: int) -> tuple[bytes, bytes]:
         """Return log and motion of a chunk; nothing for what it has not."""
-        parts = {name: data for name, _, data in self.messages(self.chunks[block])}
-        return parts.get(LOG.name, b""), parts.get(MOTION.name, b"")
-
-    def messages(self, chunk: FoundChunk) -> Iterator[tuple[str, int, bytes]]:
-        """Yield topic, time [ns] and data of each message of a chunk."""
-        if not self._topics:
-            # The first chunk says which channels there are.
-            for record in self._inside(self.chunks[0]):
-                if record[0] == Opcode.CHANNEL:
-                    self._topics.update((each.id, each.topic) for each in self._records(record))
-        for record in self._inside(chunk):
-            if record[0] == Opcode.MESSAGE:
-                _, _, channel, _, time_ns, _ = _MESSAGE.unpack_from(record)
-                yield self._topics.get(channel, ""), time_ns, record[_MESSAGE.size :]
+        messages = [record for record in self._inside(self.chunks[block]) if record[0] == Opcode.MESSAGE]
+        parts = {_MESSAGE.unpack_from(record)[2]: record[_MESSAGE.size :] for record in messages}
+        return parts.get(1, b""), parts.get(2, b"")
 
     def _inside(self, chunk: FoundChunk) -> Iterator[bytes]:
         """Yield the records in a chunk, each with its head. None is smaller than an empty message."""

@@ -20,7 +20,7 @@ from kiks.errors import ParameterError
 from kiks.model.atomic_files import path_of
 from kiks.model.checks import check_kind
 from kiks.recording.entries import block_of
-from kiks.recording.mcap_file import LOG, MOTION, McapFile
+from kiks.recording.mcap_file import McapFile
 from kiks.recording.motion import MotionWatcher
 from kiks.sim.read_completion import NEVER_NS
 from kiks.sim.run_log import ACT, CHECK, MARK, STATE, TEXT, Clock, NotedEntry
@@ -260,7 +260,7 @@ class RunRecorder:
     ) -> None:
         self.path = path_of(path, "a recording's file").absolute()
         self._sim = sim
-        self._file = McapFile(path, (LOG, MOTION))
+        self._file = McapFile(path)
         self._is_open = True
         self._error: ParameterError | None = None
         for name, text in (programs or {}).items():
@@ -325,7 +325,7 @@ class RunRecorder:
     def write(self, begin_ns: int, log: bytes, motion: bytes) -> bool:
         """Write a chunk; see `Store`."""
         has_begun = (self._sim.now_ns, self._sim.world.change_count) != self._began
-        self._file.write([(LOG, begin_ns, log), (MOTION, begin_ns, motion)], keeps_earlier=not has_begun)
+        self._file.write(begin_ns, log, motion, keeps_earlier=not has_begun)
         if self._file.has_failed or self._file.is_disk_full:
             self._end()
             if self._error is None:
