@@ -86,7 +86,7 @@ def test_files_that_are_there_stay_without_force(tmp_path, there, command):
         (("maze", ""), "OUT must go to a file that can be written, but '.' cannot (it is a folder)"),
         (("maze", "no/such/folder/maze.toml"), "but 'no/such/folder/maze.toml' cannot (No such file or directory)"),
         (("maze", "m.toml", "--path-mm", 80), "path_mm must be a whole number from 97 to 10000, but it was 80."),
-        (("new", "n.toml", "--width-mm", 50, "--height-mm", 200), "width_mm must be a whole number from 100"),
+        (("new", "n.toml", "--width-mm", 50, "--height-mm", 200), "width_mm must be at least 100"),
         (("new", "n.toml", "--width-mm", 200, "--height-mm", 200, "--brightness", "wod"), "Did you mean 'wood'?"),
         (("new", "n.toml", "--width-mm", 200, "--height-mm", 200, "--brightness=-3"), "but it was -3. 1 is black"),
         (("new", "n.toml", "--width-mm", 200, "--height-mm", 200, "--brightness=--3"), "but it was '--3'."),

@@ -305,12 +305,12 @@ def test_what_a_measure_needs_must_be_sensed() -> None:
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: kiks.measures.wall_following("top"), "side must be one of 'left', 'right', but it was 'top'"),
-        (lambda: kiks.measures.beside_wall_share(counts=1024), "counts must be a number from 1 to 1023"),
+        (lambda: kiks.measures.wall_following("top"), "side must be 'left' or 'right', but it was 'top'"),
+        (lambda: kiks.measures.beside_wall_share(counts=1024), "counts must be at most 1023"),
         (lambda: kiks.measures.coverage(kiks.Arena.box(2000, 2000), square_mm=1), "at most 1000000 squares, but 1 mm"),
-        (lambda: kiks.measures.goal_mm("here", 0), "x_mm must be a number from -1"),
-        (lambda: kiks.measures.gathered(0, 0, radius_mm=-1), "radius_mm must be a number from 0"),
-        (lambda: kiks.measures.largest_group(-1), "radius_mm must be a number from 0"),
+        (lambda: kiks.measures.goal_mm("here", 0), "x_mm must be a number, but it was 'here'"),
+        (lambda: kiks.measures.gathered(0, 0, radius_mm=-1), "radius_mm must be at least 0"),
+        (lambda: kiks.measures.largest_group(-1), "radius_mm must be at least 0"),
     ],
 )
 def test_arguments_out_of_range(make: Any, message: str) -> None:

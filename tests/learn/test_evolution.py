@@ -247,8 +247,8 @@ def test_the_favourite_of_an_own_algorithm_is_tried() -> None:
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: Own(asked=np.zeros((8, 17))), r"candidates of ask\(\) must be numbers of the shape \[any, 18\]"),
-        (lambda: Own(asked=np.zeros(18)), r"candidates of ask\(\) must be numbers of the shape"),
+        (lambda: Own(asked=np.zeros((8, 17))), r"candidates of ask\(\) must be finite numbers \[any, 18\]"),
+        (lambda: Own(asked=np.zeros(18)), r"candidates of ask\(\) must be finite numbers"),
         (lambda: Own(asked=np.full((8, 18), np.nan)), r"candidates of ask\(\) must be finite"),
         (lambda: Own(asked=None), r"candidates of ask\(\) must be finite"),
         (lambda: Own(count=0), r"candidates of ask\(\) must be at least one"),
@@ -262,13 +262,13 @@ def test_wrong_algorithms_are_errors(make: Any, message: str) -> None:
 
 
 def test_wrong_later_answers_of_an_algorithm_are_errors() -> None:
-    with pytest.raises(ParameterError, match=r"of the shape \[4, 18\], but their shape was \(8, 18\)"):
+    with pytest.raises(ParameterError, match=r"finite numbers \[4, 18\], but it had the shape \[8, 18\]"):
         kiks.Evolution(small(), Own(), population=4)
     own = Own()
     evolution = kiks.Evolution(small(), own)
     evolution.tell(np.zeros(8))
     own.count = 9
-    with pytest.raises(ParameterError, match=r"of the shape \[8, 18\], but their shape was \(9, 18\)"):
+    with pytest.raises(ParameterError, match=r"finite numbers \[8, 18\], but it had the shape \[9, 18\]"):
         evolution.ask()
     for best in (np.zeros(17), np.full(18, np.nan)):
         evolution = kiks.Evolution(small(), OwnWithFavourite(best=best))
@@ -395,7 +395,7 @@ def test_a_champion_drives_on_a_serial_line_as_in_the_batch() -> None:
         ("champion = 1", "champion = 9", "champion must be 1, but it was 9. It is the version of the format"),
         ('kind = "linear"', 'kind = "linaer"', "Did you mean 'linear'"),
         ("parameters = [", "parameters = [\n    1.0,", "must be given 18 parameters, but got 19"),
-        ("period_s = 0.06", "period_s = -1", "timing.period_s must be a number from 0 to 1000, but it was -1"),
+        ("period_s = 0.06", "period_s = -1", "timing.period_s must be at least 0, but it was -1"),
         ("seed = 3", "sed = 3", "Did you mean 'seed'"),
         ('robot = "khepera"\n', "", "robot must be given, but it is missing"),
         ("champion = 1", "champion = ", "must be TOML in UTF-8"),

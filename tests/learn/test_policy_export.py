@@ -219,16 +219,16 @@ def test_exploration_changed_spaces_and_other_functions_are_refused() -> None:
         ("model.zip", "policy must be a model or a policy .* but it was 'model.zip'"),
         ([], "but it had no layer"),
         ([np.zeros((2, 8))], "a member of the list was"),
-        ([(np.zeros((2, 8)), np.zeros(3))], r"the biases of layer 1 must be numbers of the shape \[2\]"),
+        ([(np.zeros((2, 8)), np.zeros(3))], r"the biases of layer 1 must be finite numbers \[2\]"),
         ([(np.zeros((2, 16)), np.zeros(2))], r"with 8 inputs, but it was \(2, 16\). Transpose weights"),
         ([(np.zeros((8, 2)), np.zeros(8))], "with 8 inputs"),
         ([(np.zeros((4, 8)), np.zeros(4))], "must have two outputs, .* but it had 4"),
         ([(np.full((2, 8), np.nan), np.zeros(2))], "the weights of layer 1 must be finite numbers"),
-        ([("ab", np.zeros(2))], "the weights of layer 1 must be finite numbers, but they were 'ab'"),
+        ([("ab", np.zeros(2))], "the weights of layer 1 must be finite numbers \\[any, any\\], but it was 'ab'"),
         (LAYERS, "activation must be 'tanh' or 'relu', but it was left out"),
         (network((8, 513, 2)), "activation must be"),
         ({"scale": np.zeros(2)}, "it has 'scale'. Give the part that maps observations to actions"),
-        ({"0.weight": np.zeros(2)}, "the weights of layer 1 must be numbers of the shape"),
+        ({"0.weight": np.zeros(2)}, "the weights of layer 1 must be finite numbers"),
         ({3: np.zeros(2)}, "policy must be a model or a policy"),
     ],
 )
@@ -253,7 +253,7 @@ def test_options_that_do_not_fit_are_errors(options: dict[str, Any], message: st
 
 
 def test_a_policy_of_too_many_units_is_an_error() -> None:
-    with pytest.raises(kiks.ParameterError, match=r"hidden\[0\] must be a whole number from 1 to 512, but it was 513"):
+    with pytest.raises(kiks.ParameterError, match=r"hidden\[0\] must be at most 512, but it was 513"):
         kiks.champion_of_policy(network((8, 513, 2)), "Avoid", activation="relu")
 
 

@@ -154,12 +154,12 @@ def test_a_box_has_its_walls():
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"width_mm": 300.5}, "width_mm must be a whole number .* but it was 300.5"),
-        ({"height_mm": "1"}, "height_mm must be a whole number .* but it was '1'"),
+        ({"width_mm": 300.5}, "width_mm must be a whole number, but it was 300.5"),
+        ({"height_mm": "1"}, "height_mm must be a whole number, but it was '1'"),
         ({"wall_mm": 100}, "wall_mm must be a whole number from 0 to 99, but it was 100"),
         ({"rounded_mm": 91}, "rounded_mm must be a whole number from 0 to 90, but it was 91"),
-        ({"brightness": 0}, "brightness must be a whole number from 1 to 255, but it was 0. 1 is black, 255 white"),
-        ({"brightness": True}, "brightness must be a whole number from 1 to 255, but it was True"),
+        ({"brightness": 0}, "brightness must be at least 1, but it was 0. 1 is black, 255 white"),
+        ({"brightness": True}, "brightness must be a whole number, but it was True"),
         ({"brightness": "woods"}, r"one of \['white', 'wood', .*\], but it was 'woods'. Did you mean 'wood'"),
     ],
 )
@@ -269,16 +269,16 @@ def test_an_arena_has_floor():
         (
             {"lamps": [(50, 50, 0.0)]},
             ParameterError,
-            r"lamp 1: power_w must be a number above 0 .* but it was 0.0. .* Switch",
+            r"lamp 1: power_w must be greater than 0, but it was 0.0. .* Switch",
         ),
         ({"balls": [(1, 1)]}, ArenaError, r"ball 1 must stand on floor"),
         ({"cylinders": [(50, 50), (1, 1)]}, ArenaError, r"cylinder 2 must stand on floor"),
         (
             {"starts": [(math.nan, 50, 0)]},
             ParameterError,
-            r"start 1: x_mm must be a number from -1e9 to 1e9, but it was nan",
+            r"start 1: x_mm must be .* but it was nan",
         ),
-        ({"balls": [("a", 50)]}, ParameterError, r"ball 1: x_mm must be a number from -1e9 to 1e9, but it was 'a'"),
+        ({"balls": [("a", 50)]}, ParameterError, r"ball 1: x_mm must be a number, but it was 'a'"),
     ],
 )
 def test_entries_stand_where_they_can(changes, error, words):

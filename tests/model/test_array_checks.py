@@ -71,8 +71,8 @@ def test_what_numpy_saves_is_read(tmp_path: Path, compress: bool) -> None:
         ({"row": [1, 2, 3j]}, "but it was of type 'complex128'."),
         ({"row": ["a", "b", "c"]}, "but it was of type '<U1'."),
         ({"row": [None]}, "but it was of type 'object'."),
-        ({"row": np.zeros(3, "datetime64[s]")}, "must be a whole .npz file of NumPy, but: row has no head, or one"),
-        ({"row": np.zeros(3, [("a", "f8")])}, "but: row has no head, or one that tells of other things than numbers."),
+        ({"row": np.zeros(3, "datetime64[s]")}, "but it was of type 'datetime64[s]'."),
+        ({"row": np.zeros(3, [("a", "f8")])}, "but it was of type \"[('a', '<f8')]\"."),
         ({"row": []}, "but it had the shape [0]."),
         ({"row": 5.0}, "but it had the shape []."),
         (
@@ -114,19 +114,22 @@ HOSTILE = {
     "a bomb of lzma": (npz(zipfile.ZIP_LZMA, row=npy("(3,)", body=bytes(10**7))), "another way"),
     "a bomb of bzip2": (npz(zipfile.ZIP_BZIP2, row=npy("(3,)", body=bytes(10**7))), "another way"),
     "a bomb that says so": (npz(row=npy("(1250000,)", body=bytes(10**7))), "1250000 of them, more than 1000."),
-    "a bomb that does not": (npz(row=npy("(3,)", body=bytes(10**7))), "row must have 24 bytes, but has more"),
-    "too short": (npz(row=npy("(3,)", body=bytes(23))), "row must have 24 bytes, but has fewer"),
+    "a bomb that does not": (npz(row=npy("(3,)", body=bytes(10**7))), "as many bytes as its head says, but it has 25"),
+    "too short": (npz(row=npy("(3,)", body=bytes(23))), "as many bytes as its head says, but it has 23"),
     "10^12 numbers": (npz(row=npy("(1000000000000,)")), "1000000000000 of them"),
     "10^25 numbers": (npz(row=npy(f"({10**25},)")), f"{10**25} of them"),
     "10^500 numbers": (npz(row=npy(f"({10**500},)")), "of them, more than 1000."),
     "10^12 in a table": (npz(row=ROW, table=npy("(1000000, 1000000)")), "but it had the shape [1000000, 1000000]"),
-    "fewer than none": (npz(row=npy("(-1,)")), "no head"),
+    "fewer than none": (npz(row=npy("(-1,)")), "had the shape [-1]"),
     "a pickle": (npz(row=npy("(1,)", "|O", b"\x80\x04K\1.")), "of type 'object'"),
-    "a program": (npz(row=npy("(__import__('os').abort(),)")), "no head"),
-    "brackets": (npz(row=b"\x93NUMPY\1\0" + struct.pack("<H", 9000) + b"(" * 9000), "no head"),
-    "a long head": (npz(row=b"\x93NUMPY\2\0" + struct.pack("<I", 2**32 - 1) + b"{" * 1000), "no head"),
-    "a head of blanks": (npz(row=npy("(3,)" + " " * 9000, body=bytes(24))), "no head"),
-    "no mark": (npz(row=ROW[1:]), "no head"),
+    "a program": (npz(row=npy("(__import__('os').abort(),)")), "must be a whole .npz file"),
+    "brackets": (npz(row=b"\x93NUMPY\1\0" + struct.pack("<H", 9000) + b"(" * 9000), "must be a whole .npz file"),
+    "a long head": (
+        npz(row=b"\x93NUMPY\2\0" + struct.pack("<I", 2**32 - 1) + b"{" * 1000),
+        "must be a whole .npz file",
+    ),
+    "a head of blanks": (npz(row=npy("(3,)" + " " * 9000, body=bytes(24))), "must be a whole .npz file"),
+    "no mark": (npz(row=ROW[1:]), "must be a whole .npz file"),
     "a type that is none": (npz(row=npy("(3,)", "<f3", bytes(9))), "f3"),
 }
 
@@ -165,7 +168,7 @@ def test_damaged_files_are_read_or_refused(tmp_path_factory: pytest.TempPathFact
     assert all(np.isfinite(array).all() for array in found.values())
 
 
-kinds = st.sampled_from([np.float64, np.float32, np.float16, np.int8, np.int64, np.uint64, np.bool_])
+kinds = st.sampled_from([np.float64, np.float32, np.float16, np.int8, np.int64, np.uint64])
 
 
 @given(kinds.flatmap(lambda kind: arrays(kind, st.sampled_from([(0,), (2,), (3,), (2, 3), ()]))), st.booleans())

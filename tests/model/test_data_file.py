@@ -46,29 +46,29 @@ GOOD = {"name": "a", "wheel": [{"radius_mm": 8}], "spare": {"radius_mm": 8, "sid
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"name": 3}, "name must be a text of up to 1000 characters, but it was 3."),
-        ({"name": "a\0"}, "name must be a text of up to 1000 characters"),
+        ({"name": 3}, "name must be a text, but it was 3."),
+        ({"name": "a\0"}, "name must match pattern"),
         ({"wheel": [{}]}, "wheel 1: radius_mm must be given, but it is missing. A Khepera's is 8."),
-        ({"wheel": 1}, "wheel must be a list of tables, but it was 1."),
+        ({"wheel": 1}, "wheel must be a list, but it was 1."),
         ({"wheel": [{"radius_mm": 8}, 2]}, "wheel 2 must be a table, but it was 2."),
-        ({"spare": {"radius_mm": 0}}, "spare.radius_mm must be a number above 0 and at most 50, but it was 0. A Khep"),
-        ({"spare": {"radius_mm": float("nan")}}, "spare.radius_mm must be a number above 0 and at most 50, but it was"),
-        ({"spare": {"radius_mm": 10**400}}, "spare.radius_mm must be a number above 0 and at most 50, but it was 1000"),
+        ({"spare": {"radius_mm": 0}}, "spare.radius_mm must be greater than 0, but it was 0. A Khep"),
+        ({"spare": {"radius_mm": float("nan")}}, "spare.radius_mm must be a finite number, but it was nan"),
+        ({"spare": {"radius_mm": 10**400}}, "spare.radius_mm must be a number, but it was 1000"),
         ({"spare": {"radius_mm": True}}, "but it was True."),
-        ({"spare": {"radius_mm": 1, "side": "rihgt"}}, "one of 'left', 'right', but it was 'rihgt'. Did you mean 'rig"),
+        ({"spare": {"radius_mm": 1, "side": "rihgt"}}, "'left' or 'right', but it was 'rihgt'. Did you mean 'rig"),
         ({"spare": {"radius": 8}}, "spare must have known keys only, but it has 'radius'. Did you mean 'radius_mm'?"),
         (
             {"spare": {"radius_mm": 8, "gains": [1, 10]}},
-            "spare.gains[1] must be a whole number from 0 to 9, but it was",
+            "spare.gains[1] must be at most 9, but it was 10.",
         ),
-        ({"spare": {"radius_mm": 8, "gains": [1] * 4}}, "spare.gains must be a list of 0 to 3 values, each a whole"),
+        ({"spare": {"radius_mm": 8, "gains": [1] * 4}}, "spare.gains must have at most 3 items, but it was"),
         ({"spare": {"radius_mm": 8, "side": "right", "gains": [1]}}, "gains must be those of the left wheel, but"),
         ({"wheel": [{"radius_mm": 8, "side": "right", "gains": [1]}]}, "wheel 1: gains must be those of the left"),
         (
             {"nmae": 1},
             "the file must have known keys only, but it has 'nmae'. Did you mean 'name'? Known are name, wheel",
         ),
-        ({"place": {"x_mm": 1, "y_mm": -1}}, "place.y_mm must be a number of at least 0, but it was -1."),
+        ({"place": {"x_mm": 1, "y_mm": -1}}, "place.y_mm must be at least 0, but it was -1."),
     ],
 )
 def test_one_line_says_what_is_wrong(changes: dict[str, object], words: str) -> None:
@@ -82,7 +82,7 @@ def test_one_line_says_what_is_wrong(changes: dict[str, object], words: str) -> 
 def test_code_and_files_make_the_same_records() -> None:
     cart = check(Cart, GOOD, "x")
     assert cart == Cart("a", (Wheel(8),), Wheel(8, "right"))
-    with pytest.raises(ParameterError, match=r"^radius_mm must be a number above 0 and at most 50, but it was 99\."):
+    with pytest.raises(ParameterError, match=r"^radius_mm must be at most 50, but it was 99\."):
         replace(cart.wheel[0], radius_mm=99)
     with pytest.raises(ParameterError, match=r"^gains must be those of the left wheel"):
         Wheel(8, "right", (1,))

@@ -391,7 +391,7 @@ def test_numbers_that_pass_are_a_finite_array_of_their_own(hostile: Any) -> None
 
 
 def test_numbers_of_another_shape_are_named() -> None:
-    with pytest.raises(KiksError, match=r"it must be numbers of the shape \[any, 4\], but their shape was \(2, 3\)"):
+    with pytest.raises(KiksError, match=r"it must be finite numbers \[any, 4\], but it had the shape \[2, 3\]"):
         check_numbers("it", np.zeros((2, 3)), (None, 4))
 
 

@@ -29,7 +29,7 @@ def schema_of(kind: FileKind) -> JsonSchemaValue:
 
     from kiks.learn.tasks import TaskFile
     from kiks.model.arena_file import ArenaFile
-    from kiks.model.data_file import adapter, descriptions
+    from kiks.model.data_file import adapter
     from kiks.model.project import ProjectFile
     from kiks.model.robot import RobotSpec
 
@@ -45,12 +45,6 @@ def schema_of(kind: FileKind) -> JsonSchemaValue:
 
         def field_title_should_be_set(self, schema: Any) -> bool:
             return False
-
-        def dataclass_schema(self, schema: Any) -> JsonSchemaValue:
-            made = super().dataclass_schema(schema)
-            for name, text in descriptions(schema["cls"]).items():
-                made["properties"][name]["description"] = text
-            return made
 
     models = {"robot": RobotSpec, "arena": ArenaFile, "project": ProjectFile, "task": TaskFile}
     made = adapter(models[kind]).json_schema(schema_generator=Generator)

@@ -2,14 +2,12 @@
 
 No invalid number reaches the engine, and no file takes more memory than its declared arrays may. `Numbers` declares an
 array, and `check_array` checks it. `read_arrays` reads an .npz: the header of each array first, and then as many bytes
-as the header announces, if that is not too many. Source: NumPy's NEP 1 for the head: a mark, the version, a length, and
-a dict in ASCII, here as NumPy itself writes it.
+as the header announces, if that is not too many.
 """
 
 from __future__ import annotations
 
 import math
-import re
 import sys
 import zipfile
 from collections.abc import Mapping
@@ -20,6 +18,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from numpy.lib import format as npy
 
 from kiks.errors import KiksError, ParameterError, figure, shown
 from kiks.model.data_file import one_line, read_file
@@ -29,9 +28,6 @@ NUMBERS_MAX = 1 << 24
 
 _EXACT_MAX = 2.0**53  # above it, floats leave whole numbers out
 _HEAD_BYTES_MAX = 1 << 10
-_HEAD = re.compile(
-    r"\{'descr': '([<>|=]?[a-zA-Z]\d*)', 'fortran_order': (True|False), 'shape': \(((?:\d+, ?)*\d*)\),? ?\}\s*"
-)
 
 
 @dataclass(frozen=True)
@@ -39,7 +35,8 @@ class Numbers:
     """The rule of an array: finite numbers in a range, along axes.
 
     Args:
-        axes: The length of each axis, or its name: arrays of a file have equal lengths along axes of the same name.
+        axes: The length of each axis, None for any, or its name: arrays of a file have equal lengths along axes of the
+            same name. Any shape if left out.
         low: Least number.
         high: Largest number.
         is_whole: Whether they must be whole numbers, of whatever type.
@@ -50,7 +47,7 @@ class Numbers:
         'whole numbers from 0 to 1023 [gap, 8]'
     """
 
-    axes: tuple[int | str, ...]
+    axes: tuple[int | str | None, ...] | None = None
     low: float = -sys.float_info.max
     high: float = sys.float_info.max
     is_whole: bool = False
@@ -60,24 +57,21 @@ class Numbers:
         kind = "whole numbers" if self.is_whole else "finite numbers"
         ends = ((word, end) for word, end in (("from", self.low), ("to", self.high)) if abs(end) < sys.float_info.max)
         span = "".join(f" {word} {figure(end)}" for word, end in ends)
-        return f"{kind}{span} [{', '.join(map(str, self.axes))}]"
+        axes = (
+            "" if self.axes is None else f" [{', '.join('any' if each is None else str(each) for each in self.axes)}]"
+        )
+        return f"{kind}{span}{axes}"
 
 
 def check_numbers(name: str, numbers: Any, shape: tuple[int | None, ...] | None = None) -> npt.NDArray[np.float64]:
-    """Return finite numbers as a float64 array.
+    """Return finite numbers as a new float64 array.
 
     Args:
         name: What they are called in the message.
         numbers: An array, or a list of numbers.
         shape: The shape that it must have, None for any length along an axis; any shape if left out.
     """
-    values = array_of(numbers)
-    if values is None or not np.isfinite(values).all():
-        raise ParameterError(f"{name} must be finite numbers, but they were {shown(numbers)}.")
-    if shape is not None and not _fits(values.shape, shape):
-        wanted = "[" + ", ".join("any" if length is None else str(length) for length in shape) + "]"
-        raise ParameterError(f"{name} must be numbers of the shape {wanted}, but their shape was {values.shape}.")
-    return values
+    return check_array(numbers, Numbers(shape), name)
 
 
 def array_of(numbers: Any) -> npt.NDArray[np.float64] | None:
@@ -90,13 +84,8 @@ def array_of(numbers: Any) -> npt.NDArray[np.float64] | None:
         return None
 
 
-def _fits(given: tuple[int, ...], wanted: tuple[int | None, ...]) -> bool:
-    pairs = zip(given, wanted, strict=False)
-    return len(given) == len(wanted) and all(length in (None, there) for there, length in pairs)
-
-
 def check_array(values: object, rule: Numbers, name: str, counts: dict[str, int] | None = None) -> npt.NDArray[Any]:
-    """Return an array after a check against a rule.
+    """Return a new array after a check against a rule.
 
     Args:
         values: An array, or anything that NumPy converts to one.
@@ -105,24 +94,25 @@ def check_array(values: object, rule: Numbers, name: str, counts: dict[str, int]
         counts: Known lengths of named axes; the others are added.
 
     Returns:
-        int64 for whole numbers, else float64; the array itself if it is of that type.
+        int64 for whole numbers, else float64.
     """
     try:
         given = np.asarray(values)
     except (TypeError, ValueError, OverflowError):
-        raise _broken(name, rule, f"was {shown(values)}") from None
+        given = np.array(None)
+    if given.dtype.kind not in "iuf" and not isinstance(values, np.ndarray):
+        raise _broken(name, rule, f"was {shown(values)}")
     _check_form(given.dtype, given.shape, rule, name, {} if counts is None else counts)
-    is_float = given.dtype.kind == "f"
-    if is_float:
+    if given.dtype.kind == "f":
         with np.errstate(over="ignore"):
             given = given.astype(np.float64, copy=False)
     is_good = (given >= rule.low) & (given <= rule.high)
-    if rule.is_whole and is_float:
+    if rule.is_whole and given.dtype.kind == "f":
         is_good &= (given == np.rint(given)) & (np.abs(given) <= _EXACT_MAX)
     if not is_good.all():
         place = tuple(int(part) for part in np.unravel_index(int(np.argmin(is_good)), given.shape))
         raise _broken(name, rule, f"was {given[place].item()!r}{f' at {list(place)}' if place else ''}")
-    return given.astype(np.int64 if rule.is_whole else np.float64, copy=False)
+    return np.array(given, np.int64 if rule.is_whole else np.float64, order="C")
 
 
 def read_arrays(
@@ -170,31 +160,30 @@ def _array(
     if archive.getinfo(f"{name}.npy").compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
         raise ValueError(f"{name} is compressed in another way than NumPy does")  # those unpack without a limit
     with archive.open(f"{name}.npy") as stream:
-        start = stream.read(8)
-        length = int.from_bytes(stream.read(2 if start[6:7] == b"\1" else 4), "little")
-        head = _HEAD.fullmatch(stream.read(min(length, _HEAD_BYTES_MAX)).decode("latin-1"))
-        if start[:6] != b"\x93NUMPY" or head is None:
-            raise ValueError(f"{name} has no head, or one that tells of other things than numbers")
-        kind, order, sides = np.dtype(head[1]), "F" if head[2] == "True" else "C", head[3]
-        shape = tuple(int(side) for side in sides.split(",") if side.strip())
+        is_first = npy.read_magic(stream) == (1, 0)
+        head = (npy.read_array_header_1_0 if is_first else npy.read_array_header_2_0)(stream, _HEAD_BYTES_MAX)
+        shape, is_fortran, kind = head
         _check_form(kind, shape, rule, name, counts)
-        if math.prod(shape) > numbers_max:
-            raise _broken(name, rule, f"would be {shown(math.prod(shape))} of them, more than {numbers_max}")
-        size = math.prod(shape) * kind.itemsize
-        body = stream.read(size + 1)
-    if len(body) != size:
-        raise ValueError(f"{name} must have {size} bytes, but has {'more' if len(body) > size else 'fewer'}")
-    return np.frombuffer(body, kind).reshape(shape, order=order)  # type: ignore[call-overload, no-any-return]
+        if (count := math.prod(shape)) > numbers_max:
+            raise _broken(name, rule, f"would be {shown(count)} of them, more than {numbers_max}")
+        # One byte more than the head announces: NumPy's own reader would ask for as much memory as that says.
+        body = stream.read(count * kind.itemsize + 1)
+    if len(body) != count * kind.itemsize:
+        raise ValueError(f"{name} must have as many bytes as its head says, but it has {len(body)}")
+    return np.frombuffer(body, kind).reshape(shape, order="F" if is_fortran else "C")
 
 
 def _check_form(kind: np.dtype[Any], shape: tuple[int, ...], rule: Numbers, name: str, counts: dict[str, int]) -> None:
     """Check type and shape, and learn how long axes with names are."""
-    if kind.kind not in "biuf":
+    if kind.kind not in "iuf":
         raise _broken(name, rule, f"was of type {shown(str(kind))}")
-    known = [counts.get(axis) if isinstance(axis, str) else axis for axis in rule.axes]
-    if len(shape) != len(known) or any(
-        side != count if count is not None else side < 1 for side, count in zip(shape, known, strict=True)
-    ):
+    if rule.axes is None:
+        return
+    fits = len(shape) == len(rule.axes) and all(
+        side == counts.get(axis, max(side, 1)) if isinstance(axis, str) else axis in (None, side)
+        for side, axis in zip(shape, rule.axes, strict=True)
+    )
+    if not fits:
         told = "".join(f", {axis} = {counts[axis]}" for axis in rule.axes if isinstance(axis, str) and axis in counts)
         raise _broken(name, rule, f"had the shape {shown(list(shape))}{told}")
     counts |= {axis: side for axis, side in zip(rule.axes, shape, strict=True) if isinstance(axis, str)}

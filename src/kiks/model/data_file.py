@@ -2,8 +2,8 @@
 
 A file that users write or receive is read completely or not at all. For any error, one line names the file, the key,
 the rule, the value and what to do. No file takes much more memory than its size. A model is a class under `record`,
-with the rules beside its fields (pydantic). `check` creates one from a table. The declaration gives the words of a
-message: type and bounds give the rule, the description gives the advice.
+with the rules beside its fields (pydantic). `check` creates one from a table. Messages are pydantic's, with a field's
+description as the advice.
 """
 
 from __future__ import annotations
@@ -14,13 +14,12 @@ import os
 import re
 import tomllib
 import types
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import (
     Annotated,
     Any,
-    Literal,
     NamedTuple,
     TypeVar,
     Union,
@@ -33,10 +32,9 @@ from typing import (
 import numpy as np
 import pydantic.dataclasses
 from pydantic import ConfigDict, Field, Strict, Tag, TypeAdapter, ValidationError
-from pydantic.fields import FieldInfo
 from pydantic_core import core_schema
 
-from kiks.errors import SHOWN_MAX, KiksError, ParameterError, figure, nearest, shown
+from kiks.errors import SHOWN_MAX, KiksError, ParameterError, nearest, shown
 
 BYTES_MAX = 4 << 20
 """Default limit of a file's size [bytes]."""
@@ -52,7 +50,7 @@ COORDINATE_MAX = 1e9
 
 
 class Rule(NamedTuple):
-    """The words for a field's rule, if its type and bounds do not give them."""
+    """The words for a field's rule, if those of pydantic do not say it well."""
 
     text: str
 
@@ -121,13 +119,6 @@ def check(
 def adapter(model: Any) -> TypeAdapter[Any]:
     """Return the object that validates a model and describes it as a JSON schema."""
     return TypeAdapter(model)
-
-
-def descriptions(kind: Any) -> dict[str, str]:
-    """Return the rule and the description of each field of a record, as text."""
-    places = {name: _declared(hint) for name, hint in _hints(kind).items()}
-    texts = {name: f"{_rule(place)}. {place.description}".rstrip() for name, place in places.items()}
-    return {name: text[0].upper() + text[1:] for name, text in texts.items()}
 
 
 def as_list(values: object) -> object:
@@ -217,7 +208,24 @@ def one_line(failure: BaseException) -> str:
     return text[:SHOWN_MAX].rstrip(".")
 
 
-# ---- messages about broken rules ----
+# ---- messages about broken rules: pydantic's own, with the place before it, the value and the advice after it ----
+
+_UNKNOWN = ("unexpected_keyword_argument", "extra_forbidden")
+
+_WORDS = {
+    r"^\w+ should ": "",
+    r" after validation.*": "",
+    r"a dictionary or an instance of \w+|a valid dictionary": "a table",
+    r"an instance of (\w+)": r"a kiks.\1",
+    "a valid tuple": "a list",
+    "a valid string": "a text",
+    "a valid integer": "a whole number",
+    "a valid boolean": "true or false",
+    "a valid number": "a number",
+    "greater than or equal to": "at least",
+    "less than or equal to": "at most",
+}
+"""What stands in place of Python's words: files are TOML and JSON."""
 
 
 def _sentence(model: type[Any], error: ValidationError, advice: str = "", whole: str = "the file") -> str:
@@ -225,162 +233,86 @@ def _sentence(model: type[Any], error: ValidationError, advice: str = "", whole:
     found = error.errors(include_url=False)
     first = next((each for each in found if each["type"] in _UNKNOWN), found[0])
     kind, given = first["type"], first["input"]
-    path, place = _place(model, first["loc"])
-    name = _named(model, path) or whole
+    place, hint, description = _place(model, first["loc"])
+    name, way_out = place.rstrip(":") or whole, description or advice
     if kind in _UNKNOWN:
-        key, known = str(first["loc"][-1]), list(_hints(place.base))
+        key, known = str(first["loc"][-1]), list(_fields(hint))
         rule = f"{name} must have known keys only, but it has {shown(key)}."
         return f"{rule}{nearest(key, known)} Known are {', '.join(known)}."
     if kind == "value_error":
         # A rule that begins with 'must' is one of the field; any other names its keys itself, but not the entry.
-        said, entry = str(first["ctx"]["error"]), _named(model, path[: _entry_depth(model, path)])
-        return f"{name} {said}" if said.startswith("must ") else f"{entry}: {said}" if entry else said
-    way_out = place.description or advice
-    if kind == "missing":
+        said, entry = str(first["ctx"]["error"]), place[: place.rfind(":") + 1]
+        return f"{name} {said}" if said.startswith("must ") else f"{entry} {said}".lstrip()
+    if kind.startswith("missing"):
         return f"{name} must be given, but it is missing. {way_out}".rstrip()
-    if isinstance(given, str) and (names := _names(place)):
-        way_out = f"{nearest(given, names)} {way_out}".lstrip()
     if kind == "union_tag_invalid":
-        tags = [bound.tag for each in _alternatives(place.base) for bound in each.bounds if isinstance(bound, Tag)]
-        way_out = f"{nearest(first['ctx']['tag'], tags)} {way_out}".lstrip()
-    return f"{name} must be {_rule(place)}, but it was {shown(given)}. {way_out}".rstrip()
+        rules, given = [f"be one of {first['ctx']['expected_tags']}"], first["ctx"]["tag"]
+    else:
+        # Of a value that may be one of several things each one's rule is broken.
+        alike = [each for each in found if _place(model, each["loc"])[0] == place]
+        rules = [_own_rule(hint)] if _own_rule(hint) else [_rule(each["msg"]) for each in alike]
+    choices = re.findall(r"'([^']*)'", " ".join(rules))
+    hint_text = nearest(given, choices) if isinstance(given, str) else ""
+    return f"{name} must {' or '.join(dict.fromkeys(rules))}, but it was {shown(given)}.{hint_text} {way_out}".rstrip()
 
 
-_UNKNOWN = ("unexpected_keyword_argument", "extra_forbidden")
+def _own_rule(hint: Any) -> str:
+    return next((f"be {each.text}" for each in _metadata(hint) if isinstance(each, Rule)), "")
 
 
-class _Place(NamedTuple):
-    """The declaration at a place of a model: type, bounds and description."""
-
-    base: Any
-    bounds: tuple[Any, ...]
-    description: str
+def _rule(message: str) -> str:
+    for words, ours in _WORDS.items():
+        message = re.sub(words, ours, message)
+    return message
 
 
-def _place(model: Any, loc: tuple[int | str, ...]) -> tuple[tuple[int | str, ...], _Place]:
-    """Return the place of a broken rule, without the names of alternatives that pydantic adds, and its declaration."""
-    here = _declared(model)
-    path: list[int | str] = []
+def _place(model: Any, loc: tuple[int | str, ...]) -> tuple[str, Any, str]:
+    """Return the place of a broken rule: its name ('body.diameter_mm', 'gain[4]', 'start 2:'), type and description."""
+    name, hint, description = "", model, ""
     for part in loc:
-        hints = _hints(here.base)
-        if isinstance(part, int) and part < len(hints):
-            # An argument without its name.
-            part = list(hints)[part]
-        if part in hints:
-            here = _declared(hints[str(part)])
-        elif isinstance(part, int) and get_origin(here.base) is tuple:
-            inner = _declared(get_args(here.base)[0])
-            here = inner._replace(description=inner.description or here.description)
-        elif get_origin(here.base) is dict:
-            here, part = _declared(get_args(here.base)["[key]" not in loc]), str(part)[: SHOWN_MAX // 4]
-        else:
-            # pydantic names the alternative that it has taken.
-            tagged = (each for each in _alternatives(here.base) if Tag(str(part)) in each.bounds)
-            here = next(tagged, here)
+        if isinstance(part, int) and isinstance(hint, type):
+            part = list(_fields(hint))[part]  # an argument without its name
+        tagged = [each for each in _parts(hint) if Tag(str(part)) in getattr(each, "__metadata__", ())]
+        if tagged:
+            hint = get_args(tagged[0])[0]  # pydantic names the alternative that it has taken
             continue
-        path.append(part)
-    return tuple(path), here
+        fields, inner = _fields(hint), {get_origin(each): get_args(each) for each in reversed(list(_parts(hint)))}
+        if part in fields:
+            hint, description = fields[str(part)], ""
+        elif isinstance(part, int) and tuple in inner:
+            hint = inner[tuple][0]
+            part = f" {part + 1}:" if _fields(hint) else f"[{part}]"
+        elif dict in inner:
+            hint, part = inner[dict]["[key]" not in loc], str(part)[: SHOWN_MAX // 4]
+        else:
+            continue  # the name of an alternative without a tag
+        description = next(filter(None, (getattr(each, "description", "") for each in _metadata(hint))), description)
+        name += part if not name or part[0] in " [" else f" {part}" if name.endswith(":") else f".{part}"
+    return name, hint, description
 
 
-def _declared(hint: Any) -> _Place:
-    """Return the declaration of an annotation; for an optional one, that of its value."""
-    if get_origin(hint) in (Union, types.UnionType):
-        parts = [part for part in get_args(hint) if part is not type(None)]
-        if len(parts) == 1:
-            return _declared(parts[0])
-    if get_origin(hint) is not Annotated:
-        return _Place(hint, (), "")
-    inner = _declared(get_args(hint)[0])
-    bounds, description = list(inner.bounds), inner.description
-    for said in get_args(hint)[1:]:
-        bounds += said.metadata if isinstance(said, FieldInfo) else [said]
-        description = getattr(said, "description", None) or description
-    return _Place(inner.base, tuple(bounds), description)
+def _parts(hint: Any) -> Iterator[Any]:
+    """Yield an annotation and all annotations in it, from outside to inside."""
+    yield hint
+    for each in get_args(hint):
+        yield from _parts(each)
 
 
-def _alternatives(hint: Any) -> list[_Place]:
-    is_union = get_origin(hint) in (Union, types.UnionType)
-    return [_declared(part) for part in get_args(hint)] if is_union else []
+def _metadata(hint: Any) -> list[Any]:
+    """Return what is said about a type beside it, the last word first; of an optional one what is said of its value."""
+    if get_origin(hint) is Annotated:
+        return [*reversed(hint.__metadata__), *_metadata(get_args(hint)[0])]
+    optional = [each for each in get_args(hint) if each is not type(None)]
+    return _metadata(optional[0]) if get_origin(hint) in (Union, types.UnionType) and len(optional) == 1 else []
 
 
 @cache
-def _hints(kind: Any) -> dict[str, Any]:
-    """Return the fields of a record or a named tuple with their annotations."""
-    if not isinstance(kind, type) or not (dataclasses.is_dataclass(kind) or hasattr(kind, "_fields")):
-        return {}
-    return get_type_hints(kind, include_extras=True)
+def _hints(kind: type) -> dict[str, Any]:
+    is_record = dataclasses.is_dataclass(kind) or hasattr(kind, "_fields")
+    return get_type_hints(kind, include_extras=True) if is_record else {}
 
 
-def _named(model: Any, path: tuple[int | str, ...]) -> str:
-    """Return the name of a place in messages: 'body.diameter_mm', 'proximity.gain[4]', 'start 2: at_mm'."""
-    text = ""
-    for depth, part in enumerate(path, start=1):
-        if isinstance(part, str):
-            text += part if not text or text.endswith(" ") else f".{part}"
-        elif _hints(_place(model, path[:depth])[1].base):
-            text += f" {part + 1}" + (": " if depth < len(path) else "")
-        else:
-            text += f"[{part}]"
-    return text
-
-
-def _entry_depth(model: Any, path: tuple[int | str, ...]) -> int:
-    """Return the number of parts of a path up to the innermost entry of a list of tables; 0 without one."""
-    depths = [depth for depth, part in enumerate(path, start=1) if isinstance(part, int)]
-    return max((depth for depth in depths if _hints(_place(model, path[:depth])[1].base)), default=0)
-
-
-def _names(place: _Place) -> list[str]:
-    """Return the names to choose from, if the declaration is a choice."""
-    if get_origin(place.base) is Literal:
-        return [str(each) for each in get_args(place.base)]
-    return [name for bound in place.bounds if isinstance(bound, OneOf) for name in bound.names]
-
-
-def _rule(place: _Place) -> str:
-    """Return the rule of a value as text."""
-    base, bounds, _ = place
-    said = next((bound.text for bound in bounds if isinstance(bound, Rule)), None)
-    if said is not None:
-        return said
-    if names := _names(place):
-        if len(names) == 1:
-            return names[0]
-        return f"one of {', '.join(map(repr, names))}"
-    limits = {name: getattr(bound, name) for bound in bounds for name in _LIMITS if hasattr(bound, name)}
-    if get_origin(base) is tuple:
-        inner = _declared(get_args(base)[0])
-        low, high = limits.get("min_length", 0), limits.get("max_length")
-        count = f"{low} " if low == high else f"{low} to {high} " if high else f"{low} or more " if low else ""
-        is_table = _hints(inner.base) and not any(isinstance(bound, Rule) for bound in inner.bounds)
-        of = "" if is_table else f", each {_rule(inner)}"
-        return f"a list of {count}{'tables' if not of else 'values'}{of}"
-    if base is str:
-        count = f"{'1 to' if 'min_length' in limits else 'up to'} {limits.get('max_length', TEXT_MAX)}"
-        return f"a text of {count} characters"
-    if base is bool:
-        return "true or false"
-    if base in (int, float):
-        span = _span(limits)
-        return f"a {'whole ' if base is int else '' if span else 'finite '}number{span}"
-    if base is Callable or get_origin(base) is Callable:
-        return "a function"
-    is_other = isinstance(base, type) and base.__module__.startswith("kiks.") and not _hints(base)
-    return f"a kiks.{base.__name__}" if is_other else "a table"
-
-
-_LIMITS = ("ge", "gt", "le", "lt", "min_length", "max_length")
-
-
-def _span(limits: Mapping[str, Any]) -> str:
-    low, high = limits.get("ge", limits.get("gt")), limits.get("le", limits.get("lt"))
-    above, below = "gt" in limits, "lt" in limits
-    if low is None and high is None:
-        return ""
-    if high is None:
-        return f" above {low:g}" if above else f" of at least {low:g}"
-    if low is None:
-        return f" below {high:g}" if below else f" of at most {high:g}"
-    if not above and not below:
-        return f" from {figure(low)} to {figure(high)}"
-    return f" {'above' if above else 'of at least'} {figure(low)} and {'below' if below else 'at most'} {figure(high)}"
+def _fields(hint: Any) -> dict[str, Any]:
+    """Return the fields of all records in an annotation with their annotations."""
+    kinds = (each for each in _parts(hint) if isinstance(each, type))
+    return {name: each for kind in kinds for name, each in _hints(kind).items()}

@@ -146,7 +146,7 @@ def test_readings_from_many_poses_are_those_of_a_robot_that_is_put_there(respons
 @pytest.mark.parametrize(
     ("poses", "words"),
     [
-        ([[1.0, 2.0]], "poses must be numbers of the shape"),
+        ([[1.0, 2.0]], "poses must be finite numbers"),
         ([[math.nan, 2.0, 0.0]], "poses must be finite numbers"),
         ([[1e9, 2.0, 0.0]], "poses must be in the arena, 600 x 600 mm"),
     ],
