@@ -9,6 +9,7 @@ from __future__ import annotations
 import base64
 import hashlib
 from collections.abc import Callable
+from functools import lru_cache
 from pathlib import Path
 
 import jinja2
@@ -56,16 +57,8 @@ def save_page(
     """
     figures = panels_of(recording, robot=robot)
     frames = RunFrames(recording.log, on_progress)
-    script = bundle(WEB / "run_page.js")
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(WEB),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters["clock"] = clock_text
-    page = environment.get_template("run_page.html").render(
+    template, script, style = _parts()
+    page = template.render(
         contents_of(recording, frames, robot),
         title=title,
         robot=robot,
@@ -82,7 +75,22 @@ def save_page(
         version=__version__,
         script=Markup(script),
         script_hash=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),
-        style=Markup("\n".join((WEB / name).read_text("utf-8") for name in STYLES)),
+        style=Markup(style),
     )
     # The name of a file may hold what is no text.
     replace_file(path, page.encode("utf-8", "replace"), "a page")
+
+
+@lru_cache(1)
+def _parts() -> tuple[jinja2.Template, str, str]:
+    """Return template, script and style, which are the same for all pages and made once."""
+    environment = jinja2.Environment(
+        loader=jinja2.FileSystemLoader(WEB),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["clock"] = clock_text
+    style = "\n".join((WEB / name).read_text("utf-8") for name in STYLES)
+    return environment.get_template("run_page.html"), bundle(WEB / "run_page.js"), style
