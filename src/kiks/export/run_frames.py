@@ -63,30 +63,23 @@ class RunFrames:
         self.state_hash = ""
         self._key: tuple[Any, ...] = ()
         self._arena: Any = None
-        self._is_other = False
         self.first = Replay(log, log.begin_ns).sim
         self._replay = Replay(log, log.begin_ns, self._compare)
         self._take()
         begin_ns, end_ns = log.begin_ns, log.end_ns
         self.period_ns = _period_ns(end_ns - begin_ns, len(self.frames[0]))
         for time_ns in range(begin_ns + self.period_ns, end_ns, self.period_ns):
-            self._go_to(time_ns)
+            self._replay.sim.advance_to(time_ns)
             self._take()
             if len(self.frames) % 100 == 0:
                 on_progress((time_ns - begin_ns) / (end_ns - begin_ns))
         while self._replay.advance():
             pass
-        self._go_to(end_ns)
+        self._replay.sim.advance_to(end_ns)
         if end_ns > begin_ns:
             self._take()
         self.last = self._replay.sim
         on_progress(1.0)
-
-    def _go_to(self, time_ns: int) -> None:
-        self._replay.sim.advance_to(time_ns)
-        if self._is_other:
-            self._is_other = False
-            self._replay = Replay(self._log, time_ns, self._compare)
 
     def _compare(self, checkpoint: Entry) -> None:
         self.state_hash = checkpoint.data[:HASH_LENGTH].decode("ascii", "replace")
@@ -94,7 +87,7 @@ class RunFrames:
         if is_same(checkpoint, self._replay.sim):
             self.equal_count += 1
         else:
-            self._is_other = True
+            self._log.state_of(checkpoint).restore(self._replay.sim)
 
     def _take(self) -> None:
         """Add a frame of the present state."""
