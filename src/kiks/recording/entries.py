@@ -40,7 +40,7 @@ def block_of(values: Sequence[Any]) -> bytes:
     """Return a block of entries.
 
     Args:
-        values: Those of the first entry (see `NotedEntry`), those of the second, and so on.
+        values: The fields of all entries (see `NotedEntry`), flattened.
 
     Example:
         >>> Columns.of_block(block_of((2, 5, 0, 5, 5, b"N")), "block").entry(0).data

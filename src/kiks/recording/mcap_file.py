@@ -80,7 +80,7 @@ TOPICS = ("/kiks/log", "/kiks/motion")
 class McapFile:
     """A file that grows chunk by chunk, while no other recording does there.
 
-    It begins beside an earlier file, and takes its place when there is something that is worth it.
+    It begins beside an earlier file, and replaces it when something has happened.
 
     The first chunk announces all channels, so that every chunk can be read without an index. After an error of the
     disk nothing more is written, and `close` raises it: a recording never ends the run.

@@ -36,7 +36,7 @@ class Recording:
     Attributes:
         log: All that was recorded, entry by entry.
         is_whole: Whether the run that wrote it came to its end.
-        about: What is told of the run: the version of KiKS, the command, the policy of thinking.
+        about: Description of the run: the version of KiKS, the command, the policy of thinking.
         programs: Texts of the programs that drove its robots, by name.
 
     Example:

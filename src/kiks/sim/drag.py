@@ -12,13 +12,13 @@ from kiks.model.checks import check_count, check_heading, check_number
 from kiks.sim.simulation import Simulation
 
 STEP_MM = 0.5
-"""How far a thing goes before it is looked whether it is still free [mm], as in KiKS 2.2.0 (kiks-behaviour.md 1.5)."""
+"""Distance between two collision checks of a drag [mm], as in KiKS 2.2.0 (kiks-behaviour.md 1.5)."""
 
 STEPS_MAX = 2000
 """Most steps of one move; a longer pull takes several moves."""
 
 SIDES_RAD = (0.0, *(sign * math.radians(degrees) for degrees in (25, 50, 75, 87) for sign in (1, -1)))
-"""Directions beside the straight one in which a thing may give way: it never gets farther from where it is wanted."""
+"""Detour angles tried when the straight way is blocked: a thing never gets farther from where it is wanted."""
 
 KINDS = ("robot", "body", "lamp")
 

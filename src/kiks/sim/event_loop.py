@@ -171,7 +171,7 @@ class EventLoop:
             while recorder.next_ns <= time_ns:
                 self._do_events_to(recorder.next_ns)
                 recorder.check()
-            self._record_ns = -1 if self.world.lamps_are_lent else recorder.next_ns
+            self._record_ns = -1 if self.world.lamps_exposed else recorder.next_ns
         self._do_events_to(time_ns)
 
     def _do_events_to(self, time_ns: int) -> None:

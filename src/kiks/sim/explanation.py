@@ -25,7 +25,7 @@ RESPONSES = {
     "fast": "the thesis's table, which takes lengths in steps of 10 mm",
     "curve": "counts against distance as they were measured on a real robot",
 }
-"""What each response goes by (docs/sensors.md)."""
+"""One-line description of each sensor model (docs/sensors.md)."""
 
 
 @dataclass(frozen=True)
@@ -37,8 +37,7 @@ class SeenRay:
         length_mm: From the sensor to what it met, as the response takes it [mm]; infinite for nothing.
         met: What it met: 'wall', 'robot 2', 'ball 1', 'cylinder 1' or 'nothing'.
         brightness: Of what it met, 1 black to 255 white; 0 for nothing.
-        incidence_deg: Between the ray and the upright on the surface [deg], 0 where it meets it squarely; no number for
-            nothing.
+        incidence_deg: Angle of incidence [deg], 0 if the ray hits a surface squarely; NaN if it hits nothing.
         contribution_counts: How much less the sensor would expect if this ray met nothing. Responses are no sums: the
             contributions of all rays may come to more or less than the whole.
     """

@@ -53,8 +53,7 @@ class Simulation:
         thinking: What the program's own computing costs: 'none', 'fixed:MS', 'live', 'live:FACTOR' or 'replay:FILE'.
         robot: Kind of all robots: a name that `RobotSpec.load` knows, a file, or a `RobotSpec`; or a list of such, one
             for each robot.
-        response: What makes counts of their proximity sensors' rays, such as 'thesis' or 'fast' (docs/sensors.md); what
-            the robot's file says if left out.
+        response: Proximity sensor model, such as 'thesis' (docs/sensors.md); the robot file's own if left out.
 
     Attributes:
         world: The arena with all that stands and moves in it.
@@ -205,14 +204,14 @@ class Simulation:
     def lamps(self) -> NDArray[np.float64]:
         """The lamps: x_mm, y_mm, power_w, and 1 for on or 0 for off: float64 [lamp, 4].
 
-        Write to it to move or switch them; a lamp at a place that is no number is nowhere.
+        Write to it to move or switch them. A lamp with a NaN position is ignored.
         """
-        return self.world.lend_lamps()
+        return self.world.expose_lamps()
 
     @lamps.setter
     def lamps(self, lamps: NDArray[np.float64]) -> None:
         self.world.lamps = lamps
-        self.world.lend_lamps()
+        self.world.expose_lamps()
 
     # ---- time ----
 
@@ -290,7 +289,7 @@ class Simulation:
 
         Args:
             robot: Its kind: a name that `RobotSpec.load` knows, a file, or a `RobotSpec`.
-            pose: x_mm, y_mm, heading_rad, whatever is there; for those who know that it stood there.
+            pose: Start pose: x_mm, y_mm, heading_rad; not checked for collisions.
 
         Example:
             >>> sim = Simulation(Arena.box(500, 500))

@@ -42,7 +42,7 @@ class Things:
         world: The world.
 
     Attributes:
-        body_count: Number of bodies that there ever were: the last number given.
+        body_count: Bodies created so far, i.e. the last number.
     """
 
     def __init__(self, world: World) -> None:

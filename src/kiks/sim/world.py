@@ -60,7 +60,7 @@ class World:
         watchers: Objects that read the state after ticks of their own choice.
         change_count: How often something other than time and the robots' lines has changed the world.
         on_change: Called at each of these changes.
-        lamps_are_lent: Whether a caller has the array of lamps, and may write to it without a word.
+        lamps_exposed: Whether a caller holds the writable array of lamps.
     """
 
     def __init__(
@@ -80,7 +80,7 @@ class World:
         self._from_tick = self._due_tick = NEVER_TICK
         self.change_count = 0
         self.on_change: Callable[[], None] = lambda: None
-        self.lamps_are_lent = False
+        self.lamps_exposed = False
         self._lamps = np.array(arena.lamps, np.float64).reshape(-1, 4)
         self.free_space = FreeSpace(arena, self.specs, self.state)
         self._pack_specs()
@@ -105,9 +105,9 @@ class World:
         self.note_change()
         self._scene.set_lamps(self._lamps[None])
 
-    def lend_lamps(self) -> NDArray[np.float64]:
+    def expose_lamps(self) -> NDArray[np.float64]:
         """Return the lamps to a caller who may write to them."""
-        self.lamps_are_lent = True
+        self.lamps_exposed = True
         self.on_change()
         return self._lamps
 
