@@ -14,7 +14,7 @@ export PYTHONDONTWRITEBYTECODE =
 .PHONY: demo test test-all quick checked interpreters user setup system lint types docs benchmarks wheel octave-package clean
 
 demo: user
-	$(BIN)/kiks demo follow --arena examples/arenas/office.toml --seconds 300 --picture kiks-demo.png
+	$(BIN)/kiks demo follow --arena examples/arenas/office.toml --seconds 300 --export kiks-demo.png
 
 # The engine is compiled before the first test, whose time limit does not include that (tests/conftest.py).
 test: setup system

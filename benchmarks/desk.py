@@ -28,9 +28,10 @@ from contextlib import contextmanager
 from typing import Any
 from urllib.parse import urlsplit
 
-import kiks
+from behaviours import Follow
 from calibration import report
-from kiks.demos.follow import Follow
+
+import kiks
 from kiks.desk.server import server
 from kiks.desk.server.show import show
 from kiks.desk.server.token import COOKIE

@@ -15,23 +15,26 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import io
 import logging
 import resource
 import statistics
-import sys
 import tempfile
 import time
 from pathlib import Path
 
-import kiks
 from calibration import calibration_loops_per_s, report
-from kiks.ports.program_process import Command
+
+import kiks
+from kiks.model.project import Project
+from kiks.ports.program_process import Command, commands_of
 from kiks.ports.programs import Programs
 from kiks.script.runner import run_here
+from kiks.sim.from_project import simulation_of
+from kiks.sim.supervision import Supervision
+from kiks.units import ns_from_s
 
-sys.path.insert(0, str(Path(__file__).parent.parent / "examples" / "soccer"))
-from soccer_command import player
-from soccer_match import FullTime, Match
+SOCCER = Path(__file__).parent.parent / "examples" / "soccer"
 
 SOURCE = """
 import sys, serial
@@ -85,16 +88,19 @@ def run(program: Path, count: int, loops: int) -> tuple[float, float]:
 
 def match(seconds: float) -> tuple[float, float, float]:
     """Return the real time [s] of a match and that of its start, and the time of processors in both."""
-    programs = Programs(
-        Match(seconds), [player(None, 1, "left"), player(None, 2, "right")], when_silent="wait", say=lambda text: None
-    )
+    project = Project.load(SOCCER / "soccer.kiks")
+    sim = simulation_of(project, SOCCER)
+    programs = Programs(sim, commands_of(project, SOCCER), when_silent="wait")
+    sim.loop.end_at(ns_from_s(seconds), lambda: programs.end(0, ""))
+    referee = Supervision(sim, SOCCER / "referee.py")
     start_s, cpu_s = time.perf_counter(), processor_s()
     programs.begin()
     while programs.sim.now_ns == 0:
         programs.round(0.05)
     begin_s = time.perf_counter()
-    with contextlib.suppress(FullTime):
+    with contextlib.redirect_stdout(io.StringIO()):
         programs.run()
+        referee.close()
     return time.perf_counter() - begin_s, begin_s - start_s, processor_s() - cpu_s
 
 

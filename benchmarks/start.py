@@ -4,7 +4,7 @@ Run: python benchmarks/start.py [--json]. Some minutes. Each figure is one start
 its beginning to the end of what it is named for:
 
 * `start.demo_s`: the follow-wall demo in the office has made its first step, and only its kernels are compiled;
-* `start.clone_s`: the same after all kernels of the engine, as `kiks demo` compiles them at its first start;
+* `start.clone_s`: the same after all kernels of the engine, as `kiks run` compiles them at its first start;
 * `start.all_s`: all kernels are compiled, those of batches as well, as `kiks warmup` does;
 * `start.wheel_s`: the demo's first step, from a copy of the package that brings the kernels, as `make wheel` packs it;
 * `start.again_s`: the demo's first step at the second start in a clone.
@@ -26,15 +26,17 @@ import tempfile
 import time
 from pathlib import Path
 
-import kiks
 from calibration import calibration_loops_per_s, report
+
+import kiks
 
 ARENA = Path(__file__).parent.parent / "examples" / "arenas" / "office.toml"
 
 DEMO = f"""
 import kiks
-from kiks.demos.follow import Follow
-Follow().step(kiks.Khepera(kiks.Simulation(kiks.Arena.load({str(ARENA)!r}), seed=1).port(1)))
+robot = kiks.Khepera(kiks.Simulation(kiks.Arena.load({str(ARENA)!r}), seed=1).port(1))
+robot.proximity()
+robot.set_speed(5, 5)
 """
 ENGINE = "from kiks.cli.engine_start import ready_engine\nready_engine()\n"
 ALL = "from kiks.cli.warmup import warmup\nwarmup()\n"

@@ -16,9 +16,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-import kiks
+from behaviours import Follow
 from calibration import calibration_loops_per_s, median_of, report
-from kiks.demos.follow import Follow
+
+import kiks
 
 ARENA = Path(__file__).parent.parent / "examples" / "arenas" / "office.toml"
 

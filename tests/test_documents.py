@@ -17,7 +17,7 @@ ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
 
 
-COMMANDS = {command.callback.__name__ for command in app.registered_commands if command.callback} | {
+COMMANDS = {command.name or command.callback.__name__ for command in app.registered_commands if command.callback} | {
     group.name for group in app.registered_groups
 }
 

@@ -41,7 +41,7 @@ main()
 COMMANDS = {
     "run": ("run", WANDER),
     "serve": ("serve", "--no-pty", "--tcp", "0"),
-    "demo": ("demo", "--seconds", "86400", "--picture", os.devnull + ".png"),
+    "demo": ("demo", "avoid", "--seconds", "86400", "--export", os.devnull + ".png"),
     "desk": ("desk", "--no-browser", "--port", "0"),
     "evolve": ("evolve", "avoid", "--out", "OUT"),
     "warmup": ("warmup",),

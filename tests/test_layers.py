@@ -32,7 +32,6 @@ LAYERS = [
     "batch",
     "export",
     "learn",
-    "demos",
     "fit",
     "desk",
     "toolbox",

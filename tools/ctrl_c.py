@@ -80,7 +80,7 @@ KINDS = {
     "desk": Kind("desk --no-browser --port 0 --no-wait --speed 0 long_sleep.py talks.py", STOPPED),
     "serve": Kind("serve --no-pty --tcp 0 --thinking live --speed 100", STOPPED),
     "evolve": Kind("evolve avoid --out OUT", "the same command continues"),
-    "demo": Kind("demo --seconds 86400 --picture OUT/picture.png", "It was interrupted"),
+    "demo": Kind("demo avoid --seconds 86400 --export OUT/picture.png", "it was interrupted"),
     "film": Kind("export --force long.mcap OUT/film.mp4", "kiks: stopped."),
 }
 

@@ -29,7 +29,7 @@ COMMANDS = {
     "page": ("export", "OUT/sound.mcap", "OUT/page.html"),
     "film": ("export", "OUT/sound.mcap", "OUT/film.gif"),
     "table": ("export", "OUT/sound.mcap", "OUT/poses.csv"),
-    "demo": ("demo", "clean", "--seconds", "1", "--picture", "OUT/clean.png"),
+    "demo": ("demo", "clean", "--seconds", "1", "--export", "OUT/clean.png"),
     "evolve": ("evolve", "--generations", "1", "--population", "4", "--out", "OUT/evolved"),
     "evolve on Ray": (
         "evolve",

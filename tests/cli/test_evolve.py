@@ -1,11 +1,13 @@
-"""`kiks evolve`, and what champions do in `kiks run`, `kiks demo` and `kiks drive`."""
+"""`kiks evolve`, and what champions do in `kiks run`."""
 
 from __future__ import annotations
 
 import re
+import subprocess
 from pathlib import Path
 
 import pytest
+from tests import forked
 from tests.at_length import at_length
 from typer.testing import CliRunner, Result
 
@@ -27,6 +29,10 @@ def kiks(*words: object) -> Result:
         raise result.exception
     assert result.exit_code == 0, result.output
     return result
+
+
+def ran(*words: object, cwd: Path) -> subprocess.CompletedProcess[str]:
+    return forked.run(*map(str, words), cwd=cwd)
 
 
 @pytest.fixture
@@ -60,14 +66,13 @@ def test_a_run_leaves_its_files_and_goes_on(folder: Path) -> None:
 
 def test_champions_run_and_are_shown(folder: Path, tmp_path: Path) -> None:
     champion = folder / "champion.toml"
-    after = kiks("run", champion, "--seconds", 2, "--seed", 5).output
-    assert "34 loops" in after
-    assert after == kiks("run", "--seconds", 2, "--seed", 5, champion).output
-    said = kiks("demo", champion, "--seconds", 2, "--picture", tmp_path / "shown.png").output
-    assert "contacts" in said
-    assert "the same on every computer" in said
-    assert (tmp_path / "shown.png").exists()
-    assert "17 loops" in kiks("drive", champion, "--port", "kiks://1", "--seconds", 1).output
+    after = ran("run", champion, "--seconds", "2", "--seed", "5", "--robots", "2", "--export", "out.png", cwd=tmp_path)
+    assert after.returncode == 0, after.stderr
+    assert "kiks: robot 2: 0." in after.stderr
+    assert "2.000 s simulated, seed 5" in after.stderr
+    assert (tmp_path / "out.png").exists()
+    before = ran("run", "--seconds", "2", "--seed", "5", "--robots", "2", champion, cwd=tmp_path)
+    assert after.stderr == before.stderr
 
 
 def test_the_tasks_are_listed() -> None:
@@ -90,22 +95,17 @@ def test_two_sides_evolve_and_are_shown(tmp_path: Path, monkeypatch: pytest.Monk
     pictures = {"fitness.png", "tournament.png", "tournament.parquet", "result.json"}
     assert names == pictures | {"predator.toml", "prey.toml", "log.parquet", "generations", "evolution.json"}
     assert "Continuing after generation 2" in kiks(*words, 3).output
-    shown = kiks("demo", folder, "--seconds", 3, "--picture", tmp_path / "shown.png").output
-    assert re.search("predator and prey (have not touched|touched after)", shown)
-    assert (tmp_path / "shown.png").exists()
+    shown = ran("run", folder, "--seconds", "3", cwd=tmp_path)
+    assert re.search(r"kiks: (the run has ended after 3 s|the supervisor has ended the run at)", shown.stderr)
     with pytest.raises(KiksError, match="--record must be left out with pursuit, which has two sides"):
         kiks("evolve", "pursuit", "--record", tmp_path / "run.mcap")
-    with pytest.raises(KiksError, match=r"champion.toml' must exist"):
-        kiks("demo", tmp_path)
 
 
 @pytest.mark.parametrize(
     ("words", "said"),
     [
         (("evolve", "avoyd"), "Did you mean 'avoid'"),
-        (("demo", "folow"), "Did you mean 'follow'"),
         (("run", "nowhere.toml"), "Champion's file 'nowhere.toml' must exist"),
-        (("drive", "nowhere.toml", "--port", "kiks://1"), "Champion's file 'nowhere.toml' must exist"),
     ],
 )
 def test_wrong_words_are_named(words: tuple[str, ...], said: str) -> None:
@@ -117,43 +117,41 @@ def test_wrong_words_are_named(words: tuple[str, ...], said: str) -> None:
 def test_champions_are_shown_in_their_world(folder: Path, tmp_path: Path) -> None:
     from kiks import Champion
 
-    champion, picture = folder / "champion.toml", tmp_path / "shown.png"
-    said = kiks("demo", champion, "--seconds", 1, "--picture", picture).output
-    assert f"Seed {2**40}, state" in said
+    champion = folder / "champion.toml"
+    said = ran("run", champion, "--seconds", "1", cwd=tmp_path).stderr
+    assert f"seed {2**40}, state" in said
     assert "names no world" not in said
+    folder_said = ran("run", folder, "--seconds", "1", cwd=tmp_path).stderr
+    assert folder_said == said
     text = champion.read_text()
     champion.write_text(text.replace('world = "champion_world.kiks"\n', ""))
     assert Champion.load(champion).world is None
-    for command in (("demo", champion, "--picture", picture), ("run", champion)):
-        assert "names no world, so it drives in the default box" in kiks(*command, "--seconds", 1).output
-        assert "names no world" not in kiks(*command, "--seconds", 1, "--arena", "examples/arenas/maze.toml").output
+    words = ("run", champion, "--seconds", "1")
+    assert "names no world, so it drives in the default box" in ran(*words, cwd=tmp_path).stderr
+    arena = Path("examples/arenas/maze.toml").absolute()
+    assert "names no world" not in ran(*words, "--arena", arena, cwd=tmp_path).stderr
 
 
 @at_length
-def test_a_folder_is_its_champion_or_one_of_a_generation(folder: Path, tmp_path: Path) -> None:
-    picture, task = tmp_path / "shown.png", folder.parent / "quick.py"
-    said = [
-        kiks("demo", shown, "--seconds", 2, "--picture", picture).output.partition("Picture")[2]
-        for shown in (folder, folder / "champion.toml")
-    ]
-    assert said[0] == said[1]
-    words = ("demo", folder, "--generation", 2, "--picture", picture)
+def test_any_candidate_becomes_a_champion(folder: Path, tmp_path: Path) -> None:
+    task, out = folder.parent / "quick.py", tmp_path / "third.toml"
+    words = ("champion", folder, out, "--force", "--generation", 2)
     once = kiks(*words, "--rank", 3, "--world", 1, "--task", task).output
     assert re.search(r"Candidate \d of generation 2: rank 3, fitness \d", once)
-    assert "1.0 s" in once
+    assert "1.000 s simulated" in ran("run", out, cwd=tmp_path).stderr
+    assert (
+        "The elite nearest to 300,0.5: path_mm"
+        in kiks("champion", folder, tmp_path / "elite.toml", "--at", "300,0.5").output
+    )
     for more, message in (
         ((), "quick.py' is a Python file. Give it: --task FILE"),
         (("--task", task, "--rank", 9), "rank must be a whole number from 1 to 8"),
-        (("--task", task, "--seed", 1), "--seed must be left out with --generation"),
+        (("--at", "1,2"), "either --at or --generation must be given"),
     ):
         with pytest.raises(KiksError, match=message):
             kiks(*words, *more)
-    with pytest.raises(KiksError, match="--rank must be left out without --generation"):
-        kiks("demo", folder, "--rank", 2)
-    with pytest.raises(KiksError, match="--generation must come with the folder of an evolution"):
-        kiks("demo", "avoid", "--generation", 2)
-    with pytest.raises(KiksError, match=r"champion.toml' must exist"):
-        kiks("demo", tmp_path)
+    with pytest.raises(KiksError, match="--rank must be left out with --at"):
+        kiks("champion", folder, out, "--force", "--at", "1,2", "--rank", 2)
 
 
 @at_length

@@ -8,13 +8,13 @@ import pytest
 
 import kiks
 from kiks.clock.thinking import ThinkingLive, parse_thinking, save_thinking
-from kiks.demos.avoid import Avoid
 
 
 def course(sim: kiks.Simulation, loops: int = 40) -> str:
     robot = kiks.Khepera(sim.port(1))
     for _ in range(loops):
-        Avoid().step(robot)
+        readings = robot.proximity()
+        robot.set_speed(8 - readings[3] / 60, 8 - readings[2] / 60)
     robot.close()
     return sim.state_hash()
 

@@ -5,56 +5,81 @@ from __future__ import annotations
 import math
 import re
 from pathlib import Path
+from typing import Any, NoReturn
 
 import numpy as np
 import pytest
 import sight
 from player import BAUD, Player
-from soccer_command import player
-from soccer_match import FullTime, Match, play, scorer
-from soccer_picture import draw_match
 from tests import forked
 from tests.at_length import at_length
 from tests.busy import busy_computer
+from tests.cli.test_cli import state_of
+from tests.demos.shown import world_of
 from whereabouts import Whereabouts
 
-from kiks import Arena, Khepera, ParameterError
+from kiks import Arena, Khepera
 from kiks.model import pitch
+from kiks.sim.simulation import Simulation
+from kiks.sim.supervision import Supervision
+from kiks.units import ns_from_s
 
 # Whole matches.
 pytestmark = pytest.mark.slow
 
 ROOT = Path(__file__).parents[2]
-CHASER = str(ROOT / "examples/players/chaser.py")
+SOCCER = ROOT / "examples/soccer"
+CHASER = ROOT / "examples/players/chaser.py"
 
-# States after twenty seconds with seed 1, by the programs of both sides. To renew: python tests/demos/test_soccer.py
+# States after twenty seconds with seed 1, by the programs of both sides.
 HASHES = {"own": "a12ddc206aca8100", "chaser": "0d0c8453d0ba36aa"}
 
 
-def run(match: Match, right: str | None = None) -> Match:
-    assert play(match, [player(None, 1, "left"), player(right, 2, "right")]) == ""
-    return match
+def match(seed: int = 0) -> Simulation:
+    """Return a match at its start, with its referee."""
+    sim = world_of("soccer", seed=seed)
+    Supervision(sim, SOCCER / "referee.py")
+    return sim
 
 
-def hashes() -> dict[str, str]:
-    return {"own": run(Match(20, 1)).state_hash(), "chaser": run(Match(20, 1), CHASER).state_hash()}
+def played(*words: str, seconds: float = 20.0, cwd: Path) -> tuple[str, str]:
+    """Return what a match with seed 1 printed, and its state."""
+    result = forked.run("demo", "soccer", "--seconds", f"{seconds:g}", "--seed", "1", *words, cwd=cwd)
+    assert result.returncode == 0, result.stderr
+    return result.stdout, state_of(result.stderr)
 
 
-def test_a_match_is_the_same_on_every_computer() -> None:
-    assert hashes() == HASHES
+def test_a_match_is_the_same_on_every_computer(tmp_path: Path) -> None:
+    said, state = played(cwd=tmp_path)
+    assert state == HASHES["own"]
+    *goals, score = said.splitlines()
+    assert all(re.fullmatch(r" *\d+\.\d s   \d:\d   (left|right)", line) for line in goals)
+    assert re.fullmatch(r"left \d, right \d, \d dropped balls", score)
+    assert (tmp_path / "kiks-soccer.png").exists()
+    own = [str(SOCCER / "player.py"), "kiks://1", "left"]
+    assert played(*own, str(CHASER), "kiks://2", cwd=tmp_path)[1] == HASHES["chaser"]
 
 
 @at_length
-def test_a_match_is_the_same_on_a_busy_computer() -> None:
+def test_a_match_is_the_same_on_a_busy_computer(tmp_path: Path) -> None:
     with busy_computer(3):
-        assert run(Match(20, 1)).state_hash() == HASHES["own"]
+        assert played("--when-silent", "wait", cwd=tmp_path)[1] == HASHES["own"]
 
 
 @at_length
-def test_goals_fall_on_both_sides() -> None:
-    scores = np.array([run(Match(300, seed)).report.score() for seed in (0, 1)])
-    assert scores.sum(axis=1).min() >= 2
-    assert scores.sum(axis=0).min() >= 1
+def test_goals_fall_on_both_sides(tmp_path: Path) -> None:
+    found = re.search(r"left (\d+), right (\d+)", played(seconds=300.0, cwd=tmp_path)[0])
+    assert found is not None
+    assert min(map(int, found.groups())) >= 1
+
+
+def test_a_program_that_ends_leaves_the_other_to_play(tmp_path: Path) -> None:
+    (tmp_path / "brief.py").write_text("raise SystemExit(3)")
+    result = forked.run("demo", "soccer", "--seconds", "8", "brief.py", cwd=tmp_path)
+    assert "program 1 (brief.py) has ended with exit code 3." in result.stderr
+    assert "robot 1: 0.00 m driven" in result.stderr
+    assert "8.000 s simulated" in result.stderr
+    assert "robot 2: 0.00 m driven" not in result.stderr
 
 
 # ---- the eye ---------------------------------------------------------------------------------------------------------
@@ -145,15 +170,15 @@ def test_where_the_lens_is_dark_there_is_no_post() -> None:
 
 
 def test_the_constants_are_those_of_the_camera() -> None:
-    match = Match(10)
-    match.move_body(match.ball, 900, 100)
+    sim = world_of("soccer")
+    sim.move_body(ball_of(sim)["number"], 900, 100)
     greys = {}
     for name, pose in {"dim": (300, 350, math.pi), "bright": (930, 350, 0), "wall": (400, 200, -math.pi / 2)}.items():
-        match.place(2, 600, 600, 0)
-        match.place(1, *pose)
-        match.run(0.1)
-        answer = Khepera(match.port(1)).turret(2, "S")
-        high, low = Khepera(match.port(1)).turret(2, "L")
+        sim.place(2, 600, 600, 0)
+        sim.place(1, *pose)
+        sim.run(0.1)
+        answer = Khepera(sim.port(1)).turret(2, "S")
+        high, low = Khepera(sim.port(1)).turret(2, "L")
         middle = sight.smooth(answer)[12:20]
         greys[name] = np.mean(middle) - sight.exposure(sight.smooth(answer), 256 * high + low)
     assert greys["wall"] == pytest.approx(sight.WALL, abs=12)
@@ -202,17 +227,22 @@ def test_what_cannot_be_a_post_changes_nothing() -> None:
     assert (place.x, place.y, place.heading) == (0.0, 0.0, 0.0)
 
 
-def test_a_player_alone_scores_and_knows_where_it_is() -> None:
-    match = Match(60, seed=2)
-    match.place(2, 1000, 620, 0)
-    port = match.port(1)
+def test_a_player_alone_scores_and_knows_where_it_is(capsys: pytest.CaptureFixture[str]) -> None:
+    sim = match(seed=2)
+    sim.place(2, 1000, 620, 0)
+    sim.loop.end_at(ns_from_s(60), full_time)
+    port = sim.port(1)
     port.baudrate = BAUD
     one = Player(Khepera(port))
-    with pytest.raises(FullTime):
+    with pytest.raises(TimeoutError):
         play_on(one)
-    assert match.report.score()[0] >= 1
-    x_mm, y_mm, _ = match.pose(1)
+    assert re.search(r" [1-9]:\d   left\n", capsys.readouterr().out)
+    x_mm, y_mm, _ = sim.pose(1)
     assert math.hypot(one.place.x + 615 - x_mm, one.place.y + 350 - y_mm) < 80
+
+
+def full_time() -> NoReturn:
+    raise TimeoutError
 
 
 def play_on(one: Player) -> None:
@@ -223,119 +253,54 @@ def play_on(one: Player) -> None:
 # ---- the referee -----------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("x_mm", "side"), [(1172.1, "left"), (1171.9, None), (58.1, None), (57.9, "right")])
-def test_all_of_the_ball_must_be_behind_the_line(x_mm: float, side: str | None) -> None:
-    assert scorer(x_mm, 32.0) == side
+@pytest.mark.parametrize(("x_mm", "goal"), [(1172.1, 1), (1171.9, 0), (58.1, 0), (57.9, -1)])
+def test_all_of_the_ball_must_be_behind_the_line(x_mm: float, goal: int) -> None:
+    assert pitch.goal_at(x_mm, 32.0) == goal
 
 
-def test_after_a_goal_the_ball_falls_near_the_middle_and_robots_stay() -> None:
-    told = []
-    match = Match(20, seed=5, on_goal=lambda report: told.append(report.score()))
-    poses = match.poses()
-    match.move_body(match.ball, 1000, 300, speed_mm_s=300)
-    match.run(3)
-    assert [goal.side for goal in match.report.goals] == ["left"]
-    assert told == [(1, 0)]
-    ball = match.bodies()[0]
+def ball_of(sim: Simulation) -> Any:
+    return sim.bodies()[0]
+
+
+def test_after_a_goal_the_ball_falls_near_the_middle_and_robots_stay(capsys: pytest.CaptureFixture[str]) -> None:
+    sim = match(seed=5)
+    poses = sim.poses()
+    sim.move_body(ball_of(sim)["number"], 1000, 300, speed_mm_s=300)
+    sim.run(3)
+    assert capsys.readouterr().out.endswith("1:0   left\n")
+    ball = ball_of(sim)
     assert abs(ball["x_mm"] - pitch.MIDDLE_X_MM) <= 40
     assert abs(ball["y_mm"] - pitch.MIDDLE_Y_MM) <= 120
     assert ball["velocity_x"] == 0
-    assert np.array_equal(match.poses(), poses)
+    assert np.array_equal(sim.poses(), poses)
 
 
 def test_a_ball_that_lies_still_is_dropped_and_not_onto_a_robot() -> None:
-    match = Match(30)
-    match.move_body(match.ball, 1080, 150)
-    match.place(1, pitch.MIDDLE_X_MM, pitch.MIDDLE_Y_MM, 0)
-    match.run(9)
-    assert match.report.drops_s == []
-    match.run(3)
-    assert len(match.report.drops_s) == 1
-    ball = match.bodies()[0]
+    sim = match()
+    sim.move_body(ball_of(sim)["number"], 1080, 150)
+    sim.place(1, pitch.MIDDLE_X_MM, pitch.MIDDLE_Y_MM, 0)
+    sim.run(9)
+    assert ball_of(sim)["x_mm"] == 1080
+    sim.run(3)
+    ball = ball_of(sim)
     assert 59.5 < math.hypot(ball["x_mm"] - pitch.MIDDLE_X_MM, ball["y_mm"] - pitch.MIDDLE_Y_MM) < 130
-
-
-def run_on(match: Match, step_s: float) -> None:
-    while True:
-        match.run(step_s)
 
 
 @pytest.mark.parametrize("slice_s", [0.013, 0.1, 7.0])
 def test_it_does_not_matter_how_time_is_cut(slice_s: float) -> None:
-    def state(step_s: float) -> tuple[str, list[tuple[float, ...]]]:
-        match = Match(5.05, seed=1)
-        match.move_body(match.ball, 1000, 300, speed_mm_s=300)
-        match.port(1).write(b"D,20,18\n")
-        with pytest.raises(FullTime):
-            run_on(match, step_s)
-        assert match.time_s == 5.05
-        return match.state_hash(), match.report.trail
+    def state(step_s: float) -> str:
+        sim = match(seed=1)
+        sim.move_body(ball_of(sim)["number"], 1000, 300, speed_mm_s=300)
+        sim.port(1).write(b"D,20,18\n")
+        while sim.time_s < 5.05:
+            sim.advance_to(min(sim.now_ns + ns_from_s(step_s), ns_from_s(5.05)))
+        return sim.state_hash()
 
     assert state(slice_s) == state(0.25)
 
 
-def test_a_program_that_ends_leaves_the_other_to_play(tmp_path: Path) -> None:
-    (tmp_path / "brief.py").write_text("raise SystemExit(3)")
-    said: list[str] = []
-    match = Match(8, seed=1)
-    play(match, [player(str(tmp_path / "brief.py"), 1, "left"), player(None, 2, "right")], said.append)
-    assert said == ["program 1 (brief.py) has ended with exit code 3."]
-    assert match.time_s == 8
-    assert match.travelled_mm(1) == 0
-    assert match.travelled_mm(2) > 100
-
-
-# ---- what people see -------------------------------------------------------------------------------------------------
-
-
 def test_the_pitch_is_the_example_arena() -> None:
-    example, drawn = Arena.load(ROOT / "examples/arenas/pitch.toml"), pitch.arena()
-    assert np.array_equal(example.brightness, drawn.brightness)
-    assert np.allclose(np.array(example.starts), np.array(drawn.starts))
-
-
-def test_the_picture_has_a_row_for_four_goals() -> None:
-    match = Match(5)
-    without = draw_match(match).size
-    match.move_body(match.ball, 1000, 300, speed_mm_s=300)
-    match.run(3)
-    width, height = draw_match(match).size
-    assert (width, height > without[1]) == (without[0], True)
-
-
-def test_the_command_tells_score_speed_seed_and_state(tmp_path: Path) -> None:
-    result = forked.run("demo", "soccer", "--seconds", "20", "--seed", "1", cwd=tmp_path)
-    assert result.returncode == 0, result.stderr
-    *goals, score, state = result.stdout.splitlines()
-    assert all(re.fullmatch(r" *\d+\.\d s   \d:\d   (left|right)", line) for line in goals)
-    assert re.fullmatch(r"soccer: left \d, right \d   20\.0 s   \d+ x real time   \d dropped balls", score)
-    own = HASHES["own"]
-    assert state == f"Picture: kiks-soccer.png   Seed 1, state {own}: the same on every computer."
-    assert (tmp_path / "kiks-soccer.png").exists()
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (
-            ("soccer", "--left", "none.py"),
-            "--left must be a Python file, with its arguments behind it in quotes, but it",
-        ),
-        (("soccer", "--right", ""), "--right must be a Python file"),
-        (("soccer", "--baud", "9600"), "--baud must be left out with soccer, but it was 9600."),
-        (("follow", "--left", "x.py"), "--left must be left out with follow, but it was 'x.py'."),
-    ],
-)
-def test_wrong_words_are_explained(words: tuple[str, ...], said: str, tmp_path: Path) -> None:
-    result = forked.run("demo", *words, cwd=tmp_path)
-    assert result.returncode == 2
-    assert said in result.stderr
-
-
-def test_a_match_takes_some_time() -> None:
-    with pytest.raises(ParameterError, match=r"seconds must be a number of at least 0.1, but it was 0. Take 300."):
-        Match(0)
-
-
-if __name__ == "__main__":
-    print(hashes())
+    drawn, own = pitch.arena(), world_of("soccer").arena
+    for arena in (Arena.load(ROOT / "examples/arenas/pitch.toml"), own):
+        assert np.array_equal(arena.brightness, drawn.brightness)
+        assert np.allclose(np.array(arena.starts), np.array(drawn.starts))

@@ -152,15 +152,10 @@ def test_ctrl_c_ends_waiting_for_a_page(words: tuple[str, ...], tmp_path: Path) 
         assert process.wait(GUARD_S) == 0
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    cases([(("demo", "avoid", "--seconds", "1"), "avoid: "), (("demo", "soccer", "--seconds", "1"), "soccer: left 0")]),
-)
-def test_demonstration_on_a_desk(words: tuple[str, ...], said: str, tmp_path: Path) -> None:
-    with started(*words, "--desk", "--no-wait", folder=tmp_path) as (process, output):
+@pytest.mark.parametrize("name", cases(["soccer", "avoid"]))
+def test_demonstration_on_a_desk(name: str, tmp_path: Path) -> None:
+    with started("demo", name, "--desk", "--no-wait", folder=tmp_path) as (process, output):
         url = url_of(output)
-        assert line_with(output, said)
-        assert line_with(output, "Picture: ")
         with browser().open(url, timeout=GUARD_S) as answer:
             assert answer.status == 200
         process.send_signal(signal.SIGINT)

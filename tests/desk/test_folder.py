@@ -13,11 +13,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from kiks.desk.server.example_worlds import EXAMPLES
 from kiks.desk.server.folder import LISTED_MAX, OPENED, UPLOAD_BYTES_MAX, Folder, decode, encode
 from kiks.errors import ArenaError, KiksError, ParameterError
 from kiks.model.arena import Arena, Lamp
 from kiks.model.project import Project
+from kiks.model.shipped import demonstrations
 from kiks.sim.from_project import simulation_of
 
 BAD_NAMES = [
@@ -162,8 +162,8 @@ def test_invalid_uploads_are_refused(name, data, words):
         decode(name, data)
 
 
-@pytest.mark.parametrize("name", EXAMPLES)
-def test_examples_are_valid_worlds(name):
-    project = EXAMPLES[name]()
+@pytest.mark.parametrize("name", demonstrations())
+def test_demonstrations_are_valid_worlds(name):
+    project = Project.load(demonstrations()[name])
     sim = simulation_of(Project.from_bytes(project.to_bytes()))
     assert sim.robot_count == len(project.robots)

@@ -286,22 +286,17 @@ def test_the_champion_of_the_maze_reaches_the_goal_though_others_are_cheaper(alg
 # ---- commands ----
 
 
-def test_a_demonstration_takes_a_folder_and_a_place_of_its_archive(tmp_path: Path) -> None:
+def test_an_elite_becomes_a_champion(tmp_path: Path) -> None:
     archive = archive_of(run("map-elites", folder=tmp_path / "out"))
     elite = archive.elites[-1]
-    words = ["demo", str(tmp_path / "out"), "--seconds", "1", "--picture", str(tmp_path / "seen.png")]
-    assert CliRunner().invoke(app, words).exit_code == 0
-    place = ",".join(str(elite.values[axis.measure]) for axis in archive.axes)
-    said = CliRunner().invoke(app, [*words, "--at", place])
+    words = ["champion", str(tmp_path / "out"), str(tmp_path / "elite.toml"), "--at"]
+    said = CliRunner().invoke(app, [*words, ",".join(str(elite.values[axis.measure]) for axis in archive.axes)])
     assert said.exit_code == 0, said.output
     assert f"of generation {elite.generation}." in said.output.replace("\n", " ")
-    for at, where, message in (
-        ("1,x", words[1], "must be numbers"),
-        ("1,2", "avoid", "must come with the folder of an evolution"),
-    ):
-        failed = CliRunner().invoke(app, [words[0], where, *words[2:], "--at", at])
-        assert isinstance(failed.exception, ParameterError)
-        assert message in str(failed.exception)
+    assert kiks.Champion.load(tmp_path / "elite.toml").parameters == tuple(elite.parameters)
+    failed = CliRunner().invoke(app, [*words, "1,x", "--force"])
+    assert isinstance(failed.exception, ParameterError)
+    assert "must be numbers" in str(failed.exception)
 
 
 def test_the_picture_shows_the_archive_of_every_algorithm(tmp_path: Path) -> None:

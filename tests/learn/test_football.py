@@ -8,14 +8,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests import forked
 
 import kiks
+from kiks.cli.job import CONTESTS
 from kiks.control.controller import Controller
-from kiks.demos.contest import ENDS, ContestScene
 from kiks.learn.football import GOAL_REWARD, ball_ahead, ball_gain, goals, kick_offs
 from kiks.learn.tasks import football
 from kiks.model import pitch
 from kiks.model.arena import Arena, Ball, Pose
+from kiks.model.arena_file import save_arena
+from kiks.model.shipped import shipped
 
 pytestmark = pytest.mark.slow
 
@@ -85,15 +88,17 @@ def _stand(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
     wheels[0] = wheels[1] = 0.0
 
 
-def test_champions_play_in_a_demonstration_until_a_goal(tmp_path: Path) -> None:
-    assert set(ENDS) == {name for name in kiks.tasks.TASKS if kiks.tasks.load(name).against}
-    evolution = kiks.Evolution(football(seconds=1.0), seed=1, population=4, opponents=1, folder=tmp_path)
+def test_champions_play_until_a_goal(tmp_path: Path) -> None:
+    assert set(CONTESTS) == {name for name in kiks.tasks.TASKS if kiks.tasks.load(name).against}
+    assert all(shipped(f"examples/demos/supervisors/{name}.py").is_file() for name in CONTESTS)
+    evolution = kiks.Evolution(football(seconds=1.0), seed=1, population=4, opponents=1, folder=tmp_path / "out")
     evolution.run(generations=1)
-    scene = ContestScene(tmp_path, seed=1)
-    assert scene.run(1.0) == "no goal"
-    scene = ContestScene(tmp_path, before_goal(0))
-    scene.sim.move_body(1, pitch.RIGHT_LINE_MM + 40.0, pitch.MIDDLE_Y_MM)
-    assert scene.run(2.0).startswith("left scored after 0.")
+    played = forked.run("run", "out", "--seconds", "1", cwd=tmp_path)
+    assert (played.returncode, played.stdout) == (0, "")
+    goal = Ball(pitch.RIGHT_LINE_MM + 40.0, pitch.MIDDLE_Y_MM, friction_mm_s2=pitch.FRICTION_MM_S2)
+    save_arena(replace(before_goal(0), balls=(goal,)), tmp_path / "goal.toml")
+    scored = forked.run("run", "out", "--arena", "goal.toml", cwd=tmp_path)
+    assert scored.stdout.startswith("left scored after 0."), scored.stderr
 
 
 # ---- the environment ----

@@ -14,11 +14,11 @@ import jsonschema
 import numpy as np
 import pytest
 from mcap.reader import make_reader
+from tests.demos.shown import run, shown, world_of
 
 import kiks
 from kiks import Arena, Khepera, ParameterError, Recording, Simulation
 from kiks.clock.gate import Gate
-from kiks.demos.scenes import SCENES
 from kiks.export import foxglove
 from kiks.firmware.general_io import GeneralIO
 from kiks.firmware.turret import Orders, Turret
@@ -46,7 +46,7 @@ def drive(sim: Simulation, seconds: float, robot: int = 1) -> None:
         khepera.set_speed(8 - values[3] // 60, 8 - values[2] // 60)
 
 
-def recorded(sim: Simulation, file: Path, act: Callable[[Simulation], None]) -> Recording:
+def recorded(sim: Simulation, file: Path, act: Callable[[Simulation], object]) -> Recording:
     with sim.record(file):
         act(sim)
     assert sim.loop.recorder is None
@@ -90,13 +90,12 @@ def has_fewer_turrets(sim: Simulation, other: Simulation) -> bool:
     return any(len(sim.turrets(robot)) < len(other.turrets(robot)) for robot in range(1, sim.robot_count + 1))
 
 
-@pytest.mark.parametrize("name", [name for name in SCENES if name != "swarm"])
+@pytest.mark.parametrize("name", ["follow", "clean", "camera"])
 def test_demonstrations_are_the_same_with_a_recording_and_again(name: str, tmp_path: Path) -> None:
-    alone, with_it = (SCENES[name](None, seed=3, baud=None) for _ in range(2))
-    alone.run(SECONDS)
-    recording = recorded(with_it.sim, tmp_path / "run.mcap", lambda _: with_it.run(SECONDS))
-    assert with_it.sim.state_hash() == alone.sim.state_hash()
-    check_again(recording, alone.sim.state_hash())
+    alone, with_it = shown(name, SECONDS, seed=3), world_of(name, seed=3)
+    recording = recorded(with_it, tmp_path / "run.mcap", lambda sim: run(sim, name, SECONDS))
+    assert with_it.state_hash() == alone.state_hash()
+    check_again(recording, alone.state_hash())
 
 
 def test_a_world_goes_on_from_any_time_as_it_went_on_then(tmp_path: Path) -> None:

@@ -449,7 +449,7 @@ _HAND_IN = (
     ("run", "--record", "../own.mcap", "../drive.py", "../drive.py"), ("replay", "--check", "../run.mcap"),
     ("export", "../run.mcap", "../plot.png", "--kind", "figures"), ("export", "../run.mcap", "../page.html"),
     ("export", "../run.mcap", "../film.gif"), ("export", "../run.mcap", "../table.csv"), ("warmup",),
-    ("demo", "clean", "--seconds", "1", "--picture", "../clean.png"), ("arena", "maze", "../maze.toml"),
+    ("demo", "clean", "--seconds", "1", "--export", "../clean.png"), ("arena", "maze", "../maze.toml"),
     ("evolve", "--generations", "1", "--population", "4", "--out", "../evolved"),
 )  # fmt: skip
 

@@ -32,8 +32,9 @@ from tools.sensors.models import thesis
 
 import kiks
 from kiks.cli.compare import compare
+from kiks.cli.job import job_of
+from kiks.cli.options import World
 from kiks.clock.thinking import parse_thinking
-from kiks.demos.contest import ContestScene
 from kiks.desk.server.folder import decode
 from kiks.fit.samples import load_samples, nearnesses
 from kiks.learn.archive import ARCHIVE
@@ -192,10 +193,8 @@ def _result(path: Path) -> None:
 
 
 def _contest(path: Path) -> None:
-    scene = ContestScene(path.parent, seed=1)
-    for _ in range(3):
-        scene.step()
-    scene.sim.state_hash()
+    job = job_of(str(path.parent), [], World(seed=1))
+    simulation_of(job.project, kinds=job.kinds).state_hash()
 
 
 def _sides(path: Path) -> None:

@@ -8,10 +8,9 @@ import typer
 
 from kiks.cli.arena import arena
 from kiks.cli.calibrate import calibrate
+from kiks.cli.champion import champion
 from kiks.cli.compare import compare
-from kiks.cli.demo import demo
 from kiks.cli.desk import desk
-from kiks.cli.drive import drive
 from kiks.cli.evolve import evolve
 from kiks.cli.export import export
 from kiks.cli.fit import fit
@@ -39,10 +38,9 @@ app = typer.Typer(
 )
 for _command in (
     desk,
-    demo,
     run,
-    drive,
     evolve,
+    champion,
     compare,
     replay,
     export,
@@ -56,6 +54,7 @@ for _command in (
     warmup,
 ):
     app.command(cls=RunCommand if _command is run else Command)(with_options(_command))
+app.command("demo", cls=RunCommand)(with_options(run))
 app.add_typer(arena, name="arena")
 
 

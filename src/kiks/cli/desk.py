@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import threading
 from collections.abc import Callable
 from dataclasses import replace
@@ -15,7 +14,7 @@ from kiks.cli.engine_start import ready_engine
 from kiks.cli.options import World, is_project, parse_words
 from kiks.cli.record import RecordFile, recorded
 from kiks.ending import end_as_with_ctrl_c
-from kiks.errors import HaltError, ParameterError
+from kiks.errors import ParameterError
 
 if TYPE_CHECKING:
     from kiks.desk.server.desk import Desk
@@ -66,7 +65,7 @@ def desk(
     ready_engine()
     from kiks.desk.server.access import LOOPBACK
     from kiks.desk.server.desk import Desk
-    from kiks.ports.program_process import commands_of
+    from kiks.ports.program_process import commands_of, supervisor_of
     from kiks.sim.from_project import simulation_of
 
     words = list(program or [])
@@ -92,6 +91,7 @@ def desk(
         owns_world=True,
         may_run_programs=run_programs or host in LOOPBACK,
         commands=commands,
+        supervisor=supervisor_of(project, home) if file is not None else None,
         is_held=not no_wait,
     )
     # A new start makes another world: the recording ends with the first one.
@@ -117,8 +117,6 @@ def open_desk(
     port: int | None = None,
     browser: bool = True,
     waits: bool = True,
-    work: Callable[[], None] | None = None,
-    goes_on: bool = True,
     programs_ended: Callable[[Simulation], None] = lambda sim: None,
 ) -> None:
     """Show a desk until Ctrl-C.
@@ -128,12 +126,9 @@ def open_desk(
         host: Address of the page.
         port: TCP port of the page.
         browser: Whether to open a browser.
-        waits: Whether programs and work begin when the first page shows the world; otherwise at once.
-        work: Moves the world first.
-        goes_on: Whether time passes by itself after that.
+        waits: Whether programs begin when the first page shows the world; otherwise at once.
         programs_ended: Called with the world, locked, when its programs have ended.
     """
-    from kiks.desk.server.outside_programs import PlainPrograms
     from kiks.desk.server.show import Driver, Shown
 
     shown = Shown(desk, host=host, port=port)
@@ -142,17 +137,11 @@ def open_desk(
     try:
         if browser:
             shown.browse()
-        if waits and (desk.has_beginners or work is not None or desk.past is not None):
+        if waits and (desk.has_beginners or desk.past is not None):
             typer.echo("The run begins when a page shows it; with --no-wait it begins at once.")
             _wait_for(desk.is_seen)
         desk.begin()
-        if work is not None:
-            desk.outside = PlainPrograms(desk.gate.halt)
-            with contextlib.suppress(HaltError):
-                work()
-            desk.outside = PlainPrograms()
-        if goes_on:
-            Driver(desk, programs_ended).run()
+        Driver(desk, programs_ended).run()
         _wait_for(threading.Event())
     except KeyboardInterrupt:
         typer.echo(f"Stopped after {desk.sim.time_s:.1f} s of simulated time.")

@@ -9,7 +9,6 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
-import numpy as np
 import typer
 
 from kiks.cli.engine_start import ready_batch, ready_engine
@@ -155,6 +154,8 @@ def winners_of(tournament: Tournament) -> Iterator[str]:
 
     The winner is the side with the higher fitness.
     """
+    import numpy as np
+
     count = len(tournament.generations)
     for period in np.array_split(np.arange(count), min(PERIODS, count)):
         first, last = tournament.generations[period[[0, -1]]].tolist()
@@ -203,9 +204,9 @@ def _tell_champion(evolution: Evolution, folder: Path) -> None:
     if (archive := evolution.archive) is not None:
         filled = f"{len(archive.elites)} of {archive.cell_count} cells ({100 * archive.coverage:.1f} %)"
         names = ", ".join(axis.measure for axis in archive.axes)
-        typer.echo(f"Archive by {names}: {filled}, QD score {archive.qd_score:.4g}   One of them: kiks demo --at")
+        typer.echo(f"Archive by {names}: {filled}, QD score {archive.qd_score:.4g}   One of them: kiks champion --at")
     shown = folder if evolution.task.against else folder / "champion.toml"
-    typer.echo(f"Folder: {folder}   See it drive: kiks demo {shown}")
+    typer.echo(f"Folder: {folder}   See it drive: kiks run {shown}")
 
 
 def _tell_seeds(results: Sequence[Result], folder: Path) -> None:

@@ -18,26 +18,13 @@ if TYPE_CHECKING:
 Seconds = Annotated[
     float | None,
     typer.Option(
-        help="Simulated time at which the run ends [s]; if left out, a program's own end, and 60 for a champion."
+        help="Simulated time at which the run ends [s]; that of the project or champion, if it has one, if left out."
     ),
 ]
 MaxWall = Annotated[
     float | None,
     typer.Option(help="Real time after which the run ends [s], whatever runs; exit code 124, and not repeatable."),
 ]
-
-
-class LimitReached(BaseException):
-    """A limit is reached; no `except Exception` on the way may stop it, as with Ctrl-C."""
-
-    def __init__(self, code: int, message: str) -> None:
-        super().__init__(message)
-        self.code, self.message = code, message
-
-    @classmethod
-    def stop(cls, code: int, message: str) -> NoReturn:
-        """Raise it."""
-        raise cls(code, message)
 
 
 class Limits:
@@ -78,6 +65,8 @@ class Limits:
 
         if self._end_ns is not None:
             at_s = f"{self._seconds:g}"
-            sim.loop.end_at(self._end_ns, lambda: end(0, f"--seconds has ended the run at {at_s} s of simulated time."))
+            sim.loop.end_at(self._end_ns, lambda: end(0, f"the run has ended after {at_s} s of simulated time."))
+        if (supervision := sim.loop.supervisor) is not None:
+            supervision.end = end  # type: ignore[attr-defined]
         with ended_after(self._wall_s, end_in_real_time):
             yield

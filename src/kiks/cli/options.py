@@ -14,16 +14,14 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 
-from kiks.errors import ParameterError, shown
+from kiks.errors import ParameterError, nearest, shown
 from kiks.model.atomic_files import make_folder
 from kiks.model.checks import ROBOTS_MAX
 
 if TYPE_CHECKING:
-    from kiks.learn.champion import Champion
     from kiks.model.arena import Arena
     from kiks.model.project import Project
     from kiks.ports.program_process import Command
-    from kiks.sim.simulation import Simulation
 
 Seed = Annotated[int, typer.Option(help="Seed: the same seed, the same run.", min=0)]
 SeedOrOwn = Annotated[
@@ -104,12 +102,6 @@ class World:
                     robots[index] = replace(robots[index], turrets=(*robots[index].turrets, name))
         settings = {name: value for name in ("seed", "baud") if (value := getattr(self, name)) is not None}
         return replace(project, robots=tuple(robots), **settings)
-
-    def simulation(self, project: Project, folder: Path, thinking: str) -> Simulation:
-        """Return the world of a project with the kinds of robots that the options name, whose files lie anywhere."""
-        from kiks.sim.from_project import simulation_of
-
-        return simulation_of(project, folder, kinds=self.robot or (), thinking=thinking)
 
 
 @dataclass(frozen=True)
@@ -193,12 +185,6 @@ def progress_bar(work: str) -> Iterator[Callable[..., None]]:
         yield lambda done, count=1: progress.update(bar, completed=done, total=count)
 
 
-def say_without_world(champion: Champion, arena: Arena | None) -> None:
-    """Say so if a champion will drive in the default box because its file names no world."""
-    if arena is None and champion.world is None:
-        say("the champion's file names no world, so it drives in the default box. --arena names another arena.")
-
-
 def parse_turret(entry: str, robot_count: int) -> tuple[str, int | None]:
     """Return the turret and the robot's number of 'gripper=2'; no number for all robots.
 
@@ -238,6 +224,7 @@ def parse_words(words: list[str]) -> list[Command]:
     begins with a .py file or -m, it is a program with all its arguments, which may be .py files themselves. The first
     program may also be -m and a module's name in words of their own, another file, or a folder with a `__main__.py`.
     """
+    from kiks.model.shipped import demonstrations
     from kiks.ports.program_process import Command, module_command
 
     commands: list[Command] = []
@@ -263,7 +250,10 @@ def parse_words(words: list[str]) -> list[Command]:
             found = (
                 f"{shown(word)} is a folder without a __main__.py" if is_folder else f"there is no file {shown(word)}"
             )
-            raise ParameterError(f"PROGRAM must be a Python file, but {found}. Give its path before its own arguments.")
+            raise ParameterError(
+                f"PROGRAM must be a Python file, but {found}. Give its path before its own arguments."
+                f"{nearest(word, demonstrations())}"
+            )
     return commands
 
 

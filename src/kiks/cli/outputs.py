@@ -33,7 +33,10 @@ arenas, are the work of people."""
 
 
 def output(
-    *endings: str, default: Callable[[Mapping[str, Any]], Path] | None = None, beside: str = "", is_new: bool = False
+    *endings: str,
+    default: Callable[[Mapping[str, Any]], Path | None] | None = None,
+    beside: str = "",
+    is_new: bool = False,
 ) -> Callable[[Path | None], Path | None]:
     """Return the callback of an option or argument that names a file to be written; `Command` checks it.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -23,6 +23,14 @@ if TYPE_CHECKING:
 PROGRAM_CHARACTERS_MAX = 1 << 20
 """Most characters of a program's text in a recording."""
 
+
+def _picture_of_demonstration(given: Mapping[str, Any]) -> Path | None:
+    from kiks.cli.job import demonstration_of
+
+    name = demonstration_of(str(given["program"]))
+    return Path(f"kiks-{name}.png") if name else None
+
+
 RecordFile = Annotated[
     Path | None,
     typer.Option(
@@ -37,8 +45,9 @@ ExportFile = Annotated[
     Path | None,
     typer.Option(
         "--export",
-        help="Write this file of the run when it ends, as kiks export does: .png, .csv, .mp4, .html ...",
-        callback=output(*ENDINGS),
+        help="Write this file of the run when it ends, as kiks export does: .png, .csv, .mp4, .html ...; kiks-NAME.png "
+        "for a demonstration, if left out.",
+        callback=output(*ENDINGS, default=_picture_of_demonstration),
     ),
 ]
 

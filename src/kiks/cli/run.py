@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -11,8 +12,9 @@ import typer
 
 from kiks.cli.desk import NoWait, WithDesk, open_desk
 from kiks.cli.engine_start import ready_engine
+from kiks.cli.job import job_of, takes_options_behind
 from kiks.cli.limits import Limits, MaxWall, Seconds
-from kiks.cli.options import Silence, World, is_project, parse_words, say, show_log
+from kiks.cli.options import Silence, World, say, show_log
 from kiks.cli.outputs import Command as CheckedCommand
 from kiks.cli.outputs import leave_out, output
 from kiks.cli.record import ExportFile, RecordFile, noting_output, recorded, tell_run
@@ -34,7 +36,7 @@ class RunCommand(CheckedCommand):
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Move options after such a file before it, and mark where the words of programs begin."""
         options, words = self._split(ctx, args)
-        if words and words[0].lower().endswith((".kiks", ".toml")):
+        if words and takes_options_behind(words[0]):
             behind, others = self._split(ctx, words[1:])
             options, words = options + behind, [words[0], *others]
         options = [word for word in options if word != "--"]
@@ -55,8 +57,8 @@ def run(
     program: Annotated[
         Path,
         typer.Argument(
-            help="A Python program that talks to a Khepera through pyserial, a project (.kiks) or a champion's file. A "
-            "program is a file, a folder with a __main__.py, or -m and the name of a module."
+            help="A Python program that talks to a Khepera through pyserial: a file, a folder with a __main__.py, or "
+            "-m and the name of a module; or a project (.kiks), a demonstration, or a champion's file or folder."
         ),
     ],
     arguments: Annotated[
@@ -91,63 +93,42 @@ def run(
     in a process of its own: the first drives robot 1, the second robot 2, and so on.
 
     A project (.kiks) has its own world, robots and programs; programs after it replace its own, from robot 1 on. With a
-    file of `kiks evolve`, its champion drives all robots, in its own world or in --arena.
+    file or folder of `kiks evolve`, its champion drives all robots, in its own world or in --arena. Demonstrations are
+    projects that come with KiKS, and leave a picture: avoid, camera, clean, first_steps, follow, maze, pictures, race,
+    soccer, square, swarm, to_the_light.
 
     Example: kiks run --arena examples/arenas/maze.toml --map /dev/ttyUSB0=1 wander.py
+    Example: kiks demo follow --arena examples/arenas/office.toml --seconds 300
     """
-    ready_engine()
     show_log()
     if not desk:
         leave_out(context, "without --desk", "no_wait")
     else:
-        leave_out(context, "with --desk, where a person ends the run", "max_wall")
-    if program.suffix == ".toml":
-        from kiks.cli.drive import run_champion
-
-        if arguments:
-            raise ParameterError(
-                f"a champion must drive all robots alone, but {shown(arguments[0])} follows it. Leave it out."
-            )
-        leave_out(context, "of a champion", "robot", "thinking", "map_", "save_thinking", "when_silent", "patience")
-        files = (record, export)
-        seconds, limits = 60.0 if seconds is None else seconds, Limits(None, max_wall)
-        run_champion(program, world, seconds, limits, files, on_desk=desk, waits=not no_wait)
-        return
-    if desk:
-        leave_out(context, "with programs on the desk, where a person ends them", "seconds")
-    limits = Limits(seconds, max_wall)
-    from kiks.ports.program_process import Labels, commands_of
+        leave_out(context, "with --desk, where a person ends the run", "max_wall", "seconds")
+    job = job_of(str(program), arguments or [], world)
+    from kiks.ports.program_process import Labels
     from kiks.ports.program_scheduler import check_policy
     from kiks.ports.programs import Programs
-    from kiks.sim.from_project import thinking_of
+    from kiks.sim.from_project import simulation_of, thinking_of
+    from kiks.sim.supervision import Supervision
 
-    words = [str(program), *(arguments or [])]
-    file = words.pop(0) if is_project(program) else None
-    named = parse_words(words)
-    project, home = world.project(file, programs=len(named))
-    own = commands_of(project, home)
-    commands: list[Command | None] = [*named, *own[len(named) :]] if file else [*named]
-    while commands and commands[-1] is None:
-        commands.pop()
-    if not commands:
-        raise ParameterError(
-            f"a project must name a program for a robot, but {str(program)!r} names none. Name one after it: "
-            f"kiks run {program} my_program.py."
-        )
-    if any(own) and not file:
-        say(f"the programs of {world.arena} do not start here. kiks run {world.arena} starts them, too.")
+    commands, project = job.commands, job.project
+    limits = Limits(project.seconds if seconds is None and not desk else seconds, max_wall)
     mapping = dict(parse_map(entry) for entry in map_ or [])
     check_policy(silence.when_silent, silence.patience)
     import kiks.script  # noqa: F401  (under an interpreter that it does not know, KiKS ends here)
 
-    thinking = thinking_of(project, home) if thinking is None else thinking
+    is_alone = len(commands) == 1 and not desk
+    thinking = thinking_of(project, job.folder) if thinking is None else thinking
     if not thinking.startswith("live"):
         leave_out(context, f"with --thinking {thinking}", "save_thinking")
-    if len(commands) == 1 and not desk:
+    if is_alone:
         leave_out(context, "with one program", "when_silent", "patience")
+    ready_engine(as_needed=is_alone and job.needs_little)
     # A program may change the working folder.
     thoughts = None if save_thinking is None else save_thinking.absolute()
-    sim = world.simulation(project, home, thinking if len(commands) == 1 else "none")
+    each_thinks = thinking if len(commands) == 1 else "none"
+    sim = simulation_of(project, job.folder, kinds=job.kinds, thinking=each_thinks)
     for number in mapping.values():
         sim.world.index_of(number)
     names = [each.name for each in commands if each is not None]
@@ -163,17 +144,20 @@ def run(
         labels=labels,
     )
     texts = [each.file for each in commands if each is not None]
-    if desk:
-        with recorded(sim, record, export, texts):
-            # If the command line has changed the kinds of robots, the desk derives the project from the simulation.
-            told = None if world.robot else project
-            _run_on_desk(
-                sim, commands, host, thinking, waits=not no_wait, project=told, speed=project.speed, folder=home
-            )
-        return
-    end_as_with_ctrl_c()
     code, doubt = 1, ""
-    with recorded(sim, record, export, texts):
+    with ExitStack() as at_the_end:
+        if job.supervisor is not None:
+            texts.append(job.supervisor)
+            if not desk:
+                at_the_end.callback(Supervision(sim, job.supervisor).close)
+        at_the_end.enter_context(recorded(sim, record, export, texts))
+        if desk:
+            # If the command line has changed the kinds of robots, the desk derives the project from the simulation.
+            told = None if job.kinds else project
+            options = {"project": told, "speed": project.speed, "folder": job.folder, "supervisor": job.supervisor}
+            _run_on_desk(sim, commands, host, thinking, waits=not no_wait, **options)
+            return
+        end_as_with_ctrl_c()
         try:
             if len(commands) == 1 and commands[0] is not None:
                 code = _run_one(sim, commands[0], mapping, thoughts, limits)
@@ -188,6 +172,8 @@ def run(
             raise
         finally:
             _tell(sim, thinking, doubt)
+    if job.demonstration:
+        say(f"picture: {export}")
     raise typer.Exit(code)
 
 

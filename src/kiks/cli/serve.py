@@ -71,6 +71,7 @@ def serve(
     """
     from kiks.clock.patience import Patience
     from kiks.ports.server import Server
+    from kiks.sim.from_project import simulation_of
 
     def say(text: str) -> None:
         if not quiet:
@@ -88,7 +89,7 @@ def serve(
     project, home = world.project()
     if any(each.program for each in project.robots):
         say(f"The programs of {world.arena} do not start here; other programs may connect. kiks run starts them.")
-    sim = world.simulation(project, home, "none")
+    sim = simulation_of(project, home, kinds=world.robot or (), thinking="none")
     if not quiet:
         ready_engine()
     compile_everything()  # or load it, so that the first program does not wait for it

@@ -136,6 +136,18 @@ class Champion:
         """Speed of its lines [bit/s]: the highest baud rate of a Khepera if it was evolved without a line."""
         return self.timing.baud or 57600
 
+    def project(self, arena: Arena | None = None) -> Project:
+        """Return its own world, or that of an arena or the default box, with its timing and turrets for its senses."""
+        project = self.world if arena is None and self.world is not None else Project(arena or Arena.default())
+        seen = ("k213",) if "camera" in self.controller.senses else ()
+        robots = (
+            replace(each, turrets=tuple(dict.fromkeys((*each.turrets, *seen))))
+            for each in project.robots or (ProjectRobot(),)
+        )
+        think_s = self.timing.think_s
+        thinking = f"fixed:{think_s * 1e3:g}" if think_s else "none"
+        return replace(project, robots=tuple(robots), baud=self.baud, thinking=thinking)
+
     def simulation(
         self, arena: Arena | None = None, *, robots: int | None = None, seed: int | None = None
     ) -> tuple[Simulation, list[Port]]:
@@ -146,21 +158,13 @@ class Champion:
             robots: Number of robots; that of its own world, else 1, if left out.
             seed: Seed of all random numbers; that of its own world, else 0, if left out.
         """
-        project = self.world if arena is None and self.world is not None else Project(arena or Arena.default())
-        there = project.robots or (ProjectRobot(),)
+        project = self.project(arena)
+        there = project.robots
         count = len(there) if robots is None else check_count("robots", robots, 1, ROBOTS_MAX)
         named = (*there, *there[-1:] * count)[:count]
         project = replace(project, robots=named, seed=project.seed if seed is None else seed)
-        think_s = self.timing.think_s
-        sim = simulation_of(project, kinds=[self.robot], thinking=f"fixed:{think_s * 1e3:g}" if think_s else "none")
-        ports: list[Port] = []
-        for number in range(1, count + 1):
-            if "camera" in self.controller.senses:
-                sim.fit(number, "k213")
-            port = sim.port(number)
-            port.baudrate = self.baud
-            ports.append(port)
-        return sim, ports
+        sim = simulation_of(project, kinds=[self.robot])
+        return sim, [sim.port(number) for number in range(1, count + 1)]
 
     # ---- files ----
 
@@ -196,7 +200,7 @@ class Champion:
     def _text(self, recipe: Mapping[str, Any], named: Mapping[str, str]) -> str:
         top = ("task", "fitness", "generation", "algorithm", "seed", "kiks")
         lines = [
-            "# A controller for Khepera robots. See it: kiks demo FILE. Let it drive: kiks run FILE.",
+            "# A controller for Khepera robots. See it drive: kiks run FILE.",
             f"champion = {FORMAT}",
             *(f"{name} = {_toml_value(getattr(self, name))}" for name in top),
             *(f"{name} = {_toml_value(value)}" for name, value in named.items()),

@@ -51,7 +51,7 @@ def champion_of_policy(
 
     Its outputs are those of the policy without exploration, within 1e-6 of the speed limit. The network of the policy
     consists of linear layers with tanh or ReLU between them. It gets the observations of the environment as they are,
-    and its two outputs are the actions. `Champion.save` keeps it, and `kiks run`, `kiks drive` and `kiks demo`
+    and its two outputs are the actions. `Champion.save` keeps it, and `kiks run`
     take the file.
 
     Args:

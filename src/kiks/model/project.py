@@ -26,7 +26,7 @@ from kiks.model.arena_file import (
 )
 from kiks.model.arena_objects import THINGS_MAX
 from kiks.model.atomic_files import check_relative, ending_of, path_of, replace_file
-from kiks.model.checks import ROBOTS_MAX
+from kiks.model.checks import ROBOTS_MAX, SECONDS_MAX
 from kiks.model.data_file import (
     Number,
     OneOf,
@@ -52,7 +52,7 @@ FASTEST = "fastest"
 """Value in a file for no speed limit."""
 
 _VERSION = 1
-_SETTINGS = ("seed", "thinking", "baud", "response", "noise", "speed")
+_SETTINGS = ("seed", "thinking", "baud", "response", "noise", "speed", "seconds", "supervisor")
 
 
 def _check_kind(kind: str) -> str:
@@ -80,6 +80,7 @@ def _check_thinking(thinking: str) -> str:
     return thinking
 
 
+Program = Annotated[Text, AfterValidator(_check_program)]
 _Plain = Switch | Whole | Number | Text
 Change = Annotated[
     _Plain | Annotated[tuple[_Plain, ...], Field(max_length=1000)],
@@ -109,7 +110,7 @@ class ProjectRobot:
     kind: Annotated[Text, AfterValidator(_check_kind)] = "khepera"
     turrets: Annotated[tuple[Annotated[str, OneOf(tuple(TURRETS))], ...], AfterValidator(_check_differ)] = ()
     name: Text = ""
-    program: Annotated[Text, AfterValidator(_check_program)] | None = None
+    program: Program | None = None
     arguments: Annotated[tuple[Text, ...], Field(max_length=100)] = ()
     brightness: Brightness | None = None
     changes: dict[str, dict[str, Change]] = Field(default_factory=dict)
@@ -119,6 +120,9 @@ Robots = Annotated[tuple[ProjectRobot, ...], Field(max_length=ROBOTS_MAX, descri
 Seed = Annotated[Whole, Field(ge=0, le=2**63 - 1)]
 ThinkingPolicy = Annotated[Text, AfterValidator(_check_thinking)]
 Speed = Annotated[Number, Field(ge=1e-3, le=1e3, description="1 is real time.")]
+
+
+Seconds = Annotated[Number, Field(gt=0, le=SECONDS_MAX)]
 
 
 @record
@@ -135,6 +139,8 @@ class Project:
         response: Response of the proximity sensors (docs/sensors.md); that of the robots' files if None.
         noise: Whether sensors are noisy.
         speed: Simulated seconds per real second on the desk; None for no limit.
+        seconds: Simulated time at which a run ends [s]; None for the end of its programs.
+        supervisor: A Python file in the project's folder that acts in the world from outside, such as a referee.
 
     Example:
         >>> project = Project(Arena.default(), robots=(ProjectRobot(turrets=("gripper",)),), seed=7)
@@ -150,6 +156,8 @@ class Project:
     response: Response | None = None
     noise: Switch = True
     speed: Speed | None = 1.0
+    seconds: Seconds | None = None
+    supervisor: Program | None = None
 
     def __post_init__(self) -> None:
         for name in ("starts", "lamps", "balls", "cylinders"):
@@ -264,6 +272,8 @@ class ProjectFile:
     response: Response | None = None
     noise: Switch = True
     speed: Annotated[Speed | Literal["fastest"], Rule("a number from 0.001 to 1000, or 'fastest'")] = 1.0
+    seconds: Seconds | None = None
+    supervisor: Program | None = None
     name: Text | None = None
     robot: Robots = (ProjectRobot(),)
     start: Starts = ()

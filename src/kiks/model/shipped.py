@@ -23,3 +23,8 @@ def shipped(name: str) -> Path:
 def shipped_arena(name: str) -> Arena:
     """Return an arena of `examples/arenas`, such as 'maze' or 'training/rooms'; the same object each time."""
     return Arena.load(shipped(f"examples/arenas/{name}.toml"))
+
+
+def demonstrations() -> dict[str, Path]:
+    """Return the projects that come with KiKS, by name."""
+    return {path.stem: path for path in sorted(shipped("examples").glob("*/*.kiks"))}

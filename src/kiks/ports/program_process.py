@@ -99,6 +99,11 @@ def commands_of(project: Project, folder: Path) -> list[Command | None]:
     ]
 
 
+def supervisor_of(project: Project, folder: Path) -> Path | None:
+    """Return the file of the supervisor of a project in a folder; None if it has none."""
+    return None if project.supervisor is None else program_in(folder, project.supervisor)
+
+
 def module_command(module: str, arguments: Sequence[str]) -> Command:
     """Return the program that `python -m` would run; nothing is imported to find its file."""
     path: Sequence[str] | None = [os.getcwd(), *sys.path]

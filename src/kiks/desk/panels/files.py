@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from pathlib import PurePosixPath
+from pathlib import Path, PurePosixPath
 
 from nicegui import ui
 from nicegui.events import UploadEventArguments
@@ -11,13 +11,13 @@ from nicegui.events import UploadEventArguments
 from kiks.desk.panels.film import FilmDialog
 from kiks.desk.panels.widgets import named, text_button, told, with_props
 from kiks.desk.server.desk import Desk
-from kiks.desk.server.example_worlds import EXAMPLES
 from kiks.desk.server.folder import OPENED, PICTURES, UPLOAD_BYTES_MAX, Folder, decode, encode
 from kiks.desk.server.live_editing import Editing
 from kiks.errors import ArenaError, ParameterError
 from kiks.model.arena import Arena
 from kiks.model.picture import decode_picture
 from kiks.model.project import Project
+from kiks.model.shipped import demonstrations
 
 
 class FilesPanel:
@@ -47,9 +47,9 @@ class FilesPanel:
             self._choice.on("focus", self._list)
             text_button("Open", "folder_open", "open", "Open the world of this file", self._open)
         with ui.row().classes("w-full items-end no-wrap gap-1"):
-            self._example = ui.select([*EXAMPLES], label="Or an example", value=next(iter(EXAMPLES)))
+            self._example = ui.select([*demonstrations()], label="Or a demonstration", value="avoid")
             self._example.props("dense options-dense data-testid=example-name").classes("col").mark("example-name")
-            tip = "Open the world of this example"
+            tip = "Open the world of this demonstration, and start its programs"
             text_button("Open", "folder_open", "open-example", tip, self._open_example)
         self._list()
 
@@ -94,15 +94,16 @@ class FilesPanel:
 
     @told
     async def _open_example(self) -> None:
-        await self._begin(EXAMPLES[str(self._example.value)]())
+        path = demonstrations()[str(self._example.value)]
+        await self._begin(await asyncio.to_thread(Project.load, path), path.parent)
 
     async def _open_file(self, name: str, read: Project) -> None:
         """Begin the world of a file: a project, or an arena, to which the desk adds what is not in the file."""
         is_project = PurePosixPath(name).suffix.lower() == ".kiks"
         await self._begin(read if is_project else self._desk.project_of(read.arena))
 
-    async def _begin(self, project: Project) -> None:
-        await self._desk.replace(project)
+    async def _begin(self, project: Project, folder: Path | None = None) -> None:
+        await self._desk.replace(project, folder)
         ui.notify(f"Opened {project.arena.name}.")
 
     @told

@@ -20,12 +20,13 @@ from kiks.desk.server.scripts import EXAMPLES
 from kiks.errors import KiksError, LinkError, ParameterError
 from kiks.model.arena import Arena
 from kiks.model.project import Project
-from kiks.ports.program_process import Command, Permission, commands_of
+from kiks.ports.program_process import Command, Permission, commands_of, supervisor_of
 from kiks.ports.programs import Programs
 from kiks.sim.drag import Drags
 from kiks.sim.from_project import described, project_of, simulation_of
 from kiks.sim.ring_buffer import RingBuffer
 from kiks.sim.simulation import Simulation
+from kiks.sim.supervision import Supervision
 
 NEWS_LIMIT = 200
 """Number of messages to people that are kept."""
@@ -52,6 +53,7 @@ class Desk:
         owns_world: Whether the world may be replaced; False if a program outside holds it.
         may_run_programs: Whether a browser or a project may start programs other than `commands`.
         commands: Programs that start with the world, the first for robot 1 and so on; they are always permitted.
+        supervisor: File of the project's supervisor, which is permitted, too.
         new_programs: Factory of a world's program host; the default takes the project's settings.
         is_held: Whether programs wait for `begin`; else they start at once.
         has_old_coordinates: Whether people see the coordinates of KiKS 2.2.0.
@@ -80,6 +82,7 @@ class Desk:
         owns_world: bool = False,
         may_run_programs: bool = False,
         commands: Sequence[Command | None] = (),
+        supervisor: Path | None = None,
         new_programs: NewPrograms | None = None,
         is_held: bool = False,
         has_old_coordinates: bool = False,
@@ -98,11 +101,15 @@ class Desk:
         self.is_seen = threading.Event()
         self.looking = LookingBack(lambda: self.present, self.say)
         self._has_begun = not is_held
-        self._commands = self._granted = list(commands)
+        self._commands = list(commands)
+        self._supervisor = supervisor
+        self._granted = [*commands, _command_of(supervisor)]
         self._new_programs = new_programs or self._usual_programs
         self._retired: list[Programs] = []
         self.project = described(sim) if project is None else project
-        self._take(DeskWorld(sim, speed), self._commands)
+        world = DeskWorld(sim, speed)
+        self._supervise(world)
+        self._take(world, self._commands)
 
     def _take(self, world: DeskWorld, commands: Sequence[Command | None], *, is_branch: bool = False) -> None:
         """Show another present world, with programs that begin with it."""
@@ -172,7 +179,7 @@ class Desk:
         )
 
     def _permission(self) -> Permission:
-        return Permission(self._granted, folders=(self.folder, EXAMPLES), may_start_others=self.may_run_programs)
+        return Permission(self._granted, folders=(self.folder, EXAMPLES.parent), may_start_others=self.may_run_programs)
 
     def _permitted(self, commands: Sequence[Command | None]) -> list[Command | None]:
         """Return the programs with None for each that may not start; people get a message about those."""
@@ -240,13 +247,18 @@ class Desk:
 
     # ---- another world ----
 
-    async def replace(self, project: Project) -> None:
+    async def replace(self, project: Project, folder: Path | None = None) -> None:
         """Replace the world by that of a project, with the permitted ones of its programs; the old world ends.
+
+        Args:
+            project: The project.
+            folder: Where its programs lie; the desk's folder if left out.
 
         Raises:
             LinkError: If the world cannot be replaced.
         """
-        await self._put(project, commands_of(project, self.folder))
+        home = folder or self.folder
+        await self._put(project, commands_of(project, home), supervisor_of(project, home))
 
     async def start_over(self) -> None:
         """Begin again with the same world, seed and programs.
@@ -254,27 +266,41 @@ class Desk:
         Raises:
             LinkError: If the world cannot be replaced.
         """
-        await self._put(self.project, self._commands)
+        await self._put(self.project, self._commands, self._supervisor)
 
-    async def _put(self, project: Project, commands: Sequence[Command | None]) -> None:
+    async def _put(self, project: Project, commands: Sequence[Command | None], supervisor: Path | None = None) -> None:
         """Begin the world of a project."""
         self._check_owns()
         sim = await asyncio.to_thread(simulation_of, project, self.folder)
-        old, before = self.present, (self.project, self._commands)
+        old, before = self.present, (self.project, self._commands, self._supervisor)
         was_paused = old.is_paused
         world = DeskWorld(sim, old.gate.speed)
         if was_paused and self.past is None:
             world.pause()
         self.project, self._commands = project, self._permitted(commands)
+        (permitted,) = self._permitted([_command_of(supervisor)])
+        self._supervisor = None if permitted is None else supervisor
         # Its recording ends without a wait for the thread that moves it.
         await old.do(lambda _: old.pause())
         try:
+            self._supervise(world)
             self._replace(world, self._commands)
         except KiksError:
-            self.project, self._commands = before
+            self.project, self._commands, self._supervisor = before
             if not was_paused:
                 await old.do(lambda _: old.go_on())
             raise
+
+    def _supervise(self, world: DeskWorld) -> None:
+        """Let the supervisor prepare a world, and act in it; the world pauses when it has returned."""
+        if self._supervisor is not None:
+            sim = world.sim
+
+            def end(code: int, message: str) -> None:
+                self.say(message)
+                world.gate.pause(sim.now_ns)
+
+            Supervision(sim, self._supervisor).end = end
 
     def _replace(self, world: DeskWorld, commands: Sequence[Command | None], *, is_branch: bool = False) -> None:
         old, programs = self.present, self.programs
@@ -438,3 +464,7 @@ class NewsHandler(logging.Handler):
     def emit(self, record: logging.LogRecord) -> None:
         """Show a log record."""
         self._desk.say(self.format(record))
+
+
+def _command_of(supervisor: Path | None) -> Command | None:
+    return None if supervisor is None else Command(supervisor)

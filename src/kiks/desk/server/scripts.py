@@ -10,6 +10,7 @@ from pathlib import Path
 from kiks.desk.server.folder import check_name
 from kiks.errors import ParameterError, shown
 from kiks.model.atomic_files import inside, program_in, replace_file
+from kiks.model.shipped import shipped
 
 SIZE_LIMIT = 200_000
 """Maximum size of a program in the editor [bytes]."""
@@ -17,8 +18,8 @@ SIZE_LIMIT = 200_000
 COUNT_LIMIT = 200
 """Maximum number of listed files of the folder."""
 
-EXAMPLES = Path(__file__).parents[1] / "example_programs"
-"""Folder of the example programs."""
+EXAMPLES = shipped("examples/demos")
+"""Folder of the example programs, which are those of the demonstrations."""
 
 NEW = '''"""My program."""
 

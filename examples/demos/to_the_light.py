@@ -1,13 +1,11 @@
 """To the light: turn to the brighter side and drive there (Braitenberg's vehicle). Put a strong lamp near it."""
 
 import sys
-import time
 
 import serial
 
 PORT = sys.argv[1] if len(sys.argv) > 1 else "/dev/ttyUSB0"
 
-SECONDS = 60  # how long it drives
 SPEED = 6  # [pulses in 10 ms]
 FAINT = 12  # less light than this may be chance
 NEAR = 300  # reflected light of something right in front
@@ -22,8 +20,7 @@ def main() -> None:
             return [int(word) for word in port.readline().decode().split(",")[1:]]
 
         try:
-            end = time.time() + SECONDS
-            while time.time() < end:
+            while True:
                 # A light sensor reads less where it is brighter. How much brighter than at the darkest one is it?
                 values = ask("O")
                 light = [max(values) - value for value in values]

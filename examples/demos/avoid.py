@@ -1,13 +1,11 @@
 """Avoid: wander about without touching anything. What the sensors see pushes the wheels (Braitenberg's vehicle)."""
 
 import sys
-import time
 
 import serial
 
 PORT = sys.argv[1] if len(sys.argv) > 1 else "/dev/ttyUSB0"
 
-SECONDS = 60  # how long it drives
 CRUISE = 6  # speed where nothing is near [pulses in 10 ms]
 
 # How much each sensor, from the left clockwise, pushes each wheel: what is on the left makes the robot turn right.
@@ -24,8 +22,7 @@ def main() -> None:
             return [int(word) for word in port.readline().decode().split(",")[1:]]
 
         try:
-            end = time.time() + SECONDS
-            while time.time() < end:
+            while True:
                 sensors = ask("N")
                 left = right = float(CRUISE)
                 for sensor, to_left, to_right in zip(sensors, LEFT_WHEEL, RIGHT_WHEEL, strict=True):

@@ -1,4 +1,4 @@
-"""The camera: turn round slowly and print each picture of the K213, a line of 64 greys. The robot needs that turret."""
+"""Pictures: turn round slowly and print each picture of the K213, a line of 64 greys. The robot needs that turret."""
 
 import sys
 
@@ -19,7 +19,7 @@ def main() -> None:
             return port.readline().decode().strip()
 
         if not ask("T,2,B").startswith("t,2,b"):
-            sys.exit("This robot has no K213. Start KiKS with --turret k213, or put one on in the desk.")
+            sys.exit("This robot has no K213. Start KiKS with --turret k213, or fit one on the desk.")
         ask("T,2,U,1")  # a picture each 50 ms
         ask("D,2,-2")
         try:

@@ -1,1 +1,0 @@
-"""Programs to begin with: plain pyserial, for a real Khepera as well."""

@@ -1,0 +1,86 @@
+"""Supervisors: programs that act in a world from outside."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from tests import forked
+
+from kiks.errors import ParameterError
+from kiks.sim.simulation import Simulation
+from kiks.sim.supervision import Supervision
+
+TICKS = """
+def supervise(sim):
+    ball = sim.add_ball(100, 100)
+    try:
+        for number in range(3):
+            yield 0.5
+            sim.move_body(ball, 110 + 10 * number, 100)
+    finally:
+        print("moved", number + 1, "times at", sim.time_s)
+"""
+
+
+def supervised(tmp_path: Path, text: str) -> tuple[Simulation, Supervision]:
+    file = tmp_path / "referee.py"
+    file.write_text(text)
+    sim = Simulation()
+    return sim, Supervision(sim, file)
+
+
+def test_it_prepares_the_world_acts_at_its_times_and_returns(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    sim, supervision = supervised(tmp_path, TICKS)
+    ended = []
+    supervision.end = lambda code, message: ended.append((code, message))
+    assert sim.bodies()["x_mm"].tolist() == [100.0]
+    sim.run(1.2)
+    assert sim.bodies()["x_mm"].tolist() == [120.0]
+    sim.run(1.0)
+    assert ended == [(0, "the supervisor has ended the run at 1.500 s of simulated time.")]
+    assert capsys.readouterr().out == "moved 3 times at 1.5\n"
+
+
+def test_it_is_closed_wherever_it_waits(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    sim, supervision = supervised(tmp_path, TICKS)
+    sim.run(0.7)
+    supervision.close()
+    assert capsys.readouterr().out == "moved 2 times at 0.7\n"
+    sim.run(1.0)
+    assert sim.bodies()["x_mm"].tolist() == [110.0]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("x = 1", r"must define a function supervise\(sim\) that yields"),
+        ("def supervise(sim):\n    return 1", r"must define a function supervise\(sim\) that yields"),
+        ("def supervise(sim):\n    yield 0", "the time that a supervisor yields must be from 0.001"),
+        ("def supervise(sim):\n    yield 'soon'", "the time that a supervisor yields must be a number"),
+    ],
+)
+def test_a_file_that_is_no_supervisor_is_an_error(text: str, message: str, tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match=message):
+        supervised(tmp_path, text)
+
+
+def test_a_supervisor_that_fails_ends_the_run(tmp_path: Path) -> None:
+    (tmp_path / "referee.py").write_text("def supervise(sim):\n    yield 0.5\n    print(1 / 0)\n")
+    (tmp_path / "waits.py").write_text("import time\ntime.sleep(5)\n")
+    (tmp_path / "game.kiks").write_text(
+        'kiks = 1\nsupervisor = "referee.py"\n[[robot]]\nprogram = "waits.py"\n[walls]\nsize_mm = [400, 300]\n'
+    )
+    result = forked.run("run", "game.kiks", cwd=tmp_path)
+    assert result.returncode == 1
+    assert "kiks: the supervisor referee.py has failed: division by zero" in result.stderr
+    assert 'referee.py", line 3' in result.stderr
+    both = forked.run("run", "game.kiks", "waits.py", "waits.py", cwd=tmp_path)
+    assert "kiks: the supervisor referee.py has failed: division by zero" in both.stderr
+    assert "0.500 s simulated" in both.stderr
+    (tmp_path / "referee.py").unlink()
+    missing = forked.run("run", "game.kiks", cwd=tmp_path)
+    assert missing.returncode == 2
+    assert "a supervisor must be a Python file, but there is none at" in missing.stderr
