@@ -91,7 +91,7 @@ def test_our_files_are_accepted() -> None:
         ("task", {"name": "../out"}),
         ("task", {"controller": {"kind": "mlp", "hidden": [10**9]}}),
         ("task", {"controller": {"kind": "gru", "hidden": [3]}}),
-        ("task", {"controller": {"file": "x.exe", "name": "x"}}),
+        ("task", {"controller": {"function": "x.exe"}}),
     ],
 )
 def test_values_out_of_range_are_refused(kind: str, change: dict[str, Any]) -> None:

@@ -47,9 +47,9 @@ def test_a_file(tmp_path: Path) -> None:
     path = tmp_path / "mine.py"
     path.write_text(SHY)
     made = runpy.run_path(str(path), run_name="__main__")["shy"]
-    assert made.recipe == {"file": str(path), "name": "shy"}
+    assert made.recipe == {"function": f"{path}:shy"}
     recipe = kiks.controllers.recipe_for(made, tmp_path)
-    assert recipe == {"file": "mine.py", "name": "shy"}
+    assert recipe == {"function": "mine.py:shy"}
     found = kiks.controllers.from_recipe(recipe, tmp_path)
     assert (found.name, found.memory_count, found.parameter_count) == ("shy", 2, 1)
     assert kiks.controllers.from_recipe(recipe, tmp_path) is found
@@ -82,10 +82,9 @@ def test_a_controller_inside_a_function_cannot_be_named() -> None:
 @pytest.mark.parametrize(
     ("recipe", "message"),
     [
-        ("mlp", "must be a table with a kind .*, or a function, or a file and a name, but it was 'mlp'"),
-        ({}, "must be a table with a kind .*, or a function, or a file and a name, but it was {}"),
-        ({"file": "mine.py"}, "name must be given, but it is missing"),
-        ({"file": "mine.py", "name": 3}, "name must be a text, but it was 3"),
+        ("mlp", "must be a table with a kind .* or a function, but it was 'mlp'"),
+        ({}, "must be a table with a kind .* or a function, but it was {}"),
+        ({"function": 3}, "function must be 'package.module:name' or 'file.py:name', but it was 3"),
         ({"kind": "mpl"}, "Did you mean 'mlp'"),
         ({"kind": ["mlp"]}, "must be one of 'linear'"),
         ({"kind": "mlp", "hiden": [3]}, "but it has 'hiden'. Did you mean 'hidden'"),
@@ -97,28 +96,28 @@ def test_a_controller_inside_a_function_cannot_be_named() -> None:
         ({"kind": "mlp", "hidden": [256] * 9}, "hidden must have at most 8 items"),
         ({"kind": "gru", "speed_limit": float("nan")}, "speed_limit must be a finite number, but it was nan"),
         ({"kind": "gru", "senses": ["ambient", "ambient"]}, "senses must name each sense once"),
-        ({"function": "shy"}, "function must be 'package.module:name', but it was 'shy'"),
+        ({"function": "shy"}, "function must be 'package.module:name' or 'file.py:name', but it was 'shy'"),
         ({"function": "no_such_module_here:shy"}, "module 'no_such_module_here' must be one that Python can import"),
         ({"function": "kiks.errors:shy"}, "the module 'kiks.errors' must define 'shy', but does not"),
         ({"function": "kiks.errors:nearest"}, "must name a controller, but it names <function nearest"),
-        ({"file": "nowhere.py", "name": "shy"}, "must be a Python file that runs, but it raised FileNotFoundError"),
-        ({"file": "mine.py", "name": "shi"}, "must define 'shi', but does not. Did you mean 'shy'"),
-        ({"file": "mine.py", "name": "plain"}, "Write @kiks.controller over the function"),
-        ({"file": "mine.txt", "name": "shy"}, "file must be a Python file"),
-        ({"file": "bad.py", "name": "shy"}, r"must be a Python file that runs, but it raised ZeroDivisionError\("),
-        ({"file": "quits.py", "name": "shy"}, r"must be a Python file that runs, but it raised SystemExit\("),
+        ({"function": "nowhere.py:shy"}, "must be a Python file that runs, but it raised FileNotFoundError"),
+        ({"function": "mine.py:shi"}, "must define 'shi', but does not. Did you mean 'shy'"),
+        ({"function": "mine.py:plain"}, "Write @kiks.controller over the function"),
+        ({"function": "mine.txt:shy"}, "module 'mine.txt' must be one that Python can import"),
+        ({"function": "bad.py:shy"}, r"must be a Python file that runs, but it raised ZeroDivisionError\("),
+        ({"function": "quits.py:shy"}, r"must be a Python file that runs, but it raised SystemExit\("),
         (
-            {"file": ".git/mine.py", "name": "shy"},
+            {"function": ".git/mine.py:shy"},
             "in no folder whose name begins with a dot, but it was '.git/mine.py'",
         ),
         (
-            {"file": ".mine.py", "name": "shy"},
+            {"function": ".mine.py:shy"},
             "in no folder whose name begins with a dot, but it was '.mine.py'",
         ),
-        ({"file": "../mine.py", "name": "shy"}, "must lead to a file in the"),
-        ({"file": "/tmp/mine.py", "name": "shy"}, "must lead to a file in the"),
-        ({"file": "linked/mine.py", "name": "shy"}, "must lie in the folder of the file that names it"),
-        ({"file": "link.py", "name": "shy"}, "must lie in the folder of the file that names it"),
+        ({"function": "../mine.py:shy"}, "must lead to a file in the"),
+        ({"function": "/tmp/mine.py:shy"}, "must lead to a file in the"),
+        ({"function": "linked/mine.py:shy"}, "must lie in the folder of the file that names it"),
+        ({"function": "link.py:shy"}, "must lie in the folder of the file that names it"),
     ],
 )
 def test_wrong_recipes_are_errors(recipe: Any, message: str, tmp_path: Path) -> None:

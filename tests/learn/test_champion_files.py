@@ -126,7 +126,7 @@ def test_a_champion_whose_controller_has_changed_is_told(tmp_path: Path, caplog:
         "import kiks\nGAIN = 2.0\n@kiks.controller(parameters=1)\n"
         "def own(sensors, memory, parameters, wheels):\n    wheels[0] = wheels[1] = GAIN * parameters[0]\n"
     )
-    recipe = {"file": "task.py", "name": "own"}
+    recipe = {"function": "task.py:own"}
     kiks.Champion(kiks.controllers.from_recipe(recipe, tmp_path), (1.0,)).save(tmp_path / "one.toml")
     kiks.Champion(LINEAR, PARAMETERS).save(tmp_path / "ready.toml")
     code = tmp_path / "one_controller.py"

@@ -60,12 +60,12 @@ def test_all_keys(folder: Path) -> None:
     assert task.controller is kiks.controllers.gru(units=2)
     assert load(folder, 'base = "avoid"\nbaud = 0\n').timing.baud is None
     assert kiks.tasks.load(str(folder / "mine.toml"), kiks.controllers.linear()).controller.name == "linear"
-    own = load(folder, 'base = "avoid"\n[controller]\nfile = "shy.py"\nname = "shy"\n')
+    own = load(folder, 'base = "avoid"\n[controller]\nfunction = "shy.py:shy"\n')
     assert (own.controller.name, own.parameter_count) == ("shy", 1)
 
 
 def test_the_digest_depends_on_what_the_file_says_and_on_the_files_that_it_names(folder: Path) -> None:
-    text = 'base = "avoid"\narenas = ["room.toml"]\n[controller]\nfile = "shy.py"\nname = "shy"\n'
+    text = 'base = "avoid"\narenas = ["room.toml"]\n[controller]\nfunction = "shy.py:shy"\n'
     first = load(folder, text).digest()
     assert load(folder, "# a word\n" + text).digest() == first
     assert differing(load(folder, "seconds = 3\n" + text).digest(), first) == "seconds"
@@ -98,7 +98,7 @@ def test_the_digest_depends_on_what_the_file_says_and_on_the_files_that_it_names
             'base = "avoid"\n[controller]\nkind = "mlp"\nhidden = [1000000000]',
             r"controller.hidden\[0\] must be a whole",
         ),
-        ('base = "avoid"\n[controller]\nfile = "../shy.py"\nname = "shy"', "must lead to a file in"),
+        ('base = "avoid"\n[controller]\nfunction = "../shy.py:shy"', "must lead to a file in"),
     ],
 )
 def test_wrong_files_are_errors_of_one_short_line(text: str, message: str, folder: Path) -> None:

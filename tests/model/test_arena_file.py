@@ -1,9 +1,7 @@
 """Pictures and arena files: every format that is read, and the words of every refusal."""
 
-import importlib.util
 import math
 import struct
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -429,15 +427,3 @@ def test_all_floor_with_room_for_a_robot_can_be_reached(path):
 
 def test_the_default_arena_is_also_a_picture():
     assert np.array_equal(Arena.load(EXAMPLES / "default.toml").brightness, Arena.default().brightness)
-
-
-def test_the_script_draws_the_committed_pictures(tmp_path, monkeypatch):
-    monkeypatch.setattr(sys, "dont_write_bytecode", True)
-    spec = importlib.util.spec_from_file_location("draw", EXAMPLES / "draw.py")
-    draw = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(draw)
-    draw.draw_all(tmp_path)
-    drawn = {path.name for path in tmp_path.iterdir()}
-    assert drawn == {path.name for path in EXAMPLES.iterdir() if path.suffix in (".png", ".tif")}
-    for name in drawn:
-        assert np.array_equal(Image.open(tmp_path / name), Image.open(EXAMPLES / name)), name

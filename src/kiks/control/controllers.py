@@ -39,7 +39,7 @@ from kiks.control.neural_nets import (
     rectified,
     senses_as_inputs,
 )
-from kiks.control.recipes import InFile, InModule, find, relative_to
+from kiks.control.recipes import FunctionRecipe, find, relative_to
 from kiks.control.senses import check_senses, reading_count
 from kiks.engine.numbers import tanh
 from kiks.engine.simd.stack_arrays import stack_floats
@@ -411,15 +411,15 @@ def _tag(given: Any) -> str | None:
     """Return the kind of a recipe."""
     if not isinstance(given, Mapping):
         return None
-    return str(given["kind"]) if "kind" in given else next((key for key in ("function", "file") if key in given), None)
+    return str(given["kind"]) if "kind" in given else "function" if "function" in given else None
 
 
 if not TYPE_CHECKING:
-    _RECORDS = {name: arguments for name, (arguments, _) in KINDS.items()} | {"function": InModule, "file": InFile}
+    _RECORDS = {name: arguments for name, (arguments, _) in KINDS.items()} | {"function": FunctionRecipe}
     Recipe = Annotated[
         Union[tuple(Annotated[each, Tag(tag)] for tag, each in _RECORDS.items())],  # noqa: UP007
         Discriminator(_tag),
-        Rule(f"a table with a kind ({', '.join(KINDS)}), or a function, or a file and a name"),
+        Rule(f"a table with a kind ({', '.join(KINDS)}) or a function"),
     ]
     """The recipe of a controller in a file."""
 
@@ -430,7 +430,7 @@ def from_recipe(recipe: Mapping[str, Any], folder: str | Path = ".") -> Controll
     A recipe of a user's own controller names a module or a file, and that is run: load only what you trust.
 
     Args:
-        recipe: {"kind": "mlp", "hidden": [6], ...}, {"function": "module:name"} or {"file": "my.py", "name": "shy"}.
+        recipe: {"kind": "mlp", "hidden": [6], ...}, {"function": "module:name"} or {"function": "my.py:shy"}.
         folder: Where a relative file is looked for.
 
     Example:
@@ -443,7 +443,7 @@ def from_recipe(recipe: Mapping[str, Any], folder: str | Path = ".") -> Controll
 
 def controller_of(recipe: Recipe, folder: str | Path) -> Controller:
     """Return the controller of a checked recipe of a file in a folder. A user's own module or file is run."""
-    if not isinstance(recipe, InModule | InFile):
+    if not isinstance(recipe, FunctionRecipe):
         return KINDS[recipe.kind][1](recipe)
     found = find(recipe, folder)
     if not isinstance(found, Controller):

@@ -1,4 +1,4 @@
-"""Recipes of a user's own controllers: tables in files that name a function in a module or in a Python file."""
+"""Recipes of a user's own controllers: texts in files that name a function in a module or in a Python file."""
 
 from __future__ import annotations
 
@@ -18,18 +18,16 @@ from kiks.model.data_file import Rule, Text, record
 
 
 @record
-class InModule:
-    """A user's own controller, found by importing a module."""
+class FunctionRecipe:
+    """A user's own controller, found by importing a module, or by running a file in the recipe's folder or below."""
 
-    function: Annotated[Text, Field(pattern=r"^[\w.]+:[\w.]+$"), Rule("'package.module:name'")]
+    function: Annotated[Text, Field(pattern=r"^.+:[\w.]+$"), Rule("'package.module:name' or 'file.py:name'")]
 
 
-@record
-class InFile:
-    """A user's own controller, found by running a file that lies in the folder of the recipe's file or below."""
-
-    file: Annotated[Text, Field(pattern=r"\.py$"), Rule("a Python file, *.py, in the folder of this file")]
-    name: Annotated[Text, Field(min_length=1)]
+def file_of(recipe: Mapping[str, Any]) -> tuple[str, str]:
+    """Return the Python file that a recipe names, and the name in it; the file is empty if there is none."""
+    place, _, name = recipe.get("function", "").rpartition(":")
+    return place if place.endswith(".py") else "", name
 
 
 def recipe_of(function: Callable[..., Any]) -> dict[str, Any] | None:
@@ -40,35 +38,39 @@ def recipe_of(function: Callable[..., Any]) -> dict[str, Any] | None:
     name = function.__qualname__
     if "<" in name:
         return None
-    module = sys.modules.get(function.__module__)
-    if module is not None and function.__module__ != "__main__":
+    if function.__module__ != "__main__" and function.__module__ in sys.modules:
         return {"function": f"{function.__module__}:{name}"}
     path = Path(function.__code__.co_filename)
-    return {"file": str(path.absolute()), "name": name} if path.is_file() else None
+    return {"function": f"{path.absolute()}:{name}"} if path.is_file() else None
 
 
 def relative_to(recipe: Mapping[str, Any], folder: str | Path) -> dict[str, Any]:
     """Return a recipe with its file as seen from a folder, if it lies in there."""
-    if "file" not in recipe:
-        return dict(recipe)
-    path, root = Path(recipe["file"]).absolute(), Path(folder).absolute()
-    return {**recipe, "file": path.relative_to(root).as_posix() if path.is_relative_to(root) else str(path)}
+    file, name = file_of(recipe)
+    path, root = Path(file).absolute(), Path(folder).absolute()
+    return {"function": f"{path.relative_to(root)}:{name}"} if file and path.is_relative_to(root) else dict(recipe)
 
 
-def find(recipe: InModule | InFile, folder: str | Path) -> Any:
+def find(recipe: FunctionRecipe, folder: str | Path) -> Any:
     """Return what a recipe of a user's own controller names. The module or file is run, as by `import`."""
-    if isinstance(recipe, InFile):
-        path = program_in(Path(folder), recipe.file, "the recipe's file")
-        return _named(module_in(path), recipe.name, f"file {str(path)!r}")
-    module_name, _, name = recipe.function.partition(":")
-    try:
-        module = importlib.import_module(module_name)
-    except (Exception, SystemExit) as error:
-        raise ParameterError(
-            f"the recipe's module {shown(module_name)} must be one that Python can import, but: {shown(str(error))}. "
-            "Start Python where it lies, or name its file instead."
-        ) from None
-    return _named(module, name, f"module {shown(module_name)}")
+    place, _, name = recipe.function.rpartition(":")
+    if place.endswith(".py"):
+        path = program_in(Path(folder), place, "the recipe's file")
+        found, where = module_in(path), f"file {str(path)!r}"
+    else:
+        where = f"module {shown(place)}"
+        try:
+            found = importlib.import_module(place)
+        except (Exception, SystemExit) as error:
+            raise ParameterError(
+                f"the recipe's {where} must be one that Python can import, but: {shown(str(error))}. "
+                "Start Python where it lies, or name its file instead."
+            ) from None
+    for part in name.split("."):
+        if not hasattr(found, part):
+            raise ParameterError(f"the {where} must define {shown(name)}, but does not.{nearest(part, dir(found))}")
+        found = getattr(found, part)
+    return found
 
 
 def module_in(path: Path) -> Any:
@@ -87,14 +89,3 @@ def _run(path: Path, changed_ns: int) -> Any:
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
-
-
-def _named(module: Any, name: str, where: str) -> Any:
-    """Return the object with a dotted name in a module."""
-    found = module
-    for part in name.split("."):
-        if not hasattr(found, part):
-            known = tuple(vars(module))
-            raise ParameterError(f"the {where} must define {shown(name)}, but does not.{nearest(name, known)}")
-        found = getattr(found, part)
-    return found

@@ -16,6 +16,7 @@ from kiks.client.drive import Driver, drive
 from kiks.client.port import Port
 from kiks.control.controller import Controller
 from kiks.control.controllers import Recipe, controller_of, recipe_for
+from kiks.control.recipes import file_of
 from kiks.learn.fingerprint import fingerprints
 from kiks.model.arena import Arena
 from kiks.model.arena_file import quoted
@@ -183,9 +184,10 @@ class Champion:
             files[copy] = data
             return copy.name
 
-        if "file" in recipe:
-            code = read_file(target.parent / recipe["file"], "the file of the controller")
-            recipe = {"file": beside("controller.py", code), "name": recipe["name"]}
+        file, name = file_of(recipe)
+        if file:
+            code = read_file(target.parent / file, "the file of the controller")
+            recipe = {"function": f"{beside('controller.py', code)}:{name}"}
         if self.robot in robot_names():
             named["robot"] = str(self.robot)
         else:
