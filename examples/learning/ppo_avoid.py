@@ -20,7 +20,7 @@ from stable_baselines3.common.vec_env import VecEnv
 
 import kiks
 import kiks.learn.gymnasium_envs
-from kiks.learn.env_specs import without_contacts
+from kiks.learn.environments import without_contacts
 
 HIDDEN = (16, 16)
 WORLDS = 96
@@ -93,7 +93,7 @@ def main() -> None:
         autoreset_mode="SameStep",
         arenas=task.arenas,
         reward=without_contacts(kiks.measures.avoidance, CONTACT_COST),
-        speed_limit=SPEED_LIMIT,
+        controller=kiks.controllers.linear(speed_limit=SPEED_LIMIT),
     )
     model = PPO(
         "MlpPolicy",
@@ -107,11 +107,11 @@ def main() -> None:
         seed=given.seed,
         device="cpu",
     )
-    spec = envs.unwrapped.episodes.spec
+    environment = envs.unwrapped.episodes.task
     assert task.exam is not None
-    print("before:", task.exam.examine(kiks.champion_of_policy(model, spec)))
+    print("before:", task.exam.examine(kiks.champion_of_policy(model, environment)))
     model.learn(given.steps)
-    champion = kiks.champion_of_policy(model, spec)
+    champion = kiks.champion_of_policy(model, environment)
     print("after:", task.exam.examine(champion))
 
     model.save(f"{given.save}.zip")

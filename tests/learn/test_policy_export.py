@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import kiks
-from kiks.learn.env_specs import env_spec_of
+from kiks.learn.environments import environment_of
 from kiks.learn.episode_batch import Episodes
 
 pytestmark = pytest.mark.slow
@@ -61,7 +61,7 @@ def speeds_of(champion: kiks.Champion, sensors: Trace) -> Trace:
 
 
 def counts_of(spec: Any, count: int = 200) -> Trace:
-    return np.random.default_rng(3).integers(0, 1024, (count, spec.sensor_count)).astype(float)
+    return np.random.default_rng(3).integers(0, 1024, (count, spec.controller.sensor_count)).astype(float)
 
 
 def assert_equal_outputs(champion: kiks.Champion, layers: list[Layer], spec: Any, activation: str, output: str) -> None:
@@ -84,14 +84,16 @@ def assert_equal_outputs(champion: kiks.Champion, layers: list[Layer], spec: Any
 def test_outputs_are_those_of_the_network(
     name: str, hidden: tuple[int, ...], activation: str | None, output: str
 ) -> None:
-    spec = env_spec_of(name)
-    layers = network((spec.sensor_count, *hidden, 2))
+    spec = environment_of(name)
+    layers = network((spec.controller.sensor_count, *hidden, 2))
     champion = kiks.champion_of_policy(layers, name, activation=activation, output=output)
     assert_equal_outputs(champion, layers, spec, activation or "tanh", output)
 
 
 def test_light_before_proximity_is_the_same_network() -> None:
-    spec = env_spec_of("Light").with_changes(senses=("ambient", "proximity"), speed_limit=7.0)
+    spec = environment_of("Light").with_changes(
+        controller=kiks.controllers.linear(senses=("ambient", "proximity"), speed_limit=7.0)
+    )
     layers = network((16, 6, 2))
     champion = kiks.champion_of_policy(layers, spec, activation="tanh")
     assert champion.controller.senses == ("ambient", "proximity")
@@ -155,7 +157,7 @@ FORMS: dict[str, tuple[Any, str, str]] = {
 def test_forms_of_a_policy(form: str) -> None:
     policy, activation, output = FORMS[form]
     champion = kiks.champion_of_policy(policy, "Avoid")
-    assert_equal_outputs(champion, LAYERS, env_spec_of("Avoid"), activation, output)
+    assert_equal_outputs(champion, LAYERS, environment_of("Avoid"), activation, output)
     assert kiks.champion_of_policy(policy, "Avoid", activation=activation, output=output).parameters == (
         champion.parameters
     )
@@ -174,7 +176,7 @@ def test_a_state_dict_is_the_same_champion() -> None:
 
 
 def test_the_champion_drives_the_episode_of_the_policy(tmp_path: Path) -> None:
-    spec = env_spec_of("Light").with_changes(timing=kiks.Timing(0.05, 38400))
+    spec = environment_of("Light").with_changes(timing=kiks.Timing(0.05, 38400))
     layers = network((16, 12, 2))
     path = tmp_path / "learnt.toml"
     kiks.champion_of_policy(layers, spec, activation="relu").save(path)
@@ -189,7 +191,9 @@ def test_the_champion_drives_the_episode_of_the_policy(tmp_path: Path) -> None:
         by_policy.step(actions_of(layers, by_policy.observations()[0, 0].astype(np.float64), "relu", "clip")[None])
         by_champion.step(speeds_of(champion, np.rint(1023.0 * by_champion.observations()[0].astype(np.float64))))
     assert by_champion.batch.state_hash(0) == by_policy.batch.state_hash(0)
-    batch = kiks.Batch(spec.arenas, 1, seed=np.array([seed]), starts=start, senses=spec.senses, timing=spec.timing)
+    batch = kiks.Batch(
+        spec.arenas, 1, seed=np.array([seed]), starts=start, senses=spec.controller.senses, timing=spec.timing
+    )
     batch.run(champion.controller, champion.parameters, seconds=by_policy.batch.times_s[0])
     # A step has sensed once more, a few milliseconds later.
     np.testing.assert_allclose(batch.poses[0, 0, :2], by_policy.batch.poses[0, 0, :2], atol=2.0)
@@ -243,13 +247,13 @@ def test_what_is_no_policy_is_an_error(policy: Any, message: str) -> None:
         ({"activation": "relu"}, "activation must be 'tanh', as the policy has it, but it was 'relu'"),
         ({"output": "hard"}, "output must be 'clip', as the policy has it, but it was 'hard'"),
         ({"policy": LAYERS, "activation": "relu", "output": ["clip"]}, "output must be"),
-        ({"spec": "Avoit"}, "Did you mean 'Avoid'"),
-        ({"spec": "Light"}, "with 16 inputs"),
+        ({"task": "Avoit"}, "Did you mean 'Avoid'"),
+        ({"task": "Light"}, "with 16 inputs"),
     ],
 )
 def test_options_that_do_not_fit_are_errors(options: dict[str, Any], message: str) -> None:
     with pytest.raises(kiks.ParameterError, match=message):
-        kiks.champion_of_policy(**{"policy": PPO, "spec": "Avoid"} | options)
+        kiks.champion_of_policy(**{"policy": PPO, "task": "Avoid"} | options)
 
 
 def test_a_policy_of_too_many_units_is_an_error() -> None:
@@ -264,7 +268,7 @@ def test_networks_of_pytorch() -> None:
             torch.nn.Linear(8, 64), activation(), torch.nn.Linear(64, 64), activation(), torch.nn.Linear(64, 2)
         )
         champion = kiks.champion_of_policy(model.state_dict(), "Avoid", activation=name)
-        sensors = counts_of(env_spec_of("Avoid"))
+        sensors = counts_of(environment_of("Avoid"))
         with torch.no_grad():
             expected = model(torch.tensor(sensors / 1023, dtype=torch.float32)).numpy().clip(-1, 1)
         np.testing.assert_allclose(speeds_of(champion, sensors), expected, atol=1e-6)
@@ -277,7 +281,7 @@ def test_policies_of_stable_baselines3(name: str) -> None:
 
     model = getattr(library, name)("MlpPolicy", KheperaEnv("Light"), seed=1, device="cpu")
     champion = kiks.champion_of_policy(model, "Light")
-    sensors = counts_of(env_spec_of("Light"))
+    sensors = counts_of(environment_of("Light"))
     expected, _ = model.predict((sensors / 1023).astype(np.float32), deterministic=True)
     np.testing.assert_allclose(speeds_of(champion, sensors), expected, atol=1e-6)
     assert champion.algorithm == name

@@ -255,10 +255,8 @@ def test_environments_stay_sane(hostile: Any) -> None:
         {
             "lesson": lambda: KheperaEnv(h),
             "render mode": lambda: KheperaEnv("Maze", render_mode=h),
-            "speed limit": lambda: KheperaEnv("Maze", speed_limit=h),
             "arenas": lambda: KheperaEnv("Maze", arenas=h),
             "timing": lambda: KheperaEnv("Maze", timing=h),
-            "senses": lambda: KheperaEnv("Maze", senses=h),
             "starts": lambda: KheperaEnv("Maze", starts=h),
             "seed": lambda: env.reset(seed=h),
             "options": lambda: env.reset(options=h),

@@ -353,7 +353,7 @@ def _environments(rng: random.Random) -> Subject:
     )}  # fmt: skip
     calls["KheperaEnv"] = (
         KheperaEnv,
-        {"spec": "Avoid", "render_mode": None, "arenas": (_box(),), "timing": kiks.Timing(), "robot": "khepera"},
+        {"task": "Avoid", "render_mode": None, "arenas": (_box(),), "timing": kiks.Timing(), "robot": "khepera"},
     )
 
     def go_on() -> None:

@@ -225,15 +225,13 @@ def _tell_seeds(results: Sequence[Result], folder: Path) -> None:
 def _controller(kind: str, task: Task) -> Controller:
     """Return a controller of a kind with the senses and the speed limit of a task's own."""
     from kiks.control.controllers import KINDS, from_recipe
-    from kiks.learn.ready_tasks import SPEED_LIMIT
 
     if kind not in KINDS:
         raise ParameterError(
             f"--controller must be one of {', '.join(KINDS)}, but it was {shown(kind)}.{nearest(kind, KINDS)}"
         )
     own = task.controller
-    limit = (own.recipe or {}).get("speed_limit", SPEED_LIMIT)
-    recipe: dict[str, Any] = {"kind": kind, "senses": list(own.senses), "speed_limit": limit}
+    recipe: dict[str, Any] = {"kind": kind, "senses": list(own.senses), "speed_limit": task.speed_limit}
     if kind == "ctrnn":
         recipe["period_s"] = task.timings[0].period_s
     return from_recipe(recipe)

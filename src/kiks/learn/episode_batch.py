@@ -11,12 +11,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from kiks.batch.batch import Batch
 from kiks.batch.initial_state import random_starts
+from kiks.control.measure import Measure
 from kiks.control.measures import contacts, path_mm
 from kiks.control.senses import SENSES
 from kiks.errors import ParameterError
 from kiks.export.pictures import Picture
-from kiks.learn.env_specs import EnvSpec
-from kiks.model.robot import RobotSpec
+from kiks.learn.environments import environment_of
+from kiks.learn.task import Task
 
 PLACE_COUNT = 1000
 """Number of free places in an arena from which starts are drawn."""
@@ -37,43 +38,41 @@ class Episodes:
     number: two worlds with equal generators and actions give the same episode, to the bit.
 
     Args:
-        spec: The environment.
+        task: The environment: a task with a reward.
         worlds: Number of worlds.
-        robots: Number of robots in each.
-        robot: Kind of robot: a name, a robot file or a `kiks.RobotSpec`.
         response: Response of the proximity sensors, if not that of the robot's file.
         threads: Number of threads; the number of cores if left out.
     """
 
     def __init__(
         self,
-        spec: EnvSpec,
+        task: Task,
         worlds: int = 1,
         *,
-        robots: int = 1,
-        robot: str | RobotSpec = "khepera",
         response: str | None = None,
         threads: int | None = None,
     ) -> None:
-        self.spec = spec
-        goals = () if spec.goal is None else (spec.goal,)
+        self.task, self.senses = task, task.controller.senses
+        reward: Any = environment_of(task).reward
+        self._reward: Measure = reward
+        goals = () if task.goal is None else (task.goal,)
         self.batch = Batch(
-            spec.arenas,
+            task.arenas,
             worlds,
-            robot=robot,
-            robots=robots,
-            senses=spec.senses,
-            timing=spec.timing,
+            robot=task.sides[0].specs[0],
+            robots=task.robots,
+            senses=self.senses,
+            timing=task.timings[0],
             response=response,
             threads=threads,
-            measures=(spec.reward, path_mm, contacts, *goals),
+            measures=(self._reward, path_mm, contacts, *goals),
         )
-        self._goal_note = spec.reward.note_count + 2 if goals else None
+        self._goal_note = self._reward.note_count + 2 if goals else None
         self._body = self.batch.specs[0].body
-        self._places = [self._free_places(arena) for arena in self.batch.arenas] if spec.starts == "random" else []
-        self._sensors = np.zeros((worlds, robots, spec.sensor_count))
-        self._most = np.concatenate([np.full(SENSES[name].size, SENSES[name].most) for name in spec.senses])
-        self._scores = np.zeros((worlds, robots))
+        self._places = [self._free_places(arena) for arena in self.batch.arenas] if task.starts == "random" else []
+        self._sensors = np.zeros((worlds, task.robots, task.controller.sensor_count))
+        self._most = np.concatenate([np.full(SENSES[name].size, SENSES[name].most) for name in self.senses])
+        self._scores = np.zeros((worlds, task.robots))
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -129,7 +128,7 @@ class Episodes:
                 f"actions must be from -1 to 1, but among them was {given[~(np.abs(given) <= 1)][0]}. Clip them, "
                 "for example with gymnasium.wrappers.ClipAction."
             )
-        self._sensors = self.batch.step(given * self.spec.speed_limit)
+        self._sensors = self.batch.step(given * self.task.speed_limit)
         before, self._scores = self._scores, self.batch.notes[:, :, 0].copy()
         return self._scores - before
 
@@ -146,7 +145,7 @@ class Episodes:
 
     def infos(self) -> dict[str, NDArray[np.float64]]:
         """Return time_s, path_mm and contacts since the episodes began, each float64 [world, robot]."""
-        first = self.spec.reward.note_count
+        first = self._reward.note_count
         paths_mm, contact_counts = (self.batch.notes[:, :, first + k].copy() for k in range(2))
         times_s = np.repeat(self.batch.times_s[:, None], self.batch.robot_count, axis=1)
         return {"time_s": times_s, "path_mm": paths_mm, "contacts": contact_counts}

@@ -6,8 +6,8 @@
     env = gymnasium.make("kiks/Avoid-v0")
     envs = gymnasium.make_vec("kiks/Avoid-v0", num_envs=1000)
 
-`kiks.learn.env_specs` defines the environments. All kinds use `kiks.learn.episode_batch`: with the same seed, a single
-environment and a world of a vector environment have the same episodes, to the bit.
+`kiks.learn.environments` defines the environments. With the same seed, a single environment and a world of a vector
+environment have the same episodes, to the bit (`kiks.learn.episode_batch`).
 """
 
 from __future__ import annotations
@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 
 from kiks.batch.initial_state import WORLDS_LIMIT
 from kiks.errors import ParameterError, installing, shown
-from kiks.learn.env_specs import ENV_SPECS, EnvSpec, env_spec_of
+from kiks.learn.environments import ENVIRONMENTS, environment_of
 from kiks.learn.episode_batch import SEED_LIMIT, Episodes
+from kiks.learn.task import Task
 from kiks.model.checks import check_count
 
 try:
@@ -42,27 +43,26 @@ STEP_LIMIT = 600
 """Steps after which a registered environment is truncated: a minute, as each takes 0.1 s."""
 
 
-def spaces_of(spec: EnvSpec) -> tuple[Any, Any]:
+def spaces_of(task: Task) -> tuple[Any, Any]:
     """Return the observation space and the action space of one robot, two `gymnasium.spaces.Box`."""
-    return Box(0.0, 1.0, (spec.sensor_count,), np.float32), Box(-1.0, 1.0, (2,), np.float32)
+    return Box(0.0, 1.0, (task.controller.sensor_count,), np.float32), Box(-1.0, 1.0, (2,), np.float32)
 
 
 class KheperaEnv(gymnasium.Env[Floats32, Floats32]):
     """One robot.
 
     Args:
-        spec: The environment: an `EnvSpec` or the name of one.
+        task: The environment: a task with a reward, or the name of one of `kiks.learn.environments`.
         render_mode: 'rgb_array' for pictures from above, None for none.
-        **changes: Changed arguments of the specification, such as `arenas` or `timing`; and `robot` and `response` as
-            for `Episodes`.
+        **changes: Changed arguments of the task, such as `arenas` or `timing`; and `response` as for `Episodes`.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 10}  # noqa: RUF012  (a class attribute in Gymnasium)
 
-    def __init__(self, spec: str | EnvSpec, *, render_mode: str | None = None, **changes: Any) -> None:
+    def __init__(self, task: str | Task, *, render_mode: str | None = None, **changes: Any) -> None:
         self.render_mode = checked_mode(render_mode)
-        self.episodes = episodes_of(spec, 1, changes | {"threads": 1})
-        self.observation_space, self.action_space = spaces_of(self.episodes.spec)
+        self.episodes = episodes_of(task, 1, changes | {"threads": 1})
+        self.observation_space, self.action_space = spaces_of(self.episodes.task)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -91,7 +91,7 @@ class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[An
 
     Args:
         num_envs: Number of worlds.
-        spec: The environment: an `EnvSpec` or the name of one.
+        task: The environment: a task with a reward, or the name of one of `kiks.learn.environments`.
         max_episode_steps: Number of steps after which an episode is truncated; None for no limit.
         autoreset_mode: When a world resets: in the next step, whose action it ignores; in the same step, which then
             returns the first observation of the new episode; or only when `reset` is called, with the option
@@ -106,7 +106,7 @@ class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[An
     def __init__(
         self,
         num_envs: int,
-        spec: str | EnvSpec,
+        task: str | Task,
         *,
         max_episode_steps: int | None = None,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
@@ -125,8 +125,8 @@ class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[An
             ) from None
         self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
         self.max_episode_steps = checked_limit("max_episode_steps", max_episode_steps)
-        self.episodes = episodes_of(spec, num_envs, changes | {"threads": threads})
-        self.single_observation_space, self.single_action_space = spaces_of(self.episodes.spec)
+        self.episodes = episodes_of(task, num_envs, changes | {"threads": threads})
+        self.single_observation_space, self.single_action_space = spaces_of(self.episodes.task)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._rngs: list[np.random.Generator] = []
@@ -231,11 +231,12 @@ class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[An
         return {"final_obs": seen, "_final_obs": done, "final_info": infos, "_final_info": done.copy()}
 
 
-def episodes_of(spec: str | EnvSpec, worlds: int, changes: dict[str, Any]) -> Episodes:
-    """Return episodes; changes are arguments of `Episodes` or of the specification."""
-    of_episodes = {name: changes[name] for name in ("robot", "robots", "response", "threads") if name in changes}
-    of_spec = {name: value for name, value in changes.items() if name not in of_episodes}
-    return Episodes(env_spec_of(spec).with_changes(**of_spec), worlds, **of_episodes)
+def episodes_of(task: str | Task, worlds: int, changes: dict[str, Any]) -> Episodes:
+    """Return episodes; changes are arguments of `Episodes` or of the task."""
+    of_episodes = {name: changes.pop(name) for name in ("response", "threads") if name in changes}
+    if (arenas := changes.get("arenas")) is not None:
+        changes["worlds"] = len(arenas) if isinstance(arenas, Sequence) else 1
+    return Episodes(environment_of(task).with_changes(**changes), worlds, **of_episodes)
 
 
 def checked_seed(seed: int | None) -> int | None:
@@ -255,11 +256,11 @@ def checked_mode(render_mode: str | None) -> str | None:
     return render_mode
 
 
-for _name in ENV_SPECS:
+for _name in ENVIRONMENTS:
     gymnasium.register(
         f"kiks/{_name}-v0",
         entry_point="kiks.learn.gymnasium_envs:KheperaEnv",
         vector_entry_point="kiks.learn.gymnasium_envs:KheperaVectorEnv",
         max_episode_steps=STEP_LIMIT,
-        kwargs={"spec": _name},
+        kwargs={"task": _name},
     )

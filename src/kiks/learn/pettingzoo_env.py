@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.errors import ParameterError, installing, shown
-from kiks.learn.env_specs import EnvSpec
 from kiks.learn.episode_batch import SEED_LIMIT
 from kiks.learn.gymnasium_envs import STEP_LIMIT, checked_mode, checked_seed, episodes_of, spaces_of
+from kiks.learn.task import Task
 from kiks.model.checks import check_count
 
 try:
@@ -28,7 +28,7 @@ class KheperaTeam(ParallelEnv[str, Floats32, Floats32]):  # type: ignore[misc, u
     """Robots that act at the same time; each gets the reward of its own measure. An episode ends for all at once.
 
     Args:
-        spec: The environment: an `EnvSpec` or the name of one.
+        task: The environment: a task with a reward, or the name of one of `kiks.learn.environments`.
         robots: Number of robots.
         max_cycles: Number of steps after which an episode is truncated.
         render_mode: 'rgb_array' for pictures from above, None for none.
@@ -39,7 +39,7 @@ class KheperaTeam(ParallelEnv[str, Floats32, Floats32]):  # type: ignore[misc, u
 
     def __init__(
         self,
-        spec: str | EnvSpec = "Gather",
+        task: str | Task = "Gather",
         *,
         robots: int = 3,
         max_cycles: int = STEP_LIMIT,
@@ -48,10 +48,10 @@ class KheperaTeam(ParallelEnv[str, Floats32, Floats32]):  # type: ignore[misc, u
     ) -> None:
         self.render_mode = checked_mode(render_mode)
         self.max_cycles = check_count("max_cycles", max_cycles, 1, SEED_LIMIT)
-        self.episodes = episodes_of(spec, 1, changes | {"threads": 1, "robots": robots})
+        self.episodes = episodes_of(task, 1, changes | {"threads": 1, "robots": robots})
         self.possible_agents = [f"robot_{number + 1}" for number in range(robots)]
         self.agents: list[str] = []
-        spaces = {agent: spaces_of(self.episodes.spec) for agent in self.possible_agents}
+        spaces = {agent: spaces_of(self.episodes.task) for agent in self.possible_agents}
         self.observation_spaces = {agent: observations for agent, (observations, _) in spaces.items()}
         self.action_spaces = {agent: actions for agent, (_, actions) in spaces.items()}
         self._rng: np.random.Generator | None = None

@@ -21,7 +21,8 @@ from kiks.control.neural_nets import DARK_COUNTS
 from kiks.control.senses import SENSES, reading_count
 from kiks.errors import ParameterError, shown
 from kiks.learn.champion import Champion
-from kiks.learn.env_specs import EnvSpec, env_spec_of
+from kiks.learn.environments import environment_of
+from kiks.learn.task import Task
 from kiks.model.array_checks import check_numbers
 
 Floats = NDArray[np.float64]
@@ -41,7 +42,7 @@ ACCEPTED = (
 
 def champion_of_policy(
     policy: Any,
-    spec: str | EnvSpec,
+    task: str | Task,
     *,
     activation: str | None = None,
     output: str | None = None,
@@ -58,7 +59,7 @@ def champion_of_policy(
         policy: A model or a policy of Stable-Baselines3 (PPO, A2C, SAC, TD3, DDPG); the `state_dict` of linear layers
             in PyTorch; or a list of pairs of arrays, weights [unit, input] and biases [unit]. The first layer comes
             first.
-        spec: The environment in which it learnt: an `EnvSpec` or the name of one, such as 'Avoid'.
+        task: The environment in which it learnt: a task with a reward, or the name of one, such as 'Avoid'.
         activation: The function of hidden units, 'tanh' or 'relu'; a policy of Stable-Baselines3 says it itself.
         output: What keeps the actions within +-1, 'clip' or 'tanh'; a policy of Stable-Baselines3 says it itself, for
             others it is 'clip' if left out.
@@ -72,9 +73,9 @@ def champion_of_policy(
         >>> champion.controller.name, champion.parameters[:2]
         ('policy', (0.5, 0.5))
     """
-    spec = env_spec_of(spec)
+    task = environment_of(task)
     pairs, own_activation, own_output = _network_of(policy)
-    layers = _checked(pairs, spec)
+    layers = _checked(pairs, task)
     activation = _chosen("activation", activation, own_activation)
     if activation is None and len(layers) > 1:
         raise ParameterError(
@@ -85,17 +86,17 @@ def champion_of_policy(
         hidden=[len(biases) for _, biases in layers[:-1]],
         activation=activation or "tanh",
         output=_chosen("output", output, own_output) or "clip",
-        senses=spec.senses,
-        speed_limit=spec.speed_limit,
+        senses=task.controller.senses,
+        speed_limit=task.speed_limit,
     )
-    layers[0] = _with_inputs_of_controllers(layers[0], spec.senses)
+    layers[0] = _with_inputs_of_controllers(layers[0], task.controller.senses)
     parts = [part.ravel() for weights, biases in layers for part in (biases, weights.T)]
     return Champion(
         controller,
         np.concatenate(parts).tolist(),
-        task=spec.name,
+        task=task.name,
         robot=robot,
-        timing=spec.timing,
+        timing=task.timings[0],
         algorithm=type(policy).__name__ if hasattr(policy, "policy") else "",
     )
 
@@ -165,7 +166,7 @@ def _pair(given: Any) -> tuple[Any, Any]:
 # ---- its numbers ----
 
 
-def _checked(layers: Sequence[tuple[Any, Any]], spec: EnvSpec) -> list[Layer]:
+def _checked(layers: Sequence[tuple[Any, Any]], task: Task) -> list[Layer]:
     """Return layers as arrays: each takes what the one before it gives, the first the observation of an environment."""
     if not layers:
         raise ParameterError(f"policy must be {ACCEPTED}, but it had no layer.")
@@ -174,7 +175,7 @@ def _checked(layers: Sequence[tuple[Any, Any]], spec: EnvSpec) -> list[Layer]:
         matrix = check_numbers(f"the weights of layer {number + 1}", _as_array(weights), (None, None))
         given = np.zeros(len(matrix)) if biases is None else _as_array(biases)
         checked.append((matrix, check_numbers(f"the biases of layer {number + 1}", given, (len(matrix),))))
-    wanted = [spec.sensor_count, *(len(matrix) for matrix, _ in checked[:-1])]
+    wanted = [task.controller.sensor_count, *(len(matrix) for matrix, _ in checked[:-1])]
     for number, ((matrix, _), count) in enumerate(zip(checked, wanted, strict=True)):
         if matrix.shape[1] != count:
             raise ParameterError(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+import inspect
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -24,6 +26,9 @@ from kiks.model.shipped import shipped_arena
 Floats = NDArray[np.float64]
 Values = Mapping[str, Floats]
 
+TASKS: dict[str, Callable[..., Task]] = {}
+"""The tasks that come with KiKS, by name."""
+
 SPEED_LIMIT = 8.0
 """Highest speed of most ready-made tasks [pulses/10 ms]: 64 mm/s."""
 
@@ -35,6 +40,20 @@ CONTACT_COST = 3.0
 
 CONTACTS_COUNTED = 3.0
 """Largest number of contacts of a world that counts: a stuck robot has hundreds."""
+
+
+def ready(make: Callable[..., Task]) -> Callable[..., Task]:
+    """Add a function that returns a task to `TASKS`; it then takes another controller and other arguments of `Task`."""
+    own = inspect.signature(make).parameters
+
+    @functools.wraps(make)
+    def changed(controller: Controller | None = None, **changes: Any) -> Task:
+        task = make(**{name: changes.pop(name) for name in own if name in changes})
+        return replace(task, **changes if controller is None else {"controller": controller, **changes})
+
+    del vars(changed)["__wrapped__"]  # its signature is that of `changed`
+    TASKS[make.__name__] = changed
+    return changed
 
 
 def without_contacts(fitness: Floats, values: Values, cost: float = CONTACT_COST) -> Floats:
@@ -64,17 +83,13 @@ def avoid_fitness(values: Values) -> Floats:
     return without_contacts(cautious_mean(values["avoidance"] * values["roaming"]), values)
 
 
-def avoid(controller: Controller | None = None, **changes: Any) -> Task:
-    """Return the task to drive fast and straight, explore, and touch nothing (Floreano and Mondada 1994).
-
-    Args:
-        controller: The controller to evolve; a linear one if left out.
-        changes: Other arguments of `Task`.
-    """
-    task = Task(
+@ready
+def avoid() -> Task:
+    """The task to drive fast and straight, explore, and touch nothing (Floreano and Mondada 1994)."""
+    return Task(
         "avoid",
         training("pillars", "corridors", "wedges"),
-        controllers.linear(speed_limit=AVOID_SPEED_LIMIT) if controller is None else controller,
+        controllers.linear(speed_limit=AVOID_SPEED_LIMIT),
         (measures.avoidance, measures.roaming, measures.contacts, measures.path_mm, measures.straightness),
         fitness=avoid_fitness,
         seconds=20.0,
@@ -89,7 +104,6 @@ def avoid(controller: Controller | None = None, **changes: Any) -> Task:
         ),
         about="drive fast and straight, explore, touch nothing",
     )
-    return replace(task, **changes)
 
 
 def avoid_solved(values: Values) -> NDArray[np.bool_]:
@@ -119,19 +133,18 @@ def follow_solved(values: Values) -> NDArray[np.bool_]:
     return solved
 
 
-def follow(controller: Controller | None = None, *, side: str = "left", **changes: Any) -> Task:
-    """Return the task to follow walls.
+@ready
+def follow(side: str = "left") -> Task:
+    """The task to follow walls. A perceptron with feedback remembers that it has lost a wall.
 
     Args:
-        controller: The controller to evolve; a perceptron with feedback if left out, which remembers that it has lost a
-            wall.
         side: The side of the robot on which the wall is: 'left' or 'right'.
-        changes: Other arguments of `Task`.
     """
-    task = Task(
-        "follow",
+    return Task(
+        # The sides are two tasks: a folder of the one must not be continued as the other.
+        "follow-right" if side == "right" else "follow",
         training("wall_ends", "alcoves", "corridors"),
-        controllers.mlp(hidden=(), feedback=True, speed_limit=SPEED_LIMIT) if controller is None else controller,
+        controllers.mlp(hidden=(), feedback=True, speed_limit=SPEED_LIMIT),
         (measures.wall_following(side), measures.beside_wall_share(side), measures.contacts, measures.path_mm),
         fitness=follow_fitness,
         seconds=40.0,
@@ -149,8 +162,6 @@ def follow(controller: Controller | None = None, *, side: str = "left", **change
         ),
         about=f"drive along walls, on the robot's {side}",
     )
-    # The sides are two tasks: a folder of the one must not be continued as the other.
-    return replace(task, **({"name": "follow-right"} if side == "right" else {}) | changes)
 
 
 # ---- light ----
@@ -181,20 +192,17 @@ def light_solved(values: Values) -> NDArray[np.bool_]:
     return solved
 
 
-def light(controller: Controller | None = None, **changes: Any) -> Task:
-    """Return the task to find the lamp, go to it and stay there.
+@ready
+def light() -> Task:
+    """The task to find the lamp, go to it and stay there.
 
     In the exam the robot starts at least 1 m from the lamp, in the shadow of walls.
-
-    Args:
-        controller: The controller to evolve; a network of both senses with four hidden units if left out.
-        changes: Other arguments of `Task`.
     """
     default = controllers.mlp(hidden=(4,), senses=("proximity", "ambient"), speed_limit=LIGHT_SPEED_LIMIT)
-    task = Task(
+    return Task(
         "light",
         training("lit_pillars", "lit_walls", "lit_rooms"),
-        default if controller is None else controller,
+        default,
         (
             measures.light_approach,
             measures.near_light_share(AT_LAMP_MM),
@@ -215,7 +223,6 @@ def light(controller: Controller | None = None, **changes: Any) -> Task:
         ),
         about="find the lamp, go to it and stay there",
     )
-    return replace(task, **changes)
 
 
 # ---- gather ----
@@ -238,22 +245,19 @@ def gather_fitness(values: Values) -> Floats:
     return cautious_mean(values["largest_group"] + CLOSENESS_WEIGHT * values["closeness"])
 
 
-def gather(controller: Controller | None = None, **changes: Any) -> Task:
-    """Return the task to push cylinders together, wherever that is.
+@ready
+def gather() -> Task:
+    """The task to push cylinders together, wherever that is.
 
     A robot that senses proximity alone cannot know where the middle of a room is, but it notices what is near others
     (Maris and te Boekhorst, Exploiting physical constraints: heap formation through behavioral error in a group of
     robots, 1996).
-
-    Args:
-        controller: The controller to evolve; a perceptron with feedback if left out.
-        changes: Other arguments of `Task`.
     """
     default = controllers.mlp(hidden=(), feedback=True, speed_limit=GATHER_SPEED_LIMIT)
-    task = Task(
+    return Task(
         "gather",
         training(*(f"cylinders_{k}" for k in range(8))),
-        default if controller is None else controller,
+        default,
         (measures.largest_group(GROUP_MM), measures.closeness, measures.contacts, measures.path_mm),
         fitness=gather_fitness,
         seconds=90.0,
@@ -268,7 +272,6 @@ def gather(controller: Controller | None = None, **changes: Any) -> Task:
         ),
         about="push five cylinders together",
     )
-    return replace(task, **changes)
 
 
 def gather_solved(values: Values) -> NDArray[np.bool_]:
@@ -320,17 +323,13 @@ def disperse_solved(values: Values) -> NDArray[np.bool_]:
     return values["neighbour_mm"] >= SPREAD_SHARE * EXAM_SIDE_MM / math.sqrt(SWARM_ROBOTS) / 2
 
 
-def disperse(controller: Controller | None = None, **changes: Any) -> Task:
-    """Return the task of twenty robots, all with one controller, to spread out from a heap.
-
-    Args:
-        controller: The controller to evolve; a perceptron with feedback if left out.
-        changes: Other arguments of `Task`.
-    """
-    task = Task(
+@ready
+def disperse() -> Task:
+    """The task of twenty robots, all with one controller, to spread out from a heap."""
+    return Task(
         "disperse",
         (heap(1400, 700, 700, 1), heap(1600, 400, 500, 2)),
-        controllers.mlp(hidden=(), feedback=True, speed_limit=SPEED_LIMIT) if controller is None else controller,
+        controllers.mlp(hidden=(), feedback=True, speed_limit=SPEED_LIMIT),
         (measures.neighbour_mm, measures.contacts, measures.path_mm),
         fitness=disperse_fitness,
         seconds=60.0,
@@ -349,7 +348,6 @@ def disperse(controller: Controller | None = None, **changes: Any) -> Task:
         ),
         about="twenty robots spread out from a heap",
     )
-    return replace(task, **changes)
 
 
 # ---- maze ----
@@ -383,21 +381,18 @@ def maze_fitness(values: Values) -> Floats:
     return cautious_mean(np.where(maze_solved(values), GOAL_COUNTS + thrift, nearness))
 
 
-def maze(controller: Controller | None = None, **changes: Any) -> Task:
-    """Return the task to reach the goal of Kheperax's maze; the direct path is a dead end.
+@ready
+def maze() -> Task:
+    """The task to reach the goal of Kheperax's maze; the direct path is a dead end.
 
     The way leads away from the goal first. So an algorithm that follows fitness ends behind the first wall, and the
     default is MAP-Elites, which looks for ways to all places.
-
-    Args:
-        controller: The controller to evolve; a network with eight hidden units if left out.
-        changes: Other arguments of `Task`.
     """
     goal_mm = measures.closest_mm(*MAZE_GOAL_MM)
-    task = Task(
+    return Task(
         "maze",
         training("kheperax"),
-        controllers.mlp(hidden=(8,), speed_limit=MAZE_SPEED_LIMIT) if controller is None else controller,
+        controllers.mlp(hidden=(8,), speed_limit=MAZE_SPEED_LIMIT),
         (goal_mm, measures.final_x_mm, measures.final_y_mm, measures.turned_pulses),
         fitness=maze_fitness,
         seconds=70.0,
@@ -417,7 +412,6 @@ def maze(controller: Controller | None = None, **changes: Any) -> Task:
         ),
         about="reach the goal of the Kheperax maze; the archive holds ways to all places",
     )
-    return replace(task, **changes)
 
 
 def maze_solved(values: Values) -> NDArray[np.bool_]:
@@ -457,22 +451,19 @@ def prey_fitness(values: Values) -> Floats:
     return escaped
 
 
-def pursuit(controller: Controller | None = None, **changes: Any) -> Task:
-    """Return the task of two sides, a predator and a prey that is twice as fast (Floreano and Nolfi 1997).
+@ready
+def pursuit() -> Task:
+    """The task of two sides, a predator and a prey that is twice as fast (Floreano and Nolfi 1997).
 
     Both have proximity sensors, the predator has the camera K213, too. The prey's fitness is the share of the time for
     which it was not caught, the predator's is the rest. What the robots do after the first contact does not count.
-
-    Args:
-        controller: The controller of the predator; a perceptron with feedback if left out, as that of the prey.
-        changes: Other arguments of `Task`.
     """
     predator = controllers.mlp(hidden=(), senses=("proximity", "camera"), feedback=True, speed_limit=PREDATOR_SPEED)
     prey = controllers.mlp(hidden=(), feedback=True, speed_limit=PREY_SPEED)
-    task = Task(
+    return Task(
         "pursuit",
         (Arena.box(PURSUIT_MM, PURSUIT_MM),),
-        predator if controller is None else controller,
+        predator,
         (measures.escaped_share(radius_mm=CAUGHT_MM), measures.path_mm, measures.contacts),
         fitness=predator_fitness,
         side="predator",
@@ -485,7 +476,6 @@ def pursuit(controller: Controller | None = None, **changes: Any) -> Task:
         population=100,
         about="predator and prey, which evolve against each other",
     )
-    return replace(task, **changes)
 
 
 # ---- football ----
@@ -497,23 +487,20 @@ def football_fitness(values: Values) -> Floats:
     return scores
 
 
-def football(controller: Controller | None = None, **changes: Any) -> Task:
-    """Return the task of two sides, football players on the pitch of `kiks demo soccer`.
+@ready
+def football() -> Task:
+    """The task of two sides, football players on the pitch of `kiks demo soccer`.
 
     Both have proximity sensors and the camera K213. Half of the fitness are goals, 1 for one of its own and -1 for one
     of the other side; half is the mean place of the ball, from 1 at the goal line of the other side to -1 at its own.
     What one side gains, the other loses. A game ends with the first goal.
-
-    Args:
-        controller: The controller of the left side; a perceptron with feedback if left out, as that of the right side.
-        changes: Other arguments of `Task`.
     """
     player = controllers.mlp(hidden=(), senses=("proximity", "camera"), feedback=True, speed_limit=PLAYER_SPEED)
     arenas = game.kick_offs()
-    task = Task(
+    return Task(
         "football",
         arenas,
-        player if controller is None else controller,
+        player,
         (game.goals, game.ball_ahead, measures.path_mm),
         fitness=football_fitness,
         side="left",
@@ -527,19 +514,3 @@ def football(controller: Controller | None = None, **changes: Any) -> Task:
         population=50,
         about="two football players, which evolve against each other",
     )
-    return replace(task, **changes)
-
-
-# ---- tasks by name ----
-
-TASKS: dict[str, Callable[..., Task]] = {
-    "avoid": avoid,
-    "follow": follow,
-    "light": light,
-    "gather": gather,
-    "disperse": disperse,
-    "maze": maze,
-    "pursuit": pursuit,
-    "football": football,
-}
-"""The tasks that come with KiKS."""

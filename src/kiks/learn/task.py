@@ -14,6 +14,7 @@ from kiks.batch.batch import Batch
 from kiks.batch.initial_state import Arenas, Starts
 from kiks.batch.loop_timing import Timing
 from kiks.control.controller import Controller
+from kiks.control.controllers import SPEED_LIMIT
 from kiks.control.measure import Measure
 from kiks.errors import ParameterError, shown
 from kiks.learn.algorithm_name import AlgorithmName
@@ -44,7 +45,7 @@ BATCH_WORLDS_MAX = 20_000
 SECONDS_MIN, SECONDS_MAX = 1e-3, 1e6
 """Shortest and longest time for which candidates drive [s]."""
 
-_UNCOUNTED = {"name", "side", "about", "file", "algorithm", "population", "generations"}
+_UNCOUNTED = {"name", "side", "reward", "goal", "about", "file", "algorithm", "population", "generations"}
 """Arguments on which no value depends."""
 
 Seconds = Annotated[Number, Field(ge=SECONDS_MIN, le=SECONDS_MAX)]
@@ -55,6 +56,7 @@ Kinds = Annotated[
     Rule("the name of a robot, a robot file or a kiks.RobotSpec, or a list of them"),
 ]
 Evolvable = Annotated[Controller, Field(description="Write @kiks.controller(parameters=COUNT) over the function.")]
+Watched = Annotated[Measure, Field(description="Write @kiks.measure over the function.")]
 SideName = Annotated[
     Text, Field(pattern=r"^([^\W\d]\w{0,29})?$"), Rule("1 to 30 letters, digits and _, no digit first")
 ]
@@ -160,6 +162,9 @@ class Task(Experiment):
         generations: How many generations an evolution has, unless the user says otherwise.
         population: How many candidates of a side a generation has, unless the user says otherwise.
         exam: The exam of its champions.
+        reward: A measure whose first note accumulates: in the task's environment (`kiks.learn.environments`), its gain
+            in a step is the reward of that step. Evolutions do not use it.
+        goal: A measure: an episode of the environment terminates once its first note is above zero for a robot.
         about: A description in one line.
         file: The user's file that defines it.
 
@@ -197,6 +202,8 @@ class Task(Experiment):
     generations: Annotated[Whole, Field(ge=1)] = GENERATIONS
     population: Annotated[Whole, Field(ge=4)] = POPULATION
     exam: Annotated[Exam | None, Field(description="kiks.Exam(arenas, measures, solved) makes one.")] = None
+    reward: Watched | None = None
+    goal: Watched | None = None
     about: Text = ""
     file: str = ""
 
@@ -235,6 +242,12 @@ class Task(Experiment):
     def timings(self) -> tuple[Timing, ...]:
         """The timings that worlds take in turn."""
         return self.timing if isinstance(self.timing, tuple) else (self.timing,)
+
+    @property
+    def speed_limit(self) -> float:
+        """Wheel speed of an output of 1 [pulses/10 ms]: that of its controller."""
+        limit: float = (self.controller.recipe or {}).get("speed_limit", SPEED_LIMIT)
+        return limit
 
     @property
     def controllers(self) -> list[Controller]:

@@ -1,0 +1,157 @@
+"""Environments: tasks with a reward; `kiks/Avoid-v0` and the others that come with KiKS."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kiks.control.controllers import linear
+from kiks.control.measure import Measure, measure
+from kiks.control.measures import avoidance, light_approach, near_light_share, nearest_lamp_mm, wall_following
+from kiks.errors import ParameterError, nearest, shown
+from kiks.learn import football as game
+from kiks.learn import ready_tasks
+from kiks.learn.task import Task
+from kiks.model.arena import Arena, Cylinder, Pose
+from kiks.model.checks import check_kind, check_number
+
+CONTACT_COST = 5.0
+"""What a contact takes off the reward of `Follow`: as much as half a second of following at best."""
+
+ARRIVED_MM = 60.0
+"""Distance to a lamp at which a robot has arrived [mm]; nearer, most light comes from above."""
+
+
+@measure(notes=2)
+def nearer_to_light(moment: Any, notes: Any) -> None:
+    """Distance by which it has come nearer to a burning lamp since its first step [0.1 m], plus 1 once it arrives."""
+    distance_mm = nearest_lamp_mm(moment)
+    if notes[1] > 0.0:
+        notes[0] += (notes[1] - distance_mm) / 100.0
+        notes[0] += 1.0 if distance_mm <= ARRIVED_MM < notes[1] else 0.0
+    notes[1] = distance_mm
+
+
+@measure(notes=2)
+def drawn_together(moment: Any, notes: Any) -> None:
+    """Decrease of the sum of distances between all pairs of bodies since its first step [0.1 m]."""
+    total_mm = 0.0
+    for one in range(moment.bodies.shape[0]):
+        for other in range(one):
+            dx_mm = moment.bodies[one].x_mm - moment.bodies[other].x_mm
+            dy_mm = moment.bodies[one].y_mm - moment.bodies[other].y_mm
+            total_mm += (dx_mm * dx_mm + dy_mm * dy_mm) ** 0.5
+    if notes[1] > 0.0:
+        notes[0] += (notes[1] - total_mm) / 100.0
+    notes[1] = total_mm
+
+
+@functools.lru_cache(maxsize=256)
+def without_contacts(reward: Measure, cost: float = CONTACT_COST) -> Measure:
+    """Return a reward that falls by a cost with each contact; the same measure for the same arguments.
+
+    Args:
+        reward: A measure; the gain of its first note is the reward.
+        cost: What a contact takes off.
+    """
+    check_kind("reward", reward, Measure, "Write @kiks.measure over the function.")
+    cost = check_number("cost", cost, 0, 1e6)
+    watch, result = reward.kernel, reward.result
+
+    def value(notes: NDArray[np.float64]) -> NDArray[np.float64]:
+        return result(np.concatenate([notes[..., :1], notes[..., 2:]], axis=-1))
+
+    @measure(notes=reward.note_count + 1, result=value, senses=reward.senses)
+    def reward_without_contacts(moment: Any, notes: Any) -> None:
+        watch(moment, notes[1:])
+        notes[0] = notes[1] - cost * moment.contact_count
+
+    return reward_without_contacts
+
+
+def avoid() -> Task:
+    """Drive fast and straight, far from everything."""
+    return Task("Avoid", ready_tasks.training("pillars"), linear(), (avoidance,), reward=avoidance)
+
+
+def follow() -> Task:
+    """Follow a wall on the left, and touch nothing: the task `follow`."""
+    return ready_tasks.follow(name="Follow", reward=without_contacts(wall_following("left")))
+
+
+def light() -> Task:
+    """Go to a lamp and stay there: the task `light`."""
+    return ready_tasks.light(name="Light", reward=light_approach)
+
+
+def gather() -> Task:
+    """Push cylinders together."""
+    cylinders = tuple(Cylinder(x_mm, y_mm) for x_mm in (200, 500, 800) for y_mm in (200, 500, 800))
+    arena = replace(Arena.box(1000, 1000), cylinders=cylinders, starts=(Pose(350, 350, 0.0),))
+    return Task("Gather", (arena,), linear(), (drawn_together,), reward=drawn_together)
+
+
+def maze() -> Task:
+    """Find the way out of a maze with a lamp at its exit."""
+    return Task(
+        "Maze",
+        (Arena.maze(columns=3, rows=3, seed=1),),
+        linear(senses=("proximity", "ambient")),
+        (nearer_to_light,),
+        starts="arena",
+        reward=nearer_to_light,
+        goal=near_light_share(ARRIVED_MM),
+    )
+
+
+def football() -> Task:
+    """Bring the ball into the goal of the other side."""
+    task = ready_tasks.football()
+    return Task(
+        "Football",
+        task.arenas,
+        task.controller,
+        (game.ball_gain,),
+        worlds=task.worlds,
+        timing=task.timing,
+        reward=game.ball_gain,
+        goal=game.is_goal,
+    )
+
+
+ENVIRONMENTS: dict[str, Callable[[], Task]] = {
+    "Avoid": avoid,
+    "Follow": follow,
+    "Light": light,
+    "Gather": gather,
+    "Maze": maze,
+    "Football": football,
+}
+"""Functions that return the environments, by name."""
+
+
+@functools.lru_cache(maxsize=16)
+def _named(name: str) -> Task:
+    return ENVIRONMENTS[name]()
+
+
+def environment_of(task: str | Task) -> Task:
+    """Return an environment, given or by its name."""
+    if isinstance(task, str) and task in ENVIRONMENTS:
+        return _named(task)
+    if not isinstance(task, Task):
+        raise ParameterError(
+            f"task must be a kiks.Task with a reward, or one of {', '.join(ENVIRONMENTS)}, but it was {shown(task)}."
+            f"{nearest(shown(task), tuple(ENVIRONMENTS))}"
+        )
+    if task.reward is None or task.against is not None:
+        raise ParameterError(
+            f"an environment must be a task of one side with a reward, but {shown(task.name)} is not. Give it a "
+            "measure: task.with_changes(reward=measure)."
+        )
+    return task
