@@ -243,16 +243,3 @@ def test_too_few_descriptors_for_all_robots_give_one_line(tmp_path: Path) -> Non
     (line,) = done.stderr.splitlines()
     assert "this process may have 100" in line
     assert not list(os.scandir(str(tmp_path)))
-
-
-def test_hundreds_of_rejected_clients_do_not_disturb_the_client() -> None:
-    endpoint = TcpEndpoint(0)
-    with served([endpoint]) as run:
-        client = connect(endpoint)
-        assert ask_socket(client, b"H\n") == b"h,0,0\r\n"
-        for _ in range(300):
-            with connect(endpoint) as other:
-                assert other.recv(1) == b""
-        assert ask_socket(client, b"H\n") == b"h,0,0\r\n"
-        client.close()
-        run.wait_free()

@@ -142,12 +142,6 @@ def test_command_of_a_client_that_closes_at_once_acts(link: str) -> None:
         os.close(port)
 
 
-def test_link_exists_while_the_server_runs(link: str) -> None:
-    with served([PtyEndpoint(link)]):
-        assert os.readlink(link).startswith("/dev/pts/")
-    assert os.listdir(os.path.dirname(link)) == []
-
-
 @needs_root
 def test_no_other_user_can_keep_a_link_from_its_owner() -> None:
     with tempfile.TemporaryDirectory() as folder:

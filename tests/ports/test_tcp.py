@@ -4,10 +4,8 @@ import re
 import socket
 
 import pytest
-import serial
 from tests.ports.helpers import WallClock, ask_socket, connect, warnings
-from tests.ports.test_pty import course_in_memory
-from tests.served import GUARD_S, PROGRAMS, fresh, run_python, served
+from tests.served import GUARD_S, fresh, served
 
 from kiks.clock.pace import Pace
 from kiks.clock.serial_timing import OUTPUT_LIMIT
@@ -15,14 +13,6 @@ from kiks.errors import LinkError, ParameterError
 from kiks.ports.rfc2217 import Rfc2217Endpoint
 from kiks.ports.tcp import TcpChannel, TcpEndpoint
 from kiks.units import character_ns
-
-
-def test_socket_url_gives_the_same_run_as_a_port_in_memory() -> None:
-    counts, memory = course_in_memory()
-    endpoint = TcpEndpoint(0)
-    with served([endpoint]) as run:
-        assert run_python(PROGRAMS / "course.py", f"socket://{endpoint.name}").strip() == counts.strip()
-        assert run.sim.state_hash() == memory.state_hash()
 
 
 def test_live_replies_come_whole_for_a_client_that_takes_one_recv_for_each() -> None:
@@ -134,19 +124,6 @@ def test_reset_connection_drops_an_unfinished_command() -> None:
         client = connect(endpoint)
         assert ask_socket(client, b"H\n") == b"h,0,0\r\n"
         client.close()
-
-
-def test_two_robots_have_their_own_clients() -> None:
-    ways = {1: [TcpEndpoint(0)], 2: [TcpEndpoint(0)]}
-    with served(ways):
-        ports = [serial.serial_for_url(f"socket://{ways[robot][0].name}", timeout=GUARD_S) for robot in (1, 2)]
-        for robot, port in enumerate(ports):
-            port.write(b"G,%d,0\n" % robot)
-            assert port.readline() == b"g\r\n"
-        for robot, port in enumerate(ports):
-            port.write(b"H\n")
-            assert port.readline() == b"h,%d,0\r\n" % robot
-            port.close()
 
 
 def test_unread_output_is_limited_and_logged(caplog: pytest.LogCaptureFixture) -> None:

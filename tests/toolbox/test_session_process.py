@@ -16,7 +16,7 @@ from pathlib import Path
 
 import pytest
 from tests import forked
-from tests.at_length import at_length, share
+from tests.at_length import at_length
 from tests.guard import GUARD_S
 
 from kiks.model.shipped import shipped
@@ -274,18 +274,6 @@ def test_kiks_matlab_prints_the_folder_of_the_toolbox() -> None:
 
 
 # ---- unauthenticated connections ----
-
-
-def test_many_unauthenticated_connections_do_not_block_others(tmp_path: Path) -> None:
-    with started(folder=tmp_path) as session, ExitStack() as strangers:
-        session.ask("world default")
-        address = ("127.0.0.1", int(session.greeting.split()[5]))
-        for _ in range(share(200, 1000)):
-            strangers.enter_context(socket.create_connection(address))
-        assert session.ask("active") == "1"
-        with started("--join", "0", folder=tmp_path) as participant:
-            assert participant.ask("active") == "1"
-        assert len(os.listdir(f"/proc/{session.number}/fd")) < 100
 
 
 def test_running_out_of_descriptors_ends_no_session(tmp_path: Path) -> None:

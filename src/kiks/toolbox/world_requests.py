@@ -37,20 +37,27 @@ def port_of(word: str) -> int:
 # ---- robots ----
 
 
+def _ask_robot(client: SessionClient, number: int, ask: Callable[[Simulation, int], str], nothing: str) -> str:
+    """Return what a function says of a port's robot, or something else if it has none."""
+
+    def asked(sim: Simulation) -> str:
+        robot = client.robot(number)
+        return nothing if robot is None else ask(sim, robot)
+
+    return client.do(asked)
+
+
 def ask_pose(client: SessionClient, words: str) -> str:
     """Return the x, y and heading [rad] of a port's robot; an empty text if it has none."""
     number = port_of(words)
     if client.session.desk is None:
         return ""
 
-    def pose(sim: Simulation) -> str:
-        robot = client.robot(number)
-        if robot is None:
-            return ""
+    def pose(sim: Simulation, robot: int) -> str:
         x_mm, y_mm, heading_rad = sim.pose(robot)
         return numbers_text((*user_place(sim.arena, x_mm, y_mm), heading_rad))
 
-    return client.do(pose)
+    return _ask_robot(client, number, pose, "")
 
 
 def ask_pulse(client: SessionClient, words: str) -> str:
@@ -66,10 +73,7 @@ def ask_path(client: SessionClient, words: str) -> str:
     number = port_of(words)
     opened = client.openings.get(number)
 
-    def path(sim: Simulation) -> str:
-        robot = client.robot(number)
-        if robot is None:
-            return "2 0"
+    def path(sim: Simulation, robot: int) -> str:
         paths = sim.paths()
         # A robot that came after the recording began has no path yet.
         points: Any = paths[robot - 1] if robot <= len(paths) else np.empty((0, 4))
@@ -81,7 +85,7 @@ def ask_path(client: SessionClient, words: str) -> str:
         return matrix_text(np.round(np.vstack([x, y]), 3))
 
     client.session.trace()
-    return client.do(path)
+    return _ask_robot(client, number, path, "2 0")
 
 
 def ask_distances(client: SessionClient, words: str) -> str:
@@ -89,10 +93,7 @@ def ask_distances(client: SessionClient, words: str) -> str:
     number = port_of(words)
     opened = client.openings.get(number)
 
-    def distances(sim: Simulation) -> str:
-        robot = client.robot(number)
-        if robot is None:
-            return "0 0 0"
+    def distances(sim: Simulation, robot: int) -> str:
         forwards_mm, backwards_mm, straight_mm = sim.distances_mm()[robot - 1].tolist()
         if opened is not None:
             x_mm, y_mm, _ = sim.pose(robot)
@@ -100,7 +101,7 @@ def ask_distances(client: SessionClient, words: str) -> str:
             straight_mm = math.hypot(x_mm - opened.start_mm[0], y_mm - opened.start_mm[1])
         return numbers_text((forwards_mm, backwards_mm, straight_mm))
 
-    return client.do(distances)
+    return _ask_robot(client, number, distances, "0 0 0")
 
 
 def ask_set_robot(client: SessionClient, words: str) -> str:
