@@ -6,8 +6,8 @@ from collections.abc import Awaitable, Callable
 from pathlib import Path
 
 from nicegui import ui
-from nicegui.events import KeyEventArguments
 
+from kiks.desk.panels.shortcuts import SHORTCUTS, listen
 from kiks.desk.panels.widgets import FeedElement, icon_button, named, told, with_props
 from kiks.desk.server.desk import Desk
 from kiks.units import clock_text
@@ -46,18 +46,18 @@ class TimeBar:
     def __init__(self, desk: Desk, feed: str) -> None:
         self._desk = desk
         looking = desk.looking
-        self._keys: dict[str, Callable[[], Awaitable[None]]] = {}
+        self._acts: dict[str, Callable[[], Awaitable[None]]] = {}
         with ui.element("div").classes("desk-bar").props('role="group" aria-label="Time bar"') as self._bar:
             TimeSlider(feed, _WEB / "time_bar.css")
             with ui.row().classes("desk-bar-buttons items-center no-wrap gap-1"):
-                self._add("first_page", "Event before", "event-before", "u", lambda: self._jump(is_before=True))
-                self._add("keyboard_double_arrow_left", "1 s back", "back-long", "J", lambda: looking.move_by(-LONG_S))
-                self._add("keyboard_arrow_left", "0.1 s back", "back-short", "j", lambda: looking.move_by(-SHORT_S))
-                self._play = self._add("play_arrow", "Play", "play", "k", self._toggle)
+                self._add("first_page", "event-before", lambda: self._jump(is_before=True))
+                self._add("keyboard_double_arrow_left", "back-long", lambda: looking.move_by(-LONG_S))
+                self._add("keyboard_arrow_left", "back-short", lambda: looking.move_by(-SHORT_S))
+                self._play = self._add("play_arrow", "play", self._toggle)
                 self._onwards = [
-                    self._add("keyboard_arrow_right", "0.1 s on", "on-short", "l", lambda: looking.move_by(SHORT_S)),
-                    self._add("keyboard_double_arrow_right", "1 s on", "on-long", "L", lambda: looking.move_by(LONG_S)),
-                    self._add("last_page", "Event after", "event-after", "o", lambda: self._jump(is_before=False)),
+                    self._add("keyboard_arrow_right", "on-short", lambda: looking.move_by(SHORT_S)),
+                    self._add("keyboard_double_arrow_right", "on-long", lambda: looking.move_by(LONG_S)),
+                    self._add("last_page", "event-after", lambda: self._jump(is_before=False)),
                 ]
                 self._state = ui.label().classes("desk-bar-state q-ml-sm").props("data-testid=bar-state")
                 self._event = ui.label().classes("desk-bar-event col ellipsis text-caption")
@@ -70,19 +70,19 @@ class TimeBar:
                     self._branch_tip = ui.tooltip("")
         with ui.dialog() as self._dialog, ui.card().classes("gap-3").style("max-width: 620px"):
             self._build_dialog()
-        ui.keyboard(on_key=self._press, ignore=["input", "select", "textarea"])
+        listen(self._acts, is_for_buttons=True)
         ui.timer(REFRESH_S, self.refresh)
         self.refresh()
 
-    def _add(self, icon: str, label: str, name: str, key: str, act: Callable[[], Awaitable[object]]) -> ui.button:
+    def _add(self, icon: str, name: str, act: Callable[[], Awaitable[object]]) -> ui.button:
         async def acted() -> None:
-            await act()
-            self.refresh()
+            if self._desk.looking.span is not None:
+                await act()
+                self.refresh()
 
-        shown = told(acted)
-        self._keys[key] = shown
-        keys = f"Shift and {key}" if key.isupper() else key
-        return icon_button(icon, label, name, shown).tooltip(f"{label} (key: {keys})")
+        shortcut = SHORTCUTS[name]
+        self._acts[name] = shown = told(acted)
+        return icon_button(icon, shortcut.label, name, shown).tooltip(f"{shortcut.label} (key: {shortcut.words})")
 
     def refresh(self) -> None:
         """Show the present state, which another browser may have changed."""
@@ -124,13 +124,6 @@ class TimeBar:
     async def _back_to_now(self) -> None:
         await self._desk.looking.back_to_now()
         self.refresh()
-
-    async def _press(self, event: KeyEventArguments) -> None:
-        if not event.action.keydown or event.modifiers.ctrl or event.modifiers.alt or event.modifiers.meta:
-            return
-        act = self._keys.get(str(event.key))
-        if act is not None and self._desk.looking.span is not None:
-            await act()
 
     # ---- on from here ----
 

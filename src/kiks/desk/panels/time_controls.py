@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from nicegui import ui
-from nicegui.events import KeyEventArguments
 
+from kiks.desk.panels.shortcuts import SHORTCUTS, listen
 from kiks.desk.panels.widgets import BAR, FeedElement, icon_button, told, with_props
 from kiks.desk.server.desk import Desk
 
@@ -60,7 +60,7 @@ class TimePanel:
         with self._run:
             self._run_tip = ui.tooltip("")
         icon_button("skip_next", "Step", "step", self._step, look=BAR).tooltip(
-            "Run for one step, then pause (key: .). The key , goes back by one step"
+            f"Run for one step, then pause (key: {SHORTCUTS['step'].key}). The key {SHORTCUTS['step-back'].key} goes back"
         )
         icon_button("dangerous", "Halt", "halt", self._halt, look=BAR).tooltip("Halt: stop all programs and all robots")
         self._step_s = _select(STEPS, 0.01, "Size of a step", "step-size", "5rem")
@@ -75,7 +75,7 @@ class TimePanel:
             "Reset: move everything back to where it stood at the checkpoint, or at the start; time continues"
         )
         ui.timer(REFRESH_S, self._refresh)
-        ui.keyboard(on_key=self._press)
+        listen({"run": self._toggle, "step": self._step, "step-back": self._step_back}, is_for_buttons=False)
         self._refresh()
 
     def _shown_speed(self) -> float:
@@ -88,7 +88,7 @@ class TimePanel:
         word, icon = ("Run", "play_arrow") if desk.is_paused else ("Pause", "pause")
         if self._run.props.get("aria-label") != word:
             with_props(self._run, icon=icon, aria_label=word)
-            self._run_tip.text = f"{word} (space)"
+            self._run_tip.text = f"{word} (key: {SHORTCUTS['run'].words})"
         if self._speed.value != self._shown_speed():
             self._speed.value = self._shown_speed()
 
@@ -126,16 +126,6 @@ class TimePanel:
     async def _reset(self) -> None:
         await self._desk.reset()
         ui.notify("Everything is back where it stood.")
-
-    async def _press(self, event: KeyEventArguments) -> None:
-        if not event.action.keydown or event.modifiers.ctrl or event.modifiers.alt or event.modifiers.meta:
-            return
-        if event.key == " " and not event.action.repeat:
-            await self._toggle()
-        elif event.key == ".":
-            await self._step()
-        elif event.key == ",":
-            await self._step_back()
 
 
 def _select(choices: dict[float, str], value: float, word: str, name: str, width: str) -> ui.select:

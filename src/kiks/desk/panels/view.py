@@ -5,6 +5,7 @@ from __future__ import annotations
 from nicegui import ui
 
 from kiks.desk.panels.arena_view import SHOWN, ArenaView
+from kiks.desk.panels.shortcuts import SHORTCUTS
 from kiks.desk.panels.widgets import BAR, icon_button, with_props
 from kiks.desk.server.desk import Desk
 
@@ -30,7 +31,7 @@ HELP = """
 
 **With the keyboard**
 
-* Space: run and pause. `.`: one step.
+* Time: KEYS_OF_TIME.
 * On the arena (press Tab to reach it): `n` selects the next thing, arrows move it by 10 mm (with Shift 1 mm),
   `q` and `e` turn it by 5 degrees, Delete removes it, Escape deselects it; `+` `-` `0`: zoom in, zoom out, show all.
 * In the program editor: Ctrl-Enter runs; Tab indents, and leaves the editor after Escape.
@@ -64,7 +65,8 @@ class ViewPanel:
         self._robots.on("before-show", self._list_robots)
         _button("fit_screen", "Show all of the arena (key: 0)", "fit").on_click(view.fit)
         with ui.dialog() as self._help, ui.card():
-            ui.markdown(HELP)
+            keys = (f"`{each.words}` {each.label[0].lower()}{each.label[1:]}" for each in SHORTCUTS.values())
+            ui.markdown(HELP.replace("KEYS_OF_TIME", ", ".join(keys)))
             ui.button("Close", on_click=self._help.close).props("flat no-caps")
         dark = ui.dark_mode(value=None)
         with _button("contrast", "Light or dark", "dark"), ui.menu():

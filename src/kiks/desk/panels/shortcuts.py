@@ -1,0 +1,60 @@
+"""The keys that act on time, in one table: the panels listen to them, tooltips name them, and the help lists them.
+
+The keys of the arena view are in `web/keys.js`, those of the slider of the time bar in `web/time_bar.js`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable, Mapping
+from typing import Any, NamedTuple
+
+from nicegui import ui
+from nicegui.events import KeyEventArguments
+
+
+class Shortcut(NamedTuple):
+    """A key and what it does."""
+
+    key: str
+    label: str
+
+    @property
+    def words(self) -> str:
+        """The key as people call it."""
+        return "space" if self.key == " " else f"Shift and {self.key}" if self.key.isupper() else self.key
+
+
+SHORTCUTS = {
+    "run": Shortcut(" ", "Run or pause"),
+    "step": Shortcut(".", "One step"),
+    "step-back": Shortcut(",", "One step back"),
+    "event-before": Shortcut("u", "Event before"),
+    "back-long": Shortcut("J", "1 s back"),
+    "back-short": Shortcut("j", "0.1 s back"),
+    "play": Shortcut("k", "Play"),
+    "on-short": Shortcut("l", "0.1 s on"),
+    "on-long": Shortcut("L", "1 s on"),
+    "event-after": Shortcut("o", "Event after"),
+}
+
+
+def listen(acts: Mapping[str, Callable[[], Awaitable[object]]], *, is_for_buttons: bool) -> None:
+    """Listen to keys on this page, outside of fields.
+
+    Args:
+        acts: What each does, by the names of `SHORTCUTS`.
+        is_for_buttons: Whether also while a button has the focus.
+    """
+    by_key = {SHORTCUTS[name].key: act for name, act in acts.items()}
+
+    async def press(event: KeyEventArguments) -> None:
+        pressed, held = event.action, event.modifiers
+        # A held space would run and pause in turn.
+        is_again = pressed.repeat and event.key == " "
+        if pressed.keydown and not (held.ctrl or held.alt or held.meta or is_again):
+            act = by_key.get(str(event.key))
+            if act is not None:
+                await act()
+
+    fields: list[Any] = ["input", "select", "textarea"]
+    ui.keyboard(on_key=press, ignore=fields if is_for_buttons else [*fields, "button"])
