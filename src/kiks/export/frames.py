@@ -162,7 +162,7 @@ def _pack_cameras(sim: Simulation) -> NDArray[np.void]:
 
 
 def scene_key(sim: Simulation) -> tuple[Any, ...]:
-    """Return what is another when a scene message no longer holds: the world, walls, robots, turrets, lamps or bodies."""
+    """Return what changes when a scene message no longer holds: the world, walls, robots, turrets, lamps or bodies."""
     turret_count = sum(len(wire.firmware.fitted) for wire in sim.wires)
     counts = sim.robot_count, turret_count, len(sim.lamps)
     return sim, sim.arena, *counts, *sim.world.state.bodies["number"][0].tolist()

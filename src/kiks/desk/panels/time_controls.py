@@ -60,7 +60,7 @@ class TimePanel:
         with self._run:
             self._run_tip = ui.tooltip("")
         icon_button("skip_next", "Step", "step", self._step, look=BAR).tooltip(
-            f"Run for one step, then pause (key: {SHORTCUTS['step'].key}). The key {SHORTCUTS['step-back'].key} goes back"
+            f"Run for one step, then pause (key: {SHORTCUTS['step'].key}; back: {SHORTCUTS['step-back'].key})"
         )
         icon_button("dangerous", "Halt", "halt", self._halt, look=BAR).tooltip("Halt: stop all programs and all robots")
         self._step_s = _select(STEPS, 0.01, "Size of a step", "step-size", "5rem")
