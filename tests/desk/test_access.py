@@ -15,8 +15,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from tests.stranger import STRANGER, as_stranger, needs_root
 
-from kiks.desk.server.access import BODY_LIMIT, AccessControl
+from kiks.desk.server.access import AccessControl
 from kiks.desk.server.token import Token, user_of
+from kiks.model.limits import REQUEST_BYTES_MAX
 
 TOKEN = "a-secret"
 KEY = Token(TOKEN)
@@ -223,15 +224,15 @@ def test_a_path_with_a_line_end_is_a_bad_request() -> None:
 # ---- size limits and failures ----
 
 
-@pytest.mark.parametrize("length", [str(BODY_LIMIT + 1), "9" * 30, "-1", "x"])
+@pytest.mark.parametrize("length", [str(REQUEST_BYTES_MAX + 1), "9" * 30, "-1", "x"])
 def test_a_request_with_too_large_a_content_length_is_refused(length: str) -> None:
     assert status(come(method="POST", content_length=length, cookie=COOKIE)) == 413
 
 
 def test_a_too_large_body_is_cut_off() -> None:
     piece = b"x" * (1 << 20)
-    assert status(come(body=[piece] * (BODY_LIMIT >> 20), cookie=COOKIE)) == 200
-    assert status(come(body=[piece] * ((BODY_LIMIT >> 20) + 1), cookie=COOKIE)) == 413
+    assert status(come(body=[piece] * (REQUEST_BYTES_MAX >> 20), cookie=COOKIE)) == 200
+    assert status(come(body=[piece] * ((REQUEST_BYTES_MAX >> 20) + 1), cookie=COOKIE)) == 413
 
 
 @pytest.mark.parametrize("kind", ["http", "websocket"])

@@ -19,10 +19,10 @@ from websockets.sync.client import ClientConnection, connect
 
 import kiks
 from kiks.desk.server import connection_limit
-from kiks.desk.server.access import BODY_LIMIT
-from kiks.desk.server.server import MESSAGE_LIMIT, SERVER
+from kiks.desk.server.server import SERVER
 from kiks.desk.server.show import Shown, show
 from kiks.desk.server.token import COOKIE
+from kiks.model.limits import MESSAGE_BYTES_MAX, REQUEST_BYTES_MAX
 
 
 @pytest.fixture(scope="module")
@@ -191,7 +191,7 @@ def test_an_authenticated_connection_does_not_time_out(shown: Shown, monkeypatch
         b"\x83\x80\0\0\0\0",  # an opcode that is none
         b"\x89\xfe\xff\xff\0\0\0\0",  # a ping that is too long
         b"\x80\x80\0\0\0\0",  # goes on where nothing began
-        b"\x81\xff" + (MESSAGE_LIMIT + 1).to_bytes(8, "big") + b"\0\0\0\0",  # too long
+        b"\x81\xff" + (MESSAGE_BYTES_MAX + 1).to_bytes(8, "big") + b"\0\0\0\0",  # too long
         b"\x81\xff\xff\xff\xff\xff\xff\xff\xff\xff\0\0\0\0",
         b"\x88\x81\0\0\0\0x",  # a close that is half
         b"\x88\x82\0\0\0\0\xff\xff",
@@ -283,7 +283,7 @@ def test_malformed_uploads_are_refused(shown: Shown, said: list[str]) -> None:
 def test_a_too_large_body_is_not_stored(shown: Shown, said: list[str]) -> None:
     host, port, cookie = address_and_cookie(shown)
     for headers, body in (
-        ({"Content-Length": str(BODY_LIMIT + 1)}, b""),
+        ({"Content-Length": str(REQUEST_BYTES_MAX + 1)}, b""),
         ({"Transfer-Encoding": "chunked"}, b"100000\r\n" + b"x" * 0x100000 + b"\r\n"),
     ):
         head = {
@@ -296,7 +296,7 @@ def test_a_too_large_body_is_not_stored(shown: Shown, said: list[str]) -> None:
         with socket.create_connection((host, port), timeout=GUARD_S) as client:
             client.sendall(f"POST {inside('/desk/1')} HTTP/1.1\r\n{lines}\r\n".encode())
             with suppress(OSError):
-                for _ in range(BODY_LIMIT // 0x100000 + 2):
+                for _ in range(REQUEST_BYTES_MAX // 0x100000 + 2):
                     if body:
                         client.sendall(body)
             with suppress(ConnectionError):

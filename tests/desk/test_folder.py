@@ -13,9 +13,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
 
-from kiks.desk.server.folder import LISTED_MAX, OPENED, UPLOAD_BYTES_MAX, Folder, decode, encode
+from kiks.desk.server.folder import LISTED_MAX, OPENED, Folder, decode, encode
 from kiks.errors import ArenaError, KiksError, ParameterError
 from kiks.model.arena import Arena, Lamp
+from kiks.model.limits import UPLOAD_BYTES_MAX
 from kiks.model.project import Project
 from kiks.model.shipped import demonstrations
 from kiks.sim.from_project import simulation_of

@@ -9,7 +9,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kiks.desk.server.scripts import (
-    SIZE_LIMIT,
     Script,
     find_mistake,
     offered,
@@ -19,6 +18,7 @@ from kiks.desk.server.scripts import (
     split_arguments,
 )
 from kiks.errors import ParameterError
+from kiks.model.limits import PROGRAM_BYTES_MAX
 
 EXAMPLE = Script("avoid.py", is_example=True)
 
@@ -79,13 +79,13 @@ def test_links_do_not_leave_the_folder(tmp_path: Path) -> None:
 
 
 def test_unreadable_programs_are_refused(tmp_path: Path) -> None:
-    (tmp_path / "long.py").write_bytes(b"#" * (SIZE_LIMIT + 1))
+    (tmp_path / "long.py").write_bytes(b"#" * (PROGRAM_BYTES_MAX + 1))
     (tmp_path / "odd.py").write_bytes(b"\xff\xfe")
     for name, message in (("long.py", "at most 200000 bytes"), ("odd.py", "readable"), ("none.py", "readable")):
         with pytest.raises(ParameterError, match=message):
             read_script(tmp_path, Script(name, is_example=False))
     with pytest.raises(ParameterError, match=r"at most 200000 bytes"):
-        save_script(tmp_path, "long2.py", "#" * (SIZE_LIMIT + 1))
+        save_script(tmp_path, "long2.py", "#" * (PROGRAM_BYTES_MAX + 1))
 
 
 @pytest.mark.parametrize(

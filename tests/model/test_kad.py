@@ -19,7 +19,7 @@ from scipy.io import loadmat, savemat
 from kiks.errors import ArenaError, ParameterError
 from kiks.model.arena import Arena, Ball, Cylinder, Lamp, Pose
 from kiks.model.kad import PIECES_MAX, _polygon, decode_kad, encode_kad, load_kad, save_kad
-from kiks.model.mat5 import FILE_BYTES_MAX
+from kiks.model.limits import MAT_FILE_BYTES_MAX
 
 
 def greedy(picture: np.ndarray) -> list[int]:
@@ -200,7 +200,7 @@ def test_files_that_are_none_are_refused(tmp_path):
         (b"\x89PNG" * 100, "level 5"),
         (b"MATLAB 7.3 MAT-file".ljust(512), "7.3"),
         (mat(other=np.ones(3)), "variable 'walls'"),
-        (bytes(FILE_BYTES_MAX + 1), "at most"),
+        (bytes(MAT_FILE_BYTES_MAX + 1), "at most"),
         (whole[:128], "variable 'walls'"),
     ]:
         with pytest.raises(ArenaError, match=words):
@@ -253,7 +253,7 @@ def matrix(sides: bytes, numbers: bytes, *, sides_type: int = 5, name: bytes = b
 FULL = [4, 1, 8000, 8000, 1, 1, 1, 8000, 8000, 9]
 STAR = np.random.default_rng(3).integers(1, 8000, (2, 30_000))
 HOSTILE = {
-    "bomb": lambda: element(15, zlib.compress(bytes(8 * FILE_BYTES_MAX), 9)),
+    "bomb": lambda: element(15, zlib.compress(bytes(8 * MAT_FILE_BYTES_MAX), 9)),
     "huge": lambda: element(14, struct.pack("<IIII", 6, 8, 14, 0) + struct.pack("<IIii", 5, 8, 2**31 - 1, 2**31 - 1)),
     "longer than the file": lambda: struct.pack("<II", 14, 2**32 - 1),
     "many numbers": lambda: element(15, zlib.compress(matrix(struct.pack("<ii", 1, 46 << 20), bytes(46 << 20)), 9)),
@@ -274,7 +274,7 @@ def test_files_that_would_take_endless_memory_are_refused(name):
     with traced() as peak_bytes, pytest.raises(ArenaError) as caught:
         decode_kad(data)
     assert len(str(caught.value)) < 300
-    assert peak_bytes[0] < 4 * FILE_BYTES_MAX
+    assert peak_bytes[0] < 4 * MAT_FILE_BYTES_MAX
     assert time.process_time() - begin_s < 30
 
 

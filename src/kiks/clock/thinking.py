@@ -12,10 +12,8 @@ from typing import Protocol
 
 from kiks.errors import ParameterError
 from kiks.model.atomic_files import replace_file
+from kiks.model.limits import REPLAY_FILE_BYTES_MAX
 from kiks.model.thinking_policy import split_thinking
-
-FILE_BYTES_MAX = 64 << 20
-"""Most bytes of a replay file."""
 
 DIGITS_MAX = 13
 """Most digits of a time [ns]: no program thinks for three hours, and a simulation of years would seem to hang."""
@@ -105,7 +103,7 @@ def _read_times(path: Path) -> list[int]:
     from kiks.model.data_file import read_file
 
     what = f"replay file {str(path)!r}"
-    lines = read_file(path, what, bytes_max=FILE_BYTES_MAX).splitlines()
+    lines = read_file(path, what, bytes_max=REPLAY_FILE_BYTES_MAX).splitlines()
     for number, line in enumerate(lines, 1):
         if not line.isdigit() or len(line) > DIGITS_MAX:
             # The message leaves the line out, because the user may have named a private file by mistake.

@@ -28,6 +28,7 @@ from kiks.errors import ParameterError, shown
 from kiks.model.array_checks import Numbers, read_arrays
 from kiks.model.atomic_files import path_of
 from kiks.model.data_file import COORDINATE_MAX, read_file
+from kiks.model.limits import SAMPLES_FILE_NUMBERS_MAX
 from kiks.model.raster import is_number
 from kiks.model.robot import SENSOR_COUNT
 from kiks.model.thesis_networks import BODY_RADIUS_MM
@@ -42,9 +43,6 @@ MAXIMUM_COUNTS = 1023
 
 ACTIVE_COUNTS = (20, 1000)
 """Least and largest reading that tells something: below is noise, above saturation."""
-
-READINGS_MAX = 1 << 20
-"""Most numbers of a file."""
 
 _ADVICE = "See the README of the samples."
 _TABLE = {
@@ -187,7 +185,7 @@ def load_samples(file: str | Path, *, name: str = "", radius_mm: float = math.in
 
 def _read_table(path: Path, what: str) -> tuple[Floats, Floats, NDArray[np.int64]]:
     """Return gaps, angles and readings of a .npz."""
-    arrays = read_arrays(path, _TABLE, what, numbers_max=READINGS_MAX)
+    arrays = read_arrays(path, _TABLE, what, numbers_max=SAMPLES_FILE_NUMBERS_MAX)
     return arrays["gap_mm"], arrays["object_angle_deg_cw"], arrays["values"]
 
 

@@ -25,14 +25,12 @@ from kiks.model.array_checks import Numbers, check_array
 from kiks.model.atomic_files import path_of, replace_file
 from kiks.model.checks import check_number
 from kiks.model.data_file import Text, check, one_line, parse_json, read_file, record
+from kiks.model.limits import ARCHIVE_FILE_BYTES_MAX
 
 Floats = NDArray[np.float64]
 
 ARCHIVE = "archive.parquet"
 """Name in the folder of an evolution, of two sides after the name of the side."""
-
-FILE_BYTES_MAX = 256 << 20
-"""Largest size of an archive's file [byte]."""
 
 _NUMBER_BYTES = 8
 
@@ -224,7 +222,7 @@ class Archive:
         home = Folder(folder)
         file = _file(home.path, side)
         what = f"Archive {str(file)!r}"
-        data = read_file(file, what, bytes_max=FILE_BYTES_MAX)
+        data = read_file(file, what, bytes_max=ARCHIVE_FILE_BYTES_MAX)
         champion = Champion.load(home.champion_file(side))
         try:
             head, columns = _read(data, len(champion.parameters))

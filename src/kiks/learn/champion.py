@@ -23,6 +23,7 @@ from kiks.model.arena_file import quoted
 from kiks.model.atomic_files import inside, path_of, replace_files
 from kiks.model.checks import ROBOTS_MAX, check_count
 from kiks.model.data_file import Number, Rule, Text, Whole, as_list, check, parse_toml, read_file, record
+from kiks.model.limits import CHAMPION_FILE_BYTES_MAX
 from kiks.model.project import Project, ProjectRobot
 from kiks.model.robot import RobotSpec, robot_names, robot_toml, specs_of
 from kiks.sim.from_project import simulation_of
@@ -31,9 +32,6 @@ from kiks.version import __version__
 
 FORMAT = 1
 """Version of the file's format."""
-
-FILE_BYTES_MAX = 32 << 20
-"""Largest size of a champion's file [byte]."""
 
 PARAMETERS_MAX = 1_000_000
 """Largest number of parameters of a champion."""
@@ -223,7 +221,7 @@ class Champion:
         """Read a champion's file. A controller from a Python file or module is imported, which runs its code."""
         path = path_of(path)
         what = f"Champion's file {str(path)!r}"
-        read = check(_ChampionFile, parse_toml(read_file(path, what, bytes_max=FILE_BYTES_MAX), what), what)
+        read = check(_ChampionFile, parse_toml(read_file(path, what, bytes_max=CHAMPION_FILE_BYTES_MAX), what), what)
         given = {each.name: getattr(read, each.name) for each in fields(cls)}
         given["timing"] = Timing(**asdict(read.timing))
         if read.world is not None:

@@ -24,15 +24,13 @@ from kiks.learn.exam import PASS_SHARE, imperfect_robots
 from kiks.learn.fingerprint import tell_unseen
 from kiks.model.atomic_files import path_of, replace_file
 from kiks.model.data_file import TEXT_MAX, Number, Text, Whole, check, parse_json, read_file, record
+from kiks.model.limits import RESULT_FILE_BYTES_MAX
 from kiks.version import __version__
 
 Floats = NDArray[np.float64]
 
 RESULT, SUMMARY = "result.json", "summary.json"
 """Names in the folder of an evolution, and in that of several."""
-
-FILE_BYTES_MAX = 32 << 20
-"""Largest size of a result's file [byte]."""
 
 EFFECTS = ((0.06, "negligible"), (0.14, "small"), (0.21, "medium"), (0.5, "large"))
 """Names of effect sizes: largest |A - 0.5|, and the name."""
@@ -170,7 +168,7 @@ def load_result(folder: Path) -> Result | None:
     if not file.exists():
         return None
     what = f"The result of an evolution {str(file)!r}"
-    data = read_file(file, what, bytes_max=FILE_BYTES_MAX)
+    data = read_file(file, what, bytes_max=RESULT_FILE_BYTES_MAX)
     found = check(Result, parse_json(data, what), what, advice="Remove the file, and evolve again.")
     return found if found.generations == Folder(folder).generation_count() else None
 

@@ -22,9 +22,7 @@ from numpy.lib import format as npy
 
 from kiks.errors import KiksError, ParameterError, figure, shown
 from kiks.model.data_file import one_line, read_file
-
-NUMBERS_MAX = 1 << 24
-"""Default limit of numbers in all arrays of a file."""
+from kiks.model.limits import ARRAY_FILE_NUMBERS_MAX
 
 _EXACT_MAX = 2.0**53  # above it, floats leave whole numbers out
 _HEAD_BYTES_MAX = 1 << 10
@@ -116,7 +114,7 @@ def check_array(values: object, rule: Numbers, name: str, counts: dict[str, int]
 
 
 def read_arrays(
-    path: Path, rules: Mapping[str, Numbers], what: str, *, numbers_max: int = NUMBERS_MAX
+    path: Path, rules: Mapping[str, Numbers], what: str, *, numbers_max: int = ARRAY_FILE_NUMBERS_MAX
 ) -> dict[str, npt.NDArray[Any]]:
     """Return arrays of an .npz file; other arrays in it are ignored.
 

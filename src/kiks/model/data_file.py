@@ -35,9 +35,7 @@ from pydantic import ConfigDict, Field, Strict, Tag, TypeAdapter, ValidationErro
 from pydantic_core import core_schema
 
 from kiks.errors import SHOWN_MAX, KiksError, ParameterError, nearest, shown
-
-BYTES_MAX = 4 << 20
-"""Default limit of a file's size [bytes]."""
+from kiks.model.limits import DATA_FILE_BYTES_MAX
 
 TEXT_MAX = 1000
 """Most characters of a text in a file."""
@@ -129,7 +127,9 @@ def as_list(values: object) -> object:
 # ---- bytes ----
 
 
-def read_file(path: Path, what: str, *, bytes_max: int = BYTES_MAX, error: type[KiksError] = ParameterError) -> bytes:
+def read_file(
+    path: Path, what: str, *, bytes_max: int = DATA_FILE_BYTES_MAX, error: type[KiksError] = ParameterError
+) -> bytes:
     """Return the bytes of a file.
 
     Args:

@@ -21,7 +21,8 @@ from kiks.model.arena_objects import THINGS_MAX, Ball, Cylinder, Lamp, Pose
 from kiks.model.array_checks import Numbers, check_array
 from kiks.model.atomic_files import path_of, replace_file
 from kiks.model.data_file import COORDINATE_MAX, read_file
-from kiks.model.mat5 import FILE_BYTES_MAX, read_numbers
+from kiks.model.limits import MAT_FILE_BYTES_MAX
+from kiks.model.mat5 import read_numbers
 from kiks.model.raster import cells_per_pixel
 
 PIECES_MAX = 200_000
@@ -48,7 +49,7 @@ def load_kad(path: str | Path) -> Arena:
     """Read a `.kad` file."""
     path = path_of(path)
     what = f"Arena file {str(path)!r}"
-    return decode_kad(read_file(path, what, bytes_max=FILE_BYTES_MAX, error=ArenaError), path.stem, what)
+    return decode_kad(read_file(path, what, bytes_max=MAT_FILE_BYTES_MAX, error=ArenaError), path.stem, what)
 
 
 def decode_kad(data: bytes, name: str = "arena", what: str = "The arena file") -> Arena:

@@ -19,9 +19,7 @@ import numpy.typing as npt
 
 from kiks.errors import ArenaError, shown
 from kiks.model.data_file import check_size, one_line
-
-FILE_BYTES_MAX = 48 << 20
-"""Most bytes of a file, and of its unpacked content."""
+from kiks.model.limits import MAT_FILE_BYTES_MAX
 
 _HEADER_BYTES = 128
 _MATRIX, _COMPRESSED = 14, 15
@@ -38,7 +36,7 @@ def read_numbers(data: bytes, what: str) -> dict[str, npt.NDArray[Any]]:
         data: The bytes of the file.
         what: What messages call it.
     """
-    check_size(data, what, bytes_max=FILE_BYTES_MAX, error=ArenaError)
+    check_size(data, what, bytes_max=MAT_FILE_BYTES_MAX, error=ArenaError)
     order = {b"IM": "<", b"MI": ">"}.get(data[126:128])
     if order is None or struct.unpack_from(f"{order}H", data, 124)[0] != 0x0100:
         other = "one of MATLAB 7.3" if data[:10] == b"MATLAB 7.3" else "none"
@@ -54,9 +52,9 @@ def _matrices(data: memoryview, order: str) -> Iterator[memoryview]:
     """Yield the content of each matrix, unpacked.
 
     Raises:
-        ValueError: If all of them would take more than `FILE_BYTES_MAX`.
+        ValueError: If all of them would take more than `MAT_FILE_BYTES_MAX`.
     """
-    left = FILE_BYTES_MAX
+    left = MAT_FILE_BYTES_MAX
     for kind, content in _elements(data, order):
         parts = [(kind, content)]
         if kind == _COMPRESSED:
@@ -64,7 +62,7 @@ def _matrices(data: memoryview, order: str) -> Iterator[memoryview]:
             unpacked = unpacker.decompress(content, left)
             left -= len(unpacked)
             if unpacker.unconsumed_tail or left <= 0:
-                raise ValueError(f"it unpacks to more than {FILE_BYTES_MAX >> 20} MiB")
+                raise ValueError(f"it unpacks to more than {MAT_FILE_BYTES_MAX >> 20} MiB")
             parts = list(_elements(memoryview(unpacked), order))
         yield from (part for part_kind, part in parts if part_kind == _MATRIX)
 

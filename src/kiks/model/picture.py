@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from kiks.errors import ArenaError, ParameterError, shown
 from kiks.model.data_file import check_size, one_line, read_file
+from kiks.model.limits import PICTURE_FILE_BYTES_MAX
 from kiks.model.raster import cells_per_pixel
 
 if TYPE_CHECKING:
@@ -23,9 +24,6 @@ if TYPE_CHECKING:
 
 PICTURE_TYPES = ("PNG", "TIFF", "PPM", "BMP")
 """The types that are read, in Pillow's words; PPM includes PGM and PBM."""
-
-PICTURE_BYTES_MAX = 256 << 20
-"""Most bytes of a picture's file: those of the largest arena in colours, not compressed."""
 
 _BAND_PIXELS = 1 << 20
 _LOSSY = "Lossy compression smears walls into the floor. "
@@ -46,7 +44,7 @@ def read_picture(path: Path, mm_per_pixel: float) -> npt.NDArray[np.uint8]:
         uint8 [row, column] with row 0 on top: 0 = floor.
     """
     what = f"Picture {shown(str(path))}"
-    return decode_picture(read_file(path, what, bytes_max=PICTURE_BYTES_MAX, error=ArenaError), mm_per_pixel, what)
+    return decode_picture(read_file(path, what, bytes_max=PICTURE_FILE_BYTES_MAX, error=ArenaError), mm_per_pixel, what)
 
 
 def decode_picture(data: bytes, mm_per_pixel: float, what: str = "The picture") -> npt.NDArray[np.uint8]:
@@ -59,7 +57,7 @@ def decode_picture(data: bytes, mm_per_pixel: float, what: str = "The picture") 
     """
     from PIL import Image, UnidentifiedImageError
 
-    check_size(data, what, bytes_max=PICTURE_BYTES_MAX, error=ArenaError)
+    check_size(data, what, bytes_max=PICTURE_FILE_BYTES_MAX, error=ArenaError)
     with warnings.catch_warnings():
         # Pillow warns about large pictures and odd metadata: this function checks the size, and metadata do not matter.
         warnings.simplefilter("ignore")

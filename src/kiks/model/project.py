@@ -40,13 +40,11 @@ from kiks.model.data_file import (
     read_file,
     record,
 )
+from kiks.model.limits import PROJECT_FILE_BYTES_MAX
 from kiks.model.raster_text import box_keys_of, raster_of_text, raster_text
 from kiks.model.robot import Baud, Brightness, Response, robot_names
 from kiks.model.thinking_policy import split_thinking
 from kiks.model.turrets import TURRETS
-
-FILE_BYTES_MAX = 96 << 20
-"""Most bytes of a project file."""
 
 FASTEST = "fastest"
 """Value in a file for no speed limit."""
@@ -171,7 +169,7 @@ class Project:
         if path.suffix.lower() != ".kiks":
             return cls.of_arena(Arena.load(path))
         what = f"Project file {str(path)!r}"
-        data = read_file(path, what, bytes_max=FILE_BYTES_MAX, error=ArenaError)
+        data = read_file(path, what, bytes_max=PROJECT_FILE_BYTES_MAX, error=ArenaError)
         return cls.from_bytes(data, name=path.stem, what=what)
 
     @classmethod
@@ -191,7 +189,7 @@ class Project:
         *,
         name: str = "project",
         what: str = "The project file",
-        bytes_max: int = FILE_BYTES_MAX,
+        bytes_max: int = PROJECT_FILE_BYTES_MAX,
     ) -> Project:
         """Read what `to_bytes` returned, or a person wrote.
 

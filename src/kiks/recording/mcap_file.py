@@ -26,6 +26,7 @@ from mcap.writer import CompressionType, Writer
 
 from kiks.errors import ParameterError
 from kiks.model.atomic_files import FileBeside, ending_of, path_of, target_of, writing
+from kiks.model.limits import RECORD_BYTES_MAX
 from kiks.version import __version__
 
 ENDING = ".mcap"
@@ -38,9 +39,6 @@ _CHUNK_HEAD = struct.Struct("<QQQ")
 _CRC = struct.Struct("<I")
 _MESSAGE = struct.Struct("<BQHIQQ")
 _IN_CHUNKS = (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE)
-
-RECORD_BYTES_MAX = 64 << 20
-"""Most bytes of a record that is read, and of a chunk when it is expanded."""
 
 RESERVE_BYTES, RESERVE_SHARE = 128 << 20, 0.05
 """What recordings leave free of a disk [bytes], or of a small disk this share."""

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.errors import ParameterError
+from kiks.model.limits import TEXT_COLUMN_BYTES_MAX
 from kiks.recording.entries import Entry
 from kiks.recording.events import EventReader
 from kiks.recording.log import RecordedLog
@@ -39,9 +40,6 @@ _READINGS = np.dtype([("time_s", "f8"), ("robot", "i4"), ("command", "U1"), ("co
 
 
 _COUNTS = re.compile(rb"[0-9]{1,9}(,[0-9]{1,9}){7}")
-
-TEXT_BYTES_MAX = 1 << 30
-"""Most bytes of a table's column of texts, each of which takes as many as the longest."""
 
 
 def _seconds(ticks: NDArray[np.int64]) -> NDArray[np.float64]:
@@ -133,7 +131,7 @@ def events(log: RecordedLog) -> Table:
 def _longest(log: RecordedLog, lengths: Sequence[int]) -> int:
     """Return the greatest of the lengths of a column's texts, at least 1."""
     longest = max(lengths, default=1)
-    if longest * len(lengths) > TEXT_BYTES_MAX:
+    if longest * len(lengths) > TEXT_COLUMN_BYTES_MAX:
         raise ParameterError(
             f"{log.reader.what} must have texts that fit into a table, but one has {longest} bytes, and there are "
             f"{len(lengths)} rows. Read `entries()` one by one."

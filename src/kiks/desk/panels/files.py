@@ -11,10 +11,11 @@ from nicegui.events import UploadEventArguments
 from kiks.desk.panels.film import FilmDialog
 from kiks.desk.panels.widgets import named, text_button, told, with_props
 from kiks.desk.server.desk import Desk
-from kiks.desk.server.folder import OPENED, PICTURES, UPLOAD_BYTES_MAX, Folder, decode, encode
+from kiks.desk.server.folder import OPENED, PICTURES, Folder, decode, encode
 from kiks.desk.server.live_editing import Editing
 from kiks.errors import ArenaError, ParameterError
 from kiks.model.arena import Arena
+from kiks.model.limits import UPLOAD_BYTES_MAX
 from kiks.model.picture import decode_picture
 from kiks.model.project import Project
 from kiks.model.shipped import demonstrations

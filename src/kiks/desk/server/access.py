@@ -13,6 +13,7 @@ from urllib.parse import parse_qsl, quote, urlencode, urlsplit
 from kiks.desk.server.connection_limit import CONNECTION_KEY
 from kiks.desk.server.server_log import note
 from kiks.desk.server.token import COOKIE, Token
+from kiks.model.limits import REQUEST_BYTES_MAX
 
 Message = MutableMapping[str, Any]
 Receive = Callable[[], Awaitable[Message]]
@@ -30,9 +31,7 @@ HEADERS = [
 ]
 """Headers of every answer."""
 
-BODY_LIMIT = 64 << 20
-"""Maximum size of a request's body [bytes]: a compressed project of 64 million cells."""
-TOO_LARGE = f"A request must have at most {BODY_LIMIT >> 20} MiB"
+TOO_LARGE = f"A request must have at most {REQUEST_BYTES_MAX >> 20} MiB"
 
 REFUSED = (Path(__file__).parents[1] / "web" / "refused.html").read_text(encoding="utf-8")
 """The page of a refusal."""
@@ -60,7 +59,7 @@ class AccessControl:
     * A request with an `Origin` header must come from the desk's own page.
     * Only pages of this computer may embed the page.
     * A desk for this computer alone accepts only host names of this computer, against DNS rebinding.
-    * No request is larger than `BODY_LIMIT`.
+    * No request is larger than `REQUEST_BYTES_MAX`.
     * An exception in the application is logged in one line.
 
     Args:
@@ -112,7 +111,7 @@ class AccessControl:
             return Refusal(403, f"Requests must come from the desk's own page, but this one came from {_short(origin)}")
         if self._is_local and name not in LOOPBACK:
             return Refusal(403, f"The desk's host must be a name of this computer, but it was {_short(host)}")
-        if not re.fullmatch("[0-9]{1,18}", length) or int(length) > BODY_LIMIT:
+        if not re.fullmatch("[0-9]{1,18}", length) or int(length) > REQUEST_BYTES_MAX:
             return Refusal(413, f"{TOO_LARGE}, but this one has more")
         return None
 
@@ -140,7 +139,7 @@ class AccessControl:
 
     async def _pass_on(self, scope: Message, receive: Receive, send: Send) -> None:
         """Call the application; after any failure the client gets an answer, and the log one line."""
-        limited, answer = _Limited(receive, BODY_LIMIT), _Answer(send, scope)
+        limited, answer = _Limited(receive, REQUEST_BYTES_MAX), _Answer(send, scope)
         try:
             await self._app(scope, limited, answer)
         except Exception as error:

@@ -9,11 +9,9 @@ from kiks.model.arena import Arena
 from kiks.model.arena_file import decode_arena
 from kiks.model.atomic_files import check_relative, ending_of, inside, replace_file
 from kiks.model.kad import decode_kad, encode_kad
+from kiks.model.limits import UPLOAD_BYTES_MAX
 from kiks.model.picture import decode_picture
 from kiks.model.project import Project
-
-UPLOAD_BYTES_MAX = 32 << 20
-"""Maximum size of an upload [bytes]."""
 
 PICTURES = (".png", ".tif", ".tiff", ".pgm", ".pbm", ".ppm", ".bmp")
 """Endings of pictures."""

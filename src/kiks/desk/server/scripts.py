@@ -10,10 +10,8 @@ from pathlib import Path
 from kiks.desk.server.folder import check_name
 from kiks.errors import ParameterError, shown
 from kiks.model.atomic_files import inside, program_in, replace_file
+from kiks.model.limits import PROGRAM_BYTES_MAX
 from kiks.model.shipped import shipped
-
-SIZE_LIMIT = 200_000
-"""Maximum size of a program in the editor [bytes]."""
 
 COUNT_LIMIT = 200
 """Maximum number of listed files of the folder."""
@@ -69,10 +67,10 @@ def read_script(folder: Path, script: Script) -> str:
     """Return the text of a program."""
     path = path_of(folder, script)
     try:
-        if path.stat().st_size > SIZE_LIMIT:
+        if path.stat().st_size > PROGRAM_BYTES_MAX:
             raise ParameterError(
-                f"a program must have at most {SIZE_LIMIT} bytes to be edited here, but {shown(script.name)} has "
-                f"{path.stat().st_size}. Edit it elsewhere."
+                f"a program must have at most {PROGRAM_BYTES_MAX} bytes to be edited here, but "
+                f"{shown(script.name)} has {path.stat().st_size}. Edit it elsewhere."
             )
         return path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
@@ -99,8 +97,8 @@ def save_script(
             f"a program's name must have no folder, but it was {shown(name)}. Take letters and digits: square.py."
         )
     data = text.encode("utf-8", errors="replace")
-    if len(data) > SIZE_LIMIT:
-        raise ParameterError(f"a program must have at most {SIZE_LIMIT} bytes, but this one has {len(data)}.")
+    if len(data) > PROGRAM_BYTES_MAX:
+        raise ParameterError(f"a program must have at most {PROGRAM_BYTES_MAX} bytes, but this one has {len(data)}.")
     script, path = Script(name, is_example=False), inside(folder, name, "the program")
     if path.exists() and script != may_replace:
         raise ParameterError(

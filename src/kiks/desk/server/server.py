@@ -24,6 +24,7 @@ from kiks.desk.server.live_editing import Editing
 from kiks.desk.server.server_log import log_plainly, note_fault
 from kiks.desk.server.token import Token
 from kiks.errors import LinkError, ParameterError
+from kiks.model.limits import MESSAGE_BYTES_MAX
 from kiks.ports.file_descriptors import SHORTAGES, opening, shortage
 
 PORT = 8123
@@ -31,9 +32,6 @@ PORT = 8123
 
 START_S = 30.0
 """Timeout of the server's start [s]; a busy computer needs seconds."""
-
-MESSAGE_LIMIT = 1 << 20
-"""Largest WebSocket message [bytes]: a program edited in the page is one message."""
 
 BACKLOG = 128
 """Maximum number of connections that wait to be accepted."""
@@ -167,7 +165,7 @@ class DeskServer:
             access_log=False,
             lifespan="on",
             ws="websockets-sansio",
-            ws_max_size=MESSAGE_LIMIT,
+            ws_max_size=MESSAGE_BYTES_MAX,
             ws_per_message_deflate=False,
             timeout_graceful_shutdown=1,
         )
