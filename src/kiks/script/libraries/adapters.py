@@ -11,7 +11,7 @@ from importlib.machinery import ModuleSpec
 from types import ModuleType
 from typing import Any
 
-from kiks.script.libraries import c_clocks, curses_keys, pygame_time, tk_loop
+from kiks.script.libraries import c_calls, c_waits, tk_loop
 from kiks.script.libraries.host import Host
 from kiks.units import NS_PER_S
 
@@ -22,16 +22,14 @@ Adapter = Callable[[ModuleType, Host], dict[Any, dict[str, Any]]]
 def _adapters() -> dict[str, Adapter]:
     return {
         "tkinter": tk_loop.adapt,
-        "pygame.time": pygame_time.adapt,
-        "pygame.event": pygame_time.adapt_events,
-        "curses": curses_keys.adapt,
+        "pygame.time": c_waits.adapt_pygame,
+        "pygame.event": c_waits.adapt_pygame_events,
+        "curses": c_waits.adapt_curses,
         "cv2": _adapt_cv2,
-        "numpy": c_clocks.adapt_extension("numpy._core._multiarray_umath"),
+        "numpy": c_calls.adapt_extension("numpy._core._multiarray_umath"),
         "numpy.random": _seed_numpy,
-        "pydantic_core": c_clocks.adapt_extension("pydantic_core._pydantic_core"),
-        "sqlite3": c_clocks.adapt_sqlite,
-        # It gives the system's threads names, but threads of a program are none.
-        "trio._core._thread_cache": lambda module, host: {module: {"set_os_thread_name": None}},
+        "pydantic_core": c_calls.adapt_extension("pydantic_core._pydantic_core"),
+        "sqlite3": c_calls.adapt_sqlite,
     }
 
 

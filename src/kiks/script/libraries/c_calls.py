@@ -1,7 +1,7 @@
-"""Libraries whose code in C asks the operating system for the date: they get the program's.
+"""Libraries whose code in C asks the operating system for the date, or waits there: they get simulated time.
 
 Each library that is loaded from a file has a table of the functions that it calls in others (ELF, "Global Offset
-Table"). The entries for the date are changed there.
+Table"). The entries of such functions are changed there.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import re
 import struct
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from functools import cache
 from types import ModuleType
@@ -49,6 +49,47 @@ class _Library(ctypes.Structure):
     _fields_ = (("base", ctypes.c_uint64), ("name", ctypes.c_char_p), ("tables", ctypes.c_uint64))
 
 
+def redirect(path: str, functions: Mapping[str, tuple[Any, Any]], host: Host) -> None:
+    """Let a loaded library call other functions in place of those of the operating system or of another library.
+
+    Args:
+        path: The library's file.
+        functions: By name, the type in C of each function, and what it does for the program.
+        host: The program. Everybody else in this process still calls the function of that name.
+    """
+    if sys.platform != "linux" or ctypes.sizeof(ctypes.c_void_p) != 8:
+        return
+    with suppress(OSError):
+        library = ctypes.CDLL(path, mode=_LOADED_ALREADY)
+        for name, place in _entries(path, tuple(functions)):
+            kind, function = functions[name]
+            body = kind(_for_program(function, kind((name, library)), host))
+            _KEPT.append(body)
+            _write(place, ctypes.cast(body, ctypes.c_void_p).value or 0)
+
+
+def _for_program(function: Callable[..., int], real: Callable[..., int], host: Host) -> Callable[..., int]:
+    def call(*args: Any) -> int:
+        if not host.scheduler.is_here:
+            return real(*args)
+        try:
+            return function(*args)
+        except BaseException as error:
+            # No exception, such as that of Ctrl-C, passes through C: it comes up where C returns to Python.
+            thread, kind = ctypes.c_ulong(host.scheduler.os_thread), ctypes.py_object(type(error))
+            ctypes.pythonapi.PyThreadState_SetAsyncExc(thread, kind)
+            return 0
+
+    return call
+
+
+def loaded(pattern: str) -> list[str]:
+    """Return the files of this process whose names match a regular expression."""
+    with open("/proc/self/maps") as maps:
+        files = {line.split()[-1] for line in maps}
+    return sorted(file for file in files if re.search(pattern, os.path.basename(file)))
+
+
 def adapt_extension(name: str) -> Callable[[ModuleType, Host], dict[Any, dict[str, Any]]]:
     """Return an adapter that lets a module in C tell the program's date; nothing more stands in."""
 
@@ -56,11 +97,10 @@ def adapt_extension(name: str) -> Callable[[ModuleType, Host], dict[Any, dict[st
         code = sys.modules.get(name)
         if code is not None and code.__file__:
             # A program may ask in a loop, so that asking costs time.
-            _redirect(
-                code.__file__,
-                lambda: host.clock.ask_ns() if host.scheduler.is_alone else host.scheduler.world.now_ns,
-                host,
+            dates = date_functions(
+                lambda: host.clock.ask_ns() if host.scheduler.is_alone else host.scheduler.world.now_ns
             )
+            redirect(code.__file__, dates, host)
         return {}
 
     return adapt
@@ -68,48 +108,46 @@ def adapt_extension(name: str) -> Callable[[ModuleType, Host], dict[Any, dict[st
 
 def adapt_sqlite(module: ModuleType, host: Host) -> dict[Any, dict[str, Any]]:
     """Let `current_timestamp` and the like tell the program's date, and `random` follow from its seed."""
-    with open("/proc/self/maps") as maps:
-        files = {line.split()[-1] for line in maps if "sqlite3" in os.path.basename(line.split()[-1])}
-    for each in sorted(files):
-        _redirect(each, lambda: host.scheduler.world.now_ns, host)
+    for each in loaded("sqlite3"):
+        redirect(each, date_functions(lambda: host.scheduler.world.now_ns), host)
         with suppress(OSError, AttributeError):
             ctypes.CDLL(each, mode=_LOADED_ALREADY).sqlite3_test_control(_SEED, host.chance.number("sqlite", 31), None)
     return {}
 
 
-def _redirect(path: str, now_ns: Callable[[], int], host: Host) -> None:
-    """Let a library ask this for the date [ns since the program's start]."""
-    if sys.platform != "linux" or ctypes.sizeof(ctypes.c_void_p) != 8:
-        return
+def date_functions(now_ns: Callable[[], int]) -> dict[str, tuple[Any, Any]]:
+    """Return functions for `redirect` that tell the date.
 
-    def date_ns() -> int:
-        return calendar_ns(now_ns()) if host.scheduler.is_here else time.time_ns()
+    Args:
+        now_ns: Returns the time since the program's start [ns].
+    """
 
     def tell(seconds: Any) -> int:
-        now_s = date_ns() // NS_PER_S
+        now_s = calendar_ns(now_ns()) // NS_PER_S
         if seconds:
             seconds[0] = now_s
         return now_s
 
     def tell_exactly(seconds: Any, _zone: object) -> int:
-        seconds[0], rest_ns = divmod(date_ns(), NS_PER_S)
+        seconds[0], rest_ns = divmod(calendar_ns(now_ns()), NS_PER_S)
         seconds[1] = rest_ns // 1000
         return 0
 
     def tell_clock(clock: int, seconds: Any) -> int:
-        seconds[0], seconds[1] = divmod(date_ns() if clock in CALENDARS else time.clock_gettime_ns(clock), NS_PER_S)
+        time_ns = calendar_ns(now_ns()) if clock in CALENDARS else time.clock_gettime_ns(clock)
+        seconds[0], seconds[1] = divmod(time_ns, NS_PER_S)
         return 0
 
-    bodies = {"time": _Time(tell), "gettimeofday": _TimeOfDay(tell_exactly), "clock_gettime": _GetTime(tell_clock)}
-    _KEPT.extend(bodies.values())
-    with suppress(OSError):
-        for name, place in _entries(path):
-            _write(place, ctypes.cast(bodies[name], ctypes.c_void_p).value or 0)
+    return {
+        "time": (_Time, tell),
+        "gettimeofday": (_TimeOfDay, tell_exactly),
+        "clock_gettime": (_GetTime, tell_clock),
+    }
 
 
 @cache
-def _entries(path: str) -> list[tuple[str, int]]:
-    """Return where the addresses of functions that tell the date stand in a loaded library, each with its name."""
+def _entries(path: str, functions: tuple[str, ...]) -> list[tuple[str, int]]:
+    """Return where a loaded library keeps the addresses of functions that it calls, each with its name."""
     library = _Library.from_address(ctypes.CDLL(path, mode=_LOADED_ALREADY)._handle)
     tables = {}
     place = library.tables
@@ -118,9 +156,8 @@ def _entries(path: str) -> list[tuple[str, int]]:
         place += 16
     names = ctypes.string_at(tables[_NAMES], tables[_NAMES_SIZE])
     # One name may be the end of a longer one.
-    wanted = {
-        found.start(1): found[1].decode() for found in re.finditer(rb"(?=(time|gettimeofday|clock_gettime)\0)", names)
-    }
+    pattern = rb"(?=(%s)\0)" % "|".join(functions).encode()
+    wanted = {found.start(1): found[1].decode() for found in re.finditer(pattern, names)}
     entries = [
         entry
         for start, size in ((_CALLS, _CALLS_SIZE), (_DATA, _DATA_SIZE))

@@ -1,0 +1,103 @@
+"""curses and pygame: what their code in C asks of others, a wait or the time, becomes simulated.
+
+A person's key is there when it is looked for, or it is not.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from itertools import count
+from types import ModuleType
+from typing import Any
+
+from kiks.script.libraries.c_calls import date_functions, loaded, redirect
+from kiks.script.libraries.host import Host, refuse_keyboard
+from kiks.script.thread_scheduler import timeout_ns
+from kiks.sim.read_completion import NEVER_NS
+from kiks.units import NS_PER_S
+
+NS_PER_MS = 1_000_000
+
+_Int, _Pointer = ctypes.c_int, ctypes.c_void_p
+_Poll = ctypes.CFUNCTYPE(_Int, _Pointer, ctypes.c_ulong, _Int)
+_Read = ctypes.CFUNCTYPE(ctypes.c_ssize_t, _Int, _Pointer, ctypes.c_size_t)
+_Sleep = ctypes.CFUNCTYPE(_Int, ctypes.POINTER(ctypes.c_long), _Pointer)
+_Ticks, _Delay = ctypes.CFUNCTYPE(ctypes.c_uint32), ctypes.CFUNCTYPE(_Int, ctypes.c_uint32)
+_Ring = ctypes.CFUNCTYPE(ctypes.c_uint32, ctypes.c_uint32, _Pointer)
+_AddTimer = ctypes.CFUNCTYPE(_Int, ctypes.c_uint32, _Ring, _Pointer)
+
+
+def adapt_curses(_: ModuleType, host: Host) -> dict[Any, dict[str, Any]]:
+    """Let waits for keys and `napms` take simulated time."""
+    system = ctypes.CDLL(None)
+    real_poll, real_read = _Poll(("poll", system)), _Read(("read", system))
+
+    def poll(files: Any, file_count: int, timeout_ms: int) -> int:
+        found = int(real_poll(files, file_count, 0))
+        if found or timeout_ms == 0:
+            host.clock.ask_ns()
+            return found
+        if timeout_ms > 0:
+            host.clock.sleep(timeout_ms / 1000)
+            return int(real_poll(files, file_count, 0))
+        refuse_keyboard(host.scheduler, ctypes.c_int.from_address(files).value)
+        return int(real_poll(files, file_count, timeout_ms))
+
+    def read(descriptor: int, data: Any, size: int) -> int:
+        refuse_keyboard(host.scheduler, descriptor)
+        return int(real_read(descriptor, data, size))
+
+    def sleep(duration: Any, _rest: object) -> int:
+        host.clock.sleep(duration[0] + duration[1] / NS_PER_S)
+        return 0
+
+    functions = {"poll": (_Poll, poll), "read": (_Read, read), "nanosleep": (_Sleep, sleep)}
+    for each in loaded("curses|tinfo"):
+        redirect(each, date_functions(lambda: host.scheduler.world.now_ns) | functions, host)
+    return {}
+
+
+def adapt_pygame(module: ModuleType, host: Host) -> dict[Any, dict[str, Any]]:
+    """Let clocks, waits and timers of `pygame.time` take simulated time."""
+    scheduler, start_ns, numbers = host.scheduler, host.scheduler.world.now_ns, count(1)
+
+    def ticks() -> int:
+        return (host.clock.ask_ns() - start_ns) // NS_PER_MS
+
+    def delay(milliseconds: int) -> int:
+        host.clock.sleep(milliseconds / 1000)
+        return 0
+
+    def add_timer(interval_ms: int, ring: Any, data: Any) -> int:
+        def run() -> None:
+            at_ns, wait_ms = scheduler.world.now_ns, interval_ms
+            while wait_ms:
+                at_ns += wait_ms * NS_PER_MS
+                scheduler.sleep_until(at_ns)
+                wait_ms = ring(wait_ms, data)
+                host.note_event()
+
+        scheduler.start(run, (), {})
+        return next(numbers)
+
+    functions = {"SDL_GetTicks": (_Ticks, ticks), "SDL_Delay": (_Delay, delay), "SDL_AddTimer": (_AddTimer, add_timer)}
+    redirect(str(module.__file__), functions, host)
+    return {}
+
+
+def adapt_pygame_events(module: ModuleType, host: Host) -> dict[Any, dict[str, Any]]:
+    """Return what stands in for names of `pygame.event`."""
+    world, real_post = host.scheduler.world, module.post
+
+    def post(event: Any, /) -> bool:
+        is_posted = bool(real_post(event))
+        host.note_event()
+        return is_posted
+
+    def wait(timeout: int = 0) -> Any:
+        until_ns = world.now_ns + timeout_ns(timeout / 1000) if timeout > 0 else NEVER_NS
+        while not (event := module.poll()) and world.now_ns < until_ns:
+            host.wait_for_event("an event of pygame", until_ns)
+        return event
+
+    return {module: {"post": post, "wait": wait}}
