@@ -61,6 +61,9 @@ SPEED_PULSES = 4
 TURNS_DEG = np.arange(300.0, 430.0, 0.5)
 """What one turn may be by the counters and the wheel base of the robot's kind [deg]."""
 
+ASKEW_DEG = np.arange(-24.0, 25.0, 4.0)
+"""Headings at which a hand may put the robot down before the wall, and which sensors may be off [deg]."""
+
 GAP_SHARES, FAINT_SHARE = (0.15, 0.45, 0.7, 0.95), 0.03
 """Gaps at which the robot spins, as shares of the gap at which the best sensor reads `FAINT_SHARE` of the maximum."""
 
@@ -215,6 +218,15 @@ def sweeps(spins: Sequence[tuple[float, Track]], spec: RobotSpec) -> Samples:
     return Samples("wall", math.inf, np.array([gap_mm for gap_mm, _ in spins]), angle_deg, counts)
 
 
+def aligned(table: Samples, spec: RobotSpec) -> Samples:
+    """Return sweeps turned to where their readings agree with a robot's, to a few degrees: a fit begins there."""
+    errors = [
+        np.abs(predict(spec, replace(table, angle_deg=table.angle_deg + turned_deg)) - table.counts).sum(axis=(1, 2))
+        for turned_deg in ASKEW_DEG
+    ]
+    return replace(table, angle_deg=table.angle_deg + ASKEW_DEG[np.argmin(errors, axis=0)][:, None])
+
+
 def one_turn_deg(table: Samples) -> float:
     """Return the angle of the table after which readings repeat [deg]: 360, if its angles are right."""
 
@@ -256,7 +268,7 @@ class Approach:
         largest = facing_counts(spec, tried_mm) + spec.proximity.baseline_counts
         # A millimetre is near enough to begin with.
         gaps_mm = [tried_mm[np.abs(largest - spin.counts.max(axis=0)).sum(axis=1).argmin()] for spin in self.spins]
-        table = self.at_counters(np.array(gaps_mm), spec)
+        table = aligned(self.at_counters(np.array(gaps_mm), spec), spec)
         return fit_robot([table], spec, (), ON_THE_WAY).rigs[0].moved(table)
 
     def pulse_and_heading(self, gaps_mm: Array, spec: RobotSpec) -> tuple[float, float]:
@@ -310,7 +322,7 @@ class _Session:
     def _rough_fit(self, spins: Sequence[tuple[float, Track]]) -> RobotSpec:
         """Return the robot as the spins at the marks show it: its forward direction to some degrees only."""
         spec = _wider(self.spec, one_turn_deg(sweeps(spins, self.spec)) / 360.0)
-        fit = fit_robot([sweeps(spins, spec)], spec, FIELDS, AT_MARKS)
+        fit = fit_robot([aligned(sweeps(spins, spec), spec)], spec, FIELDS, AT_MARKS)
         _check_fit(fit, [gap_mm for gap_mm, _ in spins])
         return _wider(fit.spec, 1.0 / (1.0 + _mean_turn_deg(fit)[0] / 360.0))
 
@@ -320,7 +332,7 @@ class _Session:
         pulse_mm, heading_rad = approach.pulse_and_heading(seen.gap_mm, self.spec)
         known = approach.at_counters(seen.gap_mm, self.spec)
         known = replace(known, angle_deg=known.angle_deg + math.degrees(heading_rad))
-        fit = fit_robot([sweeps(spins, self.spec), known], self.spec, FIELDS, [AT_MARKS, KNOWN])
+        fit = fit_robot([aligned(sweeps(spins, self.spec), self.spec), known], self.spec, FIELDS, [AT_MARKS, KNOWN])
         turn_deg, turn_error_deg = _mean_turn_deg(fit)
         pulse_share = float(fit.rig_deviations[1].gap_mm.mean()) / approach.mark_mm
         body, proximity = fit.spec.body, fit.spec.proximity
@@ -420,7 +432,9 @@ class _Session:
         approach = Approach(mark_mm, [[drive, *(self._spin(turns) for turns in (SPIN_TURNS, -SPIN_TURNS))]])
         seen = approach.sweeps(self.spec)
         start_deg = float((seen.angle_deg - approach.at_counters(seen.gap_mm, self.spec).angle_deg).mean())
-        for wanted_deg, turns in ((ALONG_DEG, SPIN_TURNS), (ALONG_DEG + 180.0, -SPIN_TURNS)):
+        # A robot that stood askew has come off the middle of the wall: it drives to the other side.
+        along_deg = -math.copysign(ALONG_DEG, start_deg)
+        for wanted_deg, turns in ((along_deg, SPIN_TURNS), (along_deg + 180.0, -SPIN_TURNS)):
             self._turn_to(wanted_deg - start_deg)
             approach.legs.append([self._drive(ALONG_MM), self._spin(turns)])
         return approach, f"The wall was near after {drive.path[-1].mean():.0f} pulses."

@@ -290,11 +290,11 @@ class _Search:
             xtol=1e-6,
             ftol=1e-6,
             max_nfev=steps,
-            tr_solver="exact",
+            tr_options={"atol": 1e-10, "btol": 1e-10, "maxiter": 2000},
         )
         misses = self._misses(found.x)[self.measured > self.small]
         misfit = float(np.sqrt(np.mean(misses**2)))
-        covariance = np.linalg.pinv(found.jac.T @ found.jac, hermitian=True) * max(misfit, 1.0) ** 2
+        covariance = np.linalg.pinv((found.jac.T @ found.jac).toarray(), hermitian=True) * max(misfit, 1.0) ** 2
         # Rounding may make a variance negative.
         deviations = np.sqrt(np.maximum(np.diag(covariance), 0.0))
         return Fit(
@@ -343,8 +343,10 @@ class _Search:
     def _residuals(self, unknowns: Floats) -> Floats:
         return np.concatenate([self._misses(unknowns), self._priors(unknowns)])
 
-    def _slopes(self, unknowns: Floats) -> Floats:
+    def _slopes(self, unknowns: Floats) -> Any:
         """Return how the residuals grow with the unknowns."""
+        from scipy.sparse import csr_array
+
         now = self._misses(unknowns)
         matrix = np.zeros((len(now) + len(self.prior_slopes), len(unknowns)))
         matrix[len(now) :] = self.prior_slopes
@@ -354,4 +356,4 @@ class _Search:
             moved = unknowns.copy()
             moved[end - group.size : end] += group.step
             matrix[rows, end - group.size + group.owner] = (self._misses(moved) - now) / group.step
-        return matrix
+        return csr_array(matrix)
