@@ -19,6 +19,7 @@ from kiks.desk.server.scripts import (
 )
 from kiks.errors import ParameterError
 from kiks.model.limits import PROGRAM_BYTES_MAX
+from kiks.model.shipped import demonstrations
 
 EXAMPLE = Script("avoid.py", is_example=True)
 
@@ -29,8 +30,9 @@ def test_own_programs_and_examples_are_offered(tmp_path: Path) -> None:
     (tmp_path / "folder.py").mkdir()
     labels = [script.label for script in offered(tmp_path)]
     assert labels[:3] == ["a.py", "b.py", "example: avoid"]
-    assert len(labels) == 8
-    assert len(offered(tmp_path / "nowhere")) == 6
+    examples = len(demonstrations()) - 1  # all but soccer, whose program lies elsewhere
+    assert len(labels) == 2 + examples
+    assert len(offered(tmp_path / "nowhere")) == examples
 
 
 def test_saved_programs_are_read_again(tmp_path: Path) -> None:
