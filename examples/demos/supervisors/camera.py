@@ -14,7 +14,9 @@ IN_SIGHT_DEG = 18.0  # half of the camera's field of view
 
 def supervise(sim):
     angle = 2 * math.pi * random.Random(sim.seed).random()
-    ball, off_deg, distances_mm = sim.add_ball(*place_at(sim, angle)), [], []
+    balls = [each["number"] for each in sim.bodies() if each["what"] == 3]
+    ball = balls[0] if balls else sim.add_ball(*place_at(sim, angle))
+    off_deg, distances_mm = [], []
     try:
         while True:
             yield PERIOD_S

@@ -15,6 +15,8 @@ def supervise(sim):
     chance = random.Random(sim.seed)
     taken = [(x_mm, y_mm, sim.spec.body.radius_mm) for x_mm, y_mm, _ in sim.poses()]
     for _ in range(10_000):
+        if len(sim.bodies()) >= CYLINDERS:
+            break
         x_mm, y_mm = sim.arena.width_mm * chance.random(), sim.arena.height_mm * chance.random()
         if sim.arena.free_for(x_mm, y_mm, RADIUS_MM + GAP_MM) and all(
             math.dist((x_mm, y_mm), (other_x, other_y)) >= RADIUS_MM + other_mm + GAP_MM
@@ -22,8 +24,6 @@ def supervise(sim):
         ):
             taken.append((x_mm, y_mm, RADIUS_MM))
             sim.add_cylinder(x_mm, y_mm)
-        if len(sim.bodies()) == CYLINDERS:
-            break
     else:
         raise ArenaError(f"The arena must have room for {CYLINDERS} cylinders, but it is too small. Take a larger one.")
     at_start = tidy_count(sim)

@@ -101,9 +101,9 @@ class FilesPanel:
     async def _open_file(self, name: str, read: Project) -> None:
         """Begin the world of a file: a project, or an arena, to which the desk adds what is not in the file."""
         is_project = PurePosixPath(name).suffix.lower() == ".kiks"
-        await self._begin(read if is_project else self._desk.project_of(read.arena))
+        await self._begin(read if is_project else self._desk.project_of(read.arena), self._desk.folder)
 
-    async def _begin(self, project: Project, folder: Path | None = None) -> None:
+    async def _begin(self, project: Project, folder: Path) -> None:
         await self._desk.replace(project, folder)
         ui.notify(f"Opened {project.arena.name}.")
 
@@ -113,7 +113,7 @@ class FilesPanel:
         question = self._folder.question(name)
         if question and not await _agrees(question):
             return
-        project = await self._desk.present_project()
+        project = await self._desk.project_to_save()
         saved = await asyncio.to_thread(self._folder.save, project, name, may_replace=bool(question))
         self._list()
         ui.notify(f"Saved as {saved}.", type="positive")
@@ -121,7 +121,7 @@ class FilesPanel:
     @told
     async def _download(self) -> None:
         name = PurePosixPath(self._folder.full_name(str(self._name.value or "world"))).name
-        project = await self._desk.present_project()
+        project = await self._desk.project_to_save()
         ui.download.content(await asyncio.to_thread(encode, project, name), name)
 
     async def _take(self, event: UploadEventArguments) -> None:

@@ -103,6 +103,7 @@ class Desk:
         self._has_begun = not is_held
         self._commands = list(commands)
         self._supervisor = supervisor
+        self._home = self.folder
         self._granted = [*commands, _command_of(supervisor)]
         self._new_programs = new_programs or self._usual_programs
         self._retired: list[Programs] = []
@@ -252,13 +253,14 @@ class Desk:
 
         Args:
             project: The project.
-            folder: Where its programs lie; the desk's folder if left out.
+            folder: Where its programs lie; where those of the present project lie if left out.
 
         Raises:
             LinkError: If the world cannot be replaced.
         """
-        home = folder or self.folder
+        home = folder or self._home
         await self._put(project, commands_of(project, home), supervisor_of(project, home))
+        self._home = home
 
     async def start_over(self) -> None:
         """Begin again with the same world, seed and programs.
@@ -325,6 +327,14 @@ class Desk:
         """Return the project with the poses in a world: the one that is shown if left out."""
         world, project = world or self.shown, self.project
         return replace(await world.do(lambda sim: project_of(sim, project)), speed=self.present.gate.speed)
+
+    async def project_to_save(self) -> Project:
+        """Return the present project for a file in the desk's folder, without programs that lie elsewhere."""
+        project = await self.present_project()
+        if self._home == self.folder:
+            return project
+        robots = tuple(replace(each, program=None, arguments=()) for each in project.robots)
+        return replace(project, robots=robots, supervisor=None)
 
     # ---- time ----
 

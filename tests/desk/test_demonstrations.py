@@ -1,0 +1,61 @@
+"""Demonstrations on a desk: their programs and supervisors come with them, where that is allowed."""
+
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+
+import pytest
+
+from kiks.desk.server.desk import Desk
+from kiks.model.project import Project
+from kiks.model.shipped import demonstrations
+from kiks.sim.simulation import Simulation
+
+CLEAN = demonstrations()["clean"]
+
+
+def desk_in(folder: Path, *, may_run_programs: bool = True) -> Desk:
+    return Desk(Simulation(), folder=folder, owns_world=True, may_run_programs=may_run_programs, is_held=True)
+
+
+def test_a_demonstration_begins_with_its_program_and_supervisor_also_again_and_after_a_change(tmp_path: Path) -> None:
+    desk = desk_in(tmp_path)
+
+    async def do() -> None:
+        await desk.replace(Project.load(CLEAN), CLEAN.parent)
+        places = desk.sim.bodies()["x_mm"].tolist()
+        assert len(places) == 12
+        assert desk.has_beginners
+        await desk.start_over()
+        assert desk.sim.bodies()["x_mm"].tolist() == places
+        await desk.replace(await desk.present_project())
+        assert desk.sim.bodies()["x_mm"].tolist() == pytest.approx(places, abs=1e-3)
+        assert desk.has_beginners
+        saved = await desk.project_to_save()
+        assert (saved.supervisor, saved.robots[0].program, len(saved.arena.cylinders)) == (None, None, 12)
+
+    asyncio.run(do())
+    desk.clear_away()
+    desk.close()
+
+
+def test_a_page_without_that_right_opens_the_world_alone(tmp_path: Path) -> None:
+    desk = desk_in(tmp_path, may_run_programs=False)
+    asyncio.run(desk.replace(Project.load(CLEAN), CLEAN.parent))
+    assert len(desk.sim.bodies()) == 0
+    assert not desk.has_beginners
+    assert [text.partition(":")[0] for text in desk.news.since(0)[1]] == ["A program was left out"] * 2
+    desk.clear_away()
+    desk.close()
+
+
+def test_the_world_pauses_when_the_supervisor_has_returned(tmp_path: Path) -> None:
+    (tmp_path / "ends.py").write_text("def supervise(sim):\n    yield 0.5\n")
+    desk = desk_in(tmp_path)
+    asyncio.run(desk.replace(Project(supervisor="ends.py")))
+    desk.sim.loop.gate = None
+    desk.sim.run(1.0)
+    assert desk.is_paused
+    desk.clear_away()
+    desk.close()
