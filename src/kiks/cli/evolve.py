@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 import typer
 
 from kiks.cli.engine_start import ready_batch, ready_engine
-from kiks.cli.evolution_progress import progress_of
+from kiks.cli.evolution_progress import Progress
 from kiks.cli.options import Seed, written_folder
 from kiks.cli.outputs import leave_out
 from kiks.cli.record import RecordFile, recorded
@@ -110,7 +110,7 @@ def evolve(
                     typer.echo(f"Continuing after generation {len(evolution.generations)} in {home}.")
                 if cluster is not None and executor is None:
                     executor = stack.enter_context(_cluster_executor(cluster))
-                with progress_of(evolution, until, seconds) as progress:
+                with Progress(evolution, until, seconds) as progress:
                     evolution.run(
                         generations=until,
                         seconds=seconds,
