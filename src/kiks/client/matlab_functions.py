@@ -16,16 +16,11 @@ from kiks.model.array_checks import check_numbers
 from kiks.model.checks import SECONDS_MAX, check_kind, check_number
 from kiks.sim.port import VirtualPort
 
+Reference = tuple[float, float, float, float]
+"""Result of `kopen`: four numbers, as in the Matlab KiKS, each that of the port."""
 
-class Reference(tuple[float, ...]):
-    """Result of `kopen`: four numbers, as in the Matlab KiKS, and the open port."""
-
-    port: Port | None
-    opened_s: float
-
-
-_OPEN: dict[int, Reference] = {}
-"""The open references by port number, oldest first: `ktime(-1)` gives only the number."""
+_OPEN: dict[int, tuple[Port, float]] = {}
+"""The open ports and when they were opened [s], by their numbers, the oldest first."""
 
 
 def kopen(settings: Sequence[float]) -> Reference:
@@ -61,10 +56,8 @@ def kopen(settings: Sequence[float]) -> Reference:
             f"port {number} must be closed before it is opened, but it is open. Call kclose(ref) or kclose([]) first."
         )
     port = open_port(f"kiks://{-number}" if number < 0 else _device(number), baud, timeout_s)
-    reference = Reference((float(number),) * 4)
-    reference.port = port
-    reference.opened_s = _now_s(port)
-    _OPEN[number] = reference
+    _OPEN[number] = port, _now_s(port)
+    reference = float(number), float(number), float(number), float(number)
     # The Matlab KiKS exchanged a first command, too. A real robot that is off gives an empty reply.
     ksend("B\r", reference)
     return reference
@@ -85,8 +78,7 @@ def ksend(text: str, ref: Sequence[float], timeout: float | None = None) -> str:
         LinkError: If the port is not open.
     """
     check_kind("text", text, str, r'Write ksend("N\n", ref).')
-    port = _open_reference(ref).port
-    assert port is not None
+    port = _open_port(ref)
     if not text:
         _now_s(port)
         return ""
@@ -110,10 +102,8 @@ def kclose(ref: Sequence[float]) -> None:
     else:
         numbers = [_number_of(ref)]
     for number in numbers:
-        reference = _OPEN.pop(number, None)
-        if reference is not None and reference.port is not None:
-            reference.port.close()
-            reference.port = None
+        if number in _OPEN:
+            _OPEN.pop(number)[0].close()
 
 
 def ktime(port: int | Sequence[float]) -> float | None:
@@ -122,29 +112,27 @@ def ktime(port: int | Sequence[float]) -> float | None:
     Args:
         port: The port's number, or the result of `kopen`.
     """
-    reference = _OPEN.get(_number_of(port))
-    if reference is None or reference.port is None:
-        return None
-    return _now_s(reference.port) - reference.opened_s
+    opened, opened_s = _OPEN.get(_number_of(port), (None, 0.0))
+    return None if opened is None else _now_s(opened) - opened_s
 
 
 def pause(seconds: float) -> None:
     """Let time pass [s]: simulated time if a simulated port was opened last, else real time."""
-    reference = next(reversed(_OPEN.values()), None)
-    if reference is not None and isinstance(reference.port, VirtualPort):
-        reference.port.sleep(seconds)
+    port, _ = next(reversed(_OPEN.values()), (None, 0.0))
+    if isinstance(port, VirtualPort):
+        port.sleep(seconds)
     else:
         time.sleep(check_number("seconds", seconds, 0, SECONDS_MAX, "Time never runs backwards."))
 
 
-def _open_reference(ref: Sequence[float]) -> Reference:
-    reference = _OPEN.get(_number_of(ref)) if isinstance(ref, list | tuple) and len(ref) >= 4 else None
-    if reference is None or reference.port is None:
+def _open_port(ref: Sequence[float]) -> Port:
+    number = _number_of(ref) if isinstance(ref, list | tuple) and len(ref) >= 4 else None
+    if number not in _OPEN:
         raise LinkError(
             f"ref must be what kopen returned and still be open, but it was {shown(ref)}. "
             "Open it with kopen([-1, 9600, 1])."
         )
-    return reference
+    return _OPEN[number][0]
 
 
 def _number_of(ref: Any) -> int:
