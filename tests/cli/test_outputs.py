@@ -12,9 +12,8 @@ import typer
 from tests.cli.test_cli import RESULTS, WANDER
 
 from kiks.cli import app
-from kiks.cli.outputs import BEGINNINGS, PICTURES
+from kiks.cli.outputs import BEGINNINGS
 from kiks.errors import ParameterError
-from kiks.export import pictures
 from kiks.model.arena import Arena
 from kiks.model.arena_file import save_arena
 
@@ -54,10 +53,6 @@ OUTPUTS = list(outputs())
 
 def words_for(output: tuple[str, str], path: Path) -> list[str]:
     return [str(path) if word == "PLACE" else str(word) for word in RESULTS[output]]
-
-
-def test_pictures_are_those_that_can_be_drawn() -> None:
-    assert set(PICTURES) == set(pictures.PICTURES)
 
 
 def test_all_outputs_are_known() -> None:

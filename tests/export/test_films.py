@@ -225,21 +225,6 @@ def test_on_a_full_disk_the_earlier_file_stays(ending: str, recording: Recording
         assert file.read_bytes() == b"earlier"
 
 
-def test_a_link_stays_and_a_folder_is_refused(recording: Recording, tmp_path: Path) -> None:
-    file, link, folder = (tmp_path / name for name in ("film.gif", "link.gif", "folder.gif"))
-    file.write_bytes(b"earlier")
-    file.chmod(0o604)
-    link.symlink_to(file)
-    save_film(recording, link, size=(64, 64), fps=1)
-    assert link.is_symlink()
-    assert file.stat().st_mode & 0o777 == 0o604
-    assert len(pictures(file)) > 1
-    folder.mkdir()
-    for path in (folder, Path("/dev/null")):
-        with pytest.raises(ParameterError, match=r"a film must (go to a file|end in)"):
-            save_film(recording, path, size=(64, 64))
-
-
 def mistakes() -> Iterator[tuple[str, dict[str, object], str]]:
     yield "film.avi", {}, r"a film must end in .mp4 or .gif or .webp, but it was"
     yield "no/film.mp4", {}, "a film must go to a file that can be written"

@@ -19,8 +19,6 @@ from typer.core import TyperCommand
 from kiks.errors import ParameterError, shown
 from kiks.model.atomic_files import check_writable, ending_of
 
-PICTURES = (".png", ".svg", ".pdf", ".jpg")
-
 # fmt: off
 BEGINNINGS = {
     "": rb"\d+\n", ".csv": rb"time_s,", ".gif": rb"GIF8", ".html": rb"<!DOCTYPE html>", ".jpg": rb"\xff\xd8",

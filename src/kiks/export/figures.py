@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from kiks.errors import ParameterError
+from kiks.export.kinds import KINDS
 from kiks.export.looks import css, robot_colour
 from kiks.model.arena import Arena
 from kiks.model.atomic_files import ending_of, replace_file
@@ -24,8 +25,6 @@ from kiks.sim.simulation import Simulation
 from kiks.units import s_from_ns
 
 NO_ROBOT = "There was no robot in this run"
-
-TYPES = (".png", ".svg", ".pdf")
 
 COLUMN_INCHES, DOTS_PER_INCH = 5.6, 160
 
@@ -50,7 +49,7 @@ def save_figures(recordings: Sequence[Recording], path: str | Path, *, robot: in
         path: The picture's file, .png, .svg or .pdf.
         robot: Number of the robot whose readings, speeds and time are drawn; a run without a robot has paths alone.
     """
-    kind = ending_of(path, "figures", TYPES)[1:]
+    kind = ending_of(path, "figures", KINDS["figures"].endings)[1:]
     replace_file(path, file_of(figure_of(recordings, robot=robot), kind), "figures")
 
 

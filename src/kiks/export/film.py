@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from kiks.errors import ParameterError, library, shown
+from kiks.export.kinds import KINDS
 from kiks.export.panel import Panel
 from kiks.export.solid_stage import SolidStage
 from kiks.export.stage import Pixels, Stage
-from kiks.export.video_file import ENDINGS, GIF, MP4, VideoFile
+from kiks.export.video_file import GIF, MP4, VideoFile
 from kiks.model.atomic_files import ending_of, file_beside
 from kiks.model.checks import check_count, check_number
 from kiks.recording.moments import moments
@@ -127,7 +128,7 @@ def save_film(
 def check_film(path: str | Path) -> str:
     """Return the ending of a film's file."""
     library("av", "film")
-    return ending_of(path, "a film", ENDINGS)
+    return ending_of(path, "a film", KINDS["film"].endings)
 
 
 def checked_size(size: object) -> tuple[int, int]:

@@ -14,6 +14,7 @@ import numpy as np
 from mcap.writer import CompressionType, Writer
 
 from kiks.export.looks import Colour, body_colour, robot_colour
+from kiks.export.sheet import coarse_walls
 from kiks.model.arena import Arena
 from kiks.model.atomic_files import ending_of, file_beside
 from kiks.recording.events import EventReader
@@ -118,12 +119,8 @@ def _time(time_ns: int) -> dict[str, int]:
 
 def _walls(arena: Arena, time_ns: int) -> dict[str, Any]:
     """Return the walls as a grid of brightness: 0 for the floor."""
-    step = max(-(-max(arena.brightness.shape) // CELLS_MAX), 1)
-    rows, columns = (-(-length // step) for length in arena.brightness.shape)
-    padded = np.zeros((rows * step, columns * step), np.uint8)
-    padded[: arena.brightness.shape[0], : arena.brightness.shape[1]] = arena.brightness
-    cells = padded.reshape(rows, step, columns, step).max(axis=(1, 3))
-    cell_m = arena.mm_per_cell * step / 1000
+    cells, cell_mm = coarse_walls(arena, CELLS_MAX)
+    columns, cell_m = cells.shape[1], cell_mm / 1000
     return {
         "timestamp": _time(time_ns),
         "frame_id": "arena",

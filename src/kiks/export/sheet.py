@@ -9,6 +9,7 @@ from itertools import groupby, islice
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kiks.engine.state import BALL
 from kiks.export.looks import Colour, body_colour, robot_colour, robot_shapes
@@ -74,6 +75,15 @@ def wall_picture(arena: Arena, size: tuple[int, int]) -> Image:
     shade = wall_grey(cells.astype(np.uint16)).astype(np.uint8)
     colours = np.where((cells == 0)[..., None], np.array(FLOOR, np.uint8), shade[..., None])
     return Image.fromarray(colours.astype(np.uint8), "RGB").resize(size, Image.Resampling.LANCZOS)
+
+
+def coarse_walls(arena: Arena, side_max: int) -> tuple[NDArray[np.uint8], float]:
+    """Return the brightness of walls in at most so many cells a side, the most of each, and a cell's size [mm]."""
+    walls, step = arena.brightness, max(-(-max(arena.brightness.shape) // side_max), 1)
+    rows, columns = (-(-side // step) for side in walls.shape)
+    padded = np.zeros((rows * step, columns * step), walls.dtype)
+    padded[: walls.shape[0], : walls.shape[1]] = walls
+    return padded.reshape(rows, step, columns, step).max(axis=(1, 3)), arena.mm_per_cell * step
 
 
 @lru_cache(64)

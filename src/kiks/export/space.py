@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from kiks.engine.state import BALL
 from kiks.export.looks import Colour, body_colour, robot_colour
-from kiks.export.sheet import INK, wall_grey
+from kiks.export.sheet import INK, coarse_walls, wall_grey
 from kiks.export.stage import Canvas, Pixels
 from kiks.model.arena import Arena
 from kiks.model.robot_parts import Body
@@ -132,12 +132,8 @@ def _top(body: Body, index: int) -> Pixels:
 
 def walls(arena: Arena) -> dict[Colour, list[Solid]]:
     """Return boxes that make the walls of an arena, by their colour."""
-    cells, step = arena.brightness, max(-(-max(arena.brightness.shape) // CELLS_MAX), 1)
-    rows, columns = (-(-side // step) for side in cells.shape)
-    padded = np.zeros((rows * step, columns * step), cells.dtype)
-    padded[: cells.shape[0], : cells.shape[1]] = cells
-    cells = padded.reshape(rows, step, columns, step).max(axis=(1, 3))
-    cell_mm = arena.mm_per_cell * step
+    cells, cell_mm = coarse_walls(arena, CELLS_MAX)
+    rows = len(cells)
     found: dict[Colour, list[Solid]] = {}
     growing: dict[tuple[int, int, int], int] = {}  # left, right and brightness of runs that go on, and their first row
     for row in range(rows + 1):

@@ -15,8 +15,6 @@ from kiks.export.stage import Pixels
 
 MP4, GIF, WEBP = ".mp4", ".gif", ".webp"
 
-ENDINGS = (MP4, GIF, WEBP)
-
 _CODECS = {MP4: ("libx264", "yuv420p"), GIF: ("gif", "pal8"), WEBP: ("libwebp_anim", "bgra")}
 _OPTIONS = {
     # Flat colours and still walls: `animation` keeps edges sharp.
@@ -33,7 +31,7 @@ class VideoFile:
 
     Args:
         path: The file.
-        ending: Its kind, of `ENDINGS`.
+        ending: Its kind.
         size: Width and height of the pictures.
         fps: Pictures per second.
         samples: Some of the pictures, whose colours a GIF has; others need none.

@@ -12,7 +12,7 @@ from kiks.desk.panels.widgets import told, with_props
 from kiks.desk.server.desk import Desk
 from kiks.errors import ParameterError, library
 from kiks.export.film import FPS, save_film
-from kiks.export.video_file import ENDINGS
+from kiks.export.kinds import KINDS
 from kiks.recording.recording import Recording
 from kiks.units import s_from_ns
 
@@ -45,7 +45,9 @@ class FilmDialog:
                 self._speed = _number("Times real time", "film-speed", 1.0)
             self._follow = ui.select({0: "the whole arena"}, value=0, label="What is seen")
             self._follow.props("dense data-testid=film-follow").classes("w-full")
-            self._kind = ui.toggle(list(ENDINGS), value=ENDINGS[0]).props("dense no-caps data-testid=film-kind")
+            self._kind = ui.toggle(endings := list(KINDS["film"].endings), value=endings[0]).props(
+                "dense no-caps data-testid=film-kind"
+            )
             self._bar = ui.linear_progress(0.0, show_value=False).props('aria-label="How much of the film is done"')
             with ui.row().classes("w-full justify-end"):
                 ui.button("Close", on_click=self._dialog.close).props("flat no-caps data-testid=film-close")
