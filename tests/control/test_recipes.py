@@ -89,10 +89,6 @@ def test_a_controller_inside_a_function_cannot_be_named() -> None:
         ({"kind": ["mlp"]}, "must be one of 'linear'"),
         ({"kind": "mlp", "hiden": [3]}, "but it has 'hiden'. Did you mean 'hidden'"),
         ({"kind": "mlp", "hidden": [3.5]}, r"hidden\[0\] must be a whole number, but it was 3.5"),
-        (
-            {"kind": "mlp", "hidden": [10**9]},
-            r"hidden\[0\] must be at most 512, but it was 1000000000",
-        ),
         ({"kind": "mlp", "hidden": [256] * 9}, "hidden must have at most 8 items"),
         ({"kind": "gru", "speed_limit": float("nan")}, "speed_limit must be a finite number, but it was nan"),
         ({"kind": "gru", "senses": ["ambient", "ambient"]}, "senses must name each sense once"),
@@ -105,18 +101,8 @@ def test_a_controller_inside_a_function_cannot_be_named() -> None:
         ({"function": "mine.py:plain"}, "Write @kiks.controller over the function"),
         ({"function": "mine.txt:shy"}, "module 'mine.txt' must be one that Python can import"),
         ({"function": "bad.py:shy"}, r"must be a Python file that runs, but it raised ZeroDivisionError\("),
-        ({"function": "quits.py:shy"}, r"must be a Python file that runs, but it raised SystemExit\("),
-        (
-            {"function": ".git/mine.py:shy"},
-            "in no folder whose name begins with a dot, but it was '.git/mine.py'",
-        ),
-        (
-            {"function": ".mine.py:shy"},
-            "in no folder whose name begins with a dot, but it was '.mine.py'",
-        ),
+        ({"function": ".git/mine.py:shy"}, "in no folder whose name begins with a dot, but it was '.git/mine.py'"),
         ({"function": "../mine.py:shy"}, "must lead to a file in the"),
-        ({"function": "/tmp/mine.py:shy"}, "must lead to a file in the"),
-        ({"function": "linked/mine.py:shy"}, "must lie in the folder of the file that names it"),
         ({"function": "link.py:shy"}, "must lie in the folder of the file that names it"),
     ],
 )
@@ -125,11 +111,9 @@ def test_wrong_recipes_are_errors(recipe: Any, message: str, tmp_path: Path) -> 
     for place in (elsewhere, folder / ".git"):
         place.mkdir(parents=True)
         (place / "mine.py").write_text(SHY)
-    for name in ("mine.py", "mine.txt", ".mine.py"):
+    for name in ("mine.py", "mine.txt"):
         (folder / name).write_text(SHY)
     (folder / "bad.py").write_text("1 / 0\n")
-    (folder / "quits.py").write_text("raise SystemExit('no')\n")
-    (folder / "linked").symlink_to(elsewhere)
     (folder / "link.py").symlink_to(elsewhere / "mine.py")
     with pytest.raises(kiks.ParameterError, match=message):
         kiks.controllers.from_recipe(recipe, folder)

@@ -436,7 +436,7 @@ def moved_lately_mm(moment: Any, notes: Any) -> Any:
     """
     if notes[1] == 0.0:
         notes[2], notes[3] = moment.start_x_mm, moment.start_y_mm
-    # Where it was is a mean that forgets; on a straight way that is as far behind as it drives in that time.
+    # An exponential moving average of the position. On a straight way it lags by what the robot drives in `ROAMING_S`.
     share = min(moment.period_s / ROAMING_S, 1.0)
     notes[2] += share * (moment.x_mm - notes[2])
     notes[3] += share * (moment.y_mm - notes[3])

@@ -14,7 +14,7 @@ from kiks.model.checks import check_kind
 
 
 class RobotControllers(NamedTuple):
-    """The controllers of the robots in each world of some.
+    """Controllers and parameters of every robot of every world.
 
     Attributes:
         controllers: The controller of each robot.
