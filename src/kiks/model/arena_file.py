@@ -211,15 +211,17 @@ def _toml_of(arena: Arena, picture: str) -> str:
 
 def place_lines(arena: Arena) -> list[str]:
     """Return the lines of a file that `places_of` reads."""
-    lines = []
+    lines: list[str] = []
+
+    def entry(label: str, place: Any, **values: Any) -> None:
+        lines.extend(("", f"[[{label}]]", f"at_mm = {toml(place[:2])}"))
+        lines.extend(f"{name} = {toml(value)}" for name, value in values.items())
+
     for start in arena.starts:
-        lines += ["", "[[start]]", _at(start), f"heading_deg = {_degrees(start.heading_rad)!r}"]
-    for lamp in arena.lamps:
-        lines += ["", "[[lamp]]", _at(lamp), f"power_w = {lamp.power_w!r}", f"is_on = {str(lamp.is_on).lower()}"]
-    for label, bodies in (("ball", arena.balls), ("cylinder", arena.cylinders)):
-        for body in bodies:
-            lines += ["", f"[[{label}]]", _at(body), f"radius_mm = {body.radius_mm!r}"]
-            lines += [f"friction_mm_s2 = {body.friction_mm_s2!r}", f"brightness = {body.brightness!r}"]
+        entry("start", start, heading_deg=_degrees(start.heading_rad))
+    for label, places in (("lamp", arena.lamps), ("ball", arena.balls), ("cylinder", arena.cylinders)):
+        for place in places:
+            entry(label, place, **dict(zip(place._fields[2:], place[2:], strict=True)))
     return lines
 
 
@@ -230,8 +232,21 @@ def _degrees(angle_rad: float) -> float:
     return next((each for each in short if math.radians(each) == angle_rad), angle_deg)
 
 
-def _at(place: Pose | Lamp | Ball | Cylinder) -> str:
-    return f"at_mm = [{place.x_mm!r}, {place.y_mm!r}]"
+def toml(value: Any) -> str:
+    """Return a value as TOML: a text, a number, true or false, or a list or table of them.
+
+    Example:
+        >>> toml({"a b": (1.5, True), "c": "d"})
+        '{ "a b" = [1.5, true], c = "d" }'
+    """
+    if isinstance(value, tuple | list):
+        return f"[{', '.join(map(toml, value))}]"
+    if isinstance(value, dict):
+        keys = {key: key if key.isascii() and key.isidentifier() else quoted(key) for key in value}
+        return f"{{ {', '.join(f'{keys[key]} = {toml(each)}' for key, each in value.items())} }}"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return quoted(value) if isinstance(value, str) else repr(value)
 
 
 def quoted(text: str) -> str:

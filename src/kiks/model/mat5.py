@@ -1,5 +1,7 @@
 """Reads numeric variables of MATLAB files of level 5, with a limit on memory.
 
+Not with SciPy's reader: it unpacks without a limit, and a damaged file can crash it, with all of Python.
+
 Source: MATLAB's MAT-file format, level 5. A header of 128 bytes ends in the version and "MI" or "IM" for the order of
 bytes; elements follow, each a type, a count of bytes, and data padded to 8 bytes. A matrix is an element of elements:
 flags with its class, dimensions, name, real part. A compressed element unpacks to one that is not.

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field
 
@@ -22,7 +22,7 @@ from kiks.model.arena_file import (
     Walls,
     place_lines,
     places_of,
-    quoted,
+    toml,
 )
 from kiks.model.arena_objects import THINGS_MAX
 from kiks.model.atomic_files import check_relative, ending_of, path_of, replace_file
@@ -224,18 +224,18 @@ class Project:
             if name == "speed" and value is None:
                 value = FASTEST
             if value is not None:
-                lines.append(f"{name} = {_toml(value)}")
-        lines.append(f"name = {quoted(self.arena.name)}")
+                lines.append(f"{name} = {toml(value)}")
+        lines.append(f"name = {toml(self.arena.name)}")
         if not self.robots:
             lines.append("robot = []")
         for robot in self.robots:
             lines += ["", "[[robot]]"]
             values = ((each.name, getattr(robot, each.name)) for each in fields(robot))
-            lines += [f"{name} = {_toml(value)}" for name, value in values if value not in (None, "", (), {})]
+            lines += [f"{name} = {toml(value)}" for name, value in values if value not in (None, "", (), {})]
         lines += place_lines(self.arena)
         lines += ["", "[walls]"]
         if (box := box_keys_of(self.arena)) is not None:
-            lines += [f"{name} = {_toml(value)}" for name, value in box.items()]
+            lines += [f"{name} = {toml(value)}" for name, value in box.items()]
         else:
             lines += [f"mm_per_cell = {self.arena.mm_per_cell!r}", f"png = '''\n{raster_text(self.arena)}'''"]
         return ("\n".join(lines) + "\n").encode("utf-8", errors="replace")
@@ -279,17 +279,3 @@ class ProjectFile:
     ball: Balls = ()
     cylinder: Cylinders = ()
     walls: ProjectWalls = ProjectWalls()
-
-
-def _key(name: str) -> str:
-    return name if name.isascii() and name.isidentifier() else quoted(name)
-
-
-def _toml(value: Any) -> str:
-    if isinstance(value, tuple | list):
-        return f"[{', '.join(map(_toml, value))}]"
-    if isinstance(value, dict):
-        return f"{{ {', '.join(f'{_key(name)} = {_toml(each)}' for name, each in value.items())} }}"
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    return quoted(value) if isinstance(value, str) else repr(value)

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from kiks.errors import ParameterError, nearest, shown
-from kiks.model.arena_file import quoted
+from kiks.model.arena_file import toml
 from kiks.model.atomic_files import path_of, replace_file
 from kiks.model.checks import ROBOTS_MAX, check_count
 from kiks.model.data_file import Text, check, parse_toml, read_file, record
@@ -225,20 +225,12 @@ def robot_toml(spec: RobotSpec, comment: str = "") -> str:
         value = getattr(spec, entry.name)
         if hasattr(value, "__dataclass_fields__"):
             sections += ["", f"[{entry.name}]"]
-            sections += [f"{key.name} = {_toml(getattr(value, key.name))}" for key in fields(value)]
+            sections += [f"{key.name} = {toml(getattr(value, key.name))}" for key in fields(value)]
         elif value is not None:
-            lines.append(f"{entry.name} = {_toml(value)}")
+            lines.append(f"{entry.name} = {toml(value)}")
     return "\n".join(lines + sections) + "\n"
 
 
 def _printable(line: str) -> str:
     """Return a line without characters that TOML allows in no comment."""
     return "".join(character if character.isprintable() else "?" for character in line)
-
-
-def _toml(value: Any) -> str:
-    if isinstance(value, tuple):
-        return f"[{', '.join(map(_toml, value))}]"
-    if isinstance(value, bool):
-        return str(value).lower()
-    return quoted(value) if isinstance(value, str) else repr(value)
