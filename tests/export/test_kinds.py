@@ -27,7 +27,6 @@ def world() -> Simulation:
 @pytest.fixture(scope="module")
 def recording(world: Simulation, tmp_path_factory: pytest.TempPathFactory) -> Recording:
     file = tmp_path_factory.mktemp("recording") / "run.mcap"
-    world.record_paths()
     with world.record(file):
         robot = Khepera(world.port(1))
         robot.set_speed(9, 5)
@@ -43,8 +42,8 @@ def test_a_picture_of_a_recording_is_that_of_its_world(world: Simulation, record
     recording.export(tmp_path / "run.png")
     with Image.open(tmp_path / "run.png") as image:
         seen = np.asarray(image).astype(int)
-    wanted = np.asarray(Picture.of_simulation(world, has_trails=True).image()).astype(int)
-    assert (np.abs(seen - wanted).max(axis=-1) > 8).mean() < 0.001
+    wanted = np.asarray(Picture.of_simulation(world).image()).astype(int)
+    assert 0 < (np.abs(seen - wanted).max(axis=-1) > 8).mean() < 0.05  # without the trails
     recording.export(tmp_path / "early.png", time_s=1.0)
     recording.export(tmp_path / "run.svg")
     assert (tmp_path / "early.png").read_bytes() != (tmp_path / "run.png").read_bytes()

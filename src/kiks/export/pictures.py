@@ -75,22 +75,9 @@ class Picture:
     trails: Trails | None = None
 
     @classmethod
-    def of_simulation(cls, sim: Simulation, *, has_trails: bool = False) -> Picture:
-        """Return the picture of a simulation as it stands.
-
-        Args:
-            sim: The simulation.
-            has_trails: Whether it shows the paths since `sim.record_paths`.
-        """
-        bodies, poses = sim.bodies(), sim.poses()
-        trails = None
-        if has_trails:
-            paths = zip(sim.paths()[:, :, 1:], poses.tolist(), strict=True)
-            places = sim.body_paths()
-            for body in bodies:
-                places.setdefault(int(body["number"]), []).append((float(body["x_mm"]), float(body["y_mm"])))
-            trails = Trails([[*path[np.isfinite(path[:, 0])].tolist(), pose] for path, pose in paths], places)
-        return cls(sim.arena, sim.lamps, bodies, poses, [spec.body for spec in sim.specs], trails)
+    def of_simulation(cls, sim: Simulation) -> Picture:
+        """Return the picture of a simulation as it stands."""
+        return cls(sim.arena, sim.lamps, sim.bodies(), sim.poses(), [spec.body for spec in sim.specs])
 
     @classmethod
     def of_arena(cls, arena: Arena) -> Picture:
