@@ -40,7 +40,7 @@ def hypothesis_in_real_time(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let Hypothesis, which measures the collection of garbage, ask the real clock in a program that runs here."""
     from kiks.script import callers
 
-    monkeypatch.setattr(callers, "_REAL", callers._REAL | {"hypothesis"})
+    monkeypatch.setitem(callers._kind_of, "hypothesis", callers.Caller.REAL)
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

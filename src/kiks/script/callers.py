@@ -19,23 +19,26 @@ class Caller(Enum):
     """A module of Python that asks on behalf of its caller, so that the caller counts."""
 
 
-_WAITS = frozenset({"asyncio", "concurrent", "queue", "threading", "trio"})
-_REAL = frozenset({"importlib", "kiks", "llvmlite", "numba", "subprocess"})
-_PASSES = frozenset(
-    "genericpath glob logging os pathlib posixpath random secrets shutil signal tempfile uuid".split()  # noqa: SIM905
-)
+_KINDS = {
+    Caller.WAITS: "asyncio concurrent queue threading trio",
+    Caller.REAL: "importlib kiks llvmlite numba subprocess",
+    Caller.PASSES: "genericpath glob logging os pathlib posixpath random secrets shutil signal tempfile uuid",
+}
+"""Kinds of packages; all others are a program's."""
+
 _CLIENT = "kiks.client"
 """The part of KiKS that programs use."""
 
+_kind_of = {package: kind for kind, packages in _KINDS.items() for package in packages.split()}
+
 
 class _Kinds(dict[str | None, Caller]):
+    """The kind of each module that has called."""
+
     def __missing__(self, module: str | None) -> Caller:
-        top = str(module).partition(".")[0]
-        kind = Caller.WAITS if top in _WAITS else Caller.PROGRAM
-        if top in _PASSES:
-            kind = Caller.PASSES
-        if top in _REAL and not str(module).startswith(_CLIENT):
-            kind = Caller.REAL
+        name = str(module)
+        is_client = name.startswith(_CLIENT)
+        kind = Caller.PROGRAM if is_client else _kind_of.get(name.partition(".")[0], Caller.PROGRAM)
         self[module] = kind
         return kind
 

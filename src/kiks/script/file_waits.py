@@ -231,7 +231,7 @@ class Files:
             if timeout is not None and timeout < 0:
                 raise ValueError("timeout must be non-negative")
             select.select(*lists, 0)  # says what is wrong with the arguments
-            wanted = {each if isinstance(each, int) else each.fileno() for each in (*lists[0], *lists[1], *lists[2])}
+            wanted = {_descriptor(each) for each in (*lists[0], *lists[1], *lists[2])}
             empty: tuple[list[Any], list[Any], list[Any]] = [], [], []
 
             def look(block_ms: int) -> Any:
@@ -280,7 +280,7 @@ class Files:
             return ends
 
         def ioctl(fd: Any, request: int, *rest: Any) -> Any:
-            file = ports.get(fd if isinstance(fd, int) else fd.fileno())
+            file = ports.get(_descriptor(fd))
             if file is not None:
                 file.fill()
                 if request == termios.TIOCOUTQ and rest and isinstance(rest[0], bytes):
@@ -288,11 +288,11 @@ class Files:
             return fcntl.ioctl(fd, request, *rest)
 
         def drain(fd: Any, /) -> None:
-            file = ports.get(fd if isinstance(fd, int) else fd.fileno())
+            file = ports.get(_descriptor(fd))
             termios.tcdrain(fd) if file is None else file.port.flush()
 
         def flush(fd: Any, queue: int, /) -> None:
-            file = ports.get(fd if isinstance(fd, int) else fd.fileno())
+            file = ports.get(_descriptor(fd))
             termios.tcflush(fd, queue)
             if file is not None and queue in (termios.TCIFLUSH, termios.TCIOFLUSH):
                 file.port.reset_input_buffer()
@@ -365,6 +365,11 @@ class Files:
         """
         if self._is_inside(descriptor):
             self.wait_for(descriptor, event, None if os.get_blocking(descriptor) else 0)
+
+
+def _descriptor(file: Any) -> int:
+    """Return the descriptor of a file, or of what is one."""
+    return file if isinstance(file, int) else int(file.fileno())
 
 
 def _fill(ports: Iterable[_PortFile]) -> list[int]:
