@@ -29,9 +29,9 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from behaviours import Follow
-from calibration import report
 
 import kiks
+from calibration import report
 from kiks.desk.server import server
 from kiks.desk.server.show import show
 from kiks.desk.server.token import COOKIE

@@ -30,10 +30,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from calibration import report
 
 import kiks
 from batch import kheperax_python
+from calibration import report
 from kiks.batch.initial_state import random_starts
 from kiks.model.arena import Ball
 

@@ -23,9 +23,8 @@ import tempfile
 import time
 from pathlib import Path
 
-from calibration import calibration_loops_per_s, report
-
 import kiks
+from calibration import calibration_loops_per_s, report
 from kiks.model.project import Project
 from kiks.ports.program_process import Command, commands_of
 from kiks.ports.programs import Programs

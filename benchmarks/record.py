@@ -17,9 +17,9 @@ from pathlib import Path
 from statistics import median
 
 from behaviours import Follow
-from calibration import calibration_loops_per_s, report
 
 import kiks
+from calibration import calibration_loops_per_s, report
 from kiks.export.film import save_film
 
 ARENA = Path(__file__).parent.parent / "examples" / "arenas" / "office.toml"

@@ -22,9 +22,9 @@ from typing import Any
 
 import numpy as np
 from behaviours import Avoid, Follow
-from calibration import calibration_loops_per_s, report
 
 import kiks
+from calibration import calibration_loops_per_s, report
 from kiks.engine.parameters import pack
 from kiks.engine.scene import Scene
 from kiks.engine.sensing import ambient, camera, observe, proximity

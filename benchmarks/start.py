@@ -26,9 +26,8 @@ import tempfile
 import time
 from pathlib import Path
 
-from calibration import calibration_loops_per_s, report
-
 import kiks
+from calibration import calibration_loops_per_s, report
 
 ARENA = Path(__file__).parent.parent / "examples" / "arenas" / "office.toml"
 

@@ -17,9 +17,9 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from behaviours import Follow
-from calibration import calibration_loops_per_s, median_of, report
 
 import kiks
+from calibration import calibration_loops_per_s, median_of, report
 
 ARENA = Path(__file__).parent.parent / "examples" / "arenas" / "office.toml"
 
