@@ -65,15 +65,6 @@ def test_worlds_differ_between_generations_but_trial_worlds_do_not() -> None:
 # ---- files ----
 
 
-def test_a_resumed_evolution_equals_one_that_never_stopped(tmp_path: Path) -> None:
-    whole = run("cma", tmp_path / "whole")
-    part = kiks.Evolution(small(), "cma", population=8, seed=3, folder=tmp_path / "part")
-    part.run(generations=2)
-    rest = run("cma", tmp_path / "part")
-    assert candidates_of(rest) == candidates_of(whole)
-    assert (tmp_path / "part/champion.toml").read_bytes() == (tmp_path / "whole/champion.toml").read_bytes()
-
-
 KILLED = """
 import sys, kiks
 def report(evolution):
@@ -127,16 +118,6 @@ def test_a_champion_of_no_evolution_is_not_replaced(tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match=r"must hold an evolution or no champion\.toml"):
         kiks.Evolution(small(), "cma", population=8, seed=3, folder=tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["champion.toml"]
-
-
-@pytest.mark.parametrize(
-    "data", [b"", b"[]", b"[" * 100_000, b'"x"', b"{}", b"\xff", b'{"seed": 1' + b"0" * 5000, b'{"task": ' + b"9" * 400]
-)
-def test_the_error_names_a_broken_identity_file(data: bytes, tmp_path: Path) -> None:
-    (tmp_path / "evolution.json").write_bytes(data)
-    with pytest.raises(ParameterError, match=r"^The record of an evolution '.*evolution.json'") as caught:
-        kiks.Evolution(small(), "cma", population=8, seed=3, folder=tmp_path)
-    assert len(str(caught.value).replace(str(tmp_path), "")) < 300
 
 
 def test_the_error_names_a_broken_generation_file(tmp_path: Path) -> None:
