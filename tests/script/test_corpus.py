@@ -199,7 +199,6 @@ def run_real(name: str, ports: Mapping[str, str], environment: Mapping[str, str]
     arguments = {
         # A pseudo terminal has no lines for DTR and RTS.
         "control_lines": [ports["RFC 2217"]],
-        "try_ports": ["/dev/there-is-none", device],
         # `comports` lists what the kernel has, and KiKS adds no device to that: this one is told its port.
         "find_port": [device],
     }.get(name, [device])

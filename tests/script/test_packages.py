@@ -7,7 +7,6 @@ A package that cannot is told of in one line. Programs run twice, and must say t
 
 from __future__ import annotations
 
-import os
 import re
 import shlex
 import subprocess
@@ -103,19 +102,6 @@ True 2.5
 7 4.5
 """,
     ),
-    "argparse": (
-        r"""
-import argparse, configparser, io
-parser = argparse.ArgumentParser()
-parser.add_argument("--speed", type=int, default=5)
-settings = configparser.ConfigParser()
-settings.read_string("[robot]\nport = /dev/ttyUSB0\n")
-print(parser.parse_args([]), settings["robot"]["port"])
-""",
-        """\
-Namespace(speed=5) /dev/ttyUSB0
-""",
-    ),
     "asyncio": (
         r"""
 import asyncio, socket, time
@@ -170,35 +156,6 @@ asyncio.run(main())
 (b'spoken\\n', None) 0
 """,
     ),
-    "attrs": (
-        r"""
-import attrs, datetime
-@attrs.define
-class Sample:
-    taken: datetime.datetime = attrs.field(factory=datetime.datetime.now, validator=attrs.validators.instance_of(datetime.datetime))
-print(str(Sample().taken)[:19])
-""",
-        """\
-2000-01-01 00:00:00
-""",
-    ),
-    "click": (
-        r"""
-import click
-@click.command()
-@click.option("--since", type=click.DateTime(), default="2000-01-01")
-def main(since):
-    with click.progressbar(range(3)) as bar:
-        click.echo(sum(bar))
-    click.echo(since)
-main([], standalone_mode=False)
-""",
-        """\
-
-3
-2000-01-01 00:00:00
-""",
-    ),
     "concurrent.futures": (
         r"""
 import concurrent.futures as futures, time
@@ -220,16 +177,6 @@ with futures.ThreadPoolExecutor(2) as pool:
 late 5.0
 """,
     ),
-    "concurrent.futures.process": (
-        r"""
-import concurrent.futures
-with concurrent.futures.ProcessPoolExecutor(2) as pool:
-    print(list(pool.map(abs, [1, -2])))
-""",
-        """\
-kiks: a program in simulated time must start no process of Python by itself, but it did, by multiprocessing (program.py, line 3). Use threads, or run it on kiks serve, where time is real.
-""",
-    ),
     "csv": (
         r"""
 import csv, datetime, json, os, pickle, tempfile, threading
@@ -246,20 +193,6 @@ print(json.dumps({"now": now.isoformat()}))
         """\
 [['2000-01-01 00:00:00', '1']]
 {"now": "2000-01-01T00:00:00"}
-""",
-    ),
-    "cv2": (
-        r"""
-import cv2, numpy, time
-image = numpy.zeros((20, 20), numpy.uint8)
-cv2.circle(image, (10, 10), 5, 255, -1)
-found, _ = cv2.findContours(image, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
-start = cv2.getTickCount()
-time.sleep(2)
-print(len(found), round((cv2.getTickCount() - start) / cv2.getTickFrequency(), 2))
-""",
-        """\
-1 2.0
 """,
     ),
     "email": (
@@ -285,41 +218,6 @@ with tempfile.NamedTemporaryFile() as first, open(first.name) as second:
 """,
         """\
 kiks: a program in simulated time must wait by time.sleep, a lock or a port, but it waited by itself (program.py, line 4). Run it on kiks serve, where time is real.
-""",
-    ),
-    "flask": (
-        r"""
-import flask, datetime
-app = flask.Flask("app")
-@app.route("/now")
-def now():
-    return {"now": datetime.datetime.now(datetime.timezone.utc)}
-answer = app.test_client().get("/now")
-print(answer.json)
-""",
-        """\
-{'now': 'Sat, 01 Jan 2000 00:00:00 GMT'}
-""",
-    ),
-    "gevent": (
-        r"""
-import gevent
-gevent.sleep(1)
-""",
-        """\
-kiks: a program in simulated time must wait by Python's own event loops, but it imported gevent (program.py, line 1). Use asyncio, or run it on kiks serve, where time is real.
-""",
-    ),
-    "gymnasium": (
-        r"""
-import gymnasium
-env = gymnasium.make("CartPole-v1")
-print("~", env.reset()[0], env.action_space.sample())
-env.close()
-print(env.unwrapped.spec.id)
-""",
-        """\
-CartPole-v1
 """,
     ),
     "http.server": (
@@ -392,15 +290,6 @@ print(text.count("2000-01-01"), round(time.monotonic(), 1), round(time.time() - 
 1 0.5 0
 """,
     ),
-    "multiprocessing": (
-        r"""
-import multiprocessing
-multiprocessing.Process(target=print).start()
-""",
-        """\
-kiks: a program in simulated time must start no process of Python by itself, but it did, by multiprocessing (program.py, line 2). Use threads, or run it on kiks serve, where time is real.
-""",
-    ),
     "multiprocessing locks": (
         r"""
 import multiprocessing
@@ -435,17 +324,6 @@ with ThreadPool(3) as pool:
 [None, None, None] 3.0
 """,
     ),
-    "networkx": (
-        r"""
-import networkx
-print(networkx.shortest_path(networkx.path_graph(4), 0, 3))
-graph = networkx.gnm_random_graph(10, 20)
-print("~", sorted(graph.edges)[:3], networkx.spring_layout(graph)[0])
-""",
-        """\
-[0, 1, 2, 3]
-""",
-    ),
     "numba": (
         r"""
 import numba, numpy, time
@@ -471,33 +349,6 @@ print("~", numpy.random.default_rng().random(2), numpy.random.rand(2), numpy.ran
 """,
         """\
 2000-01-02T01:01:01 2000-01-02
-""",
-    ),
-    "os": (
-        r"""
-import os, shutil, tempfile, time, zipfile
-folder = tempfile.mkdtemp()
-name = os.path.join(folder, "file")
-with open(name, "w") as file:
-    file.write("first")
-time.sleep(2)
-print(round(time.time() - os.path.getmtime(name), 3))
-with open(name, "a") as file:
-    file.write("second")
-time.sleep(60)
-print(round(time.time() - os.stat(name).st_mtime, 3), time.ctime(os.stat(name).st_mtime))
-shutil.copy2(name, name + "2")
-print(os.path.getmtime(name + "2") == os.path.getmtime(name), time.time() > os.path.getmtime(os.__file__))
-with zipfile.ZipFile(name + ".zip", "w") as archive:
-    archive.write(name)
-    print(archive.infolist()[0].date_time)
-shutil.rmtree(folder)
-""",
-        """\
-2.0
-60.0 Sat Jan  1 00:00:02 2000
-True True
-(2000, 1, 1, 0, 0, 2)
 """,
     ),
     "pandas": (
@@ -550,19 +401,6 @@ except pydantic.ValidationError:
 {"taken":"2000-01-01T00:00:00" 1999-12-31
 2000-01-02 00:00:00
 future
-""",
-    ),
-    "pygame": (
-        r"""
-import pygame, time
-pygame.init()
-clock = pygame.time.Clock()
-for _ in range(10):
-    clock.tick(20)
-print(round(time.monotonic(), 2), pygame.time.get_ticks() // 100)
-""",
-        """\
-0.5 5
 """,
     ),
     "queue": (
@@ -663,21 +501,6 @@ True 1
 4
 """,
     ),
-    "schedule": (
-        r"""
-import schedule, time
-schedule.every(2).seconds.do(lambda: print("tick", round(time.monotonic(), 1)))
-schedule.every().day.at("00:00:05").do(lambda: print("daily", round(time.monotonic(), 1)))
-while time.monotonic() < 6:
-    schedule.run_pending()
-    time.sleep(0.5)
-""",
-        """\
-tick 2.0
-tick 4.0
-daily 5.0
-""",
-    ),
     "scipy": (
         r"""
 import numpy
@@ -753,35 +576,6 @@ alarm 1.5
 None 6.5
 """,
     ),
-    "simple_pid": (
-        r"""
-from simple_pid import PID
-import time
-pid = PID(1, 0.5, 0.1, setpoint=10, sample_time=0.1)
-values, speed = [], 0
-for _ in range(5):
-    speed = pid(speed) * 0.5
-    time.sleep(0.1)
-    values.append(round(speed, 3))
-print(values)
-""",
-        """\
-[5.0, 0.125, 7.747, -2.256, -2.256]
-""",
-    ),
-    "sklearn": (
-        r"""
-import numpy
-from sklearn.cluster import KMeans
-from sklearn.linear_model import LinearRegression
-x = numpy.arange(8.0)[:, None]
-print(LinearRegression().fit(x, 2 * x[:, 0]).coef_.round(3))
-print("~", KMeans(2, n_init=1).fit(x).cluster_centers_.ravel())
-""",
-        """\
-[2.]
-""",
-    ),
     "socket": (
         r"""
 import socket, socketserver, threading, time
@@ -844,16 +638,6 @@ line
 -15 True
 """,
     ),
-    "sympy": (
-        r"""
-import sympy
-x = sympy.symbols("x")
-print(sympy.integrate(sympy.sin(x) ** 2, (x, 0, sympy.pi)), sympy.solve(x ** 2 - 2), sympy.lambdify(x, x ** 2)(3))
-""",
-        """\
-pi/2 [-sqrt(2), sqrt(2)] 9
-""",
-    ),
     "threading": (
         r"""
 import ctypes, signal, threading, time
@@ -877,48 +661,6 @@ False
 True
 signal
 1.0 True
-""",
-    ),
-    "time_machine": (
-        r"""
-import time_machine
-""",
-        """\
-kiks: a program in simulated time must leave Python's clocks alone, but it imported time_machine (program.py, line 1). Run it on kiks serve, where time is real.
-""",
-    ),
-    "tqdm": (
-        r"""
-import io, time
-from tqdm import tqdm
-out = io.StringIO()
-for _ in tqdm(range(10), file=out, ascii=True, ncols=50):
-    time.sleep(1)
-print(out.getvalue().split("\r")[-1].strip().split("|")[-1], round(time.monotonic()))
-""",
-        """\
- 10/10 [00:10<00:00,  1.00s/it] 10
-""",
-    ),
-    "transitions": (
-        r"""
-from transitions import Machine
-from transitions.extensions.asyncio import AsyncMachine
-from transitions.extensions.states import add_state_features, Timeout
-import time
-@add_state_features(Timeout)
-class Timed(Machine): pass
-class Robot:
-    def stop(self): print("stopped", round(time.monotonic(), 1)); self.rest()
-robot = Robot()
-Timed(robot, states=["resting", {"name": "turning", "timeout": 2, "on_timeout": "stop"}], transitions=[["go", "resting", "turning"], ["rest", "turning", "resting"]], initial="resting")
-robot.go()
-time.sleep(3)
-print(robot.state)
-""",
-        """\
-stopped 2.0
-resting
 """,
     ),
     "trio": (
@@ -955,55 +697,6 @@ trio.run(main)
 b'round' 4.5
 """,
     ),
-    "urllib3": (
-        r"""
-import urllib3
-urllib3.PoolManager().request("GET", "http://example.com/", retries=False)
-""",
-        """\
-kiks: a program in simulated time must talk to its robots alone, but it used the network (program.py, line 2). Run it on kiks serve, where time is real.
-""",
-    ),
-    "uvloop": (
-        r"""
-import uvloop
-""",
-        """\
-kiks: a program in simulated time must wait by Python's own event loops, but it imported uvloop (program.py, line 1). Use asyncio, or run it on kiks serve, where time is real.
-""",
-    ),
-    "websockets": (
-        r"""
-import asyncio, websockets, time
-async def serve(socket):
-    async for message in socket:
-        await asyncio.sleep(1)
-        await socket.send(message.upper())
-async def main():
-    async with websockets.serve(serve, "127.0.0.1", 0) as server:
-        port = server.sockets[0].getsockname()[1]
-        async with websockets.connect(f"ws://127.0.0.1:{port}") as client:
-            await client.send("hi")
-            print(await client.recv(), round(time.monotonic(), 1))
-asyncio.run(main())
-""",
-        """\
-HI 1.0
-""",
-    ),
-    "yaml": (
-        r"""
-import datetime
-import yaml
-print(yaml.safe_dump({"day": datetime.date.today(), "now": datetime.datetime.now().replace(microsecond=0)}), end="")
-print(yaml.safe_load("at: 2000-01-01"))
-""",
-        """\
-day: 2000-01-01
-now: 2000-01-01 00:00:00
-{'at': datetime.date(2000, 1, 1)}
-""",
-    ),
     "zoneinfo": (
         r"""
 import zoneinfo, datetime, time
@@ -1016,7 +709,7 @@ print(datetime.datetime.now(zoneinfo.ZoneInfo("Europe/Berlin")).isoformat(timesp
 }
 """A program for each package, and what it says; lines with a "~" depend on the seed alone."""
 
-SLOW = {"matplotlib", "pandas", "scipy", "sklearn", "sympy"}
+SLOW = {"matplotlib", "pandas", "scipy"}
 """Packages whose import takes a second."""
 
 AGAIN = set(share([name for name in PROGRAMS if name not in SLOW], list(PROGRAMS)))
@@ -1037,14 +730,8 @@ def said(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[tuple[str, 
         path.parent.mkdir()
         path.write_text(PROGRAMS[name][0].lstrip("\n"))
         runs += [shlex.join([f"{name}.{number}", str(path)]) for number in range(count)]
-    surroundings = {
-        **os.environ,
-        "SDL_VIDEODRIVER": "dummy",
-        "SDL_AUDIODRIVER": "dummy",
-        "PYGAME_HIDE_SUPPORT_PROMPT": "1",
-    }
     command = [sys.executable, str(FOLDER / "each_alone.py"), str(folder), str(AT_ONCE), "--", *runs]
-    subprocess.run(command, env=surroundings, timeout=280, check=True, stdin=subprocess.DEVNULL)
+    subprocess.run(command, timeout=280, check=True, stdin=subprocess.DEVNULL)
 
     def read(run: str) -> tuple[str, str]:
         out, err = ((folder / f"{run}.{kind}").read_text() for kind in ("out", "err"))

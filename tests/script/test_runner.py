@@ -79,20 +79,6 @@ def test_reader_thread_is_as_repeatable_as_a_plain_loop(run: Run, capsys: pytest
     assert 21.0 <= time_s < 21.1
 
 
-def test_threads_sleep_at_once_and_end_in_their_order(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
-    code, time_s, _ = run("""
-        import threading, time
-        def nap(seconds):
-            time.sleep(seconds)
-            print(threading.current_thread().name, round(time.monotonic(), 3))
-        threads = [threading.Thread(target=nap, args=(5 - number,), name=f't{number}') for number in range(5)]
-        for thread in threads: thread.start()
-        for thread in threads: thread.join()
-    """)
-    assert (code, round(time_s, 3)) == (0, 5.0)
-    assert capsys.readouterr().out.split() == ["t4", "1.0", "t3", "2.0", "t2", "3.0", "t1", "4.0", "t0", "5.0"]
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "loop",
@@ -326,18 +312,6 @@ def test_file_waits_end_when_a_character_comes_or_the_time_is_over(
     """)
     assert run(text)[0] == 0
     assert capsys.readouterr().out == "False 0.5\nb'h,0,0\\r\\n' True\n"
-
-
-def test_pipe_wakes_the_thread_that_waits_for_it(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run("""
-        import os, select, threading, time
-        here, there = os.pipe()
-        threading.Timer(2, os.write, [there, b'!']).start()
-        print(select.select([here], [], [], 5)[0] == [here], time.monotonic())
-        threading.Timer(2, os.write, [there, b'!']).start()
-        print(os.read(here, 1), os.read(here, 1), time.monotonic())
-    """)[:2] == (0, 4.0)
-    assert capsys.readouterr().out == "True 2.0\nb'!' b'!' 4.0\n"
 
 
 # ---- ports ----
