@@ -115,7 +115,7 @@ def drive_all(folder: Path, thinking: str, robots: int = 4, **options: Any) -> t
 @pytest.mark.slow
 @pytest.mark.parametrize("thinking", cases(["fixed:3.5", "none"]))
 def test_four_programs_repeat_on_a_busy_computer(tmp_path: Path, thinking: str) -> None:
-    """test_program_scheduler.py tries all orders in which requests can arrive."""
+    """test_program_scheduler.py tries the orders in which requests can arrive."""
     with busy_computer():
         assert len({drive_all(tmp_path, thinking, patience_s=GUARD_S) for _ in range(share(2, 4))}) == 1
 

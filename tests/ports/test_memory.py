@@ -71,14 +71,6 @@ def test_polling_lets_time_pass() -> None:
         assert sim.now_ns > before_ns + 10_000_000
 
 
-def test_polling_for_a_reply_ends() -> None:
-    port = kiks.Simulation().port(1)
-    port.write(b"K\n")
-    while port.in_waiting < 15:
-        pass
-    assert port.read(15) == b"k,0,0,0,0,0,0\r\n"
-
-
 def test_robot_has_one_client() -> None:
     sim = kiks.Simulation()
     first = kiks.Khepera(sim.url(1))
@@ -110,19 +102,6 @@ def test_a_closed_port_says_so() -> None:
             use()
     assert sim.time_s == 0.0
     assert sim.port(1).write(b"N\n") == 2
-
-
-def test_close_drops_replies_on_their_way() -> None:
-    sim = kiks.Simulation()
-    port = sim.port(1)
-    port.write(b"N\nL,0,1\n")
-    port.close()
-    sim.run(1.0)
-    port = sim.port(1)
-    assert port.in_waiting == 0
-    assert sim.world.state.robots["led"][0, 0, 0] == 1
-    port.write(b"B\n")
-    assert port.readline() == b"b,5.02,5.01\r\n"
 
 
 def test_close_drops_unread_replies_and_the_robot_drives_on() -> None:

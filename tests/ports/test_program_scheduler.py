@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import heapq
 import logging
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
@@ -140,42 +140,6 @@ def run(programs: Sequence[Steps], choose: Choose) -> Log:
     assert all(fake.has_left for fake in fakes)
     assert scheduler.is_repeatable
     return [*world.log, ("end", world.now_ns)]
-
-
-def in_every_order(programs: Sequence[Steps]) -> Iterator[Log]:
-    """Run programs in each order in which their requests can arrive."""
-    path: list[int] = []
-    while True:
-        taken: list[tuple[int, int]] = []
-
-        def choose(count: int, path: list[int] = path, taken: list[tuple[int, int]] = taken) -> int:
-            taken.append((path[len(taken)] if len(taken) < len(path) else 0, count))
-            return taken[-1][0]
-
-        yield run(programs, choose)
-        while taken and taken[-1][0] + 1 == taken[-1][1]:
-            taken.pop()
-        if not taken:
-            return
-        path = [choice for choice, _ in taken]
-        path[-1] += 1
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "programs",
-    [
-        [[(5, 0)], [(5, 0)]],
-        [[(3, 2), (0, 0)], [(4, 1)]],
-        [[(1, 0)], [(7, 3)], []],
-        [[(0, 0)], [(0, 0)], [(2, 1)]],
-    ],
-    ids=["at the same instant", "one does more", "one leaves at once", "answers that take no time"],
-)
-def test_every_order_gives_the_same_run(programs: Sequence[Steps]) -> None:
-    runs = [tuple(log) for log in in_every_order(programs)]
-    assert len(runs) > 10
-    assert len(set(runs)) == 1
 
 
 TIMES_NS = st.integers(0, 12)

@@ -129,25 +129,11 @@ def test_programs_repeat_on_a_busy_computer(thinking: str, tmp_path: Path) -> No
         assert len({run_and_read(FOUR, tmp_path, thinking=thinking) for _ in range(share(2, 4))}) == 1
 
 
-def test_two_programs_repeat(tmp_path: Path) -> None:
-    assert len({run_and_read(FOUR[1:3], tmp_path) for _ in range(2)}) == 1
-
-
 def test_live_thinking_of_each_is_recorded_and_replayed(tmp_path: Path) -> None:
     times = tmp_path / "times"
     live = run(FOUR[:2], thinking="live", record=times)
     assert {path.name for path in tmp_path.iterdir()} == {"times.1", "times.2"}
     assert run(FOUR[:2], thinking=f"replay:{times}")[:2] == live[:2]
-
-
-def test_replay_file_of_one_program_has_no_number(tmp_path: Path) -> None:
-    times = tmp_path / "times"
-    live = run(FOUR[:1], thinking="live", record=times)
-    assert times.exists()
-    assert run(FOUR[:1], thinking=f"replay:{times}")[:2] == live[:2]
-    sim = fresh(thinking=f"replay:{times}")
-    assert run_here(sim, Path(FOUR[0][0]), list(FOUR[0][1:]), {}) == 0
-    assert (sim.state_hash(), sim.now_ns) == live[:2]
 
 
 # ---- programs that end, crash, hang or flood ----
@@ -339,19 +325,3 @@ def test_command_runs_two_programs() -> None:
         assert "kiks: program 2 (drive.py) has ended with exit code 0." in result.stderr
         assert re.search(r"kiks: 0\.\d{3} s simulated, seed 3, state", result.stderr)
     assert state_of(results[0].stderr) == state_of(results[1].stderr)
-
-
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (("--when-silent", "igno"), "when_silent must be 'wait', 'drop' or 'ignore', but it was 'igno'. Did you mean"),
-        (("--patience", "-1"), "patience must be a number of seconds above 0"),
-        (("--thinking", "replay:nowhere"), "replay file 'nowhere.1' must exist, but there is no such file"),
-        (("--map", "COM1=5"), "This simulation has robots 1 to 2"),
-    ],
-)
-def test_mistakes_give_one_line(words: tuple[str, ...], message: str) -> None:
-    result = forked.run("run", *words, WATCHER, "1", WATCHER, "1")
-    assert result.returncode == 2
-    assert message in result.stderr
-    assert "Traceback" not in result.stderr

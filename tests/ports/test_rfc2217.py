@@ -4,17 +4,9 @@ import socket
 
 import pytest
 import serial
-from tests.ports.test_pty import course_in_memory
-from tests.served import GUARD_S, PROGRAMS, run_python, served
+from tests.served import GUARD_S, served
 
 from kiks.ports.rfc2217 import Rfc2217Endpoint
-
-
-def test_pyserial_client_gives_the_same_run_as_a_port_in_memory() -> None:
-    counts, _ = course_in_memory()
-    endpoint = Rfc2217Endpoint(0)
-    with served([endpoint]):
-        assert run_python(PROGRAMS / "course.py", f"rfc2217://{endpoint.name}").strip() == counts.strip()
 
 
 def test_speed_purge_and_control_lines() -> None:

@@ -65,15 +65,6 @@ def test_lockstep_drops_a_line_without_end_as_the_robot_does(tmp_path: Path) -> 
         os.close(port)
 
 
-def test_commands_in_one_write_are_answered_in_their_order(tmp_path: Path) -> None:
-    link = str(tmp_path / "robot")
-    with served([PtyEndpoint(link)]):
-        port = open_plain(link)
-        os.write(port, b"N\nO\nH\nE\nK\nB\nG,1,1\n")
-        assert [read_line(port)[:1] for _ in range(7)] == [b"n", b"o", b"h", b"e", b"k", b"b", b"g"]
-        os.close(port)
-
-
 def test_live_reply_arrives_on_time(tmp_path: Path) -> None:
     link, wall = str(tmp_path / "robot"), WallClock()
     with served([PtyEndpoint(link)], thinking="live", pace=Pace(2.0, wall_ns=wall)) as run:

@@ -90,27 +90,6 @@ def test_live_reply_of_a_client_that_hangs_up_in_its_middle_reaches_no_other_cli
             assert client.recv(4096) == b"h,0,0\r\n"
 
 
-def test_second_client_is_rejected_with_a_warning(caplog: pytest.LogCaptureFixture) -> None:
-    endpoint = TcpEndpoint(0)
-    with served([endpoint]) as run:
-        first = connect(endpoint)
-        assert ask_socket(first, b"H\n") == b"h,0,0\r\n"
-        for _ in range(2):
-            second = connect(endpoint)
-            assert second.recv(1) == b""
-            second.close()
-        assert ask_socket(first, b"H\n") == b"h,0,0\r\n"
-        first.close()
-        run.wait_free()
-        third = connect(endpoint)
-        assert ask_socket(third, b"H\n") == b"h,0,0\r\n"
-        third.close()
-    assert warnings(caplog) == [
-        f"robot 1 must have one client at a time, but another came to {endpoint.name} while the client of "
-        f"{endpoint.name} has it. Close that one first."
-    ]
-
-
 def test_reset_connection_drops_an_unfinished_command() -> None:
     endpoint = TcpEndpoint(0)
     with served([endpoint]) as run:

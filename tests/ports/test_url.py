@@ -28,15 +28,6 @@ def test_pyserial_opens_a_robot() -> None:
         port.write(b"N\n")
 
 
-def test_robot_is_busy_until_its_port_is_closed() -> None:
-    sim = kiks.Simulation()
-    port = serial.serial_for_url(sim.url(1), timeout=1)
-    with pytest.raises(serial.SerialException, match="must be free to be opened, but robot 1 is in use by the program"):
-        serial.serial_for_url(sim.url(1))
-    port.close()
-    serial.serial_for_url(sim.url(1)).close()
-
-
 def test_number_alone_means_the_newest_simulation() -> None:
     older, newer = kiks.Simulation(), kiks.Simulation()
     for url, sim in (("kiks://1", newer), (older.url(1), older)):
