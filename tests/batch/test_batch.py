@@ -132,24 +132,6 @@ def test_worlds_can_be_reset_one_by_one() -> None:
     assert not np.array_equal(moved[4], first[4])
 
 
-def test_a_step_is_a_loop_of_a_run() -> None:
-    """The same speeds given step by step leave the robots where a run leaves them."""
-
-    @kiks.controller
-    def turn(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
-        wheels[0], wheels[1] = 7.0, 3.0
-
-    timing = kiks.Timing(0.05, 38400)
-    ran, stepped = make(9, timing=timing), make(9, timing=timing)
-    ran.run(turn, seconds=1.0)
-    stepped.reset()
-    for _ in range(20):
-        stepped.step(np.broadcast_to([7.0, 3.0], (9, 1, 2)))
-    np.testing.assert_array_equal(ran.times_s, stepped.times_s)
-    # A step has sensed once more, a few milliseconds later.
-    np.testing.assert_allclose(ran.poses[:, :, :2], stepped.poses[:, :, :2], atol=0.6)
-
-
 def test_lamps_can_be_moved_in_each_world() -> None:
     lit = kiks.Arena(arenas()[0].brightness, 1.0, "lit", lamps=(Lamp(200, 250, 2.0),))
     batch = kiks.Batch(lit, 3, senses="ambient", starts=(200, 60, 1.57))
@@ -313,15 +295,6 @@ def test_steps_reject_wrong_arguments() -> None:
         batch.step(np.zeros((2, 2)))
     with pytest.raises(kiks.ParameterError, match="world must be a whole number from 0 to 1"):
         batch.state_hash(2)
-
-
-def test_a_controller_that_numba_refuses() -> None:
-    @kiks.controller
-    def impossible(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
-        wheels[0] = open("file")  # noqa: SIM115
-
-    with pytest.raises(kiks.ParameterError, match="'impossible' must be Python that Numba compiles"):
-        make(2).run(impossible, seconds=1.0)
 
 
 def test_speeds_of_nan_are_zero() -> None:

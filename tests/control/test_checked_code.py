@@ -114,7 +114,7 @@ SLIPS = [
     (assigns_eight, "ValueError: cannot assign slice"),
     (returns, "it returns something, where it must write into its arguments"),
     (misspells, r"wheels\[1\] = sensors.mena\(\)\): Unknown attribute 'mena'"),
-    (opens_a_file, "construct is not supported"),
+    (opens_a_file, "must be Python that Numba compiles .*construct is not supported"),
 ]
 
 
@@ -146,6 +146,11 @@ def asks_for_a_ball(moment, notes):
 
 
 @kiks.measure
+def asks_for_happiness(moment, notes):
+    notes[0] = moment.happiness
+
+
+@kiks.measure
 def returns_its_value(moment, notes):
     return moment.path_mm
 
@@ -155,6 +160,7 @@ def returns_its_value(moment, notes):
     [
         (forgets_notes, r"notes\[1\] \+= 1.0\) leaves notes, which has 1 number. Write @kiks.measure\(notes=2\)"),
         (asks_for_a_ball, r"leaves moment.bodies"),
+        (asks_for_happiness, "the measure 'asks_for_happiness' must be Python that Numba compiles"),
         (returns_its_value, "it returns something"),
         (kiks.measure(result=lambda notes: notes[0])(lambda moment, notes: None), r"\(4, 1\), .* of shape \(1, 1\)"),
         (kiks.measure(result=lambda notes: notes.max())(lambda moment, notes: None), r"of shape \(\)"),

@@ -138,22 +138,6 @@ def test_place_measures() -> None:
     np.testing.assert_allclose(trace.values[8], spread_mm, atol=5.0)
 
 
-def test_avoidance_of_a_stepped_batch() -> None:
-    parameters = kiks.controllers.random_parameters(FULL, WORLDS, seed=9)
-    run, stepped = (kiks.Batch(arena(), worlds=WORLDS, seed=6) for _ in range(2))
-    found = run.run(FULL, parameters, seconds=3.0, measures=[kiks.measures.avoidance]).values[:, 0, 0]
-    memory, wheels, totals = np.zeros((WORLDS, 2)), np.zeros((WORLDS, 1, 2)), np.zeros(WORLDS)
-    sensors = stepped.reset()
-    for _ in range(30):
-        for world in range(WORLDS):
-            FULL(sensors[world, 0], memory[world], parameters[world], wheels[world, 0])
-            left, right = np.rint(wheels[world, 0]) / 10
-            closeness = sensors[world, 0].max() / 1023
-            totals[world] += max((left + right) / 2, 0) * (1 - np.sqrt(abs(left - right) / 2)) * (1 - closeness)
-        sensors = stepped.step(wheels)
-    np.testing.assert_allclose(found, totals / 30, atol=1e-12)
-
-
 def moment(**given: Any) -> Any:
     """Return a moment of a robot that stands in the middle of nowhere."""
     usual = dict.fromkeys(Moment._fields, 0.0) | {
@@ -213,13 +197,6 @@ def test_shuttling_or_spinning_is_not_roaming() -> None:
     assert spinning < 0.01
 
 
-def test_the_best_scores() -> None:
-    ahead = np.array([10.0, 10.0])
-    assert after(kiks.measures.avoidance, moment(wheels=ahead)) == 1.0
-    assert after(kiks.measures.avoidance, moment(wheels=np.array([10.0, -10.0]))) == 0.0
-    assert after(kiks.measures.avoidance, moment(wheels=-ahead)) == 0.0
-
-
 def along_wall(seconds: float, counts: Callable[[float], float], x_mm: Callable[[float], float]) -> list[Any]:
     """Return the moments of a robot, ten a second, with counts of the left sensor and a place at each time."""
     moments = []
@@ -256,10 +233,7 @@ def test_lamps_that_do_not_burn_are_none() -> None:
 
 
 @settings(max_examples=50, deadline=None)
-@given(
-    st.lists(st.tuples(st.floats(-500, 500), st.floats(-500, 500)), max_size=8),
-    st.floats(1, 400),
-)
+@given(st.lists(st.tuples(st.floats(-500, 500), st.floats(-500, 500)), max_size=8), st.floats(1, 400))
 def test_groups_and_closeness_follow_from_the_distances_of_pairs(
     places_mm: list[tuple[float, float]], radius_mm: float
 ) -> None:

@@ -107,11 +107,3 @@ def test_arguments_do_not_stand_for_each_other():
 
     drawn = {uniform(*arguments) for arguments in product(range(4), repeat=6)}
     assert len(drawn) == 4**6
-
-
-@settings(derandomize=True, max_examples=200)
-@given(st.tuples(*[st.integers(0, 2**62)] * 6))
-def test_the_same_arguments_draw_the_same_number(arguments):
-    drawn = uniform(*arguments)
-    assert 0.0 <= drawn < 1.0
-    assert uniform(*arguments) == drawn

@@ -164,14 +164,6 @@ def test_current_follows_the_motors() -> None:
     assert robot.execute(b"I,6", sim.now_ns) == b"i,400\r\n"
 
 
-def test_status_names_the_mode() -> None:
-    robot = a_robot()
-    for line, mode in ((b"C,9,9", 1), (b"P,9,9", 2), (b"D,0,0", 0)):
-        robot.execute(line, 0)
-        words = robot.execute(b"K", 0).decode().strip().split(",")
-        assert (words[2], words[5]) == (str(mode), str(mode))
-
-
 # ---- turrets ---------------------------------------------------------------------------------------------------------
 
 

@@ -264,25 +264,6 @@ def test_who_pushes_the_load_aside_turns_the_robot() -> None:
 # ---- lifted ----
 
 
-def test_a_lifted_thing_is_neither_seen_nor_hit() -> None:
-    sim = a_simulation(robots=2)
-    sim.place(2, 300 + TOUCHING_MM + 1 + CYLINDER_MM + RIM_MM + 10, 300, math.pi)
-    sim.fit(2, "k213")
-    closed(sim)
-    seen, picture = sim.proximity(2), sim.image(2)
-    own = sim.proximity(1)
-    ask(sim, "E,100")
-    sim.run(0.7)
-    assert sim.bodies()["is_lifted"][0] == 1
-    assert max(sim.proximity(2)[2:4]) < 0.6 * max(seen[2:4])
-    assert max(sim.proximity(1)[2:4]) < 0.6 * max(own[2:4])
-    assert sim.image(2) != picture
-    kiks.Khepera(sim.port(2)).set_speed(10, 10)
-    sim.run(0.3)
-    assert sim.pose(2)[0] < 380  # it drives through where the cylinder was
-    assert sim.contacts(2) == 0
-
-
 def test_it_puts_down_only_where_there_is_room() -> None:
     sim = holding(robots=2)
     ask(sim, "E,100")
@@ -406,19 +387,6 @@ def test_the_same_carry_again_to_the_bit_and_from_a_snapshot() -> None:
     for world in (sim, other):
         world.run(0.5)
     assert sim.state_hash() == other.state_hash()
-
-
-def test_it_does_not_matter_how_often_one_looks() -> None:
-    hashes = set()
-    for looks in (1, 7, 60):
-        sim = holding(robots=2)
-        tell(sim, "T,1,E,100")
-        tell(sim, "D,12,8")
-        for _ in range(looks):
-            sim.run(1.26 / looks)
-            sim.poses()
-        hashes.add(sim.state_hash())
-    assert len(hashes) == 1
 
 
 # ---- laws ----

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from itertools import pairwise
 
 import numpy as np
@@ -11,8 +10,6 @@ import pytest
 
 import kiks
 from kiks.firmware.k213 import K213, PERIODS_NS
-
-LENGTHS = {"B": 2, "L": 2, "M": 32, "N": 64, "O": 1, "P": 1, "Q,5": 8, "R,5": 16, "S": 32, "T": 16, "U,0": 0}
 
 
 def scene(
@@ -35,15 +32,6 @@ def contrast(image: list[float]) -> float:
 
 
 # ---- orders ----
-
-
-@pytest.mark.parametrize(("order", "count"), LENGTHS.items())
-def test_every_order_has_its_reply(order: str, count: int) -> None:
-    reply = scene()
-    port = reply.port(1)
-    port.write(f"T,2,{order}\n".encode())
-    letter = order[0].lower()
-    assert re.fullmatch(rf"t,2,{letter}(,\d{{1,3}}){{{count}}}\r\n".encode(), port.readline())
 
 
 def test_the_parts_of_an_image_are_those_of_the_whole() -> None:
@@ -77,15 +65,6 @@ def test_other_orders_are_a_protocol_error(order: str) -> None:
     assert robot.send(f"T,2,{order}") == "z,Protocol error"
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("letter", "ABCDEFGHIJKLMNOPQRSTUVWXYZ")
-def test_no_number_breaks_it(letter: str) -> None:
-    firmware = scene().wires[0].firmware
-    for words in ("", ",0", ",-1", ",63", ",64", ",255", ",-99999999999999999999999", ",1,2,3"):
-        reply = firmware.execute(f"T,2,{letter}{words}".encode(), 0)
-        assert reply == b"z,Protocol error\r\n" or reply.startswith(b"t,2," + letter.lower().encode())
-
-
 def test_without_a_camera_there_is_none() -> None:
     sim = kiks.Simulation()
     robot = kiks.Khepera(sim.port(1))
@@ -97,13 +76,6 @@ def test_without_a_camera_there_is_none() -> None:
     sim.fit(1, "k213")
     assert len(robot.image()) == 64
     assert robot.send("net") == "K213 linear vision, ID 2, revision 1.0"
-
-
-def test_a_camera_on_one_robot_is_not_on_the_other() -> None:
-    sim = kiks.Simulation(robots=2)
-    sim.fit(2, "k213")
-    assert kiks.Khepera(sim.port(1)).send("T,2,B") == "z,Turret order not supported"
-    assert len(kiks.Khepera(sim.port(2)).image()) == 64
 
 
 # ---- what it sees ----
@@ -134,17 +106,6 @@ def test_left_and_right_are_mirror_images() -> None:
     image = scene((240, 450, 30, 20, 60), (350, 480, 10, 10, 1)).image(1)
     mirrored = scene((330, 450, 30, 20, 60), (240, 480, 10, 10, 1)).image(1)
     assert image == pytest.approx(mirrored[::-1], abs=1e-6)
-
-
-def test_brighter_walls_are_brighter() -> None:
-    bars = [(0, 430, 600, 20, 255)] + [
-        (230 + 28 * k, 425, 28, 5, grey) for k, grey in enumerate((1, 64, 128, 192, 255))
-    ]
-    image = np.array(scene(*bars).image(1))
-    columns = [round((18 - math.degrees(math.atan2(-(244 + 28 * k - 300), 125))) * 63 / 36) for k in range(5)]
-    greys = [image[min(max(column, 0), 63)] for column in columns[1:4]]
-    assert greys == sorted(greys)
-    assert greys[-1] > greys[0] + 40
 
 
 def test_the_exposure_makes_the_brightest_white_and_the_light_level_tells() -> None:
@@ -309,23 +270,6 @@ def test_the_camera_is_part_of_the_state() -> None:
             assert pictures(sim, first_order=detour) != straight_on
 
 
-def test_the_hash_tells_pictures_and_periods_apart() -> None:
-    sim = scene((200, 480, 95, 20, 1))
-    before = sim.world.state.snapshot()
-    camera = sim.wires[0].firmware.turrets[2]
-    assert isinstance(camera, K213)
-    camera.order("U", (3,))
-    assert sim.state_hash() != before.hash()
-    camera.order("U", (0,))
-    assert sim.state_hash() == before.hash()
-    camera.look(0)
-    assert sim.state_hash() == before.hash()
-    sim.place(1, 300, 300, 0.3)
-    turned = sim.world.state.snapshot()
-    sim.place(1, 300, 300, math.pi / 2)
-    assert sim.state_hash() == before.hash() != turned.hash()
-
-
 def test_a_restart_sets_the_period_of_the_power_on() -> None:
     sim = scene(seed=3)
     robot, camera = kiks.Khepera(sim.port(1)), sim.wires[0].firmware.turrets[2]
@@ -369,17 +313,6 @@ def test_noise_is_bounded_and_without_bias_and_repeats() -> None:
     assert isinstance(other, K213)
     other.look(499_000)
     assert other.pixels != rows[-1]
-
-
-def test_vector_26() -> None:
-    """khepera-protocol.md, section 12."""
-    sim = kiks.Simulation(robot="khepera_ii")
-    sim.fit(1, "k213")
-    port = sim.port(1)
-    port.write(b"T,2,N\n")
-    reply = port.readline()
-    assert re.fullmatch(rb"t,2,n(,\d{1,3}){64}\r\n", reply)
-    assert all(0 <= int(word) <= 255 for word in reply.strip().split(b",")[3:])
 
 
 @pytest.mark.slow

@@ -3,7 +3,7 @@
 import re
 
 import pytest
-from tests.session_player import FOLDER, Pieces, Session, Step, load, play, sessions, simulation
+from tests.session_player import FOLDER, Pieces, Session, Step, play, sessions, simulation
 
 
 @pytest.mark.slow
@@ -36,13 +36,3 @@ def test_every_wrong_reply_is_noticed() -> None:
         port.timeout = 1.0
         with pytest.raises(AssertionError, match=f"session '{session.name}'"):
             play(port, session, wait=port.sleep, clock=lambda port=port: port.sim.time_s)
-
-
-def test_a_line_without_mark_is_refused(tmp_path) -> None:
-    path = tmp_path / "bad.txt"
-    path.write_text("> N\\n\nn,0\n")
-    with pytest.raises(ValueError, match=r"bad\.txt, line 2: a line must begin with one of"):
-        load(path)
-    path.write_text("! speed 3\n")
-    with pytest.raises(ValueError, match=r"bad\.txt, line 1: a setting must be one of"):
-        load(path)

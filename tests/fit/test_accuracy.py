@@ -14,17 +14,7 @@ from tests.at_length import at_length
 from tools.accuracy import accuracy
 from tools.sensors import card as cards
 from tools.sensors import models
-from tools.sensors.card import (
-    FOUND,
-    HALVES,
-    TOLD,
-    Score,
-    data_folder,
-    half_distances_mm,
-    load_tables,
-    make_card,
-    page,
-)
+from tools.sensors.card import FOUND, HALVES, TOLD, Score, data_folder, half_distances_mm, load_tables, make_card, page
 from typer.testing import CliRunner
 
 from kiks.cli.fit import fit, parse_file

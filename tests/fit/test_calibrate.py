@@ -316,12 +316,3 @@ def test_robot_file_round_trip(name: str, tmp_path: Path) -> None:
     assert path.read_text().startswith("# first\n# second\nname = ")
     assert robot_toml(spec) in path.read_text()
     assert [entry.name for entry in tmp_path.iterdir()] == ["robot.toml"]
-
-
-def test_error_for_a_robot_file_that_cannot_be_written(tmp_path: Path) -> None:
-    with pytest.raises(kiks.ParameterError, match="a robot must go to a file that can be written"):
-        save_robot(BASE, tmp_path / "no" / "robot.toml")
-    (tmp_path / "folder").mkdir()
-    with pytest.raises(kiks.ParameterError, match=r"folder' cannot \(it is a folder\)"):
-        save_robot(BASE, tmp_path / "folder")
-    assert [entry.name for entry in tmp_path.iterdir()] == ["folder"]

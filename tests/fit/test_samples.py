@@ -12,16 +12,7 @@ from tools.sensors.train_networks import PLACES
 
 from kiks.engine.sensing.rays import walls_of
 from kiks.errors import ParameterError
-from kiks.fit.samples import (
-    MAXIMUM_COUNTS,
-    RIG_OFFSET_DEG,
-    Fan,
-    Samples,
-    is_active,
-    load_samples,
-    meet,
-    nearnesses,
-)
+from kiks.fit.samples import RIG_OFFSET_DEG, Fan, Samples, is_active, load_samples, meet, nearnesses
 from kiks.model.arena import Arena
 from kiks.model.thesis_networks import BODY_RADIUS_MM
 
@@ -109,19 +100,11 @@ def test_tables_are_read(tmp_path):
         ({"values": None}, "values must be whole numbers from 0 to 1023 [gap, angle, 8], but it is missing."),
         ({"gap_mm": None}, "gap_mm must be finite numbers from 0 to 1e9 [gap], but it is missing."),
         ({"gap_mm": np.array([5])}, "but it had the shape [2, 3, 8], gap = 1, angle = 3."),
-        ({"gap_mm": np.array([5, np.nan])}, "but it was nan at [1]."),
         ({"gap_mm": np.array([-5, 7])}, "but it was -5 at [0]."),
-        ({"gap_mm": np.array([5, np.inf])}, "but it was inf at [1]."),
-        ({"gap_mm": np.array([5, 7j])}, "but it was of type 'complex128'."),
-        ({"gap_mm": np.array([[5], [7]])}, "gap_mm must be finite numbers from 0 to 1e9 [gap], but it had the shape"),
         ({"object_angle_deg_cw": np.array([0, 120, np.nan])}, "object_angle_deg_cw must be finite numbers"),
-        ({"object_angle_deg_cw": np.array(["a", "b", "c"])}, "but it was of type '<U1'."),
         ({"values": np.zeros((2, 3, 7), int)}, "but it had the shape [2, 3, 7]"),
         ({"values": np.full((2, 3, 8), 0.5)}, "but it was 0.5 at [0, 0, 0]."),
         ({"values": np.full((2, 3, 8), 1024)}, "but it was 1024 at [0, 0, 0]."),
-        ({"values": np.full((2, 3, 8), -1)}, "but it was -1 at [0, 0, 0]."),
-        ({"values": np.zeros((0, 3, 8), int), "gap_mm": np.zeros(0)}, "but it had the shape [0]."),
-        ({"values": np.array([None])}, "but it was of type 'object'."),
     ],
 )
 def test_broken_tables_are_told(tmp_path, changes, words):
@@ -131,13 +114,6 @@ def test_broken_tables_are_told(tmp_path, changes, words):
     assert words in str(caught.value)
     assert "wall.npz': " in str(caught.value)
     assert str(caught.value).endswith("See the README of the samples.")
-
-
-@pytest.mark.parametrize("data", [b"", b"8 180 20 5 2\n", b"PK\x03\x04broken"])
-def test_a_table_that_is_none(tmp_path, data):
-    (tmp_path / "wall.npz").write_bytes(data)
-    with pytest.raises(ParameterError, match=r"wall.npz' must be a whole \.npz file of NumPy, but: "):
-        load_samples(tmp_path / "wall.npz")
 
 
 def test_a_header_asks_for_no_memory(tmp_path):
@@ -236,4 +212,3 @@ def test_rays_are_those_of_the_engine(radius_mm, places):
 def test_nothing_in_range_is_nothing():
     samples = Samples("wall", math.inf, np.array([60.0]), np.arange(0.0, 360.0, 10.0)[None], np.zeros((1, 36, 8), int))
     assert nearnesses(samples, Fan.spread(*PLACES["rim"])).max() == 0.0
-    assert MAXIMUM_COUNTS == 1023

@@ -109,14 +109,6 @@ def test_sensors_are_trained_on_samples_and_saved(tmp_path):
         np.testing.assert_allclose(here, there, rtol=1e-5)
     fan = train_networks.fan_of(again)
     np.testing.assert_allclose(np.degrees(fan.direction_rad[2]), [72, 52, 32, 12, -8, -28, -48])
-    # The kernel says what NumPy says.
-    inputs, _ = train_networks.pairs([samples], fan, 5)
-    seen = np.zeros((len(inputs), 8, 7))
-    seen[:, 5] = inputs
-    out = np.empty((len(inputs), 8))
-    kernels.respond_networks(kernels.pack_networks(response), False, seen, out)
-    np.testing.assert_allclose(out[:, 5], np.clip(trained[5](inputs), 0, 1023), atol=0.3)
-    assert not out[:, :5].any()  # nothing near, nothing read
 
 
 def test_tanh():
@@ -156,23 +148,10 @@ def test_kernels_against_numpy():
         np.testing.assert_allclose(out[:, sensor], np.clip(network(seen[:, sensor]), 0, 1023), atol=0.5)
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("", "must be JSON in UTF-8"),
-        ("[" * 100_000, "nested too deeply"),
-        ("[]", "must be a table, but it was []. `python tools/accuracy.py"),
-        ("{}", "mount_angle_deg must be given, but it is missing"),
-        (None, "there is no such file"),
-    ],
-)
-def test_files_that_hold_no_networks(tmp_path, text, words):
-    file = tmp_path / "net.json"
-    if text is not None:
-        file.write_text(text)
-    with pytest.raises(ParameterError) as caught:
-        NetworkResponse.load(file)
-    assert words in str(caught.value)
+def test_a_file_that_holds_no_networks(tmp_path):
+    (tmp_path / "net.json").write_text("[]")
+    with pytest.raises(ParameterError, match=r"must be a table, but it was \[\]. `python tools/accuracy.py"):
+        NetworkResponse.load(tmp_path / "net.json")
 
 
 @pytest.mark.parametrize(

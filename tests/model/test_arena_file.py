@@ -208,24 +208,16 @@ def test_a_lossy_tif_is_refused(tmp_path):
         Arena.load(tmp_path / "a.tif")
 
 
-@pytest.mark.parametrize(("name", "options"), GREY_FORMATS)
+@pytest.mark.parametrize(("name", "options"), [*GREY_FORMATS, ("a.tif", {"compression": "group4"})])
 @pytest.mark.parametrize("share", [0.02, 0.3, 0.6])
 def test_truncated_pictures_are_refused(tmp_path, name, options, share):
     path = tmp_path / name
-    Image.fromarray(np.random.default_rng(0).integers(0, 256, (120, 150), np.uint8)).save(path, **options)
+    picture = np.random.default_rng(0).integers(0, 256, (120, 150), np.uint8)
+    Image.fromarray(picture > 90 if options.get("compression") == "group4" else picture).save(path, **options)
     content = path.read_bytes()
     path.write_bytes(content[: int(len(content) * share)])
     with pytest.raises(ArenaError, match=r"must be (complete and readable|a picture), but"):
         Arena.load(path)
-
-
-@pytest.mark.parametrize("share", [0.02, 0.3, 0.6])
-def test_a_truncated_fax_is_refused(tmp_path, share):
-    Image.fromarray(grey_picture() > 90).save(tmp_path / "a.tif", compression="group4")
-    content = (tmp_path / "a.tif").read_bytes()
-    (tmp_path / "a.tif").write_bytes(content[: int(len(content) * share)])
-    with pytest.raises(ArenaError, match=r"must be (complete and readable|a picture), but"):
-        Arena.load(tmp_path / "a.tif")
 
 
 def bitmap_header(width: int, height: int) -> bytes:
@@ -330,8 +322,6 @@ def test_save_arena_says_why_it_cannot(tmp_path):
 BOX = "size_mm = [300, 200]\n"
 REFUSED = [
     ("size_mm = [1,\n2\nname = 3", r"must be TOML in UTF-8, but: .*line 3.* Correct the file"),
-    ("a = " + "[" * 5000, r"must be TOML in UTF-8, but: "),
-    ("a = 1" + "0" * 5000, r"must be TOML in UTF-8, but: "),
     ("", r"must have a picture or a size, but it has neither. Give picture"),
     ("nmae = 'x'", r"the file must have known keys only, but it has 'nmae'. Did you mean 'name'\? Known are size_mm"),
     (BOX + "[[ball]]\nat_m = [1, 2]", r"ball 1 must have known keys only, but it has 'at_m'. Did you mean 'at_mm'\?"),
@@ -351,45 +341,25 @@ REFUSED = [
     ("picture = 'none.png'", r"Picture '.*none.png' must exist"),
     ("picture = 'a.toml'", r"Picture '.*a.toml' must be a picture"),
     ("picture = ''", r"picture must lie in the folder of the file that names it, or below, but '' leads elsewhere"),
-    ("picture = 'sub'", r"must be a file, but it is a folder"),
-    ("picture = 'sub/maze.png'\nmm_per_pixel = 'x'", r"mm_per_pixel must be a number, but it was 'x'"),
-    ("picture = 'sub/maze.png'\nmm_per_pixel = nan", r"mm_per_pixel must be a finite number"),
     ("size_mm = 3", r"size_mm must be two whole numbers in mm, but it was 3. Give size_mm = "),
-    ("size_mm = [300, inf]", r"size_mm\[1\] must be a whole number, but it was inf"),
-    (
-        "size_mm = [300.5, 200]",
-        r"size_mm\[0\] must be a whole number, but it was 300.5. Boxes are drawn in whole",
-    ),
+    ("size_mm = [300.5, 200]", r"size_mm\[0\] must be a whole number, but it was 300.5. Boxes are drawn in whole"),
     (
         f"size_mm = [1{'0' * 400}, 200]",
         r"size_mm\[0\] must be at most 1000000000, but it was 10{30,60}\.\.\.0{30,60}\. Boxes",
     ),
     ("size_mm = [100000, 200000]", r"at most 64 million cells"),
     (BOX + "brightness = 0", r"brightness must be at least 1, but it was 0. 1 is black"),
-    (BOX + "name = 1", r"name must be a text, but it was 1"),
-    (
-        BOX + "[start]\nat_mm = [50, 50]",
-        r"start must be a list, but it was .* Head each with \[\[start\]\]",
-    ),
+    (BOX + "[start]\nat_mm = [50, 50]", r"start must be a list, but it was .* Head each with \[\[start\]\]"),
     (BOX + "lamp = [1]", r"lamp 1 must be a table, but it was 1. Head each with"),
     (BOX + "[[start]]\nheading_deg = 1", r"start 1: at_mm must be given, but it is missing. Give at_mm = \[x, y\]"),
-    (BOX + "[[start]]\nat_mm = [50]", r"start 1: at_mm must be two numbers in mm, but it was \[50\]"),
     (
         BOX + "[[start]]\nat_mm = [50, 50]\nheading_deg = 'up'",
         r"start 1: heading_deg must be a number, but it was 'up'",
     ),
     (BOX + "[[start]]\nat_mm=[50, 50]\n[[start]]\nat_mm=[1, 1]", r"start 2 must stand on floor, but at \(1, 1\) mm"),
-    (BOX + "[[lamp]]\nat_mm = [500, 50]", r"lamp 1 must lie inside the arena"),
-    (
-        BOX + "[[lamp]]\nat_mm = [50, 50]\npower_w = true",
-        r"lamp 1: power_w must be a number, but it was True",
-    ),
-    (
-        BOX + "[[lamp]]\nat_mm = [50, 50]\npower_w = -1",
-        r"lamp 1: power_w must be greater than 0, but it was -1",
-    ),
+    (BOX + "[[lamp]]\nat_mm = [50, 50]\npower_w = true", r"lamp 1: power_w must be a number, but it was True"),
     (BOX + "[[lamp]]\nat_mm = [50, 50]\nis_on = 1", r"lamp 1: is_on must be true or false, but it was 1"),
-    (BOX + "[[cylinder]]\nat_mm = [0, 0]", r"cylinder 1 must stand on floor"),
+    (BOX + "[[lamp]]\nat_mm = [50, 50]\npower_w = -1", r"lamp 1: power_w must be greater than 0, but it was -1"),
 ]
 
 

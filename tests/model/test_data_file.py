@@ -57,10 +57,7 @@ GOOD = {"name": "a", "wheel": [{"radius_mm": 8}], "spare": {"radius_mm": 8, "sid
         ({"spare": {"radius_mm": True}}, "but it was True."),
         ({"spare": {"radius_mm": 1, "side": "rihgt"}}, "'left' or 'right', but it was 'rihgt'. Did you mean 'rig"),
         ({"spare": {"radius": 8}}, "spare must have known keys only, but it has 'radius'. Did you mean 'radius_mm'?"),
-        (
-            {"spare": {"radius_mm": 8, "gains": [1, 10]}},
-            "spare.gains[1] must be at most 9, but it was 10.",
-        ),
+        ({"spare": {"radius_mm": 8, "gains": [1, 10]}}, "spare.gains[1] must be at most 9, but it was 10."),
         ({"spare": {"radius_mm": 8, "gains": [1] * 4}}, "spare.gains must have at most 3 items, but it was"),
         ({"spare": {"radius_mm": 8, "side": "right", "gains": [1]}}, "gains must be those of the left wheel, but"),
         ({"wheel": [{"radius_mm": 8, "side": "right", "gains": [1]}]}, "wheel 1: gains must be those of the left"),

@@ -36,13 +36,7 @@ def identity(path: Path) -> None:
 
 def result(path: Path) -> None:
     curve = {"generations": 0, "evaluations": (8,), "champion_fitness": (0.5,)}
-    costs = {
-        "fitness": 0.5,
-        "generation": 1,
-        "seconds": 2.0,
-        "population": 8,
-        "seed": 3,
-    }
+    costs = {"fitness": 0.5, "generation": 1, "seconds": 2.0, "population": 8, "seed": 3}
     names = dict.fromkeys(("task", "algorithm", "controller", "kiks"), "name")
     Result(
         result=1,

@@ -2,7 +2,6 @@
 
 import hashlib
 from collections import Counter
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +9,6 @@ from scipy.ndimage import label
 
 from kiks.errors import ArenaError, ParameterError
 from kiks.model.arena import PAD, Arena, Lamp, Pose
-from kiks.model.arena_file import save_arena
 
 KHEPERA_MM = 55.0
 
@@ -109,15 +107,6 @@ def test_the_same_seed_is_the_same_maze_on_every_computer():
     assert np.array_equal(arena.brightness, Arena.maze(columns=6, rows=5, seed=7).brightness)
     assert not np.array_equal(arena.brightness, Arena.maze(columns=6, rows=5, seed=8).brightness)
     assert hashlib.sha256(arena.brightness.tobytes()).hexdigest()[:16] == "de27aa544cbcf8d3"
-
-
-@pytest.mark.parametrize("size", SIZES, ids=str)
-def test_saved_and_loaded_is_equal(tmp_path, size):
-    arena = replace(Arena.maze(**size, seed=2), name='a "maze"')
-    save_arena(arena, tmp_path / "maze.toml")
-    again = Arena.load(tmp_path / "maze.toml")
-    assert np.array_equal(again.brightness, arena.brightness)
-    assert (again.mm_per_cell, again.name, again.starts, again.lamps) == (1.0, arena.name, arena.starts, arena.lamps)
 
 
 @pytest.mark.parametrize(

@@ -45,21 +45,13 @@ def test_a_robot_of_ones_own_drives(tmp_path: Path) -> None:
     [
         ("diameter_mm = 55.0", "diametre_mm = 55.0", "Did you mean 'diameter_mm'"),
         ("diameter_mm = 55.0", "", "body.diameter_mm must be given, but it is missing. Compare it with 'khepera.toml'"),
-        (
-            "diameter_mm = 55.0",
-            "diameter_mm = '55'",
-            "body.diameter_mm must be a number, but it was '55'",
-        ),
+        ("diameter_mm = 55.0", "diameter_mm = '55'", "body.diameter_mm must be a number, but it was '55'"),
         ("diameter_mm = 55.0", "diameter_mm = nan", "body.diameter_mm must be a finite number, but it was nan"),
         ("diameter_mm = 55.0", "diameter_mm = 5", "body.diameter_mm must be at least 10, but it was 5"),
         ("diameter_mm = 55.0", "diameter_mm = ", "must be TOML in UTF-8, but: Invalid value (at line"),
         ("[motor]", "[motors]", "Did you mean 'motor'"),
         ("baud = 9600", "baud = true", "firmware.baud must be a whole number, but it was True"),
-        (
-            "profile_acceleration = 64",
-            "profile_acceleration = 0",
-            "reset.profile_acceleration must be at ",
-        ),
+        ("profile_acceleration = 64", "profile_acceleration = 0", "reset.profile_acceleration must be at "),
         ("speed_gains = [3800, 800, 100]", "speed_gains = [3800, 800]", "reset.speed_gains must have at least 3 items"),
         ('name = "Khepera"', 'name = ""', "name must have at least 1 character, but it was ''. Write: name = "),
         (

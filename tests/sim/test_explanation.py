@@ -178,22 +178,12 @@ def test_a_look_says_what_the_single_questions_say():
             sim.run(0.2371)
             look = sim.look()
             assert (look.poses == sim.poses()).all()
+            assert look.places.tolist() == [list(place) for place in sim.bodies()[["x_mm", "y_mm"]].tolist()]
             for robot in (1, 2, 3):
                 assert look.proximity[robot - 1].tolist() == sim.proximity(robot, noise=True)
                 assert look.ambient[robot - 1].tolist() == sim.ambient(robot, noise=True)
             assert ((look.brightnesses > 0) == (look.met != NOTHING)).all()
             assert (np.isinf(look.lengths_mm) == (look.met == NOTHING)).all()
-
-
-def test_bodies_are_where_they_are_at_the_instant():
-    """In the middle of a tick a body is half way."""
-    sim = Simulation(Arena.box(600, 300))
-    sim.place(1, 60.0, 60.0, 0.0)
-    ball = sim.add_ball(300.0, 100.0, friction_mm_s2=0.0)
-    sim.move_body(ball, 300.0, 100.0, speed_mm_s=100.0)
-    for k in range(1, 9):
-        sim.run(0.0125)
-        assert sim.look().places[0].tolist() == pytest.approx([300.0 + 1.25 * k, 100.0], abs=0.02)
 
 
 def test_asking_changes_nothing():

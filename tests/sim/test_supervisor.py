@@ -138,20 +138,6 @@ def test_lamps_are_added_moved_switched_and_removed(sim):
     assert sim.ambient(1) == dark
 
 
-@pytest.mark.parametrize("add", ["add_ball", "add_cylinder"])
-def test_a_body_hides_a_lamp_and_so_does_a_robot(sim, add):
-    sim.place(1, 300, 300, 0)
-    sim.place(2, 800, 500, 0)
-    sim.add_lamp(600, 300, 25.0)
-    lit = sim.ambient(1)
-    body = getattr(sim, add)(450, 300)
-    assert min(sim.ambient(1)) > min(lit) + 100
-    sim.remove_body(body)
-    assert sim.ambient(1) == lit
-    sim.place(2, 450, 300, 0)
-    assert min(sim.ambient(1)) > min(lit) + 100
-
-
 def test_brightness_shows_in_proximity_and_camera(sim):
     sim.place(1, 300, 300, 0)
     sim.fit(1, "k213")
@@ -166,16 +152,6 @@ def test_brightness_shows_in_proximity_and_camera(sim):
     assert counts[0] > counts[2] + 200
     assert greys == sorted(greys, reverse=True)
     assert sim.proximity(1) == alone
-
-
-def test_a_picture_shows_what_was_put_there_at_its_instant():
-    sim = Simulation(Arena.box(1000, 600, brightness=40), robots=2, seed=3)
-    sim.fit(1, "k213")
-    sim.place(1, 300, 300, 0)
-    sim.add_ball(450, 300)
-    greys = Khepera(sim.port(1)).image()
-    assert max(greys[28:36]) > 200
-    assert max(greys[:8]) < 150
 
 
 def test_poses_paths_and_distances_are_arrays(sim):
@@ -266,16 +242,6 @@ def test_kinds_must_be_as_many_as_robots():
         Simulation(robots=3, robot=["khepera", "khepera_ii"])
     with pytest.raises(ParameterError, match="robots must be a whole number from 1 to 1000, but it was 0"):
         Simulation(robot=[])
-
-
-def test_the_contacts_of_each_robot_are_counted(sim):
-    sim.place(1, 300, 300, 0)
-    sim.place(2, 500, 300, 0)
-    assert (sim.contacts(1), sim.contacts(2)) == (0, 0)
-    sim.port(1).write(b"D,20,20\n")
-    sim.run(3)
-    assert (sim.contacts(1), sim.contacts(2)) == (1, 1)
-    assert sim.pose(2)[0] > 510
 
 
 def test_a_robot_that_comes_changes_nothing_for_those_that_are_there():

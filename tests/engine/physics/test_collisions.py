@@ -237,15 +237,6 @@ def test_a_robot_kicks_a_ball_at_nearly_its_own_speed(speed):
     assert company.velocities[0] == pytest.approx((0.975 * true_speed, 0.0), abs=0.2)  # it may have rolled for a tick
 
 
-def test_a_ball_that_comes_gets_a_quarter_on_top():
-    company = Company(robots=[(300.0, 1000.0, 0.0)], balls=[(900.0, 1000.0, BALL_MM, 0.0)])
-    company.speed(1, 50)
-    company.run(STEADY_S)
-    company.roll(1, -200.0)
-    company.run(2.0)
-    assert company.velocities[0, 0] == pytest.approx(0.975 * 400.0 + 50.0, rel=0.02)
-
-
 @pytest.mark.parametrize("order", [(0, 1, 2, 3, 4), (4, 3, 2, 1, 0), (2, 0, 4, 1, 3)])
 def test_a_row_of_balls_passes_a_hit_on(order):
     """Newton's cradle: the last leaves with what four hits leave, 0.975^4; whatever numbers the balls have."""
@@ -257,22 +248,6 @@ def test_a_row_of_balls_passes_a_hit_on(order):
     assert company.velocities[last] == pytest.approx((0.975**4 * 300.0, 0.0), rel=1e-6)
     assert company.velocities.sum(axis=0) == pytest.approx((300.0, 0.0), rel=1e-9)
     assert company.speeds[first] < 0.03 * 300.0
-
-
-@pytest.mark.parametrize("kinds", [("balls", "balls"), ("balls", "cylinders")])
-def test_two_bodies_in_a_mirror(kinds):
-    for aside in (0.0, 7.0, 31.0):
-        ends = []
-        for sign in (1.0, -1.0):
-            places = {"balls": [], "cylinders": []}
-            for number, kind in enumerate(kinds):
-                places[kind].append((800.0 + 100.0 * number, 1000.0 + sign * aside * number))
-            company = Company(**places)
-            company.roll(1, 400.0)
-            company.roll(2, 0.0, -20.0 * sign)
-            company.run(3.0)
-            ends.append((company.places - (0.0, 1000.0)) * (1.0, sign))
-        assert ends[0] == pytest.approx(ends[1], abs=1e-9)
 
 
 # ---- robots among bodies ----
@@ -377,15 +352,6 @@ def test_robots_that_graze_slide_past_each_other(aside):
     assert first_x > second_x
     assert second_y - first_y >= 2 * ROBOT_MM - DEEPEST_MM
     assert company.sim.contacts(1) == company.sim.contacts(2) == 1
-
-
-def test_a_robot_pushes_a_row_of_cylinders():
-    company = Company(robots=[(300.0, 1000.0, 0.0)], cylinders=[(400.0 + 33.0 * k, 1000.0) for k in range(6)])
-    company.speed(1, 20)
-    for _ in company.tick(1000):
-        gaps = np.diff(company.places[:, 0])
-        assert gaps.min() >= 2 * CYLINDER_MM - DEEPEST_MM
-    assert company.places[5, 0] > 700.0
 
 
 # ---- the same run, however time is cut ----

@@ -37,11 +37,11 @@ def wander(world, rng, ticks):
         yield
 
 
-def check_laws(make_world, arena, draw, ticks):
+def check_laws(make_world, arena, draw, ticks, heading_rad=None):
     rng = np.random.default_rng(draw)
     world = make_world(arena, seed=draw, body__wall_friction=FRICTIONS[draw % 3])
     start = arena.find_start(world.radius)
-    world.place(start.x_mm, start.y_mm, rng.uniform(-4, 4))
+    world.place(start.x_mm, start.y_mm, rng.uniform(-4, 4) if heading_rad is None else heading_rad)
     pose, asked = np.array(world.pose), world.asked
     for _ in wander(world, rng, ticks):
         assert np.isfinite(world.pose).all()
@@ -61,18 +61,10 @@ def test_no_penetration_and_no_energy_from_walls(make_world, make_random_arena, 
     check_laws(make_world, make_random_arena(number), draw, share(300, 500))
 
 
-@pytest.mark.parametrize(("number", "seed", "ticks"), [(864, 864, 90), (133, 133, 170)])
-def test_a_pinch_does_not_shoot_the_robot_out(make_world, make_random_arena, number, seed, ticks):
+@pytest.mark.parametrize(("number", "ticks"), [(864, 90), (133, 170)])
+def test_a_pinch_does_not_shoot_the_robot_out(make_world, make_random_arena, number, ticks):
     """Between a post and a wall the way out along the gradient may be long."""
-    arena = make_random_arena(number)
-    world = make_world(arena, seed=seed, body__wall_friction=FRICTIONS[number % 3])
-    start = arena.find_start(world.radius)
-    world.place(start.x_mm, start.y_mm, start.heading_rad)
-    pose, asked = np.array(world.pose), world.asked
-    for _ in wander(world, np.random.default_rng(number), ticks):
-        got = math.hypot(*(np.array(world.pose) - pose) * (1, 1, HALF_BASE))
-        assert got <= 1.001 * math.hypot(*(world.asked - asked) * PULSE) / math.sqrt(2) + 1e-4
-        pose, asked = np.array(world.pose), world.asked
+    check_laws(make_world, make_random_arena(number), number, ticks, heading_rad=math.pi / 2)
 
 
 def test_no_motion_without_command(make_world, make_random_arena):

@@ -90,14 +90,6 @@ def test_power_follows_the_closed_form_of_the_lag(make_world):
 
 
 @settings(derandomize=True, max_examples=share(100, 200))
-@given(left=PATHS, right=PATHS, heading=st.floats(-50.0, 50.0))
-def test_there_and_back_again(make_world, left, right, heading):
-    world = make_world(FLOOR).place(2000.0, 2000.0, heading)
-    drive(world, [(left, right), (-left, -right)])
-    assert world.pose == pytest.approx((2000.0, 2000.0, heading), rel=0, abs=1e-9)
-
-
-@settings(derandomize=True, max_examples=share(100, 200))
 @given(left=PATHS, right=PATHS, heading=st.floats(-50.0, 50.0), share=st.floats(0.0, 1.0))
 def test_a_moment_within_a_tick_is_where_a_part_of_the_paths_leads(make_world, left, right, heading, share):
     whole = make_world(FLOOR).place(2000.0, 2000.0, heading)

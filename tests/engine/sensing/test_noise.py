@@ -94,11 +94,6 @@ def test_the_noise_of_kiks_2_2_0_is_data() -> None:
     assert -relative.min() == pytest.approx(0.9 * relative.max(), abs=0.01)
 
 
-def test_a_robot_may_have_no_noise() -> None:
-    still = SILENT.with_changes(proximity__noise_small=0.0, proximity__noise_large=0.0)
-    assert len(np.unique(rounds(still, 20, 20), axis=0)) == 1
-
-
 @pytest.mark.parametrize(
     ("key", "value", "words"),
     [

@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 import pytest
-from tests.at_length import share
 from tests.symmetry import mirrored, symmetric
 
 import kiks
@@ -27,28 +26,6 @@ def at_wall(gap_mm: float, *, brightness: int = 255, robot: RobotSpec = QUIET, s
     return sim
 
 
-def read(sim: kiks.Simulation) -> list[int]:
-    robot = kiks.Khepera(sim.port(1))
-    readings = robot.proximity()
-    robot.close()
-    return readings
-
-
-def test_nothing_near_reads_nothing() -> None:
-    sim = kiks.Simulation(kiks.Arena.box(600, 600), robot=QUIET)
-    assert read(sim) == [0] * 8
-    assert sim.proximity(1) == [0.0] * 8
-
-
-@pytest.mark.slow
-def test_nearer_is_more_and_the_front_sees_it() -> None:
-    rows = np.array([sim.proximity(1) for sim in map(at_wall, np.linspace(60, 0, share(16, 61)))])
-    assert np.all(np.diff(rows[:, 1:5], axis=0) >= -1e-9)
-    assert np.all(rows[0] == 0)
-    assert np.all(rows[-1, 2:4] > 900)
-    assert np.all(rows[:, 6:8] == 0)
-
-
 def test_left_and_right_are_mirror_images() -> None:
     left = kiks.Simulation(kiks.Arena.box(600, 600), robot=symmetric(QUIET))
     right = kiks.Simulation(kiks.Arena.box(600, 600), robot=symmetric(QUIET))
@@ -58,23 +35,6 @@ def test_left_and_right_are_mirror_images() -> None:
         left.place(1, x, y, heading)
         right.place(1, 600 - x, y, np.pi - heading)
         assert left.proximity(1) == pytest.approx(mirrored(right.proximity(1)), abs=2.0)
-
-
-def test_a_quarter_turn_of_the_world_changes_nothing() -> None:
-    sim = kiks.Simulation(kiks.Arena.box(600, 600), robot=QUIET)
-    rng = np.random.default_rng(4)
-    for _ in range(50):
-        x, y, heading = rng.uniform(45, 120), rng.uniform(45, 300), rng.uniform(-np.pi, np.pi)
-        sim.place(1, x, y, heading)
-        first = sim.proximity(1)
-        sim.place(1, 600 - y, x, heading + np.pi / 2)
-        assert first == pytest.approx(sim.proximity(1), abs=2.0)
-
-
-def test_darker_is_less() -> None:
-    fronts = [at_wall(20, brightness=brightness).proximity(1)[2] for brightness in (1, 60, 130, 255)]
-    assert fronts == sorted(fronts)
-    assert fronts[0] < 0.6 * fronts[-1]
 
 
 def test_each_sensor_is_sampled_every_20_ms_in_turn() -> None:
@@ -97,14 +57,6 @@ def test_each_sensor_is_sampled_every_20_ms_in_turn() -> None:
         assert all(time % 20 == pytest.approx(2.5 * sensor) for time in times)
 
 
-def test_two_reads_in_a_round_agree_to_the_bit_and_noise_changes_with_the_round() -> None:
-    sim = at_wall(20, robot=RobotSpec.load("khepera"), seed=1)
-    first = sim.proximity(1, noise=True)
-    assert first == sim.proximity(1, noise=True)
-    sim.run(0.05)
-    assert first != sim.proximity(1, noise=True)
-
-
 def test_readings_are_latched_while_they_travel() -> None:
     """The reply to N tells of the instant at which the command acted, not of the one at which it is read."""
     sim = at_wall(20)
@@ -114,13 +66,6 @@ def test_readings_are_latched_while_they_travel() -> None:
     sim.place(1, 300, 300, 0.0)
     readings = [int(word) for word in port.readline().split(b",")[1:]]
     assert max(readings) > 0
-
-
-def test_ambient_is_dark() -> None:
-    sim = kiks.Simulation(seed=3)
-    readings = kiks.Khepera(sim.port(1)).ambient()
-    assert all(440 <= reading <= 460 for reading in readings)
-    assert len(set(readings)) > 2
 
 
 @pytest.mark.slow
