@@ -122,37 +122,11 @@ def test_the_ball_is_where_it_is(ground: float, distance_mm: float, bearing_deg:
 
 
 @pytest.mark.parametrize("grey", [sight.WALL, sight.DIM, sight.BRIGHT])
-def test_what_the_exposure_makes_white_is_no_ball(grey: float) -> None:
-    assert sight.find_ball(seen([grey] * sight.COUNT, shift=sight.BALL - grey)) is None
-
-
-@pytest.mark.parametrize("grey", [sight.WALL, sight.DIM, sight.BRIGHT])
 def test_the_light_level_undoes_the_exposure(grey: float) -> None:
     scene = [sight.WALL] * 10 + [grey] * 12 + [sight.WALL] * 10
     shift = sight.BALL - grey
     greys = sight.smooth(take(scene, shift=shift - 10.0))
     assert sight.exposure(greys, light(scene)) == pytest.approx(shift - 10.0, abs=8.0)
-
-
-def test_a_ball_that_fills_the_picture_touches() -> None:
-    ball = sight.find_ball(seen([sight.BALL] * sight.COUNT))
-    assert ball is not None
-    assert ball.where(None) == (sight.TOUCHING_MM, 0.0)
-
-
-@pytest.mark.parametrize("side", [-1.0, 1.0])
-def test_of_a_ball_at_the_edge_the_distance_is_as_remembered(side: float) -> None:
-    ball = sight.find_ball(seen(ball_at(16.0 * side, 200.0, WALL)))
-    assert ball is not None
-    assert not ball.is_whole
-    distance, bearing = ball.where(200.0)
-    assert distance == pytest.approx(200.0)
-    assert math.degrees(bearing) == pytest.approx(16.0 * side, abs=1.5)
-
-
-def test_the_light_level_of_another_picture_makes_no_ball() -> None:
-    goal = [sight.WALL] * 16 + [sight.BRIGHT] * 16
-    assert sight.find_ball([grey + 110.0 for grey in goal]) is None
 
 
 @pytest.mark.parametrize(("grey", "name"), [(sight.DIM, "dim"), (sight.BRIGHT, "bright")])
@@ -162,11 +136,6 @@ def test_posts_are_told_by_their_goal_and_side(grey: float, name: str) -> None:
     assert (left.goal, left.is_left, right.goal, right.is_left) == (name, True, name, False)
     assert left.bearing_rad == pytest.approx(sight.bearing(11.5), abs=0.01)
     assert right.bearing_rad == pytest.approx(sight.bearing(20.5), abs=0.01)
-
-
-def test_where_the_lens_is_dark_there_is_no_post() -> None:
-    scene = [sight.BRIGHT] * sight.COUNT
-    assert sight.find_edges(seen(scene, shift=70.0), 70.0) == ()
 
 
 def test_the_constants_are_those_of_the_camera() -> None:
@@ -219,12 +188,6 @@ def test_posts_put_the_heading_right() -> None:
             assert place.see(525.0, y, math.atan2(y, 525.0))
     assert place.heading == pytest.approx(0.0, abs=0.01)
     assert math.hypot(place.x, place.y) < 10.0
-
-
-def test_what_cannot_be_a_post_changes_nothing() -> None:
-    place = Whereabouts(Wheels(), 0.0, 0.0, 0.0)  # type: ignore[arg-type]
-    assert not place.see(525.0, 150.0, -0.3)
-    assert (place.x, place.y, place.heading) == (0.0, 0.0, 0.0)
 
 
 def test_a_player_alone_scores_and_knows_where_it_is(capsys: pytest.CaptureFixture[str]) -> None:

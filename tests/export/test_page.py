@@ -246,14 +246,6 @@ def test_what_a_killed_run_has_written_becomes_a_page(short: Path, tmp_path: Pat
     assert f"{Recording(cut).duration_s:.3f} s of simulated time" in found.text
 
 
-@at_length
-def test_a_run_without_time_becomes_a_page(tmp_path: Path) -> None:
-    sim = Simulation(Arena.box(300, 300), seed=1)
-    with sim.record(tmp_path / "none.mcap"):
-        pass
-    assert "0.000 s of simulated time" in Tags(page_of(tmp_path / "none.mcap", tmp_path)).text
-
-
 @pytest.fixture
 def lonely(tmp_path: Path) -> Path:
     """A recording of a ball in a world without a robot."""

@@ -54,14 +54,6 @@ def test_lamps_light_the_floor(recording: Recording, tmp_path: Path) -> None:
     assert (robot[..., 1] - robot[..., 0]).max() > 15
 
 
-def test_the_followed_robot_is_in_the_middle(recording: Recording, tmp_path: Path) -> None:
-    picture = taken(recording, tmp_path, follow=1)
-    rows, columns = np.nonzero(picture[..., 1] - picture[..., 0] > 15)
-    assert len(rows) > 300
-    assert columns.mean() == pytest.approx(80, abs=6)
-    assert rows.mean() == pytest.approx(64, abs=10)
-
-
 @at_length
 def test_robots_have_stripes_and_names_as_in_films(tmp_path: Path) -> None:
     arena = replace(Arena.box(400, 300), starts=(Pose(100, 150, -math.pi / 2), Pose(300, 150, math.pi / 2)))

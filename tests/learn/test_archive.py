@@ -59,21 +59,6 @@ def test_each_algorithm_has_a_name_and_each_task_one_of_them() -> None:
     assert {make().algorithm for make in kiks.tasks.TASKS.values()} <= set(AlgorithmName)
 
 
-@pytest.mark.parametrize("algorithm", cases(ALGORITHMS))
-def test_an_evolution_goes_on_to_the_bit_with_every_algorithm(algorithm: str, tmp_path: Path) -> None:
-    np.random.seed(1)
-    whole = run(algorithm, 6, tmp_path / "whole")
-    np.random.seed(2)
-    run(algorithm, 3, tmp_path / "part")
-    part = run(algorithm, 6, tmp_path / "part")
-    for one, two in zip(whole.generations, part.generations, strict=True):
-        np.testing.assert_array_equal(one.candidates, two.candidates)
-        np.testing.assert_array_equal(one.values, two.values)
-    assert archive_of(whole).elites == archive_of(part).elites
-    for name in ("champion.toml", "archive.parquet"):
-        assert (tmp_path / "whole" / name).read_bytes() == (tmp_path / "part" / name).read_bytes()
-
-
 @pytest.mark.parametrize("algorithm", DIVERSE)
 def test_algorithms_for_many_behaviours_need_axes_and_measures(algorithm: str) -> None:
     with pytest.raises(ParameterError, match="must have axes"):
@@ -259,28 +244,6 @@ def test_the_fitness_of_the_maze_puts_the_goal_before_thrift_and_thrift_before_n
     order = [task.fitness(arrays(*each))[0] for each in ((near, cheap), (near, dear), (far, cheap))]
     assert order == sorted(order, reverse=True)
     assert order[1] > order[2] + 1
-
-
-@pytest.mark.parametrize("algorithm", cases(DIVERSE))
-def test_the_champion_of_the_maze_reaches_the_goal_though_others_are_cheaper(algorithm: str) -> None:
-    task = kiks.tasks.maze()
-    assert task.fitness is not None
-    evolution = kiks.Evolution(task, algorithm, seed=1, population=20)
-    rng = np.random.default_rng(1)
-    for _ in range(6):
-        candidates = evolution.ask()
-        # One parameter decides where a robot ends, and one of ten such places is at the goal, at the greatest cost.
-        across = np.abs(candidates[:, 0] * 1e3 % 1)
-        measured = {
-            "closest_mm": np.where(across < 0.1, 50.0, 1000.0),
-            "final_x_mm": 1800 * across,
-            "final_y_mm": 1800 * rng.uniform(size=len(candidates)),
-            "turned_pulses": 2e5 * (1 - across),
-        }
-        fitness = task.fitness({name: values[:, None] for name, values in measured.items()})
-        evolution.tell(np.column_stack([fitness, *(measured[name] for name in task.measure_names)]))
-    assert evolution.champion.measures["closest_mm"] == 50
-    assert any(elite.values["closest_mm"] == 1000 for elite in archive_of(evolution).elites)
 
 
 # ---- commands ----

@@ -63,19 +63,6 @@ def test_a_champion_lives_in_its_world_again(robot: str | kiks.RobotSpec, tmp_pa
     assert kiks.Champion.load(tmp_path / "other.toml").robot == robot
 
 
-@pytest.mark.parametrize("name", [name for name in kiks.tasks.TASKS if kiks.tasks.load(name).exam])
-def test_the_world_of_a_ready_made_task_survives_its_file(name: str, tmp_path: Path) -> None:
-    task = kiks.tasks.load(name)
-    zeros = (0.0,) * task.parameter_count
-    kiks.Champion(task.controller, zeros, world=task.world()).save(tmp_path / "champion.toml")
-    again = kiks.Champion.load(tmp_path / "champion.toml").world
-    assert again is not None
-    for part in ("starts", "balls", "cylinders", "lamps", "name", "mm_per_cell"):
-        assert getattr(again.arena, part) == getattr(task.world().arena, part), part
-    np.testing.assert_array_equal(again.arena.brightness, task.exam.arenas[0].brightness)
-    assert again.seed == EXAM_SEED
-
-
 def test_the_world_begins_where_the_exam_does() -> None:
     task = kiks.tasks.avoid()
     poses = task.exam.random_starts(EXAM_SEED, robots=1, radius_mm=27.5)[::2, 0]

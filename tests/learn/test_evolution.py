@@ -288,15 +288,6 @@ def test_ready_tasks_can_be_evaluated(name: str) -> None:
     assert (values[0] == values[1]).all()
 
 
-def test_values_do_not_depend_on_other_candidates() -> None:
-    task = small()
-    candidates = np.random.default_rng(1).standard_normal((5, task.parameter_count))
-    seeds = np.array([1, 2, 3, 3, 1])
-    all_at_once = task.evaluate(candidates, seeds, 2)
-    one_by_one = [task.evaluate(candidates[k : k + 1], seeds[k : k + 1], 1)[0] for k in range(5)]
-    assert (all_at_once == np.array(one_by_one)).all()
-
-
 OWN = """
 import kiks
 
@@ -357,17 +348,6 @@ def test_a_champion_equals_the_one_loaded_from_its_file(tmp_path: Path) -> None:
     for name in ("parameters", "task", "fitness", "measures", "generation", "algorithm", "seed", "robot", "timing"):
         assert getattr(again, name) == getattr(champion, name)
     assert again.controller is champion.controller
-
-
-def test_a_champion_drives_on_a_serial_line_as_in_the_batch() -> None:
-    task = small()
-    champion = run("cma").champion
-    sim, ports = champion.simulation(task.arenas[0], seed=7)
-    champion.drive(ports, seconds=2.0)
-    batch = kiks.Batch(task.arenas[0], 1, seed=7, timing=task.timing)
-    path_mm = batch.run(champion.controller, champion.parameters, seconds=2.0, measures=[kiks.measures.path_mm]).values
-    assert sim.travelled_mm(1) == pytest.approx(path_mm[0, 0, 0], abs=20)
-    assert batch.poses[0, 0].tolist()[:2] == pytest.approx(sim.pose(1)[:2], abs=10)
 
 
 @pytest.mark.parametrize(

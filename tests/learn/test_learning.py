@@ -1,4 +1,4 @@
-"""Learning algorithms raise the reward in the environments."""
+"""Rewards of the environments are for robots that do what is wanted."""
 
 from __future__ import annotations
 
@@ -18,34 +18,6 @@ import kiks.learn.gymnasium_envs  # registers the environments
 pytestmark = pytest.mark.slow
 
 ROOT = Path(__file__).parents[2]
-
-
-def returns_of(envs: Any, weights: np.ndarray, steps: int) -> np.ndarray:
-    """Return the reward of an episode for the linear policy of each world, float64 [world, sensor + 1, wheel]."""
-    seen, _ = envs.reset(seed=1)
-    total = np.zeros(envs.num_envs)
-    for _ in range(steps):
-        inputs = np.concatenate([seen, np.ones((envs.num_envs, 1))], axis=1)
-        actions = np.tanh(np.einsum("wi,wio->wo", inputs, weights)).astype(np.float32)
-        seen, rewards, *_ = envs.step(actions)
-        total += rewards
-    return total
-
-
-@pytest.mark.parametrize(("name", "gain_min"), [("kiks/Avoid-v0", 0.3), ("kiks/Follow-v0", 0.1)])
-def test_the_cross_entropy_method_learns(name: str, gain_min: float) -> None:
-    worlds, steps = 64, 150
-    envs = gymnasium.make_vec(name, num_envs=worlds)
-    rng = np.random.default_rng(1)
-    mean, deviation = np.zeros((9, 2)), np.full((9, 2), 2.0)
-    best = []
-    for _ in range(12):
-        weights = mean + deviation * rng.standard_normal((worlds, 9, 2))
-        returns = returns_of(envs, weights, steps)
-        elite = weights[np.argsort(returns)[-12:]]
-        mean, deviation = elite.mean(axis=0), elite.std(axis=0) + 0.05
-        best.append(returns.mean() / steps)
-    assert best[-1] > best[0] + gain_min, best
 
 
 def stand_still(seen: np.ndarray) -> np.ndarray:
@@ -84,14 +56,17 @@ def seek_the_light(seen: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize(
-    ("name", "good", "return_min"),
+    ("name", "good", "return_min", "useless_max"),
     [
-        ("kiks/Follow-v0", follow_the_wall, 200.0),
-        ("kiks/Light-v0", seek_the_light, 250.0),
-        ("kiks/Maze-v0", follow_the_wall, 5.0),
+        ("kiks/Avoid-v0", follow_the_wall, 150.0, 40.0),
+        ("kiks/Follow-v0", follow_the_wall, 200.0, 20.0),
+        ("kiks/Light-v0", seek_the_light, 250.0, 25.0),
+        ("kiks/Maze-v0", follow_the_wall, 5.0, 0.5),
     ],
 )
-def test_rewards_are_for_those_that_do_what_is_wanted(name: str, good: Any, return_min: float) -> None:
+def test_rewards_are_for_those_that_do_what_is_wanted(
+    name: str, good: Any, return_min: float, useless_max: float
+) -> None:
     def mean_return(policy: Any) -> float:
         envs: Any = gymnasium.make_vec(name, num_envs=24, autoreset_mode="SameStep", threads=1)
         seen, _ = envs.reset(seed=1)
@@ -105,7 +80,7 @@ def test_rewards_are_for_those_that_do_what_is_wanted(name: str, good: Any, retu
     assert mean_return(good) > return_min
     assert mean_return(stand_still) == pytest.approx(0.0, abs=1e-9)
     for useless in (spin, act_at_random()):
-        assert mean_return(useless) < 0.1 * return_min
+        assert mean_return(useless) < useless_max
 
 
 @pytest.mark.skipif(

@@ -256,11 +256,6 @@ def test_options_that_do_not_fit_are_errors(options: dict[str, Any], message: st
         kiks.champion_of_policy(**{"policy": PPO, "task": "Avoid"} | options)
 
 
-def test_a_policy_of_too_many_units_is_an_error() -> None:
-    with pytest.raises(kiks.ParameterError, match=r"hidden\[0\] must be at most 512, but it was 513"):
-        kiks.champion_of_policy(network((8, 513, 2)), "Avoid", activation="relu")
-
-
 def test_networks_of_pytorch() -> None:
     torch: Any = pytest.importorskip("torch", reason="PyTorch is not installed")
     for activation, name in ((torch.nn.Tanh, "tanh"), (torch.nn.ReLU, "relu")):

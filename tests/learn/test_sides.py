@@ -214,13 +214,8 @@ def test_a_resumed_evolution_equals_one_that_never_stopped(tmp_path: Path) -> No
     assert whole.tournament is not None
     assert (result.fitness, result.baselines) == (whole.tournament.means[0].max(), None)
     assert result.evaluations == (36, 72, 108, 144)
-    for given, message in (
-        ({"seed": 4}, "the same seed, but they have 3 and 4"),
-        ({"opponents": 4}, "they have 'ga, 3 opponents' and 'ga, 4 opponents'"),
-        ({"task": small(seconds=3.0)}, "but these differ: seconds"),
-    ):
-        with pytest.raises(ParameterError, match=message):
-            evolution_of(tmp_path / "whole", **given)
+    with pytest.raises(ParameterError, match="they have 'ga, 3 opponents' and 'ga, 4 opponents'"):
+        evolution_of(tmp_path / "whole", opponents=4)
 
 
 def test_each_side_has_an_archive_along_the_axes(tmp_path: Path) -> None:
@@ -230,22 +225,9 @@ def test_each_side_has_an_archive_along_the_axes(tmp_path: Path) -> None:
         assert len(archive.elites[0].parameters) == side.parameter_count
 
 
-@pytest.mark.parametrize(
-    ("given", "message"),
-    [
-        ({"task": "pursuit"}, "task must be"),
-        ({"algorithm": "cna"}, "Did you mean 'cma'"),
-        ({"algorithm": "map-elites"}, "must have axes"),
-        ({"population": 3}, "population must be a whole number from 4"),
-        ({"opponents": 0}, "opponents must be a whole number from 1"),
-    ],
-)
-def test_wrong_arguments_are_errors(given: dict[str, Any], message: str) -> None:
-    with pytest.raises(ParameterError, match=message):
-        evolution_of(**given)
-
-
 def test_wrong_calls_are_errors() -> None:
+    with pytest.raises(ParameterError, match="opponents must be a whole number from 1"):
+        evolution_of(opponents=0)
     evolution = evolution_of(population=4, opponents=2)
     with pytest.raises(ParameterError, match="before there is a champion"):
         evolution.champion_of("prey")

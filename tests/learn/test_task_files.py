@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -106,16 +105,6 @@ def test_wrong_files_are_errors_of_one_short_line(text: str, message: str, folde
         load(folder, text).digest()
     assert "\n" not in str(caught.value)
     assert len(str(caught.value).replace(str(folder), "")) < 400
-
-
-@pytest.mark.slow
-def test_an_evolution_resumes_only_with_the_same_task_file(folder: Path) -> None:
-    text = 'base = "avoid"\nseconds = 0.5\nworlds = 1\narenas = ["room.toml"]\n'
-    options: dict[str, Any] = {"population": 4, "folder": folder / "out"}
-    kiks.Evolution(load(folder, text), "ga", **options).run(generations=2)
-    assert len(kiks.Evolution(load(folder, text), "ga", **options).generations) == 2
-    with pytest.raises(kiks.ParameterError, match="but these differ: worlds"):
-        kiks.Evolution(load(folder, text.replace("worlds = 1", "worlds = 2")), "ga", **options)
 
 
 def test_the_example_is_a_task_and_is_quoted_in_the_documentation() -> None:

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import pytest
-from tests.at_length import at_length, cases
+from tests.at_length import at_length
 from tests.cli.test_cli import KIKS
 from tests.guard import GUARD_S
 from tests.script.screen import display
@@ -103,16 +103,13 @@ print(curses.wrapper(main))
 
 PLOT = """
 import matplotlib, time
-matplotlib.use({backend!r})
+matplotlib.use("TkAgg")
 import matplotlib.pyplot as plt
 from matplotlib.animation import FuncAnimation
 figure, axes = plt.subplots()
 for _ in range(4):
     plt.pause(0.25)
 print(round(time.monotonic(), 1))
-"""
-
-ANIMATION = """
 frames = []
 def draw(number):
     frames.append(number)
@@ -184,11 +181,10 @@ def test_waits_of_curses_are_simulated(tmp_path: Path) -> None:
     assert said.startswith("[0.25, 0.5, 1.0]\n")
 
 
-@pytest.mark.parametrize("backend", cases(["Agg", "TkAgg"]))
-def test_plots_pause_in_simulated_time(backend: str, tmp_path: Path, screen: dict[str, str]) -> None:
-    text = PLOT.format(backend=backend) + (ANIMATION if backend == "TkAgg" else "")
-    code, said, told = run(tmp_path, text, screen)
-    assert (code, said) == (0, "1.0\n" + ("10 True\n" if backend == "TkAgg" else "")), told
+@at_length
+def test_plots_pause_in_simulated_time(tmp_path: Path, screen: dict[str, str]) -> None:
+    code, said, told = run(tmp_path, PLOT, screen)
+    assert (code, said) == (0, "1.0\n10 True\n"), told
 
 
 def test_thread_that_waits_for_a_person_ends_the_program(tmp_path: Path) -> None:

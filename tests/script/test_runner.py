@@ -248,22 +248,6 @@ def test_every_clock_tells_the_robots_time(run: Run, capsys: pytest.CaptureFixtu
     assert capsys.readouterr().out == "{7}\nTrue True\n2000-01-01\n"
 
 
-def test_alarm_rings_in_simulated_time(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
-    code, time_s, _ = run("""
-        import signal, time
-        rings = []
-        signal.signal(signal.SIGALRM, lambda number, frame: rings.append(round(time.monotonic(), 3)))
-        signal.setitimer(signal.ITIMER_REAL, 1, 0.5)
-        time.sleep(2.2)
-        signal.setitimer(signal.ITIMER_REAL, 0)
-        signal.alarm(3)
-        signal.pause()
-        print(rings)
-    """)
-    assert (code, round(time_s, 3)) == (0, 5.2)
-    assert capsys.readouterr().out == "[1.0, 1.5, 2.0, 5.2]\n"
-
-
 def test_alarm_without_a_handler_ends_the_program(run: Run) -> None:
     assert run("import signal, time\nsignal.signal(14, signal.SIG_DFL)\nsignal.alarm(2)\ntime.sleep(10)\n")[:2] == (
         128 + signal.SIGALRM,
