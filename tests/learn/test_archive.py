@@ -10,6 +10,7 @@ import pyarrow
 import pytest
 from pyarrow import parquet
 from tests.at_length import cases, share
+from tests.learn.small import small
 from typer.testing import CliRunner
 
 import kiks
@@ -22,11 +23,6 @@ pytestmark = pytest.mark.slow
 
 
 DIVERSE = [str(name) for name, kind in ALGORITHMS.items() if issubclass(kind, Diverse)]
-
-
-def small(**changes: Any) -> kiks.Task:
-    """Return a task that takes 10 ms to evaluate."""
-    return kiks.tasks.avoid(**{"seconds": 1.0, "worlds": 3} | changes)
 
 
 def run(algorithm: str, generations: int = 4, folder: Path | None = None, **changes: Any) -> kiks.Evolution:

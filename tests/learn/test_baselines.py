@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tests.learn.small import small
 
 import kiks
 from kiks.learn.baselines import RANDOM_COUNT, baselines_of
-
-
-def small() -> kiks.Task:
-    return kiks.tasks.avoid(seconds=1.0, worlds=3)
 
 
 def test_baselines_follow_from_task_and_seed_alone() -> None:

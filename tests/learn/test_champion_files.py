@@ -13,12 +13,6 @@ from kiks.learn.exam import EXAM_SEED
 from kiks.model.arena import Ball, Cylinder, Lamp, Pose
 from kiks.model.project import Project, ProjectRobot
 
-
-@kiks.controller(parameters=2)
-def ahead(sensors, memory, parameters, wheels):
-    wheels[:] = parameters
-
-
 LINEAR = kiks.controllers.linear()
 PARAMETERS = tuple(np.linspace(-3, 3, 18).tolist())
 

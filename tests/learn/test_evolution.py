@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from pyarrow import parquet
 from tests.at_length import cases
+from tests.learn.small import small
 
 import kiks
 from kiks import ParameterError
@@ -21,11 +22,6 @@ from kiks.learn.algorithm_name import AlgorithmName
 from kiks.learn.experiment import cautious_mean
 
 pytestmark = pytest.mark.slow
-
-
-def small(**changes: Any) -> kiks.Task:
-    """Return a task that takes 10 ms to evaluate."""
-    return kiks.tasks.avoid(**{"seconds": 1.0, "worlds": 3} | changes)
 
 
 def run(algorithm: str, folder: Path | None = None, executor: Any = None, **given: Any) -> kiks.Evolution:

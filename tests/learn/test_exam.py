@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.learn.small import ahead
 
 import kiks
 from kiks.errors import ParameterError
@@ -13,11 +14,6 @@ from kiks.learn.exam import EXAM_SEED, PASS_SHARE, ExamResult
 from kiks.model.arena import Pose
 
 ROOM = kiks.Arena.box(500, 500)
-
-
-@kiks.controller(parameters=2)
-def ahead(sensors, memory, parameters, wheels):
-    wheels[:] = parameters
 
 
 SLOW = kiks.Champion(ahead, (1, 1))

@@ -16,6 +16,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from tests.at_length import at_length, cases
+from tests.learn.small import small
 
 import kiks
 from kiks import ParameterError
@@ -29,11 +30,6 @@ pytestmark = pytest.mark.slow
 
 def contenders(count: int) -> list[Contender]:
     return [Contender((float(number), 1.0), number + 1) for number in range(count)]
-
-
-def small(**changes: Any) -> kiks.Task:
-    """Return a task that takes 10 ms to evaluate."""
-    return kiks.tasks.avoid(**{"seconds": 1.0, "worlds": 3} | changes)
 
 
 def evolution_of(algorithm: str = "cma", folder: Path | None = None, **given: Any) -> kiks.Evolution:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from tests import forked
+from tests.learn.small import ahead
 
 import kiks
 from kiks.cli.job import CONTESTS
@@ -23,11 +24,6 @@ from kiks.model.shipped import shipped
 pytestmark = pytest.mark.slow
 
 MEASURES = (goals, ball_ahead, ball_gain)
-
-
-@kiks.controller(parameters=2)
-def ahead(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
-    wheels[0], wheels[1] = parameters[0], parameters[1]
 
 
 def before_goal(side: int) -> Arena:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.learn.small import ahead
 
 import kiks
 from kiks.learn.exam import IMPERFECT, imperfect_robots
@@ -101,11 +102,6 @@ def test_champions_of_a_family_drive_its_first_robot(tmp_path: Any) -> None:
 
 
 # ---- exams ----
-
-
-@kiks.controller(parameters=2)
-def ahead(sensors, memory, parameters, wheels):
-    wheels[:] = parameters
 
 
 def exam_of() -> kiks.Exam:
