@@ -28,15 +28,10 @@ from tests.served import PROGRAMS
 pytestmark = pytest.mark.slow
 
 CORPUS = {path.stem: str(path) for path in sorted((PROGRAMS / "corpus").glob("*.py"))}
-ON_TERMINAL, EACH_ALONE, INTO_FILE = (
-    str(PROGRAMS / f"{name}.py") for name in ("on_terminal", "each_alone", "into_file")
-)
+EACH_ALONE, INTO_FILE = (str(PROGRAMS / f"{name}.py") for name in ("each_alone", "into_file"))
 
 AGAIN = set(share(list(CORPUS)[::3], list(CORPUS)))
 """Programs that run alone a second time."""
-
-WITH_TERMINAL = {"curses_panel"}
-"""The desk gives programs no terminal, so there such a program has nowhere to draw."""
 
 AT_ONCE = 2
 """Simulated runs at the same time: one a core."""
@@ -72,26 +67,13 @@ def on_screen(environment: Mapping[str, str]) -> dict[str, str]:
 def run_alone(folder: Path, environment: Mapping[str, str], again: Collection[str]) -> tuple[Runs, Runs]:
     """Run each program by `kiks run`, some twice; return what it said each time, with the state at its end."""
     runs = {f"{name}.{time}": name for name in CORPUS for time in (1, 2) if time == 1 or name in again}
-    plain = [shlex.join([run, CORPUS[name]]) for run, name in runs.items() if name not in WITH_TERMINAL]
-    command = [sys.executable, EACH_ALONE, str(folder), str(AT_ONCE), "--seed", SEED, "--", *plain]
+    words = [shlex.join([run, CORPUS[name]]) for run, name in runs.items()]
+    command = [sys.executable, EACH_ALONE, str(folder), str(AT_ONCE), "--seed", SEED, "--", *words]
     subprocess.run(command, env=dict(environment), timeout=280, check=True, stdin=subprocess.DEVNULL)
     first, second = (
-        {
-            name: tuple((folder / f"{name}.{time}.{kind}").read_text() for kind in ("out", "err"))
-            for name in names
-            if name not in WITH_TERMINAL
-        }
+        {name: tuple((folder / f"{name}.{time}.{kind}").read_text() for kind in ("out", "err")) for name in names}
         for time, names in ((1, CORPUS), (2, again))
     )
-    for runs, names in ((first, CORPUS), (second, again)):
-        for name in WITH_TERMINAL.intersection(names):
-            words = [sys.executable, ON_TERMINAL, *KIKS, "run", "--seed", SEED, CORPUS[name]]
-            done = subprocess.run(words, env=dict(environment), timeout=GUARD_S, check=True, stdout=PIPE, text=True)
-            # On a terminal both go to the same place.
-            lines = done.stdout.splitlines(keepends=True)
-            runs[name] = tuple(
-                "".join(each for each in lines if each.startswith("kiks: ") is ours) for ours in (False, True)
-            )
     return first, second
 
 
@@ -148,7 +130,7 @@ def run_together(
 def test_programs_do_the_same_on_the_desk(
     alone: tuple[Runs, Runs], tmp_path: Path, environment: dict[str, str]
 ) -> None:
-    names = [name for name in CORPUS if name not in WITH_TERMINAL]
+    names = list(CORPUS)
     groups = [names[start : start + GROUP] for start in range(0, len(names), GROUP)]
     with ThreadPoolExecutor(AT_ONCE) as pool:
         on_desk = [
@@ -203,8 +185,6 @@ def run_real(name: str, ports: Mapping[str, str], environment: Mapping[str, str]
         "find_port": [device],
     }.get(name, [device])
     command = [sys.executable, CORPUS[name], *arguments]
-    if name in WITH_TERMINAL:
-        command = [sys.executable, ON_TERMINAL, *command]
     done = subprocess.run(
         command,
         env=dict(environment),
