@@ -166,22 +166,6 @@ def test_ray_repeats_the_work_of_lost_workers_on_loopback_alone(ray: Any, tmp_pa
 
 
 @at_length
-def test_work_of_a_lost_computer_is_done_on_the_others(ray: Any) -> None:
-    from ray.cluster_utils import Cluster
-
-    node = {"num_cpus": 1, "node_ip_address": "127.0.0.1", "object_store_memory": 80 * 2**20}
-    cluster = Cluster(initialize_head=True, head_node_args={**node, "include_dashboard": False})
-    second = cluster.add_node(**node)
-    try:
-        with RayExecutor(cluster.address) as executor:
-            check_values(executor)
-            cluster.remove_node(second, allow_graceful=False)
-            check_values(executor)
-    finally:
-        cluster.shutdown()
-
-
-@at_length
 def test_ctrl_c_ends_all_workers(ray: Any, tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "program.py").write_text(

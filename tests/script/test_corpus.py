@@ -54,14 +54,14 @@ Runs = dict[str, tuple[str, str]]
 
 @pytest.fixture(scope="module")
 def environment() -> Iterator[dict[str, str]]:
-    """What programs find in their environment: a screen for windows and none for sound."""
+    """What programs find in their environment: a screen for windows."""
     with display() as found:
         yield on_screen(found)
 
 
 def on_screen(environment: Mapping[str, str]) -> dict[str, str]:
-    """Return the environment of programs on a screen: they have no sound, and write at once."""
-    return {**environment, "SDL_AUDIODRIVER": "dummy", "PYTHONUNBUFFERED": "1"}
+    """Return the environment of programs on a screen: they write at once."""
+    return {**environment, "PYTHONUNBUFFERED": "1"}
 
 
 def run_alone(folder: Path, environment: Mapping[str, str], again: Collection[str]) -> tuple[Runs, Runs]:

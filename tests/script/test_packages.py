@@ -163,31 +163,6 @@ with tempfile.NamedTemporaryFile() as first, open(first.name) as second:
 kiks: a program in simulated time must wait by time.sleep, a lock or a port, but it waited by itself (program.py, line 4). Run it on kiks serve, where time is real.
 """,
     ),
-    "http.server": (
-        r"""
-import http.server, threading, time, urllib.request
-class Handler(http.server.BaseHTTPRequestHandler):
-    def log_message(self, *args):
-        print(self.log_date_time_string())
-    def do_GET(self):
-        time.sleep(1)
-        self.send_response(200)
-        self.end_headers()
-        self.wfile.write(self.path.encode())
-server = http.server.ThreadingHTTPServer(("localhost", 0), Handler)
-threading.Thread(target=server.serve_forever).start()
-with urllib.request.urlopen(f"http://localhost:{server.server_port}/speed", timeout=5) as answer:
-    print(answer.read(), answer.headers["Date"], round(time.monotonic(), 1))
-server.shutdown()
-server.server_close()
-print(round(time.monotonic(), 1))
-""",
-        """\
-01/Jan/2000 00:00:01
-b'/speed' Sat, 01 Jan 2000 00:00:01 GMT 1.0
-1.5
-""",
-    ),
     "logging": (
         r"""
 import logging, logging.handlers, os, tempfile, time
@@ -253,18 +228,6 @@ print(queue.get())
 """,
         """\
 1
-""",
-    ),
-    "multiprocessing.pool": (
-        r"""
-from multiprocessing.pool import ThreadPool
-from multiprocessing.dummy import Pool
-import time
-with ThreadPool(3) as pool:
-    print(pool.map(lambda left: time.sleep(left), [1, 2, 3]), round(time.monotonic(), 1))
-""",
-        """\
-[None, None, None] 3.0
 """,
     ),
     "numpy": (

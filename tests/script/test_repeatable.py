@@ -1,4 +1,4 @@
-"""The same program is the same run, whatever has become of compiled code."""
+"""The same program is the same run, whatever Python draws by chance, and whatever has become of compiled code."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ print(port.readline(), list({"left", "right", "front", "back"}), uuid.uuid4())
 """
 
 
-def run(folder: Path, *words: str, **surroundings: str) -> tuple[int, str, list[str]]:
+def run(folder: Path, **surroundings: str) -> tuple[int, str, list[str]]:
     """Run a program that wanders by chance; return its exit code, what it has said, and the lines of KiKS."""
     (folder / "wander.py").write_text(WANDER)
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONHASHSEED"} | surroundings
-    command = [*KIKS, "run", *words, str(folder / "wander.py")]
+    command = [*KIKS, "run", str(folder / "wander.py")]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=3 * GUARD_S, check=False)
     return done.returncode, done.stdout, done.stderr.splitlines()
 
@@ -51,3 +51,30 @@ def test_a_kernel_is_compiled_while_a_program_runs(is_there: bool, tmp_path: Pat
     assert (code, said, told[is_there:]) == run(tmp_path)
     assert [line.split(" in ")[0] for line in told[:is_there]] == ["kiks: Damaged files"] * is_there
     assert list((tmp_path / "cache").rglob("kiks.engine.physics.motor.set_speed-*.code"))
+
+
+DRAWS = """
+import numpy as np, os, random, secrets, uuid
+print([random.random(), str(uuid.uuid4()), os.urandom(3), secrets.token_hex(4), np.random.rand(),
+       np.random.default_rng().random(), random.Random().random(), random.SystemRandom().random(), random.random()],
+      list({"left", "right", "front", "back", "none"}))
+"""
+
+
+def said(folder: Path, *words: str) -> list[str]:
+    """Return what programs print, by the number of the program, without labels."""
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONHASHSEED"}
+    done = subprocess.run(
+        [*KIKS, "run", *words], cwd=folder, env=environment, capture_output=True, text=True, timeout=GUARD_S, check=True
+    )
+    return [line.partition("| ")[2] or line for line in sorted(done.stdout.splitlines())]
+
+
+def test_chance_follows_from_the_seed(tmp_path: Path) -> None:
+    (tmp_path / "draws.py").write_text(DRAWS)
+    (alone,), (again,) = said(tmp_path, "draws.py"), said(tmp_path, "draws.py")
+    first, second = said(tmp_path, "draws.py", "draws.py")
+    (other,) = said(tmp_path, "--seed", "1", "draws.py")
+    assert alone == again == first
+    assert len({alone.partition("]")[0], second.partition("]")[0], other.partition("]")[0]}) == 3
+    assert len({each.partition("]")[2] for each in (alone, second, other)}) == 1
