@@ -1,7 +1,5 @@
 """`kiks arena`: files made, files described, files left alone."""
 
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -99,14 +97,6 @@ def test_errors_are_clear_and_nothing_is_written(tmp_path, monkeypatch, argument
         kiks_arena(*arguments)
     assert words in str(error.value)
     assert not list(tmp_path.iterdir())
-
-
-def test_an_error_is_one_line_for_a_person(tmp_path):
-    command = [sys.executable, "-m", "kiks", "arena", "info", "nothing.toml"]
-    result = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, check=False)
-    assert result.returncode == 2
-    assert result.stderr.startswith("kiks: Arena file 'nothing.toml' must exist")
-    assert len(result.stderr.splitlines()) == 1
 
 
 def test_info_of_an_example():

@@ -323,18 +323,6 @@ def test_a_new_scene_replaces_the_old_one(visit: Callable[..., Visit]) -> None:
 
 
 @at_length
-def test_things_are_dragged_in_three_dimensions_too(visit: Callable[..., Visit]) -> None:
-    here = visit("view=solid")
-    here.wait("() => kiksDesk.isSolid()")
-    x_mm, y_mm, _ = here.pose(1)
-    here.drag((x_mm, y_mm), (x_mm + 50, y_mm + 30))
-    said = here.heard("(said) => said.some((message) => message.kind === 'drop')")
-    assert said[0] == {"kind": "grab", "what": "robot", "index": 1}
-    moved = last(said, "move")
-    assert (moved["x_mm"], moved["y_mm"]) == pytest.approx((x_mm + 50, y_mm + 30), abs=1)
-
-
-@at_length
 def test_without_webgl_the_top_view_works(visit: Callable[..., Visit], browser_without_3d: Browser) -> None:
     here = visit("view=both", by=browser_without_3d)
     here.wait("() => document.querySelector('[data-testid=arena-solid]').textContent.includes('needs WebGL 2')")

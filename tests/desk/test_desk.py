@@ -5,12 +5,9 @@ from __future__ import annotations
 import math
 
 import pytest
-from playwright.sync_api import Browser, expect
+from playwright.sync_api import expect
 from tests.at_length import at_length
 from tests.desk.visitor import Visitor
-from tests.desk.visits import NewPage
-
-from kiks.desk.server.show import Shown
 
 pytestmark = pytest.mark.slow
 
@@ -114,67 +111,6 @@ def test_robot_is_dragged_and_slides_along_a_wall(visitor: Visitor) -> None:
     assert heading_rad == 0
 
 
-@at_length
-def test_robot_is_turned_by_its_rim(visitor: Visitor) -> None:
-    visitor.pull((150 + 25.5, 200), (150, 260))
-    assert visitor.until(lambda: visitor.sim.pose(1)[2] == pytest.approx(math.pi / 2, abs=0.02))
-    visitor.picture("turned")
-    visitor.let_go()
-    assert visitor.sim.pose(1)[:2] == pytest.approx((150, 200))
-
-
-@at_length
-def test_ball_and_lamp_are_dragged(visitor: Visitor) -> None:
-    visitor.pull((300, 100), (350, 200))
-    visitor.until(lambda: math.dist(visitor.sim.bodies()[0][["x_mm", "y_mm"]].item(), (350, 200)) < 1)
-    visitor.let_go()
-    visitor.pull((80, 340), (250, 300))
-    visitor.until(lambda: math.dist(visitor.sim.lamps[0][:2], (250, 300)) < 1)
-    visitor.picture("ball_and_lamp_dragged")
-    visitor.let_go()
-
-
-@at_length
-def test_keys_alone_move_and_turn(visitor: Visitor) -> None:
-    for _ in range(60):
-        visitor.page.keyboard.press("Tab")
-        if visitor.answer("document.activeElement.dataset.testid") == "arena-top":
-            break
-    visitor.page.keyboard.press("n")
-    expect(visitor.page.locator(".kiks-live")).to_contain_text("robot 1 selected")
-    for key in ("ArrowRight", "ArrowRight", "Shift+ArrowUp"):
-        visitor.page.keyboard.press(key)
-    assert visitor.until(lambda: visitor.sim.pose(1)[:2] == pytest.approx((170, 201), abs=0.01))
-    visitor.page.keyboard.press("q")
-    assert visitor.until(lambda: visitor.sim.pose(1)[2] == pytest.approx(math.radians(5), abs=1e-3))
-    for _ in range(2):
-        visitor.page.keyboard.press("e")
-    assert visitor.until(lambda: math.remainder(visitor.sim.pose(1)[2], math.tau) < -0.08)
-    visitor.picture("moved_by_keys")
-    visitor.page.keyboard.press("Space")
-    visitor.until(lambda: visitor.desk.gate.is_paused)
-
-
-@at_length
-def test_two_browsers_see_one_world_and_both_drag(visitor: Visitor, new_page: NewPage) -> None:
-    other = Visitor(new_page(), visitor.shown)
-    visitor.pull((150, 200), (150, 300))
-    other.pull((450, 300), (400, 200))
-    visitor.until(lambda: visitor.sim.pose(1)[1] == pytest.approx(300, abs=1))
-    other.until(lambda: other.sim.pose(2)[1] == pytest.approx(200, abs=1))
-    for one in (visitor, other):
-        for robot in (1, 2):
-            one.until(lambda one=one, robot=robot: one.seen(robot) == pytest.approx(one.sim.pose(robot), abs=0.01))
-    other.picture("two_browsers_drag")
-    other.page.mouse.up()
-    other.pull((150, 300), (160, 310))
-    expect(other.at("arena-notice")).to_contain_text("one hand must let go")
-    visitor.page.mouse.up()
-    other.page.mouse.up()
-    other.at("run").click()
-    expect(visitor.at("run")).to_have_attribute("aria-label", "Run")
-
-
 # ---- views ----
 
 
@@ -215,33 +151,3 @@ def test_3d_view_shows(visitor: Visitor) -> None:
     expect(visitor.at("arena-solid").locator("canvas")).to_be_visible()
     visitor.until(lambda: visitor.answer("kiksDesk.stats().solid_frames") > 5)
     visitor.picture("both_views")
-
-
-@at_length
-def test_without_webgl_the_desk_shows_the_top_view(
-    new_page: NewPage, shown: Shown, browser_without_3d: Browser
-) -> None:
-    visitor = Visitor(new_page(by=browser_without_3d), shown)
-    visitor.at("views").get_by_text("both").click()
-    expect(visitor.at("arena-solid")).to_contain_text("needs WebGL 2")
-    visitor.drag((150, 200), (200, 200))
-    assert visitor.sim.pose(1)[0] == pytest.approx(200, abs=1)
-    visitor.picture("without_webgl")
-
-
-@at_length
-def test_a_hidden_page_gets_frames_again_when_visible(visitor: Visitor) -> None:
-    hide = """(isHidden) => {
-        Object.defineProperty(document, 'hidden', { value: isHidden, configurable: true });
-        document.dispatchEvent(new Event('visibilitychange'));
-    }"""
-    received = "kiksDesk.stats().frames_received"
-    visitor.answer(hide, True)
-    at_most = visitor.answer(received) + 4
-    begun_ns = visitor.sim.now_ns
-    visitor.until(lambda: visitor.sim.now_ns > begun_ns + 1_000_000_000)
-    assert visitor.answer(received) <= at_most
-    visitor.sim.place(1, 300, 300, 1.0)
-    visitor.answer(hide, False)
-    visitor.until(lambda: visitor.seen(1) == pytest.approx((300, 300, 1.0), abs=1e-3))
-    visitor.picture("awake_again")

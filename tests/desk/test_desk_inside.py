@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import re
 
-import numpy as np
 import pytest
 from playwright.sync_api import expect
 from tests.at_length import at_length
@@ -29,21 +28,6 @@ def test_click_on_a_robot_opens_its_monitor(visitor: Visitor) -> None:
     expect(visitor.at("facts")).to_contain_text("x 450.0, y 300.0 mm")
     expect(visitor.at("turret-words")).to_have_text("Gripper (turret 1): holds nothing")
     visitor.picture("monitor_by_click")
-
-
-@at_length
-def test_reading_of_a_sensor_is_explained(visitor: Visitor) -> None:
-    visitor.drag((150, 200), (45, 200))
-    visitor.drag((45 + 25.5, 200), (45, 260))
-    visitor.pause()
-    visitor.at("proximity-0").click()
-    count = visitor.sim.explain(1, 0).count
-    assert count > 100
-    expect(visitor.at("explanation")).to_contain_text(f"Why does it read {count}?")
-    expect(visitor.at("proximity-0")).to_have_text(str(count))
-    expect(visitor.at("explanation-table").locator("tbody tr")).to_have_count(7)
-    visitor.at("explanation").scroll_into_view_if_needed()
-    visitor.picture("why")
 
 
 @at_length
@@ -102,26 +86,6 @@ def test_commands_typed_faster_than_the_page_is_answered_all_arrive(visitor: Vis
 # ---- Programs ----
 
 
-@at_length
-def test_example_drives_prints_and_is_stopped(visitor: Visitor) -> None:
-    visitor.tab("programs")
-    visitor.choose("script", "example: avoid")
-    expect(visitor.page.locator(".cm-content")).to_contain_text("Braitenberg")
-    visitor.at("run-program").click()
-    expect(visitor.at("programs")).to_contain_text("avoid.py on robot 1: running")
-    visitor.until(lambda: math.dist(visitor.sim.pose(1)[:2], (150, 200)) > 5)
-    visitor.picture("program_runs")
-    visitor.at("stop").click()
-    expect(visitor.at("programs")).to_contain_text("avoid.py on robot 1: stopped")
-    visitor.told("program 1 (avoid.py) was stopped.")
-    visitor.until(lambda: setpoints(visitor) == [0, 0])
-    visitor.choose("script", "example: first steps")
-    expect(visitor.page.locator(".cm-content")).to_contain_text("First steps")
-    visitor.at("run-program").click()
-    expect(visitor.at("output")).to_contain_text("What the eight sensors see")
-    visitor.picture("program_has_printed")
-
-
 # ---- above the arena ----
 
 
@@ -164,38 +128,6 @@ def test_delete_removes_what_is_selected(visitor: Visitor) -> None:
     visitor.page.keyboard.press("Delete")
     visitor.until(lambda: len(visitor.sim.bodies()) == 1)
     assert visitor.sim.robot_count == 2
-
-
-@at_length
-def test_wall_is_drawn_saved_and_opened_again(visitor: Visitor) -> None:
-    visitor.tab("arena")
-    before = visitor.sim.arena.brightness.copy()
-    visitor.take("rectangle")
-    visitor.drag((250, 200), (320, 280))
-    visitor.until(lambda: visitor.sim.arena.brightness[240, 290] == 255)
-    visitor.at("undo").click()
-    visitor.until(lambda: np.array_equal(visitor.sim.arena.brightness, before))
-    visitor.at("redo").click()
-    visitor.until(lambda: visitor.sim.arena.brightness[240, 290] == 255)
-    visitor.picture("wall_drawn")
-    visitor.take("hand")
-    visitor.drag((150, 200), (200, 320))
-    saved, poses = visitor.sim.arena.brightness.copy(), visitor.sim.poses()
-    visitor.at("save-name").fill("mine")
-    visitor.at("save").click()
-    visitor.told("Saved as mine.kiks.")
-    visitor.at("example-name").scroll_into_view_if_needed()
-    visitor.at("open-example").click()
-    visitor.told("Opened ")
-    visitor.until(lambda: visitor.sim.arena.brightness.shape != saved.shape)
-    visitor.choose("open-name", "mine.kiks")
-    visitor.at("open").click()
-    visitor.until(lambda: visitor.sim.arena.brightness.shape == saved.shape)
-    assert np.array_equal(visitor.sim.arena.brightness, saved)
-    assert visitor.sim.poses() == pytest.approx(poses, abs=1e-3)
-    assert (len(visitor.sim.bodies()), len(visitor.sim.lamps)) == (2, 1)
-    visitor.page.wait_for_function("() => kiksDesk.scene().robots.length === 2 && kiksDesk.pose(1)")
-    visitor.picture("opened_again")
 
 
 # ---- Settings ----
@@ -259,15 +191,3 @@ def test_wrong_setting_gets_a_clear_message(visitor: Visitor) -> None:
     visitor.told("seed must be a whole number, but it was 1.5.")
     visitor.picture("wrong_setting")
     assert visitor.sim is old
-
-
-@at_length
-def test_start_over_restores_the_initial_state(visitor: Visitor) -> None:
-    visitor.drag((150, 200), (250, 250))
-    visitor.until(lambda: visitor.sim.now_ns > 500_000_000)
-    old = visitor.sim
-    visitor.tab("settings")
-    visitor.at("start-over").click()
-    visitor.told("Started over.")
-    assert visitor.sim is not old
-    assert visitor.sim.pose(1) == (150, 200, 0)

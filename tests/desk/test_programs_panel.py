@@ -73,15 +73,6 @@ def test_loop_that_asks_for_nothing_is_told_on_the_page_while_time_stands_still(
     expect(at(page, "programs")).to_contain_text("stopped")
 
 
-@at_length
-def test_example_runs_and_its_output_is_shown(page: Page) -> None:
-    at(page, "run-program").click()
-    expect(at(page, "output")).to_contain_text("What the eight sensors see")
-    expect(at(page, "programs")).to_contain_text("first_steps.py on robot 1: ended with exit code 0")
-    expect(at(page, "wire")).to_contain_text("→ D,5,5\\n")
-    expect(at(page, "wire")).to_contain_text("← d\\r\\n")
-
-
 def test_program_is_written_saved_run_and_stopped(page: Page, address: str, folder: Path) -> None:
     at(page, "new-program").click()
     at(page, "name").fill("mine")
