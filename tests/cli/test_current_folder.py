@@ -21,6 +21,8 @@ pytestmark = pytest.mark.slow
 KIKS = str(Path(sys.executable).with_name("kiks"))
 WANDER = str(PROGRAMS / "wander.py")
 
+EVOLVE = ("evolve", "--generations", "1", "--population", "4", "--out", "OUT/evolved")
+
 COMMANDS = {
     "run": ("run", "--record", "OUT/run.mcap", WANDER, WANDER),
     "figures": ("export", "OUT/sound.mcap", "OUT/plot.png", "--kind", "figures"),
@@ -30,18 +32,8 @@ COMMANDS = {
     "film": ("export", "OUT/sound.mcap", "OUT/film.gif"),
     "table": ("export", "OUT/sound.mcap", "OUT/poses.csv"),
     "demo": ("demo", "clean", "--seconds", "1", "--export", "OUT/clean.png"),
-    "evolve": ("evolve", "--generations", "1", "--population", "4", "--out", "OUT/evolved"),
-    "evolve on Ray": (
-        "evolve",
-        "--generations",
-        "1",
-        "--population",
-        "4",
-        "--out",
-        "OUT/evolved",
-        "--cluster",
-        "local",
-    ),
+    "evolve": EVOLVE,
+    "evolve on Ray": (*EVOLVE, "--cluster", "local"),
     "arena": ("arena", "maze", "OUT/maze.toml"),
     "warmup": ("warmup",),
     "schema": ("schema", "robot"),

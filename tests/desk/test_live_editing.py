@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable, Iterator
+from collections.abc import Awaitable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -21,6 +21,13 @@ from kiks.model.project import Project, ProjectRobot
 from kiks.ports.programs import Programs
 from kiks.sim.from_project import simulation_of
 from kiks.sim.simulation import Simulation
+
+pytestmark = pytest.mark.anyio
+
+
+@pytest.fixture
+def anyio_backend() -> str:
+    return "asyncio"
 
 
 @pytest.fixture
@@ -48,14 +55,9 @@ def desk(tmp_path: Path) -> Iterator[Desk]:
         host.close()
 
 
-def in_order(desk: Desk, *acts: Callable[[Editing], Awaitable[None]]) -> Editing:
-    async def do() -> Editing:
-        editing = Editing(desk)
-        for act in acts:
-            await act(editing)
-        return editing
-
-    return asyncio.run(do())
+@pytest.fixture
+def editing(desk: Desk) -> Editing:
+    return Editing(desk)
 
 
 def line(editing: Editing) -> Awaitable[None]:
@@ -66,12 +68,12 @@ def counts(desk: Desk) -> tuple[int, int, int]:
     return desk.sim.robot_count, len(desk.sim.bodies()), len(desk.sim.lamps)
 
 
-def test_walls_appear_in_the_running_world(desk):
+def test_walls_appear_in_the_running_world(desk, editing):
     sim, scene = desk.sim, desk.scene
     sim.port(1).write(b"D,5,5\n")
     sim.run(1.0)
     time_s, pose = sim.time_s, sim.pose(1)
-    in_order(desk, line)
+    asyncio.run(line(editing))
     assert desk.sim is sim
     assert (sim.time_s, sim.pose(1)) == (time_s, pose)
     assert sim.arena.brightness[100, 200] == 255
@@ -80,41 +82,36 @@ def test_walls_appear_in_the_running_world(desk):
     assert sim.pose(1)[0] == pytest.approx(197 - 27.5, abs=0.2)
 
 
-def test_undo_and_redo_change_the_world(desk):
+async def test_undo_and_redo_change_the_world(desk, editing):
     sim = desk.sim
     before = sim.arena.brightness.copy()
-    editing = in_order(desk, line)
-
-    async def do() -> None:
+    await line(editing)
+    await editing.undo()
+    assert np.array_equal(sim.arena.brightness, before)
+    assert editing.can_redo
+    await editing.redo()
+    assert sim.arena.brightness[100, 200] == 255
+    await editing.place(Ball(430, 320))
+    await editing.place(Lamp(20, 20, 2.0))
+    assert counts(desk) == (1, 3, 2)
+    await editing.remove(400, 105)
+    await editing.remove(50, 352)
+    assert counts(desk) == (1, 2, 1)
+    assert sim.lamps.tolist() == [[20, 20, 2.0, 1.0]]
+    assert sorted(sim.bodies()["x_mm"].tolist()) == [300, 430]
+    for _ in range(4):
         await editing.undo()
-        assert np.array_equal(sim.arena.brightness, before)
-        assert editing.can_redo
+    assert counts(desk) == (1, 2, 1)
+    assert sorted(sim.bodies()["x_mm"].tolist()) == [300, 400]
+    assert sim.lamps.tolist() == [[50, 350, 1.0, 1.0]]
+    for _ in range(9):
         await editing.redo()
-        assert sim.arena.brightness[100, 200] == 255
-        await editing.place(Ball(430, 320))
-        await editing.place(Lamp(20, 20, 2.0))
-        assert counts(desk) == (1, 3, 2)
-        await editing.remove(400, 105)
-        await editing.remove(50, 352)
-        assert counts(desk) == (1, 2, 1)
-        assert sim.lamps.tolist() == [[20, 20, 2.0, 1.0]]
-        assert sorted(sim.bodies()["x_mm"].tolist()) == [300, 430]
-        for _ in range(4):
-            await editing.undo()
-        assert counts(desk) == (1, 2, 1)
-        assert sorted(sim.bodies()["x_mm"].tolist()) == [300, 400]
-        assert sim.lamps.tolist() == [[50, 350, 1.0, 1.0]]
-        for _ in range(9):
-            await editing.redo()
-        assert counts(desk) == (1, 2, 1)
-        assert sorted(sim.bodies()["x_mm"].tolist()) == [300, 430]
-
-    asyncio.run(do())
+    assert counts(desk) == (1, 2, 1)
+    assert sorted(sim.bodies()["x_mm"].tolist()) == [300, 430]
 
 
-def test_refused_edits_change_nothing(desk):
+async def test_refused_edits_change_nothing(desk, editing):
     sim = desk.sim
-    editing = Editing(desk)
     before, hash_before = sim.arena, sim.state_hash()
 
     async def refused(act: Awaitable[None], words: str) -> None:
@@ -125,245 +122,178 @@ def test_refused_edits_change_nothing(desk):
         assert not editing.can_undo
         assert not editing.can_redo
 
-    async def do() -> None:
-        await refused(editing.draw(lambda arena: brush.rectangle(arena, 90, 90, 110, 110)), "robot 1")
-        await refused(editing.place(Ball(100, 100)), "robot 1")
-        await refused(editing.remove(250, 20), "nothing")
-        await refused(editing.place(Robot(10, 200)), "wall")
-
-    asyncio.run(do())
+    await refused(editing.draw(lambda arena: brush.rectangle(arena, 90, 90, 110, 110)), "robot 1")
+    await refused(editing.place(Ball(100, 100)), "robot 1")
+    await refused(editing.remove(250, 20), "nothing")
+    await refused(editing.place(Robot(10, 200)), "wall")
 
 
-def test_an_edit_that_the_world_refuses_is_undone(desk, monkeypatch):
-    editing = Editing(desk)
+async def test_an_edit_that_the_world_refuses_is_undone(desk, editing, monkeypatch):
 
     def refuse(_arena: Arena) -> None:
         raise ParameterError("no room")
 
     monkeypatch.setattr(desk.sim, "set_arena", refuse)
 
-    async def do() -> None:
-        with pytest.raises(ParameterError, match="no room"):
-            await line(editing)
-        assert not editing.can_undo
-        assert not editing.can_redo
-        monkeypatch.undo()
+    with pytest.raises(ParameterError, match="no room"):
         await line(editing)
-        await editing.undo()
-        monkeypatch.setattr(desk.sim, "set_arena", refuse)
-        with pytest.raises(ParameterError, match="no room"):
-            await editing.redo()
-        assert editing.can_redo
-
-    asyncio.run(do())
-
-
-def test_edits_leave_what_has_moved_where_it_is(desk):
-
-    async def do() -> None:
-        editing = Editing(desk)
-        await line(editing)
-        desk.sim.place(1, 400, 300, 0.0)
-        desk.sim.move_body(1, 50, 50)
-        with pytest.raises(KiksError, match="robot 1"):
-            await editing.draw(lambda arena: brush.rectangle(arena, 390, 290, 410, 310))
-        await editing.draw(lambda arena: brush.rectangle(arena, 95, 95, 105, 105))
-        assert editing.can_undo
-        await editing.undo()
-        await editing.undo()
-        assert not editing.can_undo
-
-    asyncio.run(do())
+    assert not editing.can_undo
+    assert not editing.can_redo
+    monkeypatch.undo()
+    await line(editing)
+    await editing.undo()
+    monkeypatch.setattr(desk.sim, "set_arena", refuse)
+    with pytest.raises(ParameterError, match="no room"):
+        await editing.redo()
+    assert editing.can_redo
 
 
-def test_changes_from_outside_are_noticed(desk):
-
-    async def do() -> None:
-        editing = Editing(desk)
-        await line(editing)
-        desk.sim.remove_body(1)
-        desk.sim.add_lamp(300, 50)
-        await editing.remove(300, 50)
-        assert counts(desk) == (1, 1, 1)
-        await editing.undo()
-        assert counts(desk) == (1, 1, 2)
-        assert not editing.can_undo
-
-    asyncio.run(do())
+async def test_edits_leave_what_has_moved_where_it_is(desk, editing):
+    await line(editing)
+    desk.sim.place(1, 400, 300, 0.0)
+    desk.sim.move_body(1, 50, 50)
+    with pytest.raises(KiksError, match="robot 1"):
+        await editing.draw(lambda arena: brush.rectangle(arena, 390, 290, 410, 310))
+    await editing.draw(lambda arena: brush.rectangle(arena, 95, 95, 105, 105))
+    assert editing.can_undo
+    await editing.undo()
+    await editing.undo()
+    assert not editing.can_undo
 
 
-def test_resets_keep_the_drawing(desk):
-
-    async def do() -> None:
-        editing = Editing(desk)
-        desk.sim.place(1, 400, 300, 0.0)
-        await editing.draw(lambda arena: brush.rectangle(arena, 50, 50, 150, 150))
-        desk.sim.place(1, 250, 200, 0.0)
-        await desk.reset()
-        assert desk.sim.pose(1)[:2] == (400, 300)
-        await desk.start_over()
-        assert desk.sim.pose(1)[:2] == (400, 300)
-        assert desk.sim.arena.brightness[100, 100] == 255
-
-    asyncio.run(do())
+async def test_changes_from_outside_are_noticed(desk, editing):
+    await line(editing)
+    desk.sim.remove_body(1)
+    desk.sim.add_lamp(300, 50)
+    await editing.remove(300, 50)
+    assert counts(desk) == (1, 1, 1)
+    await editing.undo()
+    assert counts(desk) == (1, 1, 2)
+    assert not editing.can_undo
 
 
-def test_adding_a_robot_restarts_the_world(desk):
+async def test_resets_keep_the_drawing(desk, editing):
+    desk.sim.place(1, 400, 300, 0.0)
+    await editing.draw(lambda arena: brush.rectangle(arena, 50, 50, 150, 150))
+    desk.sim.place(1, 250, 200, 0.0)
+    await desk.reset()
+    assert desk.sim.pose(1)[:2] == (400, 300)
+    await desk.start_over()
+    assert desk.sim.pose(1)[:2] == (400, 300)
+    assert desk.sim.arena.brightness[100, 100] == 255
+
+
+async def test_adding_a_robot_restarts_the_world(desk, editing):
     first = desk.sim
-
-    async def do() -> None:
-        editing = Editing(desk)
-        await line(editing)
-        await editing.place(Robot(400, 300, 1.0, ProjectRobot("khepera_ii")))
-        assert desk.sim is not first
-        assert [spec.name for spec in desk.sim.specs] == ["Khepera", "Khepera II"]
-        assert desk.sim.pose(2) == pytest.approx((400, 300, 1.0), abs=1e-4)
-        assert desk.names() == ["Ada", "2"]
-        await editing.remove(100, 100)
-        assert [spec.name for spec in desk.sim.specs] == ["Khepera II"]
-        await editing.undo()
-        assert desk.names() == ["Ada", "2"]
-        assert len(desk.sim.wires[0].firmware.fitted) == 1
-        await editing.undo()
-        await editing.undo()
-        assert counts(desk) == (1, 2, 1)
-        assert not desk.sim.arena.brightness[100, 200]
-        assert not editing.can_undo
-
-    asyncio.run(do())
+    await line(editing)
+    await editing.place(Robot(400, 300, 1.0, ProjectRobot("khepera_ii")))
+    assert desk.sim is not first
+    assert [spec.name for spec in desk.sim.specs] == ["Khepera", "Khepera II"]
+    assert desk.sim.pose(2) == pytest.approx((400, 300, 1.0), abs=1e-4)
+    assert desk.names() == ["Ada", "2"]
+    await editing.remove(100, 100)
+    assert [spec.name for spec in desk.sim.specs] == ["Khepera II"]
+    await editing.undo()
+    assert desk.names() == ["Ada", "2"]
+    assert len(desk.sim.wires[0].firmware.fitted) == 1
+    await editing.undo()
+    await editing.undo()
+    assert counts(desk) == (1, 2, 1)
+    assert not desk.sim.arena.brightness[100, 200]
+    assert not editing.can_undo
 
 
-def test_the_last_robot_may_go_and_come_back(desk):
-
-    async def do() -> None:
-        editing = Editing(desk)
-        await editing.remove(100, 100)
-        assert counts(desk) == (0, 2, 1)
-        assert desk.project.robots == ()
-        await editing.draw(lambda arena: brush.rectangle(arena, 90, 90, 110, 110))
-        await editing.undo()
-        await editing.undo()
-        assert desk.names() == ["Ada"]
-        assert desk.sim.pose(1)[:2] == (100, 100)
-        assert len(desk.sim.wires[0].firmware.fitted) == 1
-
-    asyncio.run(do())
+async def test_the_last_robot_may_go_and_come_back(desk, editing):
+    await editing.remove(100, 100)
+    assert counts(desk) == (0, 2, 1)
+    assert desk.project.robots == ()
+    await editing.draw(lambda arena: brush.rectangle(arena, 90, 90, 110, 110))
+    await editing.undo()
+    await editing.undo()
+    assert desk.names() == ["Ada"]
+    assert desk.sim.pose(1)[:2] == (100, 100)
+    assert len(desk.sim.wires[0].firmware.fitted) == 1
 
 
-def test_another_arena_keeps_the_robots(desk):
-
-    async def do() -> None:
-        editing = Editing(desk)
-        await editing.begin(Arena.maze(columns=3, rows=3))
-        assert desk.sim.arena.name == "maze"
-        assert counts(desk) == (1, 0, 1)
-        assert len(desk.sim.wires[0].firmware.fitted) == 1
-        await editing.draw(lambda arena: brush.line(arena, [(500, 50)], width_mm=30, brightness=0))
-        await editing.undo()
-        await editing.undo()
-        assert counts(desk) == (1, 2, 1)
-        assert desk.sim.arena.width_mm == 500
-
-    asyncio.run(do())
+async def test_another_arena_keeps_the_robots(desk, editing):
+    await editing.begin(Arena.maze(columns=3, rows=3))
+    assert desk.sim.arena.name == "maze"
+    assert counts(desk) == (1, 0, 1)
+    assert len(desk.sim.wires[0].firmware.fitted) == 1
+    await editing.draw(lambda arena: brush.line(arena, [(500, 50)], width_mm=30, brightness=0))
+    await editing.undo()
+    await editing.undo()
+    assert counts(desk) == (1, 2, 1)
+    assert desk.sim.arena.width_mm == 500
 
 
-def test_a_world_of_another_program_keeps_its_robots():
+async def test_a_world_of_another_program_keeps_its_robots():
     sim = Simulation(Arena.box(500, 400), robots=2, seed=1)
     desk = Desk(sim)
 
-    async def do() -> None:
-        editing = Editing(desk)
-        await line(editing)
-        assert sim.arena.brightness[100, 200] == 255
-        for act in (editing.place(Robot(400, 300)), editing.begin(Arena.box(300, 300))):
-            with pytest.raises(LinkError, match="own"):
-                await act
-            assert editing.can_undo
-            assert desk.sim is sim
+    editing = Editing(desk)
+    await line(editing)
+    assert sim.arena.brightness[100, 200] == 255
+    for act in (editing.place(Robot(400, 300)), editing.begin(Arena.box(300, 300))):
+        with pytest.raises(LinkError, match="own"):
+            await act
+        assert editing.can_undo
+        assert desk.sim is sim
+    await editing.undo()
+    assert not sim.arena.brightness[100, 200]
+    assert not editing.can_undo
+    desk.close()
+
+
+async def test_two_people_may_draw_at_once(desk, editing):
+    strokes = [
+        editing.draw(lambda arena, y=y: brush.line(arena, [(240, y), (260, y)], width_mm=4, brightness=y))
+        for y in range(20, 240, 20)
+    ]
+    await asyncio.gather(*strokes)
+    assert [int(desk.sim.arena.brightness[y, 250]) for y in range(20, 240, 20)] == list(range(20, 240, 20))
+
+
+async def test_steps_back_find_their_things_whatever_their_order(desk, editing):
+    await editing.place(Ball(430, 320))
+    await editing.remove(300, 300)
+    await editing.undo()  # comes back as the last one
+    desk.sim.move_body(int(desk.sim.bodies()["number"][-1]), 250, 200)
+    await editing.undo()
+    assert sorted(desk.sim.bodies()["x_mm"].tolist()) == [250, 400]
+    await editing.redo()
+    await editing.redo()
+    assert sorted(desk.sim.bodies()["x_mm"].tolist()) == [400, 430]
+
+
+async def test_steps_back_wait_until_there_is_room(desk, editing):
+    await line(editing)
+    await editing.draw(lambda arena: brush.rectangle(arena, 190, 10, 210, 300, 0))
+    desk.sim.place(1, 200, 150, 0.0)
+    with pytest.raises(KiksError, match="robot 1"):
         await editing.undo()
-        assert not sim.arena.brightness[100, 200]
-        assert not editing.can_undo
-
-    try:
-        asyncio.run(do())
-    finally:
-        desk.close()
+    assert not desk.sim.arena.brightness[100, 200]
+    desk.sim.place(1, 100, 100, 0.0)
+    await editing.undo()
+    assert desk.sim.arena.brightness[100, 200]
 
 
-def test_two_people_may_draw_at_once(desk):
-
-    async def do() -> None:
-        editing = Editing(desk)
-        strokes = [
-            editing.draw(lambda arena, y=y: brush.line(arena, [(240, y), (260, y)], width_mm=4, brightness=y))
-            for y in range(20, 240, 20)
-        ]
-        await asyncio.gather(*strokes)
-        assert [int(desk.sim.arena.brightness[y, 250]) for y in range(20, 240, 20)] == list(range(20, 240, 20))
-
-    asyncio.run(do())
-
-
-def test_steps_back_find_their_things_whatever_their_order(desk):
-
-    async def do() -> None:
-        editing = Editing(desk)
-        await editing.place(Ball(430, 320))
-        await editing.remove(300, 300)
-        await editing.undo()  # comes back as the last one
-        desk.sim.move_body(int(desk.sim.bodies()["number"][-1]), 250, 200)
-        await editing.undo()
-        assert sorted(desk.sim.bodies()["x_mm"].tolist()) == [250, 400]
-        await editing.redo()
-        await editing.redo()
-        assert sorted(desk.sim.bodies()["x_mm"].tolist()) == [400, 430]
-
-    asyncio.run(do())
-
-
-def test_steps_back_wait_until_there_is_room(desk):
-
-    async def do() -> None:
-        editing = Editing(desk)
-        await line(editing)
-        await editing.draw(lambda arena: brush.rectangle(arena, 190, 10, 210, 300, 0))
-        desk.sim.place(1, 200, 150, 0.0)
-        with pytest.raises(KiksError, match="robot 1"):
-            await editing.undo()
-        assert not desk.sim.arena.brightness[100, 200]
-        desk.sim.place(1, 100, 100, 0.0)
-        await editing.undo()
-        assert desk.sim.arena.brightness[100, 200]
-
-    asyncio.run(do())
-
-
-def test_steps_beyond_the_limit_are_forgotten(desk, monkeypatch):
+async def test_steps_beyond_the_limit_are_forgotten(desk, monkeypatch, editing):
     monkeypatch.setattr(live_editing, "STEPS_MAX", 5)
-
-    async def do() -> None:
-        editing = Editing(desk)
-        for x_mm in range(200, 220):
-            await editing.draw(lambda arena, x_mm=x_mm: brush.line(arena, [(x_mm + 0.5, 50.5)], width_mm=1))
-        for _ in range(5):
-            assert editing.can_undo
-            await editing.undo()
-        assert not editing.can_undo
-        assert np.count_nonzero(desk.sim.arena.brightness[50, 200:220]) == 15
-
-    asyncio.run(do())
+    for x_mm in range(200, 220):
+        await editing.draw(lambda arena, x_mm=x_mm: brush.line(arena, [(x_mm + 0.5, 50.5)], width_mm=1))
+    for _ in range(5):
+        assert editing.can_undo
+        await editing.undo()
+    assert not editing.can_undo
+    assert np.count_nonzero(desk.sim.arena.brightness[50, 200:220]) == 15
 
 
-def test_robots_beyond_the_starts_of_another_arena_find_room(desk):
-
-    async def do() -> None:
-        editing = Editing(desk)
-        await editing.place(Robot(400, 300))
-        await editing.begin(Arena.maze(columns=3, rows=3))
-        assert desk.sim.pose(1) == pytest.approx(Arena.maze(columns=3, rows=3).starts[0])
-        arena = desk.sim.arena
-        assert all(arena.free_for(*start[:2], 27.4) for start in arena.starts)
-        with pytest.raises(KiksError, match="room for robot 1"):
-            await editing.begin(Arena.box(100, 100, wall_mm=30))
-
-    asyncio.run(do())
+async def test_robots_beyond_the_starts_of_another_arena_find_room(desk, editing):
+    await editing.place(Robot(400, 300))
+    await editing.begin(Arena.maze(columns=3, rows=3))
+    assert desk.sim.pose(1) == pytest.approx(Arena.maze(columns=3, rows=3).starts[0])
+    arena = desk.sim.arena
+    assert all(arena.free_for(*start[:2], 27.4) for start in arena.starts)
+    with pytest.raises(KiksError, match="room for robot 1"):
+        await editing.begin(Arena.box(100, 100, wall_mm=30))
