@@ -1,159 +1,141 @@
-"""The monitor in a real browser, beside a real simulation (monitor_page.py)."""
+"""The monitor in a real browser, compared with the state of the engine."""
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Iterator
-from typing import Any
+from dataclasses import replace
+from pathlib import Path
 
 import pytest
-from playwright.sync_api import Locator, Page, expect
+from playwright.sync_api import expect
 from tests.at_length import at_length
-from tests.desk.visitor import leave_picture
-from tests.desk.visits import NewPage, address_of
+from tests.desk.visitor import Visitor, make_project, open_desk
+from tests.desk.visits import NewPage
+
+from kiks.model.arena_objects import Lamp, Pose
+from kiks.model.project import ProjectRobot
 
 pytestmark = pytest.mark.slow
 
 
-@pytest.fixture(scope="module")
-def address() -> Iterator[str]:
-    """Serve monitor_page.py in a process of its own."""
-    with address_of("monitor_page") as address:
-        yield address
-
-
-class Visit:
-    """A page with the monitor, and what the simulation says."""
-
-    def __init__(self, page: Page, address: str, query: str) -> None:
-        self.page, self.address = page, page.request.get(address).url.split("/desk/")[0]
-        page.request.get(f"{self.address}/ask/reset")
-        page.goto(f"{self.address}/monitor?{query}")
-        page.wait_for_function("() => window.kiksMonitor?.drawn() > 3")
-
-    def get(self, path: str) -> Any:
-        return json.loads(self.page.request.get(f"{self.address}{path}").text())
-
-    def find(self, name: str) -> Locator:
-        return self.page.get_by_test_id(name)
-
-    def fact(self, name: str) -> str:
-        """Return the value of a row of numbers."""
-        row = self.find("facts").locator("div", has=self.page.get_by_text(name, exact=True))
-        return row.locator("dd").inner_text()
-
-    def painted(self, selector: str) -> int:
-        """Return how many different colours are on a canvas."""
-        count: int = self.page.evaluate(
-            """(selector) => {
-                const canvas = document.querySelector(selector);
-                const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
-                return new Set(new Uint32Array(data.buffer)).size;
-            }""",
-            selector,
-        )
-        return count
-
-
 @pytest.fixture
-def visit(new_page: NewPage, address: str) -> Visit:
-    return Visit(new_page(520, 1100), address, "")
+def visitor(tmp_path: Path, new_page: NewPage) -> Iterator[Visitor]:
+    """Of a desk whose first robot stands by a wall, with a camera and a radio."""
+    project = make_project()
+    starts = (Pose(45, 240, 2.9), *project.arena.starts[1:])
+    arena = replace(project.arena, starts=starts, lamps=(Lamp(200, 60, 2.0), Lamp(30, 330, 1.0)))
+    robots = (ProjectRobot(turrets=("k213", "radio")), *project.robots[1:])
+    shown = open_desk(tmp_path, replace(project, arena=arena, robots=robots))
+    page = new_page(1280, 1100)
+    visitor = Visitor(page, shown)
+    drawn(visitor, 3)
+    yield visitor
+    page.close()
+    shown.close()
 
 
-def test_readings_on_the_page_equal_the_simulations(visit: Visit) -> None:
-    visit.get("/ask/drive")
-    visit.page.wait_for_function("() => kiksMonitor.drawn() > 30")
-    visit.get("/ask/pause")
-    world = visit.get("/world")
-    for sensor in range(8):
-        expect(visit.find(f"proximity-{sensor}")).to_have_text(f"{world['counts'][0][sensor]:.0f}")
-        expect(visit.find(f"ambient-{sensor}")).to_have_text(f"{world['light'][0][sensor]:.0f}")
-    assert max(world["counts"][0]) > 100
-    expect(visit.find("facts")).to_contain_text(f"Clock0:{int(world['time_s'] * 100 + 1e-6) / 100:05.2f}")
-    expect(visit.find("speed-left")).to_contain_text(", set 4")
-    assert visit.painted(".kiks-monitor-robot canvas") > 20
+def drive(visitor: Visitor) -> None:
+    visitor.tab("wire")
+    visitor.at("console").fill("D,4,6")
+    visitor.at("console").press("Enter")
+    visitor.tab("robot")
 
 
-def test_a_click_explains_a_reading(visit: Visit) -> None:
-    visit.get("/ask/pause")
-    world = visit.get("/world")
-    visit.find("proximity-2").click()
-    answer = visit.find("explanation")
-    expect(answer).to_contain_text(f"Why does it read {world['count']}?")
-    expect(answer).to_contain_text(f"Sensor 2 (left 10) of robot 1 reads {world['count']}.")
-    rows = visit.find("explanation-table").locator("tbody tr")
+def drawn(visitor: Visitor, more: int) -> None:
+    """Wait until the monitor has drawn itself some more times."""
+    visitor.page.wait_for_function("() => window.kiksMonitor")
+    before = visitor.answer("kiksMonitor.drawn()")
+    visitor.page.wait_for_function("(least) => kiksMonitor.drawn() > least", arg=before + more)
+
+
+def painted(visitor: Visitor, selector: str) -> int:
+    """Return how many different colours are on a canvas."""
+    count: int = visitor.answer(
+        """(selector) => {
+            const canvas = document.querySelector(selector);
+            const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+            return new Set(new Uint32Array(data.buffer)).size;
+        }""",
+        selector,
+    )
+    return count
+
+
+def test_readings_on_the_page_equal_the_simulations(visitor: Visitor) -> None:
+    drive(visitor)
+    drawn(visitor, 30)
+    visitor.pause()
+    sim = visitor.sim
+    for name, readings in (("proximity", sim.proximity(1, noise=True)), ("ambient", sim.ambient(1, noise=True))):
+        for sensor in range(8):
+            expect(visitor.at(f"{name}-{sensor}")).to_have_text(f"{readings[sensor]:.0f}")
+    assert max(sim.proximity(1)) > 100
+    expect(visitor.at("facts")).to_contain_text(f"Clock0:{int(sim.time_s * 100 + 1e-6) / 100:05.2f}")
+    expect(visitor.at("speed-left")).to_contain_text(", set 4")
+    assert painted(visitor, ".kiks-monitor-robot canvas") > 20
+
+
+def test_a_click_explains_a_reading(visitor: Visitor) -> None:
+    visitor.pause()
+    why = visitor.sim.explain(1, 2)
+    visitor.at("proximity-2").click()
+    answer = visitor.at("explanation")
+    expect(answer).to_contain_text(f"Why does it read {why.count}?")
+    expect(answer).to_contain_text(f"Sensor 2 (left 10) of robot 1 reads {why.count}.")
+    rows = visitor.at("explanation-table").locator("tbody tr")
     expect(rows).to_have_count(7)
     shown = [rows.nth(k).locator("td").nth(1).inner_text() for k in range(7)]
-    assert shown == ["–" if length is None else f"{length:.1f}" for length in world["lengths_mm"]]
-    assert any(length is not None for length in world["lengths_mm"])
-    expect(visit.find("explanation-drawing").locator("svg")).to_have_attribute("aria-label", re.compile("wall at"))
-    expect(visit.find("proximity-2")).to_have_attribute("aria-pressed", "true")
-    visit.find("ambient-5").click()
+    assert shown == [f"{ray.length_mm:.1f}" if ray.brightness else "–" for ray in why.rays]
+    assert any(ray.brightness for ray in why.rays)
+    expect(visitor.at("explanation-drawing").locator("svg")).to_have_attribute("aria-label", re.compile("wall at"))
+    expect(visitor.at("proximity-2")).to_have_attribute("aria-pressed", "true")
+    visitor.at("ambient-5").click()
     expect(answer).to_contain_text("Light sensor 5 (right 90) of robot 1 reads")
     expect(answer).to_contain_text("Lamp 2 (1 W)")
     expect(rows).to_have_count(2)
-    visit.find("close-explanation").click()
+    visitor.at("close-explanation").click()
     expect(answer).to_be_hidden()
 
 
-def test_keep_looking_updates_the_explanation(visit: Visit) -> None:
-    visit.find("proximity-1").click()
-    visit.find("keep-looking").click()
-    text = visit.find("explanation-text")
+def test_keep_looking_updates_the_explanation(visitor: Visitor) -> None:
+    visitor.at("proximity-1").click()
+    visitor.at("keep-looking").click()
+    text = visitor.at("explanation-text")
     before = text.inner_text()
-    visit.get("/ask/drive")
+    x_mm, y_mm, _ = visitor.sim.pose(1)
+    visitor.drag((x_mm, y_mm), (300, 250))
     expect(text).not_to_have_text(before)
 
 
 @at_length
-def test_the_monitor_works_with_keys_alone(visit: Visit) -> None:
-    visit.page.get_by_label("Robot").first.focus()
-    for _ in range(6):
-        visit.page.keyboard.press("Tab")
-    focused = visit.page.evaluate("document.activeElement.dataset.testid")
-    assert focused in [f"{which}-{sensor}" for which in ("proximity", "ambient") for sensor in range(8)]
-    visit.page.keyboard.press("Enter")
-    expect(visit.find("explanation")).to_contain_text(f"ensor {focused[-1]} (")
-    visit.find("curves-speeds").focus()
-    visit.page.keyboard.press("Enter")
-    expect(visit.find("curves-speeds")).to_have_attribute("aria-checked", "true")
+def test_the_monitor_works_with_keys_alone(visitor: Visitor) -> None:
+    """test_desk_for_all.py reaches each control with Tab."""
+    visitor.at("proximity-3").focus()
+    visitor.page.keyboard.press("Enter")
+    expect(visitor.at("explanation")).to_contain_text("Sensor 3 (")
+    visitor.at("curves-speeds").focus()
+    visitor.page.keyboard.press("Enter")
+    expect(visitor.at("curves-speeds")).to_have_attribute("aria-checked", "true")
 
 
-def test_curves_can_be_chosen_and_lines_left_out(visit: Visit) -> None:
-    visit.get("/ask/drive")
+def test_curves_can_be_chosen_and_lines_left_out(visitor: Visitor) -> None:
+    drive(visitor)
     for kind in ("ambient", "speeds", "proximity"):
-        visit.find(f"curves-{kind}").click()
-        expect(visit.find(f"curves-{kind}")).to_have_attribute("aria-checked", "true")
-        visit.page.wait_for_function(
-            "(drawn) => kiksMonitor.drawn() > drawn + 10", arg=visit.page.evaluate("kiksMonitor.drawn()")
-        )
-        assert visit.painted(".kiks-curves") > 8
-    first = visit.page.locator(".kiks-legend button").first
+        visitor.at(f"curves-{kind}").click()
+        expect(visitor.at(f"curves-{kind}")).to_have_attribute("aria-checked", "true")
+        drawn(visitor, 10)
+        assert painted(visitor, ".kiks-curves") > 8
+    first = visitor.page.locator(".kiks-legend button").first
     first.click()
     expect(first).to_have_attribute("aria-pressed", "false")
 
 
-def test_another_robot_shows_its_own_turrets(visit: Visit) -> None:
-    expect(visit.find("camera-strip")).to_be_visible()
-    expect(visit.find("turret-words")).to_contain_text("K213 linear vision (turret 2): a picture every 200 ms")
-    expect(visit.find("turret-words")).to_contain_text("Radio (turret 4): silent")
-    visit.get("/ask/show2")
-    expect(visit.find("camera-strip")).to_be_hidden()
-    expect(visit.find("facts")).to_contain_text("127 of 255, upright")
-    expect(visit.find("turret-words")).to_have_text("Gripper (turret 1): holds nothing")
-    assert visit.fact("Turrets") == "Gripper"
-
-
-@at_length
-def test_dark_pages_have_dark_colours(new_page: NewPage, address: str) -> None:
-    """The same page by day and by night, with pictures for a person to look at."""
-    for name in ("light", "dark"):
-        page = new_page(520, 1100)
-        visit = Visit(page, address, f"dark={name == 'dark'}")
-        visit.find("proximity-2").click()
-        expect(visit.find("explanation")).to_be_visible()
-        visit.page.wait_for_function("() => kiksMonitor.drawn() > 20")
-        leave_picture(page, f"monitor_{name}", full_page=True)
-        assert visit.page.evaluate("document.body.classList.contains('body--dark')") == (name == "dark")
-        assert visit.painted(".kiks-curves") > 8
+def test_another_robot_shows_its_own_turrets(visitor: Visitor) -> None:
+    expect(visitor.at("camera-strip")).to_be_visible()
+    expect(visitor.at("turret-words")).to_contain_text("K213 linear vision (turret 2): a picture every 200 ms")
+    expect(visitor.at("turret-words")).to_contain_text("Radio (turret 4): silent")
+    visitor.page.mouse.click(*visitor.on_page(450, 300))
+    expect(visitor.at("camera-strip")).to_be_hidden()
+    expect(visitor.at("facts")).to_contain_text("127 of 255, upright")
+    expect(visitor.at("turret-words")).to_have_text("Gripper (turret 1): holds nothing")
