@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -35,37 +34,19 @@ def check(*words: str) -> None:
 # ---- the tool itself ----
 
 
-@cache
-def planted() -> tuple[int, dict[str, float], str]:
-    return torture("--only", "planted")
-
-
-@pytest.mark.parametrize(
-    ("figure", "count"),
-    [("deaths", 4), ("hangs", 3), ("files_lost", 3), ("foreign_exceptions", 4 + 3 + 2)],
-)
-def test_what_is_planted_is_found(figure: str, count: int) -> None:
-    code, figures, table = planted()
+def test_what_is_planted_is_found_with_its_cause_and_ends_no_other_case() -> None:
+    code, figures, table = torture("--only", "planted")
     assert code == 1
-    assert figures[f"torture.{figure}"] == count, table
-
-
-@pytest.mark.parametrize(
-    "words",
-    [
+    for figure, count in {"deaths": 4, "hangs": 3, "files_lost": 3, "foreign_exceptions": 4 + 3 + 2}.items():
+        assert figures[f"torture.{figure}"] == count, table
+    for words in (
         "4 x foreign: ZeroDivisionError",
         "SIGABRT; first --only planted.dies",
         "3 x foreign: MemoryError",
         "message: secret, ParameterError",
         "campaigns/planted.py, _hangs: computes longer than 0.5 s",
-    ],
-)
-def test_a_finding_tells_its_cause_and_its_case(words: str) -> None:
-    assert words in planted()[2]
-
-
-def test_a_case_that_dies_ends_no_other() -> None:
-    _, figures, table = planted()
+    ):
+        assert words in table
     tried = {name.rpartition(".")[2]: count for name, count in figures.items() if ".tried." in name}
     assert tried == {"raises": 12, "dies": 12, "eats": 12, "tells": 12, "loses": 12, "refuses": 12, "hangs": 3}, table
 

@@ -12,15 +12,14 @@ import io
 import json
 import math
 import struct
-import sys
 from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
+import uvicorn
 from fastapi import FastAPI, Response, WebSocket, WebSocketDisconnect
 from nicegui import ui
 from PIL import Image
-from tests.desk.announced import serve
 
 from kiks.desk.panels.arena_view import ArenaView, Pick, Stroke, Tool
 from kiks.export.looks import robot_hue, robot_shapes
@@ -258,5 +257,14 @@ def make_app(robot_count: int) -> FastAPI:
     return app
 
 
+class Announced(uvicorn.Server):
+    """A server that prints its address when it listens."""
+
+    async def startup(self, sockets: Any = None) -> None:
+        await super().startup(sockets)
+        host, port = self.servers[0].sockets[0].getsockname()
+        print(f"http://{host}:{port}", flush=True)
+
+
 if __name__ == "__main__":
-    serve(make_app(int(sys.argv[1]) if len(sys.argv) > 1 else 3))
+    Announced(uvicorn.Config(make_app(robot_count=3), "127.0.0.1", 0, log_level="warning")).run()
