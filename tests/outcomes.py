@@ -16,8 +16,7 @@ from typing import Any
 
 from hypothesis import HealthCheck, Phase, given, settings
 from tests.cli.test_cli import KIKS
-from tests.script.screen import display
-from tests.script.test_corpus import on_screen, run_alone
+from tests.script.test_corpus import run_alone
 from tests.script.test_threads import PROGRAMS, run_threads
 
 COUNT = 200
@@ -54,8 +53,8 @@ def main(path: str, other: str = "") -> None:
     outcomes: dict[str, Any] = {json.dumps(program): run_threads(program) for program in programs}
     demonstration = subprocess.run([*KIKS, *DEMONSTRATION], capture_output=True, text=True, check=True)
     outcomes[" ".join(DEMONSTRATION)] = demonstration.stdout.partition("state ")[2]
-    with tempfile.TemporaryDirectory() as folder, display() as screen:
-        outcomes |= run_alone(Path(folder), on_screen(screen), again=())[0]
+    with tempfile.TemporaryDirectory() as folder:
+        outcomes |= run_alone(Path(folder), again=())[0]
     Path(path).write_text(json.dumps(outcomes, indent=1))
 
 

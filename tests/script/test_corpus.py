@@ -22,7 +22,6 @@ import pytest
 from tests.at_length import at_length, share
 from tests.cli.test_cli import KIKS
 from tests.guard import GUARD_S
-from tests.script.screen import display
 from tests.served import PROGRAMS
 
 pytestmark = pytest.mark.slow
@@ -48,28 +47,18 @@ WIDE = "size_mm = [1500, 1500]\n" + "".join(
 )
 """An arena in which no robot meets another one, or a wall."""
 
+ENVIRONMENT = {**os.environ, "PYTHONUNBUFFERED": "1"}
+
 Runs = dict[str, tuple[str, str]]
 """What each program has printed, and its errors with the lines of KiKS."""
 
 
-@pytest.fixture(scope="module")
-def environment() -> Iterator[dict[str, str]]:
-    """What programs find in their environment: a screen for windows."""
-    with display() as found:
-        yield on_screen(found)
-
-
-def on_screen(environment: Mapping[str, str]) -> dict[str, str]:
-    """Return the environment of programs on a screen: they write at once."""
-    return {**environment, "PYTHONUNBUFFERED": "1"}
-
-
-def run_alone(folder: Path, environment: Mapping[str, str], again: Collection[str]) -> tuple[Runs, Runs]:
+def run_alone(folder: Path, again: Collection[str]) -> tuple[Runs, Runs]:
     """Run each program by `kiks run`, some twice; return what it said each time, with the state at its end."""
     runs = {f"{name}.{time}": name for name in CORPUS for time in (1, 2) if time == 1 or name in again}
     words = [shlex.join([run, CORPUS[name]]) for run, name in runs.items()]
     command = [sys.executable, EACH_ALONE, str(folder), str(AT_ONCE), "--seed", SEED, "--", *words]
-    subprocess.run(command, env=dict(environment), timeout=280, check=True, stdin=subprocess.DEVNULL)
+    subprocess.run(command, env=ENVIRONMENT, timeout=280, check=True, stdin=subprocess.DEVNULL)
     first, second = (
         {name: tuple((folder / f"{name}.{time}.{kind}").read_text() for kind in ("out", "err")) for name in names}
         for time, names in ((1, CORPUS), (2, again))
@@ -78,8 +67,8 @@ def run_alone(folder: Path, environment: Mapping[str, str], again: Collection[st
 
 
 @pytest.fixture(scope="module")
-def alone(tmp_path_factory: pytest.TempPathFactory, environment: dict[str, str]) -> tuple[Runs, Runs]:
-    return run_alone(tmp_path_factory.mktemp("alone"), environment, AGAIN)
+def alone(tmp_path_factory: pytest.TempPathFactory) -> tuple[Runs, Runs]:
+    return run_alone(tmp_path_factory.mktemp("alone"), AGAIN)
 
 
 def printed(run: Runs) -> dict[str, str]:
@@ -98,9 +87,7 @@ def test_each_program_does_the_same_again(alone: tuple[Runs, Runs]) -> None:
 # ---- together, and on the desk ----
 
 
-def run_together(
-    names: Sequence[str], folder: Path, environment: Mapping[str, str], *, on_desk: bool
-) -> tuple[dict[str, str], str]:
+def run_together(names: Sequence[str], folder: Path, *, on_desk: bool) -> tuple[dict[str, str], str]:
     """Run programs in one world; return what each of them printed, and the line with the state at the end."""
     folder.mkdir()
     (folder / "wide.toml").write_text(WIDE)
@@ -108,7 +95,7 @@ def run_together(
     options = ["--arena", str(folder / "wide.toml"), "--seed", SEED, "--when-silent", "wait"]
     command = [*KIKS, "run", *(["--desk", "--no-wait"] if on_desk else []), *options, *words]
     pipes = {"stdout": PIPE, "stderr": subprocess.STDOUT, "stdin": subprocess.DEVNULL}
-    env = {**environment, "BROWSER": "true"}
+    env = {**ENVIRONMENT, "BROWSER": "true"}
     told = []
     with subprocess.Popen(command, cwd=folder, env=env, text=True, start_new_session=True, **pipes) as process:
         assert process.stdout is not None
@@ -127,17 +114,15 @@ def run_together(
 
 
 @at_length
-def test_programs_do_the_same_on_the_desk(
-    alone: tuple[Runs, Runs], tmp_path: Path, environment: dict[str, str]
-) -> None:
+def test_programs_do_the_same_on_the_desk(alone: tuple[Runs, Runs], tmp_path: Path) -> None:
     names = list(CORPUS)
     groups = [names[start : start + GROUP] for start in range(0, len(names), GROUP)]
     with ThreadPoolExecutor(AT_ONCE) as pool:
         on_desk = [
-            pool.submit(run_together, group, tmp_path / str(number), environment, on_desk=True)
+            pool.submit(run_together, group, tmp_path / str(number), on_desk=True)
             for number, group in enumerate(groups)
         ]
-        without = pool.submit(run_together, groups[0], tmp_path / "without", environment, on_desk=False)
+        without = pool.submit(run_together, groups[0], tmp_path / "without", on_desk=False)
     said: dict[str, str] = {}
     for job in on_desk:
         said |= job.result()[0]
@@ -175,7 +160,7 @@ def served(folder: Path, robots: int) -> Iterator[list[dict[str, str]]]:
             process.communicate(timeout=GUARD_S)
 
 
-def run_real(name: str, ports: Mapping[str, str], environment: Mapping[str, str]) -> str:
+def run_real(name: str, ports: Mapping[str, str]) -> str:
     """Run a program by Python alone, with pyserial itself; return what it said, errors, too."""
     device = ports["serial port"]
     arguments = {
@@ -187,7 +172,7 @@ def run_real(name: str, ports: Mapping[str, str], environment: Mapping[str, str]
     command = [sys.executable, CORPUS[name], *arguments]
     done = subprocess.run(
         command,
-        env=dict(environment),
+        env=ENVIRONMENT,
         timeout=GUARD_S,
         check=False,
         text=True,
@@ -197,21 +182,19 @@ def run_real(name: str, ports: Mapping[str, str], environment: Mapping[str, str]
     return done.stdout + (f"exit code {done.returncode}: {done.stderr}" if done.returncode else "")
 
 
-def run_all_real(names: Sequence[str], folder: Path, environment: Mapping[str, str]) -> dict[str, str]:
+def run_all_real(names: Sequence[str], folder: Path) -> dict[str, str]:
     """Run programs in real time, each on a robot of its own; return what each of them said."""
     folder.mkdir()
     with served(folder, len(names)) as ports, ThreadPoolExecutor(IN_REAL_TIME) as pool:
-        jobs = {name: pool.submit(run_real, name, port, environment) for name, port in zip(names, ports, strict=True)}
+        jobs = {name: pool.submit(run_real, name, port) for name, port in zip(names, ports, strict=True)}
     return {name: job.result() for name, job in jobs.items()}
 
 
 @at_length
-def test_programs_do_the_same_in_real_time(
-    alone: tuple[Runs, Runs], tmp_path: Path, environment: dict[str, str]
-) -> None:
+def test_programs_do_the_same_in_real_time(alone: tuple[Runs, Runs], tmp_path: Path) -> None:
     expected = printed(alone[0])
     said: dict[str, str] = {}
     for attempt in range(ATTEMPTS_IN_REAL_TIME):
         if late := [name for name in CORPUS if said.get(name) != expected[name]]:
-            said |= run_all_real(late, tmp_path / str(attempt), environment)
+            said |= run_all_real(late, tmp_path / str(attempt))
     assert said == expected

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import shutil
 import subprocess
 import sys
 from collections.abc import Iterator, Mapping
@@ -11,7 +13,6 @@ import pytest
 from tests.at_length import at_length
 from tests.cli.test_cli import KIKS
 from tests.guard import GUARD_S
-from tests.script.screen import display
 from tests.served import PROGRAMS
 
 pytestmark = pytest.mark.slow
@@ -131,8 +132,18 @@ input('Enter stops the robot. ')
 @pytest.fixture(scope="module")
 def screen() -> Iterator[dict[str, str]]:
     """What programs find in their environment: a screen for windows and none for sound."""
-    with display() as found:
-        yield {**found, "SDL_AUDIODRIVER": "dummy"}
+    if shutil.which("Xvfb") is None:
+        pytest.skip("there is no Xvfb for the program with a window")
+    ours, theirs = os.pipe()
+    command = ["Xvfb", "-displayfd", str(theirs), "-nolisten", "tcp"]
+    with subprocess.Popen(command, pass_fds=[theirs], stderr=subprocess.DEVNULL) as process:
+        os.close(theirs)
+        try:
+            with open(ours) as told:
+                number = told.readline().strip()
+            yield {**os.environ, "DISPLAY": f":{number}", "SDL_AUDIODRIVER": "dummy"}
+        finally:
+            process.terminate()
 
 
 def run(folder: Path, text: str, environment: Mapping[str, str] | None = None, *before: str) -> tuple[int, str, str]:
