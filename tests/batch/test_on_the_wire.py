@@ -99,15 +99,6 @@ def test_every_response_is_that_of_the_wire(response: str) -> None:
         assert found == (rollouts.step_counts[world], batch.state_hash(world))
 
 
-def test_one_program_with_three_robots() -> None:
-    timing = kiks.Timing(0.1, 19200)
-    batch = kiks.Batch(arena(ball=True), worlds=2, robots=3, seed=5, timing=timing)
-    rollouts = batch.run(wander, np.full((2, 3, 1), [[1.0], [0.5], [0.8]]), seconds=8.0)
-    for world in range(2):
-        found = drive_alone(arena(ball=True), 5 + world, timing, wander, [[1.0], [0.5], [0.8]], robots=3)
-        assert found == (rollouts.step_counts[world], batch.state_hash(world))
-
-
 def test_one_program_with_a_controller_for_each_robot() -> None:
     timing = kiks.Timing(0.1, 19200)
     batch = kiks.Batch(arena(ball=True), worlds=2, robots=3, seed=5, timing=timing)

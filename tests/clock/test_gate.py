@@ -173,9 +173,6 @@ def test_pace_changes_without_a_jump() -> None:
         pace.set_speed(0, 0)
 
 
-# ---- drags ----
-
-
 def world() -> kiks.Simulation:
     sim = kiks.Simulation(kiks.Arena.box(600, 400), robots=2, seed=1)
     sim.place(1, 100, 100, 0)

@@ -277,6 +277,7 @@ def test_speeds_are_clamped_and_nan_is_zero() -> None:
         (lambda: kiks.controllers.ctrnn(period_s=0), "period_s must be at least 0.001, but it was 0"),
         (lambda: kiks.controllers.plastic(per="node"), "per must be 'synapse' or 'neuron', but it was 'node'"),
         (lambda: kiks.controllers.linear(senses=("proximty",)), "Did you mean 'proximity'"),
+        (lambda: kiks.controllers.linear(senses=("ambient", "ambient")), "senses must name each sense once"),
         (lambda: kiks.controllers.linear(senses=()), "senses must have at least 1 item"),
     ],
 )

@@ -187,9 +187,6 @@ def test_a_link_of_another_user_leads_to_no_code(
     assert "files that you alone can write" in caplog.text
 
 
-# ---- a program's time limit ----
-
-
 class LateError(Exception):
     pass
 

@@ -26,9 +26,6 @@ def a_robot(robot: str = "khepera_ii", **changes: object) -> Firmware:
     return a_simulation(robot, **changes).wires[0].firmware
 
 
-# ---- lines -----------------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("sizes", [[1000], [1] * 1000, [255, 1, 1, 743], [256, 744], [300, 300, 400]])
 def test_a_line_may_be_as_long_as_the_limit(sizes: list[int]) -> None:
@@ -71,8 +68,6 @@ def test_quirks() -> None:
     replies = (b"h,0,0\r\n", b"d\r\n", b"t,1,b,1,0\r\n", UNKNOWN, b"help: no tool or command of that name\r\n")
     assert tuple(robot.execute(line, 0) for line in lines) == replies
 
-
-# ---- state -----------------------------------------------------------------------------------------------------------
 
 WRONG = [
     b"A,1,2", b"A,1,2,-3", b"A,1,2,x", b"C,5", b"C,5,x", b"D,5", b"D,5,x", b"D,5,5,5", b"F,1,-1,1", b"F,1,1,", b"G,5",
@@ -164,9 +159,6 @@ def test_current_follows_the_motors() -> None:
     assert robot.execute(b"I,6", sim.now_ns) == b"i,400\r\n"
 
 
-# ---- turrets ---------------------------------------------------------------------------------------------------------
-
-
 def test_a_turret_gets_numbers_that_fit_64_bits() -> None:
     class Listener(Turret):
         number, name = 9, "Listener"
@@ -180,9 +172,6 @@ def test_a_turret_gets_numbers_that_fit_64_bits() -> None:
     sim.fit(1, listener)
     assert sim.wires[0].firmware.execute(b"T,9,S,5,-" + b"9" * 200, 0) == b"t,9,s\r\n"
     assert listener.heard == (5, -(2**62))
-
-
-# ---- tools -----------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.slow
@@ -274,9 +263,6 @@ def test_restart_returns_to_the_selected_speed() -> None:
     assert robot.baud == 38400, "the selector is read at a reset"
     robot.execute(b"restart", 0)
     assert robot.baud == 57600
-
-
-# ---- the demonstration -----------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

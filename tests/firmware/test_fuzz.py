@@ -93,9 +93,6 @@ def test_pieces_make_no_difference(pairs: list[tuple[bytes, bytes]], cuts: list[
     assert answers("khepera_ii", data, cuts) == answers("khepera_ii", data, [])
 
 
-# ---- the oracle itself -----------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("limit", [1, 6, 9, 10, 63, 255, 999, 1000, 1023, 1203])
 def test_at_most(limit: int) -> None:
     pattern = re.compile(at_most(limit))

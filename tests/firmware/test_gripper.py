@@ -87,9 +87,6 @@ def deepest_overlap_mm(sim: kiks.Simulation) -> float:
     return deepest
 
 
-# ---- gripping ----
-
-
 def test_it_grips_carries_and_puts_down() -> None:
     sim = a_simulation()
     robot, port = kiks.Khepera(sim.port(1)), sim.port(1)
@@ -187,9 +184,6 @@ def test_two_grippers_at_one_cylinder() -> None:
     assert held_by(sim) == 2
 
 
-# ---- held on the floor ----
-
-
 def test_it_drags_what_it_holds_as_fast_as_it_drives() -> None:
     ways = []
     for sim in (a_simulation(200.0), holding()):
@@ -261,9 +255,6 @@ def test_who_pushes_the_load_aside_turns_the_robot() -> None:
     assert seen_from(sim) == pytest.approx((TOUCHING_MM + 1, 0.0), abs=0.02)
 
 
-# ---- lifted ----
-
-
 def test_it_puts_down_only_where_there_is_room() -> None:
     sim = holding(robots=2)
     ask(sim, "E,100")
@@ -293,9 +284,6 @@ def test_opened_in_the_air_it_drops_the_load_in_front() -> None:
     sim.run(0.1)
     assert held_by(sim) == 0
     assert place_of(sim) == pytest.approx((300 + TOUCHING_MM + 1, 300), abs=0.01)
-
-
-# ---- hands from outside ----
 
 
 def test_hands_take_things_out_of_the_jaws() -> None:
@@ -352,9 +340,6 @@ def test_a_reset_to_before_the_grip_lets_go() -> None:
     assert ask(sim, "H,0") == [0]
 
 
-# ---- the state ----
-
-
 def test_the_same_carry_again_to_the_bit_and_from_a_snapshot() -> None:
     def begin() -> kiks.Simulation:
         sim = holding(robots=2)
@@ -387,9 +372,6 @@ def test_the_same_carry_again_to_the_bit_and_from_a_snapshot() -> None:
     for world in (sim, other):
         world.run(0.5)
     assert sim.state_hash() == other.state_hash()
-
-
-# ---- laws ----
 
 
 @pytest.mark.slow

@@ -31,9 +31,6 @@ def contrast(image: list[float]) -> float:
     return float(np.abs(np.diff(image)).max())
 
 
-# ---- orders ----
-
-
 def test_the_parts_of_an_image_are_those_of_the_whole() -> None:
     pixels = [(37 * p + 11) % 256 for p in range(64)]
     camera = K213()
@@ -76,9 +73,6 @@ def test_without_a_camera_there_is_none() -> None:
     sim.fit(1, "k213")
     assert len(robot.image()) == 64
     assert robot.send("net") == "K213 linear vision, ID 2, revision 1.0"
-
-
-# ---- what it sees ----
 
 
 def test_left_is_left() -> None:
@@ -151,9 +145,6 @@ def test_the_view_begins_50_mm_from_the_centre() -> None:
     assert high >= 6  # dark
 
 
-# ---- motion ----
-
-
 def moving(left: int, right: int) -> list[float]:
     sim = scene((230, 480, 70, 10, 1), (300, 480, 70, 10, 255), (0, 0, 1, 1, 1), size_mm=600, at=300)
     kiks.Khepera(sim.port(1)).set_speed(left, right)
@@ -168,9 +159,6 @@ def test_motion_smears_and_turning_smears_more() -> None:
     assert contrast(turning) < contrast(driving) < contrast(still)
     assert contrast(turning) < 0.5 * contrast(still)
     assert contrast(moving(10, -10)) < contrast(turning)
-
-
-# ---- instants ----
 
 
 @pytest.mark.parametrize("code", range(8))
@@ -235,9 +223,6 @@ def test_the_picture_shows_where_the_robot_was_at_that_instant() -> None:
     assert np.mean(camera.pixels[10:24]) > 150
 
 
-# ---- memory ----
-
-
 def pictures(sim: kiks.Simulation, *, first_order: bytes | None = None) -> tuple[list[bytes], str, int]:
     """Drive for 1.3 s and look at the picture 13 times."""
     firmware = sim.wires[0].firmware
@@ -286,9 +271,6 @@ def test_a_restart_sets_the_period_of_the_power_on() -> None:
     sim.sync()
     assert camera.taken_ns == 1_200_000_000
     assert camera.pixels != before
-
-
-# ---- noise ----
 
 
 def test_noise_is_bounded_and_without_bias_and_repeats() -> None:

@@ -35,18 +35,6 @@ def test_a_single_command(baud: int, command: bytes) -> None:
 
 
 @BAUDS
-def test_a_second_command_starts_where_the_first_ended(baud: int) -> None:
-    port = port_at(baud)
-    port.write(b"H\n")
-    port.readline()
-    port.sleep(0.0123456)
-    begin_ns = port.sim.now_ns
-    port.write(b"E\n")
-    assert port.readline() == b"e,0,0\r\n"
-    assert port.sim.now_ns - begin_ns == 9 * character_ns(baud) + PROCESSING_NS
-
-
-@BAUDS
 @pytest.mark.parametrize("end", [b"\n", b"\r", b"\r\n", b"\r\n\r\n"])
 def test_pipelined_commands(baud: int, end: bytes) -> None:
     commands = [b"N", b"O", b"H", b"E", b"K", b"T,1,G", b"T,1,F"]

@@ -57,9 +57,6 @@ def execute(sim: kiks.Simulation, line: str, robot: int = 1) -> str:
     return sim.wires[robot - 1].firmware.execute(line.encode(), sim.now_ns).decode().rstrip()
 
 
-# ---- all of them ----
-
-
 def test_records_have_no_gaps() -> None:
     """The hash covers their bytes, and padding bytes between the fields would have any value."""
     for record in (ROBOT, BODY):
@@ -120,9 +117,6 @@ def test_what_a_turret_adds_is_in_net_and_in_no_other_robot() -> None:
     assert [line.split(", ")[1] for line in execute(sim, "net", 2).splitlines()] == ["ID 1", "ID 2", "ID 4", "ID 99"]
 
 
-# ---- General I/O ----
-
-
 def test_general_io_is_wired_to_the_outside() -> None:
     sim = kiks.Simulation()
     io = sim.fit(1, "io")
@@ -161,9 +155,6 @@ def test_general_io_is_wired_to_the_outside() -> None:
 def test_general_io_minds_its_numbers(call: Any, words: str) -> None:
     with pytest.raises(kiks.ParameterError, match=words):
         call(kiks.Simulation().fit(1, "io"))
-
-
-# ---- of one's own ----
 
 
 @pytest.mark.slow

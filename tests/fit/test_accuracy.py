@@ -14,7 +14,7 @@ from tests.at_length import at_length
 from tools.accuracy import accuracy
 from tools.sensors import card as cards
 from tools.sensors import models
-from tools.sensors.card import FOUND, HALVES, TOLD, Score, data_folder, half_distances_mm, load_tables, make_card, page
+from tools.sensors.card import FOUND, HALVES, TOLD, data_folder, half_distances_mm, load_tables, make_card, page
 from typer.testing import CliRunner
 
 from kiks.cli.fit import fit, parse_file
@@ -210,11 +210,6 @@ def test_half_distances():
     counts[:, :, 1] = 1023.0
     found = half_distances_mm(gap_mm, counts)
     assert found[:3].tolist() == [8.0, 9.0, 5.0]
-
-
-def test_scores():
-    score = Score.of(np.array([-1.0, 2.0, -3.0]))
-    assert (score.median, score.mean, score.max) == (2.0, 2.0, 3.0)
 
 
 def test_published_formulas():

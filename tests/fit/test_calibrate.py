@@ -71,13 +71,6 @@ def test_calibration_finds_hidden_parameters(base: kiks.RobotSpec, seed: int) ->
     assert found.wheel_base_deviation_mm < 0.005 * hidden.body.wheel_base_mm
 
 
-@at_length
-def test_calibrated_robot_reads_zero_as_often_as_its_kind() -> None:
-    zero_share = idle(measured(BASE).spec)[1]
-    assert zero_share == pytest.approx(idle(BASE)[1], abs=0.05)
-    assert zero_share > 0.4
-
-
 @pytest.mark.parametrize("response", ["thesis", "fast"])
 def test_response_with_directions_of_its_own_is_rejected(response: str) -> None:
     placements = SimPlacements(kiks.Simulation())
@@ -92,9 +85,6 @@ def test_response_with_directions_of_its_own_is_rejected(response: str) -> None:
 def test_guide_lists_the_default_gaps(name: str) -> None:
     guide = (Path(__file__).parents[2] / "docs" / "calibration.md").read_text(encoding="utf-8")
     assert ", ".join(f"{gap:g}" for gap in default_gaps_mm(kiks.RobotSpec.load(name))) + " and" in guide
-
-
-# ---- the command ----
 
 
 @at_length
@@ -140,9 +130,6 @@ def test_failed_calibration_writes_nothing(tmp_path: Path) -> None:
     result = CliRunner().invoke(app, ["--port", sim.url(1), "--out", str(out), "--yes"])
     assert isinstance(result.exception, CalibrationError)
     assert list(tmp_path.iterdir()) == []
-
-
-# ---- failures ----
 
 
 class Misplaced(SimPlacements):
@@ -254,24 +241,6 @@ def test_ctrl_c_in_the_middle_of_a_spin_stops_the_robot() -> None:
     with pytest.raises(KeyboardInterrupt):
         calibrate(kiks.Khepera(Flaky(sim, 260, KeyboardInterrupt())), SimPlacements(sim), BASE)
     assert stands_still(sim)
-
-
-@at_length
-def test_placements_may_repeat_a_measurement() -> None:
-    class Fussy(SimPlacements):
-        asked = 0
-
-        def wants_repeat(self, finding: str, *, is_good: bool) -> bool:
-            self.asked += 1
-            return self.asked == 2
-
-    placements = Fussy(kiks.Simulation())
-    found = calibrate(kiks.Khepera(placements.sim.port(1)), placements, BASE, gaps_mm=[5, 20])
-    assert placements.asked == 5
-    assert found.spec.body.pulse_mm == pytest.approx(BASE.body.pulse_mm, rel=0.005)
-
-
-# ---- parts ----
 
 
 @pytest.mark.parametrize("baud", [9600, 38400, 115200])

@@ -7,14 +7,10 @@ import tracemalloc
 
 import numpy as np
 import pytest
-from tests.engine.sensing.followed_rays import cast_ray
 from tools.sensors.train_networks import PLACES
 
-from kiks.engine.sensing.rays import walls_of
 from kiks.errors import ParameterError
-from kiks.fit.samples import RIG_OFFSET_DEG, Fan, Samples, is_active, load_samples, meet, nearnesses
-from kiks.model.arena import Arena
-from kiks.model.thesis_networks import BODY_RADIUS_MM
+from kiks.fit.samples import RIG_OFFSET_DEG, Fan, Samples, is_active, load_samples, nearnesses
 
 ROW = "0 1 2 3 4 5 6 1023"
 GOOD = f"8 2 3 5 2\nTURN 0\n{ROW}\n{ROW}\nTURN 1\n{ROW}\n{ROW}\nTURN 2\n{ROW}\n9 9 9 9 9 9 9 9\n"
@@ -154,59 +150,6 @@ def test_a_radius_is_positive(tmp_path, radius_mm):
 
 def test_active_readings():
     assert is_active(np.array([0, 19, 20, 1000, 1001, 1023])).tolist() == [False, False, True, True, False, False]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("radius_mm", [math.inf, 27.0, 3.0])
-@pytest.mark.parametrize("places", sorted(PLACES))
-def test_rays_are_those_of_the_engine(radius_mm, places):
-    """The same rays, followed through a raster: as long within what the raster's cells allow."""
-    cell, side, middle = 0.2, 240.0, 120.0
-    fan = Fan.spread(*PLACES[places])
-    gaps, angles = np.array([5.0, 21.0, 43.0]), np.arange(0.0, 360.0, 33.0)
-    every_gap = np.broadcast_to(angles, (len(gaps), len(angles)))
-    samples = Samples("object", radius_mm, gaps, every_gap, np.zeros((*every_gap.shape, 8), np.int64))
-    lengths, cosines = meet(samples, fan)
-    x = np.arange(cell / 2, side, cell)
-    edge = 160.0
-    if math.isinf(radius_mm):
-        inside = np.broadcast_to(x >= edge, (len(x), len(x)))
-    else:
-        inside = np.hypot(x - edge - radius_mm, x[:, None] - middle) <= radius_mm
-    arena = Arena(inside.astype(np.uint8) * 255, cell, "object")
-    walls = walls_of(arena)
-    checked = 0
-    for i, gap in enumerate(gaps):
-        for j, angle in enumerate(angles):
-            heading = math.radians(angle)
-            turn = np.array([[math.cos(heading), -math.sin(heading)], [math.sin(heading), math.cos(heading)]])
-            for sensor in range(8):
-                ox, oy = turn @ fan.origin_mm[sensor] + (edge - gap - BODY_RADIUS_MM, middle)
-                for ray in range(7):
-                    direction = heading + fan.direction_rad[sensor, ray]
-                    cosine, sine = math.cos(direction), math.sin(direction)
-                    length = lengths[i, j, sensor, ray]
-                    found, _ = cast_ray(walls, ox, oy, cosine, sine, 50.0)
-                    if length < 50.0:
-                        # How steeply the ray meets the surface: a raster moves a grazing hit far along the ray.
-                        hit = np.array([ox + length * cosine, oy + length * sine])
-                        normal = (
-                            np.array([1.0, 0.0])
-                            if math.isinf(radius_mm)
-                            else (np.array([edge + radius_mm, middle]) - hit) / radius_mm
-                        )
-                        steepness = float(normal @ (cosine, sine))
-                        assert steepness == pytest.approx(cosines[i, j, sensor, ray], abs=1e-9)
-                        assert steepness >= -1e-9
-                        if steepness > 0.2:
-                            assert found == pytest.approx(length, abs=2 * cell / steepness)
-                            checked += 1
-                    elif found < 49.0:
-                        # Only a ray that passes within a cell of the disc may meet its raster.
-                        assert not math.isinf(radius_mm)
-                        centre = np.array([edge + radius_mm - ox, middle - oy])
-                        assert abs(centre[0] * sine - centre[1] * cosine) > radius_mm - cell
-    assert checked > 20
 
 
 def test_nothing_in_range_is_nothing():

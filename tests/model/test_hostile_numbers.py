@@ -278,9 +278,6 @@ def test_environments_stay_sane(hostile: Any) -> None:
     assert np.isfinite(env.reset(seed=1)[0]).all()
 
 
-# ---- headings ----
-
-
 @pytest.mark.parametrize("heading_rad", [1e20, -1e20, 1e308, HEADING_KEPT_RAD + 1.0, 2.0**63])
 def test_headings_are_wrapped_at_every_door(heading_rad: float) -> None:
     turn_rad = math.remainder(heading_rad, 2 * math.pi)
@@ -353,9 +350,6 @@ def test_sine_and_cosine_of_anything_are_a_direction(angle_rad: float) -> None:
         assert (sine, cosine) == pytest.approx((math.sin(angle_rad), math.cos(angle_rad)), abs=1e-6)
 
 
-# ---- the checks ----
-
-
 @given(st.one_of(st.floats(), st.integers(), st.text(), st.none(), st.booleans()))
 @settings(max_examples=300)
 def test_a_number_that_passes_is_finite_and_in_range(number: Any) -> None:
@@ -391,9 +385,6 @@ def test_numbers_that_pass_are_a_finite_array_of_their_own(hostile: Any) -> None
 def test_numbers_of_another_shape_are_named() -> None:
     with pytest.raises(KiksError, match=r"it must be finite numbers \[any, 4\], but it had the shape \[2, 3\]"):
         check_numbers("it", np.zeros((2, 3)), (None, 4))
-
-
-# ---- what only tests reach ----
 
 
 def test_a_lamp_beyond_everything_costs_no_time() -> None:

@@ -45,14 +45,10 @@ def test_a_robot_of_ones_own_drives(tmp_path: Path) -> None:
     [
         ("diameter_mm = 55.0", "diametre_mm = 55.0", "Did you mean 'diameter_mm'"),
         ("diameter_mm = 55.0", "", "body.diameter_mm must be given, but it is missing. Compare it with 'khepera.toml'"),
-        ("diameter_mm = 55.0", "diameter_mm = '55'", "body.diameter_mm must be a number, but it was '55'"),
-        ("diameter_mm = 55.0", "diameter_mm = nan", "body.diameter_mm must be a finite number, but it was nan"),
         ("diameter_mm = 55.0", "diameter_mm = 5", "body.diameter_mm must be at least 10, but it was 5"),
-        ("diameter_mm = 55.0", "diameter_mm = ", "must be TOML in UTF-8, but: Invalid value (at line"),
         ("[motor]", "[motors]", "Did you mean 'motor'"),
         ("baud = 9600", "baud = true", "firmware.baud must be a whole number, but it was True"),
         ("profile_acceleration = 64", "profile_acceleration = 0", "reset.profile_acceleration must be at "),
-        ("speed_gains = [3800, 800, 100]", "speed_gains = [3800, 800]", "reset.speed_gains must have at least 3 items"),
         ('name = "Khepera"', 'name = ""', "name must have at least 1 character, but it was ''. Write: name = "),
         (
             "slip_ratio_min = 0.10",
@@ -64,7 +60,6 @@ def test_a_robot_of_ones_own_drives(tmp_path: Path) -> None:
             "mount_angle_deg = [1e308, ",
             "proximity.mount_angle_deg[0] must be at most 360, but it was 1e+308",
         ),
-        ("range_mm = 60.0", "range_mm = 0", "proximity.range_mm must be at least 1"),
     ],
 )
 def test_an_error_names_the_wrong_parameter(before: str, after: str, words: str, tmp_path: Path) -> None:

@@ -36,9 +36,6 @@ def shares(sim: Simulation, from_ns: int = 0, robot: int = 1) -> TimeShares:
     return found
 
 
-# ---- what went over the line ----
-
-
 def test_exchange_has_the_times_of_its_characters() -> None:
     sim = fresh()
     sim.run(1)
@@ -126,8 +123,6 @@ def test_who_watches_changes_nothing() -> None:
         ends.append((sim.state_hash(), sim.now_ns))
     assert ends[0] == ends[1]
 
-
-# ---- where the time went ----
 
 SPANS = st.lists(st.tuples(st.integers(0, 40), st.integers(0, 40)), max_size=8)
 

@@ -79,9 +79,6 @@ class Company:
         return self.sim.world.state.robots["wheel_pulses"][0, robot - 1].copy()
 
 
-# ---- pile-ups ----
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [*range(8), 95, 97])
 def test_things_in_a_pile_up_do_not_overlap(number):
@@ -108,9 +105,6 @@ def test_bodies_at_rest_stay_at_rest():
     assert (pile.discs() == before).all()
 
 
-# ---- bodies alone ----
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(("kind", "friction"), [("balls", 20.0), ("cylinders", 160.0)])
 @pytest.mark.parametrize("speed", [10.0, 37.0, 170.0, 400.0])
@@ -135,9 +129,6 @@ def test_off_a_wall_a_quarter_of_the_speed_across_comes_back(angle_deg, speed):
         if company.velocities[0, 0] < 0.0:
             break
     assert company.velocities[0] == pytest.approx((-0.25 * speed * cosine, speed * sine), rel=1e-6)
-
-
-# ---- nothing tunnels ----
 
 
 def thin_wall():
@@ -187,9 +178,6 @@ def test_small_bodies_at_full_speed_meet():
     company.roll(2, -1000.0)
     for _ in company.tick(50):
         assert company.places[1, 0] - company.places[0, 0] >= 20.0 - DEEPEST_MM
-
-
-# ---- hits ----
 
 
 @pytest.mark.parametrize("kinds", [("balls", "balls"), ("balls", "cylinders"), ("cylinders", "cylinders")])
@@ -248,9 +236,6 @@ def test_a_row_of_balls_passes_a_hit_on(order):
     assert company.velocities[last] == pytest.approx((0.975**4 * 300.0, 0.0), rel=1e-6)
     assert company.velocities.sum(axis=0) == pytest.approx((300.0, 0.0), rel=1e-9)
     assert company.speeds[first] < 0.03 * 300.0
-
-
-# ---- robots among bodies ----
 
 
 def test_a_cylinder_keeps_no_speed_from_a_push():
@@ -354,9 +339,6 @@ def test_robots_that_graze_slide_past_each_other(aside):
     assert company.sim.contacts(1) == company.sim.contacts(2) == 1
 
 
-# ---- the same run, however time is cut ----
-
-
 def everything() -> Company:
     rng = np.random.default_rng(7)
     places = [(x, y) for x in np.arange(60, 460, 80) for y in np.arange(60, 460, 80)]
@@ -381,18 +363,3 @@ def test_how_time_is_cut_does_not_matter():
             company.sim.run(10.0 / cuts)
         hashes.add(company.sim.state_hash())
     assert len(hashes) == 1
-
-
-def test_a_run_goes_on_from_a_snapshot_to_the_bit():
-    company = everything()
-    company.run(3.0)
-    snapshot = company.sim.world.state.snapshot()
-    time_ns = company.sim.now_ns
-    company.run(5.0)
-    expected = company.sim.state_hash(), company.sim.proximity(1, noise=True)
-    company.sim.world.state.restore(snapshot)
-    company.sim.world.now_ns = time_ns
-    company.sim.world.rebuild_scene()
-    assert company.sim.world.state.hash() == snapshot.hash()
-    company.run(5.0)
-    assert (company.sim.state_hash(), company.sim.proximity(1, noise=True)) == expected

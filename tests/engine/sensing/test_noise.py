@@ -58,11 +58,6 @@ def test_idle_readings_are_those_of_a_real_khepera() -> None:
     assert idle.mean(axis=0) == pytest.approx([2.8] * 8, abs=0.3)
 
 
-def test_the_sensors_do_not_jitter_together() -> None:
-    together = np.corrcoef(rounds(KHEPERA, 2000).T) - np.eye(8)
-    assert np.abs(together).max() < 0.1
-
-
 def test_noise_is_small_seldom_large_and_without_bias() -> None:
     """Thesis 3.3, "Proximity sensor noise model"."""
     relative = rounds(SILENT, 4000, 25)[:, 2:4] / expected(SILENT, 25)[2:4] - 1
@@ -97,12 +92,12 @@ def test_the_noise_of_kiks_2_2_0_is_data() -> None:
 @pytest.mark.parametrize(
     ("key", "value", "words"),
     [
-        ("jitter_counts", (), "a list of 1 to 51 values, each a number from -1023 to 65535"),
-        ("jitter_counts", (3.0, 1.0), "a list in which none is below the one before"),
-        ("noise_down", 1.5, "a number from 0 to 1"),
+        ("jitter_counts", (), "have at least 1 item"),
+        ("jitter_counts", (3.0, 1.0), "be a list in which none is below the one before"),
+        ("noise_down", 1.5, "be at most 1"),
     ],
 )
 def test_an_error_names_the_wrong_parameter(key: str, value: object, words: str) -> None:
     with pytest.raises(kiks.ParameterError) as caught:
         KHEPERA.with_changes(**{f"proximity__{key}": value})
-    assert f"proximity.{key} must be {words}, but it was {value!r}" in str(caught.value)
+    assert f"proximity.{key} must {words}, but it was {value!r}" in str(caught.value)

@@ -84,9 +84,6 @@ def free_poses(sim: kiks.Simulation, rng: np.random.Generator, count: int, gap_m
     return found
 
 
-# ---- limits ----
-
-
 def test_nothing_within_60_mm_is_nothing() -> None:
     rng = np.random.default_rng(1)
     checked = 0
@@ -116,9 +113,6 @@ def test_no_reading_leaves_the_converters_range() -> None:
         assert 0 <= counts.min() < 20
         assert counts.max() == 1023
         assert ((counts > 100) & (counts < 900)).sum() > 50
-
-
-# ---- more light is more ----
 
 
 @pytest.mark.parametrize("cell_mm", [0.25, 1.0])
@@ -174,9 +168,6 @@ def test_a_post_that_grows_never_reads_less(cell_mm: float, tolerance: float) ->
     assert np.sum(before == 1023) > 20
 
 
-# ---- posts and corners ----
-
-
 def beside_walls(cell_mm: float) -> tuple[np.ndarray, np.ndarray]:
     """Return distances of sensors from a wall that they face [mm], and what each reads, shape [8, distances]."""
     sim, away_mm = world(half_plane(), cell_mm), np.arange(1.5, 60.0, 0.25)
@@ -225,9 +216,6 @@ def test_nothing_jumps_while_a_robot_turns_past_a_post(cell_mm: float, largest: 
         assert counts.max() > 400
 
 
-# ---- how cells lie ----
-
-
 @pytest.mark.parametrize(
     ("radius_mm", "cell_mm", "largest", "usual"),
     [
@@ -264,9 +252,6 @@ def test_readings_are_those_of_geometry_however_cells_lie(
     assert active.sum() > 40 * share(3, 5)
     assert np.abs(both[0]).max() < largest
     assert np.sqrt(np.mean(both[0][active] ** 2)) < usual
-
-
-# ---- which way is into the wall ----
 
 
 def normals(arena: Arena) -> tuple[np.ndarray, np.ndarray]:

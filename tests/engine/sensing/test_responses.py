@@ -101,9 +101,6 @@ def test_an_unknown_response_is_named() -> None:
         kiks.Simulation(response="curve")
 
 
-# ---- the curve of the Khepera II ----
-
-
 def test_a_white_wall_reads_what_the_curve_says() -> None:
     """khepera-protocol.md 8.6, less what is left of it at the end of the range."""
     robot = KHEPERA_II.with_changes(
@@ -170,7 +167,6 @@ def test_the_khepera_ii_reads_multiples_of_four_above_a_baseline() -> None:
     [
         ("distance_mm", (10.0, 10.0), "a list that rises"),
         ("counts", (1200.0, 1300.0, 10.0, 5.0), "one for each distance, falling"),
-        ("ray_weight", (1.0, 0.5), "a list of 4 values, each a number from 0 to 1"),
     ],
 )
 def test_a_wrong_curve_is_named(key: str, value: object, words: str) -> None:
