@@ -6,7 +6,6 @@ import os
 import pickle
 import random
 import re
-import resource
 import shutil
 import signal
 import stat
@@ -18,6 +17,7 @@ from typing import Any
 
 import numba
 import pytest
+from tests.model.test_atomic_files import full_disk
 from tests.stranger import STRANGER, as_stranger, needs_root
 
 from kiks.engine import code_cache
@@ -300,12 +300,8 @@ def test_a_folder_that_others_can_write_to_is_not_used(tmp_path: Path, caplog: p
 
 
 def test_on_a_full_disk_the_run_goes_on(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, before[1]))
-    try:
+    with full_disk(1000):
         assert [call(), call(), call(0.5)] == [False] * 3
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
     (line,) = [record.getMessage() for record in caplog.records]
     assert "(File too large)" in line
     assert line.endswith("so each start compiles it. Set NUMBA_CACHE_DIR to a folder of yours with room.")

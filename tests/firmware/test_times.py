@@ -60,11 +60,3 @@ def test_pieces_of_a_command_wait_for_each_other(baud: int) -> None:
     port.write(b"\n")
     port.readline()
     assert port.sim.now_ns == 1_000_000_000 + (1 + 7) * character_ns(baud) + PROCESSING_NS
-
-
-def test_a_character_of_a_reply_arrives_at_its_time() -> None:
-    port = port_at(9600)
-    port.write(b"B\n")
-    for count in range(1, 12):
-        assert len(port.read(1)) == 1
-        assert port.sim.now_ns == (2 + count) * character_ns(9600) + PROCESSING_NS

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-import tracemalloc
 
 import numpy as np
 import pytest
+from tests.model.test_kad import traced
 from tools.sensors.train_networks import PLACES
 
 from kiks.errors import ParameterError
@@ -114,12 +114,9 @@ def test_broken_tables_are_told(tmp_path, changes, words):
 
 def test_a_header_asks_for_no_memory(tmp_path):
     file = write(tmp_path, f"8 3600 1000 5 2\nTURN 0\n{ROW}\n")
-    tracemalloc.start()
-    with pytest.raises(ParameterError, match=r"line 3: .*the end of the file"):
+    with traced() as peak_bytes, pytest.raises(ParameterError, match=r"line 3: .*the end of the file"):
         load_samples(file)
-    peak_bytes = tracemalloc.get_traced_memory()[1]
-    tracemalloc.stop()
-    assert peak_bytes < 1e7
+    assert peak_bytes[0] < 1e7
 
 
 @pytest.mark.parametrize("seed", range(60))

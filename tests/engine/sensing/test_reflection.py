@@ -129,17 +129,6 @@ def test_straight_towards_a_wall_a_reading_rises_to_saturation(sensor: int, cell
     assert 17 < gaps_mm[np.argmax(counts > 511)] < 29
 
 
-@pytest.mark.parametrize("radius_mm", [12.0, 27.0])
-@pytest.mark.parametrize("cell_mm", [0.25, 1.0])
-def test_straight_towards_a_post_too(cell_mm: float, radius_mm: float) -> None:
-    sim = world(disc(radius_mm), cell_mm)
-    gaps_mm = np.arange(65.0, cell_mm, -0.1)
-    for sensor in range(SENSOR_COUNT):
-        counts = np.array([read(sim, -radius_mm - RADIUS_MM - gap, 0.0, facing(sensor))[sensor] for gap in gaps_mm])
-        assert np.diff(counts).min() >= 0
-        assert np.all(counts[gaps_mm < 5] == 1023)
-
-
 def test_a_brighter_surface_never_reads_less() -> None:
     for seed in range(share(1, 4)):
         worlds = [random_world(np.random.default_rng(seed), brightness=shade) for shade in (1, 40, 100, 180, 255)]
@@ -152,20 +141,6 @@ def test_a_brighter_surface_never_reads_less() -> None:
                 rows[-1].append(sim.proximity(1))
         assert np.diff(np.array(rows), axis=0).min() >= 0
         assert (np.array(rows[-1]) - np.array(rows[0])).max() > 200
-
-
-@pytest.mark.parametrize(("cell_mm", "tolerance"), [(0.25, 1.0), (1.0, 15.0)])
-def test_a_post_that_grows_never_reads_less(cell_mm: float, tolerance: float) -> None:
-    """Each ray meets it nearer and more squarely."""
-    rng = np.random.default_rng(5)
-    before = np.zeros((30, 8))
-    poses = [(-60.0 + x, y, turn) for x, y, turn in rng.uniform((-4, -8, -math.pi), (4, 8, math.pi), (30, 3))]
-    for radius_mm in np.arange(2.0, 27.0, share(4.0, 1.0)):
-        sim = world(disc(radius_mm), cell_mm)
-        now = np.array([read(sim, *pose) for pose in poses])
-        assert np.min(now - before) >= -tolerance
-        before = now
-    assert np.sum(before == 1023) > 20
 
 
 def beside_walls(cell_mm: float) -> tuple[np.ndarray, np.ndarray]:
@@ -203,17 +178,6 @@ def test_posts_and_corners_are_less_than_a_wall_that_is_as_near(cell_mm: float) 
                 assert np.all(counts <= np.array(most) + 15.0)
                 active += np.sum((counts > 20) & (counts < 1000))
         assert active > 20
-
-
-@pytest.mark.parametrize(("cell_mm", "largest"), [(0.25, 160.0), (1.0, 320.0)])
-def test_nothing_jumps_while_a_robot_turns_past_a_post(cell_mm: float, largest: float) -> None:
-    """Half a degree at a time past a post with a radius of 12 mm: found are 149 and 293 counts, next to it."""
-    sim = world(disc(12.0), cell_mm)
-    for gap_mm, part in ((1.0, 1.0), (2.0, 1.0), (5.0, 0.85), (12.0, 0.7), (20.0, 0.4)):
-        turns = np.radians(np.arange(0.0, 360.5, 0.5))
-        counts = np.array([read(sim, -12.0 - RADIUS_MM - gap_mm - cell_mm, 0.0, turn) for turn in turns])
-        assert np.abs(np.diff(counts, axis=0)).max() < part * largest
-        assert counts.max() > 400
 
 
 @pytest.mark.parametrize(
