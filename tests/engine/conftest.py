@@ -42,14 +42,17 @@ class World:
         self.robot["trail"][:] = (x_mm, y_mm, heading_rad)
         return self
 
-    def speed(self, left: int, right: int) -> None:
+    def speed(self, left: int, right: int, *, ticks: int = 0) -> None:
         motor.set_speed(self.state.robots, 0, 0, left, right)
+        self.tick(ticks)
 
-    def pwm(self, left: int, right: int) -> None:
+    def pwm(self, left: int, right: int, *, ticks: int = 0) -> None:
         motor.set_pwm(self.state.robots, 0, 0, left, right)
+        self.tick(ticks)
 
-    def position(self, left: int, right: int) -> None:
+    def position(self, left: int, right: int, *, ticks: int = 0) -> None:
         motor.set_position(self.state.robots, 0, 0, left, right)
+        self.tick(ticks)
 
     def set_counters(self, left: int, right: int) -> None:
         motor.set_counters(self.state.robots, 0, 0, left, right)

@@ -21,6 +21,12 @@ def ask(sim: kiks.Simulation, order: str, robot: int = 1) -> list[int]:
     return kiks.Khepera(sim.port(robot)).turret(1, order)
 
 
+def act(sim: kiks.Simulation, order: str, seconds: float, robot: int = 1) -> None:
+    """Give an order and let time pass."""
+    ask(sim, order, robot)
+    sim.run(seconds)
+
+
 def tell(sim: kiks.Simulation, line: str, robot: int = 1) -> None:
     kiks.Khepera(sim.port(robot)).send(line)
 
@@ -28,8 +34,7 @@ def tell(sim: kiks.Simulation, line: str, robot: int = 1) -> None:
 def closed(sim: kiks.Simulation, robot: int = 1) -> None:
     """Lower the arm, jaws open, and close them."""
     for order, seconds in (("D,0", 0.0), ("E,255", 1.0), ("D,1", 0.6)):
-        ask(sim, order, robot)
-        sim.run(seconds)
+        act(sim, order, seconds, robot)
 
 
 def a_simulation(ahead_mm: float = TOUCHING_MM + 1, aside_mm: float = 0.0, *, robots: int = 1) -> kiks.Simulation:
@@ -91,16 +96,13 @@ def test_it_grips_carries_and_puts_down() -> None:
     sim = a_simulation()
     robot, port = kiks.Khepera(sim.port(1)), sim.port(1)
     assert ask(sim, "G") == [0]  # the arm is up
-    ask(sim, "E,255")
-    sim.run(0.6)
+    act(sim, "E,255", 0.6)
     assert ask(sim, "G") == [255]
     assert ask(sim, "F") == [int(sim.bodies()["brightness"][0])]
-    ask(sim, "D,1")
-    sim.run(0.6)
+    act(sim, "D,1", 0.6)
     assert held_by(sim) == 1
     assert ask(sim, "H,0") == [115]  # 200 (16 - 0.5)/27
-    ask(sim, "E,150")
-    sim.run(0.6)
+    act(sim, "E,150", 0.6)
     assert sim.bodies()["is_lifted"][0] == 1
     assert ask(sim, "G") == [255]
     robot.set_speed(10, 10)
@@ -109,12 +111,10 @@ def test_it_grips_carries_and_puts_down() -> None:
     sim.run(0.2)
     assert sim.pose(1)[0] > 440
     assert seen_from(sim) == pytest.approx((TOUCHING_MM + 1, 0.0), abs=1e-9)
-    ask(sim, "E,255")
-    sim.run(0.6)
+    act(sim, "E,255", 0.6)
     assert held_by(sim) == 1
     assert sim.bodies()["is_lifted"][0] == 0
-    ask(sim, "D,0")
-    sim.run(0.6)
+    act(sim, "D,0", 0.6)
     assert held_by(sim) == 0
     where = place_of(sim)
     robot.set_speed(-10, -10)
@@ -157,13 +157,10 @@ def test_what_is_too_wide_or_far_above_is_not_gripped() -> None:
     closed(sim)
     assert held_by(sim) == 0
     sim = a_simulation()
-    ask(sim, "E,200")
-    sim.run(0.5)
-    ask(sim, "D,1")
-    sim.run(0.6)
+    act(sim, "E,200", 0.5)
+    act(sim, "D,1", 0.6)
     assert held_by(sim) == 0
-    ask(sim, "E,255")  # closed jaws grip nothing
-    sim.run(0.6)
+    act(sim, "E,255", 0.6)  # closed jaws grip nothing
     assert held_by(sim) == 0
 
 
@@ -172,8 +169,7 @@ def test_two_grippers_at_one_cylinder() -> None:
     x, _ = place_of(sim)
     sim.place(2, x + TOUCHING_MM + 1, 300, math.pi)
     for robot in (1, 2):
-        ask(sim, "E,255", robot)
-    sim.run(0.6)
+        act(sim, "E,255", 0.6, robot)
     for robot in (1, 2):
         tell(sim, "T,1,D,1", robot)
     sim.run(0.7)
@@ -213,11 +209,9 @@ def test_a_wall_stops_both() -> None:
 def test_a_wall_beside_the_load_stops_the_turn() -> None:
     sim = holding()
     sim.place(1, 300, 300, 0.0)
-    ask(sim, "E,150")
-    sim.run(0.6)
+    act(sim, "E,150", 0.6)
     sim.place(1, 861, 300, math.pi / 2)  # almost at the wall at its right, which the load meets after 0.3 rad
-    ask(sim, "E,255")
-    sim.run(0.6)
+    act(sim, "E,255", 0.6)
     assert sim.bodies()["is_lifted"][0] == 0
     before = sim.world.state.robots["wheel_pulses"][0, 0].copy()
     kiks.Khepera(sim.port(1)).set_speed(5, -5)
@@ -257,15 +251,12 @@ def test_who_pushes_the_load_aside_turns_the_robot() -> None:
 
 def test_it_puts_down_only_where_there_is_room() -> None:
     sim = holding(robots=2)
-    ask(sim, "E,100")
-    sim.run(0.7)
+    act(sim, "E,100", 0.7)
     sim.place(2, 300 + TOUCHING_MM + 25, 300, 0.0)
-    ask(sim, "E,255")
-    sim.run(1.0)
+    act(sim, "E,255", 1.0)
     assert sim.bodies()["is_lifted"][0] == 1
     assert 205 <= ask(sim, "H,1")[0] < 215  # it rests on the robot
-    ask(sim, "D,0")
-    sim.run(1.0)
+    act(sim, "D,0", 1.0)
     assert held_by(sim) == 1
     assert deepest_overlap_mm(sim) == 0.0
     sim.place(2, 60, 120, 0.0)
@@ -278,10 +269,8 @@ def test_it_puts_down_only_where_there_is_room() -> None:
 
 def test_opened_in_the_air_it_drops_the_load_in_front() -> None:
     sim = holding()
-    ask(sim, "E,100")
-    sim.run(0.7)
-    ask(sim, "D,0")
-    sim.run(0.1)
+    act(sim, "E,100", 0.7)
+    act(sim, "D,0", 0.1)
     assert held_by(sim) == 0
     assert place_of(sim) == pytest.approx((300 + TOUCHING_MM + 1, 300), abs=0.01)
 
@@ -312,13 +301,11 @@ def test_a_robot_that_is_lifted_leaves_what_stands_on_the_floor() -> None:
 @pytest.mark.parametrize("is_open", [True, False])
 def test_a_reset_takes_the_grip_back(is_open: bool) -> None:
     sim = holding()
-    ask(sim, "E,100")
-    sim.run(0.7)
+    act(sim, "E,100", 0.7)
     lifted = sim.checkpoint()
     kiks.Khepera(sim.port(1)).set_speed(-10, -10)
     if is_open:
-        ask(sim, "D,0")
-    sim.run(1.0)
+        act(sim, "D,0", 1.0)
     sim.reset(lifted)
     kiks.Khepera(sim.port(1)).set_speed(0, 0)
     sim.run(0.5)
@@ -331,8 +318,7 @@ def test_a_reset_to_before_the_grip_lets_go() -> None:
     sim = a_simulation()
     before = sim.checkpoint()
     closed(sim)
-    ask(sim, "E,100")
-    sim.run(0.7)
+    act(sim, "E,100", 0.7)
     sim.reset(before)
     assert held_by(sim) == 0
     sim.run(0.6)

@@ -26,6 +26,18 @@ def scene(
     return sim
 
 
+def camera_of(sim: kiks.Simulation) -> K213:
+    camera = sim.wires[0].firmware.turrets[2]
+    assert isinstance(camera, K213)
+    return camera
+
+
+def run(sim: kiks.Simulation, seconds: float) -> None:
+    """Let time pass up to this very instant."""
+    sim.run(seconds)
+    sim.sync()
+
+
 def contrast(image: list[float]) -> float:
     """The steepest step between neighbours."""
     return float(np.abs(np.diff(image)).max())
@@ -169,8 +181,7 @@ def test_pictures_are_taken_at_whole_periods(code: int) -> None:
     period_s = PERIODS_NS[code] / 1e9
     before, changes = firmware.execute(b"T,2,N", 0), []
     for k in range(1, 31):
-        sim.run(k * period_s / 10 - sim.time_s)
-        sim.sync()
+        run(sim, k * period_s / 10 - sim.time_s)
         now = firmware.execute(b"T,2,N", sim.now_ns)
         if now != before:
             changes.append(k)
@@ -193,17 +204,13 @@ def test_an_image_does_not_depend_on_how_often_one_looks() -> None:
 
 def test_a_change_of_period_takes_no_picture_of_the_past() -> None:
     sim = scene(seed=1)
-    camera = sim.wires[0].firmware.turrets[2]
-    assert isinstance(camera, K213)
-    sim.run(0.47)
-    sim.sync()
+    camera = camera_of(sim)
+    run(sim, 0.47)
     assert camera.taken_ns == 400_000_000
     camera.order("U", (1,))
-    sim.run(0.02)
-    sim.sync()
+    run(sim, 0.02)
     assert camera.taken_ns == 400_000_000
-    sim.run(0.01)
-    sim.sync()
+    run(sim, 0.01)
     assert camera.taken_ns == 500_000_000
 
 
@@ -214,12 +221,10 @@ def test_the_picture_shows_where_the_robot_was_at_that_instant() -> None:
     before = kiks.Khepera(sim.port(1)).image()
     sim.place(1, 300, 300, -math.pi / 2)
     sim.run(0.01)
-    camera = sim.wires[0].firmware.turrets[2]
-    assert isinstance(camera, K213)
+    camera = camera_of(sim)
     assert camera.taken_ns % PERIODS_NS[0] == 0
     assert np.mean(before[2:24]) < 100
-    sim.run(0.2)
-    sim.sync()
+    run(sim, 0.2)
     assert np.mean(camera.pixels[10:24]) > 150
 
 
@@ -229,8 +234,7 @@ def pictures(sim: kiks.Simulation, *, first_order: bytes | None = None) -> tuple
     replies = [] if first_order is None else [firmware.execute(first_order, sim.now_ns)]
     for _ in range(13):
         replies += [firmware.execute(order, sim.now_ns) for order in (b"T,2,N", b"T,2,L")]
-        sim.run(0.1)
-        sim.sync()
+        run(sim, 0.1)
     return replies, sim.state_hash(), sim.now_ns
 
 
@@ -239,8 +243,7 @@ def test_the_camera_is_part_of_the_state() -> None:
     kiks.Khepera(sim.port(1)).set_speed(3, -2)
     sim.run(0.53 - sim.time_s)
     sim.wires[0].firmware.execute(b"T,2,U,1", sim.now_ns)
-    sim.run(0.3)
-    sim.sync()
+    run(sim, 0.3)
     snapshot, now_ns = sim.world.state.snapshot(), sim.now_ns
     straight_on = pictures(sim)
     assert len(set(straight_on[0])) > 20
@@ -257,8 +260,7 @@ def test_the_camera_is_part_of_the_state() -> None:
 
 def test_a_restart_sets_the_period_of_the_power_on() -> None:
     sim = scene(seed=3)
-    robot, camera = kiks.Khepera(sim.port(1)), sim.wires[0].firmware.turrets[2]
-    assert isinstance(camera, K213)
+    robot, camera = camera_of(kiks.Khepera(sim.port(1)), sim)
     robot.send("T,2,U,7")
     assert camera.period_ns == 5_000_000_000
     sim.run(1.1 - sim.time_s)
@@ -267,8 +269,7 @@ def test_a_restart_sets_the_period_of_the_power_on() -> None:
     sim.wires[0].firmware.execute(b"restart", sim.now_ns)
     assert camera.period_ns == PERIODS_NS[0]
     assert camera.pixels == before
-    sim.run(0.1)
-    sim.sync()
+    run(sim, 0.1)
     assert camera.taken_ns == 1_200_000_000
     assert camera.pixels != before
 
@@ -276,8 +277,7 @@ def test_a_restart_sets_the_period_of_the_power_on() -> None:
 def test_noise_is_bounded_and_without_bias_and_repeats() -> None:
     sim = scene(seed=5)
     expected = np.array(sim.image(1))
-    camera = sim.wires[0].firmware.turrets[2]
-    assert isinstance(camera, K213)
+    camera = camera_of(sim)
     rows = []
     for k in range(500):
         camera.look(k * 1000)
@@ -287,12 +287,10 @@ def test_noise_is_bounded_and_without_bias_and_repeats() -> None:
     assert np.abs(noise).max() <= 12.75 + 9 + 9 + 0.5
     assert np.abs(noise.mean(axis=0)).max() < 4
     assert 5 < noise.std() < 12
-    again = scene(seed=5).wires[0].firmware.turrets[2]
-    assert isinstance(again, K213)
+    again = camera_of(scene(seed=5))
     again.look(499_000)
     assert again.pixels == rows[-1]
-    other = scene(seed=6).wires[0].firmware.turrets[2]
-    assert isinstance(other, K213)
+    other = camera_of(scene(seed=6))
     other.look(499_000)
     assert other.pixels != rows[-1]
 

@@ -47,6 +47,10 @@ class Company:
         self.sim.sync()
         motor.set_speed(self.sim.world.state.robots, 0, robot - 1, left, left if right is None else right)
 
+    def drive(self, robot, speed, seconds):
+        self.speed(robot, speed)
+        self.run(seconds)
+
     def roll(self, body, velocity_x, velocity_y=0.0):
         self.bodies["velocity_x"][body - 1], self.bodies["velocity_y"][body - 1] = velocity_x, velocity_y
 
@@ -240,12 +244,10 @@ def test_a_row_of_balls_passes_a_hit_on(order):
 
 def test_a_cylinder_keeps_no_speed_from_a_push():
     company = Company(robots=[(300.0, 1000.0, 0.0)], cylinders=[(400.0, 1000.0)])
-    company.speed(1, 60)
-    company.run(1.0)
+    company.drive(1, 60, 1.0)
     assert company.places[0, 0] > 450.0
     assert company.speeds[0] == 0.0
-    company.speed(1, 0)
-    company.run(STEADY_S)
+    company.drive(1, 0, STEADY_S)
     stands = company.places.copy()
     company.run(1.0)
     assert company.places == pytest.approx(stands, abs=0.01)  # the motor creeps
@@ -257,8 +259,7 @@ def test_a_movable_thing_does_not_slow_a_robot(speed):
     ends, wheels, contacts = [], [], []
     for cylinders in ([], [(600.0, 1000.0)]):
         company = Company(robots=[(555.0, 1000.0, 0.0)], cylinders=cylinders)
-        company.speed(1, speed)
-        company.run(40.0 / speed + 1.0)
+        company.drive(1, speed, 40.0 / speed + 1.0)
         ends.append(company.sim.pose(1))
         wheels.append(company.wheels(1))
         contacts.append(company.sim.contacts(1))
@@ -269,8 +270,7 @@ def test_a_movable_thing_does_not_slow_a_robot(speed):
 
 def test_a_ball_pushed_along_is_one_contact():
     company = Company(robots=[(300.0, 1000.0, 0.0)], balls=[(362.0, 1000.0)])
-    company.speed(1, 20)
-    company.run(2.0)  # at first it runs ahead of a robot that was faster for a moment
+    company.drive(1, 20, 2.0)  # at first it runs ahead of a robot that was faster for a moment
     contacts = company.sim.contacts(1)
     company.run(7.0)
     assert company.sim.contacts(1) == contacts <= 3
@@ -283,8 +283,7 @@ def test_a_blocked_thing_stops_a_robot(body, speed):
     radius = BALL_MM if body == "balls" else CYLINDER_MM
     x = 1990.0 - radius
     company = Company(robots=[(x - radius - ROBOT_MM - 20.0, 1000.0, 0.0)], **{body: [(x, 1000.0)]})
-    company.speed(1, speed)
-    company.run(40.0 / speed + 2.0)
+    company.drive(1, speed, 40.0 / speed + 2.0)
     pose, before, contacts = company.sim.pose(1), company.wheels(1), company.sim.contacts(1)
     company.run(10.0)
     assert math.dist(company.sim.pose(1)[:2], pose[:2]) < 0.05
@@ -292,8 +291,7 @@ def test_a_blocked_thing_stops_a_robot(body, speed):
     assert (share >= 0.10).all()
     assert (share <= 0.15).all()
     assert company.sim.contacts(1) == contacts
-    company.speed(1, -speed)
-    company.run(STEADY_S)
+    company.drive(1, -speed, STEADY_S)
     x_mm = company.sim.pose(1)[0]
     company.run(1.0)
     assert x_mm - company.sim.pose(1)[0] == pytest.approx(speed * PULSE_MM * 100, rel=0.02, abs=0.5)
@@ -303,8 +301,7 @@ def test_a_blocked_thing_stops_a_robot(body, speed):
 def test_two_robots_head_on_stand_still():
     company = Company(robots=[(900.0, 1000.0, 0.0), (1000.0, 1000.0, math.pi)])
     company.speed(1, 30)
-    company.speed(2, 30)
-    company.run(2.0)
+    company.drive(2, 30, 2.0)
     poses, before = company.sim.poses(), [company.wheels(1), company.wheels(2)]
     company.run(5.0)
     assert company.sim.poses() == pytest.approx(poses, abs=0.05)
@@ -317,8 +314,7 @@ def test_two_robots_head_on_stand_still():
 
 def test_a_robot_shoves_another_at_half_its_speed():
     company = Company(robots=[(900.0, 1000.0, 0.0), (960.0, 1000.0, 1.0)])
-    company.speed(1, 40)
-    company.run(1.0)
+    company.drive(1, 40, 1.0)
     before = company.sim.poses()
     company.run(2.0)
     moved = company.sim.poses() - before
@@ -331,8 +327,7 @@ def test_a_robot_shoves_another_at_half_its_speed():
 def test_robots_that_graze_slide_past_each_other(aside):
     company = Company(robots=[(800.0, 1000.0, 0.0), (1000.0, 1000.0 + aside, math.pi)])
     company.speed(1, 30)
-    company.speed(2, 30)
-    company.run(2.0)
+    company.drive(2, 30, 2.0)
     (first_x, first_y, _), (second_x, second_y, _) = company.sim.poses()
     assert first_x > second_x
     assert second_y - first_y >= 2 * ROBOT_MM - DEEPEST_MM

@@ -72,8 +72,7 @@ def test_no_motion_without_command(make_world, make_random_arena):
         arena = make_random_arena(number)
         start = arena.find_start(27.5)
         world = make_world(arena).place(*start)
-        world.speed(40, 43)
-        world.tick(200)
+        world.speed(40, 43, ticks=200)
         world.pwm(0, 0)
         world.robot["motor_speed"] = 0.0
         pose = world.pose
@@ -125,8 +124,7 @@ def test_mirror_and_quarter_turn(make_world, make_random_arena):
 @pytest.mark.parametrize("speed", [2, 20, 100])
 def test_head_on_it_stands_and_its_wheels_slip(make_world, heading, speed):
     world = make_world(Arena.box(500, 400)).place(300.0, 200.0, heading)
-    world.speed(speed, speed)
-    world.tick(1000 + 40_000 // speed)
+    world.speed(speed, speed, ticks=1000 + 40_000 // speed)
     pose, before = world.pose, world.counters
     for _ in range(1000):
         world.tick()
@@ -140,8 +138,7 @@ def test_head_on_it_stands_and_its_wheels_slip(make_world, heading, speed):
 @pytest.mark.parametrize("angle_deg", [5, 10, 20, 30, 40])
 def test_grazing_without_friction_slides_by_the_cosine(make_world, angle_deg):
     world = make_world(Arena.box(2000, 200), body__wall_friction=0.0).place(100.0, 162.4, math.radians(angle_deg))
-    world.speed(20, 20)
-    world.tick(50)
+    world.speed(20, 20, ticks=50)
     x, asked = world.pose[0], world.asked.mean()
     world.tick(200)
     made_good = (world.pose[0] - x) / ((world.asked.mean() - asked) * PULSE)
@@ -155,8 +152,7 @@ def test_friction_turns_towards_the_wall_the_more_the_larger(make_world, angle_d
     for friction in (0.0, 0.05, 0.1, 0.2, 0.4):
         arena = Arena.box(2000, 200)
         world = make_world(arena, body__wall_friction=friction).place(100.0, 162.4, math.radians(angle_deg))
-        world.speed(20, 20)
-        world.tick(40)
+        world.speed(20, 20, ticks=40)
         turned.append(world.pose[2] - math.radians(angle_deg))
     assert turned[0] == pytest.approx(0.0, abs=1e-9)
     assert all(more > less + 1e-4 for less, more in pairwise(turned))
@@ -168,8 +164,7 @@ def test_friction_turns_towards_the_wall_the_more_the_larger(make_world, angle_d
 def test_corners_hold_without_jitter_and_let_go(make_world, angle_deg, turn, speed):
     arena = wedge(angle_deg)
     world = make_world(arena).place(300.0, 250.0, math.pi + turn)
-    world.speed(speed, speed)
-    world.tick(2000 + 5000 // speed)
+    world.speed(speed, speed, ticks=2000 + 5000 // speed)
     pose = world.pose
     poses = []
     for _ in range(1000):
@@ -178,18 +173,15 @@ def test_corners_hold_without_jitter_and_let_go(make_world, angle_deg, turn, spe
     assert np.ptp(poses, axis=0).max() < 0.05
     pose = world.pose
     back = make_world(arena).place(*pose)
-    back.speed(-10, -10)
-    back.tick(60)
+    back.speed(-10, -10, ticks=60)
     assert math.dist(back.pose[:2], pose[:2]) > 25
     around = make_world(arena).place(*pose)
-    around.speed(10, -10)
-    around.tick(200)
+    around.speed(10, -10, ticks=200)
     assert around.pose[2] - pose[2] == pytest.approx((around.asked[1] - around.asked[0]) * PULSE / 53, abs=0.01)
     # From whatever way it faces: turn to the open side, and out.
     x, y, _ = around.pose
     out = make_world(arena).place(x, y, 0.0)
-    out.speed(10, 10)
-    out.tick(60)
+    out.speed(10, 10, ticks=60)
     assert math.dist(out.pose[:2], (x, y)) > 40
 
 
@@ -224,8 +216,7 @@ def test_rolling_around_a_post_is_smooth(make_world, offset_mm):
     picture = np.zeros((300, 600), np.uint8)
     picture[150, 300] = 255
     world = make_world(Arena.from_array(picture), body__wall_friction=0.0).place(200.0, 149.5 + offset_mm, 0.0)
-    world.speed(20, 20)
-    world.tick(20)
+    world.speed(20, 20, ticks=20)
     touched = 0
     while world.pose[0] < 400:
         was_touching = world.robot["is_touching"] == CONTACT_TICKS
@@ -285,7 +276,6 @@ def test_a_robot_put_down_a_hair_inside_a_wall_can_leave(make_world):
     arena = Arena.box(500, 400)
     for heading in np.linspace(0, math.pi, 9):
         world = make_world(arena).place(462.509, 200.0, heading + math.pi / 2)
-        world.speed(10, 10)
-        world.tick(60)
+        world.speed(10, 10, ticks=60)
         assert math.dist(world.pose[:2], (462.5, 200.0)) > 10 * abs(math.sin(heading)) or heading in (0.0, math.pi)
         assert world.depth_mm() < 0.01

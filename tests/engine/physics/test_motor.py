@@ -118,15 +118,13 @@ def test_a_move_arrives_whatever_ran_before(make_world, mode, first, target, tic
     scale = {"speed": 1, "pwm": 2, "position": 50}[mode]
     getattr(world, mode)(first * scale, -first * scale)
     world.tick(ticks)
-    world.position(target, -target)
-    world.tick(1500)
+    world.position(target, -target, ticks=1500)
     assert (world.status[0], world.status[3]) == (1, 1)
     assert world.counters == pytest.approx((target, -target), abs=2)
 
 
 def test_a_move_to_the_same_place_stirs_nothing(world):
-    world.position(500, -500)
-    world.tick(300)
+    world.position(500, -500, ticks=300)
     before = world.counters
     world.position(500, -500)
     assert world.status[0] == 0
@@ -137,8 +135,7 @@ def test_a_move_to_the_same_place_stirs_nothing(world):
 
 @pytest.mark.parametrize(("speed", "acceleration"), [(1, 1), (5, 255), (127, 255), (60, 30)])
 def test_a_new_profile_holds_for_the_move_in_progress(world, speed, acceleration):
-    world.position(3000, -3000)
-    world.tick(60)
+    world.position(3000, -3000, ticks=60)
     world.robot["profile_speed"][:] = speed
     world.robot["profile_acceleration"][:] = acceleration
     world.tick(90)
@@ -150,8 +147,7 @@ def test_a_new_profile_holds_for_the_move_in_progress(world, speed, acceleration
 def test_setting_the_counters_moves_nothing_while_holding(make_world):
     one, other = make_world(FAR).place(1000.0, 1000.0), make_world(FAR).place(1000.0, 1000.0)
     for world in (one, other):
-        world.position(300, 300)
-        world.tick(300)
+        world.position(300, 300, ticks=300)
     one.set_counters(0, -12345)
     assert one.counters == (0, -12345)
     for _ in range(300):
@@ -164,8 +160,7 @@ def test_setting_the_counters_moves_nothing_while_holding(make_world):
 def test_setting_the_counters_shifts_a_move(make_world):
     one, other = make_world(FAR).place(1000.0, 1000.0), make_world(FAR).place(1000.0, 1000.0)
     for world in (one, other):
-        world.position(1500, 900)
-        world.tick(40)
+        world.position(1500, 900, ticks=40)
     shift = [7000 - one.counters[0], -9 - one.counters[1]]
     one.set_counters(7000, -9)
     for _ in range(300):
@@ -176,18 +171,15 @@ def test_setting_the_counters_shifts_a_move(make_world):
 
 
 def test_full_power_is_the_free_speed_and_little_power_none(world):
-    world.pwm(255, 8)
-    world.tick(100)
+    world.pwm(255, 8, ticks=100)
     assert world.robot["motor_speed"].tolist() == pytest.approx([127.0, 0.0], abs=1e-9)
-    world.pwm(9, -9)
-    world.tick(100)
+    world.pwm(9, -9, ticks=100)
     assert world.robot["motor_speed"].tolist() == pytest.approx([127 / 247, -127 / 247], abs=1e-6)
 
 
 def test_counters_overflow_at_32_bits(world):
     world.set_counters(2**31 - 1, -(2**31))
-    world.speed(10, -10)
-    world.tick(100)
+    world.speed(10, -10, ticks=100)
     moved = world.robot["pulse_count"]
     assert world.counters == (-(2**31) + moved[0] - 1, 2**31 + moved[1])
 
@@ -195,8 +187,7 @@ def test_counters_overflow_at_32_bits(world):
 @pytest.mark.parametrize("edge", [2**31 - 1, -(2**31)])
 def test_holding_at_the_overflow_of_the_counters_stays_put(world, edge):
     """The error is counted over the edge: a wheel that goes one pulse over it does not run off to bring back 2^32."""
-    world.position(200, 200)
-    world.tick(200)
+    world.position(200, 200, ticks=200)
     world.set_counters(edge, edge)
     before = world.robot["wheel_pulses"].copy()
     world.robot["wheel_pulses"] += 3.0 * math.copysign(1.0, edge)  # an outside push turns the wheels
@@ -206,8 +197,7 @@ def test_holding_at_the_overflow_of_the_counters_stays_put(world, edge):
     world.tick(300)
     assert abs(world.status[2]) <= 3
     world.set_counters(0, 0)
-    world.position(100, 100)
-    world.tick(300)
+    world.position(100, 100, ticks=300)
     assert world.counters == pytest.approx((100, 100), abs=2)
 
 
@@ -230,8 +220,7 @@ def test_no_gains_blow_up(world, gains, mode):
 def test_an_integrator_that_is_too_full_empties_again(world):
     """Without gains it fills up unseen. With gains again the wheels must not run at full power for ever."""
     world.robot["speed_gains"] = (0, 0, 0)
-    world.speed(20, -20)
-    world.tick(1000)
+    world.speed(20, -20, ticks=1000)
     world.robot["speed_gains"] = (3800, 800, 100)
     world.tick(1000)
     start = world.counters
@@ -241,8 +230,7 @@ def test_an_integrator_that_is_too_full_empties_again(world):
 
 @pytest.mark.parametrize("speed", [1, 2, 3])
 def test_slow_speeds_are_smooth(world, speed):
-    world.speed(speed, speed)
-    world.tick(300)
+    world.speed(speed, speed, ticks=300)
     speeds = []
     for _ in range(300):
         world.tick()
