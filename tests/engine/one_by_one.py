@@ -66,19 +66,6 @@ def advance_eight(scene, worlds, ticks, until, lanes, room):
 
 
 @entry
-def records_taken(record, spare, ticks):
-    """Return how many records of eight a bunch of the first world has, if there is memory for more robots."""
-    scene = open_scene(record[0])
-    return count_records(scene, np.zeros(1, np.int64), ticks, make_lanes(spare), make_room(scene, 1))
-
-
-@kernel
-def count_records(scene, worlds, ticks, lanes, room):
-    """Return how many records of eight a bunch has."""
-    return take(scene, worlds, ticks, lanes, room).robots.shape[0]
-
-
-@entry
 def read_one_by_one(record, world, robot, tick, time_ns, out):
     """Read the proximity sensors one by one: all rays to their ends, and each ray past each disc of the world."""
     scene = open_scene(record[0])

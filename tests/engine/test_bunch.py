@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tests.engine.one_by_one import advance_alone, advance_each, records_taken
+from tests.engine.one_by_one import advance_alone, advance_each
 
 from kiks.engine import step
 from kiks.engine.parameters import pack
@@ -144,13 +144,3 @@ def test_robots_that_never_meet_move_as_if_alone(count):
         for name in robots.dtype.names:
             assert state.robots[name].tobytes() == other.robots[name].tobytes(), name
     assert robots["contact_count"].any()
-
-
-@pytest.mark.parametrize(("robots", "records"), [(1, 1), (8, 1), (9, 2), (20, 3)])
-def test_memory_for_more_worlds_is_not_used(robots, records):
-    """The last bunch of a block may have fewer worlds than the others."""
-    state = State.empty(world_count=1, robot_count=robots)
-    state.robots["x_mm"] = 40.0 + 60.0 * np.arange(robots)
-    spec = RobotSpec.load("khepera")
-    given = pack(spec), [Arena.box(1500, 300)], networks_for("reflection"), np.zeros((1, 0, 4)), [5]
-    assert records_taken(Scene(state, *given).record, 80, np.zeros(1, np.int64)) == records

@@ -62,16 +62,6 @@ def test_a_rectangle_covers_centres_in_it(a, b):
     assert inside.all() or np.array_equal(shown == 77, inside)
 
 
-@settings(max_examples=40)
-@given(st.lists(points, min_size=1, max_size=6), widths)
-def test_mirrored_strokes_are_mirror_images(stroke, width):
-    mirrored = [(WIDTH - x, y) for x, y in stroke]
-    turned = [(WIDTH - x, HEIGHT - y) for x, y in stroke]
-    shown = painted(lambda arena: brush.line(arena, stroke, width_mm=width))
-    assert np.array_equal(shown[:, ::-1], painted(lambda arena: brush.line(arena, mirrored, width_mm=width)))
-    assert np.array_equal(shown[::-1, ::-1], painted(lambda arena: brush.line(arena, turned[::-1], width_mm=width)))
-
-
 @settings(max_examples=20)
 @given(st.lists(points, min_size=2, max_size=5), widths)
 def test_a_stroke_is_its_segments_together(stroke, width):

@@ -36,15 +36,6 @@ def test_never_more_than_a_slice_is_due_however_time_passes() -> None:
     assert behind_ns(sim) <= sim.world.slice_ns
 
 
-def test_a_slice_is_shorter_the_more_there_is_to_move() -> None:
-    assert driving(1).world.slice_ns == 100 * NS_PER_S
-    sim = Simulation(Arena.box(2000, 2000), robots=20, seed=3)
-    assert sim.world.slice_ns == 50 * NS_PER_S
-    for column in range(5):
-        sim.add_cylinder(200 + 400 * column, 30)
-    assert sim.world.slice_ns == 40 * NS_PER_S
-
-
 def test_a_long_sleep_can_be_stopped_between_two_slices_and_leaves_the_world_there() -> None:
     sim = driving()
     calls: list[int] = []

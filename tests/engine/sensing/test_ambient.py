@@ -205,21 +205,6 @@ def test_noise_is_that_of_the_dark_value_and_comes_with_the_round() -> None:
     assert noise.std(axis=0) == pytest.approx([SPEC.ambient.noise_counts / math.sqrt(3)] * 8, rel=0.1)
 
 
-def test_each_sensor_is_sampled_at_its_own_instant() -> None:
-    quiet = SPEC.with_changes(ambient__noise_counts=0.0)
-    sim = dark_room((820, 700), robot=quiet)
-    kiks.Khepera(sim.port(1)).set_speed(20, -20)
-    sim.run(1.0 - sim.time_s)
-    before = sim.ambient(1, noise=True)
-    for k in range(1, 200):
-        sim.run(1.0 + k * 0.0005 - sim.time_s)
-        now = sim.ambient(1, noise=True)
-        for sensor in range(8):
-            if now[sensor] != before[sensor]:
-                assert k * 0.5 % 20 == pytest.approx(2.5 * sensor)
-        before = now
-
-
 def test_the_robot_reports_what_its_sensors_see() -> None:
     sim = kiks.Simulation(replace(kiks.Arena.box(500, 500), lamps=(Lamp(300, 250, 2.0),)), robot="khepera_ii", seed=3)
     sim.place(1, 200, 250, 0.0)

@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 import pytest
-from tests.symmetry import mirrored, symmetric
 
 import kiks
 from kiks.model.robot import RobotSpec
@@ -16,6 +15,7 @@ QUIET = RobotSpec.load("khepera").with_changes(
     proximity__noise_large=0.0,
     proximity__baseline_counts=(0.0,) * 8,
     proximity__jitter_counts=(0.0,),
+    ambient__noise_counts=0.0,
 )
 
 
@@ -26,28 +26,20 @@ def at_wall(gap_mm: float, *, brightness: int = 255, robot: RobotSpec = QUIET, s
     return sim
 
 
-def test_left_and_right_are_mirror_images() -> None:
-    left = kiks.Simulation(kiks.Arena.box(600, 600), robot=symmetric(QUIET))
-    right = kiks.Simulation(kiks.Arena.box(600, 600), robot=symmetric(QUIET))
-    rng = np.random.default_rng(3)
-    for _ in range(50):
-        x, y, heading = rng.uniform(45, 120), rng.uniform(45, 120), rng.uniform(-np.pi, np.pi)
-        left.place(1, x, y, heading)
-        right.place(1, 600 - x, y, np.pi - heading)
-        assert left.proximity(1) == pytest.approx(mirrored(right.proximity(1)), abs=2.0)
-
-
-def test_each_sensor_is_sampled_every_20_ms_in_turn() -> None:
+@pytest.mark.parametrize("sense", ["proximity", "ambient"])
+def test_each_sensor_is_sampled_every_20_ms_in_turn(sense: str) -> None:
     """A robot that turns: sensor i changes at 20 k + 2.5 i ms and at no other time."""
     sim = kiks.Simulation(kiks.Arena.box(150, 150, rounded_mm=45), robot=QUIET)
+    read = getattr(sim, sense)
+    sim.add_lamp(140, 75)
     sim.place(1, 60, 75, 0.0)
     kiks.Khepera(sim.port(1)).set_speed(20, -20)
     sim.run(1.0 - sim.time_s)
-    before = sim.proximity(1, noise=True)
+    before = read(1, noise=True)
     changed_ms: dict[int, list[float]] = {}
     for k in range(1, 400):
         sim.run(1.0 + k * 0.0005 - sim.time_s)
-        now = sim.proximity(1, noise=True)
+        now = read(1, noise=True)
         for sensor in range(8):
             if now[sensor] != before[sensor]:
                 changed_ms.setdefault(sensor, []).append(k * 0.5)
