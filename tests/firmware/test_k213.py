@@ -74,19 +74,6 @@ def test_other_orders_are_a_protocol_error(order: str) -> None:
     assert robot.send(f"T,2,{order}") == "z,Protocol error"
 
 
-def test_without_a_camera_there_is_none() -> None:
-    sim = kiks.Simulation()
-    robot = kiks.Khepera(sim.port(1))
-    assert robot.send("T,2,N") == "z,Turret order not supported"
-    with pytest.raises(kiks.LinkError, match="Is the turret fitted"):
-        robot.image()
-    with pytest.raises(kiks.ParameterError, match=r"one of .k213.,.* it was .k214.. Did you mean .k213."):
-        sim.fit(1, "k214")
-    sim.fit(1, "k213")
-    assert len(robot.image()) == 64
-    assert robot.send("net") == "K213 linear vision, ID 2, revision 1.0"
-
-
 def test_left_is_left() -> None:
     image = scene((200, 430, 95, 20, 1)).image(1)
     assert max(image[2:24]) < 70 < 200 < min(image[34:44])

@@ -53,16 +53,6 @@ def test_a_message_takes_the_time_of_its_characters(data: list[int]) -> None:
     assert read(sim, 2) == [0] * 18
 
 
-def test_over_the_wire() -> None:
-    sim = a_simulation()
-    first, second = (kiks.Khepera(sim.port(robot)) for robot in (1, 2))
-    first.turret(4, "S,2,2,104,105,0,0,0,0,0,0,0,0,0,0,0,0,0,0")
-    sim.run(0.1)
-    assert second.turret(4, "F") == [READY | RECEIVED]
-    assert second.turret(4, "R")[:4] == [1, 2, 104, 105]
-    assert first.turret(4, "F") == [READY]
-
-
 def test_bytes_beyond_the_length_are_not_sent_and_only_eight_bits_count() -> None:
     sim = a_simulation()
     execute(sim, 1, "T,4,S,2,3,257,-1,3,4,5,6,7,8,9,10,11,12,13,14,15,16")

@@ -123,21 +123,6 @@ def test_a_speed_of_a_body_out_of_range(sim):
         sim.move_body(ball, 100, 100, speed_mm_s=1500)
 
 
-def test_lamps_are_added_moved_switched_and_removed(sim):
-    dark = sim.ambient(1)
-    x_mm, y_mm, heading_rad = sim.pose(1)
-    ahead = x_mm + 150 * math.cos(heading_rad), y_mm + 150 * math.sin(heading_rad)
-    lamp = sim.add_lamp(*ahead, 9.0)
-    lit = sim.ambient(1)
-    assert min(lit) < 200 < min(dark)
-    sim.lamps[lamp - 1, 3] = 0
-    assert sim.ambient(1) == dark
-    sim.lamps[lamp - 1, 3] = 1
-    assert sim.ambient(1) == lit
-    sim.remove_lamp(lamp)
-    assert sim.ambient(1) == dark
-
-
 def test_brightness_shows_in_proximity_and_camera(sim):
     sim.place(1, 300, 300, 0)
     sim.fit(1, "k213")

@@ -147,7 +147,7 @@ def test_two_lamps_are_brighter_than_one() -> None:
     )
 
 
-def test_lamps_are_switched_and_moved() -> None:
+def test_lamps_are_switched_moved_and_removed() -> None:
     sim = dark_room((*beside(2, 60), False), beside(0, 60))
     assert sim.ambient(1)[2] == 450
     assert sim.ambient(1)[0] < 100
@@ -156,6 +156,10 @@ def test_lamps_are_switched_and_moved() -> None:
     assert sim.ambient(1)[0] == 450
     sim.lamps[0, :2] = 100, 100
     assert sim.ambient(1)[2] == 450
+    sim.lamps[1, 3] = 1
+    assert sim.ambient(1)[0] < 100
+    sim.remove_lamp(2)
+    assert sim.ambient(1)[0] == 450
     for nonsense in (math.nan, math.inf, -1e300, 1e12):
         sim.lamps[0] = nonsense
         assert all(50 <= reading <= 450 for reading in sim.ambient(1))
