@@ -94,8 +94,8 @@ def test_a_response_is_picked_in_python_or_in_a_file(tmp_path: Path) -> None:
 
 
 def test_an_unknown_response_is_named() -> None:
-    names = "'reflection', 'thesis', 'fast', 'curve'"
-    with pytest.raises(ParameterError, match=rf"proximity.response must be one of {names}, but"):
+    names = "'reflection', 'thesis', 'fast' or 'curve'"
+    with pytest.raises(ParameterError, match=rf"proximity.response must be {names}, but it was 'thesys'. Did you mean"):
         kiks.Simulation(response="thesys")
     with pytest.raises(ParameterError, match=r"'curve', which needs a section \[curve\]"):
         kiks.Simulation(response="curve")
