@@ -247,7 +247,7 @@ def test_the_camera_is_part_of_the_state() -> None:
 
 def test_a_restart_sets_the_period_of_the_power_on() -> None:
     sim = scene(seed=3)
-    robot, camera = camera_of(kiks.Khepera(sim.port(1)), sim)
+    robot, camera = kiks.Khepera(sim.port(1)), camera_of(sim)
     robot.send("T,2,U,7")
     assert camera.period_ns == 5_000_000_000
     sim.run(1.1 - sim.time_s)

@@ -22,14 +22,7 @@ STEADY_S = 0.5
 
 
 class Company:
-    """A few robots, balls and cylinders on a floor.
-
-    Args:
-        robots: Their poses.
-        balls: Their places, and whatever else `Ball` takes.
-        cylinders: Likewise.
-        arena: The floor; none is near by default.
-    """
+    """Robots at their poses, balls and cylinders (places, and what else they take), on a wide floor by default."""
 
     def __init__(self, robots=((1900.0, 1900.0, 0.0),), balls=(), cylinders=(), arena=None, **changes):
         self.sim = Simulation(

@@ -29,15 +29,9 @@ def cast_rays(walls, columns, rows, cosines, sines, lengths):
 
 @entry
 def cast_eight(walls, column, row, directions, reach, out):
-    """Follow eight rays as a proximity sensor does, for Python; all lengths in cells.
+    """Follow eight rays as a proximity sensor does, in cells: `directions` holds cosines and sines, shape [2, 8].
 
-    Args:
-        walls: The walls as rays see them, `walls_of` an arena.
-        column: Origin.
-        row: Origin.
-        directions: Cosines and sines, shape [2, 8].
-        reach: Longest length followed.
-        out: Output: lengths and brightnesses, shape [2, 8].
+    `out`, shape [2, 8], gets lengths and brightnesses.
     """
     walls = Walls(*walls)
     ways, origins, under_way = stack_narrow(WAY_SIZE), stack_integers(1), stack_integers(1)
