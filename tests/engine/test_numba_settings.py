@@ -31,7 +31,11 @@ def python(*words: str, folder: Path, **settings: str) -> subprocess.CompletedPr
 @pytest.mark.parametrize("setting", cases(BAD, 3))
 def test_a_command_refuses_them_in_one_line(setting: str, tmp_path: Path) -> None:
     name, _, value = setting.partition("=")
-    words = {"evolve": ["evolve", "--out", "out"], "replay": ["replay", "--check", "run.mcap"]}
+    words = {
+        "demo": ["demo", "square"],
+        "evolve": ["evolve", "--out", "out"],
+        "replay": ["replay", "--check", "run.mcap"],
+    }
     done = python("-m", "kiks", *words.get(BAD[setting], [BAD[setting]]), folder=tmp_path, **{name: value})
     assert done.returncode == 2
     (line,) = done.stderr.splitlines()

@@ -22,7 +22,9 @@ LAYERS = {
 
 VIEWS = {"top": "2-D", "both": "both", "solid": "3-D"}
 
-HELP = """
+_KEYS_OF_TIME = ", ".join(f"`{each.words}` {each.label[0].lower()}{each.label[1:]}" for each in SHORTCUTS.values())
+
+HELP = f"""
 **With the mouse or a finger**
 
 * Drag a robot to move it. Drag its rim, or drag with Shift, to turn it. You can drag balls, cylinders and lamps, too.
@@ -31,7 +33,7 @@ HELP = """
 
 **With the keyboard**
 
-* Time: KEYS_OF_TIME.
+* Time: {_KEYS_OF_TIME}.
 * On the arena (press Tab to reach it): `n` selects the next thing, arrows move it by 10 mm (with Shift 1 mm),
   `q` and `e` turn it by 5 degrees, Delete removes it, Escape deselects it; `+` `-` `0`: zoom in, zoom out, show all.
 * In the program editor: Ctrl-Enter runs; Tab indents, and leaves the editor after Escape.
@@ -65,8 +67,7 @@ class ViewPanel:
         self._robots.on("before-show", self._list_robots)
         _button("fit_screen", "Show all of the arena (key: 0)", "fit").on_click(view.fit)
         with ui.dialog() as self._help, ui.card():
-            keys = (f"`{each.words}` {each.label[0].lower()}{each.label[1:]}" for each in SHORTCUTS.values())
-            ui.markdown(HELP.replace("KEYS_OF_TIME", ", ".join(keys)))
+            ui.markdown(HELP)
             ui.button("Close", on_click=self._help.close).props("flat no-caps")
         dark = ui.dark_mode(value=None)
         with _button("contrast", "Light or dark", "dark"), ui.menu():
