@@ -26,7 +26,6 @@ def torture(*words: str) -> tuple[int, dict[str, float], str]:
 
 
 def check(*words: str) -> None:
-    """Check that no promise is broken."""
     code, _, table = torture(*words)
     assert code == 0, table
 

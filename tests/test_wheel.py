@@ -50,7 +50,6 @@ def kernels(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def built(target: Path, **changes: str) -> Path:
-    """Return the wheel of this checkout."""
     command = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-index", "--no-build-isolation"]
     subprocess.run([*command, "--wheel-dir", str(target), str(ROOT)], env=os.environ | changes, check=True)
     (wheel,) = target.glob("*.whl")

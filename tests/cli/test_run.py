@@ -13,7 +13,6 @@ from typing import Any
 
 import pytest
 from tests import forked
-from tests.at_length import cases
 from tests.cli.test_cli import KIKS, state_of
 from tests.served import GUARD_S, PROGRAMS, fresh
 
@@ -223,16 +222,6 @@ def test_max_wall_ends_whatever_runs(words: tuple[str], endless: Path) -> None:
 
 
 # ---- what a run leaves ----
-
-
-@pytest.mark.parametrize("count", cases([2, 1]))
-def test_recording_changes_nothing(count: int, tmp_path: Path) -> None:
-    programs = [DRIVE, "COM1", "40", "7", "6"] * count
-    plain = forked.run("run", *programs)
-    kept = forked.run("run", "--record", "run.mcap", "--export", "run.png", *programs, cwd=tmp_path)
-    assert kept.returncode == 0, kept.stderr
-    assert state_of(kept.stderr) == state_of(plain.stderr)
-    assert {path.name for path in tmp_path.iterdir()} == {"run.png", "run.mcap"}
 
 
 def test_the_last_lines_are_one_for_each_robot_and_that_of_the_state() -> None:

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser
 from tests.at_length import at_length, cases
-from tests.desk.visits import NewPage, Visit, address_of
+from tests.desk.visits import NewPage, Visit, fake_desk
 
 SENSOR_RAD = math.radians(66.4)
 
@@ -18,8 +18,7 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture(scope="module")
 def address() -> Iterator[str]:
-    """Serve the desk of fake_desk.py in a process of its own."""
-    with address_of("fake_desk") as address:
+    with fake_desk() as address:
         yield address
 
 

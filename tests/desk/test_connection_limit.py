@@ -62,7 +62,6 @@ def open_socket(shown: Shown, path: str) -> ClientConnection:
 
 
 def knock(shown: Shown, data: bytes) -> bytes:
-    """Send bytes and return the complete answer."""
     host, port, _ = address_and_cookie(shown)
     with socket.create_connection((host, port), timeout=GUARD_S) as stranger:
         with suppress(OSError):

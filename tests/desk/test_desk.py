@@ -117,7 +117,7 @@ def test_robot_is_dragged_and_slides_along_a_wall(visitor: Visitor) -> None:
 def test_robot_is_followed_and_layers_are_chosen(visitor: Visitor) -> None:
     visitor.page.mouse.move(*visitor.on_page(300, 200))
     visitor.page.mouse.wheel(0, -600)
-    visitor.menu("follow", "Robot 2")
+    visitor.choose("follow", "Robot 2")
     centre = centre_of_view(visitor)
 
     def is_in_the_middle() -> bool:
@@ -127,7 +127,7 @@ def test_robot_is_followed_and_layers_are_chosen(visitor: Visitor) -> None:
     visitor.sim.place(2, 300, 250, 0)
     visitor.until(is_in_the_middle)
     visitor.picture("followed")
-    visitor.menu("follow", "No robot")
+    visitor.choose("follow", "No robot")
     visitor.sim.place(2, 450, 300, 0)
     visitor.until(lambda: not is_in_the_middle())
     # Layers go on and off.

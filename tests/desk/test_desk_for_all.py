@@ -113,7 +113,7 @@ def test_tab_reaches_everything(visitor: Visitor, tab: str, inside: tuple[str, .
 
 @pytest.mark.parametrize("theme", cases(["Light", "Dark"]))
 def test_everything_has_a_name_and_enough_contrast(visitor: Visitor, theme: str) -> None:
-    visitor.menu("dark", theme)
+    visitor.choose("dark", theme)
     expect(visitor.page.locator("body.body--dark")).to_have_count(int(theme == "Dark"))
     for tab in TABS:
         visitor.tab(tab)

@@ -21,15 +21,6 @@ def setpoints(visitor: Visitor, robot: int = 1) -> list[int]:
 # ---- Robot ----
 
 
-def test_click_on_a_robot_opens_its_monitor(visitor: Visitor) -> None:
-    visitor.tab("wire")
-    visitor.page.mouse.click(*visitor.on_page(450, 300))
-    expect(visitor.at("monitor-robot")).to_have_value("Robot 2")
-    expect(visitor.at("facts")).to_contain_text("x 450.0, y 300.0 mm")
-    expect(visitor.at("turret-words")).to_have_text("Gripper (turret 1): holds nothing")
-    visitor.picture("monitor_by_click")
-
-
 @at_length
 def test_click_on_a_sensor_in_the_arena_explains_its_reading(visitor: Visitor) -> None:
     x_mm, y_mm, heading_rad = visitor.sim.pose(1)

@@ -50,7 +50,6 @@ class Browser:
         self.socket.send(json.dumps({"kind": kind, **words}))
 
     def hear(self) -> bytes | dict[str, Any]:
-        """Return the next frame or message."""
         message = self.socket.recv(GUARD_S)
         if isinstance(message, bytes):
             return message

@@ -5,13 +5,13 @@ from __future__ import annotations
 import asyncio
 import os
 import threading
-from collections.abc import Callable, Coroutine, Iterator
+from collections.abc import Coroutine, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
 
 import pytest
-from tests.guard import GUARD_S
+from tests.guard import GUARD_S, wait_until
 
 from kiks import Arena, Khepera, Recording, Simulation
 from kiks.desk.server.desk import Desk
@@ -41,16 +41,6 @@ Fact = TypeVar("Fact")
 
 def run(work: Coroutine[Any, Any, Fact]) -> Fact:
     return asyncio.run(work)
-
-
-def until(fact: Callable[[], Fact]) -> Fact:
-    """Wait for a condition."""
-    waited = threading.Event()
-    for _ in range(int(GUARD_S / 0.005)):
-        if found := fact():
-            return found
-        waited.wait(0.005)
-    raise AssertionError("what was waited for did not come")
 
 
 def drive(sim: Simulation, seconds: float, hashes: dict[int, str] | None = None) -> None:
@@ -127,7 +117,7 @@ def test_a_program_that_waits_at_the_gate_goes_on_as_if_nothing_had_been() -> No
         running.start()
         for _ in range(3):
             before_ns = sim.now_ns
-            until(lambda before_ns=before_ns: sim.now_ns > before_ns or not running.is_alive())
+            wait_until(lambda before_ns=before_ns: sim.now_ns > before_ns or not running.is_alive())
             run(desk.looking.look_at(sim.now_ns // 2))
             assert desk.sim.now_ns <= sim.now_ns
             run(desk.looking.back_to_now())
@@ -153,9 +143,9 @@ def test_the_past_is_played_up_to_the_present(tmp_path: Path) -> None:
         run(desk.pause())
         run(desk.looking.look_at(0))
         run(desk.step(0.25))
-        until(lambda: desk.sim.now_ns == 250_000_000)
+        wait_until(lambda: desk.sim.now_ns == 250_000_000)
         run(desk.go_on())
-        until(lambda: desk.is_paused)
+        wait_until(lambda: desk.is_paused)
         assert state_of(desk) == (sim.now_ns, sim.state_hash())
         run(desk.looking.move_by(-0.1))
         assert desk.sim.now_ns == sim.now_ns - 100_000_000
@@ -241,7 +231,7 @@ def test_of_a_long_past_the_oldest_goes(monkeypatch: pytest.MonkeyPatch) -> None
         run(desk.looking.look_at(0))
         assert desk.sim.now_ns == span.begin_ns
         run(desk.go_on())
-        until(lambda: desk.is_paused)
+        wait_until(lambda: desk.is_paused)
         assert state_of(desk) == (sim.now_ns, sim.state_hash())
         for time_ns in [each for each in hashes if each >= span.begin_ns][::11]:
             run(desk.looking.look_at(time_ns))
@@ -352,7 +342,7 @@ def test_a_recording_is_shown_played_and_begun_again_at_its_end(tmp_path: Path) 
     with replaying(tmp_path / "run.mcap", list(hashes)[5]) as desk:
         assert state_of(desk) == list(hashes.items())[5]
         desk.begin()
-        until(lambda: desk.is_paused)
+        wait_until(lambda: desk.is_paused)
         assert state_of(desk) == list(hashes.items())[-1]
         run(desk.set_speed(0.001))
         run(desk.go_on())
@@ -413,7 +403,7 @@ def test_from_a_time_of_a_recording_a_person_goes_on(tmp_path: Path) -> None:
         run(desk.grab("hand", "robot", 0))
         run(desk.drop("hand"))
         run(desk.go_on())
-        until(lambda: sim.now_ns > time_ns + NS_PER_S)
+        wait_until(lambda: sim.now_ns > time_ns + NS_PER_S)
         # The bar reaches from the beginning of the recording through the branch to now.
         run(desk.pause())
         now_ns, now_hash = state_of(desk)
@@ -458,11 +448,11 @@ def with_programs(folder: Path) -> Iterator[Desk]:
 def test_another_world_has_another_past(tmp_path: Path) -> None:
     with with_programs(tmp_path) as desk:
         first = desk.sim
-        until(lambda: first.now_ns > NS_PER_S)
+        wait_until(lambda: first.now_ns > NS_PER_S)
         run(desk.start_over())
         assert desk.sim is not first
         assert first.loop.recorder is None
-        until(lambda: desk.sim.now_ns > NS_PER_S)
+        wait_until(lambda: desk.sim.now_ns > NS_PER_S)
         assert not desk.is_paused
         run(desk.looking.look_at(NS_PER_S // 2))
         run(desk.start_over())
@@ -492,5 +482,5 @@ def test_robots_that_came_are_gone_before_they_came() -> None:
         run(desk.looking.look_at(NS_PER_S // 2))
         assert desk.sim.robot_count == 2
         run(desk.go_on())
-        until(lambda: desk.is_paused)
+        wait_until(lambda: desk.is_paused)
         assert (desk.sim.robot_count, state_of(desk)) == (3, (sim.now_ns, sim.state_hash()))

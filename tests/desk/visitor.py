@@ -100,7 +100,6 @@ class Visitor:
         return self.page.get_by_test_id(name)
 
     def until(self, fact: Callable[[], Fact]) -> Fact:
-        """Wait for a condition."""
         for _ in range(PICTURES_MAX):
             if found := fact():
                 return found
@@ -113,14 +112,8 @@ class Visitor:
         expect(self.at(INSIDE[name])).to_be_visible()
 
     def choose(self, name: str, text: str) -> None:
-        """Choose an entry of a list by its text."""
+        """Choose an entry of a list, or of a button's menu."""
         self.at(name).click()
-        self.page.locator(".q-menu .q-item").get_by_text(text, exact=True).click()
-        expect(self.page.locator(".q-menu")).to_have_count(0)
-
-    def menu(self, button: str, text: str) -> None:
-        """Choose an entry of a button's menu."""
-        self.at(button).click()
         self.page.locator(".q-menu .q-item").get_by_text(text, exact=True).click()
         expect(self.page.locator(".q-menu")).to_have_count(0)
 
@@ -137,7 +130,6 @@ class Visitor:
         self.until(lambda: self.desk.gate.is_paused)
 
     def seen(self, robot: int) -> tuple[float, float, float]:
-        """Return the position of a robot on the page."""
         pose = self.answer("(index) => kiksDesk.pose(index)", robot - 1)
         return pose["x_mm"], pose["y_mm"], pose["heading_rad"]
 
@@ -181,7 +173,6 @@ class Visitor:
         self.page.keyboard.insert_text(text)
 
     def is_free(self, robot: int) -> bool:
-        """Return whether a robot stands in a free place."""
         with self.sim.lock:
             x_mm, y_mm, _ = self.sim.pose(robot)
             return bool(self.sim.world.free_space.may_lie(robot - 1)(x_mm, y_mm))

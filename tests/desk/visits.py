@@ -20,9 +20,9 @@ NewPage = Callable[..., Page]
 
 
 @contextmanager
-def address_of(module: str, *words: str) -> Iterator[str]:
-    """Run a module of this folder that serves a page; yield the address that it prints."""
-    command = [sys.executable, "-m", f"tests.desk.{module}", *words]
+def fake_desk() -> Iterator[str]:
+    """Serve the desk of fake_desk.py in a process of its own; yield its address."""
+    command = [sys.executable, "-m", "tests.desk.fake_desk"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=ROOT) as process:
         try:
             assert process.stdout is not None

@@ -47,7 +47,6 @@ def has_tcp() -> bool:
 
 
 def need_tcp() -> None:
-    """Skip a test where Octave has no TCP connections."""
     if not has_tcp():
         pytest.skip("Octave's instrument-control is not here: apt-get install octave-instrument-control")
 

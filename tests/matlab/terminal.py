@@ -65,7 +65,6 @@ class Terminal:
             os.waitpid(self.number, 0)
 
     def type(self, line: str) -> None:
-        """Type a line."""
         os.write(self.end, f"{line}\n".encode())
 
     def press_ctrl_c(self) -> None:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import os
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 from tests.at_length import AT_LENGTH, at_length, share
 from tests.forked import kiks_command
-from tests.matlab.octave import GUARD_S, has_ended, needs_octave
+from tests.guard import wait_until
+from tests.matlab.octave import has_ended, needs_octave
 from tests.matlab.terminal import Terminal, processor_ticks, state
 
 pytestmark = [needs_octave, pytest.mark.slow]
@@ -50,13 +50,6 @@ def interrupt(terminal: Terminal, line: str) -> None:
     terminal.press_ctrl_c()
     assert terminal.ask("7") == "7", "the prompt is back"
     assert session in terminal.sessions()
-
-
-def wait_until(fact: Callable[[], object]) -> None:
-    """Poll a condition until it is true."""
-    end_s = time.monotonic() + GUARD_S
-    while not fact():
-        assert time.monotonic() < end_s, "it never was so"
 
 
 @at_length

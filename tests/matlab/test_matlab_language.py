@@ -83,7 +83,6 @@ class Names(AST_Visitor):
         self.slips: set[str] = set()
 
     def visit(self, node: Node, n_parent: Node, relation: str) -> None:
-        """Look at a node."""
         match node:
             case Identifier():
                 if not (isinstance(n_parent, Selection) and relation == "Field"):

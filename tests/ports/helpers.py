@@ -40,7 +40,6 @@ def connect(endpoint: TcpEndpoint) -> socket.socket:
 
 
 def ask_socket(client: socket.socket, command: bytes) -> bytes:
-    """Send a command and return the reply."""
     client.sendall(command)
     line = b""
     while not line.endswith(b"\n"):

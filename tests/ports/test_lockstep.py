@@ -2,29 +2,23 @@
 
 from __future__ import annotations
 
-import hashlib
 import socket
-import subprocess
-import sys
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.at_length import cases, share
-from tests.busy import busy_computer
+from tests.at_length import cases
 from tests.ports.helpers import WallClock, warnings
-from tests.served import GUARD_S, PROGRAMS, Served, fresh, served
+from tests.served import GUARD_S, Served, fresh, served
 
 from kiks.clock.pace import Pace
 from kiks.clock.patience import Patience
 from kiks.clock.serial_timing import BACKLOG_LIMIT
 from kiks.errors import ParameterError
 from kiks.ports.endpoint import READ_SIZE, Endpoint
-from kiks.ports.pty import PtyEndpoint
 from kiks.ports.server import Server
 from kiks.ports.tcp import TcpEndpoint
 
@@ -80,48 +74,6 @@ def clients(count: int = 2, **options: Any) -> Iterator[tuple[Served, list[Clien
 
 
 # ---- repeatability ----
-
-
-def mixed_endpoints(folder: Path, robots: int) -> dict[int, Sequence[Endpoint]]:
-    """Return a serial port for robots with an odd number and a TCP port for the others."""
-    return {
-        robot: [PtyEndpoint(folder / f"robot{robot}") if robot % 2 else TcpEndpoint(0)]
-        for robot in range(1, robots + 1)
-    }
-
-
-def drive_all(folder: Path, thinking: str, robots: int = 4, **options: Any) -> tuple[str, int, str]:
-    """Let each robot be driven by a process; return the state, the time and a digest of all replies."""
-    ways = mixed_endpoints(folder, robots)
-    with served(ways, thinking=thinking, **options) as run:
-        processes = []
-        for robot in range(1, robots + 1):
-            (way,) = ways[robot]
-            name = way.name if isinstance(way, PtyEndpoint) else f"socket://{way.name}"
-            words = [name, str(12 + robot), str(3 * robot), "7"]
-            processes.append(
-                subprocess.Popen([sys.executable, str(PROGRAMS / "drive.py"), *words], stdout=subprocess.PIPE)
-            )
-        replies = hashlib.sha256()
-        for process in processes:
-            out, _ = process.communicate(timeout=GUARD_S)
-            assert process.returncode == 0
-            replies.update(out)
-        for robot in range(1, robots + 1):
-            run.wait_free(robot)
-        return run.sim.state_hash(), run.sim.now_ns, replies.hexdigest()
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("thinking", cases(["fixed:3.5", "none"]))
-def test_four_programs_repeat_on_a_busy_computer(tmp_path: Path, thinking: str) -> None:
-    """test_program_scheduler.py tries the orders in which requests can arrive."""
-    with busy_computer():
-        assert len({drive_all(tmp_path, thinking, patience_s=GUARD_S) for _ in range(share(2, 4))}) == 1
-
-
-def test_two_programs_repeat(tmp_path: Path) -> None:
-    assert len({drive_all(tmp_path, "none", robots=2, patience_s=GUARD_S) for _ in range(2)}) == 1
 
 
 @pytest.mark.slow

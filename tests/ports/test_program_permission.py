@@ -51,7 +51,6 @@ def project_with(path: str, trace: Path) -> Project:
 
 
 def wait_for_programs(desk: Desk) -> None:
-    """Wait until all started programs have ended."""
     for handle in desk.programs.handles:
         handle.process.wait()
 
@@ -72,7 +71,6 @@ def draw(desk: Desk, project: Project) -> None:
 
 
 def start_from_panel(desk: Desk, project: Project) -> None:
-    """Start it as the panel of programs does."""
     (robot,) = project.robots
     assert robot.program is not None
     command = Command(desk.folder / robot.program, list(robot.arguments))

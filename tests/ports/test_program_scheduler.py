@@ -77,7 +77,6 @@ class FakeProgram(Participant):
         return not (self.has_sent or self.waits or self.has_left)
 
     def send(self) -> None:
-        """Send the next command of the program."""
         self.is_here = self.has_sent = True
 
     def next_ns(self) -> int | None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 import select
 import signal
 import subprocess
@@ -14,10 +13,8 @@ from pathlib import Path
 from typing import IO, Any
 
 import pytest
-from tests import forked
 from tests.at_length import cases, share
 from tests.busy import busy_computer
-from tests.cli.test_cli import state_of
 from tests.ports.helpers import warnings
 from tests.served import GUARD_S, PROGRAMS, fresh
 
@@ -313,15 +310,3 @@ def test_command_line_is_split_into_programs(tmp_path: Path) -> None:
         parse_words(["c.py", one])
     with pytest.raises(ParameterError, match=r"PROGRAM must be a Python file, but '.*' is a folder without a __"):
         parse_words([str(tmp_path), one])
-
-
-def test_command_runs_two_programs() -> None:
-    results = [
-        forked.run("run", "--seed", "3", DRIVE, "COM1", "9", "3", "5", DRIVE, "COM1", "5", "7", "5") for _ in range(2)
-    ]
-    for result in results:
-        assert result.returncode == 0, result.stderr
-        assert result.stdout.count("n,") == 14
-        assert "kiks: program 2 (drive.py) has ended with exit code 0." in result.stderr
-        assert re.search(r"kiks: 0\.\d{3} s simulated, seed 3, state", result.stderr)
-    assert state_of(results[0].stderr) == state_of(results[1].stderr)

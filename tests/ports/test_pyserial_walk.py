@@ -186,7 +186,6 @@ def later(delay_s: float, call: Callable[[], object]) -> None:
 
 
 def run_real(script: Script) -> Answer:
-    """Run a program on pyserial."""
     robot = Robot()
     port = serial.Serial(robot.name, BAUD, timeout=3)
     names = {"port": port, "serial": serial, "sleep": time.sleep, "later": later}
@@ -219,7 +218,6 @@ with open(sys.argv[1], "wb") as file:
 
 
 def run_program(script: Script, path: Path) -> Answer:
-    """Run a program by `kiks run`."""
     program, said = path / "program.py", path / "said"
     program.write_text(PROGRAM)
     sim = kiks.Simulation(seed=1)
@@ -229,7 +227,6 @@ def run_program(script: Script, path: Path) -> Answer:
 
 
 def run_url(script: Script) -> Answer:
-    """Run a program on a `kiks://` port."""
     sim = kiks.Simulation(seed=1)
     port: Any = serial.serial_for_url(sim.url(1), baudrate=BAUD, timeout=3)
     names = {"port": port, "serial": serial, "sleep": lambda seconds: port.sim_port.sleep(seconds)}
@@ -237,7 +234,6 @@ def run_url(script: Script) -> Answer:
 
 
 def run_memory(script: Script) -> Answer:
-    """Run a program on a port in memory."""
     sim = kiks.Simulation(seed=1)
     port = sim.port(1)
     port.baudrate, port.timeout = BAUD, 3

@@ -6,7 +6,7 @@ import asyncio
 import threading
 import time
 import tracemalloc
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from importlib import resources
 from pathlib import Path
@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests.at_length import share
-from tests.guard import GUARD_S
+from tests.guard import GUARD_S, wait_until
 
 from kiks.errors import ParameterError
 from kiks.model.arena import Arena
@@ -706,12 +706,6 @@ def halt(session: Session) -> None:
     presses = threading.Thread(target=lambda: asyncio.run(desk.halt()))
     presses.start()
     presses.join(GUARD_S)
-
-
-def wait_until(fact: Callable[[], bool]) -> None:
-    end_s = time.monotonic() + GUARD_S
-    while not fact():
-        assert time.monotonic() < end_s
 
 
 def set_points(session: Session) -> list[list[int]]:

@@ -9,14 +9,13 @@ import signal
 import socket
 import subprocess
 import sys
-import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 import pytest
 from tests import forked
-from tests.guard import GUARD_S
+from tests.guard import GUARD_S, wait_until
 
 from kiks.model.shipped import shipped
 
@@ -57,7 +56,6 @@ class Session:
 
     @property
     def number(self) -> int:
-        """Number of the process."""
         return int(self.greeting.split()[3])
 
     def hear(self, *, confirms: bool = True) -> str:
@@ -106,13 +104,6 @@ class Session:
 def ended(*words: str, folder: Path) -> subprocess.CompletedProcess[str]:
     """Wait for a process to end and return its output and exit code."""
     return forked.run("session", *words, env={"XDG_RUNTIME_DIR": str(folder)})
-
-
-def wait_until(fact: Callable[[], object]) -> None:
-    """Poll a condition until it is true."""
-    end_s = time.monotonic() + GUARD_S
-    while not fact():
-        assert time.monotonic() < end_s, "it never was so"
 
 
 @contextmanager
