@@ -290,13 +290,11 @@ def test_a_new_world_closes_ports_with_an_error(session: Session) -> None:
     assert ask("ask 1 N").startswith("n,")
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("request_", ["ask 1 N", "pause 5", "time 1", "pose 1", "close 1", "listen 1"])
-def test_requests_to_a_paused_world_can_be_cancelled(session: Session, request_: str) -> None:
+def cancelled(session: Session, ask: Asker, number: int, request: str, then: str) -> list[str]:
+    """Cancel a request to a paused world, let time go on, and return its answer and that to the next request."""
     awaited = AwaitedAnswer()
-    ask = begun(session)
     ask.client.leave()
-    ask.client = SessionClient(session, 1, awaited)
+    ask.client = SessionClient(session, number, awaited)
     told: list[str] = []
     is_paused = threading.Event()
 
@@ -305,22 +303,29 @@ def test_requests_to_a_paused_world_can_be_cancelled(session: Session, request_:
         assert session.desk is not None
         session.desk.gate.pause(session.world.now_ns)
         is_paused.set()
-        told.append(ask.told(request_))
+        told.append(ask.told(request))
         awaited.is_cancelled = False
         session.desk.gate.go_on()
-        told.append(ask.told("ask 1 N"))
+        told.append(ask.told(then))
 
     thread = threading.Thread(target=drive)
     thread.start()
     assert is_paused.wait(GUARD_S)
+    awaited.is_cancelled = True
     for _ in range(1000):
         if told:
             break
-        awaited.is_cancelled = True
         ask.client.cancel()
         thread.join(GUARD_S / 1000)
     thread.join(GUARD_S)
     assert not thread.is_alive()
+    return told
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("request_", ["ask 1 N", "pause 5", "time 1", "pose 1", "close 1", "listen 1"])
+def test_requests_to_a_paused_world_can_be_cancelled(session: Session, request_: str) -> None:
+    told = cancelled(session, begun(session), 1, request_, "ask 1 N")
     assert told[0][0] == "+" or "the program was interrupted" in told[0]
     assert told[1][HEAD:].startswith("n,") or request_ == "close 1", told
 
@@ -329,33 +334,9 @@ def test_an_interrupted_pause_in_a_shared_world_has_not_run_ahead_of_it(session:
     other = begun(session)
     other("open 1 9600")
     other("close 1")
-    awaited = AwaitedAnswer()
-    told: list[str] = []
-    is_paused = threading.Event()
-    ask = Asker(session, 2)
-    ask.client.leave()
-
-    def drive() -> None:
-        ask.client = SessionClient(session, 2, awaited)
-        ask("open 1 9600")
-        assert session.desk is not None
-        session.desk.gate.pause(session.world.now_ns)
-        is_paused.set()
-        told.append(ask.told("pause 1e6"))
-        awaited.is_cancelled = False
-        session.desk.gate.go_on()
-        told.append(ask("time 1"))
-
-    thread = threading.Thread(target=drive)
-    thread.start()
-    assert is_paused.wait(GUARD_S)
-    awaited.is_cancelled = True
-    while not told:
-        ask.client.cancel()
-        thread.join(GUARD_S / 1000)
-    thread.join(GUARD_S)
+    told = cancelled(session, Asker(session, 2), 2, "pause 1e6", "time 1")
     assert "the program was interrupted" in told[0]
-    assert float(told[1]) < 5
+    assert float(told[1][HEAD:]) < 5
 
 
 def test_waiting_for_other_programs_can_be_cancelled(session: Session) -> None:
