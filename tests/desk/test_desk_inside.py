@@ -13,11 +13,6 @@ from tests.desk.visitor import Visitor
 pytestmark = pytest.mark.slow
 
 
-def setpoints(visitor: Visitor, robot: int = 1) -> list[int]:
-    found: list[int] = visitor.sim.world.state.robots["speed_setpoint"][0, robot - 1].tolist()
-    return found
-
-
 # ---- Robot ----
 
 
@@ -35,18 +30,16 @@ def test_click_on_a_sensor_in_the_arena_explains_its_reading(visitor: Visitor) -
 
 def test_typed_command_drives_the_robot_and_appears_on_the_wire(visitor: Visitor) -> None:
     visitor.tab("wire")
-    visitor.at("console").fill("D,10,15")
-    visitor.at("console").press("Enter")
-    visitor.until(lambda: setpoints(visitor) == [10, 15])
+    visitor.send("D,10,15")
+    visitor.until(lambda: visitor.setpoints() == [10, 15])
     visitor.until(lambda: math.dist(visitor.sim.pose(1)[:2], (150, 200)) > 5)
     expect(visitor.at("console-log")).to_contain_text("← d")
     expect(visitor.at("wire")).to_contain_text("→ D,10,15\\n")
     expect(visitor.at("wire")).to_contain_text("← d\\r\\n")
     expect(visitor.at("wire-bar")).to_have_attribute("aria-label", re.compile("Link .* Robot .* Waiting"))
     visitor.picture("wire")
-    visitor.at("console").fill("D,0,0")
-    visitor.at("console").press("Enter")
-    visitor.until(lambda: setpoints(visitor) == [0, 0])
+    visitor.send("D,0,0")
+    visitor.until(lambda: visitor.setpoints() == [0, 0])
 
 
 AT_ONCE = """([input, ...texts]) => {
@@ -66,7 +59,7 @@ def test_commands_typed_faster_than_the_page_is_answered_all_arrive(visitor: Vis
     visitor.tab("wire")
     texts = [f"C,{k},{k}" for k in range(5)] + ["D,7,8"]
     visitor.page.evaluate(AT_ONCE, [visitor.at("console").element_handle(), *texts])
-    visitor.until(lambda: setpoints(visitor) == [7, 8])
+    visitor.until(lambda: visitor.setpoints() == [7, 8])
     for text in texts:
         expect(visitor.at("console-log")).to_contain_text(f"→ {text}")
     expect(visitor.at("console")).to_have_value("D,7,")
@@ -83,17 +76,16 @@ def test_commands_typed_faster_than_the_page_is_answered_all_arrive(visitor: Vis
 def test_halt_stops_programs_and_robots(visitor: Visitor) -> None:
     visitor.tab("wire")
     visitor.choose("wire-robot", "robot 2")
-    visitor.at("console").fill("D,4,4")
-    visitor.at("console").press("Enter")
+    visitor.send("D,4,4")
     visitor.tab("programs")
     visitor.choose("script", "example: avoid")
     expect(visitor.page.locator(".cm-content")).to_contain_text("Braitenberg")
     visitor.at("run-program").click()
-    visitor.until(lambda: setpoints(visitor) != [0, 0] and setpoints(visitor, 2) == [4, 4])
+    visitor.until(lambda: visitor.setpoints() != [0, 0] and visitor.setpoints(2) == [4, 4])
     visitor.at("halt").click()
     visitor.told("All programs and all robots are stopped.")
     expect(visitor.at("programs")).to_contain_text("avoid.py on robot 1: stopped")
-    visitor.until(lambda: setpoints(visitor) == setpoints(visitor, 2) == [0, 0])
+    visitor.until(lambda: visitor.setpoints() == visitor.setpoints(2) == [0, 0])
 
 
 @at_length

@@ -67,6 +67,12 @@ class Browser:
         self.say("ack")
         return heard
 
+    def error(self) -> str:
+        """Return the text of the next error."""
+        while not (isinstance(heard := self.hear(), dict) and heard["kind"] == "error"):
+            pass
+        return str(heard["text"])
+
     def wait_for(self, fact: Any) -> bytes:
         """Return the first frame that satisfies a condition."""
         while not fact(frame := self.frame()):
@@ -147,9 +153,7 @@ def test_two_browsers_may_drag_at_once(shown: Shown) -> None:
         one.say("grab", what="robot", index=0)
         one.wait_for(lambda frame: struct.unpack_from("<I", frame, 32 + 28)[0] & 8)
         two.say("grab", what="robot", index=0)
-        while not (isinstance(heard := two.hear(), dict) and heard["kind"] == "error"):
-            pass
-        assert "one hand must let go" in heard["text"]
+        assert "one hand must let go" in two.error()
         two.say("grab", what="robot", index=1)
         two.say("move", x_mm=500, y_mm=300)
         one.say("move", x_mm=100, y_mm=300)
@@ -182,7 +186,7 @@ def test_of_the_moves_of_a_page_only_the_newest_counts(monkeypatch: pytest.Monke
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "text",
+    "message",
     [
         *("", "{", "[]", "7", "[" * 100_000, '{"kind": 3}', '{"kind": "fly"}'),
         *('{"kind": "grab"}', '{"kind": "grab", "what": "robot"}', '{"kind": "grab", "what": "robot", "index": "0"}'),
@@ -200,14 +204,13 @@ def test_of_the_moves_of_a_page_only_the_newest_counts(monkeypatch: pytest.Monke
     ],
     ids=lambda text: text[:40],
 )
-def test_malformed_messages_get_an_error(shown: Shown, text: str) -> None:
+def test_malformed_messages_get_an_error(shown: Shown, message: str) -> None:
     with browsing(shown) as browser:
         browser.say("grab", what="robot", index=0)
-        browser.socket.send(text)
-        while not (isinstance(heard := browser.hear(), dict) and heard["kind"] == "error"):
-            pass
-        assert "must" in heard["text"]
-        assert len(heard["text"]) < 400
+        browser.socket.send(message)
+        text = browser.error()
+        assert "must" in text
+        assert len(text) < 400
         browser.say("ack", count=-(10**18))
         browser.say("ack", count=[[]])
         browser.frame()
@@ -236,9 +239,7 @@ def test_a_seek_shows_the_past_and_all_browsers_are_told(shown: Shown) -> None:
                 assert browser.bar["is_past"]
                 assert (browser.bar["begin_s"], browser.bar["end_s"]) == (0.0, 2.0)
         one.say("grab", what="robot", index=0)
-        while not (isinstance(heard := one.hear(), dict) and heard["kind"] == "error"):
-            pass
-        assert "which cannot be changed" in heard["text"]
+        assert "which cannot be changed" in one.error()
     assert shown.desk.present.sim is sim
     assert sim.now_ns == 2_000_000_000
 

@@ -37,8 +37,7 @@ def visitor(tmp_path: Path, new_page: NewPage) -> Iterator[Visitor]:
 
 def drive(visitor: Visitor) -> None:
     visitor.tab("wire")
-    visitor.at("console").fill("D,4,6")
-    visitor.at("console").press("Enter")
+    visitor.send("D,4,6")
     visitor.tab("robot")
 
 

@@ -26,11 +26,6 @@ while True:
 """
 
 
-def setpoints(visitor: Visitor) -> list[int]:
-    found: list[int] = visitor.sim.world.state.robots["speed_setpoint"][0, 0].tolist()
-    return found
-
-
 def begin_program(visitor: Visitor, name: str, text: str) -> None:
     """Write a new program, without starting it."""
     visitor.tab("programs")
@@ -54,19 +49,17 @@ def test_program_is_written_saved_run_and_stopped(visitor: Visitor) -> None:
     visitor.page.keyboard.press("Control+Enter")
     expect(visitor.at("output")).to_contain_text("begun b'd\\r\\n'")
     assert (visitor.desk.folder / "mine.py").read_text() == FOR_EVER
-    assert setpoints(visitor) == [5, 5]
+    assert visitor.setpoints() == [5, 5]
     visitor.tab("wire")
     expect(visitor.at("share-link")).not_to_contain_text("Link 0.0 %")
-    visitor.at("console").fill("H")
-    visitor.at("console").press("Enter")
+    visitor.send("H")
     visitor.told("line of robot 1 must be free")
     visitor.tab("programs")
     visitor.at("stop").click()
     expect(visitor.at("programs")).to_contain_text("mine.py on robot 1: stopped")
-    visitor.until(lambda: setpoints(visitor) == [0, 0])
+    visitor.until(lambda: visitor.setpoints() == [0, 0])
     visitor.tab("wire")
-    visitor.at("console").fill("H")
-    visitor.at("console").press("Enter")
+    visitor.send("H")
     expect(visitor.at("console-log")).to_contain_text("← h,")
 
 
@@ -97,7 +90,7 @@ def test_console_has_history_suggestions_and_replies(visitor: Visitor) -> None:
     expect(visitor.at("console-log")).not_to_contain_text("←")
     visitor.at("run").click()
     expect(visitor.at("console-log")).to_contain_text("← d")
-    assert setpoints(visitor) == [3, 4]
+    assert visitor.setpoints() == [3, 4]
     console.fill("D,0,0")
     console.press("Enter")
     expect(console).to_have_value("")

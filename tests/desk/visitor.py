@@ -125,6 +125,15 @@ class Visitor:
         closable.locator("button").evaluate_all("(buttons) => buttons.forEach((button) => button.click())")
         closable.first.wait_for(state="detached")
 
+    def send(self, command: str) -> None:
+        """Send a command to the robot of the tab of the wire."""
+        self.at("console").fill(command)
+        self.at("console").press("Enter")
+
+    def setpoints(self, robot: int = 1) -> list[int]:
+        found: list[int] = self.sim.world.state.robots["speed_setpoint"][0, robot - 1].tolist()
+        return found
+
     def pause(self) -> None:
         self.at("run").click()
         self.until(lambda: self.desk.gate.is_paused)
