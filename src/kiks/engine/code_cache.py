@@ -161,7 +161,8 @@ def _syntax_digest() -> bytes:
     globs = (*(f"{folder}/**/*.py" for folder in KERNEL_FOLDERS), *CONSTANT_FILES)
     paths = [path for each in globs for path in sorted(package.glob(each))]
     sources = {".".join(path.relative_to(package.parent).with_suffix("").parts): path.read_bytes() for path in paths}
-    name = f"sources-{_digest(repr(sources).encode())[:32].decode()}"
+    # Each version of Python writes syntax trees in its own way.
+    name = f"sources-{_digest(repr((sys.version_info, sources)).encode())[:32].decode()}"
     for file in (root / name for root in (SHIPPED, *_roots())):
         with _IfAllowed():
             if _is_believed(file.parent) and _is_safe(file.lstat()) and _DIGEST.fullmatch(digest := file.read_bytes()):
