@@ -63,7 +63,7 @@ system:
 lint: setup
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	git ls-files -z | xargs -0 $(BIN)/codespell
+	$(BIN)/codespell .ci benchmarks docs examples matlab src tests tools *.md Makefile noxfile.py pyproject.toml
 	$(BIN)/mh_lint --brief matlab
 	$(BIN)/mh_style --brief matlab
 

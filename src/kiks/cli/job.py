@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 CHAMPION_S = 60.0
 """Simulated time for which a champion drives whose file does not say it [s]."""
 
-CONTESTS = ("pursuit", "football")
+TWO_SIDED = ("pursuit", "football")
 """Tasks of two sides, whose champions drive against each other until their supervisors end it."""
 
 
@@ -121,7 +121,7 @@ def _champion_job(path: Path, world: World) -> Job:
     from kiks.learn.champion import Champion
 
     file = path / "champion.toml" if path.is_dir() else path
-    if path.is_dir() and not file.exists() and (found := _contest_job(path, world)) is not None:
+    if path.is_dir() and not file.exists() and (found := _two_sided_job(path, world)) is not None:
         return found
     champion = Champion.load(file)
     arena = None if world.arena is None else load_arena(world.arena)
@@ -132,8 +132,8 @@ def _champion_job(path: Path, world: World) -> Job:
     return Job(project, Path(), [_driver([file] * len(project.robots))], world.robot or [champion.robot])
 
 
-def _contest_job(folder: Path, world: World) -> Job | None:
-    """Return the contest of the champions of both sides; None if the folder has none."""
+def _two_sided_job(folder: Path, world: World) -> Job | None:
+    """Return the champions of both sides against each other; None if the folder has none."""
     import numpy as np
 
     from kiks.learn import tasks
@@ -141,7 +141,7 @@ def _contest_job(folder: Path, world: World) -> Job | None:
     from kiks.model.arena import Pose
     from kiks.model.shipped import shipped
 
-    for task in map(tasks.load, CONTESTS):
+    for task in map(tasks.load, TWO_SIDED):
         files = [folder / f"{side.name}.toml" for side in task.sides]
         if all(file.is_file() for file in files):
             break

@@ -162,15 +162,15 @@ def _draw_arena(axes: Any, arena: Arena) -> None:
 
 def _draw_paths(axes: Any, recording: Recording, poses: Table, wheels: Table) -> None:
     """Draw where robots drove, where their wheels say that they drove, and where they began to touch something."""
-    setup = recording.start
-    _draw_arena(axes, setup.arena)
+    saved = recording.start
+    _draw_arena(axes, saved.arena)
     for number in recording.robots:
         path, counts = poses[poses["robot"] == number], wheels[wheels["robot"] == number]
         colour = css(robot_colour(number - 1))
         axes.plot(path["x_mm"], path["y_mm"], color=colour, linewidth=1.2, label=f"robot {number}")
         axes.plot(path["x_mm"][:1], path["y_mm"][:1], "o", color=colour, markersize=4)
-        if len(recording.robots) == len(setup.specs) == 1:
-            body = setup.specs[0].body
+        if len(recording.robots) == len(saved.specs) == 1:
+            body = saved.specs[0].body
             pulses = np.column_stack([counts["left_pulses"], counts["right_pulses"]])
             start = np.array([path[name][0] for name in ("x_mm", "y_mm", "heading_rad")])
             guess = odometry(pulses, start, body.pulse_mm, body.wheel_base_mm)
@@ -185,8 +185,8 @@ def _draw_paths(axes: Any, recording: Recording, poses: Table, wheels: Table) ->
             markersize=5,
             label="contacts" if number == recording.robots[-1] and len(touched) else None,
         )
-    axes.set_xlim(0, setup.arena.width_mm)
-    axes.set_ylim(0, setup.arena.height_mm)
+    axes.set_xlim(0, saved.arena.width_mm)
+    axes.set_ylim(0, saved.arena.height_mm)
     if 1 <= len(recording.robots) <= 6:
         legend = axes.legend(fontsize="x-small", loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
         legend.set_in_layout(False)

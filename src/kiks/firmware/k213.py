@@ -110,7 +110,7 @@ class K213(Turret):
     and hash of the state. A reset of the robot sets the period to that of the power-on; the picture stays.
 
     Attributes:
-        take: Takes a picture of what the robot sees at a time [ns], which is the present one; whoever fits it sets it.
+        take: Takes a picture of what the robot sees now; it gets the time [ns]. The world of the camera sets it.
         record: The robot's record of `kiks.engine.state.ROBOT`; another one when the state's arrays were replaced.
 
     Example:

@@ -1,4 +1,4 @@
-"""The pitch of `kiks demo soccer` and of the contest `football`."""
+"""The pitch of `kiks demo soccer` and of the task `football`."""
 
 from __future__ import annotations
 
