@@ -12,7 +12,7 @@ from tests import forked
 from tests.learn.small import ahead
 
 import kiks
-from kiks.cli.job import CONTESTS
+from kiks.cli.job import TWO_SIDED
 from kiks.control.controller import Controller
 from kiks.learn.football import GOAL_REWARD, ball_ahead, ball_gain, goals, kick_offs
 from kiks.learn.tasks import football
@@ -85,8 +85,8 @@ def _stand(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
 
 
 def test_champions_play_until_a_goal(tmp_path: Path) -> None:
-    assert set(CONTESTS) == {name for name in kiks.tasks.TASKS if kiks.tasks.load(name).against}
-    assert all(shipped(f"examples/demos/supervisors/{name}.py").is_file() for name in CONTESTS)
+    assert set(TWO_SIDED) == {name for name in kiks.tasks.TASKS if kiks.tasks.load(name).against}
+    assert all(shipped(f"examples/demos/supervisors/{name}.py").is_file() for name in TWO_SIDED)
     evolution = kiks.Evolution(football(seconds=1.0), seed=1, population=4, opponents=1, folder=tmp_path / "out")
     evolution.run(generations=1)
     played = forked.run("run", "out", "--seconds", "1", cwd=tmp_path)
