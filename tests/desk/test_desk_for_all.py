@@ -15,8 +15,6 @@ from tests.desk.visitor import Visitor
 from tests.desk.visits import NewPage
 
 from kiks.desk.panels.page import Page
-from kiks.desk.server.desk import Desk
-from kiks.desk.server.gateway import Viewer
 from kiks.desk.server.server import SERVER
 from kiks.desk.server.show import Shown
 
@@ -159,15 +157,10 @@ def test_closed_pages_leave_nothing_behind(new_page: NewPage, shown: Shown) -> N
             visitor.tab(tab)
     page.goto("about:blank")
     visitor.until(lambda: not any(client.has_socket_connection for client in Client.instances.values()))
-    visitor.until(lambda: not viewers(shown.desk))
+    visitor.until(lambda: not shown.gateway._viewers)
     forget_all()
     visitor.until(lambda: gc.collect() >= 0 and not any(type(each) is Page for each in gc.get_objects()))
     assert all(wire.log is None for wire in shown.desk.sim.wires), "no line is watched"
-
-
-def viewers(desk: Desk) -> list[Viewer]:
-    gateways = [served.gateway for served in SERVER.desks.values() if served.desk is desk]
-    return [viewer for gateway in gateways for viewer in gateway._viewers]
 
 
 def forget_all() -> None:

@@ -10,20 +10,18 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
-from urllib.parse import urlsplit
 
 import pytest
 from tests.at_length import share
+from tests.desk.clients import open_socket
 from tests.guard import GUARD_S
 from websockets.exceptions import InvalidStatus
-from websockets.sync.client import ClientConnection, connect
+from websockets.sync.client import ClientConnection
 
 import kiks
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.gateway import IN_FLIGHT, Gateway, Viewer
-from kiks.desk.server.server import SERVER
 from kiks.desk.server.show import Shown, show
-from kiks.desk.server.token import COOKIE
 from kiks.errors import ParameterError
 
 
@@ -82,12 +80,7 @@ class Browser:
 
 @contextmanager
 def browsing(shown: Shown, **options: Any) -> Iterator[Browser]:
-    url = urlsplit(shown.url)
-    cookie = {"Cookie": f"{COOKIE}={SERVER.key.token}"}
-    options = {"additional_headers": cookie, **options}
-    with connect(
-        f"ws://{url.netloc}{SERVER.key.place}{url.path}/feed", compression=None, open_timeout=GUARD_S, **options
-    ) as socket:
+    with open_socket(shown, **options) as socket:
         yield Browser(socket)
 
 

@@ -42,7 +42,7 @@ def test_other_servers_of_this_computer_never_get_the_token(visitor: Visitor, no
 
 
 def test_a_ticket_opens_the_desk_once(new_page: NewPage, browser: Browser, shown: Shown) -> None:
-    url = SERVER.url_for_once(shown._served.number)
+    url = SERVER.url_for_once(shown.gateway.number)
     page = new_page()
     page.goto(url)
     page.wait_for_function(FIRST_PICTURE)

@@ -16,6 +16,7 @@ from typing import Any
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from kiks.desk.server.desk import Desk
+from kiks.desk.server.live_editing import Editing
 from kiks.desk.server.marks import Mark, thinned
 from kiks.errors import KiksError, ParameterError
 from kiks.export.frames import arena_picture, describe_scene, describe_shapes, pack_frame, scene_key
@@ -51,9 +52,7 @@ class Viewer:
     Attributes:
         name: Owner of the browser's hand.
         in_flight: Number of unacknowledged frames.
-        scene: Number of the last scene sent.
-        shapes: The last shapes sent.
-        bar: The last description of the time bar sent.
+        sent: The last scene, shapes and time bar that were sent, by their kinds.
         newest: The next frame to send.
         pulls: The newest message of each kind that moves what the browser holds, to be done before the next frame.
         texts: Messages to send before that frame.
@@ -62,9 +61,7 @@ class Viewer:
     def __init__(self, name: str) -> None:
         self.name = name
         self.in_flight = 0
-        self.scene = -1
-        self.shapes: dict[str, Any] = {}
-        self.bar: dict[str, Any] = {}
+        self.sent: dict[str, dict[str, Any]] = {}
         self.newest: bytes | None = None
         self.pulls: dict[str, Callable[[Simulation], None]] = {}
         self.texts: list[str] = []
@@ -104,12 +101,18 @@ class Gateway:
     Args:
         desk: The desk.
         number: Its number in this process.
+
+    Attributes:
+        desk: The desk.
+        number: Its number in this process.
+        editing: Edits its world, for all browsers.
     """
 
     def __init__(self, desk: Desk, number: int) -> None:
-        self._number = number
+        self.desk = desk
+        self.number = number
+        self.editing = Editing(desk)
         self._is_closed = False
-        self._desk = desk
         self._viewers: set[Viewer] = set()
         self._count = 0
         self._wake = asyncio.Event()
@@ -121,8 +124,7 @@ class Gateway:
         self._picture: tuple[Any, bytes] = (None, b"")
         self._shapes: dict[str, Any] = {}
         self._bar: dict[str, Any] = {}
-        self._bar_state: dict[str, Any] = {}
-        self._marks: list[Mark] | None = None
+        self._bar_source: tuple[list[Mark], dict[str, Any]] | None = None
         self._frame_count = 0
 
     # ---- sending ----
@@ -143,24 +145,24 @@ class Gateway:
             self._wake.clear()
             await asyncio.gather(*(self._pull(viewer) for viewer in self._viewers))
             if any(viewer.is_ready for viewer in self._viewers):
-                self._show(await self._desk.do(self._look))
+                self._show(await self.desk.do(self._look))
         tending.cancel()
 
     async def _tend(self) -> None:
         """Keep the past of the world."""
         while True:
-            await self._desk.looking.tend()
+            await self.desk.looking.tend()
             await asyncio.sleep(TEND_S)
 
     def _look(self, sim: Simulation) -> bytes:
-        desk = self._desk
+        desk = self.desk
         sim.sync()
         if (seen := (desk.scene, *scene_key(sim))) != self._seen:
             self._seen = seen
             self._scene = describe_scene(sim, self._scene.get("scene", 0) + 1, desk.names())
             self._scene["secret"] = self._secret
             self._scene["has_old_coordinates"] = desk.has_old_coordinates
-            self._scene["arena"]["picture"] = f"{self._number}/arena/{self._scene['scene']}.png"
+            self._scene["arena"]["picture"] = f"{self.number}/arena/{self._scene['scene']}.png"
             if self._picture[0] is not sim.arena:
                 self._picture = sim.arena, arena_picture(sim.arena)
             self._shapes = describe_shapes(sim)
@@ -181,7 +183,7 @@ class Gateway:
 
     def _describe_bar(self) -> None:
         """Describe the time bar, if it has changed: browsers know from frames where it stands."""
-        looking = self._desk.looking
+        looking = self.desk.looking
         past, span = looking.past, looking.span
         state: dict[str, Any] = {
             "kind": "bar",
@@ -190,22 +192,16 @@ class Gateway:
             "is_past": past is not None,
             "has_present": looking.has_present,
         }
-        if looking.marks is not self._marks or state != self._bar_state:
-            self._marks, self._bar_state = looking.marks, state
+        if (source := (looking.marks, state)) != self._bar_source:
+            self._bar_source = source
             self._bar = {**state, "marks": [(*mark[:2], mark.text) for mark in thinned(looking.marks, span)]}
 
     def _show(self, frame: bytes) -> None:
-        number = self._scene["scene"]
         for viewer in self._viewers:
-            if viewer.scene != number:
-                viewer.scene = number
-                viewer.tell(self._scene)
-            if viewer.shapes is not self._shapes:
-                viewer.shapes = self._shapes
-                viewer.tell(self._shapes)
-            if viewer.bar != self._bar:
-                viewer.bar = self._bar
-                viewer.tell(self._bar)
+            for message in (self._scene, self._shapes, self._bar):
+                if viewer.sent.get(message["kind"]) != message:
+                    viewer.sent[message["kind"]] = message
+                    viewer.tell(message)
             if viewer.is_ready:
                 viewer.show(frame)
 
@@ -236,7 +232,7 @@ class Gateway:
             for task in (sending, hearing):
                 task.cancel()
             await asyncio.gather(sending, hearing, return_exceptions=True)
-            await self._desk.drop(viewer.name)
+            await self.desk.drop(viewer.name)
             with contextlib.suppress(RuntimeError, WebSocketDisconnect):
                 await socket.close()
 
@@ -257,9 +253,9 @@ class Gateway:
             count = message.get("count")
             shown_count = count if isinstance(count, int) and 1 <= count <= IN_FLIGHT else 1
             viewer.in_flight = max(viewer.in_flight - shown_count, 0)
-            self._desk.is_seen.set()
+            self.desk.is_seen.set()
             return
-        desk, name = self._desk, viewer.name
+        desk, name = self.desk, viewer.name
         if kind == "seek":
             self._seek(viewer, ns_from_s(_number(message, "time_s", SECONDS_MAX)))
             return
@@ -288,7 +284,7 @@ class Gateway:
         pulls, viewer.pulls = viewer.pulls, {}
         for pull in pulls.values():
             try:
-                await self._desk.do(pull)
+                await self.desk.do(pull)
             except KiksError as error:
                 viewer.tell({"kind": "error", "text": str(error)})
 
@@ -297,7 +293,7 @@ class Gateway:
 
         async def seek() -> None:
             try:
-                await self._desk.looking.look_at(time_ns)
+                await self.desk.looking.look_at(time_ns)
             except KiksError as error:
                 viewer.tell({"kind": "error", "text": str(error)})
             self._wake.set()

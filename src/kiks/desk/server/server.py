@@ -7,7 +7,6 @@ import logging
 import socket
 import threading
 from contextlib import suppress
-from dataclasses import dataclass
 
 import uvicorn
 from fastapi import FastAPI, Response, WebSocket
@@ -16,11 +15,9 @@ from nicegui import ui
 from starlette.responses import RedirectResponse
 
 from kiks.desk.panels.page import Page
-from kiks.desk.server.access import LOOPBACK, AccessControl
-from kiks.desk.server.connection_limit import LimitedConnection
+from kiks.desk.server.access import HEADERS, LOOPBACK, AccessControl, LimitedConnection
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.gateway import Gateway
-from kiks.desk.server.live_editing import Editing
 from kiks.desk.server.server_log import log_plainly, note_fault
 from kiks.desk.server.token import Token
 from kiks.errors import LinkError, ParameterError
@@ -42,35 +39,18 @@ EVERY_ADDRESS = ("0.0.0.0", "::")
 CLOSED = "KiKS: this desk is closed. Open it again where it was opened."
 
 
-@dataclass(frozen=True)
-class Served:
-    """A desk that browsers can see.
-
-    Attributes:
-        desk: The desk.
-        editing: Edits its world.
-        gateway: Sends its frames.
-        number: Its number in this process.
-    """
-
-    desk: Desk
-    editing: Editing
-    gateway: Gateway
-    number: int
-
-
 class DeskServer:
     """Serves desks to browsers.
 
     NiceGUI has one application per process, so there is one server per process: `SERVER`.
 
     Attributes:
-        desks: The open desks by number.
+        desks: The gateways of the open desks by number.
         key: The token that browsers must know.
     """
 
     def __init__(self) -> None:
-        self.desks: dict[int, Served] = {}
+        self.desks: dict[int, Gateway] = {}
         self.key = Token()
         self._is_local = True
         self._count = 0
@@ -107,22 +87,21 @@ class DeskServer:
                     f"the desk must begin to serve within {START_S:g} s, but it did not. Look above for the reason."
                 )
 
-    def open(self, desk: Desk) -> Served:
+    def open(self, desk: Desk) -> Gateway:
         """Make a desk available to browsers; `start` must have been called."""
         with self._lock:
             self._count += 1
-            served = Served(desk, Editing(desk), Gateway(desk, self._count), self._count)
-            self.desks[self._count] = served
+            gateway = self.desks[self._count] = Gateway(desk, self._count)
             assert self._loop is not None
-            asyncio.run_coroutine_threadsafe(served.gateway.run(), self._loop)
-        return served
+            asyncio.run_coroutine_threadsafe(gateway.run(), self._loop)
+        return gateway
 
-    def close(self, served: Served) -> None:
+    def close(self, gateway: Gateway) -> None:
         """Remove a desk from the server and close it."""
-        self.desks.pop(served.number, None)
+        self.desks.pop(gateway.number, None)
         assert self._loop is not None
-        self._loop.call_soon_threadsafe(served.gateway.close)
-        served.desk.close()
+        self._loop.call_soon_threadsafe(gateway.close)
+        gateway.desk.close()
 
     def url(self, number: int | None = None) -> str:
         """Return the URL of a desk, or of the newest one, with the token."""
@@ -156,6 +135,7 @@ class DeskServer:
         config = uvicorn.Config(
             AccessControl(app, self.key, is_local=self._is_local),
             http=LimitedConnection,
+            headers=HEADERS,
             # uvloop ends the process when there is no file descriptor for its loop.
             loop="asyncio",
             backlog=BACKLOG,
@@ -190,26 +170,26 @@ class DeskServer:
 
         @app.get("/desk/{number}/arena/{scene}.png")
         def picture(number: int, scene: int) -> Response:
-            served = self.desks.get(number)
-            if served is None:
+            gateway = self.desks.get(number)
+            if gateway is None:
                 return Response(status_code=404)
-            return Response(served.gateway.picture(), media_type="image/png", headers={"cache-control": "no-store"})
+            return Response(gateway.picture(), media_type="image/png", headers={"cache-control": "no-store"})
 
         @app.websocket("/desk/{number}/feed")
         async def feed(socket: WebSocket, number: int) -> None:
-            served = self.desks.get(number)
-            if served is None:
+            gateway = self.desks.get(number)
+            if gateway is None:
                 await socket.close()
             else:
-                await served.gateway.serve(socket)
+                await gateway.serve(socket)
 
         @ui.page("/desk/{number}")
         def page(number: int) -> None:
-            served = self.desks.get(number)
-            if served is None:
+            gateway = self.desks.get(number)
+            if gateway is None:
                 ui.label(CLOSED)
             else:
-                Page(served.desk, served.editing, number)
+                Page(gateway.desk, gateway.editing, number)
 
 
 def _own_address(family: socket.AddressFamily) -> str:

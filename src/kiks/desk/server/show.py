@@ -82,6 +82,7 @@ class Shown:
 
     Attributes:
         desk: The desk.
+        gateway: Serves its browsers.
         url: URL of the desk, with its token.
 
     Raises:
@@ -97,8 +98,8 @@ class Shown:
             pack_frame(desk.sim, scene=0)
         desk.keep_past()
         SERVER.start(host=host, port=port)
-        self._served = SERVER.open(desk)
-        self.url = SERVER.url(self._served.number)
+        self.gateway = SERVER.open(desk)
+        self.url = SERVER.url(self.gateway.number)
         self._driver: Driver | None = None
         self._thread: threading.Thread | None = None
         self._cell: int | None = None
@@ -116,7 +117,7 @@ class Shown:
         """Open the desk in a browser if there is a screen."""
         if has_screen():
             # Other users can see the URL that a browser is started with, so it must not contain the token.
-            webbrowser.open(SERVER.url_for_once(self._served.number))
+            webbrowser.open(SERVER.url_for_once(self.gateway.number))
 
     def present(self, *, browser: bool) -> None:
         """Show the desk below the cell of a notebook; elsewhere print its URL and open a browser.
@@ -142,7 +143,7 @@ class Shown:
         if self._thread is not None:
             # It may be in a long step; as a daemon thread it does not block the end of the process.
             self._thread.join(STOP_S)
-        SERVER.close(self._served)
+        SERVER.close(self.gateway)
 
     def __repr__(self) -> str:
         return f"<KiKS desk at {self.url}>"

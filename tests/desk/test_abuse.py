@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import http.client
 import json
 import logging
 import random
@@ -13,15 +12,14 @@ from typing import Any
 from urllib.parse import urlsplit
 
 import pytest
+from tests.desk.clients import WITH_TOKEN, ask, connected, open_socket
 from tests.guard import GUARD_S
-from websockets.exceptions import ConnectionClosed
-from websockets.sync.client import ClientConnection, connect
+from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 import kiks
-from kiks.desk.server import connection_limit
+from kiks.desk.server import access
 from kiks.desk.server.server import SERVER
 from kiks.desk.server.show import Shown, show
-from kiks.desk.server.token import COOKIE
 from kiks.model.limits import MESSAGE_BYTES_MAX, REQUEST_BYTES_MAX
 
 
@@ -42,28 +40,9 @@ def said(caplog: pytest.LogCaptureFixture, capfd: pytest.CaptureFixture[str]) ->
     assert "Traceback" not in capfd.readouterr().err
 
 
-def address_and_cookie(shown: Shown) -> tuple[str, int, str]:
-    """Return the server's host and port, and the cookie with the token."""
-    url = urlsplit(shown.url)
-    assert url.hostname is not None
-    assert url.port is not None
-    return url.hostname, url.port, f"{COOKIE}={SERVER.key.token}"
-
-
-def inside(path: str) -> str:
-    """Return a path of the desk as it is for browsers with the token."""
-    return f"{SERVER.key.place}{path}"
-
-
-def open_socket(shown: Shown, path: str) -> ClientConnection:
-    """Open a WebSocket as a browser with the token."""
-    host, port, cookie = address_and_cookie(shown)
-    return connect(f"ws://{host}:{port}{inside(path)}", additional_headers={"Cookie": cookie}, open_timeout=GUARD_S)
-
-
 def knock(shown: Shown, data: bytes) -> bytes:
-    host, port, _ = address_and_cookie(shown)
-    with socket.create_connection((host, port), timeout=GUARD_S) as stranger:
+    """Return the answer to bytes of a client without the token."""
+    with connected(shown) as stranger:
         with suppress(OSError):
             stranger.sendall(data)
             stranger.shutdown(socket.SHUT_WR)
@@ -74,20 +53,9 @@ def knock(shown: Shown, data: bytes) -> bytes:
     return answer
 
 
-def ask(shown: Shown, method: str, path: str, body: bytes | None = None, **headers: str) -> tuple[int, bytes]:
-    """Return the answer to a browser with the token: the status and the page."""
-    host, port, cookie = address_and_cookie(shown)
-    asking = http.client.HTTPConnection(host, port, timeout=GUARD_S)
-    asking.request(method, inside(path), body, {"Cookie": cookie, **headers})
-    answer = asking.getresponse()
-    page = answer.read()
-    asking.close()
-    return answer.status, page
-
-
 def is_well(shown: Shown) -> bool:
     """Return whether a browser with the token gets its page."""
-    status, page = ask(shown, "GET", urlsplit(shown.url).path)
+    status, _, page = ask(shown, "GET", urlsplit(shown.url).path)
     return status == 200 and b"KiKS" in page
 
 
@@ -136,16 +104,13 @@ def test_malformed_requests_are_refused(shown: Shown, said: list[str]) -> None:
 
 
 def test_silent_connections_do_not_block_others(shown: Shown, said: list[str]) -> None:
-    host, port, _ = address_and_cookie(shown)
-    idle = [
-        socket.create_connection((host, port), timeout=GUARD_S) for _ in range(3 * connection_limit.UNAUTHENTICATED_MAX)
-    ]
+    idle = [connected(shown) for _ in range(3 * access.STRANGERS_MAX)]
     for half in idle[::2]:
         with suppress(OSError):
             half.sendall(b"GET / HTTP/1.1\r\n")
     assert is_well(shown)
     # The server closes the oldest connections first.
-    for early in idle[: connection_limit.UNAUTHENTICATED_MAX]:
+    for early in idle[: access.STRANGERS_MAX]:
         with suppress(ConnectionError):
             assert early.recv(1) == b""
     for each in idle:
@@ -154,20 +119,14 @@ def test_silent_connections_do_not_block_others(shown: Shown, said: list[str]) -
 
 
 def test_an_unauthenticated_connection_times_out(shown: Shown, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(connection_limit, "AUTHENTICATION_S", 0.0)
-    host, port, _ = address_and_cookie(shown)
-    with socket.create_connection((host, port), timeout=GUARD_S) as stranger, suppress(ConnectionError):
+    monkeypatch.setattr(access, "STRANGER_S", 0.0)
+    with connected(shown) as stranger, suppress(ConnectionError):
         assert stranger.recv(1) == b""
 
 
 def test_an_authenticated_connection_does_not_time_out(shown: Shown, monkeypatch: pytest.MonkeyPatch) -> None:
-    host, port, _ = address_and_cookie(shown)
-    path = urlsplit(shown.url).path
-    with open_socket(shown, f"{path}/feed") as feed:
-        idle = [
-            socket.create_connection((host, port), timeout=GUARD_S)
-            for _ in range(2 * connection_limit.UNAUTHENTICATED_MAX)
-        ]
+    with open_socket(shown) as feed:
+        idle = [connected(shown) for _ in range(2 * access.STRANGERS_MAX)]
         for _ in range(5):
             while not isinstance(feed.recv(GUARD_S), bytes):
                 pass
@@ -177,6 +136,9 @@ def test_an_authenticated_connection_does_not_time_out(shown: Shown, monkeypatch
 
 
 # ---- an authenticated browser that misbehaves ----
+
+EVENTS = "/_nicegui_ws/socket.io/?EIO=4&transport=websocket"
+"""Where a page sends its events."""
 
 
 @pytest.mark.slow
@@ -199,9 +161,7 @@ def test_an_authenticated_connection_does_not_time_out(shown: Shown, monkeypatch
 )
 @pytest.mark.parametrize("which", ["feed", "socket.io"])
 def test_malformed_websocket_frames_close_the_socket(shown: Shown, said: list[str], which: str, frames: bytes) -> None:
-    path = f"{urlsplit(shown.url).path}/feed"
-    path = path if which == "feed" else "/_nicegui_ws/socket.io/?EIO=4&transport=websocket"
-    with open_socket(shown, path) as client:
+    with open_socket(shown, None if which == "feed" else EVENTS) as client:
         client.socket.sendall(frames)
         # Below the library: it would object itself.
         with suppress(OSError):
@@ -246,8 +206,7 @@ def test_malformed_websocket_frames_close_the_socket(shown: Shown, said: list[st
     ids=lambda text: text[:40],
 )
 def test_malformed_events_are_ignored(shown: Shown, caplog: pytest.LogCaptureFixture, message: str, said: Any) -> None:
-    path = "/_nicegui_ws/socket.io/?EIO=4&transport=websocket"
-    with open_socket(shown, path) as client:
+    with open_socket(shown, EVENTS) as client:
         client.send("40")
         client.recv(GUARD_S)
         client.send(message)
@@ -275,32 +234,49 @@ def test_malformed_uploads_are_refused(shown: Shown, said: list[str]) -> None:
         ("\xff", b""),
     ]
     for kind, body in kinds:
-        assert ask(shown, "POST", path, body, **{"Content-Type": kind})[0] in (200, 400, 415), (kind, body)
+        assert ask(shown, "POST", path, body, **{"Content-Type": kind})[0] in (200, 400, 415, 500), (kind, body)
     assert is_well(shown)
 
 
 def test_a_too_large_body_is_not_stored(shown: Shown, said: list[str]) -> None:
-    host, port, cookie = address_and_cookie(shown)
-    for headers, body in (
-        ({"Content-Length": str(REQUEST_BYTES_MAX + 1)}, b""),
-        ({"Transfer-Encoding": "chunked"}, b"100000\r\n" + b"x" * 0x100000 + b"\r\n"),
-    ):
-        head = {
-            "Host": f"{host}:{port}",
-            "Cookie": cookie,
-            "Content-Type": "multipart/form-data; boundary=b",
-            **headers,
-        }
-        lines = "".join(f"{name}: {value}\r\n" for name, value in head.items())
-        with socket.create_connection((host, port), timeout=GUARD_S) as client:
-            client.sendall(f"POST {inside('/desk/1')} HTTP/1.1\r\n{lines}\r\n".encode())
+    url = urlsplit(shown.url)
+    piece = b"100000\r\n" + b"x" * 0x100000 + b"\r\n"
+    head = f"POST {SERVER.key.place}/desk/1 HTTP/1.1\r\nHost: {url.netloc}\r\nCookie: {WITH_TOKEN['Cookie']}\r\n"
+    for header, body in ((f"Content-Length: {REQUEST_BYTES_MAX + 1}", b""), ("Transfer-Encoding: chunked", piece)):
+        with connected(shown) as client:
+            client.sendall(f"{head}{header}\r\n\r\n".encode())
             with suppress(OSError):
                 for _ in range(REQUEST_BYTES_MAX // 0x100000 + 2):
-                    if body:
-                        client.sendall(body)
+                    client.sendall(body)
             with suppress(ConnectionError):
-                assert client.recv(100).split(b" ", 2)[1] in (b"413", b"405")
+                assert client.recv(100).split(b" ", 2)[1] == b"413"
     assert is_well(shown)
+
+
+def test_a_failure_of_the_application_is_one_line_of_the_log(shown: Shown, caplog: pytest.LogCaptureFixture) -> None:
+    from nicegui import app
+
+    @app.get("/fails")
+    @app.websocket("/fails-too")
+    async def fail() -> None:
+        raise KeyError("x" * 1000)
+
+    status, _, page = ask(shown, "GET", "/fails")
+    assert (status, b"Traceback" in page) == (500, False)
+    with pytest.raises(InvalidStatus, match="500"):
+        open_socket(shown, "/fails-too")
+    for record in (record for record in caplog.records if record.name.startswith("kiks")):
+        assert record.getMessage().startswith("The desk: Exception in ASGI application: KeyError(")
+        assert len(record.getMessage()) < 250
+        assert record.exc_info is None
+
+
+def test_only_pages_of_this_computer_may_embed_the_desk(shown: Shown) -> None:
+    inside, refused = ask(shown, "GET", urlsplit(shown.url).path)[1], knock(shown, b"GET / HTTP/1.0\r\n\r\n").decode()
+    for headers in (inside, refused):
+        policy = headers.split("content-security-policy: ")[1].splitlines()[0]
+        assert policy.startswith("frame-ancestors 'self' http://localhost:*")
+        assert " *" not in policy.replace(":*", "")
 
 
 def test_json_of_the_gateway_never_raises(shown: Shown, said: list[str]) -> None:
@@ -322,8 +298,7 @@ def test_json_of_the_gateway_never_raises(shown: Shown, said: list[str]) -> None
         "x" * 999,
     ]
     names = ["kind", "what", "index", "x_mm", "y_mm", "heading_rad", "count", ""]
-    path = urlsplit(shown.url).path
-    with open_socket(shown, f"{path}/feed") as feed:
+    with open_socket(shown) as feed:
         for _ in range(1000):
             message = {name: chance.choice(values) for name in chance.sample(names, chance.randrange(len(names)))}
             message["kind"] = chance.choice(["grab", "move", "turn", "drop", "ack"])
