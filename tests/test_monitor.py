@@ -9,14 +9,14 @@ from pathlib import Path
 
 import pytest
 import typer
+from click.testing import Result
 from rich.console import Console
 from typer.testing import CliRunner
 
 import kiks
-from kiks.client.monitor import COLUMNS, CsvLog, RateMeter, Sample, logged, samples
 
-app = typer.Typer()
 command = importlib.import_module("kiks.cli.monitor")  # `kiks.cli.monitor` itself is the function
+app = typer.Typer()
 app.command()(command.monitor)
 
 
@@ -27,9 +27,13 @@ def robot() -> kiks.Khepera:
     return kiks.Khepera(sim.port(1))
 
 
+def run(*words: object) -> Result:
+    return CliRunner().invoke(app, ["--port", *map(str, words)])
+
+
 def test_samples_hold_everything_at_the_rate_that_was_asked_for(robot: kiks.Khepera) -> None:
     robot.set_speed(5, -5)
-    taken = list(samples(robot, rate_hz=4, seconds=2.0))
+    taken = list(command.samples(robot, 4.0, 2.0))
     assert [sample.time_s for sample in taken] == pytest.approx([0.25 * index for index in range(8)], abs=0.01)
     last = taken[-1]
     assert max(last.proximity) > 500
@@ -39,119 +43,92 @@ def test_samples_hold_everything_at_the_rate_that_was_asked_for(robot: kiks.Khep
     assert [motor.mode for motor in last.status] == [0, 0]
 
 
-def test_a_slow_line_gives_what_it_can(robot: kiks.Khepera) -> None:
-    taken = list(samples(robot, rate_hz=100, seconds=2.0))
-    meter = RateMeter()
-    rates = [meter.note(sample.time_s) for sample in taken]
-    assert rates[0] == 0.0
-    assert 5 < rates[-1] < 10
-    assert rates[-1] == pytest.approx(len(taken) / 2, abs=0.5)
-
-
-@pytest.mark.parametrize(
-    ("settings", "words"),
-    [
-        ({"rate_hz": 0}, "rate_hz must be from 0.01 to 100, but it was 0"),
-        ({"seconds": -1.0}, "seconds must be from 0.001 to 1"),
-    ],
-)
-def test_wrong_numbers_are_named(robot: kiks.Khepera, settings: dict[str, float], words: str) -> None:
-    with pytest.raises(kiks.ParameterError, match=words):
-        samples(robot, **settings)  # type: ignore[arg-type]
-
-
-def test_the_log_is_on_the_disk_after_each_sample(robot: kiks.Khepera, tmp_path: Path) -> None:
-    path = tmp_path / "log.csv"
-    log = CsvLog(path)
-    stream = logged(samples(robot, rate_hz=5), log)
-    for count in (1, 2, 3):
-        sample = next(stream)
-        rows = list(csv.DictReader(path.read_text().splitlines()))
-        assert len(rows) == count
-        assert float(rows[-1]["time_s"]) == pytest.approx(sample.time_s, abs=0.001)
-        assert int(rows[-1]["proximity_3_counts"]) == sample.proximity[3]
-        assert int(rows[-1]["ambient_0_counts"]) == sample.ambient[0]
-        assert int(rows[-1]["right_error_pulses"]) == sample.status[1].error
-    log.close()
-    assert path.read_text().splitlines()[0].startswith("time_s,proximity_0_counts,")
-    assert len(COLUMNS) == len(rows[0]) == 27
-
-
-def test_a_log_never_replaces_a_file(tmp_path: Path) -> None:
-    path = tmp_path / "log.csv"
-    path.write_text("precious")
-    with pytest.raises(kiks.ParameterError, match=r"a log must go to a new file, but .*log.csv' cannot be one"):
-        CsvLog(path)
-    assert path.read_text() == "precious"
-
-
-def test_a_log_says_that_its_disk_is_full(robot: kiks.Khepera) -> None:
-    log = CsvLog.__new__(CsvLog)
-    log._file = open("/dev/full", "w")  # noqa: SIM115  (closed by close)
-    with pytest.raises(kiks.ParameterError, match=r"'/dev/full' cannot any more \(No space left on device\)"):
-        log.add(next(samples(robot)))
-    log.close()
+def test_wrong_numbers_are_named() -> None:
+    for option, value, words in (
+        ("--rate", "0", "rate must be from 0.01 to 100, but it was 0"),
+        ("--seconds", "-1", "seconds must be from 0.001 to 1"),
+    ):
+        assert words in str(run("kiks://1", option, value).exception)
 
 
 def test_the_picture_shows_each_reading_at_its_place(robot: kiks.Khepera) -> None:
-    sample = next(samples(robot))
+    sample = next(command.samples(robot, 10.0, None))
     sample = sample._replace(proximity=[11, 122, 233, 344, 455, 566, 677, 788])
-    console = Console(file=io.StringIO(), width=100)
-    console.print(command.picture(sample, 6.5, "a port"))
-    assert isinstance(console.file, io.StringIO)
-    lines = console.file.getvalue().splitlines()
-    assert "6.5 samples per second" in console.file.getvalue()
-    for number in sample.proximity + sample.ambient:
-        assert str(number) in console.file.getvalue()
+    for width in (100, 60):
+        file = io.StringIO()
+        Console(file=file, width=width).print(command.picture(sample, 6.5, "a port", width))
+        lines = file.getvalue().splitlines()
 
-    def line_of(number: int) -> int:
-        return next(index for index, line in enumerate(lines) if f" {number}" in line)
+        def line_of(number: int) -> int:
+            return next(index for index, line in enumerate(lines) if str(number) in line.split())  # noqa: B023
 
-    assert line_of(233) == line_of(344) < line_of(122) == line_of(455) < line_of(566) < line_of(677) == line_of(788)
-    narrow = Console(file=io.StringIO(), width=60)
-    narrow.print(command.picture(sample, 6.5, "a port", 60))
-    assert isinstance(narrow.file, io.StringIO)
-    assert all(f" {number} " in narrow.file.getvalue() for number in sample.proximity + sample.ambient)
-    assert "…" not in narrow.file.getvalue()
-    assert command.bar(0).strip() == "0"
-    assert command.bar(2000) == "██████████ 2000"
+        assert line_of(233) == line_of(344) < line_of(122) == line_of(455) < line_of(566) < line_of(677) == line_of(788)
+        for number in sample.ambient:
+            assert str(number) in file.getvalue().split()
+        assert "6.5 samples per second" in file.getvalue()
+        assert "…" not in file.getvalue()
 
 
-def test_the_command_prints_lines_and_logs_where_there_is_no_terminal(tmp_path: Path) -> None:
+def test_the_command_prints_and_logs_rows_where_there_is_no_terminal(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     sim = kiks.Simulation(seed=1)
-    arguments = ["--port", sim.url(1), "--rate", "5", "--seconds", "0.6", "--csv", str(path)]
-    result = CliRunner().invoke(app, arguments)
+    result = run(sim.url(1), "--rate", 5, "--seconds", 0.6, "--csv", path)
     assert result.exit_code == 0, result.output
-    lines = result.output.splitlines()
-    assert "BIOS 5.02" in lines[0]
-    assert len(lines) == 5
-    assert "N 8 0 0 0 5 0 6 7" in lines[1]
-    assert lines[-1].startswith("3 samples, 5.0 per second at the end, in ")
-    assert len(path.read_text().splitlines()) == 4
-    again = CliRunner().invoke(app, arguments)
-    assert isinstance(again.exception, kiks.ParameterError)
+    assert result.stdout == path.read_text()
+    assert "BIOS 5.02" in result.stderr
+    assert "3 samples, 5.0 per second at the end, in " in result.stderr
+    rows = list(csv.DictReader(result.stdout.splitlines()))
+    assert len(rows) == 3
+    assert len(rows[0]) == 27
+    assert [rows[0][f"proximity_{sensor}_counts"] for sensor in range(8)] == ["8", "0", "0", "0", "5", "0", "6", "7"]
+    assert 400 < int(rows[0]["ambient_7_counts"]) < 500
+    assert (rows[0]["left_pulses"], rows[0]["right_mode"]) == ("0", "0")
+    again = run(sim.url(1), "--csv", path)
+    assert "the log must go to a file that can be written" in str(again.exception)
+    assert result.stdout == path.read_text(), "a log never replaces a file"
+
+
+def test_a_slow_line_gives_what_it_can_and_its_log_is_on_the_disk_after_each_sample(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, counts = tmp_path / "log.csv", []
+
+    def paced(robot: kiks.Khepera) -> object:
+        return lambda: counts.append(len(path.read_text().splitlines()))
+
+    monkeypatch.setattr(command, "_pacer", paced)
+    sim = kiks.Simulation(seed=1)
+    result = run(sim.url(1), "--rate", 100, "--seconds", 2, "--csv", path)
+    assert counts == list(range(2, 2 + len(counts)))
+    rate_hz = float(result.stderr.split("samples, ")[1].split()[0])
+    assert 5 < rate_hz < 10
+    assert rate_hz == pytest.approx(len(counts) / 2, abs=0.5)
+
+
+def test_a_log_says_that_its_disk_is_full(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("builtins.open", lambda *_, **kept: io.open("/dev/full", "w", **kept))  # noqa: UP020, SIM115
+    sim = kiks.Simulation()
+    result = run(sim.url(1), "--csv", "log.csv")
+    assert "'log.csv' cannot (No space left on device)" in str(result.exception)
 
 
 def test_ctrl_c_ends_cleanly(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = tmp_path / "log.csv"
     sim = kiks.Simulation(seed=1)
-    seen: list[Sample] = []
 
-    def line(sample: Sample, rate_hz: float) -> str:
-        seen.append(sample)
-        if len(seen) == 2:
-            raise KeyboardInterrupt
-        return ""
+    def paced(robot: kiks.Khepera) -> object:
+        def wait() -> None:
+            if len(path.read_text().splitlines()) == 3:
+                raise KeyboardInterrupt
 
-    monkeypatch.setattr(command, "line", line)
-    result = CliRunner().invoke(app, ["--port", sim.url(1), "--csv", str(path)])
+        return wait
+
+    monkeypatch.setattr(command, "_pacer", paced)
+    result = run(sim.url(1), "--csv", path)
     assert result.exit_code == 0
     assert "2 samples" in result.output
-    assert len(path.read_text().splitlines()) == 3
     sim.port(1).claim("the next one")
 
 
 def test_a_robot_that_is_not_there_is_named() -> None:
-    result = CliRunner().invoke(app, ["--port", "/dev/ttyNOWHERE"])
-    assert isinstance(result.exception, kiks.LinkError)
+    assert isinstance(run("/dev/ttyNOWHERE").exception, kiks.LinkError)

@@ -2,29 +2,77 @@
 
 from __future__ import annotations
 
+import math
+import time
+from collections import deque
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, suppress
+from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
 from kiks.cli.engine_start import ready_engine
 from kiks.cli.outputs import output
 from kiks.ending import end_as_with_ctrl_c
+from kiks.model.atomic_files import writing
 
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-    from kiks.client.monitor import Sample
+    from kiks.client.khepera import Khepera, Status
 
 FULL_COUNTS = 1023
 BAR_WIDTH = 10
 """Characters of a full proximity bar."""
 
-_PARTS = " ▏▎▍▌▋▊▉█"
+RATE_MIN_HZ, RATE_MAX_HZ = 0.01, 100.0
+
+RATE_WINDOW = 20
+"""Number of samples over which the shown rate is averaged."""
+
 _MODES = {0: "speed", 1: "position", 2: "PWM"}
+
+
+class Sample(NamedTuple):
+    """All readings of a robot at one time.
+
+    Attributes:
+        time_s: Time since the start at which the first command was sent [s].
+        proximity: Reflected light, clockwise from the left [counts]; more is nearer.
+        ambient: Ambient light [counts]; less is brighter.
+        encoders: Position counters, left and right [pulses].
+        speed: Measured speeds, left and right [pulses/10 ms].
+        status: Reports of the two controllers.
+    """
+
+    time_s: float
+    proximity: list[int]
+    ambient: list[int]
+    encoders: tuple[int, int]
+    speed: tuple[int, int]
+    status: tuple[Status, Status]
+
+    def row(self) -> str:
+        """Return the sample as a line of the log, in the order of `COLUMNS`."""
+        states = [value for motor in self.status for value in (int(motor.on_target), motor.mode, motor.error)]
+        numbers = [*self.proximity, *self.ambient, *self.encoders, *self.speed, *states]
+        return ",".join((f"{self.time_s:.3f}", *map(str, numbers)))
+
+
+COLUMNS = (
+    "time_s",
+    *(f"proximity_{sensor}_counts" for sensor in range(8)),
+    *(f"ambient_{sensor}_counts" for sensor in range(8)),
+    "left_pulses",
+    "right_pulses",
+    "left_speed_pulses",
+    "right_speed_pulses",
+    *(f"{side}_{what}" for side in ("left", "right") for what in ("on_target", "mode", "error_pulses")),
+)
+"""Columns of the log. Speeds and controllers' errors are in pulses/10 ms; errors of position moves are in pulses."""
 
 
 def monitor(
@@ -43,44 +91,62 @@ def monitor(
     from rich.console import Console
 
     from kiks.client.khepera import Khepera
-    from kiks.client.monitor import CsvLog, RateMeter, logged, samples
+    from kiks.model.checks import SECONDS_MAX, check_number
 
+    check_number("rate", rate, RATE_MIN_HZ, RATE_MAX_HZ, "At 9600 baud about 6 are possible.")
+    if seconds is not None:
+        check_number("seconds", seconds, 1e-3, SECONDS_MAX, "Leave it out for no end.")
     if port.startswith("kiks:"):
         ready_engine()
-    console = Console()
     end_as_with_ctrl_c()
-    count, rate_hz, log = 0, 0.0, None
-    with Khepera(port, baud=baud) as robot:
-        stream = samples(robot, rate_hz=rate, seconds=seconds)
+    count, rate_hz = 0, 0.0
+    times_s: deque[float] = deque(maxlen=RATE_WINDOW + 1)
+    with ExitStack() as ends:
+        robot = ends.enter_context(Khepera(port, baud=baud))
         bios, protocol = robot.version()
-        title = f"{port}   BIOS {bios}, protocol {protocol}"
         wait = _pacer(robot)
-        meter = RateMeter()
-        try:
-            log = None if csv is None else CsvLog(csv)
-            with _display(console, title) as show:
-                for sample in logged(stream, log):
-                    count += 1
-                    rate_hz = meter.note(sample.time_s)
-                    show(sample, rate_hz)
-                    wait()
-        except KeyboardInterrupt:
-            pass
-        finally:
-            if log is not None:
-                log.close()
-    typer.echo(f"{count} samples, {rate_hz:.1f} per second at the end{'' if csv is None else f', in {csv}'}")
+        show = ends.enter_context(_display(Console(), f"{port}   BIOS {bios}, protocol {protocol}"))
+        log = ends.enter_context(_log(csv))
+        ends.enter_context(suppress(KeyboardInterrupt))
+        for count, sample in enumerate(samples(robot, rate, seconds), 1):
+            log(sample.row())
+            times_s.append(sample.time_s)
+            rate_hz = (len(times_s) - 1) / (times_s[-1] - times_s[0]) if count > 1 else 0.0
+            show(sample, rate_hz)
+            wait()
+    typer.echo(f"{count} samples, {rate_hz:.1f} per second at the end{'' if csv is None else f', in {csv}'}", err=True)
 
 
-def _pacer(robot: object) -> Callable[[], None]:
+def samples(robot: Khepera, rate_hz: float, seconds: float | None) -> Iterator[Sample]:
+    """Yield samples at a steady rate, or as fast as the line allows if that is slower.
+
+    The commands of one sample take 0.15 s at 9600 baud, so the rate there is at most 6 or 7 Hz.
+
+    Args:
+        robot: The robot.
+        rate_hz: Samples per second [Hz].
+        seconds: Duration by the robot's clock [s]; None for no end.
+
+    Raises:
+        LinkError: If the robot does not answer.
+    """
+    start_s, due_s = robot.time_s, 0.0
+    while due_s < (math.inf if seconds is None else seconds):
+        now_s = robot.time_s - start_s
+        if now_s < due_s:
+            robot.pause(due_s - now_s)
+            now_s = robot.time_s - start_s
+        yield Sample(now_s, robot.proximity(), robot.ambient(), robot.encoders(), robot.speed(), robot.status())
+        # After a late sample the next one is due at once; missed samples are not made up for.
+        due_s = max(due_s + 1.0 / rate_hz, robot.time_s - start_s)
+
+
+def _pacer(robot: Khepera) -> Callable[[], None]:
     """Return a function that keeps a simulated robot at real time; for a real robot it does nothing."""
-    import time
-
-    from kiks.client.khepera import Khepera
     from kiks.clock.pace import Pace
     from kiks.sim.simulation import SimPort
 
-    port = robot.port if isinstance(robot, Khepera) else None
+    port = robot.port
     if not isinstance(port, SimPort):
         return lambda: None
     sim, pace = port.sim, Pace(1.0)
@@ -89,37 +155,28 @@ def _pacer(robot: object) -> Callable[[], None]:
 
 
 @contextmanager
+def _log(path: Path | None) -> Iterator[Callable[[str], object]]:
+    """Yield a function that writes a line into a new file at once, below a line with the columns."""
+    if path is None:
+        yield lambda line: None
+        return
+    with writing("the log", path), open(path, "x", encoding="utf-8", buffering=1) as file:
+        print(",".join(COLUMNS), file=file)
+        yield lambda line: print(line, file=file)
+
+
+@contextmanager
 def _display(console: Console, title: str) -> Iterator[Callable[[Sample, float], None]]:
-    """Yield a function that shows a sample: as a picture on a terminal, otherwise as a line."""
+    """Yield a function that shows a sample: as a picture on a terminal, otherwise as a line of the log."""
     if not console.is_terminal:
-        typer.echo(title)
-        yield lambda sample, rate_hz: typer.echo(line(sample, rate_hz))
+        typer.echo(title, err=True)
+        typer.echo(",".join(COLUMNS))
+        yield lambda sample, rate_hz: typer.echo(sample.row())
         return
     from rich.live import Live
 
     with Live(console=console, auto_refresh=False, screen=False) as live:
         yield lambda sample, rate_hz: live.update(picture(sample, rate_hz, title, console.width), refresh=True)
-
-
-def line(sample: Sample, rate_hz: float) -> str:
-    """Return a sample as a line of text."""
-    words = [f"{sample.time_s:9.3f} s"]
-    for letter, values in zip("NOHE", sample[1:5], strict=True):
-        words.append(f"{letter} {' '.join(map(str, values))}")
-    words.append(f"K {' '.join(f'{int(motor.on_target)} {motor.mode} {motor.error}' for motor in sample.status)}")
-    return "   ".join((*words, f"{rate_hz:.1f} Hz"))
-
-
-def bar(count: float, width: int = BAR_WIDTH) -> str:
-    """Return a reading as a bar and a number, always of the same width.
-
-    Example:
-        >>> bar(512)
-        '█████       512'
-    """
-    eighths = round(min(max(count / FULL_COUNTS, 0.0), 1.0) * width * 8)
-    full, rest = divmod(eighths, 8)
-    return f"{('█' * full + _PARTS[rest].strip()).ljust(width)} {count:4.0f}"
 
 
 def picture(sample: Sample, rate_hz: float, title: str, width: int = 80) -> Table:
@@ -132,28 +189,26 @@ def picture(sample: Sample, rate_hz: float, title: str, width: int = 80) -> Tabl
         width: Characters of a line, at least 60.
     """
     from rich import box
+    from rich.bar import Bar
     from rich.table import Table
     from rich.text import Text
 
-    def cell(sensor: int | None) -> Text:
+    # A row has four sensors, each with its number, bar and reading, and a blank after each of them.
+    bar_width = min(BAR_WIDTH, width // 4 - len("0 ") - len(" 1023 "))
+
+    def cells(sensor: int | None) -> list[Text | Bar]:
         if sensor is None:
-            return Text("")
+            return [Text()] * 3
         count = sample.proximity[sensor]
         colour = "green" if count < FULL_COUNTS / 3 else "yellow" if count < FULL_COUNTS * 2 / 3 else "red"
-        return Text(f"{sensor} ", "dim").append(bar(count, bar_width), colour)
+        bar = Bar(FULL_COUNTS, 0, count, width=bar_width, color=colour)
+        return [Text(str(sensor), "dim"), bar, Text(f"{count:4d}", colour)]
 
-    # A row has four sensors, each with its number, bar and reading, and two blanks between them.
-    bar_width = min(BAR_WIDTH, (width - 3 * 2) // 4 - len("0 ") - len(" 1023"))
-    around = Table.grid(padding=(0, 2))
+    around = Table.grid(padding=(0, 1))
     for row in ((None, 2, 3, None), (1, None, None, 4), (0, None, None, 5), (None, 7, 6, None)):
-        around.add_row(*(cell(sensor) for sensor in row))
-    light = Table(box=box.SIMPLE, padding=(0, 1))
-    light.add_column("sensor")
-    for sensor in range(len(sample.ambient)):
-        light.add_column(str(sensor), justify="right", min_width=3)
-    light.add_row("ambient", *map(str, sample.ambient))
+        around.add_row(*chain.from_iterable(map(cells, row)))
     wheels = Table(box=box.SIMPLE, padding=(0, 1))
-    for name in ("wheel", "counter [pulses]", "speed [pulses/10 ms]", "mode", "on target", "error"):
+    for name in ("wheel", "pulses", "pulses/10 ms", "mode", "on target", "error"):
         wheels.add_column(name, justify="left" if name == "wheel" else "right")
     for side, counter, speed, motor in zip(
         ("left", "right"), sample.encoders, sample.speed, sample.status, strict=True
@@ -164,6 +219,6 @@ def picture(sample: Sample, rate_hz: float, title: str, width: int = 80) -> Tabl
     whole = Table.grid()
     whole.add_row(Text(title, "bold"))
     whole.add_row(f"{sample.time_s:.2f} s   {rate_hz:.1f} samples per second   Ctrl-C ends")
-    for part in ("", around, light, wheels):
+    for part in ("", around, "", f"ambient, 0 to 7  {''.join(f'{count:5d}' for count in sample.ambient)}", wheels):
         whole.add_row(part)
     return whole
