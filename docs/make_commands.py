@@ -147,7 +147,7 @@ def lines() -> Iterator[str]:
         "they are done: a program that uses one has to read until nothing more comes."
     )
     yield ""
-    for name, summary in tools.SUMMARY.items():
+    for name, (summary, _) in tools.TOOLS.items():
         usage, _, meaning = summary.partition(": ")
         yield f"### {name}"
         yield ""

@@ -6,14 +6,14 @@ import runpy
 from pathlib import Path
 
 from kiks.firmware.commands import COMMANDS, Command
-from kiks.firmware.tools import SUMMARY
+from kiks.firmware.tools import TOOLS
 
 DOCS = Path(__file__).parents[2] / "docs"
 
 
 def test_everything_has_a_section() -> None:
     page = (DOCS / "commands.md").read_text(encoding="utf-8")
-    for name in (*(f"{row.letter}: {row.name}" for row in COMMANDS), *SUMMARY):
+    for name in (*(f"{row.letter}: {row.name}" for row in COMMANDS), *TOOLS):
         assert f"### {name}\n" in page
 
 

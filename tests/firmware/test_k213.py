@@ -45,7 +45,7 @@ def contrast(image: list[float]) -> float:
 
 def test_the_parts_of_an_image_are_those_of_the_whole() -> None:
     pixels = [(37 * p + 11) % 256 for p in range(64)]
-    camera = K213()
+    camera = camera_of(scene())
     camera.take = lambda time_ns: (pixels, 1234)
     camera.look(0)
     assert camera.order("N", ()) == tuple(pixels)

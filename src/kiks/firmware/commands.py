@@ -86,13 +86,13 @@ def version(robot: Robot) -> Reply:
 
 def go_to_position(robot: Robot, left: int, right: int) -> Reply:
     """Move each wheel to a counter reading along a trapezoid of speed; the reply does not wait for the arrival."""
-    motor.set_position(robot.robots, robot.world, robot.number, _limit(left), _limit(right))
+    motor.set_position(robot.robots, 0, robot.number, _limit(left), _limit(right))
     return ()
 
 
 def set_speed(robot: Robot, left: int, right: int) -> Reply:
     """Turn the wheels at these speeds until the next command that moves them."""
-    motor.set_speed(robot.robots, robot.world, robot.number, _limit(left), _limit(right))
+    motor.set_speed(robot.robots, 0, robot.number, _limit(left), _limit(right))
     return ()
 
 
@@ -110,7 +110,7 @@ def set_position_gains(robot: Robot, kp: int, ki: int, kd: int) -> Reply:
 def set_counters(robot: Robot, left: int, right: int) -> Reply:
     """Set the position counters; nothing moves."""
     # Beyond 32 bits the low ones count (khepera-protocol.md 4.8).
-    motor.set_counters(robot.robots, robot.world, robot.number, left & 0xFFFFFFFF, right & 0xFFFFFFFF)
+    motor.set_counters(robot.robots, 0, robot.number, left & 0xFFFFFFFF, right & 0xFFFFFFFF)
     return ()
 
 
@@ -147,7 +147,7 @@ def read_status(robot: Robot) -> Reply:
     """Report for each motor: T on target, M mode (0 speed, 1 position, 2 PWM), E error (command minus measurement)."""
     view = robot.view
     on_target, mode = view.on_target.tolist(), view.motor_mode.tolist()
-    error = [motor.controller_error(robot.robots, robot.world, robot.number, wheel) for wheel in (0, 1)]
+    error = [motor.controller_error(robot.robots, 0, robot.number, wheel) for wheel in (0, 1)]
     return (on_target[0], mode[0], error[0], on_target[1], mode[1], error[1])
 
 
@@ -171,7 +171,7 @@ def read_ambient(robot: Robot) -> Reply:
 
 def set_pwm(robot: Robot, left: int, right: int) -> Reply:
     """Feed the motors without control."""
-    motor.set_pwm(robot.robots, robot.world, robot.number, _limit(left), _limit(right))
+    motor.set_pwm(robot.robots, 0, robot.number, _limit(left), _limit(right))
     return ()
 
 

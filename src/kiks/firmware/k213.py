@@ -7,12 +7,11 @@ asked: two answers between two instants are equal to the bit.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kiks.engine.state import PIXEL_COUNT, ROBOT
+from kiks.engine.state import PIXEL_COUNT
 from kiks.firmware.turret import Orders, Shape, Site, Turret
 from kiks.units import s_from_ns
 
@@ -111,10 +110,10 @@ class K213(Turret):
 
     Attributes:
         take: Takes a picture of what the robot sees now; it gets the time [ns]. The world of the camera sets it.
-        record: The robot's record of `kiks.engine.state.ROBOT`; another one when the state's arrays were replaced.
 
     Example:
-        >>> camera = K213()
+        >>> from kiks import Simulation
+        >>> camera = Simulation().fit(1, "k213")
         >>> camera.take = lambda time_ns: (list(range(64)), 300)
         >>> camera.look(0)
         >>> camera.order("Q", (60,)), camera.order("L", ()), camera.order("X", ())
@@ -127,39 +126,31 @@ class K213(Turret):
 
     take: Callable[[int], Picture]
 
-    def __init__(self) -> None:
-        self._begin(np.zeros(1, ROBOT)[0])
-
     def fit(self, site: Site) -> None:
         """Fit the camera to a robot; it has taken no picture yet."""
         super().fit(site)
-        self._begin(site.record)
-
-    def _begin(self, record: Any) -> None:
-        self.record = record
-        record["camera_period"] = 0
-        record["camera_taken_ns"] = -1
+        site.record["camera_period"], site.record["camera_taken_ns"] = 0, -1
 
     @property
     def period_ns(self) -> int:
         """Pictures are taken when the time is a multiple of this [ns]."""
-        return PERIODS_NS[int(self.record["camera_period"])]
+        return PERIODS_NS[int(self.site.record["camera_period"])]
 
     @property
     def taken_ns(self) -> int:
         """Time of the last picture [ns]."""
-        return int(self.record["camera_taken_ns"])
+        return int(self.site.record["camera_taken_ns"])
 
     @property
     def pixels(self) -> list[int]:
         """The last picture's greys, the leftmost first."""
-        greys: list[int] = self.record["camera_pixels"].tolist()
+        greys: list[int] = self.site.record["camera_pixels"].tolist()
         return greys
 
     @property
     def light(self) -> int:
         """The last picture's light level."""
-        return int(self.record["camera_light"])
+        return int(self.site.record["camera_light"])
 
     def reset(self) -> None:
         """Set the reading period to that of the power-on."""
@@ -167,12 +158,12 @@ class K213(Turret):
 
     def look(self, instant_ns: int) -> None:
         """Take a picture."""
-        self.record["camera_pixels"], self.record["camera_light"] = self.take(instant_ns)
-        self.record["camera_taken_ns"] = instant_ns
+        self.site.record["camera_pixels"], self.site.record["camera_light"] = self.take(instant_ns)
+        self.site.record["camera_taken_ns"] = instant_ns
 
     def set_period(self, code: int) -> None:
         """Set the reading period to that of a code of order U."""
-        self.record["camera_period"] = code
+        self.site.record["camera_period"] = code
 
     def status(self) -> str:
         """Return its reading period and what it took last."""

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 
-from kiks.engine.state import State
 from kiks.firmware import tools
 from kiks.firmware.commands import COMMANDS, NoTurretError, ProtocolError, Reply, set_speed
-from kiks.firmware.receiver import LINE_LIMIT, Receiver
+from kiks.firmware.receiver import LINE_LIMIT
 from kiks.firmware.robot import Robot
-from kiks.model.robot import RobotSpec
 
 UNKNOWN = b"Command not found\r\n"
 PROTOCOL_ERROR = b"z,Protocol error\r\n"
@@ -19,24 +16,12 @@ NO_TURRET = b"z,Turret order not supported\r\n"
 DEMO_PERIOD_NS = 20_000_000
 """Period of the demonstration of mode 0 [ns]: one sensor round."""
 
+_COMMANDS = {command.letter.encode(): (command.act, len(command.parameters)) for command in COMMANDS}
 _NUMBER = re.compile(rb"[ \t]*([+-]?[0-9]+)[ \t]*")
 
 
 class Firmware(Robot):
     """The firmware of one robot: it answers lines; for the arguments see `Robot`."""
-
-    def __init__(
-        self,
-        spec: RobotSpec,
-        state: State,
-        number: int,
-        *,
-        sense_proximity: Callable[[], list[int]],
-        sense_ambient: Callable[[], list[int]],
-    ) -> None:
-        super().__init__(spec, state, number, sense_proximity=sense_proximity, sense_ambient=sense_ambient)
-        self.receiver = Receiver(keeps_empty_lines=spec.quirks.answer_empty_lines)
-        self._commands = {command.letter.encode(): (command.act, len(command.parameters)) for command in COMMANDS}
 
     # ---- a line ----
 
@@ -62,8 +47,8 @@ class Firmware(Robot):
         if quirks.accept_lower_case:
             letter = letter.upper()
         try:
-            if letter in self._commands:
-                act, count = self._commands[letter]
+            if letter in _COMMANDS:
+                act, count = _COMMANDS[letter]
                 if letter == b"T":
                     if self.dictated is not None and line == self.dictated[0]:
                         return self.dictated[1] + b"\r\n"

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from kiks.engine.state import MODE_SPEED, ROBOT, State
+from kiks.firmware.receiver import Receiver
 from kiks.firmware.turret import Turret
 from kiks.model.robot import RobotSpec
 from kiks.units import SENSOR_SLOT_NS
@@ -23,6 +24,7 @@ class Robot:
         sense_ambient: The same for light.
 
     Attributes:
+        receiver: Makes lines of the characters that arrive.
         fitted: All turrets.
         turrets: Those that answer orders, by their numbers.
         dictated: An order for a turret, and the robot's reply to it, if the program that sends it says that, too.
@@ -40,10 +42,10 @@ class Robot:
         sense_ambient: Callable[[], list[int]],
     ) -> None:
         self.spec = spec
-        self.world = 0
         self.number = number
         self.sense_proximity = sense_proximity
         self.sense_ambient = sense_ambient
+        self.receiver = Receiver(keeps_empty_lines=spec.quirks.answer_empty_lines)
         self.fitted: list[Turret] = []
         self.turrets: dict[int, Turret] = {}
         self.dictated: tuple[bytes, bytes] | None = None
@@ -59,7 +61,7 @@ class Robot:
         # Writable views of this robot's fields: a field of one number has shape [1], the others keep their own.
         fields: dict[str, Any] = {}
         for name in ROBOT.names or ():
-            column = state.robots[name][self.world]
+            column = state.robots[name][0]
             fields[name] = column[self.number] if column.ndim > 1 else column[self.number : self.number + 1]
         self.view = SimpleNamespace(**fields)
 

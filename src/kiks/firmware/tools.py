@@ -3,29 +3,18 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 
 from kiks.firmware.commands import COMMANDS
 from kiks.firmware.robot import Robot
 
 PROTOCOL_MODE = "Serial Communication Protocol"
-LOADER_MODE = "S format Motorola loader mode"
+
+Tool = Callable[[Robot, list[str]], bytes]
+"""Carries a tool out: takes the words behind its name, and returns what the robot prints."""
 
 BAUDS = (9600, 19200, 38400, 57600, 115200)
 """Line speeds that the robots know [bit/s] (khepera-protocol.md section 1)."""
-
-SUMMARY = {
-    "help": "help [name]: this list, or a line on one tool or command letter",
-    "list": "list: the modules in ROM",
-    "net": "net: the intelligent turrets that are fitted",
-    "process": "process: what is running",
-    "memory": "memory: use of ROM and RAM",
-    "k-team": "k-team: who made the robot",
-    "serial": "serial <baud>: change the speed of the line at once",
-    "restart": "restart: the same as the reset button",
-    "run": "run <function>: start a function in ROM: demo, sloader, user-flash",
-    "sfill": "sfill: load S-records without starting them",
-    "flash": "flash E | flash W: erase or write the user's flash memory",
-}
 
 
 def text(*lines: str) -> bytes:
@@ -43,12 +32,13 @@ def run(robot: Robot, line: bytes) -> bytes | None:
     """Carry out a tool; return what it prints, or None if the first word names none."""
     # Blanks are blanks and tabs: `str.split` would take control characters for blanks, too.
     words = re.split("[ \t]+", line.decode("latin-1").strip(" \t"))
-    return _TOOLS[words[0]](robot, words[1:]) if words[0] in _summary(robot) else None
+    return TOOLS[words[0]][1](robot, words[1:]) if words[0] in _summary(robot) else None
 
 
 def _summary(robot: Robot) -> dict[str, str]:
+    """Return the line on each tool that a robot has."""
     has_flash = robot.spec.firmware.has_user_flash
-    return {name: line for name, line in SUMMARY.items() if name != "flash" or has_flash}
+    return {name: line for name, (line, _) in TOOLS.items() if name != "flash" or has_flash}
 
 
 def _help(robot: Robot, words: list[str]) -> bytes:
@@ -108,14 +98,14 @@ def _run(robot: Robot, words: list[str]) -> bytes:
         robot.start_demo()
         return text("Demonstration: obstacle avoidance; restart ends it")
     if words == ["sloader"]:
-        return text(LOADER_MODE, "S: this robot loads no code; download terminated")
+        return _load(robot, words)
     if words == ["user-flash"]:
         return text("No user application in flash")
     return text("run: one of demo, sloader, user-flash")
 
 
-def _sfill(robot: Robot, words: list[str]) -> bytes:
-    return text(LOADER_MODE, "S: this robot loads no code; download terminated")
+def _load(robot: Robot, words: list[str]) -> bytes:
+    return text("S format Motorola loader mode", "S: this robot loads no code; download terminated")
 
 
 def _flash(robot: Robot, words: list[str]) -> bytes:
@@ -126,16 +116,17 @@ def _flash(robot: Robot, words: list[str]) -> bytes:
     return text("flash: E or W")
 
 
-_TOOLS = {
-    "help": _help,
-    "list": _list,
-    "net": _net,
-    "process": _process,
-    "memory": _memory,
-    "k-team": _k_team,
-    "serial": _serial,
-    "restart": _restart,
-    "run": _run,
-    "sfill": _sfill,
-    "flash": _flash,
+TOOLS: dict[str, tuple[str, Tool]] = {
+    "help": ("help [name]: this list, or a line on one tool or command letter", _help),
+    "list": ("list: the modules in ROM", _list),
+    "net": ("net: the intelligent turrets that are fitted", _net),
+    "process": ("process: what is running", _process),
+    "memory": ("memory: use of ROM and RAM", _memory),
+    "k-team": ("k-team: who made the robot", _k_team),
+    "serial": ("serial <baud>: change the speed of the line at once", _serial),
+    "restart": ("restart: the same as the reset button", _restart),
+    "run": ("run <function>: start a function in ROM: demo, sloader, user-flash", _run),
+    "sfill": ("sfill: load S-records without starting them", _load),
+    "flash": ("flash E | flash W: erase or write the user's flash memory", _flash),
 }
+"""For each tool the line that `help` prints, and what carries it out."""

@@ -10,6 +10,9 @@ from kiks.errors import LinkError, ParameterError, nearest, shown
 if TYPE_CHECKING:
     from kiks.sim.simulation import SimPort, Simulation
 
+_SHOWN_NAMES = 5
+"""Most simulations that a message names: the newest."""
+
 _OPTIONS = ("arena", "robots", "robot", "seed", "thinking")
 
 
@@ -26,7 +29,7 @@ def find_port(url: str) -> SimPort:
         LinkError: If the name is malformed, or the simulation or the robot does not exist.
     """
     # Imported here: a program in a process of its own finds its ports by another function, and needs no simulation.
-    from kiks.sim.simulation import REGISTRY, SimPort, Simulation
+    from kiks.sim.simulation import SIMULATIONS, SimPort, Simulation
 
     parts = urlsplit(url)
     path = parts.path.strip("/")
@@ -39,10 +42,15 @@ def find_port(url: str) -> SimPort:
     options = dict(parse_qsl(parts.query, keep_blank_values=True))
     if options:
         sim = _new_simulation(options, url)
-    elif name:
-        sim = REGISTRY.find(name)
     else:
-        sim = REGISTRY.newest() or Simulation()
+        alive = dict(SIMULATIONS)
+        if name and name not in alive:
+            known = " or ".join(list(alive)[-_SHOWN_NAMES:]) or "none now"
+            raise LinkError(
+                f"a simulation's name must be one that is alive, such as {known}, but it was {shown(name)}. "
+                f"'kiks://1' without a name is robot 1 of the newest simulation."
+            )
+        sim = alive[name] if name else next(reversed(alive.values()), None) or Simulation()
     robot = int(number)
     if not 1 <= robot <= sim.robot_count:
         if not sim.robot_count:

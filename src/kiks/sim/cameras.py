@@ -34,11 +34,6 @@ class Cameras:
         camera.take = partial(self._take, index)
         camera.look(self._world.now_ns)
 
-    def take_state(self) -> None:
-        """Use the arrays of the state after they were replaced."""
-        for index, fitted in self._fitted.items():
-            fitted.record = self._world.state.robots[0, index]
-
     def sync(self) -> None:
         """Let each camera take the last of its pictures that is due; a program cannot ask for earlier ones.
 

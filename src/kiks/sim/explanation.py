@@ -13,7 +13,6 @@ from kiks.engine.sensing import explain
 from kiks.engine.sensing.observe import NOTHING
 from kiks.model.checks import check_count
 from kiks.model.robot import SENSOR_COUNT
-from kiks.sim.snapshot import name_of
 from kiks.sim.world import World
 
 SENSOR_NAMES = ("left 90", "left 45", "left 10", "right 10", "right 45", "right 90", "back right", "back left")
@@ -225,7 +224,7 @@ def explain_proximity(world: World, robot: int, sensor: int) -> Explanation:
         SeenRay(
             angle_deg=angles_deg[ray],
             length_mm=math.inf if met[ray] == NOTHING else float(rays[0, ray]),
-            met="nothing" if met[ray] == NOTHING else name_of(world, int(met[ray])),
+            met="nothing" if met[ray] == NOTHING else world.free_space.name_of(int(met[ray])),
             brightness=int(rays[2, ray]),
             incidence_deg=math.nan if met[ray] == NOTHING else math.degrees(math.acos(min(rays[1, ray], 1.0))),
             contribution_counts=expected - float(without[ray]),
@@ -297,7 +296,7 @@ def _check_sensor(sensor: int) -> None:
 
 def _state_of(world: World, how: int, hider: int) -> str:
     if how == explain.HIDDEN:
-        return f"hidden by {name_of(world, hider)}"
+        return f"hidden by {world.free_space.name_of(hider)}"
     return {
         explain.SHINING: "seen",
         explain.OFF: "off",

@@ -131,7 +131,9 @@ class FreeSpace:
         return float(contact.clearance_of_disc(*self.ground, float(x_mm), float(y_mm), radius_mm))
 
     def name_of(self, disc: int) -> str:
-        """Return the name of a robot, ball or cylinder for a message."""
+        """Return what people call a disc: 'robot 2', 'ball 1' or 'cylinder 3'; a negative number is that of a wall."""
+        if disc < 0:
+            return "wall"
         if disc < self._robot_count:
             return f"robot {disc + 1}"
         body = self._state.bodies[0, disc - self._robot_count]
@@ -167,7 +169,7 @@ class FreeSpace:
         return (
             "it is outside of the arena"
             if disc == -2
-            else f"{'a wall' if disc < 0 else self.name_of(disc)} is {depth_mm:.1f} mm inside it"
+            else f"{'a ' if disc < 0 else ''}{self.name_of(disc)} is {depth_mm:.1f} mm inside it"
         )
 
     def may_lie(self, disc: int) -> Callable[[float, float], bool]:

@@ -21,27 +21,21 @@ from kiks.engine.state import BALL, BODY, CYLINDER, MEMORY_COUNT, ROBOT
 from kiks.errors import ParameterError, shown
 from kiks.firmware.k213 import PERIODS_NS
 from kiks.firmware.radio import ATTEMPTS, DATA_LIMIT
-from kiks.firmware.receiver import LINE_LIMIT
 from kiks.firmware.turret import Turret
 from kiks.model.arena import Arena
 from kiks.model.checks import CLOCK_END_NS, ROBOTS_MAX
-from kiks.model.data_file import OneOf, Switch, Text, Whole, check, parse_json, parse_toml, record
+from kiks.model.data_file import OneOf, Text, Whole, check, parse_json, parse_toml, record
 from kiks.model.project import Project
-from kiks.model.robot import Baud, RobotSpec, robot_toml
+from kiks.model.robot import RobotSpec, robot_toml
 from kiks.model.turrets import TURRETS
 from kiks.sim.free_space import FreeSpace
 from kiks.sim.simulation import Simulation
 from kiks.sim.turret_host import name_of
-from kiks.sim.wire import SavedWire
+from kiks.sim.wire import Count, SavedWire
 from kiks.sim.world import World
 from kiks.units import TICK_NS
 
-Instant = Annotated[Whole, Field(ge=-CLOCK_END_NS, le=2 * CLOCK_END_NS)]
-Count = Annotated[Whole, Field(ge=0, le=2**62)]
 Part = TypeVar("Part", Arena, RobotSpec)
-
-Line = Annotated[str, Field(max_length=LINE_LIMIT + 1, pattern=r"^[\x00-\xff]*$")]
-"""Bytes of a line, as characters of Latin-1."""
 
 
 @record
@@ -131,26 +125,12 @@ class WorldFiles:
 
 
 @record
-class _WireFile:
-    """A `SavedWire` in a file."""
-
-    line: tuple[Baud, Instant, Instant]
-    robot_baud: Baud
-    selected_baud: Baud
-    demo_wakes_ns: Instant | None
-    partial: Line
-    pending: tuple[tuple[Instant, Line, Switch], ...]
-    last_act_ns: Instant
-    orphan_count: Count
-
-
-@record
 class _RobotFile:
     """A robot in the head of a saved state."""
 
     kind: Text
     turrets: tuple[Annotated[str, OneOf(tuple(TURRETS))] | TurretOfUser, ...]
-    wire: _WireFile
+    wire: SavedWire
 
 
 @record
@@ -224,7 +204,7 @@ class SavedState:
             files.arena(head.arena),
             tuple(files.kind(robot.kind) for robot in head.robots),
             tuple(robot.turrets for robot in head.robots),
-            tuple(SavedWire(**vars(robot.wire)) for robot in head.robots),
+            tuple(robot.wire for robot in head.robots),
             np.frombuffer(rest[:robots_end], ROBOT)[None],
             np.frombuffer(rest[robots_end:bodies_end], BODY)[None],
             np.frombuffer(rest[bodies_end:]).reshape(-1, 4),
@@ -312,7 +292,7 @@ def state_bytes(sim: Simulation, files: WorldFiles) -> bytes:
             {
                 "kind": files.name_of(wire.firmware.spec),
                 "turrets": [name_of(turret) or _described(turret) for turret in wire.firmware.fitted],
-                "wire": wire.save()._asdict(),
+                "wire": wire.save(),
             }
             for wire in sim.wires
         ]

@@ -6,9 +6,11 @@ import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
+from itertools import count
 from pathlib import Path
 from threading import RLock
 from typing import Any
+from weakref import WeakValueDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +30,6 @@ from kiks.sim.free_space import FreeSpace
 from kiks.sim.local_line import LocalLine
 from kiks.sim.paths import Paths
 from kiks.sim.port import CLOSED, VirtualPort
-from kiks.sim.registry import Registry
 from kiks.sim.sensors import Sensors
 from kiks.sim.snapshot import Snapshot, look, proximity_at, trace_rays
 from kiks.sim.things import Checkpoint, Things
@@ -111,7 +112,8 @@ class Simulation:
             self._power_up(index)
         self._paths: Paths | None = None
         self._ports: dict[int, SimPort] = {}
-        self.name = REGISTRY.enter(self)
+        self.name = f"sim{next(_NUMBERS)}"
+        SIMULATIONS[self.name] = self
 
     def _power_up(self, index: int) -> None:
         """Give a robot its firmware and its serial line."""
@@ -302,7 +304,6 @@ class Simulation:
             index = world.add_robot(spec, pose)
             for firmware in self._firmwares:
                 firmware.take(world.state)
-            self._turrets.cameras.take_state()
             self._power_up(index)
             return index + 1
 
@@ -655,8 +656,10 @@ class SimPort(VirtualPort):
         self.robot = robot
 
 
-REGISTRY: Registry[Simulation] = Registry()
-"""The simulations of this process."""
+SIMULATIONS: WeakValueDictionary[str, Simulation] = WeakValueDictionary()
+"""The simulations of this process that are alive, by name, the oldest first."""
+
+_NUMBERS = count(1)
 
 
 def check_kinds(kinds: object, response: object = None) -> None:

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from kiks.engine.parameters import RAY_COUNT
 from kiks.engine.sensing import observe
-from kiks.engine.state import BALL
 from kiks.errors import ParameterError
 from kiks.model.array_checks import check_numbers
 from kiks.model.checks import check_heading
@@ -83,13 +82,3 @@ def proximity_at(world: World, index: int, poses: NDArray[np.float64]) -> NDArra
     counts, state = np.empty((len(poses), SENSOR_COUNT)), world.state
     observe.read_from(world.scene, index, state.tick_count, world.now_ns, poses, counts)
     return counts
-
-
-def name_of(world: World, met: int) -> str:
-    """Return what people call a thing that a ray met: 'wall', 'robot 2', 'ball 1' or 'cylinder 3'."""
-    if met < 0:
-        return "wall"
-    if met < world.robot_count:
-        return f"robot {met + 1}"
-    body = world.state.bodies[0, met - world.robot_count]
-    return f"{'ball' if body['what'] == BALL else 'cylinder'} {body['number']}"

@@ -4,10 +4,16 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Annotated, Any
+
+from pydantic import Field
 
 from kiks.clock.serial_timing import SerialTiming
 from kiks.firmware.khepera import Firmware
+from kiks.firmware.receiver import LINE_LIMIT
+from kiks.model.checks import CLOCK_END_NS
+from kiks.model.data_file import Switch, Whole, record
+from kiks.model.robot import Baud
 from kiks.sim.run_log import ACT, DROP, HANG_UP, SEND, SET_BAUD, THINK, TYPE, WireRecorder
 from kiks.sim.wire_log import TimeShares, WireLog
 from kiks.units import ns_from_s
@@ -19,7 +25,14 @@ Hear = Callable[[bytes, int], None]
 """A callback that takes a reply, and when its last character arrives [ns]."""
 
 
-class SavedWire(NamedTuple):
+Instant = Annotated[Whole, Field(ge=-CLOCK_END_NS, le=2 * CLOCK_END_NS)]
+Count = Annotated[Whole, Field(ge=0, le=2**62)]
+Characters = Annotated[str, Field(max_length=LINE_LIMIT + 1, pattern=r"^[\x00-\xff]*$")]
+"""Bytes of a line, as characters of Latin-1."""
+
+
+@record
+class SavedWire:
     """All that a wire and its firmware remember besides the robot's record, as JSON can hold it.
 
     Attributes:
@@ -33,14 +46,14 @@ class SavedWire(NamedTuple):
         orphan_count: Number of replies to come that are dropped.
     """
 
-    line: tuple[int, int, int]
-    robot_baud: int
-    selected_baud: int
-    demo_wakes_ns: int | None
-    partial: str
-    pending: list[tuple[int, str, bool]]
-    last_act_ns: int
-    orphan_count: int
+    line: tuple[Baud, Instant, Instant]
+    robot_baud: Baud
+    selected_baud: Baud
+    demo_wakes_ns: Instant | None
+    partial: Characters
+    pending: tuple[tuple[Instant, Characters, Switch], ...]
+    last_act_ns: Instant
+    orphan_count: Count
 
 
 def ignore_reply(_reply: bytes, _arrival_ns: int) -> None:
@@ -231,22 +244,22 @@ class Wire:
         self.firmware.receiver.clear()
         self.line.forget()
 
-    def save(self) -> SavedWire:
-        """Return all that this and the firmware remember besides the robot's record and replies that wait."""
-        firmware = self.firmware
-        return SavedWire(
-            self.line.save(),
-            firmware.baud,
-            firmware.selected_baud,
-            firmware.demo_wakes_ns,
-            firmware.receiver.partial.decode("latin-1"),
-            [(act_ns, line.decode("latin-1"), hear is not None) for act_ns, line, hear in self.pending],
-            self._last_act_ns,
-            self._orphan_count,
-        )
+    def save(self) -> dict[str, Any]:
+        """Return the fields of a `SavedWire`; replies that wait are not in it."""
+        firmware, pending = self.firmware, self.pending
+        return {
+            "line": self.line.save(),
+            "robot_baud": firmware.baud,
+            "selected_baud": firmware.selected_baud,
+            "demo_wakes_ns": firmware.demo_wakes_ns,
+            "partial": firmware.receiver.partial.decode("latin-1"),
+            "pending": [(act_ns, line.decode("latin-1"), hear is not None) for act_ns, line, hear in pending],
+            "last_act_ns": self._last_act_ns,
+            "orphan_count": self._orphan_count,
+        }
 
     def restore(self, saved: SavedWire) -> None:
-        """Go back to what `save` returned; replies that came before are dropped."""
+        """Go back to what was saved; replies that came before are dropped."""
         firmware = self.firmware
         self.line.restore(*saved.line)
         firmware.baud, firmware.selected_baud = saved.robot_baud, saved.selected_baud
