@@ -11,7 +11,7 @@ import pytest
 import kiks
 from kiks.errors import ParameterError
 from kiks.export.looks import robot_colour
-from kiks.export.pictures import Picture, save_image
+from kiks.export.pictures import Picture
 from kiks.model.arena import Pose
 
 FLOOR = (246, 243, 236)
@@ -88,4 +88,4 @@ def test_trails_show_where_everything_was(tmp_path: Path) -> None:
 @pytest.mark.parametrize("name", ["no/such/folder/x.png", "x.nothing"])
 def test_a_picture_that_cannot_be_written_says_so(name: str, tmp_path) -> None:
     with pytest.raises(ParameterError, match=r"a picture must (go to a file|end in .png)"):
-        save_image(Picture.of_simulation(world()).image(), tmp_path / name)
+        Picture.of_simulation(world()).save(tmp_path / name)

@@ -170,7 +170,7 @@ def test_a_picture_gives_the_name_and_the_scale(tmp_path):
     Image.fromarray(grey_picture()).save(tmp_path / "yard.png")
     arena = Arena.from_image(str(tmp_path / "yard.png"), 2)
     assert (arena.name, arena.width_mm, arena.height_mm) == ("yard", 300, 240)
-    with pytest.raises(ParameterError, match="mm_per_pixel must be a number"):
+    with pytest.raises(ParameterError, match="mm_per_pixel must be from"):
         Arena.from_image(tmp_path / "yard.png", 0)
 
 

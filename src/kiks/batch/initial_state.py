@@ -8,13 +8,13 @@ from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, InstanceOf
 
 from kiks.engine.parameters import PARAMETERS, pack
 from kiks.engine.sensing.thesis_networks import networks_for
 from kiks.engine.state import State
 from kiks.errors import ParameterError, shown
-from kiks.model.arena import AnArena, Arena
+from kiks.model.arena import Arena
 from kiks.model.array_checks import check_numbers
 from kiks.model.checks import ROBOTS_MAX, check_count
 from kiks.model.data_file import OneOf
@@ -35,7 +35,9 @@ def _listed(arenas: object) -> object:
     return (arenas,) if isinstance(arenas, Arena) else arenas
 
 
-Arenas = Annotated[tuple[AnArena, ...], BeforeValidator(_listed), Field(min_length=1, max_length=ARENAS_LIMIT)]
+Arenas = Annotated[
+    tuple[InstanceOf[Arena], ...], BeforeValidator(_listed), Field(min_length=1, max_length=ARENAS_LIMIT)
+]
 """Arenas that worlds take in turn; a single arena needs no list."""
 
 Starts = Annotated[str, OneOf(("random", "arena"))]

@@ -13,7 +13,7 @@ from kiks.export.panel import Panel
 from kiks.export.solid_stage import SolidStage
 from kiks.export.stage import Pixels, Stage
 from kiks.export.video_file import GIF, MP4, VideoFile
-from kiks.model.atomic_files import ending_of, file_beside
+from kiks.model.atomic_files import ending_of, writing
 from kiks.model.checks import check_count, check_number
 from kiks.recording.moments import moments
 from kiks.recording.recording import Recording
@@ -118,7 +118,7 @@ def save_film(
 
     sampled = np.linspace(0, len(times_ns) - 1, SAMPLE_COUNT).astype(int)
     samples = pictures([times_ns[index] for index in sampled.tolist()])
-    with file_beside(path, "a film") as beside, VideoFile(beside, ending, (width, height), fps, samples) as film:
+    with writing(path, "a film") as beside, VideoFile(beside.path, ending, (width, height), fps, samples) as film:
         for number, picture in enumerate(pictures(times_ns), 1):
             film.add(picture)
             on_progress(number / len(times_ns))

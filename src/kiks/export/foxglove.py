@@ -16,7 +16,7 @@ from mcap.writer import CompressionType, Writer
 from kiks.export.looks import Colour, body_colour, robot_colour
 from kiks.export.sheet import coarse_walls
 from kiks.model.arena import Arena
-from kiks.model.atomic_files import ending_of, file_beside
+from kiks.model.atomic_files import ending_of, writing
 from kiks.recording.events import EventReader
 from kiks.recording.mcap_file import ENDING
 from kiks.recording.moments import Moment, moments
@@ -56,8 +56,8 @@ def save_foxglove(
     ending_of(path, "a recording for Foxglove", (ENDING,))
     begin_ns, end_ns = recording.log.begin_ns, recording.log.end_ns
     channels: dict[str, int] = {}
-    with file_beside(path, "a recording for Foxglove") as beside, beside.open("wb") as stream:
-        writer = Writer(stream, compression=CompressionType.LZ4)
+    with writing(path, "a recording for Foxglove") as beside:
+        writer = Writer(beside.file, compression=CompressionType.LZ4)
         writer.start(library=f"kiks {__version__}")
         messages = merge(_of_moments(recording), _of_events(recording), key=lambda message: message[2])
         for count, (topic, schema, time_ns, values) in enumerate(messages):

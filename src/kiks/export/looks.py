@@ -12,7 +12,7 @@ import numpy as np
 
 from kiks.engine.state import BALL
 from kiks.firmware.turret import Shape
-from kiks.model.robot_parts import Body
+from kiks.model.robot import Body
 
 Colour = tuple[int, ...]
 """Red, green, blue, and perhaps opacity, 0 to 255."""

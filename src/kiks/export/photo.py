@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 
 from kiks.errors import library
 from kiks.export.film import SIZE, checked_follow, checked_size
+from kiks.export.kinds import KINDS
 from kiks.export.looks import Colour
-from kiks.export.pictures import check_picture, save_image
+from kiks.export.pictures import save_image
 from kiks.export.sheet import FLOOR
 from kiks.export.space import VIEW_DEG, Solid, camera_places, things, walls
+from kiks.model.atomic_files import check_writable, ending_of
 from kiks.model.checks import check_count
 from kiks.recording.moments import Moment, moments
 from kiks.recording.recording import Recording
@@ -54,7 +56,8 @@ def save_photo(
     """
     from PIL import Image
 
-    check_picture(path)
+    ending_of(path, "a photo", KINDS["photo"].endings)
+    check_writable(path, "a photo")
     size = checked_size(size)
     follow, zoom = checked_follow(recording, follow, zoom)
     samples = check_count("samples", samples, 1, SAMPLES_MAX)

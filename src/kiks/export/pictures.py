@@ -16,9 +16,8 @@ from kiks.engine.state import BALL, BODY, CYLINDER
 from kiks.export.looks import Colour, body_colour, robot_colour
 from kiks.export.sheet import FINER, Place, Sheet, path_colour, path_mm, wall_picture
 from kiks.model.arena import Arena, Ball
-from kiks.model.atomic_files import check_writable, ending_of, replace_file
-from kiks.model.robot import RobotSpec
-from kiks.model.robot_parts import Body
+from kiks.model.atomic_files import ending_of, replace_file
+from kiks.model.robot import Body, RobotSpec
 from kiks.recording.moments import moments
 from kiks.recording.recording import Recording
 from kiks.sim.simulation import Simulation
@@ -120,7 +119,7 @@ class Picture:
             save_image(self.image(), path)
             return
         sheet = self._sheet(_LONGEST_SIDE, pen := _SvgPen())
-        replace_file(path, _svg(sheet.image, pen.elements, finer=FINER), "a picture")
+        replace_file(path, _svg(sheet.image, pen.elements), "a picture")
 
     def for_notebook(self) -> tuple[bytes, dict[str, int]]:
         """Return it as a PNG, and at which size a notebook shows it: half, so it is sharp on any screen."""
@@ -166,20 +165,11 @@ def save_picture(recording: Recording, path: str | Path, *, time_s: float | None
 
 
 def save_image(image: Image, path: str | Path) -> None:
-    """Write an image; the type follows from the ending."""
+    """Write an image in pixels; the type follows from the ending."""
     pixels, kind = BytesIO(), _type_of(path)
-    if kind == "SVG":
-        replace_file(path, _svg(image, []), "a picture")
-        return
     # PDF: so many pixels an inch that it fits a page across, and pixels as they are.
     image.save(pixels, kind, **({"resolution": image.width / _PAGE_INCHES, "quality": 95} if kind == "PDF" else {}))
     replace_file(path, pixels.getvalue(), "a picture")
-
-
-def check_picture(path: str | Path) -> None:
-    """Raise, before the run that is drawn, what `save_image` would raise."""
-    _type_of(path)
-    check_writable(path, "a picture")
 
 
 def _type_of(path: str | Path) -> str:
@@ -236,13 +226,13 @@ def _svg_colour(name: str, colour: Colour | None) -> Iterable[str]:
         yield f'{name}-opacity="{colour[3] / 255:.2f}"'
 
 
-def _svg(image: Image, elements: Sequence[str], *, finer: int = 1) -> str:
-    """Return a file with a picture in pixels, and elements above it; it is shown smaller than they are."""
+def _svg(image: Image, elements: Sequence[str]) -> str:
+    """Return a file with the picture of a sheet, and elements above it; it is shown smaller than they are."""
     pixels = BytesIO()
     image.save(pixels, "PNG")
     size = f'width="{image.width}" height="{image.height}"'
     data = b64encode(pixels.getvalue()).decode()
-    shown = f'width="{image.width // finer}" height="{image.height // finer}"'
+    shown = f'width="{image.width // FINER}" height="{image.height // FINER}"'
     lines = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {image.width} {image.height}" {shown}>',
         f'<image {size} href="data:image/png;base64,{data}"/>',

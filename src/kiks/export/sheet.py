@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from kiks.engine.state import BALL
 from kiks.export.looks import Colour, body_colour, robot_colour, robot_shapes
 from kiks.model.arena import PAD, Arena
-from kiks.model.robot_parts import Body
+from kiks.model.robot import Body
 
 if TYPE_CHECKING:
     from PIL.Image import Image

@@ -19,7 +19,7 @@ from kiks.export.looks import Colour, body_colour, robot_colour
 from kiks.export.sheet import INK, coarse_walls, wall_grey
 from kiks.export.stage import Canvas, Pixels
 from kiks.model.arena import Arena
-from kiks.model.robot_parts import Body
+from kiks.model.robot import Body
 from kiks.recording.moments import Moment
 
 WALL_MM, ROBOT_MM, CYLINDER_MM, CHASSIS_MM = 36.0, 32.0, 50.0, 4.0

@@ -27,9 +27,9 @@ from numpy.typing import NDArray
 from kiks.errors import ParameterError, shown
 from kiks.model.array_checks import Numbers, read_arrays
 from kiks.model.atomic_files import path_of
+from kiks.model.checks import check_number
 from kiks.model.data_file import COORDINATE_MAX, read_file
 from kiks.model.limits import SAMPLES_FILE_NUMBERS_MAX
-from kiks.model.raster import is_number
 from kiks.model.robot import SENSOR_COUNT
 from kiks.model.thesis_networks import BODY_RADIUS_MM
 
@@ -173,10 +173,8 @@ def load_samples(file: str | Path, *, name: str = "", radius_mm: float = math.in
         radius_mm: Radius of the object [mm]: infinite for a straight wall. The files do not tell.
     """
     path = path_of(file, "file")
-    if not (radius_mm == math.inf or (is_number(radius_mm) and radius_mm > 0)):
-        raise ParameterError(
-            f"radius_mm must be positive, but it was {shown(radius_mm)}. Leave it out for a straight wall."
-        )
+    if radius_mm != math.inf:
+        check_number("radius_mm", radius_mm, 1e-3, COORDINATE_MAX, "Leave it out for a straight wall.")
     read = _read_table if path.suffix == ".npz" else _read_text
     gap_mm, angle_deg, counts = read(path, f"Samples {str(path)!r}")
     angle_deg = np.broadcast_to(angle_deg - RIG_OFFSET_DEG, counts.shape[:2])

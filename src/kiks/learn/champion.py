@@ -175,7 +175,7 @@ class Champion:
         target = path_of(path)
         recipe = recipe_for(self.controller, target.parent)
         named: dict[str, str] = {}
-        files: dict[Path, bytes | str] = {}
+        files: dict[str | Path, bytes | str] = {}
 
         def beside(ending: str, data: bytes | str) -> str:
             copy = target.with_name(f"{target.stem}_{ending}")

@@ -9,11 +9,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import InstanceOf
 
 from kiks import upwards
 from kiks.errors import ArenaError, ParameterError, counted, shown
@@ -21,7 +20,6 @@ from kiks.model.arena_objects import Ball, Cylinder, Lamp, Pose, checked_places
 from kiks.model.atomic_files import path_of
 from kiks.model.box import Box
 from kiks.model.checks import check_kind, check_number
-from kiks.model.data_file import Rule
 from kiks.model.maze import draw_maze
 from kiks.model.raster import (
     MAX_CELLS,
@@ -314,7 +312,3 @@ def _described(value: object) -> str:
     if isinstance(value, np.ndarray):
         return f"an array of {value.dtype} with {value.ndim} dimensions"
     return f"of type {type(value).__name__}"
-
-
-AnArena = Annotated[InstanceOf[Arena], Rule("a kiks.Arena")]
-"""An arena as a field of a record."""

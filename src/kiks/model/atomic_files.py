@@ -5,7 +5,7 @@ from __future__ import annotations
 import fcntl
 import os
 import stat
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, closing, contextmanager, suppress
 from pathlib import Path, PurePosixPath
 from typing import IO, BinaryIO, cast
@@ -29,22 +29,26 @@ def replace_file(path: str | Path, data: bytes | str, what: str = "The file", *,
         what: Its name in messages.
         rights: Its permissions, at most; those of the earlier file, or those of the umask, if left out.
     """
-    replace_files({path_of(path, what): data}, what, rights=rights)
+    replace_files({path: data}, what, rights=rights)
 
 
-def replace_files(files: Mapping[Path, bytes | str], what: str = "The file", *, rights: int | None = None) -> None:
+def replace_files(files: dict[str | Path, bytes | str], what: str = "The file", *, rights: int | None = None) -> None:
     """Write files that belong together like `replace_file`: none is replaced before all are on the disk."""
     with ExitStack() as stack:
-        fresh = []
-        for path, data in files.items():
-            with writing(what, path):
-                beside = FileBeside(target_of(path), 0o666 if rights is None else rights)
-                fresh.append(stack.enter_context(closing(beside)))
-                beside.file.write(data.encode() if isinstance(data, str) else data)
-                beside.settle()
-        for path, beside in zip(files, fresh, strict=True):
-            with writing(what, path):
-                beside.take_place(keeps_rights=rights is None)
+        for path, data in reversed(files.items()):  # the stack ends with the first one, which takes its place first
+            beside = stack.enter_context(writing(path, what, rights=rights))
+            beside.file.write(data.encode() if isinstance(data, str) else data)
+            beside.settle()
+
+
+@contextmanager
+def writing(path: str | Path, what: str, *, rights: int | None = None) -> Iterator[FileBeside]:
+    """Yield a file in the making, which takes the place of another one if no error ends it; see `replace_file`."""
+    with explained(path, what):
+        target = target_of(path_of(path, what))
+        with closing(FileBeside(target, 0o666 if rights is None else rights)) as beside:
+            yield beside
+            beside.take_place(keeps_rights=rights is None)
 
 
 class FileBeside:
@@ -184,23 +188,6 @@ def _release(file: IO[bytes]) -> None:
         fcntl.flock(file, fcntl.LOCK_UN)
 
 
-@contextmanager
-def file_beside(path: str | Path, what: str) -> Iterator[Path]:
-    """Yield the path of a file for a library to write, which replaces another when it is complete.
-
-    Args:
-        path: The file that it replaces, as for `replace_file`; no pipe.
-        what: Its name in messages.
-    """
-    with writing(what, path):
-        target = target_of(path_of(path, what))
-        if target.exists() and not target.is_file():
-            raise OSError(None, "it is no file")
-        with closing(FileBeside(target)) as beside:
-            yield beside.path
-            beside.take_place()
-
-
 def check_writable(path: str | Path, what: str, *, is_new: bool = False) -> None:
     """Raise if a file could not be written; for use before a long computation whose result goes there.
 
@@ -213,7 +200,7 @@ def check_writable(path: str | Path, what: str, *, is_new: bool = False) -> None
     """
     if is_new and os.path.lexists(path):
         raise ParameterError(f"{what} must name a new file, but {str(path)!r} exists. Choose another name.")
-    with writing(what, path):
+    with explained(path, what):
         target = target_of(path_of(path, what))
         if not target.exists() or target.is_file():
             FileBeside(target, 0o600).close()
@@ -221,7 +208,7 @@ def check_writable(path: str | Path, what: str, *, is_new: bool = False) -> None
 
 def make_folder(path: str | Path, what: str) -> None:
     """Make a folder, if it is not there, in which files can be written."""
-    with writing(what, path, "folder"):
+    with explained(path, what, "folder"):
         path_of(path, what).mkdir(parents=True, exist_ok=True)
         FileBeside(Path(path, "file"), 0o600).close()
 
@@ -251,8 +238,8 @@ def _settle(folder: Path) -> None:
 
 
 @contextmanager
-def writing(what: str, path: str | Path, kind: str = "file") -> Iterator[None]:
-    """Tell of a file or folder that cannot be written."""
+def explained(path: str | Path, what: str, kind: str = "file") -> Iterator[None]:
+    """Say which file or folder cannot be written, and why."""
     try:
         yield
     except KiksError:  # one may be an OSError, too

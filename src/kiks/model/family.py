@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from kiks.errors import ParameterError, shown
+from kiks.model.checks import check_count, check_number
 from kiks.model.robot import SENSOR_COUNT, RobotSpec
 
 
@@ -37,12 +37,10 @@ def family(
         >>> len({robot.body.pulse_mm for robot in robots})
         3
     """
-    if not isinstance(count, int) or count < 1:
-        raise ParameterError(f"count must be a whole number from 1, but it was {shown(count)}.")
+    check_count("count", count, 1)
     shares = {"gain_spread": gain_spread, "wheel_spread": wheel_spread, "motor_spread": motor_spread}
     for name, share in (shares | {"dead_share": dead_share}).items():
-        if not (isinstance(share, int | float) and 0.0 <= share <= 0.9):
-            raise ParameterError(f"{name} must be a share from 0 to 0.9, but it was {shown(share)}.")
+        check_number(name, share, 0.0, 0.9)
     rng = np.random.default_rng(seed)
 
     def spread(share: float, values: tuple[float, ...]) -> tuple[float, ...]:

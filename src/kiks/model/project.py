@@ -9,10 +9,10 @@ from dataclasses import fields, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, Field, InstanceOf
 
 from kiks.errors import ArenaError, KiksError, ParameterError, nearest, shown
-from kiks.model.arena import AnArena, Arena
+from kiks.model.arena import Arena
 from kiks.model.arena_file import (
     Balls,
     Cylinders,
@@ -146,7 +146,7 @@ class Project:
         ('gripper',)
     """
 
-    arena: AnArena = Field(default_factory=Arena.default)
+    arena: InstanceOf[Arena] = Field(default_factory=Arena.default)
     robots: Robots = (ProjectRobot(),)
     seed: Seed = 0
     thinking: ThinkingPolicy = "none"

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from itertools import product
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from kiks.errors import ArenaError, ParameterError, shown
+from kiks.errors import ArenaError
+from kiks.model.checks import check_number
 
 PAD = 2
 """Wall cells that stand around the raster in `Arena.surface` and `Arena.clearance`: the world outside is wall.
@@ -35,7 +35,6 @@ FACE_UNITS = (1023.0, 1023.0, 256.0)
 FACE_BITS = (11, 11, 10)
 """Bits of each of them, from the highest on."""
 
-_NUMBER_MAX = 1e9
 _BLOCK_ROWS = 64
 _WAY_REACH, _FILL_REACH = 9.0, 3.5  # surroundings of a cell that tell which way its wall is, and how far [blocks]
 
@@ -48,11 +47,8 @@ def cells_per_pixel(row_count: int, column_count: int, mm_per_pixel: float) -> i
         column_count: Columns of the picture.
         mm_per_pixel: Edge of a pixel [mm].
     """
-    if not is_number(mm_per_pixel) or not MM_PER_PIXEL_MIN <= mm_per_pixel <= MM_PER_PIXEL_MAX:
-        raise ParameterError(
-            f"mm_per_pixel must be a number from {MM_PER_PIXEL_MIN:g} to {MM_PER_PIXEL_MAX:g}, but it was "
-            f"{shown(mm_per_pixel)}. Most arenas are drawn with 1 mm per pixel."
-        )
+    advice = "Most arenas are drawn with 1 mm per pixel."
+    check_number("mm_per_pixel", mm_per_pixel, MM_PER_PIXEL_MIN, MM_PER_PIXEL_MAX, advice)
     shape = f"{column_count} x {row_count} pixels of {mm_per_pixel:g} mm"
     # The tiny allowance is for products such as 1429 * 0.07 that fall a rounding error short.
     if min(row_count, column_count) * mm_per_pixel < SIZE_MIN_MM - 1e-9:
@@ -67,13 +63,6 @@ def cells_per_pixel(row_count: int, column_count: int, mm_per_pixel: float) -> i
             f"has {shape}, which makes {row_count * column_count * cells**2 / 1e6:.1f} million. Draw a smaller one."
         )
     return cells
-
-
-def is_number(value: Any) -> bool:
-    """Tell whether a value is a real number of a size that a coordinate may have; booleans and NaN are none."""
-    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
-        return False
-    return bool(-_NUMBER_MAX <= value <= _NUMBER_MAX)
 
 
 def clearance_mm(surface: npt.NDArray[np.uint8], mm_per_cell: float) -> npt.NDArray[np.float32]:

@@ -1,9 +1,14 @@
-"""What a robot is: every constant of its body, motors, sensors and firmware, read from a small TOML file."""
+"""What a robot is: every constant of its body, motors, sensors and firmware, read from a small TOML file.
+
+The file has a section for each part: a frozen record with choices and limits.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import asdict, field, fields
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -13,51 +18,246 @@ from kiks.errors import ParameterError, nearest, shown
 from kiks.model.arena_file import toml
 from kiks.model.atomic_files import path_of, replace_file
 from kiks.model.checks import ROBOTS_MAX, check_count
-from kiks.model.data_file import Text, check, parse_toml, read_file, record
-from kiks.model.robot_parts import (
-    AMBIENT_MODELS,
-    CURVE_POINT_LIMIT,
-    JITTER_POINT_LIMIT,
-    LAMP_POINT_LIMIT,
-    RESPONSES,
-    SENSOR_COUNT,
-    Ambient,
-    Baud,
-    Body,
-    Brightness,
-    Camera,
-    Curve,
-    FirmwareSpec,
-    Motor,
-    Proximity,
-    Quirks,
-    Reflection,
-    Reset,
-    Response,
-)
+from kiks.model.data_file import Number, OneOf, Switch, Text, Whole, check, parse_toml, read_file, record
 
-__all__ = [
-    "AMBIENT_MODELS",
-    "CURVE_POINT_LIMIT",
-    "JITTER_POINT_LIMIT",
-    "LAMP_POINT_LIMIT",
-    "RESPONSES",
-    "SENSOR_COUNT",
-    "Ambient",
-    "Baud",
-    "Body",
-    "Brightness",
-    "Camera",
-    "Curve",
-    "FirmwareSpec",
-    "Motor",
-    "Proximity",
-    "Quirks",
-    "Reflection",
-    "Reset",
-    "Response",
-    "RobotSpec",
-]
+SENSOR_COUNT = 8
+"""Infra-red sensors of a Khepera, clockwise from the left side (khepera-protocol.md 4.14)."""
+
+RESPONSES = ("reflection", "thesis", "fast", "curve")
+"""The responses (`kiks.engine.sensing.responses`)."""
+
+JITTER_POINT_LIMIT = 51
+"""Most points of the distribution of the jitter."""
+
+CURVE_POINT_LIMIT = 32
+"""Most points of a measured curve of counts against distance."""
+
+AMBIENT_MODELS = ("flux", "thesis")
+"""Models of several lamps: the sum of their light, or the thesis's formula for the strongest."""
+
+LAMP_POINT_LIMIT = 64
+"""Most points of the curve of light against distance."""
+
+STRIPE_LIMIT = 100
+"""Most stripes of either colour around a body."""
+
+Response = Annotated[str, OneOf(RESPONSES)]
+Angle = Annotated[Number, Field(ge=-360, le=360)]
+Counts = Annotated[Number, Field(ge=-1023, le=65535)]
+Share = Annotated[Number, Field(ge=0, le=1)]
+Brightness = Annotated[Whole, Field(ge=1, le=255, description="1 is black, 255 white.")]
+PulseMm = Annotated[Number, Field(ge=0.001, le=1)]
+DeadBandPwm = Annotated[Number, Field(ge=0, lt=255)]
+Baud = Annotated[Whole, Field(ge=75, le=4_000_000, description="A Khepera's usual is 9600.")]
+Gains = Annotated[tuple[Annotated[Whole, Field(ge=0, le=32767)], ...], Field(min_length=3, max_length=3)]
+_ONE_EACH = Field(min_length=SENSOR_COUNT, max_length=SENSOR_COUNT, description="One for each sensor.")
+
+
+@record
+class Body:
+    """Shape and contact. `slip_ratio_min` and `_max` bound a blocked wheel's speed, as a share of its command.
+
+    `brightness` is its brightness for other robots' sensors: 1 black to 255 white. With a `stripe_count` above 0 that
+    many black and as many white stripes stand around the body instead, the middle of a black one ahead.
+    """
+
+    diameter_mm: Annotated[Number, Field(ge=10, le=500)]
+    brightness: Brightness
+    wheel_base_mm: Annotated[Number, Field(gt=0, le=500)]
+    pulse_mm: PulseMm
+    wall_friction: Annotated[Number, Field(ge=0, le=2)]
+    slip_ratio_min: Share
+    slip_ratio_max: Share
+    stripe_count: Annotated[Whole, Field(ge=0, le=STRIPE_LIMIT)] = 0
+
+    def __post_init__(self) -> None:
+        # Wheels may stick out a little; calibration also tries unrealistic robots.
+        must(self.wheel_base_mm <= 2 * self.diameter_mm, self, "wheel_base_mm", "at most twice the diameter")
+        must(self.slip_ratio_min <= self.slip_ratio_max, self, "slip_ratio_min", "at most slip_ratio_max")
+
+    @property
+    def radius_mm(self) -> float:
+        """Half the diameter [mm]."""
+        return self.diameter_mm / 2
+
+    @property
+    def white_stripes_rad(self) -> tuple[tuple[float, float], ...]:
+        """Where each white stripe begins and ends, counter-clockwise from ahead [rad]; between them it is black."""
+        half = math.pi / max(2 * self.stripe_count, 1)
+        return tuple(((4 * k + 1) * half, (4 * k + 3) * half) for k in range(self.stripe_count))
+
+
+@record
+class Motor:
+    """Wheel speed against PWM: linear beyond a dead band, with a first-order lag."""
+
+    free_speed_pulses: Annotated[Number, Field(ge=1, le=1000)]
+    time_constant_ms: Annotated[Number, Field(ge=0.1, le=1000)]
+    dead_band_pwm: DeadBandPwm
+    left_gain: Annotated[Number, Field(ge=0.5, le=1.5)]
+    right_gain: Annotated[Number, Field(ge=0.5, le=1.5)]
+    gain_scale: Annotated[Whole, Field(ge=1, le=1 << 20)]
+
+
+@record
+class Reset:
+    """Settings of the controllers after a reset: gains (Kp, Ki, Kd) and the speed profile."""
+
+    speed_gains: Gains
+    position_gains: Gains
+    profile_speed_pulses: Annotated[Whole, Field(ge=1, le=127)]
+    profile_acceleration: Annotated[Whole, Field(ge=1, le=255)]
+
+
+@record
+class Proximity:
+    """Places and directions of the eight infra-red sensors [deg, left positive], and their response [counts].
+
+    `response` is one of `RESPONSES`. With noise a reading r becomes r (1 + e u^n) or, as often, r (1 - d e u^n), with
+    e from `noise_small` at 0 to `noise_large` at 1000 counts, the exponent n, `noise_down` d and u from 0 to 1.
+    `jitter_counts` are added to any reading: the distribution of a sensor's readings around its baseline with nothing
+    near, from the smallest to the largest value in equally probable steps.
+    """
+
+    response: Response
+    mount_angle_deg: Annotated[tuple[Angle, ...], _ONE_EACH]
+    mount_radius_mm: Annotated[tuple[Annotated[Number, Field(gt=0, le=250)], ...], _ONE_EACH]
+    direction_deg: Annotated[tuple[Angle, ...], _ONE_EACH]
+    field_of_view_deg: Annotated[Number, Field(gt=0, le=180)]
+    range_mm: Annotated[Number, Field(ge=1, le=1000)]
+    gain: Annotated[tuple[Annotated[Number, Field(ge=0, le=20)], ...], _ONE_EACH]
+    baseline_counts: Annotated[tuple[Counts, ...], _ONE_EACH]
+    maximum_counts: Annotated[Whole, Field(ge=1, le=65535)]
+    step_counts: Annotated[Whole, Field(ge=1, le=65535)]
+    noise_small: Annotated[Number, Field(ge=0, lt=1)]
+    noise_large: Annotated[Number, Field(ge=0, lt=1)]
+    noise_exponent: Annotated[Whole, Field(ge=1, le=20)]
+    noise_down: Share
+    jitter_counts: Annotated[tuple[Counts, ...], Field(min_length=1, max_length=JITTER_POINT_LIMIT)]
+
+    def __post_init__(self) -> None:
+        is_gain = all(gain == 0 or gain >= 0.05 for gain in self.gain)
+        must(is_gain, self, "gain", "between 0.05 and 20, or 0 for a dead sensor")
+        must(self.step_counts <= self.maximum_counts, self, "step_counts", "at most maximum_counts")
+        must(self.noise_large <= self.noise_small, self, "noise_large", "at most noise_small")
+        must(rises(self.jitter_counts), self, "jitter_counts", "a list in which none is below the one before")
+
+
+@record
+class Curve:
+    """Constants of the response 'curve': counts above the baseline of a sensor that looks straight at a white wall.
+
+    `distance_mm` rises, `counts` fall; `ray_weight` says how much a ray counts, from the middle one to the edge.
+    All counts are multiplied by `scale`.
+    """
+
+    distance_mm: Annotated[
+        tuple[Annotated[Number, Field(ge=1, le=10_000)], ...], Field(min_length=2, max_length=CURVE_POINT_LIMIT)
+    ]
+    counts: Annotated[
+        tuple[Annotated[Number, Field(gt=0, le=65535)], ...], Field(min_length=2, max_length=CURVE_POINT_LIMIT)
+    ]
+    ray_weight: Annotated[tuple[Share, ...], Field(min_length=4, max_length=4)]
+    scale: Annotated[Number, Field(ge=0.05, le=20)]
+
+    def __post_init__(self) -> None:
+        must(all(near < far for near, far in pairwise(self.distance_mm)), self, "distance_mm", "a list that rises")
+        falls = rises(self.counts[::-1]) and len(self.counts) == len(self.distance_mm)
+        must(falls, self, "counts", "one for each distance, falling")
+        must(self.ray_weight[0] > 0, self, "ray_weight", "a list whose first number is above 0")
+
+
+@record
+class Reflection:
+    """Constants of the response 'reflection': from the light that a sensor gets back to its count.
+
+    A ray of the length t that meets a surface with the reflectance b at the angle of incidence i brings the light
+    b w (cos(i) / (t + behind))^3, where w falls with the angle off the sensor's axis as a Gaussian of `lobe_deg` does.
+    `light` is that of the middle ray for a white surface, square to it, at 20 mm. Their sum L gives the share
+    (1 + threshold) L - threshold of the largest count, which is rounded at both ends: at the lower one over
+    `faint` and at the upper one over `bright`, shares too, to either side.
+    """
+
+    behind_mm: Annotated[Number, Field(ge=0.1, le=1000)]
+    light: Annotated[tuple[Annotated[Number, Field(ge=1e-3, le=1e3)], ...], _ONE_EACH]
+    threshold: Annotated[tuple[Annotated[Number, Field(ge=0, le=10)], ...], _ONE_EACH]
+    lobe_deg: Annotated[tuple[Annotated[Number, Field(ge=1, le=180)], ...], _ONE_EACH]
+    faint: Annotated[Number, Field(ge=1e-3, le=1)]
+    bright: Annotated[Number, Field(ge=1e-3, le=1)]
+
+
+@record
+class Ambient:
+    """How the sensors answer to light.
+
+    `direction_deg` is where each receives light from, left positive: not quite where reflections come from best, which
+    the sensor's own lamp has to reach as well. `lamp_counts` is what a sensor reads that looks straight at a lamp of
+    1 W from 0, 1, 2, ... steps of `lamp_step_mm`; `background_counts` what it reads of the room's daylight alone, which
+    in the dark is `dark_counts`.
+    """
+
+    model: Annotated[str, OneOf(AMBIENT_MODELS)]
+    direction_deg: Annotated[tuple[Angle, ...], _ONE_EACH]
+    dark_counts: Annotated[Number, Field(ge=0, le=1023)]
+    noise_counts: Annotated[Number, Field(ge=0, le=1023)]
+    background_counts: Annotated[Number, Field(ge=0, le=1023)]
+    angle_exponent: Annotated[Number, Field(gt=0, le=20)]
+    lamp_step_mm: Annotated[Number, Field(ge=0.1, le=1000)]
+    lamp_counts: Annotated[
+        tuple[Annotated[Number, Field(ge=0, le=1023)], ...], Field(min_length=2, max_length=LAMP_POINT_LIMIT)
+    ]
+
+    def __post_init__(self) -> None:
+        counts = self.lamp_counts
+        must(rises(counts) and counts[-1] <= self.dark_counts, self, "lamp_counts", "a list that rises to dark_counts")
+        is_between = counts[0] < self.background_counts <= self.dark_counts
+        must(is_between, self, "background_counts", "above lamp_counts, up to dark_counts")
+
+
+@record
+class Camera:
+    """How the linear camera K213 takes its pictures, where a robot carries one.
+
+    `noise_share` is the share of each pixel that is random. With `adapts_exposure` the brightest pixel becomes white;
+    without, the shutter is fixed, and a dark scene gives a dark picture.
+    """
+
+    noise_share: Share = 0.1
+    adapts_exposure: Switch = True
+
+
+@record
+class FirmwareSpec:
+    """Versions of the robot's firmware, and its processing time per command."""
+
+    banner: Text
+    bios_version: Text
+    protocol_version: Text
+    processing_ms: Annotated[Number, Field(ge=0, le=1000)]
+    baud: Baud
+    has_user_flash: Switch
+
+
+@record
+class Quirks:
+    """Deviations that some clients need (khepera-protocol.md 3.4 and 11.3). All off is the documented robot."""
+
+    answer_empty_lines: Switch = False
+    accept_lower_case: Switch = False
+    unknown_command_with_z: Switch = False
+    d_reply_trailing_comma: Switch = False
+
+
+def must(holds: bool, part: object, key: str, rule: str) -> None:
+    """Raise a ParameterError that names the section of a robot's file if a rule between fields is broken."""
+    if not holds:
+        section = type(part).__name__.removesuffix("Spec").lower()
+        raise ParameterError(f"{section}.{key} must be {rule}, but it was {shown(getattr(part, key))}.")
+
+
+def rises(values: tuple[float, ...]) -> bool:
+    """Return whether no value is below the one before it."""
+    return all(low <= high for low, high in pairwise(values))
 
 
 @record
@@ -105,7 +305,7 @@ class RobotSpec:
                 "Copy a "
                 "robot of ours to begin with one of your own."
             )
-        spec = check(RobotSpec, parse_toml(data, what), what, advice=_ADVICE)
+        spec = _checked(parse_toml(data, what), what)
         return spec if response is None else spec.with_changes(proximity__response=response)
 
     def __post_init__(self) -> None:
@@ -162,7 +362,7 @@ class RobotSpec:
                     f"Sections: {sections}."
                 )
             table[section][key] = value
-        return check(RobotSpec, table, self.name, advice=_ADVICE)
+        return _checked(table, self.name)
 
 
 _FOLDER = Path(__file__).with_name("robots")
@@ -174,7 +374,11 @@ def robot_names() -> list[str]:
     return list(_NAMES)
 
 
-_ADVICE = "Compare it with 'khepera.toml'."
+def _checked(table: dict[str, Any], what: str) -> RobotSpec:
+    """Return the robot of a file's table; messages name the file of ours that is most like it."""
+    name = str(table.get("name")).lower().replace(" ", "_")
+    like = max((known for known in _NAMES if name.startswith(known)), key=len, default="khepera")
+    return check(RobotSpec, table, what, advice=f"Compare it with '{like}.toml'.")
 
 
 def specs_of(

@@ -16,7 +16,7 @@ from pydantic import Field
 
 from kiks.model.atomic_files import replace_file
 from kiks.model.data_file import Number, check, parse_json, read_file, record
-from kiks.model.robot_parts import SENSOR_COUNT, Angle
+from kiks.model.robot import SENSOR_COUNT, Angle
 
 INPUT_COUNT, TANH_COUNT, LINEAR_COUNT = 7, 13, 7
 """Rays, neurons of the first and of the second hidden layer (thesis 3.3)."""

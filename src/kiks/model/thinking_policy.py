@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+from contextlib import suppress
 
 from kiks.errors import ParameterError, nearest, shown
 
@@ -31,12 +31,7 @@ def split_thinking(text: str) -> tuple[str, float | str]:
 
 
 def _number(text: str, value: str, meaning: str, most: float) -> float:
-    try:
-        number = float(value)
-    except ValueError:
-        number = math.nan
-    if not 0 <= number <= most:
-        raise ParameterError(
-            f"thinking must give {meaning} from 0 to {most:g} after the colon, but it was {shown(text)}."
-        )
-    return number
+    with suppress(ValueError):
+        if 0 <= (number := float(value)) <= most:
+            return number
+    raise ParameterError(f"thinking must give {meaning} from 0 to {most:g} after the colon, but it was {shown(text)}.")

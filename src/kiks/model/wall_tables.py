@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -32,30 +33,27 @@ class WallTables:
     @cached_property
     def surface(self) -> npt.NDArray[np.uint8]:
         """See `Arena.surface`."""
-        surface = np.pad(self._brightness, PAD, constant_values=255)
-        surface.setflags(write=False)
-        return surface
+        return _read_only(np.pad(self._brightness, PAD, constant_values=255))
 
     @cached_property
     def clearance(self) -> npt.NDArray[np.float32]:
         """See `Arena.clearance`."""
-        clearance = clearance_mm(self.surface, self._mm_per_cell)
-        clearance.setflags(write=False)
-        return clearance
+        return _read_only(clearance_mm(self.surface, self._mm_per_cell))
 
     @cached_property
     def leaps(self) -> npt.NDArray[np.int16]:
         """See `Arena.leaps`."""
-        leaps = free_leaps(self.surface)
-        leaps.setflags(write=False)
-        return leaps
+        return _read_only(free_leaps(self.surface))
 
     @cached_property
     def faces(self) -> npt.NDArray[np.int32]:
         """See `Arena.faces`."""
-        faces = wall_faces(self.surface, self.clearance, self._mm_per_cell)
-        faces.setflags(write=False)
-        return faces
+        return _read_only(wall_faces(self.surface, self.clearance, self._mm_per_cell))
+
+
+def _read_only(table: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    table.setflags(write=False)
+    return table
 
 
 def tables_of(brightness: npt.NDArray[np.uint8], mm_per_cell: float) -> WallTables:

@@ -25,7 +25,7 @@ from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 
 from kiks.errors import ParameterError
-from kiks.model.atomic_files import FileBeside, ending_of, path_of, target_of, writing
+from kiks.model.atomic_files import FileBeside, ending_of, explained, path_of, target_of
 from kiks.model.limits import RECORD_BYTES_MAX
 from kiks.version import __version__
 
@@ -90,7 +90,7 @@ class McapFile:
     def __init__(self, path: str | Path) -> None:
         ending_of(path, "a recording's file", (ENDING,))
         self._path = path
-        with writing("a recording", path):
+        with explained(path, "a recording"):
             target = target_of(path)
             self._folder = target.parent
             if (room := room_of(self._folder)).is_too_small:
@@ -160,7 +160,7 @@ class McapFile:
         """Write the index, and close the file; it goes if it never took its place."""
         self._do(self._writer.finish)
         self._do(self._beside.file.flush)
-        with writing("a recording", self._path):
+        with explained(self._path, "a recording"):
             self._beside.close()
 
 

@@ -13,8 +13,7 @@ from pydantic import BeforeValidator, Field
 
 from kiks.engine.parameters import LIGHT_MM
 from kiks.model.data_file import Number, Rule, Switch, Whole, record
-from kiks.model.robot import SENSOR_COUNT, RobotSpec
-from kiks.model.robot_parts import STRIPE_LIMIT, DeadBandPwm, PulseMm
+from kiks.model.robot import SENSOR_COUNT, STRIPE_LIMIT, DeadBandPwm, PulseMm, RobotSpec
 
 RANGE_MM = 50.0
 """Range of the Khepera's proximity sensors [mm]."""

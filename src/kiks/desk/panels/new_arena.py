@@ -10,7 +10,6 @@ from kiks.desk.panels.widgets import named
 from kiks.errors import KiksError
 from kiks.model.arena import Arena
 from kiks.model.materials import REFLECTANCES
-from kiks.model.raster import is_number
 
 
 async def ask_for_box() -> Arena | None:
@@ -56,7 +55,7 @@ def _number(label: str, value: int, name: str, low: int, high: int) -> Callable[
     """Build a field for a whole number and return its getter, which returns -1 for an empty field."""
     field = ui.number(label, value=value, min=low, max=high, precision=0).classes("w-full")
     named(field, name).props("dense")
-    return lambda: int(field.value) if is_number(field.value) else -1
+    return lambda: -1 if field.value is None else int(field.value)
 
 
 def _finish(dialog: ui.dialog, make: Callable[[], Arena]) -> None:
