@@ -39,7 +39,7 @@ HASHES = {
     "pictures": "1750069ddd58deac",
     "race": "6df4fa018b9068cf",
     "square": "61c1edeb8a13691d",
-    "swarm": "8c51e3343f5b7f2b",
+    "swarm": "f5e3b017e62f2180",
     "to_the_light": "ea8aafe8c90f2016",
 }
 
