@@ -23,7 +23,7 @@ from kiks import upwards
 
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)  # the names of __init__.pyi
 
-upwards.load_arena_file.provide("kiks.model.arena_formats", "load_arena_file")
+upwards.load_arena_file.provide("kiks.model.project", "load_arena_file")
 upwards.draw_for_notebook.provide("kiks.export.notebook", "for_notebook")
 upwards.record_simulation.provide("kiks.recording.recorder", "RunRecorder")
 upwards.plot_simulation.provide("kiks.export.figures", "figure_of_run")

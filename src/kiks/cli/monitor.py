@@ -16,7 +16,7 @@ import typer
 from kiks.cli.engine_start import ready_engine
 from kiks.cli.outputs import output
 from kiks.ending import end_as_with_ctrl_c
-from kiks.model.atomic_files import writing
+from kiks.model.atomic_files import explained
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -160,7 +160,7 @@ def _log(path: Path | None) -> Iterator[Callable[[str], object]]:
     if path is None:
         yield lambda line: None
         return
-    with writing("the log", path), open(path, "x", encoding="utf-8", buffering=1) as file:
+    with explained(path, "the log"), open(path, "x", encoding="utf-8", buffering=1) as file:
         print(",".join(COLUMNS), file=file)
         yield lambda line: print(line, file=file)
 

@@ -9,7 +9,6 @@ No function changes the world. The caller holds the simulation's lock.
 
 from __future__ import annotations
 
-import io
 import math
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -23,7 +22,8 @@ from kiks.export.looks import body_colour, robot_hue, robot_shapes
 from kiks.firmware.gripper import Gripper
 from kiks.firmware.k213 import K213
 from kiks.firmware.turret import Shape
-from kiks.model.arena import PAD, Arena
+from kiks.model.arena import Arena
+from kiks.model.picture import encode_picture
 from kiks.model.robot import SENSOR_COUNT
 from kiks.sim.simulation import Simulation
 
@@ -255,9 +255,4 @@ def _shape(shape: Shape) -> dict[str, Any]:
 
 def arena_picture(arena: Arena) -> bytes:
     """Return the walls of an arena as a PNG with one pixel per cell, its grey the brightness; 0 is floor."""
-    from PIL import Image
-
-    with io.BytesIO() as file:
-        # Large uniform areas compress well even at a low level.
-        Image.fromarray(np.flipud(arena.surface[PAD:-PAD, PAD:-PAD])).save(file, "PNG", compress_level=3)
-        return file.getvalue()
+    return encode_picture(arena.brightness, compress_level=3)  # large uniform areas compress well even so

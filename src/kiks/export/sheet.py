@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from kiks.engine.state import BALL
 from kiks.export.looks import Colour, body_colour, robot_colour, robot_shapes
-from kiks.model.arena import PAD, Arena
+from kiks.model.arena import Arena
 from kiks.model.robot import Body
 
 if TYPE_CHECKING:
@@ -71,7 +71,7 @@ def wall_picture(arena: Arena, size: tuple[int, int]) -> Image:
     """Return a picture of the floor and the walls of an arena, of a size in pixels."""
     from PIL import Image
 
-    cells = np.flipud(arena.surface[PAD:-PAD, PAD:-PAD])
+    cells = np.flipud(arena.brightness)
     shade = wall_grey(cells.astype(np.uint16)).astype(np.uint8)
     colours = np.where((cells == 0)[..., None], np.array(FLOOR, np.uint8), shade[..., None])
     return Image.fromarray(colours.astype(np.uint8), "RGB").resize(size, Image.Resampling.LANCZOS)

@@ -6,11 +6,9 @@ import json
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import replace
-from io import BytesIO
 from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
 from pydantic import Field
 
 from kiks.errors import ArenaError, KiksError, ParameterError
@@ -19,7 +17,7 @@ from kiks.model.arena_objects import THINGS_MAX, Ball, Brightness, Cylinder, Fri
 from kiks.model.atomic_files import path_of, replace_files, within
 from kiks.model.box import PartMm, SideMm
 from kiks.model.data_file import Coordinate, Number, Point, Rule, Switch, Text, check, parse_toml, read_file, record
-from kiks.model.picture import read_picture
+from kiks.model.picture import encode_picture, read_picture
 from kiks.model.raster import MM_PER_PIXEL_MAX, MM_PER_PIXEL_MIN
 
 Pitch = Annotated[
@@ -189,24 +187,13 @@ def save_arena(arena: Arena, path: str | Path) -> None:
         arena: The arena.
         path: The TOML file.
     """
-    from PIL import Image
-
     path = path_of(path)
     if path.suffix.lower() != ".toml":
         raise ParameterError(f"path must end in '.toml', but it was {str(path)!r}. The picture goes beside it as .png.")
-    picture, pixels = path.with_suffix(".png"), BytesIO()
-    Image.fromarray(np.flipud(arena.brightness)).save(pixels, "PNG")
-    replace_files({picture: pixels.getvalue(), path: _toml_of(arena, picture.name)}, "an arena")
-
-
-def _toml_of(arena: Arena, picture: str) -> str:
-    lines = [
-        f"picture = {quoted(picture)}",
-        f"mm_per_pixel = {arena.mm_per_cell!r}",
-        f"name = {quoted(arena.name)}",
-        *place_lines(arena),
-    ]
-    return "\n".join(lines) + "\n"
+    picture = path.with_suffix(".png")
+    keys = {"picture": picture.name, "mm_per_pixel": arena.mm_per_cell, "name": arena.name}
+    lines = [*(f"{name} = {toml(value)}" for name, value in keys.items()), *place_lines(arena)]
+    replace_files({picture: encode_picture(arena.brightness), path: "\n".join(lines) + "\n"}, "an arena")
 
 
 def place_lines(arena: Arena) -> list[str]:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
 from pydantic import BeforeValidator, Field
 
-from kiks.errors import ParameterError
+from kiks.errors import KiksError, ParameterError
 from kiks.model.arena_objects import Brightness
 from kiks.model.data_file import Whole, record
 from kiks.model.raster import SIZE_MIN_MM, cells_per_pixel
@@ -58,3 +59,21 @@ class Box:
         for corner in (floor, floor[::-1], floor[:, ::-1], floor[::-1, ::-1]):
             corner[:radius, :radius][outside_circle] = self.brightness
         return raster
+
+    @classmethod
+    def of_raster(cls, raster: npt.NDArray[np.uint8]) -> Box | None:
+        """Return the box that has the very raster at 1 mm per cell, None if there is none."""
+        height, width = raster.shape
+        greys = raster[raster > 0]
+        grey = int(greys[0]) if len(greys) else 255
+        wall = int(np.argmax(raster[:, width // 2] == 0))
+        corner = int(np.argmax(raster[wall, wall:] == 0))
+        for rounded in range(corner, min(width, height) // 2 - wall + 1):
+            # The number of cells of the first row that are outside a circle of that radius.
+            from_centre = rounded - np.arange(min(corner + 1, rounded)) - 0.5
+            if np.count_nonzero(from_centre**2 + (rounded - 0.5) ** 2 > rounded**2) == corner:
+                with suppress(KiksError):
+                    box = cls(width, height, wall, rounded, grey)
+                    if np.array_equal(box.raster(), raster):
+                        return box
+        return None

@@ -79,6 +79,15 @@ def decode_picture(data: bytes, mm_per_pixel: float, what: str = "The picture") 
             raise ArenaError(f"{what} must be complete and readable, but: {one_line(error)}. {_SAVE_AGAIN}") from None
 
 
+def encode_picture(brightness: npt.NDArray[np.uint8], *, compress_level: int = 6) -> bytes:
+    """Return the PNG of a raster, uint8 [row, column] with row 0 at the bottom."""
+    from PIL import Image
+
+    file = BytesIO()
+    Image.fromarray(np.flipud(brightness)).save(file, "PNG", compress_level=compress_level)
+    return file.getvalue()
+
+
 def _check_type(image: Image.Image) -> None:
     kind = f"of type {image.format}"
     is_lossy = image.format in _LOSSY_TYPES

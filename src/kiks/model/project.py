@@ -5,6 +5,8 @@ The file is an arena file with its raster within, the robots, and the settings o
 
 from __future__ import annotations
 
+from base64 import b64decode, b64encode
+from collections.abc import Callable
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Annotated, Literal
@@ -20,12 +22,14 @@ from kiks.model.arena_file import (
     Pitch,
     Starts,
     Walls,
+    load_arena,
     place_lines,
     places_of,
     toml,
 )
 from kiks.model.arena_objects import THINGS_MAX
 from kiks.model.atomic_files import check_relative, ending_of, path_of, replace_file
+from kiks.model.box import Box
 from kiks.model.checks import ROBOTS_MAX, SECONDS_MAX
 from kiks.model.data_file import (
     Number,
@@ -40,8 +44,9 @@ from kiks.model.data_file import (
     read_file,
     record,
 )
+from kiks.model.kad import load_kad
 from kiks.model.limits import PROJECT_FILE_BYTES_MAX
-from kiks.model.raster_text import box_keys_of, raster_of_text, raster_text
+from kiks.model.picture import decode_picture, encode_picture
 from kiks.model.robot import Baud, Brightness, Response, robot_names
 from kiks.model.thinking_policy import split_thinking
 from kiks.model.turrets import TURRETS
@@ -50,6 +55,7 @@ FASTEST = "fastest"
 """Value in a file for no speed limit."""
 
 _VERSION = 1
+_LINE = 116
 _SETTINGS = ("seed", "thinking", "baud", "response", "noise", "speed", "seconds", "supervisor")
 
 
@@ -234,10 +240,14 @@ class Project:
             lines += [f"{name} = {toml(value)}" for name, value in values if value not in (None, "", (), {})]
         lines += place_lines(self.arena)
         lines += ["", "[walls]"]
-        if (box := box_keys_of(self.arena)) is not None:
-            lines += [f"{name} = {toml(value)}" for name, value in box.items()]
+        raster, mm_per_cell = self.arena.brightness, self.arena.mm_per_cell
+        if mm_per_cell == 1.0 and (box := Box.of_raster(raster)) is not None:
+            lines.append(f"size_mm = [{box.width_mm}, {box.height_mm}]")
+            lines += [f"{name} = {getattr(box, name)}" for name in ("wall_mm", "rounded_mm", "brightness")]
         else:
-            lines += [f"mm_per_cell = {self.arena.mm_per_cell!r}", f"png = '''\n{raster_text(self.arena)}'''"]
+            text = b64encode(encode_picture(raster)).decode()
+            rows = "\n".join(text[start : start + _LINE] for start in range(0, len(text), _LINE))
+            lines += [f"mm_per_cell = {mm_per_cell!r}", f"png = '''\n{rows}\n'''"]
         return ("\n".join(lines) + "\n").encode("utf-8", errors="replace")
 
 
@@ -256,7 +266,14 @@ class ProjectWalls(Walls):
 
     def arena(self) -> Arena:
         """Return the walls as an arena."""
-        return self.box() if self.png is None else raster_of_text(self.png, self.mm_per_cell or 1.0)
+        if self.png is None:
+            return self.box()
+        try:
+            data = b64decode("".join(self.png.split()), validate=True)
+        except ValueError as error:
+            raise ArenaError(f"png must be a PNG file in base64, but: {error}. Save the project again.") from None
+        mm_per_cell = self.mm_per_cell or 1.0
+        return Arena.from_array(decode_picture(data, mm_per_cell, "png"), mm_per_pixel=mm_per_cell)
 
 
 @record
@@ -279,3 +296,15 @@ class ProjectFile:
     ball: Balls = ()
     cylinder: Cylinders = ()
     walls: ProjectWalls = ProjectWalls()
+
+
+_READERS: dict[str, Callable[[Path], Arena]] = {
+    ".toml": load_arena,
+    ".kiks": lambda path: Project.load(path).arena,
+    ".kad": load_kad,
+}
+
+
+def load_arena_file(path: Path) -> Arena:
+    """Read an arena file, a project's arena, a `.kad` file of the Matlab KiKS, or a picture of 1 mm cells."""
+    return _READERS.get(path.suffix.lower(), Arena.from_image)(path)
