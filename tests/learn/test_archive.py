@@ -6,10 +6,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pyarrow
 import pytest
-from pyarrow import parquet
-from tests.at_length import cases, share
+from tests.at_length import cases
 from tests.learn.small import small
 from typer.testing import CliRunner
 
@@ -158,65 +156,20 @@ def test_an_archive_equals_the_one_loaded_from_its_folder(tmp_path: Path) -> Non
     assert (champion.algorithm, champion.seed, champion.timing) == ("map-elites", 3, evolution.task.timing)
 
 
-@pytest.mark.parametrize("data", [b"", b"nothing", b"PAR1" * 50, b"\xff" * 1000])
-def test_files_that_are_no_parquet_are_errors(data: bytes, tmp_path: Path) -> None:
-    run("map-elites", folder=tmp_path)
-    whole = (tmp_path / "archive.parquet").read_bytes()
-    for broken in (data, whole[: len(whole) // 2] + data, whole[:-100] + data):
-        (tmp_path / "archive.parquet").write_bytes(broken)
-        with pytest.raises(ParameterError, match=r"^Archive '.*archive.parquet'") as caught:
-            kiks.Archive.load(tmp_path)
-        assert len(str(caught.value).replace(str(tmp_path), "")) < 400
-
-
-def test_foreign_and_wrong_archives_are_errors(tmp_path: Path) -> None:
-    run("map-elites", folder=tmp_path)
-    file = tmp_path / "archive.parquet"
-    good = parquet.read_table(file)
-    head = good.schema.metadata[b"kiks archive"]
-
-    def changed(name: str, column: Any) -> Any:
-        return good.set_column(good.schema.names.index(name), name, [column])
-
-    rows, unnamed = len(good), head.replace(b'"path_mm"', b'"path"', 1)
-    wrong: list[tuple[Any, dict[str, Any], str]] = [
-        (good.replace_schema_metadata(None), {}, "is another Parquet file"),
-        (good.replace_schema_metadata({b"kiks archive": b"{"}), {}, "its head must be JSON"),
-        (good.replace_schema_metadata({b"kiks archive": b"{}"}), {}, "axes must be given"),
-        (good.replace_schema_metadata({b"kiks archive": unnamed}), {}, "must name one"),
-        (good.replace_schema_metadata({b"kiks archive": head.replace(b"20", b"0", 1)}), {}, "cells must be"),
-        (good.drop_columns(["parameter_3"]), {}, "'parameter_3' is missing"),
-        (good.drop_columns(["contacts"]), {}, "'contacts' is missing"),
-        (changed("fitness", pyarrow.array([float("nan")] * rows)), {}, "fitness must be finite numbers"),
-        (changed("fitness", pyarrow.array(["x"] * rows)), {}, "fitness must be finite numbers"),
-        (changed("parameter_1", pyarrow.array([None] * rows, pyarrow.float64())), {}, "parameter_1 must be finite"),
-        (changed("generation", pyarrow.array([-1] * rows)), {}, "generation must be whole numbers from 0"),
-        (pyarrow.concat_tables([good[:1]] * 10_000), {"compression": "gzip"}, "must hold its numbers as they are"),
-    ]
-    for table, options, message in wrong:
-        parquet.write_table(table, file, **{"compression": "none"} | options)
-        with pytest.raises(ParameterError, match=message):
-            kiks.Archive.load(tmp_path)
-    file.unlink()
-    with pytest.raises(ParameterError, match="must exist"):
+def test_folders_without_an_archive_are_errors(tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match="must be the folder of an evolution"):
+        kiks.Archive.load(tmp_path)
+    run("cma", folder=tmp_path, axes=())
+    with pytest.raises(ParameterError, match="for an archive, but it has 0 axes"):
         kiks.Archive.load(tmp_path)
 
 
-def test_damaged_footers_are_errors_of_one_line(tmp_path: Path) -> None:
-    """Such a footer makes pyarrow's own view of a column end the process."""
-    run("map-elites", 1, tmp_path)
-    file = tmp_path / "archive.parquet"
-    whole = file.read_bytes()
-    end = len(whole) - 8
-    messages = []
-    for place in range(end - int.from_bytes(whole[end : end + 4], "little"), end, share(50, 5)):
-        file.write_bytes(whole[:place] + bytes([whole[place] ^ 1]) + whole[place + 1 :])
-        try:
-            kiks.Archive.load(tmp_path)
-        except ParameterError as error:
-            messages.append(str(error))
-    assert len(messages) > share(10, 100)
-    assert all(map(str.isprintable, messages))
+def test_generations_with_fitness_alone_are_not_in_the_archive(tmp_path: Path) -> None:
+    evolution = kiks.Evolution(small(), "cma", population=8, folder=tmp_path)
+    evolution.tell(np.zeros(len(evolution.ask())))
+    told(evolution, 1, generations=2)
+    evolution.save_log()
+    assert kiks.Archive.load(tmp_path).elites == archive_of(evolution).elites != ()
 
 
 def test_too_many_cells_are_an_error() -> None:

@@ -12,7 +12,7 @@ from tests.at_length import cases
 
 import kiks
 from kiks import ParameterError
-from kiks.learn.evolution import TRIALS
+from kiks.learn.evolution_log import TRIALS
 from kiks.learn.individual import individual_of
 from kiks.model.arena_file import save_arena
 from kiks.model.family import family
@@ -69,17 +69,17 @@ def test_a_demonstration_is_the_world_of_the_evaluation(
     task = TASKS[name]()
     evolution = evolved(task, tmp_path)
     log = parquet.read_table(tmp_path / "log.parquet").to_pydict()
-    found = individual_of(tmp_path, 2, rank=3, task=task)
+    found, candidate = individual_of(tmp_path, 2, rank=3, task=task)
     rows = [row for row, number in enumerate(log["generation"]) if number == 2]
-    row = rows[found.candidate]
+    row = rows[candidate]
     assert found.fitness == log["fitness"][row] == sorted(evolution.generations[1].fitness)[-3]
-    expected = hashes(task, found.champion.parameters, log["seed"][row], monkeypatch)
+    expected = hashes(task, found.parameters, log["seed"][row], monkeypatch)
     found_hashes = []
     for world in range(task.worlds):
-        champion = individual_of(tmp_path, 2, rank=3, world=world, task=task).champion
+        champion, _ = individual_of(tmp_path, 2, rank=3, world=world, task=task)
         sim, ports = champion.simulation()
         driver = champion.driver(ports)
-        while driver.begin_ns < ns_from_s(found.seconds):
+        while driver.begin_ns < ns_from_s(champion.world.seconds):
             driver.step()
         found_hashes.append(sim.state_hash())
     if len(task.timings) == 1:
@@ -95,8 +95,8 @@ def test_generations_need_no_rival_on_trial(tmp_path: Path) -> None:
         evolution.tell(np.zeros((len(evolution.ask()), len(task.value_names))))
     assert [len(each.candidates) - 6 for each in evolution.generations] == [0, TRIALS, 0, 0]
     for number, generation in enumerate(evolution.generations, 1):
-        found = individual_of(tmp_path, number, rank=2, task=task)
-        assert found.champion.parameters == tuple(generation.candidates[1])
+        found, _ = individual_of(tmp_path, number, rank=2, task=task)
+        assert found.parameters == tuple(generation.candidates[1])
     np.savez(tmp_path / "generations/000002.npz", candidates=np.zeros((9, 18)), values=np.zeros((9, 1)), seconds=1.0)
     with pytest.raises(ParameterError, match="candidates must be 6 or 14, but their number was 9"):
         individual_of(tmp_path, 2, task=task)
@@ -106,9 +106,9 @@ def test_the_task_is_found_again(tmp_path: Path) -> None:
     save_arena(kiks.Arena.box(400, 300), tmp_path / "room.toml")
     (tmp_path / "mine.toml").write_text('task = 1\nbase = "avoid"\nseconds = 1\nworlds = 1\narenas = ["room.toml"]\n')
     evolved(kiks.tasks.load(tmp_path / "mine.toml"), tmp_path / "out")
-    assert individual_of(tmp_path / "out", 1).seconds == 1.0
+    assert individual_of(tmp_path / "out", 1)[0].world.seconds == 1.0
     evolved(kiks.tasks.maze(controller=kiks.controllers.gru()), tmp_path / "gru")
-    assert individual_of(tmp_path / "gru", 3).champion.controller is kiks.controllers.gru()
+    assert individual_of(tmp_path / "gru", 3)[0].controller is kiks.controllers.gru()
 
 
 def test_a_task_that_cannot_be_found_is_an_error(tmp_path: Path) -> None:
@@ -123,7 +123,7 @@ def test_a_task_that_cannot_be_found_is_an_error(tmp_path: Path) -> None:
     evolved(kiks.tasks.load(file), tmp_path / "file")
     with pytest.raises(ParameterError, match=r"quick.py' is a Python file. Give it: --task FILE"):
         individual_of(tmp_path / "file", 1)
-    assert individual_of(tmp_path / "file", 1, task=kiks.tasks.load(file)).seconds == 1.0
+    assert individual_of(tmp_path / "file", 1, task=kiks.tasks.load(file))[0].task == "avoid"
     (tmp_path / "nothing").mkdir()
     with pytest.raises(ParameterError, match="nothing' must be the folder of an evolution"):
         individual_of(tmp_path / "nothing", 1)

@@ -57,7 +57,7 @@ RESULTS = [
 def put(result: Result, folder: Path, generations: int = 3) -> None:
     """Write a folder that looks like that of a finished evolution."""
     names = (result.task, result.algorithm, result.seed, result.population, result.controller)
-    Folder(folder).check_identity(Identity(*names, result.task_digest, result.kiks))
+    Folder(folder).check_identity(Identity(*names, result.task_digest, result.kiks, "", {"": 18}, ("contacts",), ()))
     for number in range(1, generations + 1):
         (folder / f"generations/{number:06}.npz").touch()
     result.save(folder)

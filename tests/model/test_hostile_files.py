@@ -20,7 +20,8 @@ from kiks.model.project import Project
 from kiks.model.thesis_networks import NetworkResponse
 
 LINEAR = kiks.controllers.linear()
-IDENTITY = Identity("avoid", "cma", 3, 8, "linear", {"fitness": "0123456789abcdef"}, kiks.__version__)
+DIGEST, AXES = {"fitness": "0123456789abcdef"}, (kiks.Axis("contacts", 0, 1),)
+IDENTITY = Identity("avoid", "cma", 3, 8, "linear", DIGEST, kiks.__version__, "", {"": 18}, ("contacts",), AXES)
 TASK = 'task = 1\nbase = "avoid"\nname = "mine"\nseconds = 2.5\nworlds = 6\nbaud = 9600\n[controller]\nkind = "gru"\n'
 
 

@@ -9,7 +9,7 @@ import random
 import tempfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import redirect_stdout
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache, partial
 from importlib import resources
 from pathlib import Path
@@ -25,7 +25,6 @@ from tools.campaigns.strange import (
     strange_mat,
     strange_netpbm,
     strange_npz,
-    strange_parquet,
     strange_png,
 )
 from tools.sensors.models import thesis
@@ -37,7 +36,6 @@ from kiks.cli.options import World
 from kiks.clock.thinking import parse_thinking
 from kiks.desk.server.folder import decode
 from kiks.fit.samples import load_samples, nearnesses
-from kiks.learn.archive import ARCHIVE
 from kiks.learn.evolution_log import CHAMPION
 from kiks.learn.individual import individual_of
 from kiks.learn.results import RESULT, result_of
@@ -173,11 +171,11 @@ def _evolution(path: Path) -> None:
 
 def _individual(path: Path) -> None:
     folder = path.parent if path.name == "evolution.json" else path.parents[1]
-    _drive_champion(individual_of(folder, 1, rank=2, task=_task()).champion)
+    _drive_champion(individual_of(folder, 1, rank=2, task=_task())[0])
 
 
 def _archive(path: Path) -> None:
-    archive = kiks.Archive.load(path.parent)
+    archive = kiks.Archive.load(path.parents[1])
     if archive.elites:
         _drive_champion(archive.champion_at(*[0.5] * len(archive.axes)))
 
@@ -278,6 +276,7 @@ def _finished() -> Mapping[str, bytes]:
     with tempfile.TemporaryDirectory() as folder:
         evolution = kiks.Evolution(_task(), "ga", seed=3, population=4, folder=folder)
         values = np.outer(np.linspace(0.1, 0.9, 4), np.ones(len(_task().value_names)))
+        evolution.ask()
         evolution.tell(values)
         evolution.save_log()
         result_of(evolution).save(Path(folder))
@@ -297,6 +296,7 @@ def _coevolved() -> Mapping[str, bytes]:
     """Return the files of a co-evolution of one generation, by name."""
     with tempfile.TemporaryDirectory() as folder:
         evolution = kiks.Evolution(_pursuit(), seed=3, population=4, opponents=1, folder=folder)
+        evolution.ask()
         evolution.tell(np.zeros((8, len(_pursuit().value_names))))
         evolution.save_log()
         return _files_in(folder)
@@ -421,8 +421,7 @@ def _kinds() -> Iterator[Kind]:
     yield _among(
         "champion_world", evolved, "champion_world.kiks", lambda path: _champion(path.parent / CHAMPION), "toml"
     )
-    archive = _among("archive", evolved, ARCHIVE, _archive)
-    yield replace(archive, strange=(partial(strange_parquet, *archive.sound),))
+    yield _among("archive", evolved, _GENERATION, _archive)
     yield _among("result", evolved, RESULT, _result, "json")
     yield _among("contest", coevolved, "prey.toml", _contest, "toml")
     yield _among("sides", coevolved, _IDENTITY, _sides, "json")

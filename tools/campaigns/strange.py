@@ -150,53 +150,6 @@ def _zip_bomb(name: str, rng: random.Random) -> bytes:
     return local + central + b"PK\x05\x06" + struct.pack("<HHHHIIH", 0, 0, 1, 1, len(central), len(local), 0)
 
 
-_HOSTILE_COLUMNS: tuple[Any, ...] = (
-    [SECRET] * 4, [b"\xff" * 9] * 4, [None] * 4, [1.0, None, 2.0, 3.0], [[1.0]] * 4, [{"a": {"b": 1}}] * 4, [True] * 4,
-    [2**63 - 1] * 4, [-1] * 4, [float("nan")] * 4, [1e308, -1e308, 5e-324, float("inf")], [10**30] * 4,
-)  # fmt: skip
-"""Columns of a Parquet file that are not what they should be."""
-
-
-def strange_parquet(sound: bytes, rng: random.Random) -> bytes:
-    """Return a whole Parquet file with another head, other columns, or packed so that it unpacks to more memory.
-
-    Args:
-        sound: A file of four rows.
-        rng: Random numbers.
-    """
-    import pyarrow
-    from pyarrow import parquet
-
-    table = parquet.read_table(pyarrow.BufferReader(sound), use_threads=False)
-    row_count, is_packed = rng.choice((4, 4, 4, 0, 4000, 2_000_000)), rng.random() < 0.4
-    packing = rng.choice(("none", "snappy", "gzip", "zstd", "brotli")) if is_packed else "none"
-    head = {name: mutated(rng, text) if rng.random() < 0.2 else text for name, text in table.schema.metadata.items()}
-    name = rng.choice(table.column_names)
-    columns = {each: table.column(each).to_pylist() for each in table.column_names}
-    columns[name] = rng.choice(_HOSTILE_COLUMNS)
-    if rng.random() < 0.1:
-        columns.pop(name)
-    elif row_count > 4 and rng.random() < 0.5:
-        columns[name] = ["x" * rng.choice((1000, 400_000))] * 4
-    if row_count > 4:
-        # Runs of equal values: a file of some kilobytes, whatever the count of rows.
-        columns = {each: values[:1] * 4 for each, values in columns.items()}
-    arrays = {}
-    for each, values in columns.items():
-        array = pyarrow.array([str(value) for value in values] if 10**30 in values else values)
-        is_plain = row_count <= 4 or pyarrow.types.is_nested(array.type) or pyarrow.types.is_null(array.type)
-        encoded = array if is_plain else array.dictionary_encode()
-        arrays[each] = encoded.take(pyarrow.array(np.arange(row_count) % 4))
-    if rng.random() < 0.1:
-        arrays |= {f"{SECRET}{number}": next(iter(arrays.values())) for number in range(rng.choice((1, 300)))}
-    file = io.BytesIO()
-    table = pyarrow.table(arrays).replace_schema_metadata(head)
-    parquet.write_table(
-        table, file, compression=packing, use_dictionary=is_packed or row_count > 4, store_schema=rng.random() < 0.5
-    )
-    return file.getvalue()
-
-
 def _mat_element(kind: int, data: bytes) -> bytes:
     return struct.pack("<II", kind, len(data)) + data + bytes(-len(data) % 8)
 

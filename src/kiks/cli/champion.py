@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -66,11 +65,10 @@ def _save_candidate(folder: Path, generation: int, rank: int, world: int, task: 
     from kiks.learn.individual import individual_of
 
     given = None if task is None else tasks.load(task)
-    found = individual_of(folder, generation, rank=rank, world=world, task=given)
-    assert found.champion.world is not None
-    replace(found.champion, world=replace(found.champion.world, seconds=found.seconds)).save(out)
-    typer.echo(f"Candidate {found.candidate} of generation {generation}: rank {rank}, fitness {found.fitness:.4f}")
+    found, number = individual_of(folder, generation, rank=rank, world=world, task=given)
+    found.save(out)
+    typer.echo(f"Candidate {number} of generation {generation}: rank {rank}, fitness {found.fitness:.4f}")
     if found.kiks != __version__:
         say(f"KiKS {found.kiks} has evaluated it. This is KiKS {__version__}, where it may drive differently.")
-    if found.champion.timing.baud is None:
-        say(f"it was evaluated without a serial line; here it drives on one of {found.champion.baud} baud.")
+    if found.timing.baud is None:
+        say(f"it was evaluated without a serial line; here it drives on one of {found.baud} baud.")

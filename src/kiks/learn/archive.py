@@ -6,47 +6,29 @@ algorithms can be compared.
 
 from __future__ import annotations
 
-import io
-import json
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
 
-from kiks.errors import ParameterError, library, shown
+from kiks.errors import ParameterError, shown
+from kiks.export.tables import write_parquet
 from kiks.learn.champion import Champion
 from kiks.learn.evolution_log import Folder
 from kiks.learn.task import Axis
-from kiks.model.array_checks import Numbers, check_array
-from kiks.model.atomic_files import path_of, replace_file
+from kiks.model.atomic_files import path_of
 from kiks.model.checks import check_number
-from kiks.model.data_file import Text, check, one_line, parse_json, read_file, record
-from kiks.model.limits import ARCHIVE_FILE_BYTES_MAX
 
 Floats = NDArray[np.float64]
 
 ARCHIVE = "archive.parquet"
 """Name in the folder of an evolution, of two sides after the name of the side."""
 
-_NUMBER_BYTES = 8
-
 CELLS_MAX = 2**53
 """Most cells of an archive."""
-
-_HEAD = b"kiks archive"
-_ADVICE = "Take the file that kiks evolve has written."
-
-
-@record
-class _Head:
-    """What the file says of the archive, beside the rows."""
-
-    axes: Annotated[tuple[Axis, ...], Field(min_length=1, max_length=100)]
-    values: Annotated[tuple[Text, ...], Field(min_length=1, max_length=1000)]
 
 
 @dataclass(frozen=True)
@@ -194,8 +176,7 @@ class Archive:
     # ---- files ----
 
     def save(self, folder: str | Path, side: str = "") -> None:
-        """Write `archive.parquet`, or that of a side of two, into a folder, with a row for each elite."""
-        pyarrow, parquet = library("pyarrow"), library("pyarrow.parquet")
+        """Write `archive.parquet`, or that of a side of two, into a folder: a table with a row for each elite."""
         elites = self.elites
         columns: dict[str, Any] = {"generation": np.array([elite.generation for elite in elites], np.int64)}
         for number, axis in enumerate(self.axes):
@@ -204,77 +185,31 @@ class Archive:
         columns |= dict(zip(self.value_names, values.T, strict=True))
         parameters = np.array([elite.parameters for elite in elites]).reshape(len(elites), -1)
         columns |= {f"parameter_{number}": column for number, column in enumerate(parameters.T, 1)}
-        head = {"axes": [asdict(axis) for axis in self.axes], "values": self.value_names}
-        table = pyarrow.table(columns).replace_schema_metadata({_HEAD: json.dumps(head).encode()})
-        buffer = io.BytesIO()
-        # Columns without compression take no more memory than the file has bytes.
-        parquet.write_table(table, buffer, compression="none", use_dictionary=False)
-        replace_file(_file(path_of(folder, "folder"), side), buffer.getvalue(), "the archive")
+        write_parquet(columns, path_of(folder, "folder") / (f"{side}_{ARCHIVE}" if side else ARCHIVE), "the archive")
 
     @classmethod
     def load(cls, folder: str | Path, side: str = "") -> Archive:
-        """Read the archive in the folder of an evolution, and its champion. The champion's controller may run code.
+        """Return the archive of the evolution in a folder. The controller of its champion may run code.
 
         Args:
             folder: The folder.
             side: Name of the side, if there are two.
         """
         home = Folder(folder)
-        file = _file(home.path, side)
-        what = f"Archive {str(file)!r}"
-        data = read_file(file, what, bytes_max=ARCHIVE_FILE_BYTES_MAX)
-        champion = Champion.load(home.champion_file(side))
-        try:
-            head, columns = _read(data, len(champion.parameters))
-            archive = cls(head.axes, head.values, champion)
-        except ParameterError as broken:
-            raise ParameterError(f"{what}: {broken}") from None
-        names = [f"parameter_{number}" for number in range(1, len(champion.parameters) + 1)]
-        candidates = np.column_stack([columns[name] for name in names])
-        values = np.column_stack([columns[name] for name in archive.value_names])
-        for number, generation in enumerate(columns["generation"].tolist()):
-            row = slice(number, number + 1)
-            archive.add(candidates[row], values[row], generation)
+        identity, champion = home.identity(), Champion.load(home.champion_file(side))
+        if not identity.axes or side not in identity.sides:
+            raise ParameterError(
+                f"the evolution in {str(home.path)!r} must have axes and the side {shown(side)} for an archive, but "
+                f"it has {len(identity.axes)} axes and the sides {shown(list(identity.sides))}."
+            )
+        archive = cls(identity.axes, ("fitness", *identity.measures), champion)
+        number, value_count = list(identity.sides).index(side), len(archive.value_names)
+        first = sum(list(identity.sides.values())[:number])
+        own = slice(first, first + identity.sides[side])
+        for generation in range(home.generation_count()):
+            saved = home.generation(generation, identity)
+            candidates, values = (saved[name][: identity.population] for name in ("candidates", "values"))
+            if values.shape[1] == len(identity.sides) * value_count:
+                part = values[:, number * value_count : (number + 1) * value_count]
+                archive.add(candidates[:, own], part, generation + 1)
         return archive
-
-
-def _file(folder: Path, side: str) -> Path:
-    return folder / (f"{side}_{ARCHIVE}" if side else ARCHIVE)
-
-
-def _read(data: bytes, parameter_count: int) -> tuple[_Head, dict[str, NDArray[Any]]]:
-    """Return head and columns of a file, checked."""
-    pyarrow, parquet = library("pyarrow"), library("pyarrow.parquet")
-    try:
-        file = parquet.ParquetFile(pyarrow.BufferReader(data))
-        described = file.metadata
-        text = (described.metadata or {}).get(_HEAD)
-        row_count = sum(described.row_group(group).num_rows for group in range(described.num_row_groups))
-        found = [(field.name, field.type) for field in file.schema_arrow]
-    except Exception as failure:  # the library raises whatever it stumbles over in a damaged file
-        raise ParameterError(f"it must be a whole Parquet file, but: {one_line(failure)}. {_ADVICE}") from None
-    if text is None:
-        raise ParameterError(f"it must be an archive of KiKS, but it is another Parquet file. {_ADVICE}")
-    head = check(_Head, parse_json(text, "its head"), "its head", advice=_ADVICE)
-    names = ("generation", *head.values, *(f"parameter_{number}" for number in range(1, parameter_count + 1)))
-    if missing := [name for name in names if name not in dict(found)]:
-        raise ParameterError(
-            f"it must have a column for each value and each of the champion's {parameter_count} parameters, but "
-            f"{shown(missing[0])} is missing. Take archive and champion of the same folder."
-        )
-    rules = {name: Numbers((row_count,), advice=_ADVICE) for name in names}
-    rules["generation"] = Numbers((row_count,), low=0, is_whole=True, advice=_ADVICE)
-    for name, kind in found:
-        if name in rules and kind not in (pyarrow.int64(), pyarrow.float64()):
-            raise ParameterError(f"{name} must be {rules[name]}, but it was of type {shown(str(kind))}. {_ADVICE}")
-    if (count := row_count * len(names)) > len(data) // _NUMBER_BYTES:
-        raise ParameterError(
-            f"it must hold its numbers as they are, at most {len(data) // _NUMBER_BYTES} in {len(data)} bytes, but it "
-            f"held {count}. {_ADVICE}"
-        )
-    try:
-        table = file.read(columns=list(names))
-        columns = {name: table.column(name).to_numpy() for name in names}
-    except Exception as failure:
-        raise ParameterError(f"it must be a whole Parquet file, but: {one_line(failure)}. {_ADVICE}") from None
-    return head, {name: check_array(column, rules[name], name) for name, column in columns.items()}

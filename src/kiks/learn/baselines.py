@@ -9,7 +9,7 @@ import numpy as np
 
 from kiks.control.controller import Controller
 from kiks.learn import seeds
-from kiks.learn.evolution import TRIALS
+from kiks.learn.evolution_log import TRIALS
 from kiks.learn.seeds import seed_for
 from kiks.learn.task import Task
 from kiks.model.data_file import Number, record

@@ -32,7 +32,7 @@ from kiks.learn.algorithms import Algorithm, make_algorithm
 from kiks.learn.archive import Archive
 from kiks.learn.champion import Champion
 from kiks.learn.evaluation import Floats, Integers, evaluate
-from kiks.learn.evolution_log import Folder, Generation, Identity
+from kiks.learn.evolution_log import TRIALS, Folder, Generation, Identity
 from kiks.learn.finals import FINALISTS, Contender, Finals, Tournament, hold_finals, hold_tournament, rounds_of
 from kiks.learn.fingerprint import fingerprints
 from kiks.learn.seeds import seed_for
@@ -43,9 +43,6 @@ from kiks.version import __version__
 
 LOG_EVERY_S = 10.0
 """Time between two writes of the log [s]; each writes the whole log."""
-
-TRIALS = 8
-"""Trials of a rival, each in as many worlds as a candidate of the population gets."""
 
 OPPONENTS = 10
 """Default number of opponents of a candidate (Floreano and Nolfi 1997)."""
@@ -523,11 +520,22 @@ class Evolution:
         controllers = " and ".join(side.controller.name for side in task.sides)
         algorithm = f"{self.name}, {self.opponents} opponents" if task.against else self.name
         digest = task.digest() | fingerprints({"algorithm": type(self.algorithms[0])})
-        folder.check_identity(
-            Identity(task.name, algorithm, self.seed, self.population, controllers, digest, __version__, task.file)
+        identity = Identity(
+            *(task.name, algorithm, self.seed, self.population, controllers, digest, __version__, task.file),
+            sides={side.name: side.parameter_count for side in task.sides},
+            measures=task.measure_names,
+            axes=task.axes,
         )
-        for values, seconds in folder.saved_generations(self._rows, len(task.value_names)):
-            self._tell(values, seconds)
+        folder.check_identity(identity)
+        for number in range(folder.generation_count()):
+            saved = folder.generation(number, identity)
+            if not np.array_equal(self._rows(), saved["candidates"]):
+                raise ParameterError(
+                    f"the evolution in {str(folder.path)!r} must continue to the bit, but generation {number + 1} "
+                    "would have other candidates here: the libraries or the computer have changed. Continue on the "
+                    "computer where it began, or take a new folder."
+                )
+            self._tell(saved["values"], float(saved["seconds"]))
         self._earlier_s = self.generations[-1].seconds if self.generations else 0.0
         if len(finalists := self._finalists()) > 1:
             sizes, worlds = rounds_of(len(finalists), self._evaluation_count)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -22,6 +22,7 @@ from kiks.errors import ParameterError, shown
 from kiks.export.tables import write_parquet
 from kiks.learn.finals import Contender, Finals, Tournament
 from kiks.learn.fingerprint import differing, tell_unseen
+from kiks.learn.task import Axis
 from kiks.model.array_checks import Numbers, read_arrays
 from kiks.model.atomic_files import make_folder, path_of, replace_file
 from kiks.model.data_file import Rule, Text, Whole, check, parse_json, read_file, record
@@ -37,13 +38,23 @@ IDENTITY, GENERATIONS, LOG, CHAMPION = "evolution.json", "generations", "log.par
 TOURNAMENT = "tournament.parquet"
 """Names in the folder."""
 
+TRIALS = 8
+"""Trials of a rival, each in as many worlds as a candidate of the population gets."""
+
 _ADVICE = "Remove the file, and those after it."
 _FINALS_ADVICE = "Remove the file: then the finals are held again."
 
 
 @record
 class Identity:
-    """The properties that identify an evolution, and the file of its task, which may be moved."""
+    """The properties that identify an evolution, and what its generations consist of.
+
+    Attributes:
+        task_file: The file of its task, which may be moved.
+        sides: Number of parameters of a candidate of each side, by the name of the side.
+        measures: Names of the measures.
+        axes: Axes of the archive.
+    """
 
     task: Text
     algorithm: Text
@@ -52,7 +63,10 @@ class Identity:
     controller: Text
     task_digest: Digest
     kiks: Text
-    task_file: Text = ""
+    task_file: Text
+    sides: Annotated[dict[Text, Annotated[Whole, Field(ge=1, le=1_000_000)]], Field(min_length=1, max_length=2)]
+    measures: Annotated[tuple[Text, ...], Field(min_length=1, max_length=100)]
+    axes: Annotated[tuple[Axis, ...], Field(max_length=100)]
 
 
 @dataclass(frozen=True)
@@ -145,49 +159,25 @@ class Folder:
         advice = "Take a new folder, or go back to the arguments of the evolution that it holds."
         check_alike(self.identity(), identity, names, f"the evolution in {str(self.path)!r} and yours", advice)
 
-    def generation(
-        self, number: int, candidate_counts: Collection[int], parameter_count: int, value_count: int
-    ) -> dict[str, NDArray[Any]] | None:
-        """Return candidates, values and seconds of a saved generation; None if there is none.
-
-        Args:
-            number: Number of the generation, from 0.
-            candidate_counts: Numbers of candidates of which it must have one.
-            parameter_count: Number of parameters of a candidate.
-            value_count: Largest number of values of a candidate.
-        """
-        file = self._file(number)
-        if not file.exists():
-            return None
+    def generation(self, number: int, identity: Identity) -> dict[str, NDArray[Any]]:
+        """Return candidates, values and seconds of a saved generation, whose number counts from 0."""
+        # There may be a rival on trial or not: the first generation has none, nor has one after all elites were tried.
+        counts = (identity.population, identity.population + TRIALS)
+        side_count, parameter_count = len(identity.sides), sum(identity.sides.values())
+        value_count = side_count * (1 + len(identity.measures))
         rules = {
             "candidates": Numbers(("candidate", parameter_count), advice=_ADVICE),
             "values": Numbers(("candidate", "value"), advice=_ADVICE),
             "seconds": Numbers((), low=0.0, advice=_ADVICE),
         }
-        what, numbers_max = f"Generation {str(file)!r}", max(candidate_counts) * (parameter_count + value_count) + 1
-        arrays = read_arrays(file, rules, what, numbers_max=numbers_max)
-        if (count := len(arrays["candidates"])) not in candidate_counts:
-            wanted = " or ".join(map(str, candidate_counts))
-            raise ParameterError(f"{what}: candidates must be {wanted}, but their number was {count}. {_ADVICE}")
-        return arrays
-
-    def saved_generations(self, ask: Callable[[], Floats], value_count: int) -> Iterator[tuple[Floats, float]]:
-        """Yield values and seconds of the saved generations, for an evolution that begins anew.
-
-        Args:
-            ask: Returns the candidates that the evolution has for its next generation, float64 [candidate, parameter].
-            value_count: Largest number of values of a candidate.
-        """
-        number = 0
-        while (saved := self.generation(number, ask().shape[:1], ask().shape[1], value_count)) is not None:
-            number += 1
-            if not np.array_equal(ask(), saved["candidates"]):
+        file, what = self._file(number), f"Generation {str(self._file(number))!r}"
+        arrays = read_arrays(file, rules, what, numbers_max=counts[1] * (parameter_count + value_count) + 1)
+        for name, axis, known in (("candidates", 0, counts), ("values", 1, (side_count, value_count))):
+            if (count := arrays[name].shape[axis]) not in known:
                 raise ParameterError(
-                    f"the evolution in {str(self.path)!r} must continue to the bit, but generation {number} would have "
-                    "other candidates here: the libraries or the computer have changed. Continue on the computer where "
-                    "it began, or take a new folder."
+                    f"{what}: {name} must be {known[0]} or {known[1]}, but their number was {count}. {_ADVICE}"
                 )
-            yield saved["values"], float(saved["seconds"])
+        return arrays
 
     def generation_count(self) -> int:
         """Return the number of saved generations."""
@@ -240,24 +230,20 @@ class Folder:
     def save_log(self, generations: Sequence[Generation], value_names: Sequence[str]) -> None:
         """Write the log of all generations, a row for each evaluation: the population, then the trials of a rival."""
         counts = [len(each.values) for each in generations]
-
-        def per_candidate(values: Sequence[float]) -> NDArray[Any]:
-            return np.repeat(np.array(values), counts) if counts else np.zeros(0)
-
+        width = min(each.values.shape[1] for each in generations)  # fitness alone, if one generation has no more
+        numbers = np.arange(1, len(generations) + 1)
+        is_trial = [np.arange(count) >= each.population for count, each in zip(counts, generations, strict=True)]
         columns: dict[str, Any] = {
-            "generation": per_candidate(range(1, len(counts) + 1)).astype(np.int64),
-            "candidate": np.concatenate([np.zeros(0, np.int64), *map(np.arange, counts)]).astype(np.int64),
+            "generation": np.repeat(numbers, counts),
+            "candidate": np.concatenate([np.arange(count) for count in counts]),
+            "is_trial": np.concatenate(is_trial),
+            "seed": np.concatenate([each.seeds for each in generations]),
         }
-        populations = per_candidate([each.population for each in generations])
-        columns["is_trial"] = columns["candidate"] >= populations
-        columns["seed"] = np.concatenate([np.zeros(0, np.int64), *(each.seeds for each in generations)])
-        values = [each.values for each in generations]
-        table = np.concatenate(values) if values else np.zeros((0, len(value_names)))
-        columns |= {name: table[:, number] for number, name in enumerate(value_names[: table.shape[1]])}
-        columns["champion_fitness"] = per_candidate([each.champion_fitness for each in generations])
-        columns["seconds"] = per_candidate([each.seconds for each in generations])
-        evaluations = np.cumsum([each.evaluations for each in generations]).tolist()
-        columns["evaluations"] = per_candidate(evaluations).astype(np.int64)
+        values = np.concatenate([each.values[:, :width] for each in generations])
+        columns |= dict(zip(value_names, values.T, strict=False))
+        columns["champion_fitness"] = np.repeat([each.champion_fitness for each in generations], counts)
+        columns["seconds"] = np.repeat([each.seconds for each in generations], counts)
+        columns["evaluations"] = np.repeat(np.cumsum([each.evaluations for each in generations]), counts)
         write_parquet(columns, self.path / LOG, "the log")
 
     def save_tournament(self, tournament: Tournament) -> None:

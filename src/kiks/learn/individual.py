@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
 
 from kiks.errors import ParameterError, shown
 from kiks.learn import tasks
 from kiks.learn.champion import Champion
-from kiks.learn.evolution import TRIALS
 from kiks.learn.evolution_log import Folder, Identity
 from kiks.learn.fingerprint import differing
 from kiks.learn.seeds import WORLDS, seed_for
@@ -16,29 +15,12 @@ from kiks.learn.task import Task
 from kiks.model.checks import check_count
 
 
-@dataclass(frozen=True)
-class Individual:
-    """A candidate of a generation.
-
-    Attributes:
-        champion: Its controller with its parameters, in the world.
-        candidate: Its number in the generation, from 0, as in the log.
-        fitness: Its fitness.
-        seconds: Time for which it drove [s].
-        kiks: Version of KiKS that evaluated it.
-    """
-
-    champion: Champion
-    candidate: int
-    fitness: float
-    seconds: float
-    kiks: str
-
-
 def individual_of(
     folder: str | Path, generation: int, *, rank: int = 1, world: int = 0, task: Task | None = None
-) -> Individual:
-    """Return a candidate of an evolution, to drive it again.
+) -> tuple[Champion, int]:
+    """Return a candidate of an evolution, to drive it again, and its number in the generation as in the log.
+
+    The candidate's world is one of those of its evaluation, and ends when that did.
 
     Args:
         folder: Folder of the evolution.
@@ -54,16 +36,13 @@ def individual_of(
         raise ParameterError(f"the evolution in {str(saved.path)!r} must have a generation, but it has none yet.")
     number = check_count("generation", generation, 1, count) - 1
     found = _task_of(saved, identity, task)
-    # There may be a rival on trial or not: the first generation has none, nor has one after all elites were tried.
-    counts = (identity.population, identity.population + TRIALS)
-    arrays = saved.generation(number, counts, found.parameter_count, len(found.value_names))
-    assert arrays is not None
+    arrays = saved.generation(number, identity)
     fitness = arrays["values"][: identity.population, 0]
     order = (-fitness).argsort(kind="stable")
     candidate = int(order[check_count("rank", rank, 1, identity.population) - 1])
-    seed = seed_for(identity.seed, WORLDS, number)
-    champion = found.individual(arrays["candidates"][candidate], seed, world)
-    return Individual(champion, candidate, float(fitness[candidate]), found.seconds, identity.kiks)
+    champion = found.individual(arrays["candidates"][candidate], seed_for(identity.seed, WORLDS, number), world)
+    known = replace(champion, fitness=float(fitness[candidate]), generation=generation, kiks=identity.kiks)
+    return replace(known, algorithm=identity.algorithm, seed=identity.seed), candidate
 
 
 def _task_of(folder: Folder, identity: Identity, given: Task | None) -> Task:

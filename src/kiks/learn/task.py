@@ -319,7 +319,7 @@ class Task(Experiment):
             task=self.name,
             robot=specs[turns[world] % len(specs)],
             timing=self.timings[timings[world]],
-            world=Project(arena, robots=(ProjectRobot(),) * self.robots, seed=seed + world),
+            world=Project(arena, robots=(ProjectRobot(),) * self.robots, seed=seed + world, seconds=self.seconds),
         )
 
     def digest(self) -> dict[str, str]:

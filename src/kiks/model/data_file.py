@@ -287,7 +287,7 @@ def _place(model: Any, loc: tuple[int | str, ...]) -> tuple[str, Any, str]:
         else:
             continue  # the name of an alternative without a tag
         description = next(filter(None, (getattr(each, "description", "") for each in _metadata(hint))), description)
-        name += part if not name or part[0] in " [" else f" {part}" if name.endswith(":") else f".{part}"
+        name += part if not name or part.startswith((" ", "[")) else f" {part}" if name.endswith(":") else f".{part}"
     return name, hint, description
 
 

@@ -21,9 +21,6 @@ CHAMPION_FILE_BYTES_MAX = 32 << 20
 RESULT_FILE_BYTES_MAX = 32 << 20
 """The result of an evolution."""
 
-ARCHIVE_FILE_BYTES_MAX = 256 << 20
-"""An archive of an evolution."""
-
 ARRAY_FILE_NUMBERS_MAX = 1 << 24
 """Numbers in all arrays of a file."""
 
