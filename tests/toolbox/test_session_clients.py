@@ -18,7 +18,7 @@ from tests.guard import GUARD_S, wait_until
 
 from kiks.errors import ParameterError
 from kiks.model.arena import Arena
-from kiks.ports.local_link import AwaitedAnswer
+from kiks.ports.messages import AwaitedAnswer
 from kiks.recording.mcap_file import Room
 from kiks.recording.recording import Recording
 from kiks.sim.simulation import Simulation

@@ -8,11 +8,9 @@ from __future__ import annotations
 
 import contextlib
 import threading
-from dataclasses import dataclass
-from typing import Protocol
 
 from kiks.errors import LinkError
-from kiks.ports.messages import Answer, Kind, Request
+from kiks.ports.messages import Answer, AwaitedAnswer, Kind, Request
 from kiks.ports.programs import Programs
 from kiks.ports.remote_link import Connection
 from kiks.units import NS_PER_S
@@ -27,26 +25,6 @@ WATCHED_SLICE_NS = NS_PER_S // 10
 """The same if the program shares a watched world: a pause that is interrupted has run ahead of the world so far."""
 
 
-class PendingAnswer(Protocol):
-    """State of the answer that a program waits for."""
-
-    @property
-    def is_cancelled(self) -> bool:
-        """Whether the program has stopped waiting."""
-
-    @property
-    def is_held(self) -> bool:
-        """Whether the program has yet to confirm that it waits; until then its pause must not go on."""
-
-
-@dataclass
-class AwaitedAnswer:
-    """An answer for which the program waits until it arrives."""
-
-    is_cancelled: bool = False
-    is_held: bool = False
-
-
 class LocalConnection(Connection):
     """The connection of a program to a world of this process; it belongs to the thread that makes it.
 
@@ -54,13 +32,13 @@ class LocalConnection(Connection):
         programs: The programs that share the world.
         name: Name of the program, for a person.
         rank: Order among programs that act at the same instant.
-        pending: State of the answer that the program waits for.
+        awaited: The answer that the program waits for.
         advice: What its user can do if it is silent while others wait, as a sentence.
     """
 
-    def __init__(self, programs: Programs, name: str, rank: int, pending: PendingAnswer, advice: str) -> None:
+    def __init__(self, programs: Programs, name: str, rank: int, awaited: AwaitedAnswer, advice: str) -> None:
         super().__init__(programs.sim.lock, is_late=True)
-        self._pending = pending
+        self._awaited = awaited
         self._thread = threading.get_ident()
         self._programs = programs
         self._participant = programs.admit(name, rank)
@@ -82,7 +60,7 @@ class LocalConnection(Connection):
             while (answer := participant.answer) is None or answer.ticket != ticket:
                 if participant.is_closed:
                     raise LinkError("the world must be there to answer, but it has ended. Open the port again.")
-                self._check_pending()
+                self._check_awaited()
                 wait_s = programs.move()
                 if participant.answer is None or participant.answer.ticket != ticket:
                     programs.wait(POLL_S if wait_s is None else min(wait_s, POLL_S))
@@ -105,19 +83,19 @@ class LocalConnection(Connection):
         super().pass_to(time_ns)
 
     def _yield_world(self) -> None:
-        """Release the lock, which the caller holds, for other threads, and wait while the pending answer is held.
+        """Release the lock, which the caller holds, for other threads, and wait while the awaited answer is held.
 
         Raises:
             LinkError: If the answer was cancelled.
         """
         self._programs.wait(0)
-        self._check_pending()
-        while self._pending.is_held:
+        self._check_awaited()
+        while self._awaited.is_held:
             self._programs.wait(POLL_S)
-            self._check_pending()
+            self._check_awaited()
 
     def cancel(self) -> None:
-        """Make the program's thread check its pending answer at once, even in a paused world; for any thread."""
+        """Make the program's thread check its awaited answer at once, even in a paused world; for any thread."""
         gate = self._programs.sim.gate
         if gate is not None:
             gate.keep(self._check_at_gate)
@@ -125,14 +103,14 @@ class LocalConnection(Connection):
     def _check_at_gate(self) -> None:
         gate = self._programs.sim.gate
         is_own = threading.get_ident() == self._thread
-        if is_own or not self._pending.is_cancelled:
+        if is_own or not self._awaited.is_given_up:
             assert gate is not None
             gate.leave(self._check_at_gate)
         if is_own:
-            self._check_pending()
+            self._check_awaited()
 
-    def _check_pending(self) -> None:
-        if self._pending.is_cancelled:
+    def _check_awaited(self) -> None:
+        if self._awaited.is_given_up:
             raise LinkError("the answer must be waited for, but the program was interrupted. Ask again.")
 
     @property

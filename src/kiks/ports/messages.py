@@ -92,6 +92,24 @@ class Answer(NamedTuple):
     error: str = ""
 
 
+class AwaitedAnswer:
+    """The answer that a program in a thread of this process waits for; other threads set its attributes.
+
+    Attributes:
+        is_cancelled: Whether the program has stopped waiting.
+        is_halted: Whether a person has halted the program, which does not know it yet.
+        is_held: Whether the program has yet to confirm that it waits; until then its pause must not go on.
+    """
+
+    def __init__(self) -> None:
+        self.is_cancelled = self.is_halted = self.is_held = False
+
+    @property
+    def is_given_up(self) -> bool:
+        """Whether nothing waits for it."""
+        return self.is_cancelled or self.is_halted
+
+
 class Start(NamedTuple):
     """What the process of a program gets at its start.
 

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import logging
-import socket
 from collections import deque
 from typing import Any
 
 from kiks.clock.serial_timing import BACKLOG_LIMIT
 from kiks.errors import KiksError
-from kiks.ports.messages import ASKING, RECEIVE_SIZE, Answer, Kind, Request, packed, take_messages
+from kiks.ports.messages import ASKING, Answer, Kind, Request
 from kiks.ports.port_names import PortNames
 from kiks.ports.program_scheduler import Participant, ProgramScheduler
 from kiks.sim.local_line import claim
@@ -279,82 +278,3 @@ class ProgramParticipant(Participant):
             ahead_count = max(-((now_ns - line.sending_until_ns) // line.character_ns), 0)
         self.acts_from_ns = now_ns
         self.reply(Answer(self._ticket, now_ns, result, ahead_count, error))
-
-
-class RemoteParticipant(ProgramParticipant):
-    """A program in a process of its own.
-
-    Args:
-        connection: This end of the socket to it.
-        name: Its name in messages.
-        rank: Its number, from 1.
-        robot: Number of its own robot.
-        sim: The world.
-        scheduler: Decides when it acts.
-        names: Which robot answers on which port name.
-
-    Attributes:
-        has_hung_up: Whether it has closed its end.
-        events: The events that the selector reports of the socket.
-    """
-
-    def __init__(
-        self,
-        connection: socket.socket,
-        name: str,
-        rank: int,
-        robot: int,
-        sim: Simulation,
-        scheduler: ProgramScheduler,
-        names: PortNames,
-    ) -> None:
-        super().__init__(name, rank, robot, sim, scheduler, names)
-        self.has_hung_up = False
-        self.events = 0
-        self._socket = connection
-        self._socket.setblocking(False)
-        self._received = bytearray()
-        self._unsent = bytearray()
-
-    def close(self) -> None:
-        """Close the connection."""
-        self._socket.close()
-
-    def fileno(self) -> int:
-        """Return the socket's descriptor."""
-        return self._socket.fileno()
-
-    def receive(self) -> bool:
-        """Take the requests that have arrived; return False when the program has hung up."""
-        try:
-            received = self._socket.recv(RECEIVE_SIZE)
-        except BlockingIOError:
-            return True
-        except OSError:
-            received = b""
-        if not received:
-            self.leave()
-            return False
-        self._received += received
-        for fields in take_messages(self._received):
-            self.add_request(Request(*fields))
-        return True
-
-    def reply(self, answer: Answer) -> None:
-        """Send an answer; bytes that the program does not take yet wait."""
-        self._unsent += packed(answer)
-        self.flush()
-
-    @property
-    def has_unsent(self) -> bool:
-        """Whether bytes of an answer wait; call `flush` when the socket is writable."""
-        return bool(self._unsent)
-
-    def flush(self) -> None:
-        """Send the waiting bytes that the program takes."""
-        try:
-            del self._unsent[: self._socket.send(self._unsent)]
-        except BlockingIOError:
-            pass
-        except OSError:
-            self._unsent.clear()

@@ -16,34 +16,72 @@ from kiks.clock.thinking import parse_thinking
 from kiks.ending import INTERRUPTED, noting_endings
 from kiks.errors import KiksError, ParameterError
 from kiks.ports.file_descriptors import opening
-from kiks.ports.messages import Start
-from kiks.ports.participant import ProgramParticipant, RemoteParticipant
+from kiks.ports.messages import RECEIVE_SIZE, Answer, Request, Start, packed, take_messages
+from kiks.ports.participant import ProgramParticipant
 from kiks.ports.port_names import PortNames
 from kiks.ports.program_process import Command, Labels, OutputLine, Permission, Process, chance_seed
 from kiks.ports.program_scheduler import PATIENCE_S, START_PATIENCE_S, VISIT_PATIENCE_S, ProgramScheduler
 from kiks.sim.ring_buffer import RingBuffer
 from kiks.sim.simulation import Simulation
 
+IDLE_S = 0.05
+"""Longest wait of a round [s of real time]: KiKS notices a second Ctrl-C within it."""
 
-class Handle:
-    """A started program.
+GRACE_S = 1.0
+"""Time that a program has to end after a person has stopped it [s of real time]."""
 
-    Attributes:
-        command: The command that started it.
+CTRL_C_GRACE_S = 0.6
+"""Time that all programs and the world have to end after Ctrl-C [s of real time]: a second with what follows."""
+
+WORLD_SHARE = 0.3
+"""Share of that time in which the world comes to where they have ended."""
+
+_log = logging.getLogger("kiks.run")
+
+
+class Handle(ProgramParticipant):
+    """A started program, in a process of its own.
+
+    Args:
+        command: The command that starts it.
+        connection: This end of the socket to it.
         number: Its number, from 1, in the order of starts.
         robot: Number of its own robot.
-        name: Its name in messages.
+        sim: The world.
+        scheduler: Decides when it acts.
+        names: Which robot answers on which port name.
+
+    Attributes:
+        process: Its process.
+        has_hung_up: Whether it has closed its end.
+        has_ended: Set when the process has ended.
+        is_end_reported: Whether its end has been reported.
+        events: The events that the selector reports of the socket.
     """
 
-    def __init__(self, command: Command, participant: RemoteParticipant) -> None:
-        self.command = command
-        self.number = participant.rank
-        self.robot = participant.robot
-        self.name = participant.name
-        self.has_been_reported = False
+    process: Process
+
+    def __init__(
+        self,
+        command: Command,
+        connection: socket.socket,
+        number: int,
+        robot: int,
+        sim: Simulation,
+        scheduler: ProgramScheduler,
+        names: PortNames,
+    ) -> None:
+        super().__init__(f"program {number} ({command.name})", number, robot, sim, scheduler, names)
+        self.command, self.number = command, number
+        self.has_hung_up = self.is_end_reported = False
         self.has_ended = threading.Event()
-        self.participant = participant
-        self.process: Process
+        self.events = 0
+        self._socket = connection
+        self._socket.setblocking(False)
+        self._received = bytearray()
+        self._unsent = bytearray()
+
+    # ---- the process ----
 
     @property
     def is_running(self) -> bool:
@@ -65,10 +103,10 @@ class Handle:
     def state(self) -> str:
         """Its state: 'running', 'stopping', 'stopped', 'silenced', or how it has ended."""
         if self.is_running:
-            return "stopping" if self.participant.is_stopped else "running"
-        if self.participant.is_stopped:
+            return "stopping" if self.is_stopped else "running"
+        if self.is_stopped:
             return "stopped"
-        return "silenced" if self.participant.is_silenced else f"ended {self.how}"
+        return "silenced" if self.is_silenced else f"ended {self.how}"
 
     @property
     def how(self) -> str:
@@ -78,20 +116,50 @@ class Handle:
             return ""
         return f"with exit code {code}" if code >= 0 else f"by signal {-code}"
 
+    # ---- the connection ----
 
-IDLE_S = 0.05
-"""Longest wait of a round [s of real time]: KiKS notices a second Ctrl-C within it."""
+    def close(self) -> None:
+        """Close the connection."""
+        self._socket.close()
 
-GRACE_S = 1.0
-"""Time that a program has to end after a person has stopped it [s of real time]."""
+    def fileno(self) -> int:
+        """Return the socket's descriptor."""
+        return self._socket.fileno()
 
-CTRL_C_GRACE_S = 0.6
-"""Time that all programs and the world have to end after Ctrl-C [s of real time]: a second with what follows."""
+    def receive(self) -> bool:
+        """Take the requests that have arrived; return False when the program has hung up."""
+        try:
+            received = self._socket.recv(RECEIVE_SIZE)
+        except BlockingIOError:
+            return True
+        except OSError:
+            received = b""
+        if not received:
+            self.leave()
+            return False
+        self._received += received
+        for fields in take_messages(self._received):
+            self.add_request(Request(*fields))
+        return True
 
-WORLD_SHARE = 0.3
-"""Share of that time in which the world comes to where they have ended."""
+    def reply(self, answer: Answer) -> None:
+        """Send an answer; bytes that the program does not take yet wait."""
+        self._unsent += packed(answer)
+        self.flush()
 
-_log = logging.getLogger("kiks.run")
+    @property
+    def has_unsent(self) -> bool:
+        """Whether bytes of an answer wait; call `flush` when the socket is writable."""
+        return bool(self._unsent)
+
+    def flush(self) -> None:
+        """Send the waiting bytes that the program takes."""
+        try:
+            del self._unsent[: self._socket.send(self._unsent)]
+        except BlockingIOError:
+            pass
+        except OSError:
+            self._unsent.clear()
 
 
 class _OverError(Exception):
@@ -222,7 +290,7 @@ class Programs:
                         f"robot {robot} must be free for another program, but {handle.name} has it. Stop that one "
                         "first, or take another robot."
                     )
-                handle.participant.disconnect()
+                handle.disconnect()
             parse_thinking(self._policy(self._count + 1))
             for each in self.handles:
                 if not each.is_running:
@@ -278,9 +346,9 @@ class Programs:
         """
         if not handle.is_running:
             return
-        was_interrupted, handle.participant.is_stopped = handle.participant.is_stopped, True
+        was_interrupted, handle.is_stopped = handle.is_stopped, True
         self._was_touched = True
-        if was_interrupted or not handle.participant.is_here:
+        if was_interrupted or not handle.is_here:
             handle.process.kill()
             return
         handle.process.interrupt()
@@ -297,18 +365,18 @@ class Programs:
             # The programs get the signal, too, and may still stop their robots.
             with noting_endings(lambda _number: self._note_signal()):
                 loop.on_slice = self._check_signals
-                while any(not handle.has_been_reported for handle in self.handles) or self._scheduler.participants:
+                while any(not handle.is_end_reported for handle in self.handles) or self._scheduler.participants:
                     self._check_signals()
                     self.round(IDLE_S)
         except _OverError:
             for handle in self.handles:
-                handle.participant.is_stopped = handle.is_running and not handle.participant.has_hung_up
+                handle.is_stopped = handle.is_running and not handle.has_hung_up
         finally:
             loop.on_slice = lambda: None
             self.close()
         if self._signals:
             return INTERRUPTED
-        own = next((each.code for each in self.handles if each.code and not each.participant.is_stopped), 0)
+        own = next((each.code for each in self.handles if each.code and not each.is_stopped), 0)
         if self._over is None:
             return own
         code, message = self._over
@@ -349,11 +417,11 @@ class Programs:
                 if key.data is not None and events & selectors.EVENT_READ and not key.data.receive():
                     self._hang_up(key.data)
             handled = [key.data for key, _ in ready]
-            for participant in over:
+            for handle in over:
                 # A child process of the program may still hold the connection.
-                if participant not in handled and not participant.has_hung_up:
-                    participant.leave()
-                    self._hang_up(participant)
+                if handle not in handled and not handle.has_hung_up:
+                    handle.leave()
+                    self._hang_up(handle)
             ended = self._new_ends()
         for handle in ended:
             self._report_end(handle)
@@ -362,14 +430,14 @@ class Programs:
         """End all processes, report how programs have ended, and close the connections."""
         self._is_closed = True
         for handle in self.handles:
-            if handle.participant.has_hung_up:
+            if handle.has_hung_up:
                 handle.has_ended.wait(GRACE_S)  # the process ends by itself and will have an exit code
             handle.process.kill()
         for handle in self._new_ends():
             self._report_end(handle)
         for handle in self.handles:
             handle.process.wait()
-            handle.participant.close()
+            handle.close()
         with self.sim.lock:
             for participant in self._visitors:
                 participant.close()
@@ -395,10 +463,8 @@ class Programs:
         """Start a program's process, if it may start, and add the program."""
         self.permission.check(command)
         number = self._count + 1
-        name = f"program {number} ({command.name})"
         here, there = socket.socketpair()
-        participant = RemoteParticipant(here, name, number, robot, self.sim, self._scheduler, self._names)
-        handle = Handle(command, participant)
+        handle = Handle(command, here, number, robot, self.sim, self._scheduler, self._names)
         start = Start(
             is_late=self._scheduler.has_begun,
             end_ns=self.sim.loop.end_ns,
@@ -422,12 +488,12 @@ class Programs:
                     hear=lambda line: self._record_line(robot, line),
                 )
             except KiksError:
-                participant.close()
+                handle.close()
                 raise
         # A running world does not wait for the imports of a new program.
-        participant.is_waited_for = not self._scheduler.has_begun
+        handle.is_waited_for = not self._scheduler.has_begun
         self._count = number
-        self._scheduler.join(participant)
+        self._scheduler.join(handle)
         self.handles.append(handle)
         return handle
 
@@ -438,69 +504,68 @@ class Programs:
 
     def _end(self, handle: Handle) -> None:
         """Free the robots of a stopped program: here, because `round` may be waiting at the gate."""
-        if handle.participant.is_stopped and not self._is_closed:
+        if handle.is_stopped and not self._is_closed:
             with self.sim.lock:
-                handle.participant.disconnect()
+                handle.disconnect()
         handle.has_ended.set()
         self._wake()
 
-    def _check_processes(self) -> list[RemoteParticipant]:
+    def _check_processes(self) -> list[Handle]:
         """Kill silenced programs, update the selector, return programs whose process has ended."""
         over = []
         for handle in self.handles:
-            participant = handle.participant
-            if participant.is_silenced and handle.is_running:
+            if handle.is_silenced and handle.is_running:
                 handle.process.kill()
-            if participant.is_stopped and handle.process.code is not None:
-                participant.disconnect()
+            if handle.is_stopped and handle.process.code is not None:
+                handle.disconnect()
                 handle.has_ended.set()
-            if not participant.has_hung_up:
-                self._listen_to(participant)
+            if not handle.has_hung_up:
+                self._listen_to(handle)
                 if not handle.is_running:
-                    over.append(participant)
+                    over.append(handle)
         return over
 
-    def _listen_to(self, participant: RemoteParticipant) -> None:
-        events = selectors.EVENT_READ | (selectors.EVENT_WRITE if participant.has_unsent else 0)
-        if not participant.events:
-            self._selector.register(participant, events, participant)
-        elif events != participant.events:
-            self._selector.modify(participant, events, participant)
-        participant.events = events
+    def _listen_to(self, handle: Handle) -> None:
+        events = selectors.EVENT_READ | (selectors.EVENT_WRITE if handle.has_unsent else 0)
+        if not handle.events:
+            self._selector.register(handle, events, handle)
+        elif events != handle.events:
+            self._selector.modify(handle, events, handle)
+        handle.events = events
 
-    def _hang_up(self, participant: RemoteParticipant) -> None:
-        self._selector.unregister(participant)
-        participant.has_hung_up = True
-        if participant.has_left:
-            participant.close()
+    def _hang_up(self, handle: Handle) -> None:
+        self._selector.unregister(handle)
+        handle.has_hung_up = True
+        if handle.has_left:
+            handle.close()
 
     def _new_ends(self) -> list[Handle]:
         """Return the programs that have ended since the last call."""
         ended = [
             handle
             for handle in self.handles
-            if handle.participant.has_hung_up and not handle.is_running and not handle.has_been_reported
+            if handle.has_hung_up and not handle.is_running and not handle.is_end_reported
         ]
         for handle in ended:
-            handle.has_been_reported = True
+            handle.is_end_reported = True
         self._drop_replaced()
         return ended
 
     def _drop_replaced(self) -> None:
         """Drop programs whose end has been reported and whose robot has had another program since."""
         last = {handle.robot: handle for handle in self.handles}
-        self.handles = [each for each in self.handles if last[each.robot] is each or not each.has_been_reported]
+        self.handles = [each for each in self.handles if last[each.robot] is each or not each.is_end_reported]
 
     def _report_end(self, handle: Handle) -> None:
         """Report how a program has ended."""
-        self._say(f"{handle.name} {'was stopped' if handle.participant.is_stopped else f'has ended {handle.how}'}.")
-        left = [other.participant for other in self.handles if other.is_running and other.participant.is_here]
-        if left and not any(participant.is_waited_for for participant in left):
-            names = ", ".join(participant.name for participant in left)
+        self._say(f"{handle.name} {'was stopped' if handle.is_stopped else f'has ended {handle.how}'}.")
+        left = [other for other in self.handles if other.is_running and other.is_here]
+        if left and not any(other.is_waited_for for other in left):
+            names = ", ".join(other.name for other in left)
             _log.warning("%s, which the world does not wait for, still runs. Ctrl-C ends it.", names)
 
     def _missing(self) -> str:
-        return ", ".join(each.name for each in self.handles if not each.participant.is_here) or "a program elsewhere"
+        return ", ".join(each.name for each in self.handles if not each.is_here) or "a program elsewhere"
 
     def _wake(self) -> None:
         """Wake `round`."""

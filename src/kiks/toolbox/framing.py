@@ -22,6 +22,8 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator
 
+from kiks.ports.messages import AwaitedAnswer
+
 LINE_MAX = 1 << 26
 """Longest request [bytes]: enough for all arenas except very large ones of noise."""
 
@@ -75,7 +77,7 @@ BUSY = frame("~")
 SESSION_GOES_ON = frame(">")
 
 
-class Exchange:
+class Exchange(AwaitedAnswer):
     """The connection to a program over two descriptors. At first the program waits for the greeting.
 
     One thread calls `lines` and `reply`; the heartbeat calls `beat`.
@@ -88,8 +90,6 @@ class Exchange:
         said: The bytes received so far.
 
     Attributes:
-        is_cancelled: Whether the program has stopped waiting for the answer under way.
-        is_held: Whether the program has not confirmed that it waits.
         has_left: Whether it has closed the connection or sent `LEAVE`.
         on_cancel: Called by the heartbeat while a cancelled request is under way.
     """
@@ -103,10 +103,9 @@ class Exchange:
         parent: int = 0,
         said: bytes = b"",
     ) -> None:
+        super().__init__()
         self.source = source
         self._close: Callable[[], None] | None = close
-        self.is_cancelled = False
-        self.is_held = False
         self.has_left = False
         self.on_cancel: Callable[[], None] = lambda: None
         self._sink = sink

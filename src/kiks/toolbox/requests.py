@@ -74,7 +74,7 @@ def answer(client: SessionClient, line: str) -> str:
             raise ParameterError(
                 f"a request must have at most {WORDS_MAX} characters, but this one, {shown(name)}, has {len(words)}."
             )
-        if client.is_halted and act is not _poll:
+        if client.awaited.is_halted and act is not _poll:
             raise HaltError(HALT_MESSAGE)
         result = act(client, words)
         if len(result) > ANSWER_MAX:
@@ -82,7 +82,7 @@ def answer(client: SessionClient, line: str) -> str:
                 f"an answer must have at most {ANSWER_MAX} characters, but this one, to {shown(name)}, has "
                 f"{len(result)}. Ask for less: a path begins anew when the port is opened anew."
             )
-        if client.is_halted:
+        if client.awaited.is_halted:
             raise HaltError(HALT_MESSAGE)
         return f"+{client.clock()}{result}"
     except TurretOrder as asked:

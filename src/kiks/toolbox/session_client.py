@@ -16,7 +16,8 @@ from typing import TypeVar
 from kiks.clock.program_clock import ProgramClock
 from kiks.errors import KiksError, LinkError, ParameterError
 from kiks.model.arena import Arena
-from kiks.ports.local_link import AwaitedAnswer, LocalConnection, PendingAnswer
+from kiks.ports.local_link import LocalConnection
+from kiks.ports.messages import AwaitedAnswer
 from kiks.ports.remote_link import RemoteLine
 from kiks.sim.port import VirtualPort
 from kiks.sim.simulation import Simulation
@@ -90,7 +91,7 @@ class SessionClient:
     Args:
         session: The session.
         number: Its number, from 1 in the order of joining.
-        pending: State of the answer under way; if left out, the program waits for every answer.
+        awaited: The answer under way; if left out, the program waits for every answer.
 
     Attributes:
         ports: The open ports by number: 1 for port -1.
@@ -98,14 +99,14 @@ class SessionClient:
         asked: Number of the port that the present request concerns; 0 for none.
         film: The film that it makes of the world; None for none.
         turrets: The names of the turrets that are functions of the program, by their numbers.
-        is_halted: Whether Halt was pressed on the desk, and the program does not know yet.
+        awaited: The answer under way.
         last_line: Number of the line of the desk's log that it has printed last; 0 for none.
         typed: Commands for the program to evaluate that people have typed on the desk, the oldest first.
     """
 
-    def __init__(self, session: Session, number: int, pending: PendingAnswer | None = None) -> None:
+    def __init__(self, session: Session, number: int, awaited: AwaitedAnswer | None = None) -> None:
         self.session = session
-        self._pending = AwaitedAnswer() if pending is None else pending
+        self.awaited = AwaitedAnswer() if awaited is None else awaited
         self.number = number
         self.name = f"program {number} (Octave or MATLAB)"
         self.asked = 0
@@ -113,7 +114,6 @@ class SessionClient:
         self.openings: dict[int, OpenPort] = {}
         self.film: SessionFilm | None = None
         self.turrets: dict[int, str] = {}
-        self.is_halted = False
         self.last_line = 0
         self.typed: deque[str] = deque()
         self._sim: Simulation | None = None
@@ -142,7 +142,9 @@ class SessionClient:
             self._sim = sim
         if self._connection is None:
             assert session.desk is not None
-            self._connection = LocalConnection(session.desk.programs, self.name, self.number, self, SILENCE_ADVICE)
+            self._connection = LocalConnection(
+                session.desk.programs, self.name, self.number, self.awaited, SILENCE_ADVICE
+            )
         if not self.ports:
             self._connection.wake()
             # A new clock, so that the time without an open port does not count as thinking.
@@ -226,18 +228,8 @@ class SessionClient:
 
     def halt(self) -> None:
         """Stop the program: the request under way, or else the next one, fails; from any thread."""
-        self.is_halted = True
+        self.awaited.is_halted = True
         self.cancel()
-
-    @property
-    def is_cancelled(self) -> bool:
-        """Whether nothing waits for the answer under way."""
-        return self.is_halted or self._pending.is_cancelled
-
-    @property
-    def is_held(self) -> bool:
-        """Whether the program has yet to confirm that it waits; until then its pause must not go on."""
-        return self._pending.is_held
 
     def next_command(self) -> str:
         """Return the answer that makes the program evaluate the next typed command; there is one."""
@@ -245,9 +237,9 @@ class SessionClient:
 
     def take_halt(self) -> bool:
         """Return whether the program was halted since the last call; then its ports are closed and its robots stop."""
-        if not self.is_halted:
+        if not self.awaited.is_halted:
             return False
-        self.is_halted = False
+        self.awaited.is_halted = False
         if self._connection is not None:
             self._connection.halt()
             self._connection = None
@@ -341,11 +333,11 @@ class SessionClient:
         with suppress(LinkError):  # the world may have been replaced
             self.do(lambda sim: None)
 
-        def check_pending(share: float) -> None:
-            if self._pending.is_cancelled:
+        def check_awaited(share: float) -> None:
+            if self.awaited.is_cancelled:
                 raise LinkError("The program was interrupted; the film was discarded.")
 
-        return film.save(check_pending)
+        return film.save(check_awaited)
 
     # ---- time ----
 
