@@ -12,7 +12,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
 from io import FileIO
@@ -57,8 +57,8 @@ class Changes:
         self.owners: dict[str, Any] = {}
         self.missing: list[str] = []
 
-    def note(self, replacements: patching.Replacements) -> None:
-        for path, names in replacements.items():
+    def note(self, replacements: list[tuple[str, Mapping[str, Any]]]) -> None:
+        for path, names in replacements:
             owner = patching._find(path)
             if owner is None:
                 self.missing.append(path)
@@ -83,14 +83,14 @@ class Changes:
 
 @pytest.fixture
 def changes(monkeypatch: pytest.MonkeyPatch) -> Changes:
-    noted, change = Changes(), patching._change
+    noted, change = Changes(), patching.change
 
-    def note(replacements: patching.Replacements, scheduler: Scheduler, undo: Undo) -> None:
-        noted.note(replacements)
+    def note(replacements: Iterable[tuple[str, Mapping[str, Any]]], scheduler: Scheduler, undo: Undo) -> None:
+        noted.note(listed := list(replacements))
         noted.before = noted.state()
-        change(replacements, scheduler, undo)
+        change(listed, scheduler, undo)
 
-    monkeypatch.setattr(patching, "_change", note)
+    monkeypatch.setattr(patching, "change", note)
     return noted
 
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial, update_wrapper
+from itertools import chain
 from types import BuiltinFunctionType
 from typing import Any
 
@@ -33,7 +34,7 @@ class Reading:
 
 
 @contextmanager
-def replaced(replacements: Replacements, scheduler: Scheduler) -> Iterator[None]:
+def replaced(parts: Iterable[Replacements], scheduler: Scheduler) -> Iterator[None]:
     """Let names of modules and classes mean something else, for the threads of a program.
 
     A function in C stays the same object and gets another body, which the program and its libraries reach. KiKS, and
@@ -41,20 +42,21 @@ def replaced(replacements: Replacements, scheduler: Scheduler) -> Iterator[None]
     A class stays the same object and gets an attribute; a method that must tell callers apart uses `for_program`.
 
     Args:
-        replacements: What stands in. A module that has not been imported, or has no such name, is left alone.
+        parts: What stands in. A module that has not been imported, or has no such name, is left alone.
         scheduler: The threads of the program.
     """
     undo = Undo()
     try:
-        with uncollected():
-            _change(replacements, scheduler, undo)
+        change(chain.from_iterable(part.items() for part in parts), scheduler, undo)
         yield
     finally:
         undo()
 
 
-def _change(replacements: Replacements, scheduler: Scheduler, undo: Undo) -> None:
-    for path, names in replacements.items():
+@uncollected()
+def change(replacements: Iterable[tuple[str, Mapping[str, Any]]], scheduler: Scheduler, undo: Undo) -> None:
+    """Put in what stands in, by path; see `replaced`."""
+    for path, names in replacements:
         owner = _find(path)
         for name, value in names.items():
             before = vars(owner).get(name, _MISSING) if owner is not None else _MISSING

@@ -9,9 +9,6 @@ from types import FrameType
 
 from kiks.script.thread_scheduler import Scheduler
 
-ADVICE = "run it on kiks serve, where time is real."
-"""Advice for a program that cannot run in simulated time."""
-
 OURS = (str(Path(__file__).parent.parent), os.path.dirname(os.__file__))
 """Folders of foreign code: KiKS, and Python's own library."""
 
@@ -19,14 +16,15 @@ INSTALLED = ("site-packages", "dist-packages")
 """Folders in which libraries are installed."""
 
 
+def refusal(must: str, given: str, way: str = "") -> str:
+    """Return the line for a program: what it must do, what it did, and what to do instead."""
+    advice = f"{way}run it on kiks serve, where time is real."
+    return f"a program in simulated time must {must}, but {given}. {advice[0].upper()}{advice[1:]}"
+
+
 def refuse(scheduler: Scheduler, must: str, given: str, way: str = "") -> None:
-    """End the program with one line: what it must do, what it did, and what to do instead."""
-    advice = way + ADVICE
-    scheduler.end(
-        1,
-        f"a program in simulated time must {must}, but {given}{where(sys._getframe())}. "
-        f"{advice[0].upper()}{advice[1:]}",
-    )
+    """End the program with this line."""
+    scheduler.end(1, refusal(must, given + where(sys._getframe()), way))
 
 
 def refuse_network(scheduler: Scheduler, given: str) -> None:

@@ -128,7 +128,7 @@ def run_program(
         sys.stdout.flush()
         scheduler.end(code)
 
-    replacements = _merged(
+    replacements = (
         cpython.thread_starts(scheduler),
         cpython.thread_locals(),
         locks.replacements(scheduler),
@@ -176,14 +176,6 @@ def run_program(
     finally:
         cpython.forget_threads(scheduler.tasks)
         sys.excepthook = hook_before
-
-
-def _merged(*parts: dict[str, dict[str, Any]]) -> dict[str, dict[str, Any]]:
-    whole: dict[str, dict[str, Any]] = {}
-    for part in parts:
-        for module, names in part.items():
-            whole.setdefault(module, {}).update(names)
-    return whole
 
 
 class _AtExit:

@@ -13,6 +13,7 @@ import sys
 from _multiprocessing import SemLock  # type: ignore[import-not-found]
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 from multiprocessing.process import BaseProcess
 from subprocess import Popen
 from typing import Any
@@ -76,7 +77,7 @@ def replacements(scheduler: Scheduler) -> dict[str, dict[str, Any]]:
 @contextmanager
 def watched(scheduler: Scheduler, system: FileSystem) -> Iterator[None]:
     """End the program where it leaves simulated time."""
-    _hook.install()
+    _install()
     _watching.append((scheduler, system))
     try:
         yield
@@ -84,26 +85,19 @@ def watched(scheduler: Scheduler, system: FileSystem) -> Iterator[None]:
         _watching.pop()
 
 
-class _Hook:
-    """The audit hook; Python cannot remove one."""
-
-    is_installed = False
-
-    def install(self) -> None:
-        if not self.is_installed:
-            self.is_installed = True
-            sys.addaudithook(self._hear)
-
-    def _hear(self, event: str, arguments: tuple[Any, ...]) -> None:
-        if _watching and (
-            event in ("open", "import") or event in socket_waits.EVENTS or event in _FORKS or event in _STARTS
-        ):
-            scheduler, system = _watching[-1]
-            if scheduler.is_here:
-                _judge(scheduler, system, event, arguments)
+@cache
+def _install() -> None:
+    """Install the audit hook, once: Python cannot remove one."""
+    sys.addaudithook(_hear)
 
 
-_hook = _Hook()
+def _hear(event: str, arguments: tuple[Any, ...]) -> None:
+    if _watching and (
+        event in ("open", "import") or event in socket_waits.EVENTS or event in _FORKS or event in _STARTS
+    ):
+        scheduler, system = _watching[-1]
+        if scheduler.is_here:
+            _judge(scheduler, system, event, arguments)
 
 
 def _judge(scheduler: Scheduler, system: FileSystem, event: str, arguments: tuple[Any, ...]) -> None:

@@ -22,7 +22,7 @@ from types import FrameType
 
 from kiks.ending import leave, tell
 from kiks.script import thread_scheduler
-from kiks.script.refusals import ADVICE, OURS, where
+from kiks.script.refusals import OURS, refusal, where
 from kiks.script.thread_scheduler import Scheduler
 
 SAMPLE_S = 0.05
@@ -189,11 +189,7 @@ class _Watch:
         return where(self._frame())
 
     def _tell(self, what: str, way: str = "") -> None:
-        advice = way + ADVICE
-        self._message = (
-            "a program in simulated time must wait by time.sleep, a lock or a port, but "
-            f"{what}. {advice[0].upper()}{advice[1:]}"
-        )
+        self._message = refusal("wait by time.sleep, a lock or a port", what, way)
         with suppress(OSError):
             signal.pthread_kill(self._watched, _SIGNAL)
         if not self._going_on.acquire(timeout=GRACE_S):

@@ -9,14 +9,15 @@ from contextlib import contextmanager
 from importlib.abc import MetaPathFinder
 from importlib.machinery import ModuleSpec
 from types import ModuleType
-from typing import Any
 
+from kiks.script.cpython import Undo
 from kiks.script.libraries import c_calls, c_waits, tk_loop
 from kiks.script.libraries.host import Host
+from kiks.script.patching import Replacements, change
 from kiks.units import NS_PER_S
 
-Adapter = Callable[[ModuleType, Host], dict[Any, dict[str, Any]]]
-"""Returns what stands in for names, by the module or class that has them."""
+Adapter = Callable[[ModuleType, Host], Replacements]
+"""Gets a library that has been imported; returns what stands in for its names."""
 
 
 def _adapters() -> dict[str, Adapter]:
@@ -33,28 +34,25 @@ def _adapters() -> dict[str, Adapter]:
     }
 
 
-def _seed_numpy(module: ModuleType, host: Host) -> dict[Any, dict[str, Any]]:
+def _seed_numpy(module: ModuleType, host: Host) -> Replacements:
     """Seed the generator that NumPy's functions share."""
     module.seed(host.chance.number("numpy", 32))
     return {}
 
 
-def _adapt_cv2(module: ModuleType, host: Host) -> dict[Any, dict[str, Any]]:
+def _adapt_cv2(_: ModuleType, host: Host) -> Replacements:
     """Count ticks in simulated nanoseconds."""
-    return {module: {"getTickCount": host.clock.ask_ns, "getTickFrequency": lambda: float(NS_PER_S)}}
+    return {"cv2": {"getTickCount": host.clock.ask_ns, "getTickFrequency": lambda: float(NS_PER_S)}}
 
 
 @contextmanager
 def adapted(host: Host) -> Iterator[None]:
     """Let libraries wait in simulated time, those that are imported meanwhile, too."""
     adapters = _adapters()
-    undo: list[tuple[Any, str, Any]] = []
+    undo = Undo()
 
     def adapt(name: str, module: ModuleType) -> None:
-        for owner, names in adapters[name](module, host).items():
-            for attribute, value in names.items():
-                undo.append((owner, attribute, vars(owner)[attribute]))
-                setattr(owner, attribute, value)
+        change(adapters[name](module, host).items(), host.scheduler, undo)
 
     for name in adapters:
         if name in sys.modules:
@@ -65,8 +63,7 @@ def adapted(host: Host) -> Iterator[None]:
         yield
     finally:
         sys.meta_path.remove(finder)
-        for owner, attribute, value in reversed(undo):
-            setattr(owner, attribute, value)
+        undo()
 
 
 class _Finder(MetaPathFinder):

@@ -22,6 +22,7 @@ from typing import Any
 from kiks.clock.program_clock import calendar_ns
 from kiks.script.clocks import CALENDARS
 from kiks.script.libraries.host import Host
+from kiks.script.patching import Replacements
 from kiks.units import NS_PER_S
 
 _NAMES, _NAMES_SIZE, _SYMBOLS, _CALLS, _CALLS_SIZE, _DATA, _DATA_SIZE = 5, 10, 6, 23, 2, 7, 8
@@ -90,10 +91,10 @@ def loaded(pattern: str) -> list[str]:
     return sorted(file for file in files if re.search(pattern, os.path.basename(file)))
 
 
-def adapt_extension(name: str) -> Callable[[ModuleType, Host], dict[Any, dict[str, Any]]]:
+def adapt_extension(name: str) -> Callable[[ModuleType, Host], Replacements]:
     """Return an adapter that lets a module in C tell the program's date; nothing more stands in."""
 
-    def adapt(_: ModuleType, host: Host) -> dict[Any, dict[str, Any]]:
+    def adapt(_: ModuleType, host: Host) -> Replacements:
         code = sys.modules.get(name)
         if code is not None and code.__file__:
             # A program may ask in a loop, so that asking costs time.
@@ -106,7 +107,7 @@ def adapt_extension(name: str) -> Callable[[ModuleType, Host], dict[Any, dict[st
     return adapt
 
 
-def adapt_sqlite(module: ModuleType, host: Host) -> dict[Any, dict[str, Any]]:
+def adapt_sqlite(module: ModuleType, host: Host) -> Replacements:
     """Let `current_timestamp` and the like tell the program's date, and `random` follow from its seed."""
     for each in loaded("sqlite3"):
         redirect(each, date_functions(lambda: host.scheduler.world.now_ns), host)

@@ -12,6 +12,7 @@ from typing import Any
 
 from kiks.script.libraries.c_calls import date_functions, loaded, redirect
 from kiks.script.libraries.host import Host, refuse_keyboard
+from kiks.script.patching import Replacements
 from kiks.script.thread_scheduler import timeout_ns
 from kiks.sim.read_completion import NEVER_NS
 from kiks.units import NS_PER_S
@@ -27,7 +28,7 @@ _Ring = ctypes.CFUNCTYPE(ctypes.c_uint32, ctypes.c_uint32, _Pointer)
 _AddTimer = ctypes.CFUNCTYPE(_Int, ctypes.c_uint32, _Ring, _Pointer)
 
 
-def adapt_curses(_: ModuleType, host: Host) -> dict[Any, dict[str, Any]]:
+def adapt_curses(_: ModuleType, host: Host) -> Replacements:
     """Let waits for keys and `napms` take simulated time."""
     system = ctypes.CDLL(None)
     real_poll, real_read = _Poll(("poll", system)), _Read(("read", system))
@@ -57,7 +58,7 @@ def adapt_curses(_: ModuleType, host: Host) -> dict[Any, dict[str, Any]]:
     return {}
 
 
-def adapt_pygame(module: ModuleType, host: Host) -> dict[Any, dict[str, Any]]:
+def adapt_pygame(module: ModuleType, host: Host) -> Replacements:
     """Let clocks, waits and timers of `pygame.time` take simulated time."""
     scheduler, start_ns, numbers = host.scheduler, host.scheduler.world.now_ns, count(1)
 
@@ -85,7 +86,7 @@ def adapt_pygame(module: ModuleType, host: Host) -> dict[Any, dict[str, Any]]:
     return {}
 
 
-def adapt_pygame_events(module: ModuleType, host: Host) -> dict[Any, dict[str, Any]]:
+def adapt_pygame_events(module: ModuleType, host: Host) -> Replacements:
     """Return what stands in for names of `pygame.event`."""
     world, real_post = host.scheduler.world, module.post
 
@@ -100,4 +101,4 @@ def adapt_pygame_events(module: ModuleType, host: Host) -> dict[Any, dict[str, A
             host.wait_for_event("an event of pygame", until_ns)
         return event
 
-    return {module: {"post": post, "wait": wait}}
+    return {"pygame.event": {"post": post, "wait": wait}}

@@ -10,6 +10,7 @@ from types import ModuleType
 from typing import Any
 
 from kiks.script.libraries.host import Host
+from kiks.script.patching import Replacements
 from kiks.sim.read_completion import NEVER_NS
 
 _DONT_WAIT = 1 << 1
@@ -19,7 +20,7 @@ _NEVER_MS = 1 << 31
 """Delay of a timer of Tcl that KiKS calls itself [ms of real time]."""
 
 
-def adapt(tkinter: ModuleType, host: Host) -> dict[Any, dict[str, Any]]:
+def adapt(tkinter: ModuleType, host: Host) -> Replacements:
     """Return what stands in for names of tkinter."""
     world, numbers = host.scheduler.world, count()
     # Timers of Tcl, each with the time at which it is due; Tcl knows what it calls, and whether it was cancelled.
@@ -89,4 +90,4 @@ def adapt(tkinter: ModuleType, host: Host) -> dict[Any, dict[str, Any]]:
     }
     default = {"mainloop": lambda n=0: tkinter._get_default_root("run the main loop").mainloop(n)}
     quit_ = {"quit": lambda self: quits.add(self._root())}
-    return {Misc: {"after": after, "update": update, **waits, **quit_}, tkinter: default}
+    return {"tkinter.Misc": {"after": after, "update": update, **waits, **quit_}, "tkinter": default}
