@@ -8,8 +8,7 @@ from typing import Any
 
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Page, Playwright, expect, sync_playwright
-from tests.desk.visitor import Visitor, open_desk
-from tests.desk.visits import NewPage
+from tests.desk.visitor import NewPage, Visitor, open_desk
 from tests.guard import GUARD_S
 
 from kiks.desk.server.show import Shown

@@ -11,8 +11,7 @@ import pytest
 from nicegui import Client
 from playwright.sync_api import expect
 from tests.at_length import at_length, cases, share
-from tests.desk.visitor import Visitor
-from tests.desk.visits import NewPage
+from tests.desk.visitor import NewPage, Visitor
 
 from kiks.desk.panels.page import Page
 from kiks.desk.server.server import SERVER
@@ -112,7 +111,7 @@ def test_tab_reaches_everything(visitor: Visitor, tab: str, inside: tuple[str, .
 @pytest.mark.parametrize("theme", cases(["Light", "Dark"]))
 def test_everything_has_a_name_and_enough_contrast(visitor: Visitor, theme: str) -> None:
     visitor.choose("dark", theme)
-    expect(visitor.page.locator("body.body--dark")).to_have_count(int(theme == "Dark"))
+    expect(visitor.page.locator("body.body--dark .kiks-arena.kiks-dark")).to_have_count(int(theme == "Dark"))
     for tab in TABS:
         visitor.tab(tab)
         visitor.page.mouse.move(5, 400)

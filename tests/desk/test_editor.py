@@ -12,11 +12,11 @@ import pytest
 from PIL import Image
 from playwright.sync_api import expect
 from tests.at_length import at_length
-from tests.desk.visitor import Visitor
-from tests.desk.visits import NewPage
+from tests.desk.visitor import NewPage, Visitor
 
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.show import Shown
+from kiks.model import brush
 from kiks.model.arena import Arena, Pose
 from kiks.model.project import Project
 from kiks.sim.from_project import simulation_of
@@ -100,6 +100,24 @@ def test_walls_are_drawn_and_undone(desk: Desk, visitor: Visitor) -> None:
     visitor.at("tool-rectangle").wait_for(state="detached")
     visitor.drag((120, 120), (150, 180))
     visitor.until(lambda: desk.sim.pose(1)[1] > 170)
+
+
+def test_strokes_snap_to_the_grid_end_at_the_arena_and_are_dropped_with_escape(desk: Desk, visitor: Visitor) -> None:
+    arena = brush.line(desk.sim.arena, [(400, 300), (600, 300)], width_mm=10)
+    walls = brush.rectangle(arena, 200, 380, 260, 420).brightness
+    visitor.choose("snap", "10 mm")
+    visitor.take("line")
+    visitor.pull((200, 250), (250, 250))
+    visitor.page.keyboard.press("Escape")
+    visitor.page.mouse.up()
+    visitor.drag((400, 300), (620, 300))
+    wait_for_step(visitor)
+    visitor.take("rectangle")
+    visitor.drag((198, 382), (263, 417))
+    visitor.until(lambda: np.array_equal(desk.sim.arena.brightness, walls))
+    visitor.take("ball")
+    click(visitor, 303, 198)
+    visitor.until(lambda: desk.sim.bodies()["x_mm"].tolist() == [300])
 
 
 def test_worlds_are_created_saved_and_opened(desk: Desk, visitor: Visitor) -> None:

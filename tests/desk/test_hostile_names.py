@@ -9,8 +9,7 @@ from pathlib import Path
 
 import pytest
 from playwright.sync_api import expect
-from tests.desk.visitor import INSIDE, Visitor, make_project, open_desk
-from tests.desk.visits import NewPage
+from tests.desk.visitor import INSIDE, NewPage, Visitor, make_project, open_desk
 
 import kiks.desk
 from kiks.ports.program_process import Command

@@ -10,8 +10,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import expect
 from tests.at_length import at_length
-from tests.desk.visitor import Visitor, make_project, open_desk
-from tests.desk.visits import NewPage
+from tests.desk.visitor import NewPage, Visitor, make_project, open_desk
 
 from kiks.model.arena_objects import Lamp, Pose
 from kiks.model.project import ProjectRobot

@@ -11,8 +11,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Page, expect
 from tests.at_length import at_length, share
-from tests.desk.visitor import FIRST_PICTURE, leave_picture
-from tests.desk.visits import NewPage
+from tests.desk.visitor import FIRST_PICTURE, NewPage, leave_picture
 from tests.forked import kiks_command
 from tests.matlab.octave import need_tcp, needs_octave
 from tests.matlab.terminal import Terminal

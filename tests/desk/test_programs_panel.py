@@ -7,8 +7,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import expect
 from tests.at_length import at_length
-from tests.desk.visitor import Visitor, make_project
-from tests.desk.visits import NewPage
+from tests.desk.visitor import NewPage, Visitor, make_project
 
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.show import Shown

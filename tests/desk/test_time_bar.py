@@ -9,8 +9,7 @@ import pytest
 from playwright.sync_api import expect
 from tests.at_length import at_length
 from tests.desk.test_looking_back import drive
-from tests.desk.visitor import Visitor
-from tests.desk.visits import NewPage
+from tests.desk.visitor import NewPage, Visitor
 
 from kiks import Khepera, Recording, Simulation
 from kiks.desk.server.desk import Desk

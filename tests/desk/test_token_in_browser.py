@@ -10,8 +10,7 @@ from urllib.parse import urlsplit
 import pytest
 from playwright.sync_api import Browser, expect
 from tests.at_length import at_length
-from tests.desk.visitor import FIRST_PICTURE, Visitor, leave_picture
-from tests.desk.visits import NewPage
+from tests.desk.visitor import FIRST_PICTURE, NewPage, Visitor, leave_picture
 from tests.guard import GUARD_S
 
 from kiks.desk.server.server import SERVER

@@ -34,6 +34,9 @@ FIRST_PICTURE = "() => window.kiksDesk?.stats().frames_drawn > 3 && kiksDesk.pos
 INSIDE = {"robot": "proximity-0", "wire": "console", "arena": "save", "programs": "editor", "settings": "apply"}
 """Something in each tab."""
 
+NewPage = Callable[..., Page]
+"""What the fixture `new_page` of conftest.py is."""
+
 Fact = TypeVar("Fact")
 
 
@@ -146,10 +149,16 @@ class Visitor:
         x, y = self.page.evaluate("([x, y]) => kiksDesk.toClient(x, y)", [x_mm, y_mm])
         return x, y
 
-    def pull(self, start: tuple[float, float], end: tuple[float, float]) -> None:
+    def feed(self, expression: str) -> Any:
+        """Return the value of an expression in JavaScript that may use the page's `feed`."""
+        return self.answer(
+            f"import('kiks-desk').then(({{ pageFeed }}) => {{ const feed = pageFeed(); return {expression}; }})"
+        )
+
+    def pull(self, start: tuple[float, float], end: tuple[float, float], button: Any = "left") -> None:
         """Press the mouse at a place, and bring it to another one without letting go."""
         self.page.mouse.move(*self.on_page(*start))
-        self.page.mouse.down()
+        self.page.mouse.down(button=button)
         self.page.mouse.move(*self.on_page(*end), steps=8)
 
     def let_go(self) -> None:

@@ -24,7 +24,7 @@ from kiks.recording.replay import Replay
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
-    from tests.desk.visits import NewPage
+    from tests.desk.visitor import NewPage
 
 EVIL = (
     "</script><script>document.title = 'evil'</script><img src=x onerror=\"document.title = 'evil'\">{{ 123457 * 2 }}"
