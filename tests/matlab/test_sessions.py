@@ -253,145 +253,76 @@ ONLY_REF = re.findall(
     """,
 )
 
+
+def calls(text: str) -> list[str]:
+    """Return calls that are separated by two blanks or the end of a line."""
+    return re.split(r"\s{2,}", text.strip())
+
+
 WRONG_REFS = ["[]", "5", "'xxxx'", "[-7 -7 -7 -7]", "[-1 -1]", "[-1.5 -1.5 -1.5 -1.5]", "nan(1, 4)", "[7 9600 1 1]"]
 
-WRONG = [
-    *(f"{name}({ref})" for name in ONLY_REF for ref in WRONG_REFS),
-    "kiks_record(5)",
-    "kiks_record('run.mp4')",
-    "kiks_recordmovie(5)",
-    "kiks_recordmovie({})",
-    "kiks_recordmovie(['ab'; 'cd'])",
-    "kSetSpeed(ref, NaN, 1)",
-    "kSetSpeed(ref, 'a', 'b')",
-    "kSetSpeed(ref, 1)",
-    "kSetSpeed()",
-    "kMoveTo(ref)",
-    "kMoveTo(ref, NaN, 1)",
-    "kSetEncoders(ref, 'a', 1)",
-    "kSetProfile(ref, NaN)",
-    "kSetSpeedPID(ref, NaN)",
-    "kSetPositionPID(ref, NaN)",
-    "kLED(ref)",
-    "kLED(ref, 0, NaN)",
-    "kLED(ref, [0 1], [1 1 1])",
-    "kGetAnalog(ref)",
-    "kGetAnalog(ref, NaN)",
-    "kSetPWM(ref, 1)",
-    "kSetPWM(ref, NaN, 1)",
-    "kReadByte(ref)",
-    "kReadByte(ref, NaN)",
-    "kWriteByte(ref, 1)",
-    "kWriteByte(ref, NaN, 1)",
-    "kTurret(ref)",
-    "kTurret(ref, NaN, 'B')",
-    "kTurret(ref, 2, 5)",
-    "kTurretBios(ref)",
-    "kTurretBios(ref, NaN)",
-    "kSetArm(ref)",
-    "kSetArm(ref, NaN)",
-    "kSetGripper(ref)",
-    "kSetGripper(ref, NaN)",
-    "kRadio_send(ref)",
-    "kRadio_send(ref, NaN, 'a', 1)",
-    "kRadio_send(ref, 1, 1:3, NaN)",
-    "kRadio_send(ref, 1, 300, 1)",
-    "kcmd(ref, {})",
-    "kcmd([-7 -7 -7 -7], 'N')",
-    "kiks_ksend()",
-    "kiks_ksend(['N' 10])",
-    "kiks_ksend(['N' 10], -1)",
-    "kiks_ksend(['a'; 'b'], ref)",
-    "kiks_ksend(['N' 10], [-7 -7 -7 -7])",
-    "ksend()",
-    "ksend('N', -1)",
-    "ksends()",
-    "ksends('N', -1)",
-    "kopen()",
-    "kopen({})",
-    "kopen(NaN)",
-    "kopen([0 9600 -1])",
-    "kopen('nowhere')",
-    "kopen('/dev/nowhere', 9600, 1)",
-    "kopen([99 9600 1])",
-    "kopen([-1 9600 1])",
-    "kiks_kopen()",
-    "kiks_kopen(-1)",
-    "kiks_kopen([-1 0])",
-    "kiks_kopen([-1 9600 -1])",
-    "kiks_kopen(-1.5)",
-    "kiks_kopen([-2 1e9])",
-    "kiks_kclose('a')",
-    "kiks_kclose(NaN)",
-    "kiks_ktime('x')",
-    "kiks_ktime(-1.5)",
-    "kiks_pause()",
-    "kiks_pause(NaN)",
-    "kiks_pause([1 2])",
-    "kiks_print(5)",
-    "kiks_status({})",
-    "kiks_demo(0)",
-    "kiks_demo('tennis')",
-    "kiks_delete_object()",
-    "kiks_delete_object(0)",
-    "kiks_delete_object(99)",
-    "kiks_spawn()",
-    "kiks_spawn(7)",
-    "kiks_spawn(2, [NaN 1])",
-    "kiks_spawn(2, [1e6 5])",
-    "kiks_siminfo_setobject()",
-    "kiks_siminfo_setobject(99)",
-    "kiks_siminfo_setobject(1, 'ab')",
-    "kiks_siminfo_setobject(1, 1, 1, Inf)",
-    "kiks_siminfo_setobject(1, 1, 1, 1, 180)",
-    "kiks_siminfo_setrobot(NaN, 1)",
-    "kiks_siminfo_setrobot(1, 1, Inf)",
-    "kiks_siminfo_setrobot(1, 1, 90)",
-    "kiks_siminfo_setrobot(1, 1, 1, 0)",
-    "kiks_siminfo_robotpos(0)",
-    "kiks_siminfo_robotpath('a')",
-    "kiks_siminfo_robotdist(1)",
-    "kiks_load()",
-    "kiks_load(5)",
-    "kiks_load('nowhere.kad')",
-    "kiks_load('nowhere')",
-    "kiks_save()",
-    "kiks_save(5)",
-    "kiks_save('x.png')",
-    "kiks_save('/nowhere/x.kad')",
-    "kiks_arena('x.tif')",
-    "kiks_arena(zeros(200, 200, 2))",
-    "kiks_arena(0.5 * ones(200))",
-    "kiks_arena(zeros(200), ones(3))",
-    "kiks_arena(zeros(200), 300 * ones(200))",
-    "kiks_arena(@sin)",
-    "kiks('--what')",
-    "kiks('--join', 'x')",
-    "kiks('--join')",
-    "kiks_kad2arena()",
-    "kiks_kad2arena([100 100 4 1])",
-    "kiks_generate_maze(0)",
-    "kiks_generate_maze(2, 2, 10)",
-    "kiks_arena_new_create()",
-    "kiks_arena_new_create(50, 50)",
-    "kiks_arena_new_create(200, 200, 0, 300)",
-    "kiks_speedtest(0)",
-    "kiks_calibrate(-5)",
-    "kiks_calibrate(-1, 5)",
-    "kBraitenberg(ref, NaN)",
-    "kBraitenberg(ref, 1, -1)",
-    "kBraitenbergG(ref, NaN)",
-    "kProximityG(ref, 5)",
-]
+WRONG = [f"{name}({ref})" for name in ONLY_REF for ref in WRONG_REFS] + calls(
+    """
+    kiks_record(5)  kiks_record('run.mp4')
+    kiks_recordmovie(5)  kiks_recordmovie({})  kiks_recordmovie(['ab'; 'cd'])
+    kSetSpeed(ref, NaN, 1)  kSetSpeed(ref, 'a', 'b')  kSetSpeed(ref, 1)  kSetSpeed()
+    kMoveTo(ref)  kMoveTo(ref, NaN, 1)
+    kSetEncoders(ref, 'a', 1)
+    kSetProfile(ref, NaN)
+    kSetSpeedPID(ref, NaN)
+    kSetPositionPID(ref, NaN)
+    kLED(ref)  kLED(ref, 0, NaN)  kLED(ref, [0 1], [1 1 1])
+    kGetAnalog(ref)  kGetAnalog(ref, NaN)
+    kSetPWM(ref, 1)  kSetPWM(ref, NaN, 1)
+    kReadByte(ref)  kReadByte(ref, NaN)
+    kWriteByte(ref, 1)  kWriteByte(ref, NaN, 1)
+    kTurret(ref)  kTurret(ref, NaN, 'B')  kTurret(ref, 2, 5)
+    kTurretBios(ref)  kTurretBios(ref, NaN)
+    kSetArm(ref)  kSetArm(ref, NaN)
+    kSetGripper(ref)  kSetGripper(ref, NaN)
+    kRadio_send(ref)  kRadio_send(ref, NaN, 'a', 1)  kRadio_send(ref, 1, 1:3, NaN)  kRadio_send(ref, 1, 300, 1)
+    kcmd(ref, {})  kcmd([-7 -7 -7 -7], 'N')
+    kiks_ksend()  kiks_ksend(['N' 10])  kiks_ksend(['N' 10], -1)  kiks_ksend(['a'; 'b'], ref)
+    kiks_ksend(['N' 10], [-7 -7 -7 -7])
+    ksend()  ksend('N', -1)
+    ksends()  ksends('N', -1)
+    kopen()  kopen({})  kopen(NaN)  kopen([0 9600 -1])  kopen('nowhere')  kopen('/dev/nowhere', 9600, 1)
+    kopen([99 9600 1])  kopen([-1 9600 1])
+    kiks_kopen()  kiks_kopen(-1)  kiks_kopen([-1 0])  kiks_kopen([-1 9600 -1])  kiks_kopen(-1.5)  kiks_kopen([-2 1e9])
+    kiks_kclose('a')  kiks_kclose(NaN)
+    kiks_ktime('x')  kiks_ktime(-1.5)
+    kiks_pause()  kiks_pause(NaN)  kiks_pause([1 2])
+    kiks_print(5)
+    kiks_status({})
+    kiks_demo(0)  kiks_demo('tennis')
+    kiks_delete_object()  kiks_delete_object(0)  kiks_delete_object(99)
+    kiks_spawn()  kiks_spawn(7)  kiks_spawn(2, [NaN 1])  kiks_spawn(2, [1e6 5])
+    kiks_siminfo_setobject()  kiks_siminfo_setobject(99)  kiks_siminfo_setobject(1, 'ab')
+    kiks_siminfo_setobject(1, 1, 1, Inf)  kiks_siminfo_setobject(1, 1, 1, 1, 180)
+    kiks_siminfo_setrobot(NaN, 1)  kiks_siminfo_setrobot(1, 1, Inf)  kiks_siminfo_setrobot(1, 1, 90)
+    kiks_siminfo_setrobot(1, 1, 1, 0)
+    kiks_siminfo_robotpos(0)
+    kiks_siminfo_robotpath('a')
+    kiks_siminfo_robotdist(1)
+    kiks_load()  kiks_load(5)  kiks_load('nowhere.kad')  kiks_load('nowhere')
+    kiks_save()  kiks_save(5)  kiks_save('x.png')  kiks_save('/nowhere/x.kad')
+    kiks_arena('x.tif')  kiks_arena(zeros(200, 200, 2))  kiks_arena(0.5 * ones(200))
+    kiks_arena(zeros(200), ones(3))  kiks_arena(zeros(200), 300 * ones(200))  kiks_arena(@sin)
+    kiks('--what')  kiks('--join', 'x')  kiks('--join')
+    kiks_kad2arena()  kiks_kad2arena([100 100 4 1])
+    kiks_generate_maze(0)  kiks_generate_maze(2, 2, 10)
+    kiks_arena_new_create()  kiks_arena_new_create(50, 50)  kiks_arena_new_create(200, 200, 0, 300)
+    kiks_speedtest(0)
+    kiks_calibrate(-5)  kiks_calibrate(-1, 5)
+    kBraitenberg(ref, NaN)  kBraitenberg(ref, 1, -1)
+    kBraitenbergG(ref, NaN)
+    kProximityG(ref, 5)
+    """
+)
 
-WITHOUT_SESSION = [
-    "kiks_spawn(2)",
-    "kiks_save('x.kad')",
-    "kiks_checkpoint()",
-    "kiks_reset()",
-    "kProximity(-ones(1, 4))",
-    "kiks_arena(ones(200))",
-]
+WITHOUT_SESSION = calls(
+    "kiks_spawn(2)  kiks_save('x.kad')  kiks_checkpoint()  kiks_reset()  kProximity(-ones(1, 4))  kiks_arena(ones(200))"
+)
 
 PREFERENCES = {
     "KIKS_SEED": "-1",
@@ -410,23 +341,13 @@ PREFERENCES = {
 
 
 # Missing arguments and arguments of a wrong kind.
-FORGOTTEN = [
-    *(f"{name}()" for name in ONLY_REF),
-    *(f"{name}({{1, 2, 3, 4}})" for name in ONLY_REF),
-    "kiks_recordmovie()",
-    "kcmd()",
-    "kcmd(ref)",
-    "kcmd(ref, ['a'; 'b'])",
-    "kiks_ksend(NaN, ref)",
-    "kSetSpeed(ref, 1 + 2i, 3)",
-    "kRadio_send(ref, 1, {1}, 1)",
-    "kBraitenberg()",
-    "kclose('/dev/ttyUSB0')",
-    "kiks_mm2p()",
-    "kiks_mm2p({})",
-    "kiks_p2mm()",
-    "kiks_p2mm({})",
-]
+FORGOTTEN = [f"{name}{arguments}" for name in ONLY_REF for arguments in ("()", "({1, 2, 3, 4})")] + calls(
+    """
+    kiks_recordmovie()  kcmd()  kcmd(ref)  kcmd(ref, ['a'; 'b'])  kiks_ksend(NaN, ref)
+    kSetSpeed(ref, 1 + 2i, 3)  kRadio_send(ref, 1, {1}, 1)  kBraitenberg()  kclose('/dev/ttyUSB0')
+    kiks_mm2p()  kiks_mm2p({})  kiks_p2mm()  kiks_p2mm({})
+    """
+)
 
 
 def test_wrong_arguments_get_messages_of_kiks(tmp_path: Path) -> None:
