@@ -59,8 +59,8 @@ def driving(sim: kiks.Simulation, seconds: float) -> Iterator[threading.Thread]:
     try:
         yield thread
     finally:
-        if sim.gate is not None:
-            sim.gate.close()
+        if sim.loop.gate is not None:
+            sim.loop.gate.close()
         thread.join(GUARD_S)
         assert not thread.is_alive()
 
@@ -68,7 +68,7 @@ def driving(sim: kiks.Simulation, seconds: float) -> Iterator[threading.Thread]:
 @pytest.mark.parametrize("speed", [None, 1000.0])
 def test_gate_changes_nothing(speed: float | None) -> None:
     alone, watched = kiks.Simulation(seed=3), kiks.Simulation(seed=3)
-    watched.gate = QuickGate(watched.lock, speed, Wall())
+    watched.loop.gate = QuickGate(watched.lock, speed, Wall())
     looks = 0
 
     def look() -> None:
@@ -77,7 +77,7 @@ def test_gate_changes_nothing(speed: float | None) -> None:
         watched.poses()
         watched.proximity(1, noise=True)
 
-    watched.gate.keep(look)
+    watched.loop.gate.keep(look)
     assert course(watched) == course(alone)
     assert looks > 100
     assert watched.now_ns == alone.now_ns
@@ -108,7 +108,7 @@ def test_thinking_time_is_not_caught_up() -> None:
 
 def test_pause_step_and_go_on() -> None:
     sim = kiks.Simulation()
-    gate = sim.gate = Gate(sim.lock, speed=None)
+    gate = sim.loop.gate = Gate(sim.lock, speed=None)
     gate.pause(sim.now_ns)
     with driving(sim, 1.0) as thread:
         for count in range(1, 4):
@@ -124,7 +124,7 @@ def test_pause_step_and_go_on() -> None:
 
 def test_requests_run_at_once_or_in_the_thread_that_moves_the_world() -> None:
     sim = kiks.Simulation()
-    gate = sim.gate = Gate(sim.lock, speed=None)
+    gate = sim.loop.gate = Gate(sim.lock, speed=None)
     assert gate.ask(lambda: threading.current_thread()).result(0) is threading.current_thread()
     with pytest.raises(ParameterError, match="robot must be the number"):
         gate.ask(lambda: sim.pose(2)).result(0)
@@ -229,7 +229,7 @@ def test_several_drags_of_all_kinds() -> None:
 
 def test_dragged_robot_stays_while_its_wheels_turn() -> None:
     sim = world()
-    gate = sim.gate = Gate(sim.lock, speed=None)
+    gate = sim.loop.gate = Gate(sim.lock, speed=None)
     drags = Drags(sim)
     drags.grab("a", "robot", 0)
     gate.keep(drags.keep)
@@ -251,7 +251,7 @@ def test_other_robots_may_push_a_dragged_robot() -> None:
     sim = kiks.Simulation(replace(kiks.Arena.box(400, 400), starts=starts), robots=4, seed=1)
     for robot in range(1, 5):
         kiks.Khepera(sim.port(robot)).set_speed(20, 20)
-    gate = sim.gate = Gate(sim.lock, speed=None)
+    gate = sim.loop.gate = Gate(sim.lock, speed=None)
     drags = Drags(sim)
     drags.grab("a", "robot", 0)
     gate.keep(drags.keep)
@@ -265,7 +265,7 @@ def test_other_robots_may_push_a_dragged_robot() -> None:
 def test_halt_ends_the_wait_of_the_program_once() -> None:
     """The program waits in a world that stands still, which nothing else would end."""
     sim = kiks.Simulation()
-    sim.gate = gate = Gate(sim.lock)
+    sim.loop.gate = gate = Gate(sim.lock)
     gate.pause(sim.now_ns)
     told: list[str] = []
 

@@ -219,7 +219,7 @@ def test_requests_of_other_pages_or_without_the_token_are_refused(shown: Shown, 
 
 def test_a_seek_shows_the_past_and_all_browsers_are_told(shown: Shown) -> None:
     sim = shown.desk.sim
-    sim.gate.set_speed(None, sim.now_ns) if sim.gate is not None else None
+    sim.loop.gate.set_speed(None, sim.now_ns) if sim.loop.gate is not None else None
     sim.run(2.0)
     with browsing(shown) as one, browsing(shown) as two:
         for time_s, there_s in ((0.5, 0.5), (99.0, 2.0), (-7, 0.0)):
@@ -279,7 +279,7 @@ def test_a_closed_desk_tells_its_browsers_and_releases_its_world() -> None:
         shown.close()
         while browser.hear() != {"kind": "gone"}:
             pass
-    assert sim.gate is None
+    assert sim.loop.gate is None
     now_ns = sim.now_ns
     sim.run(100.0)
     assert sim.now_ns == now_ns + 100_000_000_000

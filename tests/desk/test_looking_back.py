@@ -105,7 +105,7 @@ def test_the_past_equals_what_was_and_the_present_goes_on_unchanged() -> None:
         run(desk.looking.look_at(sim.now_ns - 500_000_000))
         assert desk.sim.now_ns == sim.now_ns - 500_000_000
     assert sim.loop.recorder is None
-    assert sim.gate is None
+    assert sim.loop.gate is None
 
 
 def test_a_program_that_waits_at_the_gate_goes_on_as_if_nothing_had_been() -> None:

@@ -198,7 +198,7 @@ def test_turrets_of_users_need_not_be_there_again(tmp_path: Path) -> None:
 def test_a_hand_that_drags_while_the_world_runs(tmp_path: Path) -> None:
     """The gate lets another thread act between two events; where that is depends on real time, the replay does not."""
     sim = Simulation(Arena.box(500, 500), seed=4)
-    sim.gate = Gate(sim.lock, speed=30.0)
+    sim.loop.gate = Gate(sim.lock, speed=30.0)
     drags = Drags(sim)
     is_over = threading.Event()
 

@@ -69,7 +69,7 @@ class LocalConnection(Connection):
     def pass_to(self, time_ns: int) -> None:
         """Let time pass up to a time [ns], in pieces that can be interrupted."""
         sim = self._programs.sim
-        is_watched = sim.gate is not None and sim.gate.speed is not None and not self.is_alone
+        is_watched = sim.loop.gate is not None and sim.loop.gate.speed is not None and not self.is_alone
         slice_ns = WATCHED_SLICE_NS if is_watched else SLICE_NS
         now_ns = self.now_ns
         while now_ns + slice_ns < time_ns:
@@ -96,12 +96,12 @@ class LocalConnection(Connection):
 
     def cancel(self) -> None:
         """Make the program's thread check its awaited answer at once, even in a paused world; for any thread."""
-        gate = self._programs.sim.gate
+        gate = self._programs.sim.loop.gate
         if gate is not None:
             gate.keep(self._check_at_gate)
 
     def _check_at_gate(self) -> None:
-        gate = self._programs.sim.gate
+        gate = self._programs.sim.loop.gate
         is_own = threading.get_ident() == self._thread
         if is_own or not self._awaited.is_given_up:
             assert gate is not None

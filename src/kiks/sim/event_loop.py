@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from heapq import heappop, heappush
 from typing import NoReturn, Protocol
 
@@ -14,28 +15,6 @@ from kiks.sim.run_log import WireRecorder
 from kiks.sim.wire import Wire
 from kiks.sim.world import World
 from kiks.units import TICK_NS
-
-
-class EventQueue:
-    """The events to come, so that the earliest one is found without asking every wire."""
-
-    def __init__(self) -> None:
-        self._entries: list[tuple[int, int]] = []
-
-    def add(self, time_ns: int, index: int) -> None:
-        """Add the next event of a wire, at a time [ns]."""
-        heappush(self._entries, (time_ns, index))
-
-    def first(self, wires: list[Wire]) -> tuple[int, int] | None:
-        """Return the time [ns] of the earliest event and the index of its wire; None if there is no event.
-
-        At the same instant, the wire with the lower number comes first.
-        """
-        entries = self._entries
-        # A wire that has acted, or acts sooner than it was added for, leaves an outdated entry behind.
-        while entries and wires[entries[0][1]].next_ns != entries[0][0]:
-            heappop(entries)
-        return entries[0] if entries else None
 
 
 class Supervisor(Protocol):
@@ -97,7 +76,8 @@ class EventLoop:
         self._near_ns = -1
         world.on_change = self._look_again
         self._sync = sync
-        self._events = EventQueue()
+        # A heap of times [ns], with the indices of wires: the earliest event is found without asking every wire.
+        self._events: list[tuple[int, int]] = []
 
     @property
     def recorder(self) -> Recorder | None:
@@ -126,7 +106,7 @@ class EventLoop:
 
     def add_wire(self, firmware: Firmware) -> None:
         """Add the serial line of one more robot."""
-        self.wires.append(Wire(firmware, self._events.add, len(self.wires)))
+        self.wires.append(Wire(firmware, partial(heappush, self._events), len(self.wires)))
 
     def advance_to(self, time_ns: int) -> None:
         """Let time pass up to a time [ns]; does nothing if that has passed already."""
@@ -175,19 +155,28 @@ class EventLoop:
         self._do_events_to(time_ns)
 
     def _do_events_to(self, time_ns: int) -> None:
-        world, events, wires = self.world, self._events, self.wires
-        event = events.first(wires)
-        while event is not None and event[0] <= time_ns:
+        world, wires = self.world, self.wires
+        while (event := self._next_event()) is not None and event[0] <= time_ns:
             due_ns, index = event
             if due_ns > world.now_ns:
                 world.now_ns = due_ns
             self._sync()
             wires[index].act(world.now_ns)
-            event = events.first(wires)
         if time_ns > world.now_ns:
             world.now_ns = time_ns
 
     def next_event_ns(self) -> int | None:
         """Return when a robot acts next [ns]; None while all of them wait for characters."""
-        event = self._events.first(self.wires)
+        event = self._next_event()
         return None if event is None else event[0]
+
+    def _next_event(self) -> tuple[int, int] | None:
+        """Return the time [ns] of the earliest event and the index of its wire; None if there is no event.
+
+        At the same instant, the wire with the lower number comes first.
+        """
+        events, wires = self._events, self.wires
+        # A wire that has acted, or acts sooner than it was added for, leaves an outdated entry behind.
+        while events and wires[events[0][1]].next_ns != events[0][0]:
+            heappop(events)
+        return events[0] if events else None

@@ -8,14 +8,12 @@ from contextlib import contextmanager
 from functools import partial
 from itertools import count
 from pathlib import Path
-from threading import RLock
 from typing import Any
 from weakref import WeakValueDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kiks.clock.gate import Gate
 from kiks.clock.program_clock import ProgramClock
 from kiks.engine.sensing.rays import walls_of
 from kiks.errors import ParameterError, counted, shown
@@ -34,7 +32,6 @@ from kiks.sim.sensors import Sensors
 from kiks.sim.snapshot import Snapshot, look, proximity_at, trace_rays
 from kiks.sim.things import Checkpoint, Things
 from kiks.sim.turret_host import Turrets
-from kiks.sim.wire import Wire
 from kiks.sim.world import World
 from kiks.units import ns_from_s, s_from_ns
 from kiks.upwards import draw_for_notebook, plot_simulation, record_simulation, show_in_browser
@@ -58,7 +55,9 @@ class Simulation:
 
     Attributes:
         world: The arena with all that stands and moves in it.
+        lock: Held by every thread that reads or changes the simulation.
         loop: Lets time pass, event by event.
+        wires: The robots' serial lines.
         things: Its balls, cylinders and lamps.
         program: What the computing of the program on its ports costs.
         name: The name in its ports' URLs.
@@ -108,6 +107,7 @@ class Simulation:
         self._firmwares: list[Firmware] = []
         self._turrets = Turrets(self.world, self._firmwares)
         self.loop = EventLoop(self.world, self._turrets.sync)
+        self.lock, self.wires = self.world.lock, self.loop.wires
         for index in range(self.robot_count):
             self._power_up(index)
         self._paths: Paths | None = None
@@ -159,11 +159,6 @@ class Simulation:
     # ---- what it consists of ----
 
     @property
-    def lock(self) -> RLock:
-        """Held by every thread that reads or changes the simulation."""
-        return self.world.lock
-
-    @property
     def arena(self) -> Arena:
         """The walls, and what stood in them at the beginning."""
         return self.world.arena
@@ -187,20 +182,6 @@ class Simulation:
     def robot_count(self) -> int:
         """Number of robots."""
         return self.world.robot_count
-
-    @property
-    def wires(self) -> list[Wire]:
-        """The robots' serial lines."""
-        return self.loop.wires
-
-    @property
-    def gate(self) -> Gate | None:
-        """Decides how far time may go while it is watched; None while nothing watches it."""
-        return self.loop.gate
-
-    @gate.setter
-    def gate(self, gate: Gate | None) -> None:
-        self.loop.gate = gate
 
     @property
     def lamps(self) -> NDArray[np.float64]:

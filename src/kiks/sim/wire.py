@@ -65,7 +65,7 @@ class Wire:
 
     Args:
         firmware: The robot's.
-        plan: Is called with the time [ns] and the robot's index when the next event of this line is known.
+        add_event: Is called with the time [ns] of the next event of this line and the robot's index when it is known.
         index: The robot's index.
 
     Attributes:
@@ -77,9 +77,9 @@ class Wire:
         next_ns: When the robot does something next [ns], or None while it only waits for characters.
     """
 
-    def __init__(self, firmware: Firmware, plan: Callable[[int, int], None], index: int) -> None:
+    def __init__(self, firmware: Firmware, add_event: Callable[[tuple[int, int]], None], index: int) -> None:
         self.firmware = firmware
-        self._add_event = plan
+        self._add_event = add_event
         self._index = index
         self.line = SerialTiming(firmware.baud)
         self.holder: str | None = None
@@ -119,7 +119,7 @@ class Wire:
             self.pending.append((self._last_act_ns, line, hear))
             if self.next_ns is None or self._last_act_ns < self.next_ns:
                 self.next_ns = self._last_act_ns
-                self._add_event(self.next_ns, self._index)
+                self._add_event((self.next_ns, self._index))
         if (log := self.log) is not None:
             due = list(self.pending)[len(self.pending) - len(lines) :] if lines else []
             log.send(data, start_ns, character_ns, [(k, each[0]) for (k, _), each in zip(lines, due, strict=True)])
@@ -162,7 +162,7 @@ class Wire:
         else:
             self.next_ns = min(command_ns, demo_ns)
         if self.next_ns is not None:
-            self._add_event(self.next_ns, self._index)
+            self._add_event((self.next_ns, self._index))
 
     def watch(self, now_ns: int) -> WireLog:
         """Record what goes over the line from now [ns] on; call `unwatch` once for each call."""

@@ -123,7 +123,7 @@ class Desk:
         self.looking.begin(sim, is_branch=is_branch)
         self.present, self.programs = world, programs
         self._mark = sim.checkpoint()
-        sim.gate = world.gate
+        sim.loop.gate = world.gate
         self.looking.stop()
         self.tell()
 
@@ -457,7 +457,7 @@ class Desk:
         self.present.gate.close()
         self.clear_away()
         self.programs.close()
-        self.present.sim.gate = None
+        self.present.sim.loop.gate = None
 
 
 class NewsHandler(logging.Handler):
