@@ -20,7 +20,7 @@ from kiks.learn.algorithms import ALGORITHMS, Diverse
 pytestmark = pytest.mark.slow
 
 
-DIVERSE = [str(name) for name, kind in ALGORITHMS.items() if issubclass(kind, Diverse)]
+DIVERSE = [str(name) for name, kind in ALGORITHMS.items() if isinstance(kind, type) and issubclass(kind, Diverse)]
 
 
 def run(algorithm: str, generations: int = 4, folder: Path | None = None, **changes: Any) -> kiks.Evolution:
@@ -212,7 +212,7 @@ def test_an_elite_becomes_a_champion(tmp_path: Path) -> None:
 
 
 def test_the_picture_shows_the_archive_of_every_algorithm(tmp_path: Path) -> None:
-    from kiks.learn.evolution_plot import save_plot
+    from kiks.learn.plots import save_plot
 
     one = (kiks.Axis("path_mm", 0, 1500),)
     for changes in ({}, {"axes": one}, {"axes": (*small().axes, kiks.Axis("contacts", 0, 5))}, {"axes": ()}):

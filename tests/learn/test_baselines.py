@@ -7,13 +7,13 @@ import pytest
 from tests.learn.small import small
 
 import kiks
-from kiks.learn.baselines import RANDOM_COUNT, baselines_of
+from kiks.learn.results import RANDOM_COUNT, baselines_of
 
 
 def test_baselines_follow_from_task_and_seed_alone() -> None:
-    one = baselines_of(small(), 3, threads=1)
-    assert one == baselines_of(small(), 3, threads=2)
-    assert one != baselines_of(small(), 4, threads=1)
+    one = baselines_of(small(), 3)
+    assert one == baselines_of(small(), 3)
+    assert one != baselines_of(small(), 4)
 
 
 def test_a_robot_that_stands_still_does_not_move() -> None:

@@ -100,9 +100,9 @@ def test_a_lost_worker_is_an_error_if_the_executor_does_not_repeat_its_work() ->
 def test_wrong_arguments_are_errors() -> None:
     candidates, seeds = drawn(5)
     for given, message in (
-        ((candidates[0], seeds), r"it was float64 of shape \(3,"),
-        ((candidates, seeds[:4]), r"one seed for each of 5 candidates, but it was int64 of shape \(4,"),
-        ((candidates, np.ones(5)), "but it was float64"),
+        ((candidates[0], seeds), r"candidates must be finite numbers \[any, any\], but it had the shape \[3\]"),
+        ((candidates, seeds[:4]), r"seeds must be whole numbers \[5\], but it had the shape \[4\]"),
+        ((candidates, np.full(5, 0.5)), r"seeds must be whole numbers \[5\], but it was 0\.5"),
         ((candidates, seeds, "threads"), r"executor must have submit\(\) .* but it was 'threads'"),
     ):
         with pytest.raises(ParameterError, match=message):

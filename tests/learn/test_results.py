@@ -12,10 +12,11 @@ import pytest
 
 import kiks
 from kiks import ParameterError
-from kiks.learn.baselines import Baselines
 from kiks.learn.evolution_log import Folder, Identity
+from kiks.learn.plots import save_results_plot
 from kiks.learn.results import (
     RESULT,
+    Baselines,
     ExamScore,
     Result,
     comparable,
@@ -29,7 +30,6 @@ from kiks.learn.results import (
     save_summary,
     seed_folder,
 )
-from kiks.learn.results_plot import save_results_plot
 
 RESULTS = [
     Result(

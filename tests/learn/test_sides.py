@@ -16,9 +16,9 @@ import kiks
 from kiks import ParameterError
 from kiks.cli.evolve import winners_of
 from kiks.client.drive import Driver
-from kiks.learn.evolution_plot import save_tournament_plot
 from kiks.learn.finals import Tournament, latin_square
 from kiks.learn.fingerprint import differing
+from kiks.learn.plots import save_tournament_plot
 from kiks.learn.ready_tasks import CAUGHT_MM, PREY_SPEED
 from kiks.learn.results import load_results, result_of
 from kiks.learn.seeds import SQUARE, TOURNAMENT, seed_for

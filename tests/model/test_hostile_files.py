@@ -13,9 +13,8 @@ import pytest
 import kiks
 from kiks.clock.thinking import parse_thinking, save_thinking
 from kiks.errors import SHOWN_MAX, KiksError
-from kiks.learn.baselines import Baselines
 from kiks.learn.evolution_log import Folder, Identity
-from kiks.learn.results import ExamScore, Result, load_result
+from kiks.learn.results import Baselines, ExamScore, Result, load_result
 from kiks.model.project import Project
 from kiks.model.thesis_networks import NetworkResponse
 

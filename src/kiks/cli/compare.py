@@ -26,8 +26,8 @@ def compare(
 
     Example: kiks compare runs/linear runs/gru
     """
+    from kiks.learn.plots import save_results_plot
     from kiks.learn.results import comparable, difference, load_results
-    from kiks.learn.results_plot import save_results_plot
 
     if first.resolve() == second.resolve():
         raise ParameterError(f"SECOND must be another folder than FIRST, but both are {str(first)!r}.")

@@ -130,7 +130,7 @@ def evolve(
 
 def _finish(evolution: Evolution, folder: Path) -> Result:
     """Save result and pictures of an evolution that has come to its end, print the result, and return it."""
-    from kiks.learn.evolution_plot import save_plot, save_tournament_plot
+    from kiks.learn.plots import save_plot, save_tournament_plot
     from kiks.learn.results import load_result, result_of
 
     result = load_result(folder)
@@ -212,8 +212,8 @@ def _tell_champion(evolution: Evolution, folder: Path) -> None:
 def _tell_seeds(results: Sequence[Result], folder: Path) -> None:
     """Save summary and picture of several evolutions, and print them as a table."""
     from kiks.cli.compare import print_seeds
+    from kiks.learn.plots import save_results_plot
     from kiks.learn.results import SUMMARY, save_summary
-    from kiks.learn.results_plot import save_results_plot
 
     picture = folder / "seeds.png"
     save_summary(results, folder)

@@ -6,15 +6,15 @@ seed and values give the same candidates. So an evolution resumes by telling all
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any, Protocol
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kiks.errors import ParameterError, library, nearest, shown
 from kiks.learn.algorithm_name import AlgorithmName
-from kiks.learn.task import SPREAD, Axis
+from kiks.learn.task import Axis
 
 Floats = NDArray[np.float64]
 
@@ -37,29 +37,38 @@ class Algorithm(Protocol):
         ...
 
 
-class Cma:
-    """CMA-ES: a normal distribution whose mean and covariance adapt to the successful candidates.
+class Setting(NamedTuple):
+    """What an algorithm begins with.
 
-    Args:
+    Attributes:
         parameter_count: Number of parameters of a candidate.
         population: Number of candidates in a generation.
         seed: Seed of its random numbers.
+        axes: Axes along which behaviours differ.
         spread: Standard deviation of each parameter at the beginning.
     """
 
-    def __init__(
-        self, parameter_count: int, population: int, seed: int, axes: Sequence[Axis] = (), spread: float = SPREAD
-    ) -> None:
+    parameter_count: int
+    population: int
+    seed: int
+    axes: Sequence[Axis]
+    spread: float
+
+
+class Cma:
+    """CMA-ES: a normal distribution whose mean and covariance adapt to the successful candidates."""
+
+    def __init__(self, setting: Setting) -> None:
         cma = library("cma")
-        rng = np.random.default_rng(seed)
+        rng = np.random.default_rng(setting.seed)
         options = {
-            "popsize": population,
+            "popsize": setting.population,
             "randn": lambda *shape: rng.standard_normal(shape),
             "seed": np.nan,  # leaves the random numbers of the process alone
             "verbose": -9,
             "verb_log": 0,
         }
-        self._strategy: Any = cma.CMAEvolutionStrategy(np.zeros(parameter_count), spread, options)
+        self._strategy: Any = cma.CMAEvolutionStrategy(np.zeros(setting.parameter_count), setting.spread, options)
         self._candidates: list[Floats] = []
 
     def ask(self) -> Floats:
@@ -77,14 +86,7 @@ class Cma:
 
 
 class Ga:
-    """A genetic algorithm: tournaments of three, each parameter from either parent, normal mutations, one elite.
-
-    Args:
-        parameter_count: Number of parameters of a candidate.
-        population: Number of candidates in a generation.
-        seed: Seed of its random numbers.
-        spread: Standard deviation of each parameter at the beginning.
-    """
+    """A genetic algorithm: tournaments of three, each parameter from either parent, normal mutations, one elite."""
 
     MUTATION = 0.07
     """Standard deviation of a mutation, relative to that of the first generation."""
@@ -92,12 +94,10 @@ class Ga:
     RIVALS = 3
     """Number of candidates in a tournament."""
 
-    def __init__(
-        self, parameter_count: int, population: int, seed: int, axes: Sequence[Axis] = (), spread: float = SPREAD
-    ) -> None:
-        self._rng = np.random.default_rng(seed)
-        self._spread = spread
-        self._candidates = spread * self._rng.standard_normal((population, parameter_count))
+    def __init__(self, setting: Setting) -> None:
+        self._rng = np.random.default_rng(setting.seed)
+        self._spread = setting.spread
+        self._candidates = self._spread * self._rng.standard_normal((setting.population, setting.parameter_count))
         self._favourite = self._candidates[0]
 
     def ask(self) -> Floats:
@@ -126,18 +126,10 @@ class Diverse:
     """Finds many behaviours: new candidates come from an archive of those that differ. pyribs keeps it and proposes.
 
     Behaviours are counted in cells of the axes, so that axes with different units count alike.
-
-    Args:
-        parameter_count: Number of parameters of a candidate.
-        population: Number of candidates in a generation.
-        seed: Seed of its random numbers.
-        axes: Axes along which behaviours differ.
-        spread: Standard deviation of each parameter at the beginning.
     """
 
-    def __init__(
-        self, parameter_count: int, population: int, seed: int, axes: Sequence[Axis] = (), spread: float = SPREAD
-    ) -> None:
+    def __init__(self, setting: Setting) -> None:
+        axes = setting.axes
         if not axes:
             raise ParameterError(
                 "the task must have axes along which behaviours differ for this algorithm, but it has none. "
@@ -146,16 +138,18 @@ class Diverse:
         self._low, self._high = (np.array([getattr(axis, name) for axis in axes]) for name in ("low", "high"))
         self._cell = (self._high - self._low) / [axis.cells for axis in axes]
         schedulers, archives = library("ribs.schedulers"), library("ribs.archives")
-        archive = self.make_archive(archives, parameter_count, [axis.cells for axis in axes], seed)
-        emitters = self.make_emitters(library("ribs.emitters"), archive, population, seed, spread)
-        self._scheduler: Any = schedulers.Scheduler(archive, emitters)
+        archive = self.make_archive(archives, setting)
+        self._scheduler: Any = schedulers.Scheduler(
+            archive, self.make_emitters(library("ribs.emitters"), archive, setting)
+        )
 
-    def make_archive(self, archives: Any, parameter_count: int, cells: list[int], seed: int) -> Any:
+    def make_archive(self, archives: Any, setting: Setting) -> Any:
         """Return the archive: one elite for each cell."""
+        cells = [axis.cells for axis in setting.axes]
         ranges = [(0, count) for count in cells]
-        return archives.GridArchive(solution_dim=parameter_count, dims=cells, ranges=ranges, seed=seed)
+        return archives.GridArchive(solution_dim=setting.parameter_count, dims=cells, ranges=ranges, seed=setting.seed)
 
-    def make_emitters(self, emitters: Any, archive: Any, population: int, seed: int, spread: float) -> list[Any]:
+    def make_emitters(self, emitters: Any, archive: Any, setting: Setting) -> list[Any]:
         """Return what proposes candidates."""
         raise NotImplementedError
 
@@ -185,20 +179,12 @@ class MapElites(Diverse):
     NEAR, ALONG = 0.2, 0.2
     """Standard deviation of a child's distance from its parent in all directions, and along the line."""
 
-    def make_emitters(self, emitters: Any, archive: Any, population: int, seed: int, spread: float) -> list[Any]:
+    def make_emitters(self, emitters: Any, archive: Any, setting: Setting) -> list[Any]:
         """Return an emitter of variations of elites."""
-        first = spread * np.random.default_rng(seed).standard_normal((population, archive.solution_dim))
-        near = self.NEAR * spread
-        return [
-            emitters.IsoLineEmitter(
-                archive,
-                iso_sigma=near,
-                line_sigma=self.ALONG,
-                initial_solutions=first,
-                batch_size=population,
-                seed=seed,
-            )
-        ]
+        count, seed, rng = setting.population, setting.seed, np.random.default_rng(setting.seed)
+        first = setting.spread * rng.standard_normal((count, setting.parameter_count))
+        sigmas = {"iso_sigma": self.NEAR * setting.spread, "line_sigma": self.ALONG}
+        return [emitters.IsoLineEmitter(archive, **sigmas, initial_solutions=first, batch_size=count, seed=seed)]
 
 
 class CmaMe(Diverse):
@@ -213,21 +199,21 @@ class CmaMe(Diverse):
     RANKER, SELECTION, RESTART = "2imp", "filter", "no_improvement"
     """What pyribs ranks candidates by, which of them it follows, and when a strategy begins again."""
 
-    def make_emitters(self, emitters: Any, archive: Any, population: int, seed: int, spread: float) -> list[Any]:
+    def make_emitters(self, emitters: Any, archive: Any, setting: Setting) -> list[Any]:
         """Return the strategies."""
-        parts = np.array_split(np.arange(population), max(1, population // self.STRATEGY))
+        parts = np.array_split(np.arange(setting.population), max(1, setting.population // self.STRATEGY))
         return [
             emitters.EvolutionStrategyEmitter(
                 archive,
-                x0=np.zeros(archive.solution_dim),
-                sigma0=spread,
+                x0=np.zeros(setting.parameter_count),
+                sigma0=setting.spread,
                 ranker=self.RANKER,
                 selection_rule=self.SELECTION,
                 restart_rule=self.RESTART,
                 batch_size=len(part),
                 seed=child,
             )
-            for part, child in zip(parts, np.random.SeedSequence(seed).spawn(len(parts)), strict=True)
+            for part, child in zip(parts, np.random.SeedSequence(setting.seed).spawn(len(parts)), strict=True)
         ]
 
 
@@ -243,18 +229,18 @@ class Novelty(CmaMe):
 
     RANKER, SELECTION, RESTART = "nov", "mu", "basic"
 
-    def make_archive(self, archives: Any, parameter_count: int, cells: list[int], seed: int) -> Any:
+    def make_archive(self, archives: Any, setting: Setting) -> Any:
         """Return the archive of novel behaviours."""
         return archives.ProximityArchive(
-            solution_dim=parameter_count,
-            measure_dim=len(cells),
+            solution_dim=setting.parameter_count,
+            measure_dim=len(setting.axes),
             k_neighbors=self.NEIGHBOURS,
             novelty_threshold=self.NOVEL_CELLS,
-            seed=seed,
+            seed=setting.seed,
         )
 
 
-ALGORITHMS: dict[str, type[Cma] | type[Ga] | type[MapElites] | type[CmaMe]] = {
+ALGORITHMS: dict[str, Callable[[Setting], Algorithm]] = {
     AlgorithmName.CMA.value: Cma,
     AlgorithmName.GA.value: Ga,
     AlgorithmName.MAP_ELITES.value: MapElites,
@@ -264,13 +250,11 @@ ALGORITHMS: dict[str, type[Cma] | type[Ga] | type[MapElites] | type[CmaMe]] = {
 """The algorithms by their names."""
 
 
-def make_algorithm(
-    name: str, parameter_count: int, population: int, seed: int, axes: Sequence[Axis], spread: float
-) -> Algorithm:
+def make_algorithm(name: str, setting: Setting) -> Algorithm:
     """Return an algorithm."""
     if name not in ALGORITHMS:
         raise ParameterError(
             f"algorithm must be one of {', '.join(ALGORITHMS)}, or an object with ask and tell, but it was "
             f"{shown(name)}.{nearest(str(name), map(str, ALGORITHMS))}"
         )
-    return ALGORITHMS[name](parameter_count, population, seed, axes, spread)
+    return ALGORITHMS[name](setting)

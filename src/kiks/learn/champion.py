@@ -19,7 +19,7 @@ from kiks.control.controllers import Recipe, controller_of, recipe_for
 from kiks.control.recipes import file_of
 from kiks.learn.fingerprint import fingerprints
 from kiks.model.arena import Arena
-from kiks.model.arena_file import quoted
+from kiks.model.arena_file import toml, toml_key
 from kiks.model.atomic_files import inside, path_of, replace_files
 from kiks.model.checks import ROBOTS_MAX, check_count
 from kiks.model.data_file import Number, Rule, Text, Whole, as_list, check, parse_toml, read_file, record
@@ -202,8 +202,8 @@ class Champion:
         lines = [
             "# A controller for Khepera robots. See it drive: kiks run FILE.",
             f"champion = {FORMAT}",
-            *(f"{name} = {_toml_value(getattr(self, name))}" for name in top),
-            *(f"{name} = {_toml_value(value)}" for name, value in named.items()),
+            *(f"{name} = {toml(getattr(self, name))}" for name in top),
+            *(f"{name} = {toml(value)}" for name, value in named.items()),
             "parameters = [",
             *(f"    {value!r}," for value in self.parameters),
             "]",
@@ -211,9 +211,7 @@ class Champion:
         sections = {"timing": asdict(self.timing), "controller": recipe, "measures": self.measures}
         for section, entries in sections.items():
             lines += ["", f"[{section}]"]
-            lines += [
-                f"{_toml_key(name)} = {_toml_value(value)}" for name, value in entries.items() if value is not None
-            ]
+            lines += [f"{toml_key(name)} = {toml(value)}" for name, value in entries.items() if value is not None]
         return "\n".join(lines) + "\n"
 
     @classmethod
@@ -247,15 +245,3 @@ def _robot_of(name: str, folder: Path) -> str | RobotSpec:
         return name
     path = inside(folder, name, "robot")
     return RobotSpec.load(path) if path.is_file() else name
-
-
-def _toml_key(name: str) -> str:
-    """Return a name as a TOML key; names of measures may have letters that bare keys do not allow."""
-    return name if name.isascii() and name.isidentifier() else quoted(name)
-
-
-def _toml_value(value: Any) -> str:
-    """Return a value in TOML."""
-    if isinstance(value, list | tuple):
-        return f"[{', '.join(map(_toml_value, value))}]"
-    return quoted(value) if isinstance(value, str) else repr(value).lower()

@@ -9,13 +9,14 @@ from __future__ import annotations
 
 from concurrent.futures import Executor, Future
 from functools import lru_cache
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kiks.errors import KiksError, ParameterError, WorkError, shown
 from kiks.learn.fingerprint import differing
+from kiks.model.array_checks import Numbers, check_array
 from kiks.version import __version__
 
 Floats = NDArray[np.float64]
@@ -24,26 +25,14 @@ Integers = NDArray[np.int64]
 CHUNK_MIN, CHUNKS_MAX = 4, 256
 """Fewest candidates of a chunk, as sending one takes a millisecond or two; and most chunks of a generation."""
 
-
-class Work(Protocol):
-    """What evaluates candidates: a task. An executor of other processes must be able to pickle it."""
-
-    def evaluate(self, candidates: Floats, seeds: Integers, threads: int | None = None) -> Floats:
-        """Return the values of candidates [candidate, parameter] with their seeds, float64 [candidate, value]."""
-        ...
-
-    def __hash__(self) -> int: ...
-
-    def digest(self) -> dict[str, str]:
-        """Return a fingerprint of each argument on which values depend, by its name."""
-        ...
+_CANDIDATES = Numbers((None, None), advice="They are [candidate, parameter]; a single one is parameters[np.newaxis].")
 
 
-def evaluate(work: Work, candidates: Floats, seeds: Integers, executor: Executor | None = None) -> Floats:
+def evaluate(task: Any, candidates: Floats, seeds: Integers, executor: Executor | None = None) -> Floats:
     """Return the values of candidates.
 
     Args:
-        work: A task.
+        task: The task, or what has its `evaluate` and `digest`.
         candidates: Parameters, float64 [candidate, parameter].
         seeds: A seed for each, int64 [candidate].
         executor: Evaluates them, each chunk with one thread. Left out, the cores of this computer do.
@@ -75,9 +64,9 @@ def evaluate(work: Work, candidates: Floats, seeds: Integers, executor: Executor
     values: list[Floats] = []
     try:
         if executor is None:
-            return work.evaluate(candidates, seeds)
-        here = _identity(work)
-        futures += [executor.submit(_evaluate_chunk, work, here, candidates[part], seeds[part]) for part in parts]
+            return task.evaluate(candidates, seeds)  # type: ignore[no-any-return]
+        here = _identity(task)
+        futures += [executor.submit(_evaluate_chunk, task, here, candidates[part], seeds[part]) for part in parts]
         for future in futures:
             values.append(future.result())
         return np.concatenate(values)
@@ -102,42 +91,23 @@ def check_candidates(candidates: object, seeds: object) -> tuple[Floats, Integer
         candidates: Parameters, float64 [candidate, parameter].
         seeds: A seed for each, int64 [candidate].
     """
-    candidates, seeds = _array(candidates), _array(seeds)
-    if candidates.ndim != 2 or candidates.dtype != np.float64:
-        raise ParameterError(
-            f"candidates must be a float64 array [candidate, parameter], but it was {candidates.dtype} of shape"
-            f" {candidates.shape}. A single candidate is parameters[np.newaxis]."
-        )
-    if seeds.shape != candidates.shape[:1] or seeds.dtype != np.int64:
-        raise ParameterError(
-            f"seeds must be an int64 array with one seed for each of {len(candidates)} candidates, but it was"
-            f" {seeds.dtype} of shape {seeds.shape}. np.full(count, seed) gives the same seed to all."
-        )
-    return candidates, seeds
+    rows = check_array(candidates, _CANDIDATES, "candidates")
+    advice = "np.full(count, seed) gives the same seed to all."
+    return rows, check_array(seeds, Numbers((len(rows),), is_whole=True, advice=advice), "seeds")
 
 
-def _array(values: object) -> NDArray[Any]:
-    try:
-        return np.asarray(values)
-    except ValueError:  # lists of different lengths
-        return np.empty(0, object)
-
-
-def _evaluate_chunk(work: Work, there: dict[str, str], candidates: Floats, seeds: Integers) -> Floats:
+def _evaluate_chunk(task: Any, there: dict[str, str], candidates: Floats, seeds: Integers) -> Floats:
     """Return the values of a chunk, in a worker; refuse the work of a program whose modules differ from those here."""
-    if names := differing(there, _identity(work)):
+    if names := differing(there, _identity(task)):
         raise ParameterError(
             f"all computers must have the same KiKS and the same modules of yours, but on one these differ: {names}. "
             "Install the same on all."
         )
-    return work.evaluate(candidates, seeds, 1)
-
-
-def _identity(work: Work) -> dict[str, str]:
-    """Return what must be the same where a candidate is evaluated."""
-    return {"KiKS": __version__} | _digest_of(work)
+    return task.evaluate(candidates, seeds, 1)  # type: ignore[no-any-return]
 
 
 @lru_cache(maxsize=4)
-def _digest_of(work: Work) -> dict[str, str]:
-    return work.digest()
+def _identity(task: Any) -> dict[str, str]:
+    """Return what must be the same where a candidate is evaluated."""
+    found: dict[str, str] = {"KiKS": __version__} | task.digest()
+    return found

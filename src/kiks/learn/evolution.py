@@ -28,7 +28,7 @@ from numpy.typing import ArrayLike
 
 from kiks.errors import ParameterError, shown
 from kiks.learn import seeds
-from kiks.learn.algorithms import Algorithm, make_algorithm
+from kiks.learn.algorithms import Algorithm, Setting, make_algorithm
 from kiks.learn.archive import Archive
 from kiks.learn.champion import Champion
 from kiks.learn.evaluation import Floats, Integers, evaluate
@@ -122,17 +122,12 @@ class Evolution:
             self.name = str(check_kind("algorithm", name, str, advice))
             self.population = check_count("population", task.population if population is None else population, 4)
             purpose = seeds.ALGORITHM + self._first_purpose
-            self.algorithms = [
-                make_algorithm(
-                    self.name,
-                    side.parameter_count,
-                    self.population,
-                    seed_for(self.seed, purpose, number),
-                    task.axes,
-                    task.spread,
-                )
-                for number, side in enumerate(task.sides)
+            drawn = [seed_for(self.seed, purpose, number) for number in range(len(task.sides))]
+            settings = [
+                Setting(side.parameter_count, self.population, seed, task.axes, task.spread)
+                for side, seed in zip(task.sides, drawn, strict=True)
             ]
+            self.algorithms = [make_algorithm(self.name, each) for each in settings]
         self._trial_seeds = [seed_for(self.seed, seeds.TRIALS, number) for number in range(TRIALS)]
         self._favourites: list[list[Contender]] = [[] for _ in task.sides]
         self._rival: Contender | None = None
@@ -275,7 +270,7 @@ class Evolution:
             algorithm.tell(part[:, 0].copy(), behaviours)
             if self.archives and part.shape[1] == len(self._names):
                 self.archives[side].add(own, part, number)
-            best = Contender(tuple(asked[int(part[:, 0].argmax()), self._columns(side)].tolist()), number)
+            best = Contender(tuple(own[part[:, 0].argmax()].tolist()), number)
             favourite = self._favourite(side, best)
             self._favourites[side].append(favourite or best)
             self._tries_elites = favourite is None and bool(self.archives)
@@ -284,11 +279,6 @@ class Evolution:
                 self._rival = next(untried, None) if self._tries_elites else favourite or best
         self.generations.append(generation)
         self._own, self.finals, self.tournament = [], None, None
-
-    def _columns(self, side: int) -> slice:
-        """Return the columns of the parameters of a side."""
-        first = self.task.sides[0].parameter_count
-        return slice(0, first) if side == 0 else slice(first, None)
 
     def _favourite(self, side: int, best: Contender) -> Contender | None:
         """Return the candidate that an algorithm considers best; None if it prefers none.

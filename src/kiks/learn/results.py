@@ -16,12 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from kiks.control.controller import Controller
 from kiks.errors import ParameterError
-from kiks.learn.baselines import Baselines, baselines_of
+from kiks.learn import seeds
 from kiks.learn.evolution import Evolution
-from kiks.learn.evolution_log import IDENTITY, Digest, Folder, check_alike
+from kiks.learn.evolution_log import IDENTITY, TRIALS, Digest, Folder, check_alike
 from kiks.learn.exam import PASS_SHARE, imperfect_robots
 from kiks.learn.fingerprint import tell_unseen
+from kiks.learn.seeds import seed_for
+from kiks.learn.task import Task
 from kiks.model.atomic_files import path_of, replace_file
 from kiks.model.data_file import TEXT_MAX, Number, Text, Whole, check, parse_json, read_file, record
 from kiks.model.limits import RESULT_FILE_BYTES_MAX
@@ -35,11 +38,27 @@ RESULT, SUMMARY = "result.json", "summary.json"
 EFFECTS = ((0.06, "negligible"), (0.14, "small"), (0.21, "medium"), (0.5, "large"))
 """Names of effect sizes: largest |A - 0.5|, and the name."""
 
+RANDOM_COUNT = 40
+"""Number of random controllers: as many as the first generation has by default."""
+
 _FREE = {"controller", "spread", "exam"}
 """Arguments of a task that may differ when the fitness of two evolutions is compared."""
 
 _Count = Annotated[Whole, Field(ge=0, lt=2**63)]
 _GENERATIONS_MAX = 1_000_000
+
+
+@record
+class Baselines:
+    """Fitness in the trial worlds of an evolution.
+
+    Attributes:
+        standing: Mean fitness of standing still in all trials.
+        random: Median fitness of random controllers, each in one of the trials in turn.
+    """
+
+    standing: Number
+    random: Number
 
 
 @record
@@ -157,6 +176,21 @@ def result_of(evolution: Evolution) -> Result:
         baselines=None if task.against else baselines_of(task, evolution.seed),
         exam=score,
     )
+
+
+def baselines_of(task: Task, seed: int) -> Baselines:
+    """Return the baselines of the evolution of a task with a seed."""
+    trials = np.array([seed_for(seed, seeds.TRIALS, number) for number in range(TRIALS)])
+    still = Controller(_stand, senses=task.controller.senses, parameters=1)
+    standing = task.with_changes(controller=still).evaluate(np.zeros((TRIALS, 1)), trials)
+    rng = np.random.default_rng(seed_for(seed, seeds.BASELINES))
+    drawn = task.spread * rng.standard_normal((RANDOM_COUNT, task.parameter_count))
+    random = task.evaluate(drawn, np.resize(trials, RANDOM_COUNT))
+    return Baselines(float(standing[:, 0].mean()), float(np.median(random[:, 0])))
+
+
+def _stand(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
+    wheels[0] = wheels[1] = 0.0
 
 
 # ---- folders ----

@@ -229,11 +229,15 @@ def toml(value: Any) -> str:
     if isinstance(value, tuple | list):
         return f"[{', '.join(map(toml, value))}]"
     if isinstance(value, dict):
-        keys = {key: key if key.isascii() and key.isidentifier() else quoted(key) for key in value}
-        return f"{{ {', '.join(f'{keys[key]} = {toml(each)}' for key, each in value.items())} }}"
+        return f"{{ {', '.join(f'{toml_key(key)} = {toml(each)}' for key, each in value.items())} }}"
     if isinstance(value, bool):
         return "true" if value else "false"
     return quoted(value) if isinstance(value, str) else repr(value)
+
+
+def toml_key(name: str) -> str:
+    """Return a name as a key of TOML."""
+    return name if name.isascii() and name.isidentifier() else quoted(name)
 
 
 def quoted(text: str) -> str:
