@@ -25,35 +25,6 @@ def test_exchange_takes_the_time_of_its_characters_plus_one_millisecond() -> Non
         assert sim.now_ns - start_ns == (2 + len(reply)) * character_ns(baud) + 1_000_000
 
 
-def test_characters_arrive_one_after_the_other() -> None:
-    sim = kiks.Simulation()
-    port = sim.port(1)
-    port.write(b"H\n")
-    sim.run(2 * character_ns(9600) * 1e-9 + 1e-3)
-    assert port.in_waiting == 0
-    begin_ns = sim.now_ns
-    assert port.read(1) == b"h"
-    first_ns = sim.now_ns
-    assert port.read(3) == b",0,"
-    assert sim.now_ns - first_ns == 3 * character_ns(9600)
-    assert first_ns - begin_ns <= character_ns(9600)
-
-
-def test_read_returns_at_its_timeout_and_leaves_the_rest() -> None:
-    sim = kiks.Simulation()
-    port = sim.port(1)
-    port.timeout = 0.25
-    before_s = sim.time_s
-    assert port.read(5) == b""
-    assert sim.time_s - before_s == pytest.approx(0.25)
-    port.write(b"H\n")
-    port.timeout = 0.006
-    part = port.readline()
-    assert b"h,0,0\r\n".startswith(part)
-    port.timeout = 1.0
-    assert part + port.readline() == b"h,0,0\r\n"
-
-
 def test_read_without_end_raises() -> None:
     port = kiks.Simulation().port(1)
     with pytest.raises(kiks.LinkError, match=r"robot 1 must have been asked.*would never end.*set a timeout"):
@@ -130,13 +101,6 @@ def test_unread_output_is_limited() -> None:
     line = sim.wires[0].line
     assert len(line.waiting) <= OUTPUT_LIMIT
     assert line.lost_count > 0
-
-
-def test_write_waits_while_the_line_is_full() -> None:
-    sim = kiks.Simulation()
-    port = sim.port(1)
-    port.write(b"D,1,1\n" * 10_000)
-    assert sim.time_s > (60_000 - 2 * 4096) * character_ns(9600) * 1e-9
 
 
 @pytest.mark.slow

@@ -49,14 +49,6 @@ def course_in_memory() -> tuple[str, Simulation]:
     return tell(b"H"), sim
 
 
-def test_pyserial_program_gives_the_same_run_as_in_memory(link: str) -> None:
-    counts, memory = course_in_memory()
-    with served([PtyEndpoint(link)]) as run:
-        assert run_python(PROGRAMS / "course.py", link).strip() == counts.strip()
-        assert run.sim.state_hash() == memory.state_hash()
-        assert run.sim.now_ns == memory.now_ns
-
-
 def test_c_program_gives_the_same_run_as_the_python_program(link: str, tmp_path: Path) -> None:
     compiler = shutil.which("gcc")
     if compiler is None:

@@ -336,21 +336,6 @@ print(port.read(20), round(time.monotonic(), 2))
     assert capsys.readouterr().out == "b'h,0,0\\r\\n' 1.3\n"
 
 
-def test_short_timeout_cuts_no_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    program = tmp_path / "camera.py"
-    program.write_text("""
-import serial
-port = serial.Serial("/dev/ttyUSB0", 9600, timeout=0.1)
-port.write(b"T,2,N\\n")
-print(len(port.readline()))
-port.set_low_latency_mode(True)
-""")
-    sim = kiks.Simulation(seed=1)
-    sim.fit(1, "k213")
-    assert run_here(sim, program, [], {}) == 0
-    assert int(capsys.readouterr().out) > 200
-
-
 def test_line_comes_whole_to_a_thread_with_a_short_timeout(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     program = tmp_path / "reader.py"
     program.write_text("""

@@ -14,7 +14,6 @@ from tests.served import GUARD_S, PROGRAMS, Served, ask, fresh, open_plain, read
 from kiks.clock.pace import Pace
 from kiks.clock.serial_timing import BACKLOG_LIMIT
 from kiks.errors import ParameterError
-from kiks.ports.endpoint import READ_SIZE
 from kiks.ports.pty import PtyEndpoint
 from kiks.ports.server import Server
 from kiks.ports.tcp import TcpEndpoint
@@ -117,34 +116,6 @@ def test_ctrl_c_ends_the_server_between_two_rounds(monkeypatch: pytest.MonkeyPat
         server.serve(until=lambda: next(rounds) == 999)
     assert server.sim.wires[0].holder is None
     server.close()
-
-
-@pytest.mark.parametrize("length", [2, 1])
-def test_live_flooding_client_waits_for_the_line(tmp_path: Path, length: int) -> None:
-    link, wall = str(tmp_path / "robot"), WallClock()
-    with served([PtyEndpoint(link)], thinking="live", pace=Pace(wall_ns=wall)) as run:
-        port = open_plain(link)
-        os.set_blocking(port, False)
-        line = run.sim.wires[0].line
-
-        def flood() -> None:
-            try:
-                while True:
-                    os.write(port, b"H\n"[:length] * 500)
-            except BlockingIOError:
-                pass
-
-        def backlog() -> int:
-            return (line.sending_until_ns - run.sim.now_ns) // line.character_ns
-
-        for _ in range(3):
-            flood()
-            run.wait_for(lambda: backlog() > BACKLOG_LIMIT)
-            run.wait_rounds(2)
-            flood()
-            assert backlog() <= BACKLOG_LIMIT + READ_SIZE
-            wall.pass_ns(10 * NS_PER_S)
-        os.close(port)
 
 
 def test_one_client_of_several_endpoints_has_the_robot(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:

@@ -12,22 +12,6 @@ import kiks
 ARENAS = Path(__file__).parents[2] / "examples" / "arenas"
 
 
-def test_pyserial_opens_a_robot() -> None:
-    sim = kiks.Simulation(robots=2, seed=3)
-    with serial.serial_for_url("kiks://2", 19200, timeout=1, stopbits=2) as port:
-        assert isinstance(port, serial.SerialBase)
-        port.write(b"D,3,-3\n")
-        assert port.readline() == b"d\r\n"
-        assert sim.port(2).baudrate == 19200
-        assert port.in_waiting == 0
-        port.write(b"B\nH\n")
-        assert port.read_until(b"\n") == b"b,5.02,5.01\r\n"
-        port.flush()
-        port.reset_input_buffer()
-    with pytest.raises(serial.PortNotOpenError):
-        port.write(b"N\n")
-
-
 def test_number_alone_means_the_newest_simulation() -> None:
     older, newer = kiks.Simulation(), kiks.Simulation()
     for url, sim in (("kiks://1", newer), (older.url(1), older)):

@@ -166,24 +166,23 @@ def test_a_joined_program_notices_that_the_session_was_killed(tmp_path: Path) ->
 def test_connections_without_the_token_are_refused(tmp_path: Path) -> None:
     with started(folder=tmp_path) as session:
         words = session.greeting.split()
-        for token in ("", "x" * 32, words[7][:-1], "y" * 10_000):
-            with socket.create_connection(("127.0.0.1", int(words[5]))) as client:
-                client.settimeout(GUARD_S)
+        for token, answer in ((words[7][:-1], b""), (words[7], b"KiKS")):
+            with socket.create_connection(("127.0.0.1", int(words[5])), timeout=GUARD_S) as client:
                 client.sendall(f"{token}\nversion\n".encode())
                 heard = b""
                 with suppress(ConnectionResetError):
-                    heard = client.recv(100)
-                assert heard == b""
+                    heard = client.recv(200)
+                assert heard.lstrip(b" 0123456789")[:4] == answer
         door = next((tmp_path / "kiks").glob("session-*"))
         assert door.stat().st_mode & 0o077 == 0, "the token is the user's alone"
-        with socket.create_connection(("127.0.0.1", int(words[5]))) as client:
-            client.settimeout(GUARD_S)
-            client.sendall(f"{words[7]}\n".encode())
-            assert b"KiKS" in client.recv(200)
 
 
 def test_sigint_is_ignored_and_sigterm_ends_the_session(tmp_path: Path) -> None:
-    with started(folder=tmp_path, command=KIKS) as session:
+    """It is started with signals blocked, as Octave does."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGTERM, signal.SIGINT, signal.SIGHUP})
+    with ExitStack() as after:
+        after.callback(signal.pthread_sigmask, signal.SIG_SETMASK, before)
+        session = after.enter_context(started(folder=tmp_path, command=KIKS))
         session.process.send_signal(signal.SIGINT)
         assert session.ask("active") == "0"
         session.process.send_signal(signal.SIGTERM)
@@ -348,13 +347,6 @@ def test_a_pause_is_held_until_the_program_confirms_that_it_waits(tmp_path: Path
         assert session.hear_frame() == "~", "it goes on"
 
 
-def test_the_leave_line_ends_a_session_with_an_open_pipe(tmp_path: Path) -> None:
-    with started(folder=tmp_path) as session:
-        session.ask("world default")
-        session.say("\x04")
-        assert session.wait() == 0
-
-
 def test_a_disconnecting_client_learns_that_the_session_continues(tmp_path: Path) -> None:
     with started(folder=tmp_path) as first:
         first.ask("world default")
@@ -377,14 +369,3 @@ def test_killing_the_program_ends_its_session_at_any_moment(tmp_path: Path) -> N
         session.process.kill()
         session.process.wait()
         assert os.read(session.out, 1) == b"", "its end closes its output"
-
-
-def test_sigterm_ends_a_session_that_was_started_with_signals_blocked(tmp_path: Path) -> None:
-    """Start it as Octave does."""
-    blocked = {signal.SIGTERM, signal.SIGINT, signal.SIGHUP}
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, blocked)
-    with ExitStack() as after:
-        after.callback(signal.pthread_sigmask, signal.SIG_SETMASK, before)
-        session = after.enter_context(started(folder=tmp_path, command=KIKS))
-        session.process.send_signal(signal.SIGTERM)
-        assert session.wait() == 0
