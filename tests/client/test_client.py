@@ -10,6 +10,7 @@ import pickle
 import resource
 import socket
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ import serial
 import kiks
 from kiks.client.khepera import Status
 from kiks.client.port import _is_readable
+from kiks.script.runner import run_here
 
 
 @pytest.fixture
@@ -214,6 +216,15 @@ def test_functions_of_the_matlab_kiks(sim: kiks.Simulation) -> None:
     kiks.kclose([])
     assert kiks.ktime(-1) is None
     assert sim.time_s > 2
+
+
+def test_functions_of_the_matlab_kiks_reach_real_ports_under_kiks_run(
+    sim: kiks.Simulation, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    program = tmp_path / "program.py"
+    program.write_text("import kiks\nref = kiks.kopen([0])\nprint(kiks.ksend('H\\n', ref, 2))\nkiks.kclose(ref)\n")
+    assert run_here(sim, program, [], {}) == 0
+    assert capsys.readouterr().out == "h,0,0\n"
 
 
 def test_a_port_whose_settings_are_refused_stays_free(sim: kiks.Simulation) -> None:

@@ -10,17 +10,17 @@ import time
 from collections.abc import Sequence
 from typing import Any
 
-from kiks.client.port import Port, open_port
+from kiks.client.khepera import Khepera
+from kiks.client.port import open_port
 from kiks.errors import LinkError, ParameterError, shown
 from kiks.model.array_checks import check_numbers
 from kiks.model.checks import SECONDS_MAX, check_kind, check_number
-from kiks.sim.port import VirtualPort
 
 Reference = tuple[float, float, float, float]
 """Result of `kopen`: four numbers, as in the Matlab KiKS, each that of the port."""
 
-_OPEN: dict[int, tuple[Port, float]] = {}
-"""The open ports and when they were opened [s], by their numbers, the oldest first."""
+_OPEN: dict[int, tuple[Khepera, float]] = {}
+"""The robots at open ports, and when they were opened [s], by their numbers, the oldest first."""
 
 
 def kopen(settings: Sequence[float]) -> Reference:
@@ -55,8 +55,8 @@ def kopen(settings: Sequence[float]) -> Reference:
         raise LinkError(
             f"port {number} must be closed before it is opened, but it is open. Call kclose(ref) or kclose([]) first."
         )
-    port = open_port(f"kiks://{-number}" if number < 0 else _device(number), baud, timeout_s)
-    _OPEN[number] = port, _now_s(port)
+    robot = Khepera(open_port(f"kiks://{-number}" if number < 0 else _device(number), baud, timeout_s))
+    _OPEN[number] = robot, robot.time_s
     reference = float(number), float(number), float(number), float(number)
     # The Matlab KiKS exchanged a first command, too. A real robot that is off gives an empty reply.
     ksend("B\r", reference)
@@ -78,21 +78,22 @@ def ksend(text: str, ref: Sequence[float], timeout: float | None = None) -> str:
         LinkError: If the port is not open.
     """
     check_kind("text", text, str, r'Write ksend("N\n", ref).')
-    port = _open_port(ref)
+    robot = _open_robot(ref)
+    port: Any = robot.port
     if not text:
-        _now_s(port)
+        _ = robot.time_s
         return ""
-    holder: Any = port if isinstance(port, VirtualPort) else getattr(port, "port", port)
-    before = holder.timeout
+    before = port.timeout
     if timeout is not None:
-        holder.timeout = check_number("timeout", timeout, 0)
+        port.timeout = check_number("timeout", timeout, 0)
     try:
         port.write(text.encode("latin-1", errors="replace"))
         if not text.endswith(("\n", "\r")):
             return ""
-        return port.read_until(b"\n").rstrip(b"\r\n").decode("ascii", errors="replace")
+        reply: bytes = port.read_until(b"\n")
+        return reply.rstrip(b"\r\n").decode("ascii", errors="replace")
     finally:
-        holder.timeout = before
+        port.timeout = before
 
 
 def kclose(ref: Sequence[float]) -> None:
@@ -112,20 +113,20 @@ def ktime(port: int | Sequence[float]) -> float | None:
     Args:
         port: The port's number, or the result of `kopen`.
     """
-    opened, opened_s = _OPEN.get(_number_of(port), (None, 0.0))
-    return None if opened is None else _now_s(opened) - opened_s
+    robot, opened_s = _OPEN.get(_number_of(port), (None, 0.0))
+    return None if robot is None else robot.time_s - opened_s
 
 
 def pause(seconds: float) -> None:
     """Let time pass [s]: simulated time if a simulated port was opened last, else real time."""
-    port, _ = next(reversed(_OPEN.values()), (None, 0.0))
-    if isinstance(port, VirtualPort):
-        port.sleep(seconds)
+    robot, _ = next(reversed(_OPEN.values()), (None, 0.0))
+    if robot is not None:
+        robot.pause(seconds)
     else:
         time.sleep(check_number("seconds", seconds, 0, SECONDS_MAX, "Time never runs backwards."))
 
 
-def _open_port(ref: Sequence[float]) -> Port:
+def _open_robot(ref: Sequence[float]) -> Khepera:
     number = _number_of(ref) if isinstance(ref, list | tuple) and len(ref) >= 4 else None
     if number not in _OPEN:
         raise LinkError(
@@ -148,7 +149,3 @@ def _device(number: int) -> str:
     import os
 
     return f"COM{number + 1}" if os.name == "nt" else f"/dev/ttyS{number}"
-
-
-def _now_s(port: Port) -> float:
-    return port.time_s if isinstance(port, VirtualPort) else time.monotonic()

@@ -79,6 +79,16 @@ class FastPort:
         except (AttributeError, OSError):
             self._descriptor = None  # not a port of the operating system: RFC 2217
 
+    @property
+    def timeout(self) -> float | None:
+        """Longest time that a read waits [s]; None waits without end."""
+        timeout_s: float | None = self.port.timeout
+        return timeout_s
+
+    @timeout.setter
+    def timeout(self, timeout_s: float | None) -> None:
+        self.port.timeout = timeout_s
+
     def write(self, data: bytes, /) -> int | None:
         """Send characters."""
         count: int | None = self.port.write(data)
@@ -125,7 +135,7 @@ class FastPort:
         while time.perf_counter() < until_s:
             if _is_readable(descriptor, 0.0):
                 return True
-        return _is_readable(descriptor, self.port.timeout)
+        return _is_readable(descriptor, self.timeout)
 
     def close(self) -> None:
         """Close the port."""
