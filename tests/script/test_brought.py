@@ -3,58 +3,12 @@
 from __future__ import annotations
 
 import sys
-import threading
-from collections.abc import Callable
-from pathlib import Path
 
 import pytest
-from tests.served import fresh
-
-from kiks.script.runner import run_here
-
-Run = Callable[[str], int]
-
-
-@pytest.fixture
-def run(tmp_path: Path) -> Run:
-    """Run a program in this process; return its exit code."""
-
-    def run(text: str) -> int:
-        program = tmp_path / "brought.py"
-        program.write_text(text)
-        return run_here(fresh(), program, [], {})
-
-    return run
-
-
-def test_waiting_for_what_is_left_of_a_time_comes_to_an_end(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run("import time\nfor _ in range(3): time.sleep(2e-16)\nprint(time.monotonic_ns())\n") == 0
-    assert int(capsys.readouterr().out) == 3
-
-
-def test_locks_of_the_library_are_there_for_modules_that_are_imported_later(
-    run: Run, capsys: pytest.CaptureFixture[str]
-) -> None:
-    program = "import functools\nclass A:\n    @functools.cached_property\n    def b(self): return 3\nprint(A().b)\n"
-    assert run(program) == 0
-    assert capsys.readouterr().out == "3\n"
-
-
-def test_nothing_is_written_as_pyserial_refuses_it(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
-    program = "import serial\ntry: serial.Serial('COM1').write(None)\nexcept TypeError as error: print(error)\n"
-    assert run(program) == 0
-    assert capsys.readouterr().out == "cannot convert 'NoneType' object to bytearray\n"
-
-
-def test_only_threads_of_the_program_count(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
-    before = "import threading\nthread = threading.Thread(target=print)\n"
-    here = threading.active_count()  # other tests may have left a server behind
-    assert run(f"{before}thread.start()\nthread.join()\nprint(threading.active_count())\n") == 0
-    assert capsys.readouterr().out == f"\n{here}\n"
-
+from tests.script.conftest import Run
 
 CHAIN = """
-import serial, threading
+import serial, sys, threading
 port = serial.Serial('COM1')
 port.close()
 def lose():
@@ -65,17 +19,16 @@ def lose():
 thread = threading.Thread(target=lose, name='careless')
 thread.start()
 thread.join()
+threading.Thread(target=sys.exit, args=(3,)).start()
 lose()
 """
 
 
-def test_errors_are_told_with_their_causes_and_without_kiks(
-    run: Run, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_errors_are_told_with_their_causes_and_without_kiks(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     # As the library of the command line does, which shows frames of its own.
     monkeypatch.setattr(sys, "excepthook", lambda *_: print("wrong"))
-    assert run(CHAIN) == 1
-    told = capsys.readouterr().err
+    code, _, _, _, told = run(CHAIN)
+    assert code == 1
     assert told.startswith("Exception in thread careless:\nTraceback (most recent call last):\n")
     assert told.count("PortNotOpenError: ") == told.count("direct cause") == told.count("RuntimeError: lost\n") == 2
     assert "protocol_kiks" not in told
@@ -83,21 +36,36 @@ def test_errors_are_told_with_their_causes_and_without_kiks(
     assert told.count("File") == 7
 
 
-def test_hook_of_the_program_hears_its_error(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
+def test_hook_of_the_program_hears_its_error(run: Run) -> None:
     hook = "def hook(kind, error, trace): print('stopped:', error)\n"
-    assert run(f"import sys\n{hook}sys.excepthook = hook\nraise ValueError('too near')\n") == 1
-    assert capsys.readouterr() == ("stopped: too near\n", "")
+    ran = run(f"import sys\n{hook}sys.excepthook = hook\nraise ValueError('too near')\n")
+    assert (ran.code, ran.out, ran.err) == (1, "stopped: too near\n", "")
 
 
-def test_event_loop_that_lives_in_real_time_is_refused(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run("try: import uvloop\nexcept ImportError: pass\n") == 1
-    assert capsys.readouterr().err.startswith(
-        "kiks: a program in simulated time must wait by Python's own event loops, but it imported uvloop (brought.py, "
-    )
-
-
-# Each program prints what it prints without KiKS.
+# Each program prints what it prints without KiKS; times are simulated.
 SAME = {
+    "waiting for what is left of a time comes to an end": (
+        "import time\nfor _ in range(3): time.sleep(2e-16)\nprint(time.monotonic_ns())\n",
+        "3\n",
+    ),
+    "locks of the library are there for modules that are imported later": (
+        "import functools\nclass A:\n    @functools.cached_property\n    def b(self): return 3\nprint(A().b)\n",
+        "3\n",
+    ),
+    "nothing is written as pyserial refuses it": (
+        "import serial\ntry: serial.Serial('COM1').write(None)\nexcept TypeError as error: print(error)\n",
+        "cannot convert 'NoneType' object to bytearray\n",
+    ),
+    "a thread that has ended does not count": (
+        "import threading\nbefore = threading.active_count()\nthread = threading.Thread(target=print)\n"
+        "thread.start()\nthread.join()\nprint(threading.active_count() == before)\n",
+        "\nTrue\n",
+    ),
+    "other programs take no simulated time": (
+        "import subprocess\nsleeper = subprocess.Popen(['sleep', '0.05'])\n"
+        "print(sleeper.poll(), sleeper.wait(timeout=0.001))\n",
+        "0 0\n",
+    ),
     "threads that are started take no time": (
         "import threading, time\n"
         "threads = [threading.Thread(target=time.sleep, args=(1,)) for _ in range(300)]\n"
@@ -175,28 +143,18 @@ SAME = {
 
 
 @pytest.mark.parametrize("name", SAME)
-def test_program_prints_what_it_prints_without_kiks(name: str, run: Run, capsys: pytest.CaptureFixture[str]) -> None:
+def test_program_prints_what_it_prints_without_kiks(name: str, run: Run) -> None:
     program, printed = SAME[name]
-    assert run(program) == 0
-    assert capsys.readouterr().out == printed
+    ran = run(program)
+    assert (ran.code, ran.out) == (0, printed)
 
 
 ENDS = "import atexit\natexit.register(print, 'first')\n@atexit.register\ndef last(): raise SystemExit(5)\n"
 
 
-def test_any_end_is_told_as_python_does(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(f"{ENDS}import asyncio\nraise asyncio.CancelledError('early')\n") == 1
-    out, told = capsys.readouterr()
-    assert out == "first\n"
+def test_any_end_is_told_as_python_does(run: Run) -> None:
+    code, _, _, out, told = run(f"{ENDS}import asyncio\nraise asyncio.CancelledError('early')\n")
+    assert (code, out) == (1, "first\n")
     assert told.startswith("Traceback (most recent call last):\n")
     assert "CancelledError: early\nException ignored in atexit callback" in told
     assert "thread_scheduler" not in told
-
-
-def test_a_module_that_changes_the_insides_of_clocks_is_refused(
-    run: Run, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    # It has a plugin for pytest.
-    monkeypatch.delitem(sys.modules, "time_machine", raising=False)
-    assert run("try: import time_machine\nexcept ImportError: pass\n") == 1
-    assert "must leave the insides of Python's clocks alone, but it imported time_machine" in capsys.readouterr().err

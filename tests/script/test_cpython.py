@@ -8,6 +8,7 @@ import gc
 import pickle
 import queue
 import re
+import signal
 import subprocess
 import sys
 import threading
@@ -22,14 +23,13 @@ from typing import Any
 import pytest
 from tests.cli.test_cli import KIKS
 from tests.guard import GUARD_S
+from tests.script.conftest import Run
 from tests.served import PROGRAMS
 
 from kiks.errors import KiksError
 from kiks.script import cpython, patching
 from kiks.script.cpython import Undo, change_class, change_function, check_interpreter, unchanged
-from kiks.script.runner import run_here
 from kiks.script.thread_scheduler import Scheduler
-from kiks.sim.simulation import Simulation
 
 WORD = ctypes.sizeof(ctypes.c_void_p)
 FUNCTION_WORDS = range(2, 7)
@@ -94,21 +94,30 @@ def changes(monkeypatch: pytest.MonkeyPatch) -> Changes:
     return noted
 
 
-def run(folder: Path, text: str) -> int:
-    (folder / "program.py").write_text(text)
-    return run_here(Simulation(), folder / "program.py", [], {})
+THREADS = """
+import asyncio, threading, time
+asyncio.run(asyncio.sleep(1))
+threading.Thread(target=time.sleep, args=(9,), daemon=True).start()
+1 / 0
+"""
 
 
-def test_all_that_a_program_changes_comes_back(changes: Changes, tmp_path: Path) -> None:
+def test_all_that_a_program_changes_comes_back(changes: Changes, run: Run) -> None:
+    def surroundings() -> list[object]:
+        main = sorted(vars(sys.modules["__main__"]))
+        return [sys.argv, sys.path[:], signal.getsignal(signal.SIGINT), main, threading.enumerate()]
+
+    before = surroundings()
     # The first run imports what it needs.
     for _ in range(2):
-        assert run(tmp_path, "import asyncio, threading, time\nasyncio.run(asyncio.sleep(1))\n") == 0
+        assert run(THREADS, "argument").code == 1
     assert len(changes.functions) > 40
     assert changes.state() == changes.before
+    assert surroundings() == before
 
 
-def test_nothing_of_python_is_missing(changes: Changes, tmp_path: Path) -> None:
-    run(tmp_path, "")
+def test_nothing_of_python_is_missing(changes: Changes, run: Run) -> None:
+    run("")
     missing = {each for each in changes.missing if not each.startswith(("serial.", "kiks."))}
     # What has not been imported, and what another version calls otherwise.
     assert missing <= {
@@ -208,19 +217,20 @@ def test_what_a_body_holds_goes_with_the_change() -> None:
     assert held() == 0
 
 
-def test_other_threads_get_the_original(tmp_path: Path) -> None:
+def test_other_threads_get_the_original(run: Run) -> None:
     found: list[float] = []
     begin = threading.Event()
 
     def work() -> None:
         while not begin.is_set():
-            found.append(time.time())
+            with threading.Lock():
+                found.append(time.time())
 
     thread = threading.Thread(target=work)
     before = time.time()
     thread.start()
     try:
-        assert run(tmp_path, "import time\nfor _ in range(3000): time.time()\n") == 0
+        assert run("import time\nfor _ in range(3000): time.time()\n").code == 0
     finally:
         begin.set()
         thread.join(GUARD_S)

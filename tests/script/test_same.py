@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 from tests.script import same
-from tests.served import fresh
-
-from kiks.script.runner import run_here
+from tests.script.conftest import Run
 
 PROGRAM = """
 import datetime, importlib, queue, random, select, socket, threading, time, types
@@ -38,14 +34,10 @@ print("the same")
 
 
 @pytest.mark.parametrize("time", [1, 2])
-def test_no_class_and_no_function_is_replaced(
-    time: int, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    program = tmp_path / "program.py"
-    program.write_text(PROGRAM)
+def test_no_class_and_no_function_is_replaced(time: int, run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     before, inside = same.look(), same.inside()
     monkeypatch.setattr(same, "EXPECTED", before, raising=False)
-    assert run_here(fresh(), program, [], {}) == 0
-    assert capsys.readouterr() == ("the same\n", "")
+    ran = run(PROGRAM)
+    assert (ran.code, ran.out, ran.err) == (0, "the same\n", "")
     assert same.look() == before
     assert same.inside() == inside
