@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from kiks.control.compiled_function import address_of, caller_of, compiled_for
 from kiks.control.controller import ARGUMENTS, Controller
-from kiks.control.measure import Measure, Moment
+from kiks.control.measure import Moment
 from kiks.engine.state import BODY
 
 # Numba annotates these in part, and not as they are used here.
@@ -114,12 +114,3 @@ def deciders_of(controllers: Sequence[Controller], parameter_counts: Sequence[in
         rows.append((address_of(decider_of(controller, parameter_count)), first, end))
         first = end
     return np.array(rows, np.int64)
-
-
-def watchers_of(measures: tuple[Measure, ...]) -> NDArray[np.int64]:
-    """Return the address of each measure and the range of its notes, int64 [measure, 3]: address, begin, end."""
-    watchers, begin = np.zeros((len(measures), 3), np.int64), 0
-    for each, row in zip(measures, watchers, strict=True):
-        row[:] = address_of(each.check(MEASURE)), begin, begin + each.note_count
-        begin += each.note_count
-    return watchers

@@ -234,7 +234,7 @@ def call_measures(scene: Any, worlds: Any, bunch: Any, is_on: Any, times_ns: Any
         bunch: The worlds that are stepped together.
         is_on: Their mask, bool [W].
         times_ns: When the last command of each world acted [ns], int64 [W].
-        watchers: The measures (`kiks.batch.callbacks.watchers_of`).
+        watchers: The measures (`kiks.batch.measure_slots.MeasureSlots.watchers`).
         poses: Buffer for the poses of a world's robots, float64 [robot, 3].
     """
     for k in range(bunch.worlds.shape[0]):
@@ -283,7 +283,7 @@ def roll_out(scene: Any, worlds: Any, size: Any, block: Any, span: Any, callback
         span: Number of the first half of a loop to do, and of the first one not to do: even halves sense, odd halves
             act; time at and after which no loop begins [ns].
         callbacks: The controllers (`kiks.batch.callbacks.deciders_of`), none if `worlds.wheels` holds the speeds
-            already; and the measures (`kiks.batch.callbacks.watchers_of`).
+            already; and the measures (`kiks.batch.measure_slots.MeasureSlots.watchers`).
     """
     scene = open_scene(scene[0])
     robot_count = scene.robots.shape[1]

@@ -9,7 +9,8 @@ from itertools import accumulate, pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from kiks.batch.callbacks import watchers_of
+from kiks.batch.callbacks import MEASURE
+from kiks.control.compiled_function import address_of
 from kiks.control.measure import Measure
 from kiks.errors import ParameterError, shown
 from kiks.model.checks import check_kind
@@ -45,8 +46,9 @@ class MeasureSlots:
 
     @functools.cached_property
     def watchers(self) -> NDArray[np.int64]:
-        """Addresses and slots of the measures, for the loop of a batch (`kiks.batch.callbacks.watchers_of`)."""
-        return watchers_of(self.measures)
+        """The address of each measure and the range of its notes, int64 [measure, 3]: address, begin, end."""
+        addresses = [address_of(each.check(MEASURE)) for each in self.measures]
+        return np.array([*zip(addresses, self._ends[:-1], self._ends[1:], strict=True)], np.int64).reshape(-1, 3)
 
     def values(self, notes: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the values of the measures for notes [world, robot, note], float64 [world, robot, measure]."""

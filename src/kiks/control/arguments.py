@@ -34,8 +34,15 @@ def record_of(function: Callable[..., Any], **constants: Any) -> Any:
 
 def made_once(function: Callable[_Arguments, _Made]) -> Callable[_Arguments, _Made]:
     """Check the arguments of a function by its annotations, and return the same object for the same ones."""
-    arguments, signature = record_of(function), inspect.signature(function)
-    make = lru_cache(maxsize=256)(lambda given: cast(Callable[..., _Made], function)(**vars(given)))
+    make = cast(Callable[..., _Made], function)
+    return checked_call(function, record_of(function), lru_cache(maxsize=256)(lambda given: make(**vars(given))))
+
+
+def checked_call(
+    function: Callable[_Arguments, Any], arguments: Any, make: Callable[[Any], _Made]
+) -> Callable[_Arguments, _Made]:
+    """Return a function with the signature of another that makes an object of the record of its arguments."""
+    signature = inspect.signature(function)
 
     @wraps(function)
     def call(*args: _Arguments.args, **named: _Arguments.kwargs) -> _Made:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import inspect
 import linecache
 import re
@@ -9,7 +10,7 @@ import traceback
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from traceback import FrameSummary
-from typing import Any
+from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar, overload
 
 from kiks.control.checked_code import checked, is_trusted
 
@@ -22,6 +23,8 @@ from kiks.errors import KiksError, ParameterError, counted, shown
 _intrinsic: Any = extending.intrinsic
 _types: Any = types
 
+_Options = ParamSpec("_Options")
+_Made = TypeVar("_Made", covariant=True)
 
 RETURNS = "it returns something, where it must write into its arguments and return nothing."
 """What is wrong with a function that returns its values."""
@@ -107,6 +110,25 @@ class Compiled:
     @property
     def _code(self) -> Any:
         return self.function.__code__
+
+
+class Decorator(Protocol[_Options, _Made]):
+    """Makes an object of a function; with options alone it returns what does."""
+
+    @overload
+    def __call__(self, *args: _Options.args, **options: _Options.kwargs) -> Callable[[Callable[..., Any]], _Made]: ...
+    @overload
+    def __call__(self, function: Callable[..., Any], /) -> _Made: ...
+
+
+def decorator(kind: Callable[Concatenate[Callable[..., Any], _Options], _Made]) -> Decorator[_Options, _Made]:
+    """Return a decorator, with or without options, that makes objects of a class."""
+
+    @functools.wraps(kind)
+    def decorate(*function: Any, **options: Any) -> Any:
+        return kind(*function, **options) if function else functools.partial(kind, **options)
+
+    return decorate
 
 
 def explained(error: Exception, functions: Iterable[Compiled]) -> Exception:

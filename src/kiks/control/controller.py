@@ -6,13 +6,13 @@ The same function runs compiled in a batch and drives one robot on any port, sim
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any, overload
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kiks.control.compiled_function import RETURNS, Compiled, explained
+from kiks.control.compiled_function import RETURNS, Compiled, decorator, explained
 from kiks.control.recipes import recipe_of
 from kiks.control.senses import check_senses, reading_count
 from kiks.engine.compiling import entry, kernel
@@ -32,8 +32,14 @@ class Controller(Compiled):
     zeros at the start and its own from then on. `wheels` takes the speeds of the left and right wheel [pulses/10 ms],
     which are rounded and cut to +-127 when they are sent.
 
+    Args:
+        function: The function.
+        senses: Its senses, of 'proximity', 'ambient' and 'camera'.
+        memory: How many numbers it remembers.
+        parameters: How many parameters it has; any count if left out.
+
     Attributes:
-        senses: Its senses, of `SENSES`.
+        senses: Its senses.
         memory_count: Numbers in its memory.
         parameter_count: Number of its parameters; None if any number will do.
         recipe: The table that recreates it (`kiks.controllers.from_recipe`), of JSON values; None for a function inside
@@ -60,7 +66,6 @@ class Controller(Compiled):
         senses: Sequence[str] = ("proximity",),
         memory: int = 0,
         parameters: int | None = None,
-        recipe: Mapping[str, Any] | None = None,
     ) -> None:
         super().__init__(function)
         self.senses = check_senses(senses)
@@ -68,7 +73,7 @@ class Controller(Compiled):
             raise ParameterError("senses must name one sense at least, but there was none.")
         self.memory_count = check_count("memory", memory)
         self.parameter_count = None if parameters is None else check_count("parameters", parameters)
-        self.recipe = recipe_of(function) if recipe is None else dict(recipe)
+        self.recipe = recipe_of(function)
 
     @property
     def sizes(self) -> dict[str, int | None]:
@@ -108,32 +113,8 @@ class Controller(Compiled):
         return given
 
 
-@overload
-def controller(function: Callable[..., Any]) -> Controller: ...
-@overload
-def controller(
-    *, senses: Sequence[str] = ..., memory: int = ..., parameters: int | None = ...
-) -> Callable[[Callable[..., Any]], Controller]: ...
-def controller(
-    function: Callable[..., Any] | None = None,
-    *,
-    senses: Sequence[str] = ("proximity",),
-    memory: int = 0,
-    parameters: int | None = None,
-) -> Any:
-    """Make a controller of a function; a decorator, with or without arguments.
-
-    Args:
-        function: A function `(sensors, memory, parameters, wheels)`; see `Controller`.
-        senses: What it senses, of 'proximity', 'ambient' and 'camera'.
-        memory: How many numbers it remembers.
-        parameters: How many parameters it has; any count if left out.
-    """
-
-    def make(function: Callable[..., Any]) -> Controller:
-        return Controller(function, senses=senses, memory=memory, parameters=parameters)
-
-    return make if function is None else make(function)
+controller = decorator(Controller)
+"""Make a controller of a function; a decorator, with or without the options of `Controller`."""
 
 
 @kernel

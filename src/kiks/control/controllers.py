@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BeforeValidator, Discriminator, Field, Tag
 
-from kiks.control.arguments import record_of
+from kiks.control.arguments import checked_call, record_of
 from kiks.control.controller import Controller
 from kiks.control.neural_nets import (
     GAIN,
@@ -77,7 +77,7 @@ KINDS: dict[str, tuple[Any, Callable[[Any], Controller]]] = {}
 
 def kind(function: Callable[_Arguments, Made]) -> Callable[_Arguments, Controller]:
     """Make of a declaration a function that returns controllers, and a kind of recipes."""
-    name, signature, declared = function.__name__, inspect.signature(function), cast(Callable[..., Made], function)
+    name, declared = function.__name__, cast(Callable[..., Made], function)
     arguments = record_of(function, kind=name)
 
     @functools.lru_cache(maxsize=1024)
@@ -86,16 +86,14 @@ def kind(function: Callable[_Arguments, Made]) -> Callable[_Arguments, Controlle
         del values["kind"]
         decide, memory, parameters = declared(**values)
         decide.__name__ = decide.__qualname__ = name
-        recipe = adapter(arguments).dump_python(given, mode="json")
-        return Controller(decide, senses=given.senses, memory=memory, parameters=parameters, recipe=recipe)
+        made = Controller(decide, senses=given.senses, memory=memory, parameters=parameters)
+        made.recipe = adapter(arguments).dump_python(given, mode="json")
+        return made
 
-    @functools.wraps(function)
-    def call(*args: _Arguments.args, **named: _Arguments.kwargs) -> Controller:
-        return make(arguments(**signature.bind(*args, **named).arguments))
-
-    call.__signature__ = signature.replace(return_annotation=Controller)  # type: ignore[attr-defined]
     KINDS[name] = arguments, make
-    return call
+    call: Any = checked_call(function, arguments, make)
+    call.__signature__ = inspect.signature(function).replace(return_annotation=Controller)
+    return call  # type: ignore[no-any-return]
 
 
 @kind

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections import namedtuple
 from collections.abc import Callable, Sequence
-from typing import Any, overload
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from kiks.control.compiled_function import Compiled, explained
+from kiks.control.compiled_function import Compiled, decorator, explained
 from kiks.control.senses import check_senses
 from kiks.errors import ParameterError, shown
 from kiks.model.checks import check_count
@@ -63,10 +63,21 @@ def first_note(notes: NDArray[np.float64]) -> NDArray[np.float64]:
 class Measure(Compiled):
     """A function `(moment, notes)` that is called in each control step and writes into its notes.
 
-    Attributes:
-        note_count: Numbers that it keeps for each robot, zeros at the start.
-        result: From the notes at the end, float64 [..., note], to the values, float64 [...].
-        senses: The senses that must come first in `moment.sensors`; controllers with others are rejected.
+    Args:
+        function: The function; see `Moment` for what it sees.
+        notes: Numbers that it keeps for each robot, zeros at the start.
+        result: From the notes at the end, float64 [..., note], to the values, float64 [...]; the first if left out.
+        senses: The senses that must come first in `moment.sensors`, of 'proximity', 'ambient' and 'camera'; controllers
+            with others are rejected.
+
+    Example:
+        >>> import kiks
+        >>> @kiks.measure
+        ... def farthest_mm(moment, notes):
+        ...     way = ((moment.x_mm - moment.start_x_mm) ** 2 + (moment.y_mm - moment.start_y_mm) ** 2) ** 0.5
+        ...     notes[0] = max(notes[0], way)
+        >>> farthest_mm.note_count
+        1
     """
 
     what, arguments, options = "measure", ("moment", "notes"), ("notes",)
@@ -107,38 +118,5 @@ class Measure(Compiled):
         return values
 
 
-@overload
-def measure(function: Callable[..., Any]) -> Measure: ...
-@overload
-def measure(
-    *, notes: int = ..., result: Result = ..., senses: Sequence[str] = ...
-) -> Callable[[Callable[..., Any]], Measure]: ...
-def measure(
-    function: Callable[..., Any] | None = None,
-    *,
-    notes: int = 1,
-    result: Result = first_note,
-    senses: Sequence[str] = (),
-) -> Any:
-    """Make a measure of a function; a decorator, with or without arguments.
-
-    Args:
-        function: A function `(moment, notes)`; see `Moment` for what it sees.
-        notes: Numbers that it keeps for each robot, zeros at the start.
-        result: From the notes at the end, float64 [..., note], to the values, float64 [...]; the first if left out.
-        senses: The senses that must come first in `moment.sensors`, of 'proximity', 'ambient' and 'camera'.
-
-    Example:
-        >>> import kiks
-        >>> @kiks.measure
-        ... def farthest_mm(moment, notes):
-        ...     way = ((moment.x_mm - moment.start_x_mm) ** 2 + (moment.y_mm - moment.start_y_mm) ** 2) ** 0.5
-        ...     notes[0] = max(notes[0], way)
-        >>> farthest_mm.note_count
-        1
-    """
-
-    def make(function: Callable[..., Any]) -> Measure:
-        return Measure(function, notes=notes, result=result, senses=senses)
-
-    return make if function is None else make(function)
+measure = decorator(Measure)
+"""Make a measure of a function; a decorator, with or without the options of `Measure`."""
