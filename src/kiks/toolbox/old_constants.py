@@ -7,6 +7,7 @@ as they changed those models (kiks-behaviour.md 2.2 and 3). With the values of K
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from typing import Annotated, Any
 
 from pydantic import BeforeValidator, Field
@@ -91,54 +92,42 @@ class OldConstants:
             >>> OldConstants(error_exponent=4, error_small=0.5).changes(khepera)
             {'proximity': {'noise_small': 0.5, 'noise_exponent': 7}}
         """
-        body: dict[str, Any] = {}
-        motor: dict[str, Any] = {}
-        proximity: dict[str, Any] = {}
-        ambient: dict[str, Any] = {}
-        camera: dict[str, Any] = {}
-        reflection: dict[str, Any] = {}
+        changes: dict[str, dict[str, Any]] = defaultdict(dict)
         if self.figures is not None:
-            body, proximity, ambient, reflection = _shape(self.figures, spec)
+            changes |= _shape(self.figures, spec)
         if self.pulse_mm is not None:
-            body["pulse_mm"] = self.pulse_mm
+            changes["body"]["pulse_mm"] = self.pulse_mm
         if self.dead_band_pwm is not None:
-            motor["dead_band_pwm"] = self.dead_band_pwm
+            changes["motor"]["dead_band_pwm"] = self.dead_band_pwm
         if self.stripes:
-            body["stripe_count"] = self.stripes
+            changes["body"]["stripe_count"] = self.stripes
         chance = spec.proximity
         if self.noise_percent != NOISE_PERCENT:
             scale = self.noise_percent / NOISE_PERCENT
-            proximity["jitter_counts"] = tuple(round(scale * each, 6) + 0.0 for each in chance.jitter_counts)
+            jitter = tuple(round(scale * each, 6) + 0.0 for each in chance.jitter_counts)
+            changes["proximity"]["jitter_counts"] = jitter
         small = chance.noise_small
         if self.error_small != ERROR_SMALL:
             small = min(round(small * self.error_small / ERROR_SMALL, 6), _NOISE_MAX)
-            proximity["noise_small"] = small
+            changes["proximity"]["noise_small"] = small
         # The largest error of all is that of small readings.
         large = min(round(chance.noise_large * self.error_large / ERROR_LARGE, 6), small)
         if large != chance.noise_large:
-            proximity["noise_large"] = large
+            changes["proximity"]["noise_large"] = large
         if self.error_exponent != ERROR_EXPONENT:
-            proximity["noise_exponent"] = _error_exponent(self.error_exponent, chance.noise_exponent)
+            changes["proximity"]["noise_exponent"] = _error_exponent(self.error_exponent, chance.noise_exponent)
         if self.light_exponent != LIGHT_EXPONENT:
-            ambient["angle_exponent"] = _angle_exponent(self.light_exponent, spec.ambient.angle_exponent)
+            changes["ambient"]["angle_exponent"] = _angle_exponent(self.light_exponent, spec.ambient.angle_exponent)
         if self.camera_noise_percent != CAMERA_NOISE_PERCENT:
             scale = self.camera_noise_percent / CAMERA_NOISE_PERCENT
-            camera["noise_share"] = min(round(scale * spec.camera.noise_share, 6), 1.0)
+            changes["camera"]["noise_share"] = min(round(scale * spec.camera.noise_share, 6), 1.0)
         if self.fixed_shutter:
-            camera["adapts_exposure"] = False
-        sections = {
-            "body": body,
-            "motor": motor,
-            "proximity": proximity,
-            "ambient": ambient,
-            "camera": camera,
-            "reflection": reflection,
-        }
-        return {name: changed for name, changed in sections.items() if changed}
+            changes["camera"]["adapts_exposure"] = False
+        return dict(changes)
 
 
-def _shape(figures: tuple[float, ...], spec: RobotSpec) -> tuple[dict[str, Any], ...]:
-    """Return what the figures of a robot definition file change of body, proximity, ambient and reflection.
+def _shape(figures: tuple[float, ...], spec: RobotSpec) -> dict[str, dict[str, Any]]:
+    """Return what the figures of a robot definition file change of a robot, by sections of its file.
 
     Sensors are as far within the rim as on the robot that was measured. They see at s times the distance what its
     sensors see, where s is the ratio of the ranges: in the light (cos(i) / (t + behind))^3 of a ray, t and `behind`
@@ -148,22 +137,24 @@ def _shape(figures: tuple[float, ...], spec: RobotSpec) -> tuple[dict[str, Any],
     places, directions = figures[3 : 3 + SENSOR_COUNT], figures[3 + SENSOR_COUNT :]
     inset_mm = spec.body.radius_mm - max(spec.proximity.mount_radius_mm)
     scale = range_mm / RANGE_MM
-    body = {"diameter_mm": diameter_mm, "wheel_base_mm": wheel_base_mm}
-    proximity = {
-        "mount_angle_deg": places,
-        "mount_radius_mm": (diameter_mm / 2 - inset_mm,) * SENSOR_COUNT,
-        "direction_deg": directions,
-        "range_mm": spec.proximity.range_mm * scale,
+    changes: dict[str, dict[str, Any]] = {
+        "body": {"diameter_mm": diameter_mm, "wheel_base_mm": wheel_base_mm},
+        "proximity": {
+            "mount_angle_deg": places,
+            "mount_radius_mm": (diameter_mm / 2 - inset_mm,) * SENSOR_COUNT,
+            "direction_deg": directions,
+            "range_mm": spec.proximity.range_mm * scale,
+        },
+        "ambient": {"direction_deg": directions},
     }
-    reflection: dict[str, Any] = {}
     if spec.reflection is not None and scale != 1.0:
         behind_mm = spec.reflection.behind_mm
         brighter = (scale * (LIGHT_MM + behind_mm) / (LIGHT_MM + scale * behind_mm)) ** 3
-        reflection = {
+        changes["reflection"] = {
             "behind_mm": scale * behind_mm,
             "light": tuple(round(brighter * each, 9) for each in spec.reflection.light),
         }
-    return body, proximity, {"direction_deg": directions}, reflection
+    return changes
 
 
 def _error_exponent(old: float, measured: int) -> int:
