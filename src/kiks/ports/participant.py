@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections import deque
-from typing import Any
+from collections.abc import Callable
 
 from kiks.clock.serial_timing import BACKLOG_LIMIT
 from kiks.errors import KiksError
@@ -18,6 +18,16 @@ from kiks.units import NS_PER_S
 
 STOPPING_NS = NS_PER_S // 2
 """Time that a robot's wheels have to come to rest when its program was stopped [ns]."""
+
+LINE_REQUESTS: dict[int, Callable[..., object]] = {
+    Kind.SEND: lambda wire, at_ns, data: wire.send(data, at_ns),
+    Kind.COUNT: lambda wire, at_ns: wire.line.arrived_count(at_ns),
+    Kind.DROP: lambda wire, at_ns: wire.line.take(wire.line.arrived_count(at_ns)),
+    Kind.SENT: lambda wire, at_ns: max(at_ns, wire.line.sending_until_ns),
+    Kind.SET_BAUD: lambda wire, at_ns, baud: wire.set_baud(baud),
+    Kind.BAUD: lambda wire, at_ns: wire.line.baud,
+}
+"""What requests that concern the line alone do to a robot's wire at a time [ns], and their results."""
 
 _log = logging.getLogger("kiks.run")
 
@@ -211,42 +221,26 @@ class ProgramParticipant(Participant):
             self._answer(at_ns)
         elif kind == Kind.FIND:
             self._answer(at_ns, self._names.robot(request.arguments[0], self.robot))
+        elif kind == Kind.ROOM:
+            room_ns = self._wires[request.robot - 1].line.room_ns(request.arguments[0])
+            if room_ns > at_ns:
+                self._warn_of_backlog(request.robot)
+            self._answer(at_ns, room_ns, robot=request.robot)
+        elif kind == Kind.CLAIM:
+            claim(self._wires[request.robot - 1], request.robot, request.arguments[0])
+            self._robots.add(request.robot)
+            self._used.add(request.robot)
+            self._answer(at_ns, robot=request.robot)
+        elif kind == Kind.HANG_UP:
+            wire = self._wires[request.robot - 1]
+            if request.arguments[0]:
+                wire.holder = None
+                self._robots.discard(request.robot)
+            wire.hang_up()
         elif kind != Kind.REACHED:
-            result = self._use_line(kind, request.robot, at_ns, *request.arguments)
+            result = LINE_REQUESTS[kind](self._wires[request.robot - 1], at_ns, *request.arguments)
             if kind in ASKING:
                 self._answer(at_ns, result, robot=request.robot)
-
-    def _use_line(self, kind: int, robot: int, at_ns: int, argument: Any = None) -> object:
-        """Execute a request that concerns a robot's line, and return its result."""
-        wire = self._wires[robot - 1]
-        line = wire.line
-        if kind == Kind.SEND:
-            wire.send(argument, at_ns)
-        elif kind == Kind.COUNT:
-            return line.arrived_count(at_ns)
-        elif kind == Kind.DROP:
-            line.take(line.arrived_count(at_ns))
-        elif kind == Kind.SENT:
-            return max(at_ns, line.sending_until_ns)
-        elif kind == Kind.ROOM:
-            room_ns = line.room_ns(argument)
-            if room_ns > at_ns:
-                self._warn_of_backlog(robot)
-            return room_ns
-        elif kind == Kind.SET_BAUD:
-            wire.set_baud(argument)
-        elif kind == Kind.BAUD:
-            return line.baud
-        elif kind == Kind.CLAIM:
-            claim(wire, robot, argument)
-            self._robots.add(robot)
-            self._used.add(robot)
-        elif kind == Kind.HANG_UP:
-            if argument:
-                wire.holder = None
-                self._robots.discard(robot)
-            wire.hang_up()
-        return None
 
     def _end(self) -> None:
         """Release the robots of the program, which has left, and close the connection."""

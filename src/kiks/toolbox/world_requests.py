@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -180,35 +181,35 @@ def ask_spawn(client: SessionClient, words: str) -> str:
     kind, x, y = numbers_of(words.split(), 3, "type, x and y")
     if kind not in (LIGHT_ROW, BALL_ROW, CYLINDER_ROW):
         raise ParameterError(f"type must be 1 (light), 2 (ball) or 3 (cylinder), but it was {kind:g}.")
+    settings = client.session.settings
+    brightness = {BALL_ROW: settings.ball, CYLINDER_ROW: settings.cylinder}.get(int(kind))
 
-    def spawn(sim: Simulation) -> None:
-        arena = sim.arena
-        add: Callable[..., object] = sim.add_lamp
-        greys = {}
-        if kind != LIGHT_ROW:
-            add = sim.add_ball if kind == BALL_ROW else sim.add_cylinder
-            settings = client.session.settings
-            brightness = settings.ball if kind == BALL_ROW else settings.cylinder
-            greys = {} if brightness is None else {"brightness": brightness}
-        place_given = None
+    def places(sim: Simulation) -> Iterator[tuple[float, float]]:
+        """Yield the place that was given, or the middle for a thing, and then random ones."""
+        width_mm, height_mm = sim.arena.width_mm, sim.arena.height_mm
         if not math.isnan(x) and not math.isnan(y):
-            place_given = place_mm(arena, x, y)
-            if not (0 <= place_given[0] <= arena.width_mm and 0 <= place_given[1] <= arena.height_mm):
+            x_mm, y_mm = place_mm(sim.arena, x, y)
+            if not (0 <= x_mm <= width_mm and 0 <= y_mm <= height_mm):
                 raise ParameterError(
-                    f"a place must lie in the arena, x from 1 to {arena.width_mm:g} and y from 1 to "
-                    f"{arena.height_mm:g}, but it was ({x:g}, {y:g})."
+                    f"a place must lie in the arena, x from 1 to {width_mm:g} and y from 1 to {height_mm:g}, but it "
+                    f"was ({x:g}, {y:g})."
                 )
+            yield x_mm, y_mm
         elif kind != LIGHT_ROW:
-            place_given = (arena.width_mm / 2, arena.height_mm / 2)
-        if place_given is not None and _is_done(lambda: add(*place_given, **greys)) == "1":
-            return
+            yield width_mm / 2, height_mm / 2
         there = len(sim.lamps) + len(sim.bodies())
         for attempt in range(ATTEMPTS):
             shares = [uniform(sim.seed, 0, there, STREAM_SPAWN, attempt, axis) for axis in (1, 2)]
-            place = shares[0] * arena.width_mm, shares[1] * arena.height_mm
+            place = shares[0] * width_mm, shares[1] * height_mm
             # A lamp may hang anywhere, but is useful over the floor only.
-            is_good = kind != LIGHT_ROW or arena.clearance_at_mm(*place) > 0
-            if is_good and _is_done(lambda place=place: add(*place, **greys)) == "1":  # type: ignore[misc]
+            if kind != LIGHT_ROW or sim.arena.clearance_at_mm(*place) > 0:
+                yield place
+
+    def spawn(sim: Simulation) -> None:
+        add: Any = {LIGHT_ROW: sim.add_lamp, BALL_ROW: sim.add_ball, CYLINDER_ROW: sim.add_cylinder}[int(kind)]
+        greys = {} if brightness is None else {"brightness": brightness}
+        for place in places(sim):
+            if _is_done(partial(add, *place, **greys)) == "1":
                 return
         raise ParameterError("there must be room for one more object, but none was found. Take something away.")
 
