@@ -6,6 +6,7 @@ are in `support`. Each has a folder of its own, for its files and for what tells
 
 from __future__ import annotations
 
+import ast
 import contextlib
 import json
 import os
@@ -193,9 +194,32 @@ class Octave:
 
 
 def run(program: str, folder: Path, environment: Mapping[str, str] | None = None) -> Octave:
-    """Run a program to its end; it must have no error and leave no process."""
+    """Run a program to its end; it must have no error and leave no process.
+
+    A line `EXPRESSION  %= VALUE` or `EXPRESSION  %= VALUE +- TOLERANCE` must have that value, and the text of a line
+    `EXPRESSION  %~ PATTERN` must match as a whole.
+    """
+    expected: list[re.Match[str]] = []
+
+    def say(line: re.Match[str]) -> str:
+        expected.append(line)
+        return f"say('line_{len(expected)}', {line[1]})"
+
+    program = re.sub(r"^(.+?)  %([=~]) (.+?)(?: \+- (\S+))?$", say, program, flags=re.MULTILINE)
     with Octave(program, folder, environment) as octave:
-        return octave.finish()
+        octave.finish()
+    for number, line in enumerate(expected, 1):
+        said = octave.said[f"line_{number}"]
+        if line[2] == "~":
+            assert re.fullmatch(line[3], said, re.DOTALL), (line[0], said)
+            continue
+        value = ast.literal_eval(line[3])
+        if isinstance(value, list):
+            assert said.shape == np.shape(value), (line[0], said)
+            value = np.array(value)
+        near = value if isinstance(value, str) else pytest.approx(value, abs=float(line[4] or 0))
+        assert said == near, (line[0], said)
+    return octave
 
 
 def has_ended(process: int) -> bool:

@@ -37,7 +37,7 @@ data = load('-mat', 'octave.kad');
 say('walls', data.walls)
 [walls, colours] = kiks_kad2arena(data.walls);
 say('drawn', double(walls) .* double(colours))
-say('drawn_class', [class(walls) ' ' class(colours)])
+[class(walls) ' ' class(colours)]  %= "logical uint8"
 kiks_arena
 kiks_load('octave.kad')
 say('kad_pose', kiks_siminfo_robotpos())
@@ -56,7 +56,7 @@ data = load('-mat', 'python.kad');
 [walls, colours] = kiks_kad2arena(data.walls);
 say('python_drawn', double(colours))
 [walls, colours] = kiks_tif2arena('nowhere.tif');
-say('nowhere', [size(walls) size(colours)])
+[size(walls) size(colours)]  %= [[0, 0, 0, 0]]
 kiks_arena('packed.tif')
 kiks_save('packed.kad')
 kiks_quit(1)
@@ -82,7 +82,6 @@ def test_files_of_octave_and_python_are_the_same(tmp_path: Path) -> None:
     assert (len(there.starts), len(there.lamps), len(there.balls), len(there.cylinders)) == (1, 1, 1, 1)
     assert np.array_equal(loadmat(tmp_path / "octave.kad")["walls"][0], said["walls"][0])
     assert np.array_equal(said["drawn"], ours)
-    assert said["drawn_class"] == "logical uint8"
     assert said["kad_pose"][0] == pytest.approx([50, 150, np.pi / 2])
     assert said["objects"][:, :3].tolist() == [[1, 40, 40], [2, 200, 100], [3, 250, 150]]
     assert np.array_equal(said["kad_objects"], said["objects"])
@@ -98,7 +97,6 @@ def test_files_of_octave_and_python_are_the_same(tmp_path: Path) -> None:
     assert np.array_equal(said["octave_kad"], ours)
     assert np.array_equal(said["octave_toml"], ours)
     assert np.array_equal(said["python_drawn"], picture)
-    assert said["nowhere"].tolist() == [[0, 0, 0, 0]]
     assert re.search(r"warning: The arena's file must exist, but 'nowhere\.tif' ", done.text)
     assert np.array_equal(Arena.load(tmp_path / "packed.kad").brightness[::-1], picture)
 
@@ -106,7 +104,7 @@ def test_files_of_octave_and_python_are_the_same(tmp_path: Path) -> None:
 NAMES = """
 addpath('path')
 kiks('robot_wars')
-say('current', size(kiks_tif2arena('robot_wars')))
+size(kiks_tif2arena('robot_wars'))  %= [[150, 200]]
 robot_wars = 'robot_wars.tif';
 delete(robot_wars)
 kiks_arena('robot_wars')
@@ -128,7 +126,6 @@ def test_arenas_are_found_by_their_names(tmp_path: Path) -> None:
     (tmp_path / "program" / "robot_wars.tif").rename(tmp_path / "program" / "ring.tif")
     (tmp_path / "program" / "beside.m").write_text(f"cd('{tmp_path}')\nkiks_arena('ring')\nkiks_save('ring.kiks')\n")
     said = run(NAMES, tmp_path).said
-    assert said["current"].tolist() == [[150, 200]]
     assert Project.load(tmp_path / "on_path.kiks").arena.width_mm == 210
     assert Project.load(tmp_path / "ring.kiks").arena.width_mm == 220
     assert said["pillars"].tolist() == [[2, 5]], "one that comes with KiKS, with two lamps"
@@ -176,7 +173,7 @@ KIKS_ARENA_CODING = 'thesis';
 kiks_arena(codes)
 say('thesis', kiks_siminfo_objects())
 maze = kiks_generate_maze(2, 2);
-say('thesis_light', sum(maze(:) == 3))
+sum(maze(:) == 3)  %= 1
 kiks_arena(maze)
 say('thesis_maze', kiks_siminfo_objects())
 KIKS_ARENA_CODING = 'kiks';
@@ -212,7 +209,6 @@ def test_greys_are_seen_and_codes_follow_the_preference(tmp_path: Path) -> None:
     assert said["logical"].startswith("kiks:argument|The colormask must be a matrix as large as the arena")
     assert said["kiks"][:, :3].tolist() == [[1, 60, 50], [2, 150, 100], [3, 60, 150]]
     assert said["thesis"][:, :3].tolist() == [[1, 150, 100], [2, 60, 50], [3, 60, 150]]
-    assert said["thesis_light"] == 1
     assert said["thesis_maze"][:, 0].tolist() == [1]
     assert said["first"][0] == pytest.approx([200, 200, 0], abs=1e-9)
     assert said["second"][0] == pytest.approx([100, 100, np.pi / 2])
@@ -341,7 +337,7 @@ say('start', kiks_siminfo_robotpos())
 kSetSpeed(ref, 10, 10);
 kiks_pause(1)
 say('driven', kiks_siminfo_robotdist())
-say('counts', numel(kProximity(ref)))
+numel(kProximity(ref))  %= 8
 kiks_load('empty.kiks')
 say('loaded', size(kiks_siminfo_robotpos))
 say('again', kiks_siminfo_objects())
@@ -367,7 +363,6 @@ def test_world_without_a_robot_gets_one_when_it_is_needed(tmp_path):
     assert said["again"].tolist() == said["objects"].tolist()
     assert said["start"][0, :2].tolist() == said["normal"][0, :2].tolist() == [400, 300]
     assert said["driven"].ravel()[0] > 50
-    assert said["counts"] == 8
     assert (said["taken"], said["set"]) == (0, 1)
     assert said["there"].ravel().tolist() == [350, 250, 0]
     project = Project.load(tmp_path / "empty.kiks")

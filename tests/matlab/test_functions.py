@@ -30,80 +30,80 @@ NAMES = re.findall(
 
 HELP = "".join(f"say('{name}', help('{name}'))\n" for name in NAMES)
 
-ROBOT = """
+ROBOT = r"""
 ref = kiks_kopen([-1 9600 1]);
-say('ref', ref)
+ref  %= [[-1, -1, -1, -1]]
 say('proximity', kProximity(ref))
 say('ambient', kAmbient(ref))
-say('set_encoders', kSetEncoders(ref, 100, -200))
-say('encoders', kGetEncoders(ref))
-say('set_zero', kSetEncoders(ref))
-say('zero', kGetEncoders(ref))
-say('set_speed', kSetSpeed(ref, 5.4, -5.4))
+kSetEncoders(ref, 100, -200)  %= 0
+kGetEncoders(ref)  %= [[100], [-200]]
+kSetEncoders(ref)  %= 0
+kGetEncoders(ref)  %= [[0], [0]]
+kSetSpeed(ref, 5.4, -5.4)  %= 0
 kiks_pause(0.5)
-say('speed', kGetSpeed(ref))
+kGetSpeed(ref)  %= [[5], [-5]] +- 1
 say('status', kGetStatus(ref))
 kStatus(ref)
-say('stop', kStop(ref))
+kStop(ref)  %= 0
 kiks_pause(0.5)
-say('stopped', kGetSpeed(ref))
-say('profile', kSetProfile(ref, 20, 64, 20, 64))
-say('profile_of_old', kSetProfile(ref))
-say('encoders_before', kSetEncoders(ref))
-say('move', kMoveTo(ref, 200.4, 200.4))
+kGetSpeed(ref)  %= [[0], [0]]
+kSetProfile(ref, 20, 64, 20, 64)  %= 0
+kSetProfile(ref)  %= 0
+kSetEncoders(ref)  %= 0
+kMoveTo(ref, 200.4, 200.4)  %= 0
 say('on_the_way', kGetStatus(ref))
 kStatus(ref)
 kiks_pause(3)
 say('arrived', kGetStatus(ref))
-say('moved', kGetEncoders(ref))
-say('speed_pid', [kSetSpeedPID(ref) kSetSpeedPID(ref, 3800, 800, 100)])
-say('position_pid', [kSetPositionPID(ref) kSetPositionPID(ref, 3000, 20, 4000)])
-say('pwm', kSetPWM(ref, 60, 60))
+kGetEncoders(ref)  %= [[200], [200]] +- 5
+[kSetSpeedPID(ref) kSetSpeedPID(ref, 3800, 800, 100)]  %= [[0, 0]]
+[kSetPositionPID(ref) kSetPositionPID(ref, 3000, 20, 4000)]  %= [[0, 0]]
+kSetPWM(ref, 60, 60)  %= 0
 kiks_pause(0.5)
 say('pwm_speed', kGetSpeed(ref))
 kStop(ref);
-say('led', kLED(ref, 0, 1))
-say('leds', kLED(ref, [0 1], [0 2]))
-say('no_led', kLED(ref, 7, 1))
+kLED(ref, 0, 1)  %= 1
+kLED(ref, [0 1], [0 2])  %= [[0, 2]]
+kLED(ref, 7, 1)  %= -1
 [bios, protocol] = kBios(ref);
 say('bios', [bios protocol])
 say('bios_row', kBios(ref))
-say('analog', kGetAnalog(ref, 3))
-say('no_analog', kGetAnalog(ref, 17))
-say('byte', kReadByte(ref, 32))
-say('write_byte', kWriteByte(ref, 170, 32))
+kGetAnalog(ref, 3)  %= 512 +- 512
+kGetAnalog(ref, 17)  %= -1
+kReadByte(ref, 32)  %= 128 +- 128
+kWriteByte(ref, 170, 32)  %= 0
 say('list', kList(ref))
-say('team', kTeam(ref))
+kTeam(ref)  %~ .+
 say('flush', kFlush(ref))
 say('help', kcmd(ref, 'help', 1))
 say('after_flush', kcmd(ref, 'H'))
-say('wrong', kcmd(ref, 'D,1'))
-say('unknown', kcmd(ref, 'X'))
+kcmd(ref, 'D,1')  %~ z,.*
+kcmd(ref, 'X')  %~ .+
 say('ksend', kiks_ksend(['H' 10], ref))
 say('ksend_cr', kiks_ksend(['H' 13], ref, 1))
-say('without_end', kiks_ksend('H', ref))
-say('after_without_end', kiks_ksend(['N' 10], ref))
-say('only_time', kiks_ksend('', ref))
+kiks_ksend('H', ref)  %~ h(,-?\d+){2}
+kiks_ksend(['N' 10], ref)  %~ n(,\d+){8}
+kiks_ksend('', ref)  %= ""
 say('times', kiks_ktime(ref))
 say('time', kiks_ktime(-1))
 kBraitenberg(ref, 0.7, 2)
 say('after_braitenberg', kiks_ktime(-1))
 kiks_pause(0.5)
-say('at_rest', kGetSpeed(ref))
-say('proximity_g', caught(@() kProximityG(ref)))
-say('braitenberg_g', caught(@() kBraitenbergG(ref)))
+kGetSpeed(ref)  %= [[0], [0]]
+caught(@() kProximityG(ref))  %~ kiks:display\|kProximityG must open a window, but there is no display here\..*
+caught(@() kBraitenbergG(ref))  %~ kiks:display\|kBraitenbergG must open a window, but there is no display here\..*
 kiks_kclose(ref)
-say('closed', kiks_ktime(-1))
+size(kiks_ktime(-1))  %= [[0, 0]]
 kiks_kclose(ref)
-say('send_closed', caught(@() kiks_ksend(['N' 10], ref)))
+caught(@() kiks_ksend(['N' 10], ref))  %~ kiks:simulator\|port -1 must be open, but it is not\..*
 ref = kopen([-1 9600 1]);
-say('kopen', ref)
-say('ksend_real', ksend(['N' 10], ref))
-say('ksends', ksends(['D,5,5' 10], ref))
+ref  %= [[-1, -1, -1, -1]]
+ksend(['N' 10], ref)  %~ n(,\d+){8}
+ksends(['D,5,5' 10], ref)  %= "d"
 kiks_pause(0.3)
-say('after_ksends', kGetSpeed(ref))
+kGetSpeed(ref)  %= [[5], [5]] +- 1
 kclose(ref)
-say('kclose', kiks_ktime(-1))
+size(kiks_ktime(-1))  %= [[0, 0]]
 kiks_kclose([])
 """
 
@@ -143,7 +143,7 @@ def test_old_style_is_accepted_without_a_warning(tmp_path: Path) -> None:
     assert "warning" not in octave.text
 
 
-TURRETS = """
+TURRETS = r"""
 global KIKS_ROBOTS KIKS_TURRETS
 KIKS_ROBOTS = 2;
 KIKS_TURRETS = 'k213 radio battle gripper';
@@ -153,54 +153,55 @@ arena(150, 300) = -180;
 kiks(arena)
 ref = kiks_kopen([-1 19200 1]);
 other = kiks_kopen([-2 9600 1]);
-say('other', other)
+other  %= [[-2, -2, -2, -2]]
 say('pixels', kLinVis(ref))
-say('level', kLinLight(ref))
-say('order', kTurret(ref, 2, 'L'))
-say('no_turret', kTurret(ref, 17, 'L'))
-say('camera_bios', kTurretBios(ref, 2))
-say('no_bios', kTurretBios(ref, 17))
-say('ready', kRadio_status(ref))
-say('nothing', kRadio_read(other))
-say('sent', kRadio_send(ref, 2, 'Hello', 5))
+size(kLinLight(ref))  %= [[2, 1]]
+kTurret(ref, 2, 'L')  %~ l,\d+,\d+
+kTurret(ref, 17, 'L')  %= -1
+size(kTurretBios(ref, 2))  %= [[2, 1]]
+kTurretBios(ref, 17)  %= -1
+kRadio_status(ref)  %= [[1, 0, 0]]
+any(kRadio_read(other))  %= 0
+size(kRadio_read(other))  %= [[18, 1]]
+kRadio_send(ref, 2, 'Hello', 5)  %= "t,4,s"
 kiks_pause(0.3)
-say('there', kRadio_status(other))
+kRadio_status(other)  %= [[1, 1, 0]]
 say('message', kRadio_read(other))
-say('too_long', kRadio_send(ref, 2, zeros(1, 17), 17))
-say('lost', kRadio_send(ref, 9, 'nobody', 6))
+kRadio_send(ref, 2, zeros(1, 17), 17)  %= ""
+kRadio_send(ref, 9, 'nobody', 6)  %= "t,4,s"
 kiks_pause(3)
-say('failed', kRadio_status(ref))
+kRadio_status(ref)  %= [[1, 0, 1]]
 say('battle', kBattle_sensors(ref))
 say('fired', kBattle_fire(ref))
 say('hit', kBattle_sensors(other))
-say('gripper', kSetGripper(ref, 1))
-say('arm', kSetArm(ref, 255))
+kSetGripper(ref, 1)  %= "t,1,d"
+kSetArm(ref, 255)  %= "t,1,e"
 kiks_pause(1.5)
-say('arm_is', kTurret(ref, 1, 'H,1'))
+kTurret(ref, 1, 'H,1')  %= "h,255"
 KIKS_TURRETS = 'gripper';
 KIKS_ROBOTS = [];
 kiks_arena
 ref = kiks_kopen;
-say('no_pixels', kLinVis(ref))
-say('no_level', kLinLight(ref))
-say('no_radio', kRadio_status(ref))
-say('no_message', kRadio_read(ref))
-say('no_battle', kBattle_sensors(ref))
-say('no_shot', kBattle_fire(ref))
+kLinVis(ref)  %= -1
+kLinLight(ref)  %= -1
+size(kRadio_status(ref))  %= [[0, 0]]
+kRadio_read(ref)  %= -1
+kBattle_sensors(ref)  %= -1
+kBattle_fire(ref)  %= -1
 KIKS_TURRETS = 'k213';
 kiks_arena
 ref = kiks_kopen;
-say('no_arm', kSetArm(ref, 255))
+kSetArm(ref, 255)  %= "z,Turret order not supported"
 """
 
-WORLD = """
-say('pose_before', kiks_siminfo_robotpos())
-say('path_before', kiks_siminfo_robotpath())
-say('distances_before', kiks_siminfo_robotdist())
-say('objects_before', kiks_siminfo_objects())
-say('speed_before', kiks_siminfo_speed())
-say('set_before', [kiks_siminfo_setobject(1, 1, 1, 1, 1) kiks_siminfo_setrobot(100, 100, 0)])
-say('version', kiks('--version'))
+WORLD = r"""
+size(kiks_siminfo_robotpos())  %= [[0, 0]]
+size(kiks_siminfo_robotpath())  %= [[2, 0]]
+size(kiks_siminfo_robotdist())  %= [[0, 0]]
+size(kiks_siminfo_objects())  %= [[0, 5]]
+kiks_siminfo_speed()  %= [[100, 100]]
+[kiks_siminfo_setobject(1, 1, 1, 1, 1) kiks_siminfo_setrobot(100, 100, 0)]  %= [[0, 0]]
+kiks('--version')  %~ KiKS \d+\.\d+\.\d+.*
 kiks
 say('default', kiks_siminfo_robotpos())
 kiks(zeros(200))
@@ -211,22 +212,23 @@ arena(50, 60) = 2;
 arena(200, 100) = 3;
 arena(200, 300) = 4;
 kiks_arena(arena)
-say('pose', kiks_siminfo_robotpos())
-say('objects', kiks_siminfo_objects())
+kiks_siminfo_robotpos()  %= [[200, 100, 1.5708]] +- 1e-4
+kiks_siminfo_objects()(:, 1:4)  %= [[1, 60, 50, 0], [2, 100, 200, 0], [3, 300, 200, 0]]
 kiks_spawn(1, [10 20])
 kiks_spawn(2, [300 60])
 kiks_spawn(3)
-say('spawned', kiks_siminfo_objects())
-say('outside', caught(@() kiks_spawn(3, [1000 20])))
-say('set_object', [kiks_siminfo_setobject(3, 105, 200, 50, pi / 2) kiks_siminfo_setobject(3, [], 201) ...
-    kiks_siminfo_setobject(3, -50, 200) kiks_siminfo_setobject(1, 70, 80)])
-say('objects_set', kiks_siminfo_objects())
+kiks_siminfo_objects()(1:3, 1:3)  %= [[1, 60, 50], [1, 10, 20], [2, 100, 200]]
+kiks_siminfo_objects()(4:6, 1:3)  %= [[3, 300, 200], [2, 300, 60], [3, 200, 150]] +- 1
+caught(@() kiks_spawn(3, [1000 20]))  %~ kiks:\w+\|.*must lie in the arena.*
+[kiks_siminfo_setobject(3, 105, 200, 50, pi / 2) kiks_siminfo_setobject(3, [], 201)]  %= [[1, 1]]
+[kiks_siminfo_setobject(3, -50, 200) kiks_siminfo_setobject(1, 70, 80)]  %= [[0, 1]]
+kiks_siminfo_objects()([1 3], :)  %= [[1, 70, 80, 0, 0], [2, 105, 201, 50, 1.5708]] +- 1e-4
 before = rows(kiks_siminfo_objects());
 kiks_delete_object([1 before])
-say('deleted', before - rows(kiks_siminfo_objects()))
-say('demos', strjoin(kiks_demo()', ' '))
+before - rows(kiks_siminfo_objects())  %= 2
+strjoin(kiks_demo()', ' ')  %= "avoid battle camera clean dance follow football maze mv80mm siminfo"
 kiks_demo
-say('set_robot', [kiks_siminfo_setrobot(150, 100, 1) kiks_siminfo_setrobot(5, 5, 1) kiks_siminfo_setrobot(1)])
+[kiks_siminfo_setrobot(150, 100, 1) kiks_siminfo_setrobot(5, 5, 1) kiks_siminfo_setrobot(1)]  %= [[1, 0, 0]]
 say('pose_set', kiks_siminfo_robotpos())
 kiks_checkpoint
 ref = kiks_kopen;
@@ -249,22 +251,22 @@ kiks_status('quiet')
 kiks_status('loud', 1)
 kiks_status('instead', 0, 1)
 say('log', strjoin(kiks_status(), ';'))
-say('pulses', kiks_mm2p([80 0.082]))
-say('mm', kiks_p2mm([976; 1]))
+kiks_mm2p([80 0.082])  %= [[975.61, 1]] +- 0.01
+kiks_p2mm([976; 1])  %= [[80.032], [0.082]]
 kiks_save('mine.kad')
 kiks_load('mine.kad')
-say('loaded', kiks_siminfo_robotpos())
+size(kiks_siminfo_robotpos())  %= [[1, 3]]
 kiks_arena_new_create(300, 250, 1, 100)
 [walls, greys] = kiks_arena_new_create(300, 250, 1, 100);
 say('new', [size(walls) nnz(walls) double(max(greys(:))) walls(10, 125) walls(11, 125) walls(12, 12)])
-say('new_pose', kiks_siminfo_robotpos())
+size(kiks_siminfo_robotpos())  %= [[1, 3]]
 [walls, greys] = kiks_tif2arena('mine.kad');
 say('read', [size(walls) nnz(walls) double(max(greys(:)))])
 [walls, greys] = kiks_kad2arena([120 110, 4, 1 120 120 1, 1 1 10 10, 200]);
 say('drawn', [size(walls) nnz(walls) double(max(greys(:)))])
 say('maze', size(kiks_generate_maze(2, 3)))
 kiks_preferences
-say('seed', KIKS_SEED)
+KIKS_SEED  %= 0
 kiks_kiksnet('knockknock')
 kiks_record('run.mcap')
 kiks_record('')
@@ -272,7 +274,7 @@ kiks_recordmovie('run')
 kiks_recordmovie('')
 kiks_setup
 kiks_quit
-say('quit', kiks_siminfo_robotpos())
+size(kiks_siminfo_robotpos())  %= [[0, 0]]
 kiks_quit(1)
 say('index', kiks_speedtest(1))
 kiks_calibrate
@@ -299,79 +301,35 @@ def test_help_names_its_function_and_gives_an_example(tmp_path: Path) -> None:
 def test_functions_of_the_robot_itself(tmp_path: Path) -> None:
     done = run(ROBOT, tmp_path)
     said = done.said
-    assert said["ref"].tolist() == [[-1, -1, -1, -1]]
-    assert said["kopen"].tolist() == [[-1, -1, -1, -1]]
     assert said["proximity"].shape == said["ambient"].shape == (8, 1)
     assert (said["proximity"] < 60).all(), "nothing is near"
     assert ((said["ambient"] > 400) & (said["ambient"] < 520)).all(), "it is dark"
-    for name in ("set_encoders", "set_zero", "set_speed", "stop", "profile", "profile_of_old", "move", "pwm"):
-        assert said[name] == 0, name
-    assert said["encoders"].tolist() == [[100], [-200]]
-    assert said["zero"].tolist() == [[0], [0]]
-    assert said["speed"].T.tolist() == pytest.approx(np.array([[5, -5]]), abs=1)
     assert said["status"].shape == (6, 1)
     assert said["status"][[1, 4], 0].tolist() == [0, 0]
-    assert not said["stopped"].any()
     assert said["on_the_way"][[0, 1, 3, 4], 0].tolist() == [0, 1, 0, 1]
     assert said["arrived"][[0, 1, 3, 4], 0].tolist() == [1, 1, 1, 1]
-    assert said["moved"] == pytest.approx(np.full((2, 1), 200), abs=5)
     assert re.search(r"left  wheel: speed mode, error -?\d+\nright wheel: speed mode, error -?\d+\n", done.text)
     assert re.search(r"left  wheel: position mode, moving, error -?\d+\nright wheel: position mode, moving", done.text)
-    assert said["speed_pid"].tolist() == said["position_pid"].tolist() == [[0, 0]]
     assert (said["pwm_speed"] > 5).all()
-    assert said["led"] == 1
-    assert said["leds"].tolist() == [[0, 2]]
-    assert said["no_led"] == -1
     assert (said["bios"] >= 1).all()
     assert said["bios"].tolist() == said["bios_row"].tolist()
-    assert 0 <= said["analog"] <= 1023
-    assert said["no_analog"] == -1
-    assert 0 <= said["byte"] <= 255
-    assert said["write_byte"] == 0
     assert len(said["list"].splitlines()) > 1
-    assert said["team"]
     assert len(said["help"].splitlines()) > 5
     assert re.fullmatch(r"h,-?\d+,-?\d+", said["after_flush"])
-    assert said["wrong"].startswith("z,")
-    assert said["unknown"]
     assert said["ksend"] == said["ksend_cr"] == said["after_flush"]
-    assert said["only_time"] == ""
-    assert re.fullmatch(r"h(,-?\d+){2}", said["without_end"])
-    assert re.fullmatch(r"n(,\d+){8}", said["after_without_end"])
     assert said["times"].shape == (1, 4)
     assert len(set(said["times"][0])) == 1
     assert said["times"][0, 0] <= said["time"] < said["times"][0, 0] + 0.1
     assert said["time"] + 2 <= said["after_braitenberg"] < said["time"] + 2.5
-    assert not said["at_rest"].any()
-    for name, function in {"proximity_g": "kProximityG", "braitenberg_g": "kBraitenbergG"}.items():
-        assert said[name].startswith(f"kiks:display|{function} must open a window, but there is no display here.")
-    assert said["closed"].size == said["kclose"].size == 0
-    assert said["send_closed"].startswith("kiks:simulator|port -1 must be open, but it is not.")
-    assert re.fullmatch(r"n(,\d+){8}", said["ksend_real"])
-    assert said["ksends"] == "d"
-    assert said["after_ksends"] == pytest.approx(np.full((2, 1), 5), abs=1)
 
 
 def test_functions_of_turrets(tmp_path: Path) -> None:
     done = run(TURRETS, tmp_path)
     said = done.said
-    assert said["other"].tolist() == [[-2, -2, -2, -2]]
     assert said["pixels"].shape == (64, 1)
     assert ((said["pixels"] >= 0) & (said["pixels"] <= 255)).all()
-    assert said["level"].shape == (2, 1)
-    assert re.fullmatch(r"l,\d+,\d+", said["order"])
-    assert said["no_turret"] == said["no_bios"] == -1
-    assert said["camera_bios"].shape == (2, 1)
     assert re.search(r"Turret 2: version \d+, revision \d+\nTurret 17 does not answer\.", done.text)
-    assert said["ready"].tolist() == [[1, 0, 0]]
-    assert said["nothing"].shape == (18, 1)
-    assert not said["nothing"].any()
-    assert said["sent"] == "t,4,s"
-    assert said["there"].tolist() == [[1, 1, 0]]
     assert said["message"][:, 0].tolist() == [1, 5, *b"Hello", *[0] * 11]
-    assert said["too_long"] == ""
-    assert said["lost"] == "t,4,s"
-    assert said["failed"].tolist() == [[1, 0, 1]]
     x, y, angle, distance, percent, energy, hits = said["battle"][:, 0]
     assert (x, y) == pytest.approx((100, 150), abs=1)
     assert (angle, percent, hits) == (0, 100, 0)
@@ -379,40 +337,14 @@ def test_functions_of_turrets(tmp_path: Path) -> None:
     assert energy > 20
     assert said["fired"][:, 0].tolist() == [2, distance]
     assert said["hit"][6, 0] == 1
-    assert said["gripper"] == "t,1,d"
-    assert said["arm"] == "t,1,e"
-    assert said["arm_is"] == "h,255"
-    for name in ("no_pixels", "no_level", "no_message", "no_battle", "no_shot"):
-        assert said[name] == -1, name
-    assert said["no_radio"].size == 0
-    assert said["no_arm"] == "z,Turret order not supported"
 
 
 def test_functions_of_worlds(tmp_path: Path) -> None:
     done = run(WORLD, tmp_path)
     said = done.said
-    assert said["pose_before"].size == said["distances_before"].size == said["quit"].size == 0
-    assert said["path_before"].shape == (2, 0)
-    assert said["objects_before"].shape == (0, 5)
-    assert said["speed_before"].tolist() == [[100, 100]]
-    assert said["set_before"].tolist() == [[0, 0]]
-    assert re.fullmatch(r"KiKS \d+\.\d+\.\d+.*", said["version"])
     assert said["default"].shape == (1, 3)
     assert said["still_default"].tolist() == said["default"].tolist()
     assert "A session is active" in done.text
-    assert said["pose"][0] == pytest.approx([200, 100, np.pi / 2])
-    assert said["objects"][:, :4] == pytest.approx(
-        np.array([[1, 60, 50, 0], [2, 100, 200, 0], [3, 300, 200, 0]], float)
-    )
-    assert said["spawned"][:, 0].tolist() == [1, 1, 2, 3, 2, 3]
-    assert said["spawned"][1, 1:3].tolist() == [10, 20]
-    assert said["spawned"][4, 1:3].tolist() == [300, 60]
-    assert said["spawned"][5, 1:3] == pytest.approx([200, 150], abs=1)
-    assert re.match(r"kiks:\w+\|.*must lie in the arena", said["outside"])
-    assert said["set_object"].tolist() == [[1, 1, 0, 1]]
-    assert said["objects_set"][2] == pytest.approx([2, 105, 201, 50, np.pi / 2])
-    assert said["objects_set"][0, 1:3].tolist() == [70, 80]
-    assert said["set_robot"].tolist() == [[1, 0, 0]]
     assert said["pose_set"][0] == pytest.approx([150, 100, 1])
     x, y, angle = said["driven"][0]
     assert angle == pytest.approx(1, abs=0.05)
@@ -428,8 +360,6 @@ def test_functions_of_worlds(tmp_path: Path) -> None:
     assert (said["speed"] > 0).all()
     assert said["distances_back"][0, 1] > 15
     assert said["pose_reset"] == pytest.approx(said["pose_set"], abs=1e-6)
-    assert said["deleted"] == 2
-    assert said["demos"] == "avoid battle camera clean dance follow football maze mv80mm siminfo"
     assert "  6  follow    follow the wall on the left." in done.lines
     at = done.lines.index("a line")
     assert done.lines[at : at + 4] == ["a line", "two", "lines", "loud"]
@@ -439,18 +369,13 @@ def test_functions_of_worlds(tmp_path: Path) -> None:
     assert [line[9:] for line in log[-5:-2]] == ["a line", "two", "lines"]
     assert re.fullmatch(r"\d\d:\d\d:\d\d quiet", log[-2])
     assert log[-1].endswith(" instead")
-    assert said["pulses"][0] == pytest.approx([80 / 0.082, 1])
-    assert said["mm"][:, 0] == pytest.approx([80.032, 0.082])
-    assert said["loaded"].shape == (1, 3)
     rows, columns, count, grey, edge, floor, corner = said["new"][0]
     assert (rows, columns, grey, edge, floor, corner) == (300, 250, 100, 1, 0, 1)
     # 10 mm all around, and the corners outside of quarter circles of 100 mm.
     assert count == pytest.approx(300 * 250 - 280 * 230 + (4 - np.pi) * 100**2, rel=0.01)
-    assert said["new_pose"].shape == (1, 3)
     assert said["read"][0].tolist() == [300, 400, 0, 0]
     assert said["drawn"][0].tolist() == [110, 120, 1200, 200]
     assert said["maze"].tolist() == [[3 * 120 + 2 * 10, 4 * 120 + 10]]
-    assert said["seed"] == 0
     assert re.search(r"kiks_kiksnet: .*\n.* is on the path", done.text)
     assert 0.001 <= said["index"] < 20
     constant, baud, variation, index = said["calibrated"][0]

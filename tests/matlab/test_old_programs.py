@@ -86,8 +86,8 @@ say('pictures', [picture kLinVis(ref)])
 % The lines that follow in many programs: replies taken to pieces.
 reply = kiks_ksend(['H' 10], ref);
 [value, count, errmsg] = sscanf(reply, 'h,%d,%d');
-say('pieces', [numel(value) count isempty(errmsg)])
-say('letter', strcmp(reply(1), 'h'))
+[numel(value) count isempty(errmsg)]  %= [[2, 2, 1]]
+strcmp(reply(1), 'h')  %= 1
 % The first of many lines is read only; kMatlab's own kcmd, copied beside a program, does so.
 kiks_ksend(['list' 10], ref);
 say('after_list', kGetEncoders(ref))
@@ -109,8 +109,6 @@ def test_loops_end_by_the_clock_and_compare_vectors(tmp_path: Path) -> None:
     assert 2 <= said["waited"][0, 0] < 2.1
     assert said["after_clear"].shape == (8, 1)
     assert said["pictures"].shape == (64, 2)
-    assert said["pieces"].tolist() == [[2, 2, 1]]
-    assert said["letter"] == 1
     assert said["after_list"].shape == (2, 1)
 
 
@@ -236,9 +234,9 @@ kSetspeed(ref, 0, 0);
 Kproximity(ref)
 kstatus(ref)
 [major, protocol] = kbios(ref);
-say('versions', [major protocol])
+[major protocol]  %= [[5.02, 5.01]]
 say('turned', kiks_siminfo_robotpos())
-say('own', kgetspeed(ref))
+kgetspeed(ref)  %= "a function of the program"
 say('wrong', caught(@() ksetspeed(ref)))
 kiks_kclose(ref);
 clear all
@@ -254,9 +252,7 @@ def test_capitals_of_functions_do_not_matter(tmp_path: Path) -> None:
     said = done.said
     text = "\n".join(line for line in done.lines if line)
     assert re.match(r"ans = 0\nans =\n( +\d+\n){8}left  wheel: speed mode, error", text)
-    assert said["versions"].tolist() == [[5.02, 5.01]]
     assert said["turned"][0, 2] < np.pi / 2 - 0.5
-    assert said["own"] == "a function of the program"
     assert said["wrong"].startswith("kiks:argument|kSetSpeed needs the speeds of both wheels.")
     assert said["after_clear"][0, 0] >= 200
 
