@@ -49,19 +49,20 @@ while (kiks_ktime(-1) < 20)
     kiks_pause(0.05);
     loops = loops + 1;
 end;
-say('real_s', etime(clock, t0))
-say('backed', backed)
-say('loops', loops)
-say('time', kiks_ktime(-1))
+etime(clock, t0) < 20  %= 1
+% It has met a wall and felt it, and took no real second for each simulated one.
+backed >= 1  %= 1
+loops > 50  %= 1
+kiks_ktime(-1)  %= 22.5 +- 2.5
 % Closed without being stopped: it drives on as soon as time passes again.
 kSetSpeed(ref, 3, -3);
 kiks_kclose(ref);
 say('closed_at', kiks_siminfo_robotpos())
 ref = kiks_kopen([-1, 9600, 1]);
-say('begins', kiks_ktime(-1))
+kiks_ktime(-1)  %= 0 +- 0.1
 kiks_pause(1)
 say('drove_on', kiks_siminfo_robotpos())
-say('counts_on', kGetEncoders(ref))
+all(kGetEncoders(ref) ~= 0)  %= 1
 % Endless, but for a count; waiting by a vector of times; a program that forgets everything.
 i = 0;
 t = Inf;
@@ -73,16 +74,16 @@ end;
 start = kiks_ktime(ref);
 while kiks_ktime(ref) - start < 2
 end;
-say('waited', kiks_ktime(ref) - start)
+kiks_ktime(ref) - start  %= [[2, 2, 2, 2]] +- 0.1
 clear all
 kiks_kclose([]);
 ref = kiks_kopen([-1, 9600, 1]);
-say('after_clear', kProximity(ref))
+size(kProximity(ref))  %= [[8, 1]]
 % "Reset the connection", with the reference itself.
 kiks_kclose(ref); kiks_kopen(ref);
 picture = kLinVis(ref);
 kiks_kclose(ref); kiks_kopen(ref);
-say('pictures', [picture kLinVis(ref)])
+size([picture kLinVis(ref)])  %= [[64, 2]]
 % The lines that follow in many programs: replies taken to pieces.
 reply = kiks_ksend(['H' 10], ref);
 [value, count, errmsg] = sscanf(reply, 'h,%d,%d');
@@ -90,26 +91,15 @@ reply = kiks_ksend(['H' 10], ref);
 strcmp(reply(1), 'h')  %= 1
 % The first of many lines is read only; kMatlab's own kcmd, copied beside a program, does so.
 kiks_ksend(['list' 10], ref);
-say('after_list', kGetEncoders(ref))
+size(kGetEncoders(ref))  %= [[2, 1]]
 kiks_kclose(ref);
 """
 
 
 def test_loops_end_by_the_clock_and_compare_vectors(tmp_path: Path) -> None:
     said = run(LOOPS, tmp_path).said
-    assert said["backed"] >= 1, "it has met a wall, and felt it"
-    assert said["loops"] > 50
-    assert 20 <= said["time"] < 25
-    assert said["real_s"] < 20, "no real second for each simulated one"
-    assert said["begins"] < 0.1
     assert said["drove_on"][0, 2] - said["closed_at"][0, 2] < -0.5
     assert said["drove_on"][0, :2] == pytest.approx(said["closed_at"][0, :2], abs=5)
-    assert (said["counts_on"] != 0).all()
-    assert said["waited"].shape == (1, 4)
-    assert 2 <= said["waited"][0, 0] < 2.1
-    assert said["after_clear"].shape == (8, 1)
-    assert said["pictures"].shape == (64, 2)
-    assert said["after_list"].shape == (2, 1)
 
 
 # ---- scripts that print what they get, with commands of text and the number 10 ----
@@ -145,7 +135,7 @@ def test_scripts_without_semicolons_print_replies_and_opening_twice_ends_them(tm
 
 # ---- arenas from pictures, windows with buttons: one session after the other ----
 
-PICTURES = """
+PICTURES = r"""
 ARENA = imread('corridors.tif');
 ARENA = double(ARENA > 128);
 ARENA(60, 60) = -360;
@@ -167,23 +157,23 @@ for i = 1:200
 end
 say('stack', stack)
 kiks_kclose(ref);
-say('left', kiks_siminfo_robotpos())
+left = kiks_siminfo_robotpos();
 kiks('corridors.tif');
-say('ignored', kiks_siminfo_robotpos())
+isequal(kiks_siminfo_robotpos(), left)  %= 1
 kiks_quit
 kiks_quit
-say('quit', kiks_ktime(-1))
-say('after_quit', caught(@() kProximity(ref)))
-say('ending', caught(@() kiks('robot_wars.tif')))
+size(kiks_ktime(-1))  %= [[0, 0]]
+caught(@() kProximity(ref))  %~ kiks:session\|A port must be open for that, but none is\..*
+caught(@() kiks('robot_wars.tif'))  %~ kiks:argument\|The arena's file must exist, but 'robot_wars.tif' is neither in .*
 kiks('robot_wars')
-say('default', kiks_siminfo_robotpos())
+kiks_siminfo_robotpos()(1:2)  %= [[250.5, 325.5]] +- 1e-4
 kiks_quit
 kiks_kiksnet('knockknock');
 
 kiks('corridors.tif');
-say('file', kiks_siminfo_robotpos())
+size(kiks_siminfo_robotpos())  %= [[1, 3]]
 kiks_arena(imread('corridors.tif') > 128);
-say('matrix', kiks_siminfo_robotpos())
+size(kiks_siminfo_robotpos())  %= [[1, 3]]
 
 % A controller made for the real robot, with the reference exchanged.
 ref = kopen([-1, 9600, 100]);
@@ -194,7 +184,7 @@ for i = 1:20
 end
 kSetSpeed(ref, 0, 0);
 kclose(ref);
-say('inputs', inputs)
+size(inputs)  %= [[20, 16]]
 """
 
 
@@ -210,20 +200,13 @@ def test_pictures_are_arenas_and_sessions_follow_each_other(tmp_path: Path) -> N
     assert said["stack"].shape[0] == 2
     assert said["stack"][:, 0] == pytest.approx([60, 60], abs=2)
     assert said["stack"][0].max() > 300, "it has gone along the first corridor"
-    assert said["ignored"].tolist() == said["left"].tolist(), "the world that there is stays"
-    assert said["quit"].size == 0
-    assert said["file"].shape == said["matrix"].shape == (1, 3)
-    assert said["after_quit"].startswith("kiks:session|A port must be open for that, but none is.")
-    assert said["ending"].startswith("kiks:argument|The arena's file must exist, but 'robot_wars.tif' is neither in ")
-    assert said["default"][0, :2] == pytest.approx([250.5, 325.5])
     there = r"corridors\. Those of KiKS: .*, track\. The default arena is taken instead\."
     assert re.search(rf"warning: The arena's file must exist, but 'robot_wars' with one of the .*: {there}", done.text)
-    assert said["inputs"].shape == (20, 16)
 
 
 # ---- functions spelled with other capitals, which neither kMatlab nor MATLAB on Windows distinguished ----
 
-SPELLINGS = """
+SPELLINGS = r"""
 clear all
 ref = kiks_kopen([-1 9600 1]);
 before = KGetEncoders(ref);
@@ -235,13 +218,13 @@ Kproximity(ref)
 kstatus(ref)
 [major, protocol] = kbios(ref);
 [major protocol]  %= [[5.02, 5.01]]
-say('turned', kiks_siminfo_robotpos())
+kiks_siminfo_robotpos()(3) < pi / 2 - 0.5  %= 1
 kgetspeed(ref)  %= "a function of the program"
-say('wrong', caught(@() ksetspeed(ref)))
+caught(@() ksetspeed(ref))  %~ kiks:argument\|kSetSpeed needs the speeds of both wheels\..*
 kiks_kclose(ref);
 clear all
 ref = kiks_kopen([-1 9600 1]);
-say('after_clear', kgetencoders(ref))
+kgetencoders(ref)(1) >= 200  %= 1
 kiks_kclose(ref);
 """
 
@@ -249,12 +232,8 @@ kiks_kclose(ref);
 def test_capitals_of_functions_do_not_matter(tmp_path: Path) -> None:
     (tmp_path / "kgetspeed.m").write_text("function speed = kgetspeed(ref)\nspeed = 'a function of the program';\n")
     done = run(SPELLINGS, tmp_path)
-    said = done.said
     text = "\n".join(line for line in done.lines if line)
     assert re.match(r"ans = 0\nans =\n( +\d+\n){8}left  wheel: speed mode, error", text)
-    assert said["turned"][0, 2] < np.pi / 2 - 0.5
-    assert said["wrong"].startswith("kiks:argument|kSetSpeed needs the speeds of both wheels.")
-    assert said["after_clear"][0, 0] >= 200
 
 
 # ---- programs that are run again and again, and never close their port ----
@@ -282,12 +261,12 @@ place = kiks_siminfo_robotpos;
 def test_programs_that_clear_all_begin_anew(tmp_path: Path) -> None:
     (tmp_path / "again.m").write_text(AGAIN)
     (tmp_path / "kiks_preferences.m").write_text("KIKS_THINKING = 'none';\n")
-    program = """
+    program = r"""
 again
 say('first', [place time])
 again
 say('second', [place time])
-say('open', caught(@() kiks_kopen([-1 9600 1])))
+caught(@() kiks_kopen([-1 9600 1]))  %~ kiks:simulator\|port -1 must be closed before it is opened.*
 kiks(zeros(400, 400))
 clear all
 ref = kiks_kopen([-1 9600 1]);
@@ -299,7 +278,6 @@ kiks_quit(1)
     assert said["first"].tolist() == said["second"].tolist()
     assert 200 - said["first"][0, 1] > 5
     assert 0.3 < said["first"][0, 3] < 0.5, "pauses below 0 take no time"
-    assert said["open"].startswith("kiks:simulator|port -1 must be closed before it is opened")
     assert sum("A session is active" in line for line in done.lines) == 1, "that of the prompt, without clear all"
     assert said["same_world"][0] == pytest.approx(said["second"][0, :3], abs=2), "while the port opened, it drove on"
 

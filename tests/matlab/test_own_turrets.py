@@ -58,12 +58,12 @@ for k = 1:numel(orders)
     say(sprintf('took_%d', k), kiks_ktime(-1) - before)
 end
 kTurret(ref, 24, 'S,1')  %= "s,1"
-say('bios', kTurretBios(ref, 24))
+kTurretBios(ref, 24)  %= [[1], [0]]
 kcmd(ref, 'T,2,N')  %= "what I see by N"
 kcmd(ref, 'T,4,F')  %= "t,4,f,1"
-say('none', kcmd(ref, 'T,30,F'))
-say('net', kcmd(ref, 'net', 1))
-say('two', kiks_ksend(['T,24,S,7' 10 'H' 10], ref))
+kcmd(ref, 'T,30,F')  %= "z,Turret order not supported"
+kcmd(ref, 'net', 1)  %~ .*compass, ID 24.*
+kiks_ksend(['T,24,S,7' 10 'H' 10], ref)  %= "z,Protocol error"
 kSetSpeed(ref, 5, 5);
 kiks_pause(2)
 kiks_record('')
@@ -90,10 +90,6 @@ def test_functions_carry_out_the_orders_for_their_turrets(tmp_path: Path, transp
     for k, order in ((2, "S,1,2.5"), (4, "B"), (6, "X")):
         characters = len(f"T,24,{order}\n") + len(said[f"reply_{k}"]) + 2
         assert said[f"took_{k}"] == pytest.approx(characters * 11 / 9600 + 1e-3, abs=1e-4)
-    assert said["bios"].ravel().tolist() == [1, 0]
-    assert said["none"] == unknown
-    assert "compass, ID 24" in said["net"]
-    assert said["two"] == refused
     assert octave.line("A turret of the folder turrets has the number of ") == "k213 and takes its place."
     assert octave.line("turrets/compass.m could not carry out order X: ") == "no order X"
     assert "it must return a row of characters" in octave.line("turrets/compass.m could not carry out order Y: ")

@@ -24,10 +24,10 @@ kiks_siminfo_setrobot(100, 100, 0)
 kiks_pause(2)
 kiks_record('')
 kSetSpeed(ref, 0, 0);
-say('other', caught(@() kiks_record('run.mp4')))
-say('number', caught(@() kiks_record(5)))
+caught(@() kiks_record('run.mp4'))  %~ .*name must end in .mcap.*
+caught(@() kiks_record(5))  %~ .*name must end in .mcap.*
 kiks_quit
-say('late', caught(@() kiks_record('run.mcap')))
+caught(@() kiks_record('run.mcap'))  %~ .*kiks_record needs a session.*
 """
 
 
@@ -39,9 +39,6 @@ def test_a_session_is_recorded_until_it_is_told_to_stop(tmp_path: Path) -> None:
     assert len(recording.table("readings")) == 20
     assert any(row["kind"] == "change" for row in recording.table("events"))
     assert check_recording(recording.log) == Checked(1 + int(recording.duration_s))
-    for name in ("other", "number"):
-        assert "name must end in .mcap" in octave.said[name]
-    assert "kiks_record needs a session" in octave.said["late"]
 
 
 FIRST = """
