@@ -19,17 +19,7 @@ from kiks.version import __version__ as __version__  # before all others, becaus
 import lazy_loader
 import serial  # noqa: TID253  (pyserial has to be told where our plug-in is)
 
-from kiks import upwards
-
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)  # the names of __init__.pyi
-
-upwards.load_arena_file.provide("kiks.model.project", "load_arena_file")
-upwards.draw_for_notebook.provide("kiks.export.notebook", "for_notebook")
-upwards.record_simulation.provide("kiks.recording.recorder", "RunRecorder")
-upwards.plot_simulation.provide("kiks.export.figures", "figure_of_run")
-upwards.plot_recordings.provide("kiks.export.figures", "figure_of")
-upwards.export_recording.provide("kiks.export.kinds", "export")
-upwards.show_in_browser.provide("kiks.desk.server.show", "show")
 
 if "kiks.ports.pyserial" not in serial.protocol_handler_packages:
     serial.protocol_handler_packages.append("kiks.ports.pyserial")

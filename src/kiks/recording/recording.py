@@ -92,7 +92,7 @@ class Recording:
     def title(self) -> str:
         """A line that says what ran."""
         what = ", ".join(self.programs) or self.about.get("arena", "")
-        return f"{what}, seed {self.start.seed}, {self.duration_s:.1f} s"
+        return f"{what}, seed {self.start.head.seed}, {self.duration_s:.1f} s"
 
     def project_at(self, time_s: float) -> Project:
         """Return the world at a time as a project, with robots, bodies and lamps where they are then."""

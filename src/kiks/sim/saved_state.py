@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from kiks.engine.physics.gripper import ARM_MAX, JAWS_MAX
-from kiks.engine.state import BALL, BODY, CYLINDER, MEMORY_COUNT, ROBOT
+from kiks.engine.state import BALL, BODY, CYLINDER, ROBOT
 from kiks.errors import ParameterError, shown
 from kiks.firmware.k213 import PERIODS_NS
 from kiks.firmware.radio import ATTEMPTS, DATA_LIMIT
@@ -30,22 +30,12 @@ from kiks.model.robot import RobotSpec, robot_toml
 from kiks.model.turrets import TURRETS
 from kiks.sim.free_space import FreeSpace
 from kiks.sim.simulation import Simulation
-from kiks.sim.turret_host import name_of
+from kiks.sim.turret_host import TurretOfUser, described, name_of
 from kiks.sim.wire import Count, SavedWire
 from kiks.sim.world import World
 from kiks.units import TICK_NS
 
 Part = TypeVar("Part", Arena, RobotSpec)
-
-
-@record
-class TurretOfUser:
-    """What is known of a turret of a user's own without its program."""
-
-    number: Annotated[Whole, Field(ge=-1, le=99)]
-    name: Text
-    revision: Annotated[tuple[Count, ...], Field(min_length=2, max_length=2)]
-    memory_count: Annotated[Whole, Field(ge=0, le=MEMORY_COUNT)]
 
 
 class AbsentTurret(Turret):
@@ -134,8 +124,19 @@ class _RobotFile:
 
 
 @record
-class _Head:
-    """What stands before the records in the bytes of a saved state."""
+class Head:
+    """What stands before the records in the bytes of a saved state.
+
+    Attributes:
+        now_ns: The time [ns].
+        tick_count: Number of ticks done.
+        seed: Seed of all random numbers.
+        arena: Name of the file of the walls.
+        robots: The robots without their records.
+        bodies: Number of bodies.
+        lamps: Number of lamps.
+        body_count: Bodies created so far, i.e. the last number.
+    """
 
     now_ns: Annotated[Whole, Field(ge=0, le=CLOCK_END_NS)]
     tick_count: Count
@@ -154,30 +155,20 @@ class SavedState:
     Replies that a program has not read yet are not part of it.
 
     Attributes:
-        now_ns: The time [ns].
-        tick_count: Number of ticks done.
-        seed: Seed of all random numbers.
+        head: What is no record.
         arena: The walls alone.
         specs: The kind of each robot.
-        turrets: The turrets of each robot: names of built-in turrets, descriptions of custom ones.
-        wires: The robots' lines.
         robots: Records of `ROBOT`, shape [1, robot].
         bodies: Records of `BODY`, shape [1, body].
         lamps: float64 [lamp, 4].
-        body_count: Bodies created so far, i.e. the last number.
     """
 
-    now_ns: int
-    tick_count: int
-    seed: int
+    head: Head
     arena: Arena
     specs: tuple[RobotSpec, ...]
-    turrets: tuple[tuple[str | TurretOfUser, ...], ...]
-    wires: tuple[SavedWire, ...]
     robots: NDArray[np.void]
     bodies: NDArray[np.void]
     lamps: NDArray[np.float64]
-    body_count: int
 
     @classmethod
     def from_bytes(cls, data: bytes, files: WorldFiles, what: str) -> SavedState:
@@ -189,7 +180,7 @@ class SavedState:
             what: What messages call them.
         """
         line, _, rest = data.partition(b"\n")
-        head = check(_Head, parse_json(line, what), what)
+        head = check(Head, parse_json(line, what), what)
         robots_end = len(head.robots) * ROBOT.itemsize
         bodies_end = robots_end + head.bodies * BODY.itemsize
         if len(rest) != bodies_end + head.lamps * 32:
@@ -198,23 +189,23 @@ class SavedState:
                 "lamps, but it has others. Is the file damaged?"
             )
         saved = cls(
-            head.now_ns,
-            head.tick_count,
-            head.seed,
+            head,
             files.arena(head.arena),
             tuple(files.kind(robot.kind) for robot in head.robots),
-            tuple(robot.turrets for robot in head.robots),
-            tuple(robot.wire for robot in head.robots),
             np.frombuffer(rest[:robots_end], ROBOT)[None],
             np.frombuffer(rest[robots_end:bodies_end], BODY)[None],
             np.frombuffer(rest[bodies_end:]).reshape(-1, 4),
-            head.body_count,
         )
         check_records(saved.robots, saved.bodies, (saved.arena.width_mm, saved.arena.height_mm), what)
-        ticks = -(-saved.now_ns // TICK_NS)
-        _check_range(np.array(saved.tick_count), ticks, ticks, f"tick_count of {what}")
+        ticks = -(-head.now_ns // TICK_NS)
+        _check_range(np.array(head.tick_count), ticks, ticks, f"tick_count of {what}")
         _check_range(np.nan_to_num(saved.lamps), -_NUMBER_MAX, _NUMBER_MAX, f"lamps of {what}")
         return saved
+
+    @property
+    def now_ns(self) -> int:
+        """The time [ns]."""
+        return self.head.now_ns
 
     @property
     def poses(self) -> NDArray[np.float64]:
@@ -228,14 +219,14 @@ class SavedState:
         Args:
             lock: See `World`.
         """
-        sim = Simulation.of_world(World(self.arena, self.specs, self.seed, self.poses, lock))
+        sim = Simulation.of_world(World(self.arena, self.specs, self.head.seed, self.poses, lock))
         self.restore(sim)
         return sim
 
     def can_restore(self, sim: Simulation) -> bool:
         """Return whether this state has all robots and turrets of a simulation, which never loses any."""
         counts = [len(wire.firmware.fitted) for wire in sim.wires]
-        others = [len(turrets) for turrets in self.turrets]
+        others = [len(robot.turrets) for robot in self.head.robots]
         return len(counts) <= len(others) and all(a <= b for a, b in zip(counts, others, strict=False))
 
     def restore(self, sim: Simulation) -> None:
@@ -252,14 +243,14 @@ class SavedState:
             world.state.robots[...] = self.robots
             world.state.robots["kind"] = kinds
             world.state.bodies = self.bodies.copy()
-            world.state.tick_count, world.now_ns = self.tick_count, self.now_ns
+            world.state.tick_count, world.now_ns = self.head.tick_count, self.now_ns
             # In two steps, for a lamp may be nowhere: its numbers are none.
             world.lamps = np.zeros_like(self.lamps)
             world.lamps[...] = self.lamps
             world.rebuild_scene()
-            sim.things.body_count = self.body_count
-            for wire, saved_wire in zip(sim.wires, self.wires, strict=True):
-                wire.restore(saved_wire)
+            sim.things.body_count = self.head.body_count
+            for wire, robot in zip(sim.wires, self.head.robots, strict=True):
+                wire.restore(robot.wire)
             world.note_change()
 
     def _extend(self, sim: Simulation) -> None:
@@ -272,8 +263,8 @@ class SavedState:
             sim.world.take_walls(FreeSpace(self.arena, sim.specs, sim.world.state))
         for spec, pose in zip(self.specs[sim.robot_count :], poses[sim.robot_count :].tolist(), strict=True):
             sim.add_robot(spec, pose=pose)
-        for number, turrets in enumerate(self.turrets, 1):
-            for turret in turrets[len(sim.turrets(number)) :]:
+        for number, robot in enumerate(self.head.robots, 1):
+            for turret in robot.turrets[len(sim.turrets(number)) :]:
                 sim.fit(number, turret if isinstance(turret, str) else AbsentTurret(turret))
 
 
@@ -291,7 +282,7 @@ def state_bytes(sim: Simulation, files: WorldFiles) -> bytes:
         robots = [
             {
                 "kind": files.name_of(wire.firmware.spec),
-                "turrets": [name_of(turret) or _described(turret) for turret in wire.firmware.fitted],
+                "turrets": [name_of(turret) or described(turret) for turret in wire.firmware.fitted],
                 "wire": wire.save(),
             }
             for wire in sim.wires
@@ -308,11 +299,6 @@ def state_bytes(sim: Simulation, files: WorldFiles) -> bytes:
         }
         parts = json.dumps(head).encode(), b"\n", state.robots.tobytes(), state.bodies.tobytes(), lamps.tobytes()
         return b"".join(parts)
-
-
-def _described(turret: Turret) -> dict[str, Any]:
-    known = TurretOfUser(turret.number, turret.name, turret.revision, turret.memory_count)
-    return vars(known)
 
 
 # ---- records in files ----

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from importlib import import_module
-from typing import Any
+from typing import Annotated, Any
+
+from pydantic import Field
 
 from kiks.engine.physics.gripper import find_object
 from kiks.engine.scalar_math import uniform
@@ -18,6 +20,7 @@ from kiks.firmware.khepera import Firmware
 from kiks.firmware.radio import Radio, deliver
 from kiks.firmware.turret import AnyTurret, Met, Turret
 from kiks.model.checks import check_count, check_heading
+from kiks.model.data_file import Rule, Whole, check, record
 from kiks.model.robot import RobotSpec
 from kiks.model.turrets import TURRETS
 from kiks.sim.cameras import Cameras
@@ -27,17 +30,38 @@ STREAM_TURRET = 1000
 """Random streams from here on are the turrets', each its number farther."""
 
 
+@record
+class TurretOfUser:
+    """What is known of a turret of a user's own without its program."""
+
+    number: Annotated[Whole, Field(ge=-1, le=99, description="24 to 31 are for users.")]
+    name: Annotated[
+        str, Field(pattern=r"^[ -~]+$", description="Tool 'net' prints it."), Rule("a line of ASCII characters")
+    ]
+    revision: Annotated[
+        tuple[Annotated[Whole, Field(ge=0)], ...],
+        Field(min_length=2, max_length=2, description="Take (1, 0)."),
+        Rule("two whole numbers"),
+    ]
+    memory_count: Annotated[Whole, Field(ge=0, le=MEMORY_COUNT)]
+
+
 class Turrets:
     """The turrets on all robots of a world.
 
     Args:
         world: The world.
         firmwares: Of its robots, in their order; the list grows when robots are added.
+
+    Attributes:
+        world: As above.
+        firmwares: As above.
+        cameras: The cameras among them.
     """
 
     def __init__(self, world: World, firmwares: Sequence[Firmware]) -> None:
-        self._world = world
-        self._firmwares = firmwares
+        self.world = world
+        self.firmwares = firmwares
         self.cameras = Cameras(world)
         self._radios: dict[int, Radio] = {}
 
@@ -45,9 +69,9 @@ class Turrets:
         """Do the ticks that have begun, take the pictures that are due on the way, and deliver radio messages."""
         if self.cameras:
             self.cameras.sync()
-        self._world.tick_to(self._world.now_ns)
+        self.world.tick_to(self.world.now_ns)
         if self._radios:
-            deliver(self._radios, self._world.now_ns)
+            deliver(self._radios, self.world.now_ns)
 
     def fit(self, index: int, turret: str | Turret) -> Turret:
         """Put a turret on a robot; return it.
@@ -56,7 +80,7 @@ class Turrets:
             index: The robot's index.
             turret: Its name, or one of a user's own.
         """
-        firmware = self._firmwares[index]
+        firmware = self.firmwares[index]
         fitted = named(turret)
         there = [each for each in firmware.fitted if each.number == fitted.number]
         if there:
@@ -64,7 +88,10 @@ class Turrets:
                 f"turret must be one that robot {index + 1} has not got, but {shown(there[0].name)} has its number, "
                 f"{fitted.number}. Give a turret of your own another, 24 to 31."
             )
-        site = RobotSite(self._world, self.sync, self._firmwares, index, fitted, first_memory(fitted, firmware.fitted))
+        first = sum(each.memory_count for each in firmware.fitted)
+        advice = f"All turrets of a robot share {MEMORY_COUNT} numbers."
+        check_count("memory_count of a turret", fitted.memory_count, 0, MEMORY_COUNT - first, advice)
+        site = RobotSite(self, index, fitted, first)
         fitted.fit(site)
         firmware.fit(fitted)
         if isinstance(fitted, Radio):
@@ -78,26 +105,14 @@ class RobotSite:
     """A `kiks.firmware.turret.Site`: the back of a robot of a simulation.
 
     Args:
-        world: The world.
-        sync: Brings the world up to date.
-        firmwares: Of all robots.
+        turrets: All turrets of the simulation.
         index: The robot's index.
         turret: The turret that sits here.
         first: Index of its first number among those that turrets remember.
     """
 
-    def __init__(
-        self,
-        world: World,
-        sync: Callable[[], None],
-        firmwares: Sequence[Firmware],
-        index: int,
-        turret: Turret,
-        first: int,
-    ) -> None:
-        self._world = world
-        self._sync = sync
-        self._firmwares = firmwares
+    def __init__(self, turrets: Turrets, index: int, turret: Turret, first: int) -> None:
+        self._world, self._sync, self._firmwares = turrets.world, turrets.sync, turrets.firmwares
         self._index = index
         self._stream = STREAM_TURRET + turret.number
         self._first, self._count = first, turret.memory_count
@@ -216,19 +231,13 @@ def name_of(turret: Turret) -> str | None:
     return next((name for name, known in TURRETS.items() if kind == known), None)
 
 
+def described(turret: Turret) -> dict[str, Any]:
+    """Return the fields of a `TurretOfUser`."""
+    return {name: getattr(turret, name, None) for name in ("number", "name", "revision", "memory_count")}
+
+
 def _check(turret: Turret) -> None:
-    number, name = getattr(turret, "number", None), getattr(turret, "name", None)
-    check_count("number of a turret", number, 0, 99, "24 to 31 are for users.")
-    if not isinstance(name, str) or not name.isascii() or not name.isprintable() or not name:
-        raise ParameterError(
-            f"name of a turret must be a line of ASCII, but it was {shown(name)}. Tool 'net' prints it."
-        )
-    revision = turret.revision
-    is_pair = isinstance(revision, tuple) and len(revision) == 2
-    if not is_pair or not all(isinstance(part, int) and part >= 0 for part in revision):
-        raise ParameterError(
-            f"revision of a turret must be two whole numbers, but it was {shown(revision)}. Take (1, 0)."
-        )
+    check(TurretOfUser, described(turret), f"turret {type(turret).__name__}")
     for letter, row in turret.orders.items():
         if len(letter) != 1 or not "A" <= letter <= "Z" or letter == "B":
             raise ParameterError(
@@ -240,11 +249,3 @@ def _check(turret: Turret) -> None:
                 f"orders of a turret must be a count of numbers and a function, but {letter} was {shown(row)}. "
                 "Write 'orders = {\"R\": (0, read)}'."
             )
-
-
-def first_memory(turret: Turret, fitted: list[Turret]) -> int:
-    """Return where the numbers of one more turret begin among those that the turrets of a robot remember."""
-    first = sum(each.memory_count for each in fitted)
-    advice = f"All turrets of a robot share {MEMORY_COUNT} numbers."
-    check_count("memory_count of a turret", turret.memory_count, 0, MEMORY_COUNT - first, advice)
-    return first
