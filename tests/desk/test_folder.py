@@ -21,11 +21,21 @@ from kiks.model.project import Project
 from kiks.model.shipped import demonstrations
 from kiks.sim.from_project import simulation_of
 
+PROJECT = Project()
+
 BAD_NAMES = [
     "", " ", ".", "..", "../x", "a/../../x", "/etc/x", "//x", "\0", "x\0.kiks", "a\\b", "C:\\x", "c:x", "~/x", "~x",
     ".hidden", "a/.hidden", "-rf", "con", "NUL.kiks", "com1.kiks", "a/aux.kiks", "x./y", "x\ny", "x" * 500,
     "a/b\u202ec", "x?.kiks", "x*.kiks", "é" * 100,
 ]  # fmt: skip
+
+
+def save(folder: Folder, name: str, project: Project = PROJECT, *, may_replace: bool = False) -> str:
+    return folder.save(encode(project, folder.full_name(name)), name, "a project", may_replace=may_replace)
+
+
+def read(folder: Folder, name: str) -> Project:
+    return Project.load(folder.open(name))
 
 
 def snapshot(folder: Path) -> list[Path]:
@@ -45,9 +55,9 @@ def test_names_outside_the_folder_are_refused(home, name):
     folder, before = Folder(home), snapshot(home.parent)
     for each in (name, f"{name}/x.kiks"):
         with pytest.raises(KiksError):
-            folder.save(Project(), each, may_replace=True)
+            save(folder, each, may_replace=True)
         with pytest.raises(KiksError):
-            folder.open(each)
+            read(folder, each)
     assert [path for path in snapshot(home.parent) if path not in before] == []
 
 
@@ -58,7 +68,7 @@ def test_random_names_stay_in_the_folder(tmp_path_factory, name):
     home = base / "home"
     home.mkdir()
     try:
-        saved = Folder(home).save(Project(), name)
+        saved = save(Folder(home), name)
     except KiksError:
         assert snapshot(base) == [home]
         return
@@ -73,9 +83,9 @@ def test_links_do_not_lead_out(home):
     folder = Folder(home)
     for name in ("up/secret.kiks", "secret.kiks", "up/new.kiks"):
         with pytest.raises(ParameterError, match="elsewhere"):
-            folder.open(name)
+            read(folder, name)
         with pytest.raises(ParameterError, match="elsewhere"):
-            folder.save(Project(), name, may_replace=True)
+            save(folder, name, may_replace=True)
     assert folder.names() == []
     assert not (home.parent / "new.kiks").exists()
 
@@ -86,41 +96,41 @@ def test_files_are_kept_and_listed(home):
     (home / "b.txt").write_text("")
     (home / ".hidden.kiks").write_text("")
     project = replace(Project(Arena.box(300, 200)), seed=5)
-    assert folder.save(project, " room ") == "room.kiks"
-    assert folder.save(project, "sub/other.kiks") == "sub/other.kiks"
-    assert folder.save(project, "old.KAD") == "old.KAD"
+    assert save(folder, " room ", project) == "room.kiks"
+    assert save(folder, "sub/other.kiks", project) == "sub/other.kiks"
+    assert save(folder, "old.KAD", project) == "old.KAD"
     assert folder.names() == ["old.KAD", "room.kiks", "sub/other.kiks"]
-    assert folder.open("room.kiks").to_bytes() == project.to_bytes()
-    assert folder.open("old.KAD").arena.width_mm == 300
+    assert read(folder, "room.kiks").to_bytes() == project.to_bytes()
+    assert read(folder, "old.KAD").arena.width_mm == 300
     assert folder.question("room") == "room.kiks exists. Replace it?"
     assert folder.question("rooms") == ""
     with pytest.raises(ParameterError, match="exists"):
-        folder.save(project, "room")
-    folder.save(replace(project, seed=6), "room", may_replace=True)
-    assert folder.open("room.kiks").seed == 6
+        save(folder, "room", project)
+    save(folder, "room", replace(project, seed=6), may_replace=True)
+    assert read(folder, "room.kiks").seed == 6
     for name, words in [("sub/none/a", "can be written"), ("a.toml", "end in"), ("none.kiks", "exist")]:
         with pytest.raises(KiksError, match=words):
-            folder.open(name) if name.startswith("none") else folder.save(project, name)
+            read(folder, name) if name.startswith("none") else save(folder, name, project)
     (home / "dir.kiks").mkdir()
     with pytest.raises(ParameterError, match="folder"):
-        folder.save(project, "dir", may_replace=True)
+        save(folder, "dir", project, may_replace=True)
 
 
 def test_the_second_of_two_desks_is_told_that_a_file_has_changed(home):
     project, changed = Project(Arena.box(300, 200)), "was changed elsewhere since you opened or saved it here"
-    Folder(home).save(project, "room")
+    save(Folder(home), "room", project)
     one, two = Folder(home), Folder(home)
     assert "exists" in one.question("room")
     assert "exists" in two.question("room")
-    one.save(replace(project, seed=1), "room", may_replace=True)
+    save(one, "room", replace(project, seed=1), may_replace=True)
     with pytest.raises(ParameterError, match="exists"):
-        two.save(replace(project, seed=2), "room", may_replace=True)
+        save(two, "room", replace(project, seed=2), may_replace=True)
     assert changed in two.question("room")
-    two.save(replace(project, seed=2), "room", may_replace=True)
+    save(two, "room", replace(project, seed=2), may_replace=True)
     assert changed in one.question("room")
-    assert one.open("room.kiks").seed == 2
+    assert read(one, "room.kiks").seed == 2
     assert "exists" in one.question("room")
-    two.save(project, "new")
+    save(two, "new", project)
     assert changed in one.question("new")
 
 

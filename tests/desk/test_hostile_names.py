@@ -17,7 +17,7 @@ from kiks.ports.program_process import Command
 HOSTILE = '" nasty=1 href="javascript:window.ran=1" \' <img src=x onerror=window.ran=1>{{window.ran=1}}'
 """A name of a file that would be markup, if anything read it as such."""
 
-FILE = "' nasty=1 {{window.ran=1}}.kiks"
+FILE = "' nasty=1 {{window.ran=1}}"
 """The worst name of a file that the desk offers: it suits any computer."""
 
 MARKUP = """() => [...document.querySelectorAll('*')].flatMap((each) => [...each.attributes]
@@ -39,7 +39,8 @@ def visitor(tmp_path: Path, new_page: NewPage) -> Iterator[Visitor]:
     project = make_project()
     robots = tuple(replace(robot, name=HOSTILE) for robot in project.robots)
     project = replace(project, arena=replace(project.arena, name=HOSTILE), robots=robots)
-    project.save(folder / FILE)
+    project.save(folder / f"{FILE}.kiks")
+    (folder / f"{FILE}.py").write_text("pass\n")
     shown = open_desk(folder, project, [Command(program)])
     page = new_page()
     yield Visitor(page, shown)
@@ -59,9 +60,9 @@ def test_a_hostile_name_is_a_text_in_every_panel(visitor: Visitor) -> None:
     expect(visitor.at("programs")).to_contain_text(f"{HOSTILE}.py on robot 1: ended")
     expect(visitor.at("start-again")).to_have_attribute("aria-label", f"Start again: {HOSTILE}.py")
     expect(visitor.at("output")).to_contain_text(HOSTILE)
-    visitor.choose("script", f"{HOSTILE}.py")
+    visitor.choose("script", f"{FILE}.py")
     visitor.tab("arena")
-    visitor.choose("open-name", FILE)
+    visitor.choose("open-name", f"{FILE}.kiks")
     visitor.at("open").click()
     visitor.told(f"Opened {HOSTILE}")
     page.get_by_test_id("follow").click()

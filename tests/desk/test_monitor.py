@@ -135,7 +135,7 @@ def test_another_robot_shows_its_own_turrets(visitor: Visitor) -> None:
     expect(visitor.at("turret-words")).to_contain_text("Radio (turret 4): silent")
     visitor.tab("wire")
     visitor.page.mouse.click(*visitor.on_page(450, 300))
-    expect(visitor.at("monitor-robot")).to_have_value("Robot 2")
+    expect(visitor.at("monitor-robot")).to_have_value("robot 2")
     expect(visitor.at("facts")).to_contain_text("x 450.0, y 300.0 mm")
     expect(visitor.at("camera-strip")).to_be_hidden()
     expect(visitor.at("facts")).to_contain_text("127 of 255, upright")

@@ -161,7 +161,7 @@ def test_desk_shows_a_world_without_a_robot_and_then_the_robot(terminal: Termina
     terminal.type("kiks_spawn(2)")
     terminal.type("ref = kiks_kopen; kSetSpeed(ref, 2, 2)")
     page.wait_for_function(FIRST_PICTURE)
-    expect(page.get_by_test_id("monitor-robot")).to_have_value("Robot 1")
+    expect(page.get_by_test_id("monitor-robot")).to_have_value("robot 1")
     page.wait_for_function(DRIVES)
     page.get_by_test_id("tab-wire").click()
     expect(page.get_by_test_id("wire-robot")).to_have_value("robot 1")

@@ -9,62 +9,38 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kiks.desk.server.scripts import (
-    Script,
+    EXAMPLES,
+    encode_script,
     find_mistake,
     offered,
-    path_of,
+    programs_of,
     read_script,
-    save_script,
     split_arguments,
 )
 from kiks.errors import ParameterError
 from kiks.model.limits import PROGRAM_BYTES_MAX
 from kiks.model.shipped import demonstrations
 
-EXAMPLE = Script("avoid.py", is_example=True)
-
 
 def test_own_programs_and_examples_are_offered(tmp_path: Path) -> None:
     for name in ("b.py", "a.py", ".hidden.py", "text.txt"):
         (tmp_path / name).write_text("")
     (tmp_path / "folder.py").mkdir()
-    labels = [script.label for script in offered(tmp_path)]
+    (tmp_path / "folder.py" / "below.py").write_text("")
+    labels = [*offered(programs_of(tmp_path)).values()]
     assert labels[:3] == ["a.py", "b.py", "example: avoid"]
     examples = len(demonstrations()) - 1  # all but soccer, whose program lies elsewhere
     assert len(labels) == 2 + examples
-    assert len(offered(tmp_path / "nowhere")) == examples
+    assert len(offered(programs_of(tmp_path / "nowhere"))) == examples
 
 
-def test_saved_programs_are_read_again(tmp_path: Path) -> None:
-    saved = save_script(tmp_path, " mine ", "print('grün')\n")
-    assert saved == Script("mine.py", is_example=False)
-    assert read_script(tmp_path, saved) == "print('grün')\n"
-    assert save_script(tmp_path, "mine.py", "pass\n", may_replace=saved) == saved
-    assert path_of(tmp_path, saved).read_text() == "pass\n"
-    with pytest.raises(ParameterError, match=r"must have a name that is free, but there is a 'mine.py' already"):
-        save_script(tmp_path, "mine.py", "1\n")
-    with pytest.raises(ParameterError, match=r"must have a name that is free"):
-        save_script(tmp_path, "mine.py", "1\n", may_replace=EXAMPLE)
-
-
-def test_the_second_of_two_editors_is_told_that_a_program_has_changed(tmp_path: Path) -> None:
-    mine = save_script(tmp_path, "mine.py", "1\n")
-    save_script(tmp_path, "mine.py", "2\n", may_replace=mine, known="1\n")
-    with pytest.raises(ParameterError, match=r"'mine.py' has changed meanwhile, in another editor"):
-        save_script(tmp_path, "mine.py", "3\n", may_replace=mine, known="1\n")
-    assert read_script(tmp_path, mine) == "2\n"
-    path_of(tmp_path, mine).unlink()
-    save_script(tmp_path, "mine.py", "3\n", may_replace=mine, known="1\n")
-
-
-@pytest.mark.parametrize("name", ["../a.py", "/etc/a.py", "a/b.py", ".a.py", "", "a\\b.py", "con.py", "a\0.py"])
-def test_names_do_not_leave_the_folder(name: str, tmp_path: Path) -> None:
-    folder = tmp_path / "folder"
-    folder.mkdir()
-    with pytest.raises(ParameterError):
-        save_script(folder, name, "pass\n")
-    assert not list(folder.iterdir())
-    assert list(tmp_path.iterdir()) == [folder]
+def test_programs_are_saved_in_the_folder_alone_and_read_again(tmp_path: Path) -> None:
+    folder = programs_of(tmp_path)
+    assert folder.save(encode_script("print('grün')\n"), " mine ", "a program") == "mine.py"
+    assert read_script(tmp_path / "mine.py") == "print('grün')\n"
+    assert folder.full_name("text.txt") == "text.txt.py"
+    with pytest.raises(ParameterError, match="less deep"):
+        folder.save(b"pass", "a/b.py", "a program")
 
 
 def test_links_do_not_leave_the_folder(tmp_path: Path) -> None:
@@ -72,12 +48,8 @@ def test_links_do_not_leave_the_folder(tmp_path: Path) -> None:
     folder.mkdir()
     (tmp_path / "secret.py").write_text("secret")
     (folder / "link.py").symlink_to(tmp_path / "secret.py")
-    link = Script("link.py", is_example=False)
     with pytest.raises(ParameterError, match="leads elsewhere"):
-        read_script(folder, link)
-    with pytest.raises(ParameterError, match="leads elsewhere"):
-        save_script(folder, "link.py", "x", may_replace=link)
-    assert (tmp_path / "secret.py").read_text() == "secret"
+        read_script(folder / "link.py")
 
 
 def test_unreadable_programs_are_refused(tmp_path: Path) -> None:
@@ -85,9 +57,9 @@ def test_unreadable_programs_are_refused(tmp_path: Path) -> None:
     (tmp_path / "odd.py").write_bytes(b"\xff\xfe")
     for name, message in (("long.py", "at most 200000 bytes"), ("odd.py", "readable"), ("none.py", "readable")):
         with pytest.raises(ParameterError, match=message):
-            read_script(tmp_path, Script(name, is_example=False))
+            read_script(tmp_path / name)
     with pytest.raises(ParameterError, match=r"at most 200000 bytes"):
-        save_script(tmp_path, "long2.py", "#" * (PROGRAM_BYTES_MAX + 1))
+        encode_script("#" * (PROGRAM_BYTES_MAX + 1))
 
 
 @pytest.mark.parametrize(
@@ -104,10 +76,7 @@ def test_unreadable_programs_are_refused(tmp_path: Path) -> None:
     ],
 )
 def test_syntax_errors_have_their_line(text: str, line: int) -> None:
-    mistake = find_mistake(text)
-    assert mistake is not None
-    assert mistake.line == line
-    assert str(mistake).startswith(f"Line {line}: ")
+    assert find_mistake(text).startswith(f"Line {line}: ")
 
 
 @given(st.text(max_size=200))
@@ -116,8 +85,8 @@ def test_any_text_is_a_program_or_has_a_mistake(text: str) -> None:
 
 
 def test_good_programs_have_no_mistake() -> None:
-    for script in offered(Path("/nowhere")):
-        assert find_mistake(read_script(Path("/nowhere"), script)) is None
+    for script in EXAMPLES.glob("[!_]*.py"):
+        assert not find_mistake(read_script(script))
 
 
 def test_arguments_are_words() -> None:

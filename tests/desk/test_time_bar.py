@@ -116,10 +116,10 @@ def test_a_person_goes_on_from_a_recording(replay: Visitor) -> None:
     at_time(visitor, 1.0, 0.05)
     poses, time_s = visitor.sim.poses(), visitor.sim.time_s
     visitor.at("go-on-from-here").click()
-    expect(visitor.at("branch-words")).to_contain_text("have hung up")
+    expect(visitor.at("dialog-text")).to_contain_text("have hung up")
     visitor.picture("go_on_from_a_recording")
     scene = visitor.answer("kiksDesk.scene().scene")
-    visitor.at("branch-by-hand").click()
+    visitor.at("dialog-yes").click()
     visitor.told("The world is yours.")
     expect(visitor.page.locator(".q-dialog__backdrop")).to_have_count(0)
     expect(visitor.at("bar-state")).to_have_text("Now")

@@ -80,8 +80,8 @@ async def _elements(names: list[str]) -> list[tuple[str, list[str]]]:
     try:
         with Client(ui.page("/desk"), request=None) as client:
             page = Page(desk, Editing(desk), 1)
-            for tab in list(page._unbuilt):
-                page._build(tab)
+            for tab in page._builders:
+                page._open(tab)
             page._tell_news()
             found = [(each.tag, sorted(each.props)) for each in client.elements.values()]
             client.delete()

@@ -5,7 +5,7 @@ Its data arrive over the page's own WebSocket, not through this element; see `we
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -13,27 +13,20 @@ from typing import Any, Literal
 import nicegui
 from nicegui.events import GenericEventArguments
 
-from kiks.desk.panels.widgets import FeedElement
-from kiks.errors import ParameterError, shown
+from kiks.desk.panels.widgets import WEB, FeedElement
 
-__all__ = ["SHOWN", "ArenaView", "Pick", "Stroke", "Tool"]
-
-View = Literal["top", "solid", "both"]
-VIEWS = ("top", "solid", "both")
-
-SHOWN = {
-    "rays": True,
-    "light": True,
-    "camera": True,
-    "trails": False,
-    "contacts": True,
-    "grid": True,
-    "ruler": True,
-    "names": True,
+LAYERS = {
+    "rays": ("Rays of the proximity sensors, coloured by their readings", True),
+    "light": ("Light of the lamps on the floor", True),
+    "camera": ("Camera pictures beside their robots", True),
+    "trails": ("Trails of robots", False),
+    "contacts": ("Contacts of robots", True),
+    "grid": ("Grid of 10 and 100 mm", True),
+    "ruler": ("Millimetres along the edges", True),
+    "names": ("Names of the robots", True),
 }
-"""The layers of the views, and whether each is visible at first."""
+"""The layers of the views: what each shows, and whether it is visible at first."""
 
-_WEB = Path(__file__).parents[1] / "web"
 _THREE = Path(nicegui.__file__).parent / "elements" / "scene" / "dist"
 
 
@@ -45,15 +38,11 @@ class Pick:
         what: 'robot', 'sensor' (of the selected robot), 'body', 'lamp' or 'floor'.
         index: Index of the thing in frames, from 0; -1 for the floor.
         sensor: Index of the sensor, from 0; -1 for any other thing.
-        x_mm: Place of the click.
-        y_mm: Place of the click.
     """
 
     what: str
     index: int
     sensor: int
-    x_mm: float
-    y_mm: float
 
 
 @dataclass(frozen=True)
@@ -87,15 +76,15 @@ class Tool:
 
 
 class ArenaView(
-    FeedElement,
-    component=_WEB / "arena_view.js",
-    esm={"kiks-desk": str(_WEB), "nicegui-scene": str(_THREE)},
+    FeedElement, component=WEB / "arena_view.js", esm={"kiks-desk": str(WEB), "nicegui-scene": str(_THREE)}
 ):
     """The arena from above, in 3-D, or both; it fills its parent element.
 
+    Its properties: `view` is 'top', 'solid' (3-D) or 'both', and `follow` the index from 0 of the robot that stays in
+    the middle, -1 for none. Its methods in the browser: `fit` shows all of the arena, `clear_trails` deletes trails.
+
     Args:
         feed: Address of the WebSocket that frames come from, seen from the page; all its components share one.
-        view: The first view.
         on_pick: Called with each click that is not a drag.
         on_draw: Called with each stroke of a tool.
         on_remove: Called with the place of a thing that a person removes [mm].
@@ -103,72 +92,32 @@ class ArenaView(
 
     def __init__(
         self,
-        feed: str = "/desk/feed",
+        feed: str,
         *,
-        view: View = "top",
-        on_pick: Callable[[Pick], Any] | None = None,
-        on_draw: Callable[[Stroke], Any] | None = None,
-        on_remove: Callable[[float, float], Any] | None = None,
+        on_pick: Callable[[Pick], Any],
+        on_draw: Callable[[Stroke], Any],
+        on_remove: Callable[[float, float], Any],
     ) -> None:
-        super().__init__(feed, _WEB / "arena_view.css")
-        self._props["show"] = dict(SHOWN)
-        self.set_view(view)
+        super().__init__(feed, "arena_view.css")
+        self._layers = {name: is_shown for name, (_, is_shown) in LAYERS.items()}
+        self.change(show=self._layers, view="top", follow=-1)
         self.set_tool(Tool())
-        self.set_follow(-1)
-        self.set_dark(None)
-        if on_pick is not None:
-            self.on("pick", lambda event: on_pick(_pick(event)))
-        if on_draw is not None:
-            self.on("draw", lambda event: on_draw(_stroke(event)))
-        if on_remove is not None:
-            self.on("remove", lambda event: on_remove(float(event.args["x_mm"]), float(event.args["y_mm"])))
+        self.on("pick", lambda event: on_pick(_pick(event)))
+        self.on("draw", lambda event: on_draw(_stroke(event)))
+        self.on("remove", lambda event: on_remove(float(event.args["x_mm"]), float(event.args["y_mm"])))
 
-    def set_view(self, view: View) -> None:
-        """Show the arena from above ('top'), in 3-D ('solid') or 'both'."""
-        if view not in VIEWS:
-            raise ParameterError(f"view must be one of {list(VIEWS)}, but it was {shown(view)}.")
-        self._props["view"] = view
-        self.update()
-
-    def set_show(self, shown: Mapping[str, bool]) -> None:
-        """Show or hide layers; other layers stay as they are."""
-        for name in shown:
-            if name not in SHOWN:
-                raise ParameterError(f"a layer must be one of {list(SHOWN)}, but it was {name!r}.")
-        self._props["show"] = {**self._props["show"], **shown}
-        self.update()
+    def show_layer(self, name: str, is_shown: bool) -> None:
+        """Show or hide a layer."""
+        self._layers = {**self._layers, name: is_shown}
+        self.change(show=self._layers)
 
     def set_tool(self, tool: Tool) -> None:
         """Give the pointer a tool."""
-        self._props["tool"] = asdict(tool)
-        self.update()
-
-    def set_follow(self, robot: int) -> None:
-        """Keep a robot in the middle, by its index from 0; -1 for no robot."""
-        self._props["follow"] = robot
-        self.update()
-
-    def set_dark(self, is_dark: bool | None) -> None:
-        """Use dark or light colours; None follows the page."""
-        self._props["dark"] = is_dark
-        self.update()
-
-    def fit(self) -> None:
-        """Show all of the arena."""
-        self.run_method("fit")
-
-    def clear_trails(self) -> None:
-        """Delete the trails of the robots."""
-        self.run_method("clear_trails")
-
-    def select(self, what: Literal["robot", "body", "lamp"], index: int) -> None:
-        """Select a thing as a click does, by its index from 0; -1 deselects."""
-        self.run_method("select", what, index)
+        self.change(tool=asdict(tool))
 
 
 def _pick(event: GenericEventArguments) -> Pick:
-    args = event.args
-    return Pick(str(args["what"]), int(args["index"]), int(args["sensor"]), float(args["x_mm"]), float(args["y_mm"]))
+    return Pick(str(event.args["what"]), int(event.args["index"]), int(event.args["sensor"]))
 
 
 def _stroke(event: GenericEventArguments) -> Stroke:

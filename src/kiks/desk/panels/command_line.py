@@ -95,7 +95,7 @@ class CommandLine:
                 .tooltip(f"{tip}; the arrow keys recall earlier ones")
             )
             named(self._input, name)
-            icon_button("send", verb, f"{name}-send", self._take_click).tooltip(verb_tip)
+            icon_button("send", verb, f"{name}-send", self._take_click, tip=verb_tip)
 
     @property
     def text(self) -> str:

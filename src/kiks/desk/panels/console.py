@@ -7,7 +7,7 @@ from collections.abc import Callable
 from nicegui import ui
 
 from kiks.desk.panels.command_line import CommandLine
-from kiks.desk.panels.widgets import log_box, named
+from kiks.desk.panels.widgets import LogBox, named
 from kiks.desk.server.desk import Desk
 from kiks.firmware.commands import COMMANDS
 from kiks.firmware.commands import Command as RobotCommand
@@ -33,7 +33,7 @@ class ConsolePanel:
         self._of_robot = robot
         self._waiting: list[Typed] = []
         ui.label("Commands to the robot").classes("text-subtitle2")
-        self._rows = log_box(ROWS, "7rem", "console-log", "What you typed, and the replies")
+        self._rows = LogBox("7rem", "console-log", "What you typed, and the replies", rows_max=ROWS, new_max=ROWS)
         self._line = CommandLine(
             self._send,
             label="Command",
@@ -52,14 +52,14 @@ class ConsolePanel:
         while self._waiting and self._waiting[0].reply is not None:
             typed = self._waiting.pop(0)
             for line in (typed.reply or "(no reply)").split("\n"):
-                self._rows.push(f"{typed.reply_s or 0:8.3f} ← {line}", classes="wire-row wire-received")
+                self._rows.push(f"{typed.reply_s or 0:8.3f} ← {line}", "wire-row wire-received")
 
     async def _send(self, text: str) -> None:
         desk, robot = self._desk, self._of_robot()
         sent = await desk.change(lambda sim: type_lines(sim, robot, text))
         self._waiting += sent
         for typed in sent:
-            self._rows.push(f"{typed.time_s:8.3f} → {typed.text}", classes="wire-row wire-sent")
+            self._rows.push(f"{typed.time_s:8.3f} → {typed.text}", "wire-row wire-sent")
         if desk.is_paused:
             ui.notify("Time is paused. Press space to run it; then the robot answers.")
 

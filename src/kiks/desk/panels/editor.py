@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Awaitable
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
+from functools import partial
 
 from nicegui import ui
-from nicegui.events import KeyEventArguments
 
 from kiks.desk.panels.arena_view import ArenaView, Stroke, Tool
 from kiks.desk.panels.files import FilesPanel
 from kiks.desk.panels.new_arena import ask_for_box, ask_for_maze
-from kiks.desk.panels.widgets import named, text_button, told, with_props
+from kiks.desk.panels.shortcuts import SHORTCUTS, listen
+from kiks.desk.panels.widgets import Panel, named, select, text_button, told, with_props
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.live_editing import Editing, Robot
 from kiks.errors import ParameterError
 from kiks.model import brush
+from kiks.model.arena import Arena
 from kiks.model.arena_objects import Ball, Cylinder, Lamp
 from kiks.model.materials import REFLECTANCES, brightness_of
 from kiks.model.project import ProjectRobot
@@ -24,8 +26,6 @@ from kiks.model.robot import robot_names
 
 BRUSH_MAX_MM = 100
 SNAPS: dict[float, str] = {0.0: "off", 1.0: "1 mm", 5.0: "5 mm", 10.0: "10 mm", 50.0: "50 mm"}
-REFRESH_S = 0.5
-"""Period at which the undo and redo buttons are updated [s]; another browser may have drawn."""
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ TOOLS = {
 """The tools by name."""
 
 
-class EditorPanel:
+class EditorPanel(Panel):
     """The controls for drawing, opening and saving a world.
 
     Args:
@@ -66,6 +66,7 @@ class EditorPanel:
     """
 
     def __init__(self, desk: Desk, editing: Editing, view: ArenaView) -> None:
+        super().__init__(desk)
         self._editing, self._view = editing, view
         self._tool = "hand"
         self._buttons: dict[str, ui.button] = {}
@@ -73,12 +74,9 @@ class EditorPanel:
             self._build_tools()
             self._build_brush()
             self._build_steps()
-            self._build_arenas()
             FilesPanel(desk, editing)
-        ui.keyboard(on_key=self._press, ignore=["input", "select", "textarea"])
-        ui.timer(REFRESH_S, self._refresh)
         self._choose("hand")
-        self._refresh()
+        self.refresh()
 
     def _build_tools(self) -> None:
         with ui.row().classes("w-full gap-1"):
@@ -105,33 +103,35 @@ class EditorPanel:
             self._swatch.style("width: 4rem; height: 1.5rem; border: 1px solid currentColor; border-radius: 4px")
         with ui.row().classes("w-full items-center no-wrap"):
             choices = {"": "other grey"} | {name: name for name in REFLECTANCES}
-            self._material = ui.select(choices, label="Material", value="white", on_change=self._take_material)
-            self._material.props("dense options-dense data-testid=material").classes("col")
-            self._material.tooltip("Sets the brightness of the wall to that of a real material")
-            self._snap = ui.select(SNAPS, label="Snap to a grid", value=0.0, on_change=self._apply_tool)
-            self._snap.props("dense options-dense data-testid=snap").classes("col")
-            self._snap.tooltip("Corners and ends of walls snap to a grid of this size")
-            self._kind = ui.select(robot_names(), label="Kind of robot", value="khepera")
-            self._kind.props("dense options-dense data-testid=robot-kind").classes("col")
-            self._kind.tooltip("The kind of robot that the robot tool adds")
+            tip = "Sets the brightness of the wall to that of a real material"
+            self._material = select("Material", "material", choices, "white", tip, self._take_material).classes("col")
+            tip = "Corners and ends of walls snap to a grid of this size"
+            self._snap = select("Snap to a grid", "snap", SNAPS, 0.0, tip, self._apply_tool).classes("col")
+            tip = "The kind of robot that the robot tool adds"
+            self._kind = select("Kind of robot", "robot-kind", robot_names(), "khepera", tip).classes("col")
         self._show_brightness()
 
     def _build_steps(self) -> None:
+        editing, undo, redo = self._editing, SHORTCUTS["undo"], SHORTCUTS["redo"]
+        acts = {"undo": self.acting(editing.undo), "redo": self.acting(editing.redo)}
         with ui.row().classes("w-full gap-1"):
-            self._undo = text_button("Undo", "undo", "undo", "Undo the last step (Ctrl-Z)", self._step_back)
-            self._redo = text_button("Redo", "redo", "redo", "Redo the step (Ctrl-Y)", self._step_forth)
-            text_button("Clear", "layers_clear", "clear", "Erase all walls; robots and things stay", self._clear)
-
-    def _build_arenas(self) -> None:
+            self._undo = text_button("Undo", "undo", "undo", f"{undo.label} ({undo.words})", acts["undo"])
+            self._redo = text_button("Redo", "redo", "redo", f"{redo.label} ({redo.words})", acts["redo"])
+            clear = self.acting(lambda: editing.draw(_without_walls))
+            text_button("Clear", "layers_clear", "clear", "Erase all walls; robots and things stay", clear)
         with ui.row().classes("w-full gap-1"):
-            text_button("New arena", "add_box", "new-arena", "An empty box of any size", self._new_box)
-            text_button("Maze", "grid_4x4", "new-maze", "A random maze with a lamp at its exit", self._new_maze)
+            box, maze = (self.acting(partial(self._begin, ask)) for ask in (ask_for_box, ask_for_maze))
+            text_button("New arena", "add_box", "new-arena", "An empty box of any size", box)
+            text_button("Maze", "grid_4x4", "new-maze", "A random maze with a lamp at its exit", maze)
+        listen(acts)
 
     # ---- tools ----
 
-    def put_down(self) -> None:
-        """Select the hand tool, for a person who leaves the panel."""
-        self._choose("hand")
+    def set_visible(self, is_visible: bool) -> None:
+        """Select the hand tool when a person leaves the panel."""
+        super().set_visible(is_visible)
+        if not is_visible:
+            self._choose("hand")
 
     def _choose(self, name: str) -> None:
         self._tool = name
@@ -164,7 +164,7 @@ class EditorPanel:
     async def draw(self, stroke: Stroke) -> None:
         """Apply a stroke of the selected tool; a person sees an error if that is not possible."""
         await self._drawn(stroke)
-        self._refresh()
+        self.refresh()
 
     def _drawn(self, stroke: Stroke) -> Awaitable[None]:
         editing, tool, points = self._editing, self._tool, stroke.points
@@ -184,40 +184,15 @@ class EditorPanel:
         kinds: dict[str, type[Ball | Cylinder | Lamp]] = {"ball": Ball, "cylinder": Cylinder, "lamp": Lamp}
         return editing.place(kinds[tool](x_mm, y_mm))
 
-    @told
-    async def _step_back(self) -> None:
-        await self._editing.undo()
-        self._refresh()
-
-    @told
-    async def _step_forth(self) -> None:
-        await self._editing.redo()
-        self._refresh()
-
-    @told
-    async def _clear(self) -> None:
-        await self._editing.draw(lambda arena: brush.rectangle(arena, 0, 0, arena.width_mm, arena.height_mm, 0))
-        self._refresh()
-
-    @told
-    async def _new_box(self) -> None:
-        if (arena := await ask_for_box()) is not None:
+    async def _begin(self, ask: Callable[[], Awaitable[Arena | None]]) -> None:
+        if (arena := await ask()) is not None:
             await self._editing.begin(arena)
 
-    @told
-    async def _new_maze(self) -> None:
-        if (arena := await ask_for_maze()) is not None:
-            await self._editing.begin(arena)
-
-    async def _press(self, event: KeyEventArguments) -> None:
-        if not event.action.keydown or not (event.modifiers.ctrl or event.modifiers.meta):
-            return
-        key = event.key.name.lower()
-        if key == "z" and not event.modifiers.shift:
-            await self._step_back()
-        elif key in ("y", "z"):
-            await self._step_forth()
-
-    def _refresh(self) -> None:
+    def refresh(self) -> None:
+        """Show whether a step can be undone or redone."""
         self._undo.set_enabled(self._editing.can_undo)
         self._redo.set_enabled(self._editing.can_redo)
+
+
+def _without_walls(arena: Arena) -> Arena:
+    return brush.rectangle(arena, 0, 0, arena.width_mm, arena.height_mm, 0)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Awaitable, Callable
 from pathlib import Path, PurePosixPath
 
 from nicegui import ui
 from nicegui.events import UploadEventArguments
 
 from kiks.desk.panels.film import FilmDialog
-from kiks.desk.panels.widgets import named, text_button, told, with_props
+from kiks.desk.panels.widgets import agrees, named, number, select, text_button, told, with_props
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.folder import OPENED, PICTURES, Folder, decode, encode
 from kiks.desk.server.live_editing import Editing
@@ -42,21 +43,19 @@ class FilesPanel:
 
     def _build_open(self) -> None:
         with ui.row().classes("w-full items-end no-wrap gap-1"):
-            self._choice = ui.select([], label="File in the folder", with_input=True)
-            self._choice.props("dense options-dense data-testid=open-name").classes("col").mark("open-name")
-            self._choice.tooltip(f"Projects, arenas and pictures in {self._desk.folder}")
-            self._choice.on("focus", self._list)
+            tip = f"Projects, arenas and pictures in {self._desk.folder}"
+            self._choice = select("File in the folder", "open-name", [], None, tip, with_input=True)
+            self._choice.classes("col").on("focus", self._list)
             text_button("Open", "folder_open", "open", "Open the world of this file", self._open)
         with ui.row().classes("w-full items-end no-wrap gap-1"):
-            self._example = ui.select([*demonstrations()], label="Or a demonstration", value="avoid")
-            self._example.props("dense options-dense data-testid=example-name").classes("col").mark("example-name")
+            self._example = select("Or a demonstration", "example-name", [*demonstrations()], "avoid").classes("col")
             tip = "Open the world of this demonstration, and start its programs"
             text_button("Open", "folder_open", "open-example", tip, self._open_example)
         self._list()
 
     def _build_save(self) -> None:
         with ui.row().classes("w-full items-end no-wrap gap-1"):
-            self._name = ui.input("Save as").props("dense data-testid=save-name").classes("col").mark("save-name")
+            self._name = named(ui.input("Save as").props("dense").classes("col"), "save-name")
             self._name.tooltip("Name in the folder; .kiks saves the world, .kad an arena for the Matlab KiKS")
             text_button("Save", "save", "save", "Save the world with everything where it is now", self._save)
             text_button("", "download", "download", "Download the world under this name instead", self._download)
@@ -76,8 +75,7 @@ class FilesPanel:
             )
             self._upload.props("flat bordered").classes("col kiks-upload")
             with_props(named(self._upload, "upload"), accept=",".join(OPENED))
-            self._mm_per_pixel = ui.number("mm per pixel", value=1.0, min=0.1, max=100, step=0.1)
-            self._mm_per_pixel.props("dense data-testid=mm-per-pixel").classes("w-28")
+            self._mm_per_pixel = number("mm per pixel", "mm-per-pixel", 1.0, min=0.1, max=100, step=0.1).classes("w-28")
             self._mm_per_pixel.tooltip("Size of a pixel of an uploaded picture")
 
     def _list(self) -> None:
@@ -90,7 +88,7 @@ class FilesPanel:
         name = self._choice.value
         if not name:
             raise ParameterError("A file must be chosen first. Save one, or open an example.")
-        await self._open_file(name, await asyncio.to_thread(self._folder.open, name))
+        await self._open_file(name, await asyncio.to_thread(Project.load, self._folder.open(name)))
         self._name.value = str(PurePosixPath(name).with_suffix(".kiks"))
 
     @told
@@ -107,22 +105,22 @@ class FilesPanel:
         await self._desk.replace(project, folder)
         ui.notify(f"Opened {project.arena.name}.")
 
+    async def _encoded(self, name: str) -> bytes:
+        project = await self._desk.project_to_save()
+        return await asyncio.to_thread(encode, project, self._folder.full_name(name))
+
     @told
     async def _save(self) -> None:
         name = str(self._name.value or "")
-        question = self._folder.question(name)
-        if question and not await _agrees(question):
-            return
-        project = await self._desk.project_to_save()
-        saved = await asyncio.to_thread(self._folder.save, project, name, may_replace=bool(question))
+        saved = await save_in(self._folder, lambda: self._encoded(name), name, "a project")
         self._list()
-        ui.notify(f"Saved as {saved}.", type="positive")
+        if saved is not None:
+            ui.notify(f"Saved as {saved}.", type="positive")
 
     @told
     async def _download(self) -> None:
         name = PurePosixPath(self._folder.full_name(str(self._name.value or "world"))).name
-        project = await self._desk.project_to_save()
-        ui.download.content(await asyncio.to_thread(encode, project, name), name)
+        ui.download.content(await self._encoded(name), name)
 
     async def _take(self, event: UploadEventArguments) -> None:
         await self._taken(event)
@@ -143,12 +141,22 @@ class FilesPanel:
             await self._open_file(name, await asyncio.to_thread(decode, name, data))
 
 
-async def _agrees(question: str) -> bool:
-    with ui.dialog() as dialog, ui.card():
-        ui.label(question)
-        with ui.row().classes("w-full justify-end"):
-            ui.button("No", on_click=lambda: dialog.submit(False)).props("flat no-caps data-testid=dialog-no")
-            ui.button("Yes", on_click=lambda: dialog.submit(True)).props("no-caps data-testid=dialog-yes")
-    answer = await dialog
-    dialog.delete()
-    return bool(answer)
+async def save_in(
+    folder: Folder, encoded: Callable[[], Awaitable[bytes]], name: str, what: str, *, is_own: bool = False
+) -> str | None:
+    """Save a file after a person has agreed, where one would be replaced.
+
+    Args:
+        folder: The folder.
+        encoded: Makes what the file holds.
+        name: Name of the file.
+        what: What messages call it.
+        is_own: Whether it is the file that the person edits: if that is as it was, there is no question.
+
+    Returns:
+        The full name; None if the person does not agree.
+    """
+    question = "" if is_own and folder.is_known(folder.full_name(name)) else folder.question(name)
+    if question and not await agrees(question):
+        return None
+    return await asyncio.to_thread(folder.save, await encoded(), name, what, may_replace=is_own or bool(question))

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from nicegui import ui
 
-from kiks.desk.panels.widgets import told, with_props
+from kiks.desk.panels.widgets import number, select, told
 from kiks.desk.server.desk import Desk
 from kiks.errors import ParameterError, library
 from kiks.export.film import FPS, save_film
@@ -40,11 +40,10 @@ class FilmDialog:
         with ui.dialog() as self._dialog, ui.card().classes("gap-2"):
             ui.label("Make a film of the run").classes("text-h6")
             with ui.row().classes("no-wrap items-end"):
-                self._start = _number("From [s]", "film-start")
-                self._end = _number("To [s]", "film-end")
-                self._speed = _number("Times real time", "film-speed", 1.0)
-            self._follow = ui.select({0: "the whole arena"}, value=0, label="What is seen")
-            self._follow.props("dense data-testid=film-follow").classes("w-full")
+                self._start = number("From [s]", "film-start", min=0.0).classes("w-28")
+                self._end = number("To [s]", "film-end", min=0.0).classes("w-28")
+                self._speed = number("Times real time", "film-speed", 1.0, min=0.0).classes("w-28")
+            self._follow = select("What is seen", "film-follow", {0: "the whole arena"}, 0).classes("w-full")
             self._kind = ui.toggle(endings := list(KINDS["film"].endings), value=endings[0]).props(
                 "dense no-caps data-testid=film-kind"
             )
@@ -122,8 +121,3 @@ class FilmDialog:
 
     def _give_up(self) -> None:
         self._is_given_up = not self._dialog.value
-
-
-def _number(label: str, name: str, value: float | None = None) -> ui.number:
-    number = ui.number(label, value=value, min=0.0).props("dense").classes("w-28")
-    return with_props(number, data_testid=name)

@@ -4,34 +4,39 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Any
+from typing import Any, Literal, NamedTuple
 
 from nicegui import ui
+from nicegui.events import GenericEventArguments
 
 from kiks.desk.panels.explanation_drawing import draw_rays
-from kiks.desk.panels.monitor_view import MonitorView, Reading
-from kiks.desk.panels.widgets import icon_button, named, told
+from kiks.desk.panels.widgets import WEB, FeedElement, Panel, icon_button, named, offer_robots, select, told
 from kiks.desk.server.desk import Desk
-from kiks.firmware.turret import Turret
 from kiks.sim.explanation import Explanation, LightExplanation
 from kiks.sim.simulation import Simulation
-
-
-def describe_turret(turret: Turret) -> str:
-    """Return a one-line status of a turret; the caller holds the simulation's lock."""
-    number = f" (turret {turret.number})" if turret.number >= 0 else ""
-    return f"{turret.name}{number}: {turret.status()}"
-
-
-AGAIN_S = 0.5
-"""Refresh period of the explanation and the status of turrets [s]."""
 
 _RAY_COLUMNS = ("Ray", "Length [mm]", "Met", "Bright", "Angle [°]", "Counts")
 _LAMP_COLUMNS = ("Lamp", "Distance [mm]", "Angle [°]", "Power [W]", "State", "Counts")
 _TEXT_COLUMNS = ("Met", "State")
 
 
-class MonitorPanel:
+class Reading(NamedTuple):
+    """A reading of a robot: the index of the sensor, from 0, and which of its two readings."""
+
+    sensor: int
+    which: Literal["proximity", "ambient"]
+
+
+class MonitorView(FeedElement, component=WEB / "monitor_view.js", esm={"kiks-desk": str(WEB)}):
+    """One robot from above with its readings at their sensors, curves of the last seconds, numbers, and its camera.
+
+    Its data arrive over the page's own WebSocket, see `web/monitor.js`. Its properties: `robot` is the index of the
+    robot from 0, and `chosen` the reading that is explained, or None. Events: `explain`, a reading was clicked; `seen`,
+    whether the element is visible.
+    """
+
+
+class MonitorPanel(Panel):
     """The monitor of one robot, with explanations of its readings.
 
     Args:
@@ -39,29 +44,27 @@ class MonitorPanel:
         feed: Address of the WebSocket that frames come from, seen from the page.
     """
 
-    def __init__(self, desk: Desk, feed: str = "/desk/feed") -> None:
-        self._desk = desk
-        self._index = 0
+    def __init__(self, desk: Desk, feed: str) -> None:
+        super().__init__(desk)
         self._reading: Reading | None = None
-        self._is_seen = False
         with ui.column().classes("w-full gap-2 q-pa-sm"):
-            self._choice = ui.select(self._names(), value=0 if desk.sim.robot_count else None, label="Robot")
-            self._choice.on_value_change(lambda event: self._choose(event.value)).classes("w-full")
-            named(self._choice, "monitor-robot").props("dense outlined").tooltip("The robot shown here")
-            with MonitorView(feed, on_explain=self._explain, on_seen=self._see).classes("w-full") as self._view:
+            self._choice = select("Robot", "monitor-robot", {1: "robot 1"}, 1, "The robot shown here", self._choose)
+            self._choice.classes("w-full").props("outlined")
+            with MonitorView(feed, "monitor_view.css").classes("w-full") as self._view:
                 self._build_answer()
-            self._turrets = ui.label().style("white-space: pre-line").props('data-testid="turret-words"')
-        ui.timer(AGAIN_S, self._renew)
+            self._view.change(robot=0, chosen=None)
+            self._view.on("explain", self._ask).on("seen", lambda event: self.set_visible(bool(event.args)))
+            self._turrets = named(ui.label().style("white-space: pre-line"), "turret-words")
+        offer_robots(self._choice, desk)
 
     def _build_answer(self) -> None:
         """Build the explanation of a reading, hidden until a person asks for one."""
         with ui.column().classes("kiks-answer w-full gap-2").props('data-testid="explanation"') as self._answer:
             with ui.row().classes("w-full items-center justify-between no-wrap"):
                 self._title = ui.label().classes("text-h6").props('role="heading" aria-level="2" aria-live="polite"')
-                tip = "Close the explanation"
-                icon_button("close", tip, "close-explanation", self._forget).tooltip(tip)
-            self._drawing = ui.html(sanitize=False).classes("w-full").props('data-testid="explanation-drawing"')
-            self._words = ui.label().style("white-space: pre-line").props('data-testid="explanation-text"')
+                icon_button("close", "Close the explanation", "close-explanation", self._forget)
+            self._drawing = named(ui.html(sanitize=False).classes("w-full"), "explanation-drawing")
+            self._words = named(ui.label().style("white-space: pre-line"), "explanation-text")
             self._keeps = named(ui.switch("Keep looking"), "keep-looking").props("dense")
             self._keeps.tooltip("Update the explanation twice a second")
             self._table = named(ui.table(rows=[], columns=[], row_key="0"), "explanation-table").classes("w-full")
@@ -71,68 +74,69 @@ class MonitorPanel:
 
     # ---- the robot ----
 
-    def show_robot(self, index: int) -> None:
-        """Show another robot by its index from 0; an unknown index changes nothing."""
-        if 0 <= index < self._desk.sim.robot_count:
-            self._choice.set_options(self._names(), value=index)
+    def show_robot(self, number: int) -> None:
+        """Show another robot; an unknown number changes nothing."""
+        offer_robots(self._choice, self._desk)
+        if number in self._choice.options:
+            self._choice.value = number
 
-    async def show_sensor(self, index: int, sensor: int) -> None:
-        """Show a robot and explain the reading of one of its proximity sensors, by their indices from 0."""
-        self.show_robot(index)
+    async def explain(self, sensor: int) -> None:
+        """Explain the reading of one of the robot's proximity sensors, by its index from 0."""
         await self._explain(Reading(sensor, "proximity"))
 
-    def _names(self) -> dict[int, str]:
-        return {index: f"Robot {name}" for index, name in enumerate(self._desk.names())}
-
-    def _choose(self, chosen: int | None) -> None:
-        self._index = index = chosen or 0
-        self._view.set_robot(index)
+    def _choose(self) -> None:
+        self._view.change(robot=(self._choice.value or 1) - 1)
         self._forget()
 
     def _forget(self) -> None:
         self._reading = None
-        self._view.set_chosen(None)
+        self._view.change(chosen=None)
         self._answer.set_visibility(False)
-
-    def _see(self, is_seen: bool) -> None:
-        self._is_seen = is_seen
 
     # ---- turrets and explanations ----
 
-    async def _renew(self) -> None:
-        if not self._is_seen:
-            return
-        if self._choice.options != (names := self._names()):
-            self._choice.set_options(names, value=min(self._index, len(names) - 1) if names else None)
-        number = self._index + 1
-        self._turrets.set_text(await self._desk.do(lambda sim: _describe_turrets(sim, number)))
+    async def refresh(self) -> None:
+        """Show the robots, the state of the turrets, and the explanation if it is to be kept up to date."""
+        offer_robots(self._choice, self._desk)
+        self._turrets.set_text(await self._desk.do(self._describe_turrets))
         if self._keeps.value and self._reading is not None:
             await self._explain(self._reading)
 
+    def _describe_turrets(self, sim: Simulation) -> str:
+        turrets = sim.turrets(self._choice.value) if self._choice.value else ()
+        numbers = (f" (turret {turret.number})" if turret.number >= 0 else "" for turret in turrets)
+        return "\n".join(
+            f"{turret.name}{number}: {turret.status()}" for turret, number in zip(turrets, numbers, strict=True)
+        )
+
+    async def _ask(self, event: GenericEventArguments) -> None:
+        which: Literal["proximity", "ambient"] = "ambient" if event.args["which"] == "ambient" else "proximity"
+        await self._explain(Reading(int(event.args["sensor"]), which))
+
     @told
     async def _explain(self, reading: Reading) -> None:
-        number = self._index + 1
+        robot = self._choice.value or 1
 
         def explained(sim: Simulation) -> Explanation | LightExplanation:
-            explain = sim.explain if reading.kind == "proximity" else sim.explain_light
-            return explain(number, reading.sensor)
+            explain = sim.explain if reading.which == "proximity" else sim.explain_light
+            return explain(robot, reading.sensor)
 
         why = await self._desk.do(explained)
         if self._desk.has_old_coordinates:
             why = replace(why, sensor=why.sensor + 1)
         if reading != self._reading:
             self._reading = reading
-            self._view.set_chosen(reading)
+            self._view.change(chosen=reading._asdict())
         self._answer.set_visibility(True)
         self._title.set_text(f"Why does it read {why.count}?")
         self._words.set_text(why.text())
+        self._drawing.set_visibility(isinstance(why, Explanation))
         if isinstance(why, Explanation):
             self._show_rays(why)
         else:
             self._show_lamps(why)
 
     def _show_rays(self, why: Explanation) -> None:
-        self._drawing.set_visibility(True)
         self._drawing.set_content(draw_rays(why))
         rows = [
             (number, _figure(ray.length_mm), ray.met, ray.brightness or "–", _figure(ray.incidence_deg, 0),
@@ -146,7 +150,6 @@ class MonitorPanel:
         )
 
     def _show_lamps(self, why: LightExplanation) -> None:
-        self._drawing.set_visibility(False)
         rows = [
             (lamp.lamp, _figure(lamp.distance_mm, 0), _figure(lamp.angle_deg, 0), f"{lamp.power_w:g}", lamp.state,
              _signed(-lamp.contribution_counts))
@@ -173,7 +176,3 @@ def _figure(value: float, digits: int = 1) -> str:
 
 def _signed(value: float) -> str:
     return f"{value:+.1f}" if abs(value) >= 0.05 else "0"
-
-
-def _describe_turrets(sim: Simulation, number: int) -> str:
-    return "\n".join(describe_turret(turret) for turret in sim.turrets(number)) if number <= sim.robot_count else ""

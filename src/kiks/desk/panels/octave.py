@@ -5,7 +5,7 @@ from __future__ import annotations
 from nicegui import ui
 
 from kiks.desk.panels.command_line import CommandLine
-from kiks.desk.panels.widgets import log_box
+from kiks.desk.panels.widgets import LogBox, Panel, select
 from kiks.desk.server.desk import Desk
 
 ROWS_MAX = 10_000
@@ -20,7 +20,7 @@ EXPLANATION = (
 )
 
 
-class OctavePanel:
+class OctavePanel(Panel):
     """The log and the command line of the programs of Octave and MATLAB.
 
     Args:
@@ -28,17 +28,17 @@ class OctavePanel:
     """
 
     def __init__(self, desk: Desk) -> None:
-        self._desk = desk
+        super().__init__(desk, REFRESH_S)
         self._next_line = 0
         self._last_line = ""
         ui.add_css(".kiks-log * { white-space: pre-wrap; overflow-wrap: anywhere }")
         with ui.column().classes("w-full q-pa-sm gap-2"):
             ui.label("Log").classes("text-subtitle2")
-            self._rows = log_box(ROWS_MAX, "55vh", "log", "Log of the session").classes("kiks-log")
+            self._rows = LogBox("55vh", "log", "Log of the session", rows_max=ROWS_MAX, new_max=ROWS_MAX).element
+            self._rows.classes("kiks-log")
             programs = desk.outside.interpreters()
-            self._choice = ui.select(programs, value=min(programs), label="Commands for").classes("w-full")
-            self._choice.props('dense options-dense data-testid="interpreter"')
-            self._line = CommandLine(
+            self._choice = select("Commands for", "interpreter", programs, min(programs)).classes("w-full")
+            CommandLine(
                 self._send,
                 label="Command for Octave or MATLAB",
                 example="kSetSpeed(ref, 5, 5)",
@@ -48,10 +48,10 @@ class OctavePanel:
                 name="octave",
             )
             ui.label(EXPLANATION).classes("text-caption")
-        ui.timer(REFRESH_S, self._refresh)
-        self._refresh()
+        self.refresh()
 
-    def _refresh(self) -> None:
+    def refresh(self) -> None:
+        """Show new lines of the log, and the programs."""
         # The last line is read again, as a program may have replaced it.
         first, lines = self._desk.log.since(max(self._next_line - 1, 0))
         if lines and first == self._next_line - 1:
@@ -72,4 +72,4 @@ class OctavePanel:
 
     async def _send(self, command: str) -> None:
         self._desk.outside.evaluate(self._choice.value, command)
-        self._refresh()
+        self.refresh()

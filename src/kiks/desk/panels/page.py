@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 
 from nicegui import ui
 
@@ -16,16 +15,14 @@ from kiks.desk.panels.settings import SettingsPanel
 from kiks.desk.panels.time_bar import TimeBar
 from kiks.desk.panels.time_controls import TimePanel
 from kiks.desk.panels.view import ViewPanel
-from kiks.desk.panels.widgets import told, with_props
+from kiks.desk.panels.widgets import WEB, Panel, named, told
 from kiks.desk.panels.wire import WirePanel
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.live_editing import Editing
 
-STYLE = Path(__file__).parents[1] / "web" / "page.css"
-
 PRIMARY, ACCENT, POSITIVE = "#174a63", "#b85c00", "#1b7a34"
 """Background colours for white text, with contrasts of 9.4, 4.7 and 5.4 to 1. On dark pages, text in these colours is
-lighter: see `STYLE`."""
+lighter: see `web/page.css`."""
 
 HINT = "Drag a robot to move it, its rim to turn it. Click it to see its readings."
 
@@ -61,7 +58,7 @@ class Page:
         feed = f"{number}/feed"
         ui.colors(primary=PRIMARY, accent=ACCENT, positive=POSITIVE)
         ui.add_head_html(MEMORY)
-        ui.add_css(STYLE)
+        ui.add_css(WEB / "page.css")
         with ui.header(elevated=True).classes("items-center q-py-none q-px-md no-wrap gap-2").style("height: 58px"):
             ui.label("KiKS").classes("text-h6 gt-sm")
             TimePanel(desk, feed)
@@ -80,68 +77,50 @@ class Page:
         ui.timer(NEWS_S, self._tell_news)
 
     def _build_tabs(self, feed: str) -> None:
-        """Build the tabs beside the arena; the content of each is built when it is first opened."""
+        """Build the tabs beside the arena; the panel of each is built when it is first opened."""
         desk = self._desk
-        self._unbuilt: dict[str, Callable[[], object]] = {}
-        self._monitor: MonitorPanel | None = None
-        self._editor: EditorPanel | None = None
-        self._sleepers: dict[str, WirePanel | ProgramsPanel] = {}
-        tabs: list[tuple[str, str, Callable[[], object]]] = [
-            ("robot", "Robot", lambda: self._build_monitor(feed)),
-            ("wire", "Wire", lambda: self._build_sleeper("wire", WirePanel)),
-            ("arena", "Arena", self._build_editor),
-            ("programs", "Programs", lambda: self._build_sleeper("programs", ProgramsPanel)),
+        tabs: list[tuple[str, str, Callable[[], Panel]]] = [
+            ("robot", "Robot", lambda: MonitorPanel(desk, feed)),
+            ("wire", "Wire", lambda: WirePanel(desk)),
+            ("arena", "Arena", lambda: EditorPanel(desk, self._editing, self._view)),
+            ("programs", "Programs", lambda: ProgramsPanel(desk)),
             ("settings", "Settings", lambda: SettingsPanel(desk)),
         ]
         if desk.outside.interpreters():
             tabs.insert(-1, ("octave", "Octave", lambda: OctavePanel(desk)))
-        with (
-            ui.tabs().props("dense no-caps align=justify active-color=accent").classes("w-full desk-tabs") as self._tabs
-        ):
+        self._builders = {name: build for name, _, build in tabs}
+        self._panels: dict[str, Panel] = {}
+        look = "dense no-caps align=justify active-color=accent"
+        with ui.tabs().props(look).classes("w-full desk-tabs") as heads:
             for name, word, _ in tabs:
-                with_props(ui.tab(name, word), data_testid=f"tab-{name}")
-        self._panels = ui.tab_panels(self._tabs, animated=False).classes("desk-panels w-full")
-        self._places: dict[str, ui.tab_panel] = {}
-        with self._panels:
-            for name, _, build in tabs:
-                self._places[name] = ui.tab_panel(name)
-                self._unbuilt[name] = build
-        self._panels.on_value_change(lambda event: self._build(event.value))
-        self._panels.value = "robot"
+                named(ui.tab(name, word), f"tab-{name}")
+        with ui.tab_panels(heads, animated=False).classes("desk-panels w-full") as self._tabs:
+            self._places = {name: ui.tab_panel(name) for name in self._builders}
+        self._tabs.on_value_change(lambda event: self._open(event.value))
+        self._tabs.value = "robot"
 
-    def _build(self, name: str) -> None:
-        if self._editor is not None and name != "arena":
-            self._editor.put_down()
-        build = self._unbuilt.pop(name, None)
-        if build is not None:
+    def _open(self, name: str) -> None:
+        """Show a panel, and let the others rest."""
+        if name not in self._panels:
             with self._places[name]:
-                build()
-        for own, sleeper in self._sleepers.items():
-            sleeper.set_visible(own == name)
-
-    def _build_sleeper(self, name: str, kind: type[WirePanel | ProgramsPanel]) -> None:
-        """Build a panel that is inactive while it is hidden."""
-        self._sleepers[name] = kind(self._desk)
-
-    def _build_monitor(self, feed: str) -> None:
-        self._monitor = MonitorPanel(self._desk, feed)
-
-    def _build_editor(self) -> None:
-        self._editor = EditorPanel(self._desk, self._editing, self._view)
+                self._panels[name] = self._builders[name]()
+        for each, panel in self._panels.items():
+            panel.set_visible(each == name)
 
     async def _pick(self, pick: Pick) -> None:
         """Show the robot or sensor that was clicked."""
         if pick.what in ("robot", "sensor"):
-            self._panels.value = "robot"
-            if self._monitor is not None and pick.what == "robot":
-                self._monitor.show_robot(pick.index)
-            elif self._monitor is not None:
-                await self._monitor.show_sensor(pick.index, pick.sensor)
+            self._tabs.value = "robot"
+            monitor = self._panels["robot"]
+            assert isinstance(monitor, MonitorPanel)
+            monitor.show_robot(pick.index + 1)
+            if pick.what == "sensor":
+                await monitor.explain(pick.sensor)
 
     async def _draw(self, stroke: Stroke) -> None:
         """Pass a stroke to the editor."""
-        if self._editor is not None:
-            await self._editor.draw(stroke)
+        if isinstance(editor := self._panels.get("arena"), EditorPanel):
+            await editor.draw(stroke)
 
     @told
     async def _remove(self, x_mm: float, y_mm: float) -> None:

@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import asyncio
+from pathlib import Path
 from typing import Any
 
 from nicegui import ui
 
-from kiks.desk.panels.widgets import icon_button, log_box, named, offer_robots, told, with_props
+from kiks.desk.panels.files import save_in
+from kiks.desk.panels.widgets import LogBox, Panel, icon_button, named, offer_robots, select, told, with_props
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.scripts import (
+    EXAMPLES,
     NEW,
-    Script,
+    encode_script,
     find_mistake,
     offered,
-    path_of,
+    programs_of,
     read_script,
-    save_script,
     split_arguments,
 )
 from kiks.ports.program_process import Command
@@ -46,7 +48,7 @@ ICONS = {"running": "play_circle", "stopping": "hourglass_top", "stopped": "stop
 """Icons of programs by state; all other states are ends."""
 
 
-class ProgramsPanel:
+class ProgramsPanel(Panel):
     """The programs of a desk.
 
     Args:
@@ -54,13 +56,13 @@ class ProgramsPanel:
     """
 
     def __init__(self, desk: Desk) -> None:
-        self._desk = desk
+        super().__init__(desk, REFRESH_S)
+        self._folder = programs_of(desk.folder)
         self._drawn: object = None
         self._shown: Handle | None = None
-        self._next_line = 0
-        self._script: Script | None = None
-        self._drafts: dict[Script | None, str] = {}
-        self._known: dict[Script | None, str] = {}  # the texts as they were read or saved last
+        self._script: Path | None = None
+        self._text: str | None = NEW  # as it was read or saved last; None with a draft
+        self._drafts: dict[Path | None, str] = {}
         ui.add_css(CSS)
         with ui.column().classes("w-full q-pa-sm gap-2"):
             if desk.may_run_programs:
@@ -68,19 +70,15 @@ class ProgramsPanel:
             else:
                 named(ui.label(MAY_NOT).classes("text-body2"), "may-not")
             self._list = named(ui.column().classes("w-full gap-1"), "programs")
-            with ui.expansion("Output", value=True).classes("w-full").props("dense") as self._output_box:
-                self._log = log_box(SHOWN_LINES, "12rem", "output", "What the program has printed")
-        self._timer = ui.timer(REFRESH_S, self.refresh)
+            with ui.expansion("Output", value=True).classes("w-full").props("dense"):
+                label = "What the program has printed"
+                self._log = LogBox("12rem", "output", label, rows_max=SHOWN_LINES, new_max=NEWEST_LINES)
         self.refresh()
-
-    def set_visible(self, is_visible: bool) -> None:
-        """Refresh the panel only while it is visible."""
-        self._timer.active = is_visible
 
     # ---- the list and the output ----
 
     def refresh(self) -> None:
-        """Show the present state."""
+        """Show the programs, and what the chosen one prints."""
         desk = self._desk
         handles = list(desk.programs.handles)
         if self._shown not in handles:
@@ -92,8 +90,9 @@ class ProgramsPanel:
             with self._list:
                 self._draw_list(handles)
         if desk.may_run_programs:
-            offer_robots(self._robot, desk.sim.robot_count)
-        self._add_output()
+            offer_robots(self._robot, desk)
+        if self._shown is not None and self._shown.output is not None:
+            self._log.add(self._shown.output, lambda line: (line.text, "program-error" if line.is_error else ""))
 
     def _draw_list(self, handles: list[Handle]) -> None:
         if not handles:
@@ -103,7 +102,7 @@ class ProgramsPanel:
             with ui.row().classes("w-full items-center no-wrap gap-1"):
                 icon = ICONS.get(handle.state, "error_outline" if handle.code else "check_circle")
                 button = ui.button(on_click=lambda handle=handle: self._choose(handle))
-                button.props("flat no-caps align=left dense").mark(f"program-{handle.number}")
+                button.props("flat no-caps align=left dense")
                 with with_props(button, aria_pressed=str(is_shown).lower()).classes(
                     "col text-weight-bold" if is_shown else "col"
                 ):
@@ -116,12 +115,12 @@ class ProgramsPanel:
         """Add the button that stops a program or starts it again."""
         program = handle.command.name
         if handle.is_running:
-            button = icon_button("stop", f"Stop: {program}", "stop", lambda: self._stop(handle))
-            button.mark(f"stop-{handle.number}")
-            button.tooltip("End this program, as Ctrl-C would; its robot stops. A second press ends it at once")
+            tip = "End this program, as Ctrl-C would; its robot stops. A second press ends it at once"
+            icon_button("stop", f"Stop: {program}", "stop", lambda: self._stop(handle), tip=tip)
         elif self._desk.may_run_programs:
-            button = icon_button("replay", f"Start again: {program}", "start-again", lambda: self._again(handle))
-            button.mark(f"start-again-{handle.number}").tooltip("Start this program again, with the same arguments")
+            again = self.acting(lambda: self._start(handle.command, handle.robot))
+            tip = "Start this program again, with the same arguments"
+            icon_button("replay", f"Start again: {program}", "start-again", again, tip=tip)
 
     def _choose(self, handle: Handle) -> None:
         self._show(handle)
@@ -130,20 +129,7 @@ class ProgramsPanel:
     def _show(self, handle: Handle | None) -> None:
         """Show the output of another program."""
         self._shown = handle
-        self._next_line = 0
         self._log.clear()
-
-    def _add_output(self) -> None:
-        """Show the output since the last refresh."""
-        if self._shown is None or self._shown.output is None:
-            return
-        first, lines = self._shown.output.since(self._next_line)
-        left_out = first - self._next_line + max(len(lines) - NEWEST_LINES, 0)
-        if left_out:
-            self._log.push(f"... {left_out} lines are left out ...", classes="text-italic")
-        for line in lines[-NEWEST_LINES:]:
-            self._log.push(line.text, classes="program-error" if line.is_error else "")
-        self._next_line = first + len(lines)
 
     @told
     async def _stop(self, handle: Handle) -> None:
@@ -151,29 +137,25 @@ class ProgramsPanel:
         self._desk.programs.stop(handle)
         self.refresh()
 
-    @told
-    async def _again(self, handle: Handle) -> None:
-        await self._start(handle.command, handle.robot)
-
     # ---- the editor ----
 
     def _build_editor(self) -> None:
         with ui.row().classes("w-full items-end no-wrap gap-2"):
-            self._choice = named(ui.select({}, label="Program", on_change=self._open), "script")
-            self._choice.classes("col").props("dense options-dense")
-            self._choice.tooltip("Your programs in the desk's folder, and examples that come with KiKS")
-            icon_button("note_add", "New program", "new-program", self._new).tooltip("Write a new program")
+            tip = "Your programs in the desk's folder, and examples that come with KiKS"
+            self._choice = select("Program", "script", {}, None, tip, self._open).classes("col")
+            icon_button("note_add", "New program", "new-program", self._new, tip="Write a new program")
         with ui.row().classes("w-full items-end no-wrap gap-2"):
-            self._robot = named(ui.select({1: "robot 1"}, value=1, label="Runs on"), "robot")
-            self._robot.props("dense").tooltip("The robot that answers on every port that the program opens")
+            tip = "The robot that answers on every port that the program opens"
+            self._robot = select("Runs on", "robot", {1: "robot 1"}, 1, tip)
             self._arguments = named(ui.input("Arguments"), "arguments")
             self._arguments.classes("col").props("dense").tooltip("Command-line arguments of the program; usually none")
-            run = named(ui.button("Run", icon="play_arrow", on_click=self._run), "run-program")
+            act = self.acting(self._run)
+            run = named(ui.button("Run", icon="play_arrow", on_click=act), "run-program")
             run.props("unelevated no-caps color=primary")
             run.tooltip("Save and run this program (Ctrl-Enter); first stops a program that runs on this robot")
         # Here, the page's shortcut keys (space, .) are text.
         with ui.element("div").classes("w-full").on("keydown", js_handler="(event) => event.stopPropagation()"):
-            keys: dict[str, Any] = {"Ctrl-Enter": self._run, "Cmd-Enter": self._run}
+            keys: dict[str, Any] = {"Ctrl-Enter": act, "Cmd-Enter": act}
             self._editor = ui.codemirror(NEW, language="Python", theme="basicLight", keymap=keys)
             named(self._editor, "editor").on_value_change(self._note_draft)
             self._editor.classes("w-full").style("height: 38vh; border: 1px solid currentcolor")
@@ -184,7 +166,7 @@ class ProgramsPanel:
             save = named(ui.button("Save", on_click=self._save), "save-program").props("flat no-caps")
             save.tooltip("Save the program in the desk's folder")
         self._offer()
-        self._choice.value = next(script for script in self._choice.options if script.name == "first_steps.py")
+        self._choice.value = EXAMPLES / "first_steps.py"
         ui.timer(0, self._dress_editor, once=True)
         ui.on("desk-dark", lambda event: self._set_theme(bool(event.args)))
 
@@ -207,7 +189,7 @@ class ProgramsPanel:
 
     def _offer(self) -> None:
         """Update the list of programs."""
-        self._choice.set_options({script: script.label for script in offered(self._desk.folder)})
+        self._choice.set_options(offered(self._folder))
 
     @told
     async def _open(self) -> None:
@@ -215,56 +197,64 @@ class ProgramsPanel:
         script = self._choice.value
         if script is None or script == self._script:
             return
-        text = self._drafts.get(script)
-        if text is None or text == self._known.get(script):
-            text = self._known[script] = read_script(self._desk.folder, script)
-        self._script = script
-        self._name.value = script.name
-        self._editor.value = text
-        self._mistake.text = ""
+        draft = self._drafts.get(script)
+        self._text = read_script(script) if draft is None else None
+        if draft is None and script.parent == self._folder.path:
+            self._folder.open(script.name)
+        self._edit(script, script.name, draft or self._text or "")
 
     def _new(self) -> None:
-        self._script = None
         self._choice.value = None
-        self._name.value = "mine.py"
-        self._editor.value = NEW
+        self._edit(None, "mine.py", NEW)
+
+    def _edit(self, script: Path | None, name: str, text: str) -> None:
+        self._script = script
+        self._name.value = name
+        self._editor.value = text
         self._mistake.text = ""
 
     def _note_draft(self) -> None:
         self._drafts[self._script] = self._editor.value or ""
+        if self._drafts[self._script] == self._text:
+            del self._drafts[self._script]
         self._mistake.text = ""
 
-    def _store(self) -> Script:
-        """Save the program under its name and return its script; an unchanged example needs no saving."""
-        text = self._editor.value or ""
-        script, folder = self._script, self._desk.folder
-        if script is not None and script.is_example and text == read_script(folder, script):
+    async def _stored(self) -> Path | None:
+        """Save the program under its name and return its file; None if another one would be replaced and is to stay."""
+        script, text, folder = self._script, self._editor.value or "", self._folder
+        if script is not None and script.parent == EXAMPLES and text == read_script(script):
             return script
-        saved = save_script(folder, self._name.value or "", text, may_replace=script, known=self._known.get(script))
-        self._known[saved] = text
-        self._drafts.pop(self._script, None)
-        self._script = saved
-        self._name.value = saved.name
+        name, data = self._name.value or "", encode_script(text)
+
+        async def encoded() -> bytes:
+            return data
+
+        is_own = script == folder.path / folder.full_name(name)
+        saved = await save_in(folder, encoded, name, "a program", is_own=is_own)
+        if saved is None:
+            return None
+        self._drafts.pop(script, None)
+        self._script, self._text = folder.path / saved, text
+        self._name.value = saved
         self._offer()
-        self._choice.value = saved
-        return saved
+        self._choice.value = self._script
+        return self._script
 
     @told
     async def _save(self) -> None:
-        script = self._store()
-        where = "an unchanged example, with nothing to save" if script.is_example else f"saved in {self._desk.folder}"
-        ui.notify(f"{script.name} is {where}.")
+        script = await self._stored()
+        if script is not None:
+            is_example = script.parent == EXAMPLES
+            where = "an unchanged example, with nothing to save" if is_example else f"saved in {self._desk.folder}"
+            ui.notify(f"{script.name} is {where}.")
 
-    @told
     async def _run(self) -> None:
         """Check the program, save it and run it."""
-        mistake = find_mistake(self._editor.value or "")
-        if mistake is not None:
-            self._mistake.text = str(mistake)
-            return
-        arguments = split_arguments(self._arguments.value or "")
-        command = Command(path_of(self._desk.folder, self._store()), arguments)
-        await self._start(command, self._robot.value or 1)
+        self._mistake.text = find_mistake(self._editor.value or "")
+        if not self._mistake.text:
+            arguments = split_arguments(self._arguments.value or "")
+            if (script := await self._stored()) is not None:
+                await self._start(Command(script, arguments), self._robot.value or 1)
 
     async def _start(self, command: Command, robot: int) -> None:
         """Start a program on a robot after stopping the one that runs there."""
@@ -275,8 +265,6 @@ class ProgramsPanel:
                 programs.stop(handle)
                 while handle.is_running:
                     await asyncio.sleep(POLL_S)
-        handle = await desk.change(lambda _: programs.start(command, robot))
-        self._show(handle)
-        self.refresh()
+        self._show(await desk.change(lambda _: programs.start(command, robot)))
         if desk.is_paused:
             ui.notify("Time is paused. Press space to run it; then the program continues.")

@@ -7,7 +7,7 @@ from typing import Any
 
 from nicegui import ui
 
-from kiks.desk.panels.widgets import told, with_props
+from kiks.desk.panels.widgets import Panel, named, number, select, with_props
 from kiks.desk.server.desk import Desk
 from kiks.errors import ParameterError
 from kiks.model.project import ProjectRobot
@@ -41,7 +41,7 @@ several robots in one world, each with its own program, and `kiks serve` for pro
 """
 
 
-class SettingsPanel:
+class SettingsPanel(Panel):
     """The settings of a world. Applying them restarts the world with everything where it stands.
 
     Args:
@@ -49,7 +49,7 @@ class SettingsPanel:
     """
 
     def __init__(self, desk: Desk) -> None:
-        self._desk = desk
+        super().__init__(desk)
         self._rows: list[_RobotRow] = []
         with ui.column().classes("w-full q-pa-md gap-3"):
             old = ui.switch("Coordinates of KiKS 2.2.0", value=desk.has_old_coordinates)
@@ -62,9 +62,11 @@ class SettingsPanel:
                 "flat dense no-caps data-testid=add-robot"
             )
             with ui.row().classes("w-full"):
-                apply = ui.button("Apply", icon="check", on_click=self._apply).props("no-caps data-testid=apply")
+                apply = ui.button("Apply", icon="check", on_click=self.acting(self._apply)).props(
+                    "no-caps data-testid=apply"
+                )
                 apply.tooltip("Restart at time 0 with these settings; everything stays in place")
-                over = ui.button("Start over", icon="replay", on_click=self._start_over)
+                over = ui.button("Start over", icon="replay", on_click=self.acting(self._start_over))
                 over.props("no-caps outline data-testid=start-over")
                 over.tooltip("Restart at time 0 with the same seed, programs and initial places")
             if not desk.owns_world:
@@ -75,23 +77,23 @@ class SettingsPanel:
         self._show()
 
     def _build_settings(self) -> None:
-        self._seed = _number("Seed", "Whole number. The same seed gives the same run, to the bit.", "seed", minimum=0)
-        self._policy = _choice(
-            "Thinking", POLICIES, "How much simulated time the program's computing takes.", "thinking"
-        )
-        self._amount = _number("", "", "thinking-amount", minimum=0).bind_visibility_from(
-            self._policy, "value", lambda policy: policy in ("fixed", "live")
-        )
+        def choice(label: str, name: str, options: Any, hint: str) -> ui.select:
+            return with_props(select(label, name, options).props("outlined").classes("w-full"), hint=hint)
+
+        self._seed = number("Seed", "seed", min=0).props("outlined").classes("w-full")
+        with_props(self._seed, hint="Whole number. The same seed gives the same run, to the bit.")
+        hint = "How much simulated time the program's computing takes."
+        self._policy = choice("Thinking", "thinking", POLICIES, hint)
+        self._amount = number("", "thinking-amount", min=0).props("outlined").classes("w-full")
+        self._amount.bind_visibility_from(self._policy, "value", lambda policy: policy in ("fixed", "live"))
         self._policy.on_value_change(self._name_amount)
-        self._file = (
-            ui.input("Recorded times")
-            .props('dense outlined data-testid=thinking-file hint="A file of this folder, made with kiks run."')
-            .classes("w-full")
-            .bind_visibility_from(self._policy, "value", lambda policy: policy == "replay")
-        )
-        self._baud = _choice("Baud rate", BAUDS, "Speed of the serial line; programs may set another one.", "baud")
-        self._model = _choice("Sensor model", MODELS, "How a proximity sensor responds to what it sees.", "model")
-        self._noise = ui.switch("Noise").props("data-testid=noise")
+        self._file = named(ui.input("Recorded times"), "thinking-file").classes("w-full")
+        self._file.props('dense outlined hint="A file of this folder, made with kiks run."')
+        self._file.bind_visibility_from(self._policy, "value", lambda policy: policy == "replay")
+        hint = "Speed of the serial line; programs may set another one."
+        self._baud = choice("Baud rate", "baud", BAUDS, hint)
+        self._model = choice("Sensor model", "model", MODELS, "How a proximity sensor responds to what it sees.")
+        self._noise = named(ui.switch("Noise"), "noise")
         self._noise.tooltip("Real sensors are noisy; without noise it is easier to find mistakes in programs.")
 
     def _name_amount(self) -> None:
@@ -138,7 +140,6 @@ class SettingsPanel:
             return f"replay:{self._file.value}"
         return policy if policy == "none" else f"{policy}:{self._amount.value}"
 
-    @told
     async def _apply(self) -> None:
         seed = self._seed.value
         if seed is None or seed != int(seed):
@@ -157,7 +158,6 @@ class SettingsPanel:
         )
         ui.notify("Restarted with these settings.")
 
-    @told
     async def _start_over(self) -> None:
         await self._desk.start_over()
         self._show()
@@ -192,13 +192,3 @@ class _RobotRow:
             turrets=tuple(self._turrets.value),
             changes=self._given.changes if kind == self._given.kind else {},
         )
-
-
-def _number(label: str, hint: str, name: str, *, minimum: float) -> ui.number:
-    number = ui.number(label, min=minimum).props("dense outlined").classes("w-full")
-    return with_props(number, hint=hint, data_testid=name)
-
-
-def _choice(label: str, choices: Any, hint: str, name: str) -> ui.select:
-    choice = ui.select(choices, label=label).props("dense outlined options-dense").classes("w-full")
-    return with_props(choice, hint=hint, data_testid=name)

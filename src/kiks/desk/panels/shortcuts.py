@@ -1,4 +1,4 @@
-"""The keys that act on time, in one table: the panels listen to them, tooltips name them, and the help lists them.
+"""The keys of the page in one table: the panels listen to them, tooltips name them, and the help lists them.
 
 The keys of the arena view are in `web/keys.js`, those of the slider of the time bar in `web/time_bar.js`.
 """
@@ -13,7 +13,7 @@ from nicegui.events import KeyEventArguments
 
 
 class Shortcut(NamedTuple):
-    """A key and what it does."""
+    """A key, with Ctrl or Cmd if it begins with `Ctrl-`, and what it does."""
 
     key: str
     label: str
@@ -35,10 +35,12 @@ SHORTCUTS = {
     "on-short": Shortcut("l", "0.1 s on"),
     "on-long": Shortcut("L", "1 s on"),
     "event-after": Shortcut("o", "Event after"),
+    "undo": Shortcut("Ctrl-z", "Undo the last step"),
+    "redo": Shortcut("Ctrl-y", "Redo the step"),
 }
 
 
-def listen(acts: Mapping[str, Callable[[], Awaitable[object]]], *, is_for_buttons: bool) -> None:
+def listen(acts: Mapping[str, Callable[[], Awaitable[object]]], *, is_for_buttons: bool = True) -> None:
     """Listen to keys on this page, outside of fields.
 
     Args:
@@ -48,13 +50,12 @@ def listen(acts: Mapping[str, Callable[[], Awaitable[object]]], *, is_for_button
     by_key = {SHORTCUTS[name].key: act for name, act in acts.items()}
 
     async def press(event: KeyEventArguments) -> None:
-        pressed, held = event.action, event.modifiers
+        pressed, held, key = event.action, event.modifiers, str(event.key)
+        if held.ctrl or held.meta:
+            key = f"Ctrl-{'y' if key in ('Z', 'z') and held.shift else key.lower()}"
         # A held space would run and pause in turn.
-        is_again = pressed.repeat and event.key == " "
-        if pressed.keydown and not (held.ctrl or held.alt or held.meta or is_again):
-            act = by_key.get(str(event.key))
-            if act is not None:
-                await act()
+        if pressed.keydown and not held.alt and not (pressed.repeat and key == " ") and key in by_key:
+            await by_key[key]()
 
     fields: list[Any] = ["input", "select", "textarea"]
     ui.keyboard(on_key=press, ignore=fields if is_for_buttons else [*fields, "button"])

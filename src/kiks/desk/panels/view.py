@@ -4,25 +4,14 @@ from __future__ import annotations
 
 from nicegui import ui
 
-from kiks.desk.panels.arena_view import SHOWN, ArenaView
+from kiks.desk.panels.arena_view import LAYERS, ArenaView
 from kiks.desk.panels.shortcuts import SHORTCUTS
-from kiks.desk.panels.widgets import BAR, icon_button, with_props
+from kiks.desk.panels.widgets import BAR, icon_button, named
 from kiks.desk.server.desk import Desk
-
-LAYERS = {
-    "rays": "Rays of the proximity sensors, coloured by their readings",
-    "light": "Light of the lamps on the floor",
-    "camera": "Camera pictures beside their robots",
-    "trails": "Trails of robots",
-    "contacts": "Contacts of robots",
-    "grid": "Grid of 10 and 100 mm",
-    "ruler": "Millimetres along the edges",
-    "names": "Names of the robots",
-}
 
 VIEWS = {"top": "2-D", "both": "both", "solid": "3-D"}
 
-_KEYS_OF_TIME = ", ".join(f"`{each.words}` {each.label[0].lower()}{each.label[1:]}" for each in SHORTCUTS.values())
+_KEYS = ", ".join(f"`{each.words}` {each.label[0].lower()}{each.label[1:]}" for each in SHORTCUTS.values())
 
 HELP = f"""
 **With the mouse or a finger**
@@ -33,7 +22,7 @@ HELP = f"""
 
 **With the keyboard**
 
-* Time: {_KEYS_OF_TIME}.
+* On the page: {_KEYS}.
 * On the arena (press Tab to reach it): `n` selects the next thing, arrows move it by 10 mm (with Shift 1 mm),
   `q` and `e` turn it by 5 degrees, Delete removes it, Escape deselects it; `+` `-` `0`: zoom in, zoom out, show all.
 * In the program editor: Ctrl-Enter runs; Tab indents, and leaves the editor after Escape.
@@ -51,21 +40,22 @@ class ViewPanel:
     def __init__(self, desk: Desk, view: ArenaView) -> None:
         self._desk = desk
         self._view = view
-        toggle = ui.toggle(VIEWS, value="top", on_change=lambda event: view.set_view(event.value))
+        toggle = ui.toggle(VIEWS, value="top", on_change=lambda event: view.change(view=event.value))
         toggle.props("dense unelevated no-caps toggle-color=accent text-color=white color=transparent")
         toggle.props('data-testid=views aria-label="2-D or 3-D"')
         toggle.tooltip("View from above, or in 3-D: there drag to orbit, turn the wheel to zoom")
         with _button("layers", "Layers", "layers"), ui.menu(), ui.column().classes("q-pa-sm gap-0"):
-            for name, text in LAYERS.items():
+            for name, (text, is_shown) in LAYERS.items():
                 box = ui.checkbox(
-                    text, value=SHOWN[name], on_change=lambda event, name=name: view.set_show({name: event.value})
+                    text, value=is_shown, on_change=lambda event, name=name: view.show_layer(name, event.value)
                 )
-                with_props(box, data_testid=f"show-{name}").props("dense").classes("q-py-xs")
-            ui.button("Clear trails", icon="auto_fix_normal", on_click=view.clear_trails).props("flat dense no-caps")
+                named(box, f"show-{name}").props("dense").classes("q-py-xs")
+            clear = ui.button("Clear trails", icon="auto_fix_normal").props("flat dense no-caps")
+            clear.on_click(lambda: view.run_method("clear_trails"))
         with _button("my_location", "Follow a robot", "follow"), ui.menu() as self._robots:
             pass
         self._robots.on("before-show", self._list_robots)
-        _button("fit_screen", "Show all of the arena (key: 0)", "fit").on_click(view.fit)
+        _button("fit_screen", "Show all of the arena (key: 0)", "fit").on_click(lambda: view.run_method("fit"))
         with ui.dialog() as self._help, ui.card():
             ui.markdown(HELP)
             ui.button("Close", on_click=self._help.close).props("flat no-caps")
@@ -78,10 +68,10 @@ class ViewPanel:
     def _list_robots(self) -> None:
         self._robots.clear()
         with self._robots:
-            ui.menu_item("No robot", on_click=lambda: self._view.set_follow(-1))
+            ui.menu_item("No robot", on_click=lambda: self._view.change(follow=-1))
             for index, name in enumerate(self._desk.names()):
-                ui.menu_item(f"Robot {name}", on_click=lambda index=index: self._view.set_follow(index))
+                ui.menu_item(f"Robot {name}", on_click=lambda index=index: self._view.change(follow=index))
 
 
 def _button(icon: str, label: str, name: str) -> ui.button:
-    return icon_button(icon, label, name, look=BAR).tooltip(label)
+    return icon_button(icon, label, name, look=BAR)

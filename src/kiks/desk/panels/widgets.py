@@ -1,4 +1,4 @@
-"""What several panels share: buttons, and error messages for the person who acts."""
+"""What several panels share: widgets, questions, and how an action tells the person who acts of its outcome."""
 
 from __future__ import annotations
 
@@ -10,16 +10,24 @@ from typing import Any, ParamSpec, TypeVar
 from nicegui import ui
 from nicegui.element import Element
 
+from kiks.desk.server.desk import Desk
 from kiks.errors import KiksError
+from kiks.sim.ring_buffer import RingBuffer
 
 Given = ParamSpec("Given")
 Some = TypeVar("Some", bound=ui.element)
+Item = TypeVar("Item")
+
+WEB = Path(__file__).parents[1] / "web"
 
 BAR = "flat round dense color=white"
 """Look of an icon button in the bar above the arena."""
 
 
-def told(act: Callable[Given, Awaitable[None]]) -> Callable[Given, Awaitable[None]]:
+# ---- actions ----
+
+
+def told(act: Callable[Given, Awaitable[object]]) -> Callable[Given, Awaitable[None]]:
     """Show a `KiksError` of an action to the person who has caused it."""
 
     @functools.wraps(act)
@@ -30,6 +38,69 @@ def told(act: Callable[Given, Awaitable[None]]) -> Callable[Given, Awaitable[Non
             ui.notify(str(error), type="negative", multi_line=True, close_button="OK", timeout=10_000)
 
     return acted
+
+
+class Panel:
+    """A part of the page, which is refreshed while it is visible: another browser may have changed what it shows.
+
+    Args:
+        desk: The desk.
+        refresh_s: Period of `refresh` [s].
+    """
+
+    def __init__(self, desk: Desk, refresh_s: float = 0.5) -> None:
+        self._desk = desk
+        self._timer = ui.timer(refresh_s, self.refresh)
+
+    def refresh(self) -> Any:
+        """Show the present state."""
+
+    def set_visible(self, is_visible: bool) -> None:
+        """Follow the panel's tab."""
+        self._timer.active = is_visible
+
+    def acting(self, act: Callable[[], Awaitable[object]], done: str = "") -> Callable[[], Awaitable[None]]:
+        """Return a handler that acts, refreshes the panel and says what is done."""
+
+        @told
+        async def acted() -> None:
+            await act()
+            self.refresh()
+            if done:
+                ui.notify(done)
+
+        return acted
+
+
+async def agrees(question: str, explanation: str = "", *, yes: str = "Yes", no: str = "No") -> bool:
+    """Ask a person, and return whether the answer is yes."""
+    with ui.dialog() as dialog, ui.card().classes("gap-3").style("max-width: 620px"):
+        ui.label(question).classes("text-h6" if explanation else "").props('role="heading" aria-level="2"')
+        named(ui.label(explanation).classes("text-body2"), "dialog-text")
+        finish(dialog, yes, lambda: True, no)
+    return await answer(dialog) is not None
+
+
+def finish(dialog: ui.dialog, yes: str, result: Callable[[], object], no: str = "Cancel") -> None:
+    """Build the buttons of a dialog, which stays open while its result cannot be made."""
+
+    @told
+    async def submit() -> None:
+        dialog.submit(result())
+
+    with ui.row().classes("w-full justify-end"):
+        ui.button(no, on_click=lambda: dialog.submit(None)).props("flat no-caps data-testid=dialog-no")
+        ui.button(yes, on_click=submit).props("no-caps unelevated data-testid=dialog-yes")
+
+
+async def answer(dialog: ui.dialog) -> Any:
+    """Show a dialog once and return its result; None if the person cancels."""
+    result = await dialog
+    dialog.delete()
+    return result
+
+
+# ---- elements ----
 
 
 def with_props(element: Some, **texts: str) -> Some:
@@ -43,14 +114,8 @@ def with_props(element: Some, **texts: str) -> Some:
 
 
 def named(element: Some, name: str) -> Some:
-    """Give an element its name for tests, in a browser and without one."""
-    return with_props(element, data_testid=name).mark(name)
-
-
-def log_box(lines_max: int, height: str, name: str, label: str) -> ui.log:
-    """Build a box of lines; `label` is its accessible name."""
-    box = ui.log(max_lines=lines_max).classes("w-full text-caption").style(f"height: {height}")
-    return named(with_props(box, aria_label=label), name)
+    """Give an element its name for tests."""
+    return with_props(element, data_testid=name)
 
 
 class FeedElement(Element):
@@ -58,31 +123,104 @@ class FeedElement(Element):
 
     Args:
         feed: Address of the WebSocket that frames come from, seen from the page; all elements of a page share one.
-        style: Its style sheet.
+        style: Name of its style sheet.
     """
 
-    def __init__(self, feed: str, style: Path) -> None:
+    def __init__(self, feed: str, style: str) -> None:
         super().__init__()
-        ui.add_css(style)
-        self._props["feed"] = feed
+        ui.add_css(WEB / style)
+        self.change(feed=feed)
+
+    def change(self, **properties: Any) -> None:
+        """Change properties of the component."""
+        self._props.update(properties)
+        self.update()
 
 
 def icon_button(
-    icon: str, label: str, name: str, act: Callable[..., Any] | None = None, *, look: str = "flat round dense"
+    icon: str,
+    label: str,
+    name: str,
+    act: Callable[..., Any] | None = None,
+    *,
+    tip: str = "",
+    look: str = "flat round dense",
 ) -> ui.button:
-    """Build a button with an icon alone; `label` is its accessible name."""
+    """Build a button with an icon alone; `label` is its accessible name, and its tooltip unless there is a tip."""
     button = ui.button(icon=icon, on_click=act).props(look)
-    return named(with_props(button, aria_label=label), name)
+    return named(with_props(button, aria_label=label), name).tooltip(tip or label)
 
 
-def offer_robots(choice: ui.select, count: int) -> None:
-    """Let a list offer robots 1 to `count`, and keep the chosen one if it is among these."""
-    robots = {robot: f"robot {robot}" for robot in range(1, count + 1)}
-    if choice.options != robots:
-        choice.set_options(robots, value=min(choice.value or 1, count) or None)
+def relabel(button: ui.button, icon: str, label: str) -> None:
+    """Give an icon button another icon and name, unless it has them."""
+    if button.props.get("aria-label") != label:
+        with_props(button, icon=icon, aria_label=label)
 
 
 def text_button(text: str, icon: str, name: str, tip: str, act: Callable[..., Any]) -> ui.button:
     """Build a button with an icon, a text (possibly empty) and a tooltip."""
     button = ui.button(text, icon=icon, on_click=act).props('dense no-caps outline padding="4px 10px"')
     return named(with_props(button, aria_label=text or tip), name).tooltip(tip)
+
+
+def select(
+    label: str, name: str, options: Any, value: Any = None, tip: str = "", act: Any = None, **more: Any
+) -> ui.select:
+    """Build a list to choose from; more options are those of `ui.select`."""
+    choice = ui.select(options, label=label, value=value, on_change=act, **more).props("dense options-dense")
+    return named(choice.tooltip(tip) if tip else choice, name)
+
+
+def number(label: str, name: str, value: float | None = None, **options: Any) -> ui.number:
+    """Build a field for a number; options are those of `ui.number`."""
+    return named(ui.number(label, value=value, **options).props("dense"), name)
+
+
+def offer_robots(choice: ui.select, desk: Desk) -> None:
+    """Let a list offer the robots by their numbers, and keep the chosen one if it is among these."""
+    robots = {robot: f"robot {name}" for robot, name in enumerate(desk.names(), 1)}
+    if choice.options != robots:
+        choice.set_options(robots, value=min(choice.value or 1, len(robots)) or None)
+
+
+class LogBox:
+    """A box that shows the newest entries of a buffer.
+
+    Args:
+        height: Its height in CSS.
+        name: Its name for tests.
+        label: Its accessible name.
+        rows_max: Most rows in the box.
+        new_max: Most rows that are added at once.
+    """
+
+    def __init__(self, height: str, name: str, label: str, *, rows_max: int, new_max: int) -> None:
+        self.element = ui.log(max_lines=rows_max).classes("w-full text-caption").style(f"height: {height}")
+        named(with_props(self.element, aria_label=label), name)
+        self._new_max = new_max
+        self._next = 0
+
+    def push(self, text: str, look: str = "") -> None:
+        """Add a row; `look` names its CSS classes."""
+        self.element.push(text, classes=look)
+
+    def add(self, buffer: RingBuffer[Item], row: Callable[[Item], tuple[str, str] | None]) -> None:
+        """Add what is new in a buffer.
+
+        Args:
+            buffer: The buffer.
+            row: Returns text and look of an entry; None to leave it out.
+        """
+        first, items = buffer.since(self._next)
+        left_out = first - self._next + max(len(items) - self._new_max, 0)
+        if left_out:
+            self.push(f"... {left_out} lines are left out ...", "text-italic")
+        for made in map(row, items[-self._new_max :]):
+            if made is not None:
+                self.push(*made)
+        self._next = first + len(items)
+
+    def clear(self, begin: int = 0) -> None:
+        """Empty the box, and begin with a number of an entry."""
+        self.element.clear()
+        self._next = begin

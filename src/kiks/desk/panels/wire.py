@@ -5,7 +5,7 @@ from __future__ import annotations
 from nicegui import ui
 
 from kiks.desk.panels.console import ConsolePanel
-from kiks.desk.panels.widgets import icon_button, log_box, named, offer_robots, with_props
+from kiks.desk.panels.widgets import LogBox, Panel, icon_button, named, offer_robots, relabel, select
 from kiks.desk.server.desk import Desk
 from kiks.sim.wire import Wire
 from kiks.sim.wire_log import Piece, TimeShares, WireLog
@@ -44,7 +44,7 @@ CSS = """
 """
 
 
-class WirePanel:
+class WirePanel(Panel):
     """The traffic on the line of a robot.
 
     Args:
@@ -52,38 +52,32 @@ class WirePanel:
     """
 
     def __init__(self, desk: Desk) -> None:
-        self._desk = desk
+        super().__init__(desk, REFRESH_S)
         self._watched: Wire | None = None
         self._log: WireLog | None = None
-        self._next_piece = 0
         self._is_held = False
         ui.add_css(CSS)
         with ui.column().classes("w-full q-pa-sm gap-2"):
             with ui.row().classes("w-full items-end no-wrap gap-2"):
-                self._robot = ui.select({1: "robot 1"}, value=1, label="Line of", on_change=self.refresh)
-                named(self._robot, "wire-robot").classes("col").props("dense options-dense")
-                self._robot.tooltip("The robot whose line is shown, and that gets your commands")
+                tip = "The robot whose line is shown, and that gets your commands"
+                self._robot = select("Line of", "wire-robot", {1: "robot 1"}, 1, tip, self.refresh).classes("col")
                 self._filter = named(ui.input("Only with", on_change=self._show_again), "wire-filter")
                 self._filter.classes("col").props("dense clearable debounce=300")
                 self._filter.tooltip("Show only rows that contain this text, such as N or z,")
-                self._hold = icon_button("pause", "Hold the list", "wire-hold", self._toggle_hold)
-                with self._hold:
-                    self._hold_tip = ui.tooltip("Hold the list to read it; nothing is lost")
-                icon_button("delete_sweep", "Clear the list", "wire-clear", self._clear).tooltip(
-                    "Clear the list; this does not affect the robot or the program"
-                )
-            self._rows = log_box(ROWS, "16rem", "wire", "Traffic on the line")
+                tip = "Hold the list to read it, or resume it; nothing is lost"
+                self._hold = icon_button("pause", "Hold the list", "wire-hold", self._toggle_hold, tip=tip)
+                tip = "Clear the list; this does not affect the robot or the program"
+                icon_button("delete_sweep", "Clear the list", "wire-clear", lambda: self._clear(), tip=tip)
+            self._rows = LogBox("16rem", "wire", "Traffic on the line", rows_max=ROWS, new_max=ROWS)
             self._build_bar()
             self._console = ConsolePanel(desk, lambda: self._robot.value or 1)
-        self._timer = ui.timer(REFRESH_S, self.refresh)
         ui.context.client.on_delete(self._let_go)
 
     def _build_bar(self) -> None:
         with ui.row().classes("w-full items-center no-wrap"):
             ui.label("Where the milliseconds went in").classes("text-subtitle2")
-            self._window = named(ui.select(WINDOWS, value=1), "wire-window")
-            self._window.props('dense options-dense borderless aria-label="Window of time"')
-            self._window.tooltip("How far back the bar looks, in simulated time")
+            self._window = select("", "wire-window", WINDOWS, 1, "How far back the bar looks, in simulated time")
+            self._window.props('borderless aria-label="Window of time"')
         self._parts: dict[str, tuple[ui.element, ui.label, ui.label]] = {}
         bars: dict[str, tuple[ui.element, ui.label]] = {}
         labels: dict[str, ui.label] = {}
@@ -102,8 +96,8 @@ class WirePanel:
             self._parts[name] = *bars[name], labels[name]
 
     def set_visible(self, is_visible: bool) -> None:
-        """Refresh the panel only while it is visible."""
-        self._timer.active = is_visible
+        """Watch the line only while the panel is visible."""
+        super().set_visible(is_visible)
         if not is_visible:
             self._let_go()
 
@@ -118,7 +112,7 @@ class WirePanel:
     def refresh(self) -> None:
         """Show new traffic."""
         sim = self._desk.sim
-        offer_robots(self._robot, sim.robot_count)
+        offer_robots(self._robot, self._desk)
         if not sim.wires:
             self._let_go()
             return
@@ -134,22 +128,16 @@ class WirePanel:
         if wire.log is None:
             return
         if not self._is_held:
-            self._add_rows(*wire.log.pieces.since(self._next_piece))
+            self._rows.add(wire.log.pieces, self._row)
         shares = wire.shares(max(sim.now_ns - self._window.value * NS_PER_S, 0), sim.now_ns)
         if shares is not None:
             self._show_shares(shares)
         self._console.refresh()
 
-    def _add_rows(self, first: int, pieces: list[Piece]) -> None:
-        left_out = first - self._next_piece + max(len(pieces) - ROWS, 0)
-        self._next_piece = first + len(pieces)
-        text = self._filter.value or ""
-        if left_out and not text:
-            self._rows.push(f"... {left_out} rows are left out ...", classes="wire-row text-italic")
-        for piece in pieces[-ROWS:]:
-            row = row_text(piece)
-            if text in row:
-                self._rows.push(row, classes=f"wire-row wire-{'sent' if piece.is_sent else 'received'}")
+    def _row(self, piece: Piece) -> tuple[str, str] | None:
+        row = row_text(piece)
+        is_wanted = (self._filter.value or "") in row
+        return (row, f"wire-row wire-{'sent' if piece.is_sent else 'received'}") if is_wanted else None
 
     def _show_shares(self, shares: TimeShares) -> None:
         whole_ns = shares.window_ns
@@ -170,24 +158,20 @@ class WirePanel:
 
     def _show_again(self) -> None:
         """Rebuild the list from the newest rows of the log."""
-        self._rows.clear()
-        log = None if self._watched is None else self._watched.log
-        if log is not None:
-            self._next_piece = max(log.pieces.count - ROWS, 0)
-            self._add_rows(*log.pieces.since(self._next_piece))
+        self._clear(ROWS)
+        if self._watched is not None and self._watched.log is not None:
+            self._rows.add(self._watched.log.pieces, self._row)
 
     def _toggle_hold(self) -> None:
         self._is_held = not self._is_held
-        icon, word = ("play_arrow", "Resume the list") if self._is_held else ("pause", "Hold the list")
-        with_props(self._hold, icon=icon, aria_label=word)
-        self._hold_tip.text = word
+        relabel(self._hold, *(("play_arrow", "Resume the list") if self._is_held else ("pause", "Hold the list")))
         if not self._is_held:
             self._show_again()
 
-    def _clear(self) -> None:
-        self._rows.clear()
+    def _clear(self, kept: int = 0) -> None:
+        """Empty the list, and let it begin with so many of the newest rows."""
         log = None if self._watched is None else self._watched.log
-        self._next_piece = 0 if log is None else log.pieces.count
+        self._rows.clear(0 if log is None else max(log.pieces.count - kept, 0))
 
 
 def visible(data: bytes) -> str:

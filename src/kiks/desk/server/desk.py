@@ -354,6 +354,10 @@ class Desk:
         world = self.shown
         await world.do(lambda _: world.go_on())
 
+    async def run_or_pause(self) -> None:
+        """Resume simulated time, or pause it."""
+        await (self.go_on() if self.is_paused else self.pause())
+
     async def step(self, seconds: float) -> None:
         """Let `seconds` of simulated time pass, then pause."""
         world = self.shown

@@ -25,20 +25,30 @@ SAVED = (".kiks", ".kad")
 LISTED_MAX = 500
 """Maximum number of files in the list."""
 
-_DEPTH_MAX = 3
 _NAME_MAX = 120
 _RESERVED = {"con", "prn", "aux", "nul", *(f"{port}{number}" for port in ("com", "lpt") for number in range(1, 10))}
 
 
 class Folder:
-    """The folder in which a desk opens and saves files.
+    """The folder in which a desk opens and saves files of a sort.
 
     Args:
         path: The folder.
+        opened: Endings of files that can be opened.
+        saved: Endings of files that can be saved; the first one is the default.
+        depth_max: How deep its subfolders may lie; 0 for files of the folder alone.
     """
 
-    def __init__(self, path: str | Path) -> None:
+    def __init__(
+        self,
+        path: str | Path,
+        opened: tuple[str, ...] = OPENED,
+        saved: tuple[str, ...] = SAVED,
+        *,
+        depth_max: int = 3,
+    ) -> None:
         self.path = Path(path)
+        self._opened, self._saved, self._depth_max = opened, saved, depth_max
         self._known = {name: self._version(name) for name in self.names()}
 
     def names(self) -> list[str]:
@@ -55,43 +65,47 @@ class Folder:
                 name = entry.relative_to(self.path).as_posix()
                 if entry.name.startswith(".") or not self._is_inside(name):
                     continue
-                if entry.is_dir() and not entry.is_symlink() and depth < _DEPTH_MAX:
+                if entry.is_dir() and not entry.is_symlink() and depth < self._depth_max:
                     waiting.append((entry, depth + 1))
-                elif entry.suffix.lower() in OPENED and entry.is_file():
+                elif entry.suffix.lower() in self._opened and entry.is_file():
                     found.append(name)
         return sorted(found, key=str.lower)[:LISTED_MAX]
 
-    def open(self, name: str) -> Project:
-        """Read a project, an arena or a picture."""
-        path, version = self._path(name, OPENED), self._version(name)
-        project = Project.load(path)
-        self._known[name] = version
-        return project
+    def open(self, name: str) -> Path:
+        """Return the path of a file that is read now."""
+        path = self._path(name, self._opened)
+        self._known[name] = self._version(name)
+        return path
 
-    def save(self, project: Project, name: str, *, may_replace: bool = False) -> str:
-        """Write a project, or its arena alone if the name ends in .kad; return the name with its ending.
+    def save(self, data: bytes, name: str, what: str, *, may_replace: bool = False) -> str:
+        """Write a file; return its name with its ending.
 
         Args:
-            project: The project.
-            name: Name of the file, .kiks if it has no ending.
+            data: What it holds.
+            name: Name of the file, with the default ending if it has none.
+            what: What messages call it.
             may_replace: Whether to replace an existing file as it was when it was opened, saved or asked about here.
         """
         full = self.full_name(name)
-        path = self._path(full, SAVED)
-        if path.exists() and not (may_replace and self._known.get(full) == self._version(full)):
+        path = self._path(full, self._saved)
+        if path.exists() and not (may_replace and self.is_known(full)):
             raise ParameterError(f"The name must be new, but {full!r} exists. Choose another one, or replace it.")
-        replace_file(path, encode(project, full), "a project")
+        replace_file(path, data, what)
         self._known[full] = self._version(full)
         return full
 
     def question(self, name: str) -> str:
         """Return what a person is to be asked before a file is saved under a name; nothing if it would be a new one."""
         full = self.full_name(name)
-        if not self._path(full, SAVED).exists():
+        if not self._path(full, self._saved).exists():
             return ""
-        known, self._known[full] = self._known.get(full), self._version(full)
-        fact = "exists" if known == self._known[full] else "was changed elsewhere since you opened or saved it here"
+        was_known, self._known[full] = self.is_known(full), self._version(full)
+        fact = "exists" if was_known else "was changed elsewhere since you opened or saved it here"
         return f"{full} {fact}. Replace it?"
+
+    def is_known(self, name: str) -> bool:
+        """Return whether a file is as it was when it was opened, saved or asked about here."""
+        return name in self._known and self._known[name] == self._version(name)
 
     def _version(self, name: str) -> object:
         """Return what is another after a file was written; None without one."""
@@ -104,10 +118,12 @@ class Folder:
     def full_name(self, name: str) -> str:
         """Add the default ending to a name without a known ending."""
         typed = name.strip()
-        return typed if PurePosixPath(typed).suffix.lower() in OPENED else f"{typed}{SAVED[0]}"
+        return typed if PurePosixPath(typed).suffix.lower() in self._opened else f"{typed}{self._saved[0]}"
 
     def _path(self, name: str, endings: tuple[str, ...]) -> Path:
         check_name(name, endings)
+        if name.count("/") > self._depth_max:
+            raise ParameterError(f"The name must lead less deep into folders, but it was {name!r}. Leave some out.")
         path = inside(self.path, name, "The name")
         if path.is_dir():
             raise ParameterError(f"The name must be that of a file, but {name!r} is a folder. Add a name to it.")

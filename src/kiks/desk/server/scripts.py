@@ -1,20 +1,16 @@
-"""The Python programs of a desk: listed, opened, saved, and checked before they run."""
+"""The Python programs of a desk: listed, read, and checked before they run."""
 
 from __future__ import annotations
 
 import shlex
 import warnings
-from dataclasses import dataclass
 from pathlib import Path
 
-from kiks.desk.server.folder import check_name
+from kiks.desk.server.folder import Folder
 from kiks.errors import ParameterError, shown
-from kiks.model.atomic_files import inside, program_in, replace_file
+from kiks.model.atomic_files import program_in
 from kiks.model.limits import PROGRAM_BYTES_MAX
 from kiks.model.shipped import shipped
-
-COUNT_LIMIT = 200
-"""Maximum number of listed files of the folder."""
 
 EXAMPLES = shipped("examples/demos")
 """Folder of the example programs, which are those of the demonstrations."""
@@ -30,111 +26,42 @@ with serial.Serial("/dev/ttyUSB0", 9600, timeout=1) as port:
 """Text of a new program."""
 
 
-@dataclass(frozen=True)
-class Script:
-    """A program in the list.
-
-    Attributes:
-        name: Its file name in the desk's folder or that of the examples.
-        is_example: Whether it is an example.
-    """
-
-    name: str
-    is_example: bool
-
-    @property
-    def label(self) -> str:
-        """Its entry in the list."""
-        return f"example: {self.name.removesuffix('.py').replace('_', ' ')}" if self.is_example else self.name
+def programs_of(folder: Path) -> Folder:
+    """Return a folder whose files are programs; those in folders below it are not offered."""
+    return Folder(folder, (".py",), (".py",), depth_max=0)
 
 
-def offered(folder: Path) -> list[Script]:
-    """Return the programs of a folder and the examples."""
-    try:
-        files = [path for path in sorted(folder.glob("*.py")) if path.is_file() and not path.name.startswith(".")]
-    except OSError:
-        files = []
-    own = [Script(path.name, is_example=False) for path in files[:COUNT_LIMIT]]
-    return own + [Script(path.name, is_example=True) for path in sorted(EXAMPLES.glob("[!_]*.py"))]
+def offered(folder: Folder) -> dict[Path, str]:
+    """Return the programs of a folder and the examples, with what the list calls them."""
+    own = {folder.path / name: name for name in folder.names()}
+    examples = sorted(EXAMPLES.glob("[!_]*.py"))
+    return own | {path: f"example: {path.stem.replace('_', ' ')}" for path in examples}
 
 
-def path_of(folder: Path, script: Script) -> Path:
-    """Return the path of a program."""
-    return program_in(EXAMPLES if script.is_example else folder, script.name)
-
-
-def read_script(folder: Path, script: Script) -> str:
+def read_script(path: Path) -> str:
     """Return the text of a program."""
-    path = path_of(folder, script)
+    path, name = program_in(path.parent, path.name), path.name
     try:
         if path.stat().st_size > PROGRAM_BYTES_MAX:
             raise ParameterError(
                 f"a program must have at most {PROGRAM_BYTES_MAX} bytes to be edited here, but "
-                f"{shown(script.name)} has {path.stat().st_size}. Edit it elsewhere."
+                f"{shown(name)} has {path.stat().st_size}. Edit it elsewhere."
             )
         return path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        raise ParameterError(f"a program must be readable text, but {shown(script.name)} is not: {error}.") from None
+        raise ParameterError(f"a program must be readable text, but {shown(name)} is not: {error}.") from None
 
 
-def save_script(
-    folder: Path, name: str, text: str, *, may_replace: Script | None = None, known: str | None = None
-) -> Script:
-    """Write a program into a folder.
-
-    Args:
-        folder: The folder.
-        name: Its file name; .py is appended if it is missing.
-        text: The program.
-        may_replace: The script that it was read from; no other file is replaced.
-        known: The text that was read or saved last; another one is not replaced. Any if left out.
-    """
-    name = name.strip()
-    name = name if name.endswith(".py") else f"{name}.py"
-    check_name(name, (".py",))
-    if "/" in name:
-        raise ParameterError(
-            f"a program's name must have no folder, but it was {shown(name)}. Take letters and digits: square.py."
-        )
+def encode_script(text: str) -> bytes:
+    """Return the bytes of a program's file."""
     data = text.encode("utf-8", errors="replace")
     if len(data) > PROGRAM_BYTES_MAX:
         raise ParameterError(f"a program must have at most {PROGRAM_BYTES_MAX} bytes, but this one has {len(data)}.")
-    script, path = Script(name, is_example=False), inside(folder, name, "the program")
-    if path.exists() and script != may_replace:
-        raise ParameterError(
-            f"a program must have a name that is free, but there is a {shown(name)} already. Take another name, or "
-            "open that one and change it."
-        )
-    if known is not None and path.exists() and read_script(folder, script) != known:
-        raise ParameterError(
-            f"a program must be saved as it was opened, but {shown(name)} has changed meanwhile, in another editor. "
-            "Save this one under another name, and then open that one again."
-        )
-    replace_file(path, data, "a program")
-    return script
+    return data
 
 
-@dataclass(frozen=True)
-class Mistake:
-    """A syntax error.
-
-    Attributes:
-        line: Number of the line, from 1.
-        message: Python's message.
-        text: The line.
-    """
-
-    line: int
-    message: str
-    text: str
-
-    def __str__(self) -> str:
-        shown = f": {self.text.strip()}" if self.text.strip() else ""
-        return f"Line {self.line}: {self.message}{shown}"
-
-
-def find_mistake(text: str) -> Mistake | None:
-    r"""Return the first syntax error of a program; None if it has none.
+def find_mistake(text: str) -> str:
+    r"""Return the first syntax error of a program with its line; nothing if it has none.
 
     Example:
         >>> print(find_mistake("x = 1\nif x = 2:\n    pass\n"))
@@ -145,12 +72,12 @@ def find_mistake(text: str) -> Mistake | None:
             warnings.simplefilter("ignore")
             compile(text, "program", "exec", dont_inherit=True)
     except SyntaxError as error:
-        line = error.lineno or 1
-        lines = text.splitlines()
-        return Mistake(line, error.msg, lines[line - 1] if line <= len(lines) else "")
+        number, lines = error.lineno or 1, text.splitlines()
+        line = lines[number - 1].strip() if number <= len(lines) else ""
+        return f"Line {number}: {error.msg}" + (f": {line}" if line else "")
     except (ValueError, RecursionError, MemoryError) as error:
-        return Mistake(1, str(error) or "too deeply nested", "")
-    return None
+        return f"Line 1: {error}" if str(error) else "Line 1: too deeply nested"
+    return ""
 
 
 def split_arguments(text: str) -> list[str]:

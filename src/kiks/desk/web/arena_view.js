@@ -15,13 +15,11 @@ export default {
       <div ref="live" class="kiks-live" aria-live="polite"></div>
     </div>`,
   props: {
-    feed: { type: String, default: "/desk/feed" },
+    feed: { type: String, required: true },
     tool: { type: Object, default: () => ({ kind: "hand" }) },
     show: { type: Object, default: () => ({}) },
     view: { type: String, default: "top" },
     follow: { type: Number, default: -1 },
-    /** null follows the page. */
-    dark: { type: Boolean, default: null },
   },
   emits: ["pick", "draw", "remove"],
   computed: {
@@ -32,7 +30,6 @@ export default {
     show: { deep: true, handler(show) { this.stage.setShow({ ...show }); } },
     view(view) { this.stage.setView(view); },
     follow(follow) { this.stage.setFollow(follow); },
-    dark(isDark) { this.stage.setDark(isDark); },
   },
   mounted() {
     const { root, top, topPane, solidPane, notice, live } = this.$refs;
@@ -42,7 +39,7 @@ export default {
     stage.setTool(this.tool);
     stage.setShow({ ...this.show });
     stage.setFollow(this.follow);
-    stage.setDark(this.dark);
+    stage.setDark(null); // as the page
     stage.setView(this.view);
     window.kiksDesk = {
       pose: (index) => stage.feed.frame?.pose(index),
@@ -61,6 +58,5 @@ export default {
     press(event) { this.stage.press(event); },
     fit() { this.stage.fit(); },
     clear_trails() { this.stage.clearTrails(); },
-    select(what, index) { this.stage.select(what, index); },
   },
 };

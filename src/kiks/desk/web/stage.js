@@ -108,8 +108,6 @@ export class Stage {
     this._isWanted = true;
   }
 
-  select(what, index) { this.hand.select({ what, index }); }
-
   press(event) {
     if (!pressKey(event, this.feed, this.hand, this.drawing, this.topView.viewport, this._tell)) return;
     event.preventDefault();
