@@ -68,6 +68,10 @@ def test_what_is_refused_breaks_nothing() -> None:
 # ---- KiKS ----
 
 
+def test_hostile_files_and_arguments_break_no_promise() -> None:
+    check("--only", "files", "--only", "calls", "--cases", "25", "--seed", "12")
+
+
 @at_length
 @pytest.mark.parametrize(
     "words",
@@ -76,7 +80,8 @@ def test_what_is_refused_breaks_nothing() -> None:
         "--only compiled --cases 4 --seed 17",
         "--only names --cases 4 --seed 17",
         pytest.param("--only users --cases 1 --seed 18", marks=needs_root),
-        "--only files --only calls --only messages --cases 3 --seed 12",
+        "--only files --only calls --cases 400 --seed 19",
+        "--only messages --cases 3 --seed 12",
         "--only faults.kill_writer --only faults.fill_disk --only faults.no_descriptors --cases 4 --seed 13",
         *(f"--only faults.kill_{scene} --cases 1 --seed 14" for scene in ("server", "desk")),
         *(f"--only crowd.{group} --cases 1 --seed 15" for group in ("serve", "session")),

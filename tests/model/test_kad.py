@@ -204,21 +204,6 @@ def test_files_that_are_none_are_refused(tmp_path):
         load_kad(tmp_path)
 
 
-@pytest.mark.slow
-@settings(max_examples=150)
-@given(st.data())
-def test_damaged_files_are_arenas_or_refused(data):
-    compress = data.draw(st.booleans())
-    whole = bytearray(mat(compress=compress, walls=walls_of(encode_kad(Arena.box(150, 120, rounded_mm=9)))))
-    for _ in range(data.draw(st.integers(1, 4))):
-        whole[data.draw(st.integers(100, len(whole) - 1))] = data.draw(st.integers(0, 255))
-    del whole[data.draw(st.integers(0, len(whole))) :]
-    try:
-        decode_kad(bytes(whole))
-    except ArenaError:
-        return
-
-
 def element(kind: int, data: bytes) -> bytes:
     return struct.pack("<II", kind, len(data)) + data
 

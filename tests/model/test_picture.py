@@ -11,8 +11,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from PIL import Image
 from tests.at_length import at_length
 
@@ -150,22 +148,3 @@ def test_large_pictures_take_ten_bytes_a_pixel_at_most(tmp_path: Path) -> None:
     for mode in ("I", "F"):
         Image.new(mode, size).save(tmp_path / f"{mode}.tif", compression="tiff_adobe_deflate")
     assert memory_of_reading_mb(tmp_path) < 10 * 9
-
-
-@settings(max_examples=400)
-@given(st.data())
-def test_damaged_pictures_are_read_or_refused(data: st.DataObject) -> None:
-    packing = data.draw(st.sampled_from([None, "tiff_lzw", "tiff_adobe_deflate", "packbits"]))
-    kind = data.draw(st.sampled_from(["PNG", "BMP", "PPM"])) if packing is None else "TIFF"
-    whole = bytearray(
-        file_of(noise(data.draw(st.sampled_from(["1", "L", "RGB"])), 110, 100), kind, compression=packing)
-    )
-    for _ in range(data.draw(st.integers(1, 4))):
-        near = data.draw(st.sampled_from([100, len(whole)]))
-        whole[data.draw(st.integers(0, min(near, len(whole)) - 1))] = data.draw(st.integers(0, 255))
-    try:
-        grey = decode_picture(bytes(whole), 1.0)
-    except ArenaError:
-        return
-    assert grey.dtype == np.uint8
-    assert grey.ndim == 2

@@ -179,19 +179,6 @@ def test_bad_bytes_are_refused(tmp_path):
         Project().save(tmp_path / "none" / "a.kiks")
 
 
-@pytest.mark.slow
-@settings(max_examples=80)
-@given(projects(), st.data())
-def test_damaged_files_are_projects_or_refused(project, data):
-    whole = bytearray(project.to_bytes())
-    for _ in range(data.draw(st.integers(1, 4))):
-        whole[data.draw(st.integers(0, len(whole) - 1))] = data.draw(st.integers(0, 255))
-    try:
-        Project.from_bytes(bytes(whole))
-    except ArenaError:
-        return
-
-
 @pytest.mark.parametrize(
     "name",
     [

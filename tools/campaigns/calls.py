@@ -23,8 +23,10 @@ from kiks.clock.thinking import parse_thinking
 from kiks.control.controllers import KINDS
 from kiks.learn.evaluation import evaluate
 from kiks.learn.gymnasium_envs import KheperaEnv, KheperaVectorEnv
+from kiks.learn.pettingzoo_env import KheperaTeam
 from kiks.model.arena import Ball, Cylinder, Lamp, Pose
 from kiks.model.project import Project, ProjectRobot
+from kiks.sim.drag import Drags
 from kiks.sim.from_project import simulation_of
 from kiks.sim.simulation import Simulation
 
@@ -50,6 +52,12 @@ INTERNAL = (
     "add_note",
     "prepare",
     "start_poses",
+    "split",
+    "parameters_of",
+    "individual",
+    "random_starts",
+    "of_world",
+    "take_arenas",
 )
 """Public names that programs have no use for, or that open a browser."""
 
@@ -150,6 +158,11 @@ def _simulation(rng: random.Random) -> Subject:
         Simulation,
         {"arena": _box(), "robots": 2, "seed": 3, "thinking": "none", "robot": "khepera", "response": "thesis"},
     )
+    hands = Drags(sim)
+    hands.grab("a", "robot", 0)
+    calls["grab"] = partial(hands.grab, "b", "robot"), {"index": 1}
+    calls["drag"] = partial(hands.move, "a"), {"x_mm": 140.0, "y_mm": 130.0}
+    calls["turn"] = partial(hands.turn, "a"), {"heading_rad": 0.7}
     # Documented as an array to be written to: whatever NumPy takes, the engine has to live with.
     value = rng.choice((math.nan, math.inf, 1e308, -1e20, 5e-324, 0.0))
     calls["lamps"] = partial(write_lamps, 0, rng.randrange(4), value), {}
@@ -258,6 +271,7 @@ def _control(rng: random.Random) -> Subject:
     found = {}
     wanted = (*KINDS, "random_parameters", "from_recipe", "recipe_for")
     wanted += ("coverage", "gathered", "goal_mm", "near_light_share", "reached_s", "wall_following")
+    wanted += ("closest_mm", "largest_group")
     for name in wanted:
         call = getattr(kiks.controllers, name, None) or getattr(kiks.measures, name)
         found[name] = call, {key: value for key, value in good.items() if key in inspect.signature(call).parameters}
@@ -297,7 +311,8 @@ def _learning(rng: random.Random) -> Subject:
     champion = kiks.Champion(task.controller, (0.1,) * 18)
     sim = _world()
     good = {
-        "task": task, "algorithm": "ga", "seed": 1, "population": 4, "folder": None, "values": np.arange(4.0),
+        "task": task, "algorithm": "ga", "seed": 1, "population": 4, "opponents": 2, "folder": None,
+        "values": np.arange(4.0),
         "generations": 1, "each": None,
         "executor": None, "seconds": 0.5, "candidates": np.zeros((1, 18)), "seeds": np.array([1]),
         "threads": 1, "measure": "contacts",
@@ -356,6 +371,12 @@ def _environments(rng: random.Random) -> Subject:
         {"task": "Avoid", "render_mode": None, "arenas": (_box(),), "timing": kiks.Timing(), "robot": "khepera"},
     )
 
+    taken = {"task": "Avoid", "robots": 2, "max_cycles": 9, "seed": 1, "threads": 1}
+    calls["KheperaTeam"] = (
+        KheperaTeam,
+        {key: taken[key] for key in inspect.signature(KheperaTeam).parameters & taken.keys()},
+    )
+
     def go_on() -> None:
         env.reset(seed=1)
         env.step(good.get("action", good.get("actions")))
@@ -368,7 +389,7 @@ def _project(rng: random.Random) -> Subject:
         "arena": _box(), "robots": (ProjectRobot(),), "seed": 1, "thinking": "none", "baud": 9600,
         "response": "thesis", "noise": True,
         "speed": 1.0, "kind": "khepera", "turrets": ("k213",), "name": "a", "program": "a.py", "arguments": ("a",),
-        "brightness": 99, "changes": {"body": {"diameter_mm": 60.0}},
+        "brightness": 99, "changes": {"body": {"diameter_mm": 60.0}}, "seconds": 5.0, "supervisor": None,
     }  # fmt: skip
 
     def project(**settings: Any) -> None:
@@ -403,8 +424,10 @@ def _port(rng: random.Random) -> Subject:
     def on_port(call: Callable[..., Any], *given: Any, **named: Any) -> None:
         try:
             call(*given, **named)
-        except TypeError:
-            pass  # As pyserial has it: programs run unchanged.
+        except (TypeError, ValueError) as error:
+            if isinstance(error, kiks.KiksError):
+                raise
+            # As pyserial has it: programs run unchanged.
         finally:
             port.timeout = 1.0
 

@@ -343,6 +343,16 @@ arguments = ["a"]
 brightness = 90
 """
 
+_TASK_TOML = b"""task = 1
+base = "avoid"
+name = "mine"
+seconds = 2.5
+worlds = 6
+baud = 9600
+[controller]
+kind = "gru"
+"""
+
 _TEXT_SAMPLES = (
     "8 2 3 5 2\n" + "".join(f"TURN {n}\n0 1 2 3 4 5 6 1023\n9 8 7 6 5 4 3 2\n" for n in range(3)) + "END\n"
 ).encode()
@@ -429,6 +439,7 @@ def _kinds() -> Iterator[Kind]:
 
     yield Kind("recording", "own.mcap", [recordings.sound()], recordings.use, strange=(recordings.strange_recording,))
 
+    yield Kind("task", "own.toml", [_TASK_TOML], lambda path: kiks.tasks.load(str(path)), "toml")
     yield Kind("network", "own.json", [THESIS.read_bytes()[:200_000]], _network, "json")
 
     table = {

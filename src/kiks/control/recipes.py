@@ -13,7 +13,7 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from kiks.errors import ParameterError, nearest, shown
-from kiks.model.atomic_files import program_in
+from kiks.model.atomic_files import path_of, program_in
 from kiks.model.data_file import Rule, Text, record
 
 
@@ -47,7 +47,7 @@ def recipe_of(function: Callable[..., Any]) -> dict[str, Any] | None:
 def relative_to(recipe: Mapping[str, Any], folder: str | Path) -> dict[str, Any]:
     """Return a recipe with its file as seen from a folder, if it lies in there."""
     file, name = file_of(recipe)
-    path, root = Path(file).absolute(), Path(folder).absolute()
+    path, root = Path(file).absolute(), path_of(folder, "folder").absolute()
     return {"function": f"{path.relative_to(root)}:{name}"} if file and path.is_relative_to(root) else dict(recipe)
 
 

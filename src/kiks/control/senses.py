@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from kiks.engine.state import PIXEL_COUNT
@@ -44,9 +44,10 @@ def reading_count(senses: Sequence[str]) -> int:
 
 def check_senses(senses: str | Sequence[str]) -> tuple[str, ...]:
     """Return some of `SENSES`."""
-    if not isinstance(senses, Iterable):
-        raise ParameterError(f"senses must be some of {', '.join(SENSES)}, but they were {shown(senses)}.")
-    given = (senses,) if isinstance(senses, str) else tuple(senses)
+    try:
+        given = (senses,) if isinstance(senses, str) else tuple(senses)
+    except TypeError:
+        raise ParameterError(f"senses must be some of {', '.join(SENSES)}, but they were {shown(senses)}.") from None
     for sense in given:
         if not isinstance(sense, str) or sense not in SENSES:
             raise ParameterError(

@@ -137,7 +137,8 @@ class Champion:
 
     def project(self, arena: Arena | None = None) -> Project:
         """Return its own world, or that of an arena or the default box, with its timing and turrets for its senses."""
-        project = self.world if arena is None and self.world is not None else Project(arena or Arena.default())
+        own = self.world if arena is None else None
+        project = own or Project(Arena.default() if arena is None else arena)
         seen = ("k213",) if "camera" in self.controller.senses else ()
         robots = (
             replace(each, turrets=tuple(dict.fromkeys((*each.turrets, *seen))))

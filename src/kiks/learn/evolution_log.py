@@ -114,7 +114,7 @@ def check_alike(
                 f"{whose} must have the same {name}, but they have {shown(known)} and {shown(value)}. {advice}"
             )
     if found := differing(one.task_digest, other.task_digest, free):
-        raise ParameterError(f"{whose} must have the same task, but these differ: {found}. {advice}")
+        raise ParameterError(f"{whose} must have the same task, but these differ: {shown(found)[1:-1]}. {advice}")
 
 
 class Folder:
