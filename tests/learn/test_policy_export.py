@@ -185,7 +185,7 @@ def test_the_champion_drives_the_episode_of_the_policy(tmp_path: Path) -> None:
     assert champion.task == "Light"
     by_policy, by_champion = Episodes(spec, 1, threads=1), Episodes(spec, 1, threads=1)
     for episodes in (by_policy, by_champion):
-        episodes.begin([0], [np.random.default_rng(1)])
+        episodes.begin([0], [1])
     seed, start = int(np.random.default_rng(1).integers(2**63 - 1)), by_policy.batch.poses[0, 0].tolist()
     for _ in range(100):
         by_policy.step(actions_of(layers, by_policy.observations()[0, 0].astype(np.float64), "relu", "clip")[None])

@@ -109,7 +109,9 @@ def evolve(
                 if evolution.generations:
                     typer.echo(f"Continuing after generation {len(evolution.generations)} in {home}.")
                 if cluster is not None and executor is None:
-                    executor = stack.enter_context(_cluster_executor(cluster))
+                    from kiks.learn.ray_executor import RayExecutor
+
+                    executor = stack.enter_context(RayExecutor(None if cluster == "local" else cluster))
                 with Progress(evolution, until, seconds) as progress:
                     evolution.run(
                         generations=until,
@@ -235,10 +237,3 @@ def _controller(kind: str, task: Task) -> Controller:
     if kind == "ctrnn":
         recipe["period_s"] = task.timings[0].period_s
     return from_recipe(recipe)
-
-
-def _cluster_executor(address: str) -> Executor:
-    """Return the executor for --cluster."""
-    from kiks.learn.ray_executor import RayExecutor
-
-    return RayExecutor(None if address == "local" else address)

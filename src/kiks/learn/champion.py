@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field
 
 from kiks.batch.loop_timing import Baud, Timing
-from kiks.client.drive import Driver, drive
+from kiks.client.drive import drive
 from kiks.client.port import Port
 from kiks.control.controller import Controller
 from kiks.control.controllers import Recipe, controller_of, recipe_for
@@ -121,14 +121,6 @@ class Champion:
         """
         period_s = self.timing.period_s
         return drive(port, self.controller, self.parameters, seconds=seconds, period_s=period_s, baud=self.baud)
-
-    def driver(self, port: str | Port | Sequence[str | Port]) -> Driver:
-        """Return a driver of one or more robots, to call loop by loop.
-
-        Raises:
-            LinkError: If a port cannot be opened.
-        """
-        return Driver(port, self.controller, self.parameters, period_s=self.timing.period_s, baud=self.baud)
 
     @property
     def baud(self) -> int:

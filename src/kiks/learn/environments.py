@@ -125,25 +125,15 @@ def football() -> Task:
 
 
 ENVIRONMENTS: dict[str, Callable[[], Task]] = {
-    "Avoid": avoid,
-    "Follow": follow,
-    "Light": light,
-    "Gather": gather,
-    "Maze": maze,
-    "Football": football,
+    make.__name__.capitalize(): functools.cache(make) for make in (avoid, follow, light, gather, maze, football)
 }
-"""Functions that return the environments, by name."""
-
-
-@functools.lru_cache(maxsize=16)
-def _named(name: str) -> Task:
-    return ENVIRONMENTS[name]()
+"""Functions that return the environments, by name; each time the same one."""
 
 
 def environment_of(task: str | Task) -> Task:
     """Return an environment, given or by its name."""
     if isinstance(task, str) and task in ENVIRONMENTS:
-        return _named(task)
+        return ENVIRONMENTS[task]()
     if not isinstance(task, Task):
         raise ParameterError(
             f"task must be a kiks.Task with a reward, or one of {', '.join(ENVIRONMENTS)}, but it was {shown(task)}."

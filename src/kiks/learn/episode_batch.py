@@ -42,6 +42,9 @@ class Episodes:
         worlds: Number of worlds.
         response: Response of the proximity sensors, if not that of the robot's file.
         threads: Number of threads; the number of cores if left out.
+
+    Attributes:
+        step_counts: Number of steps of each world's episode, int64 [world].
     """
 
     def __init__(
@@ -73,31 +76,37 @@ class Episodes:
         self._sensors = np.zeros((worlds, task.robots, task.controller.sensor_count))
         self._most = np.concatenate([np.full(SENSES[name].size, SENSES[name].most) for name in self.senses])
         self._scores = np.zeros((worlds, task.robots))
+        self._rngs: dict[int, np.random.Generator] = {}
+        self.step_counts = np.zeros(worlds, np.int64)
 
     @property
     def shape(self) -> tuple[int, int]:
         """Number of worlds, and of robots in each."""
         return self.batch.world_count, self.batch.robot_count
 
-    def begin(self, worlds: ArrayLike, rngs: Sequence[np.random.Generator]) -> None:
+    def begin(self, worlds: ArrayLike, seeds: Sequence[int | None] | None = None) -> None:
         """Begin new episodes in some worlds; the first call must name all worlds.
 
         Args:
             worlds: Their numbers, int64 [world].
-            rngs: A random generator for each world; its arena, if there are several, its seed and its start are drawn
-                from it.
+            seeds: Seed of the random generator of each of them, from which its arena, if there are several, its seed
+                and its start are drawn; None where the generator continues, or begins at random.
         """
         chosen, arena_count = np.asarray(worlds, np.int64), len(self.batch.arenas)
+        for world, seed in zip(chosen.tolist(), [None] * len(chosen) if seeds is None else seeds, strict=True):
+            if seed is not None or world not in self._rngs:
+                self._rngs[world] = np.random.default_rng(seed)
+        rngs = [self._rngs[world] for world in chosen.tolist()]
         if arena_count > 1:
             self.batch.take_arenas(chosen, [int(rng.integers(arena_count)) for rng in rngs])
-        seeds = np.array([rng.integers(SEED_LIMIT) for rng in rngs], np.int64)
+        drawn = np.array([rng.integers(SEED_LIMIT) for rng in rngs], np.int64)
         starts = None
         if self._places:
             pairs = zip(chosen.tolist(), rngs, strict=True)
             starts = np.array([self._draw_starts(world, rng) for world, rng in pairs])
         selected = None if len(chosen) == self.batch.world_count else chosen
-        self._sensors = self.batch.reset(selected, seeds=seeds, starts=starts)
-        self._scores[chosen] = 0.0
+        self._sensors = self.batch.reset(selected, seeds=drawn, starts=starts)
+        self._scores[chosen], self.step_counts[chosen] = 0.0, 0
 
     def step(self, actions: ArrayLike, ignored: NDArray[np.bool_] | None = None) -> NDArray[np.float64]:
         """Let all robots act, then read their sensors.
@@ -129,6 +138,7 @@ class Episodes:
                 "for example with gymnasium.wrappers.ClipAction."
             )
         self._sensors = self.batch.step(given * self.task.speed_limit)
+        self.step_counts += 1
         before, self._scores = self._scores, self.batch.notes[:, :, 0].copy()
         return self._scores - before
 

@@ -28,7 +28,6 @@ from kiks.model.checks import check_count
 try:
     import gymnasium
     from gymnasium.spaces import Box
-    from gymnasium.utils.seeding import np_random
     from gymnasium.vector import AutoresetMode
     from gymnasium.vector.utils import batch_space
 except ModuleNotFoundError as error:
@@ -69,7 +68,7 @@ class KheperaEnv(gymnasium.Env[Floats32, Floats32]):
     ) -> tuple[Floats32, dict[str, Any]]:
         """Begin an episode; the same seed gives the same episode."""
         super().reset(seed=checked_seed(seed))
-        self.episodes.begin([0], [self.np_random])
+        self.episodes.begin([0], [seed])
         return self.episodes.observations()[0, 0], self._info()
 
     def step(self, action: Floats32) -> tuple[Floats32, float, bool, bool, dict[str, Any]]:
@@ -124,13 +123,14 @@ class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[An
                 f"autoreset_mode must be one of {modes}, but it was {shown(autoreset_mode)}."
             ) from None
         self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
-        self.max_episode_steps = checked_limit("max_episode_steps", max_episode_steps)
+        self.max_episode_steps = max_episode_steps
+        if max_episode_steps is not None:
+            check_count("max_episode_steps", max_episode_steps, 1, SEED_LIMIT)
         self.episodes = episodes_of(task, num_envs, changes | {"threads": threads})
         self.single_observation_space, self.single_action_space = spaces_of(self.episodes.task)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
-        self._rngs: list[np.random.Generator] = []
-        self._step_counts = np.zeros(num_envs, np.int64)
+        self._has_begun = False
         self._done = np.zeros(num_envs, np.bool_)
 
     def reset(
@@ -149,16 +149,9 @@ class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[An
         ):
             raise ParameterError(f"reset_mask must be bool [{self.num_envs}], but it was {shown(mask)}.")
         seeds = self._seeds(seed)
-        chosen = np.arange(self.num_envs)
-        if not self._rngs:
-            self._rngs = [np_random(None if seeds is None else seeds[k])[0] for k in range(self.num_envs)]
-        elif mask is not None:
-            chosen = np.flatnonzero(mask)
-        if seeds is not None:
-            for k in chosen.tolist():
-                if seeds[k] is not None:
-                    self._rngs[k] = np_random(seeds[k])[0]
-        self._begin(chosen)
+        chosen = np.flatnonzero(mask) if mask is not None and self._has_begun else np.arange(self.num_envs)
+        self._begin(chosen, [seeds[k] for k in chosen.tolist()])
+        self._has_begun = True
         return self.episodes.observations()[:, 0], self._infos()
 
     def step(self, actions: Floats32) -> tuple[Floats32, NDArray[Any], NDArray[Any], NDArray[Any], dict[str, Any]]:
@@ -170,19 +163,12 @@ class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[An
             )
         # In the other modes none has ended here.
         rewards = self.episodes.step(actions, ignored=self._done)[:, 0]
-        self._step_counts += 1
         terminations = self.episodes.terminations()
-        truncations = np.zeros(self.num_envs, np.bool_)
-        if self.max_episode_steps is not None:
-            truncations = self._step_counts >= self.max_episode_steps
+        truncations = self.episodes.step_counts >= (self.max_episode_steps or np.inf)
         resetting, self._done = self._done, terminations | truncations
         if self.autoreset_mode is AutoresetMode.NEXT_STEP and resetting.any():
-            rewards[resetting], terminations[resetting], truncations[resetting], self._done[resetting] = (
-                0.0,
-                False,
-                False,
-                False,
-            )
+            for each in (rewards, terminations, truncations):
+                each[resetting] = 0
             self._begin(np.flatnonzero(resetting))
         final: dict[str, Any] = {}
         if self.autoreset_mode is AutoresetMode.SAME_STEP and self._done.any():
@@ -196,10 +182,10 @@ class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[An
 
     # ---- inside ----
 
-    def _seeds(self, seed: int | Sequence[int | None] | None) -> list[int | None] | None:
-        """Return a seed for each world, or None without seeds."""
+    def _seeds(self, seed: int | Sequence[int | None] | None) -> Sequence[int | None]:
+        """Return a seed for each world; None where it continues its random numbers."""
         if seed is None:
-            return None
+            return [None] * self.num_envs
         given: Any = seed
         if isinstance(given, list | tuple) or (isinstance(given, np.ndarray) and given.ndim == 1):
             if len(given) != self.num_envs:
@@ -208,11 +194,10 @@ class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[An
                 )
             return [checked_seed(each) for each in given]
         first = check_count("seed", seed, 0, SEED_LIMIT - self.num_envs)
-        return [first + k for k in range(self.num_envs)]
+        return range(first, first + self.num_envs)
 
-    def _begin(self, chosen: NDArray[np.int64]) -> None:
-        self.episodes.begin(chosen, [self._rngs[k] for k in chosen.tolist()])
-        self._step_counts[chosen] = 0
+    def _begin(self, chosen: NDArray[np.int64], seeds: Sequence[int | None] | None = None) -> None:
+        self.episodes.begin(chosen, seeds)
         self._done[chosen] = False
 
     def _infos(self) -> dict[str, Any]:
@@ -242,11 +227,6 @@ def episodes_of(task: str | Task, worlds: int, changes: dict[str, Any]) -> Episo
 def checked_seed(seed: int | None) -> int | None:
     """Return a checked seed, or None."""
     return None if seed is None else check_count("seed", seed, 0, SEED_LIMIT)
-
-
-def checked_limit(name: str, steps: int | None) -> int | None:
-    """Return a checked number of steps, or None for no limit."""
-    return None if steps is None else check_count(name, steps, 1, SEED_LIMIT)
 
 
 def checked_mode(render_mode: str | None) -> str | None:

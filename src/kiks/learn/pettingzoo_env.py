@@ -14,7 +14,6 @@ from kiks.learn.task import Task
 from kiks.model.checks import check_count
 
 try:
-    from gymnasium.utils.seeding import np_random
     from pettingzoo import ParallelEnv
 except ModuleNotFoundError as error:
     raise ModuleNotFoundError(
@@ -54,8 +53,6 @@ class KheperaTeam(ParallelEnv[str, Floats32, Floats32]):  # type: ignore[misc, u
         spaces = {agent: spaces_of(self.episodes.task) for agent in self.possible_agents}
         self.observation_spaces = {agent: observations for agent, (observations, _) in spaces.items()}
         self.action_spaces = {agent: actions for agent, (_, actions) in spaces.items()}
-        self._rng: np.random.Generator | None = None
-        self._step_count = 0
 
     def observation_space(self, agent: str) -> Any:
         """Return the observation space of a robot."""
@@ -69,11 +66,8 @@ class KheperaTeam(ParallelEnv[str, Floats32, Floats32]):  # type: ignore[misc, u
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Floats32], dict[str, dict[str, Any]]]:
         """Begin an episode; the same seed gives the same episode."""
-        if seed is not None or self._rng is None:
-            self._rng, _ = np_random(checked_seed(seed))
-        self.episodes.begin([0], [self._rng])
+        self.episodes.begin([0], [checked_seed(seed)])
         self.agents = list(self.possible_agents)
-        self._step_count = 0
         return self._by_agent(self.episodes.observations()[0]), self._infos()
 
     def step(
@@ -86,8 +80,8 @@ class KheperaTeam(ParallelEnv[str, Floats32, Floats32]):  # type: ignore[misc, u
                 f"but they were for {shown(list(actions) if isinstance(actions, dict) else actions)}."
             )
         rewards = self.episodes.step([[actions[agent] for agent in self.agents]])[0]
-        self._step_count += 1
-        is_terminated, is_truncated = bool(self.episodes.terminations()[0]), self._step_count >= self.max_cycles
+        is_terminated = bool(self.episodes.terminations()[0])
+        is_truncated = bool(self.episodes.step_counts[0] >= self.max_cycles)
         result = (
             self._by_agent(self.episodes.observations()[0]),
             self._by_agent(rewards.tolist()),

@@ -17,13 +17,7 @@ from kiks.learn.finals import Tournament
 from kiks.learn.results import Baselines, Result, curves, passed_count
 from kiks.learn.task import Axis
 
-CHAMPION_MARK: dict[str, Any] = {
-    "marker": "*",
-    "color": "tab:red",
-    "markersize": 12,
-    "markeredgecolor": "white",
-    "linestyle": "",
-}
+CHAMPION_MARK: dict[str, Any] = {"color": "tab:red", "markersize": 12, "markeredgecolor": "white"}
 """How the champion is drawn."""
 
 SIDE_COLOURS, GROUP_COLOURS = ("tab:red", "tab:blue"), ("tab:blue", "tab:orange")
@@ -66,12 +60,11 @@ def _draw_fitness(axes: Any, evolution: Evolution, side: int, baselines: Baselin
         champions = [each.champion_fitness for each in generations]
         axes.plot(numbers, champions, color="tab:red", drawstyle="steps-post", label="champion, on trial")
     if evolution.finals is not None:
-        axes.plot(len(generations), evolution.champion.fitness, **CHAMPION_MARK, label="champion, in the finals")
+        axes.plot(len(generations), evolution.champion.fitness, "*", **CHAMPION_MARK, label="champion, in the finals")
     if baselines is not None:
         _draw_baselines(axes, baselines)
-    axes.set_xlabel("generation")
-    axes.set_ylabel(f"fitness{against}")
-    axes.set_title(f"{name}: {evolution.name}, seed {evolution.seed}")
+    title = f"{name}: {evolution.name}, seed {evolution.seed}"
+    axes.set(xlabel="generation", ylabel=f"fitness{against}", title=title)
     axes.grid(alpha=0.3)
     axes.legend(loc="best", fontsize="small")
 
@@ -101,10 +94,9 @@ def _draw_archive(figure: Any, axes: Any, archive: Archive, champion: Champion) 
     place = [champion.measures.get(axis.measure, axis.low) for axis in archive.axes[:2]]
     if not others:
         place.append(0.5)
-    axes.plot(*place, **CHAMPION_MARK, label="champion")
-    axes.set_xlabel(across.measure)
-    axes.set_ylabel(up.measure)
-    axes.set_title(f"{len(archive.elites)} of {archive.cell_count} cells, QD score {archive.qd_score:.4g}")
+    axes.plot(*place, "*", **CHAMPION_MARK, label="champion")
+    title = f"{len(archive.elites)} of {archive.cell_count} cells, QD score {archive.qd_score:.4g}"
+    axes.set(xlabel=across.measure, ylabel=up.measure, title=title)
     axes.legend(loc="best", fontsize="small")
     figure.colorbar(image, ax=axes, label="fitness")
 
@@ -126,16 +118,14 @@ def save_tournament_plot(tournament: Tournament, path: str | Path) -> None:
     image = squares.imshow(
         tournament.scores[0], origin="lower", extent=extent, interpolation="nearest", cmap="gray", aspect="equal"
     )
-    squares.set_xlabel(f"generation of the {second}")
-    squares.set_ylabel(f"generation of the {first}")
-    squares.set_title("champions of all generations against each other")
+    title = "champions of all generations against each other"
+    squares.set(xlabel=f"generation of the {second}", ylabel=f"generation of the {first}", title=title)
     figure.colorbar(image, ax=squares, label=f"fitness of the {first}")
     for side, name in enumerate(tournament.sides):
         best, means = tournament.best[side], tournament.means[side]
         curves.plot(generations, means, color=SIDE_COLOURS[side], label=name)
         curves.plot([best], [means.max()], "o", color=SIDE_COLOURS[side], label=f"best {name}: generation {best}")
-    curves.set_xlabel("generation of the champion")
-    curves.set_ylabel("mean fitness against all champions")
+    curves.set(xlabel="generation of the champion", ylabel="mean fitness against all champions")
     curves.grid(alpha=0.3)
     curves.legend(loc="best", fontsize="small")
     save_figure(figure, path)
@@ -165,9 +155,7 @@ def save_results_plot(groups: Mapping[str, Sequence[Result]], path: str | Path) 
     first = results[0]
     if first.baselines is not None:
         _draw_baselines(axes[0], first.baselines)
-    axes[0].set_xlabel("evaluations")
-    axes[0].set_ylabel("fitness of the champion")
-    axes[0].set_title(first.task)
+    axes[0].set(xlabel="evaluations", ylabel="fitness of the champion", title=first.task)
     axes[0].grid(alpha=0.3)
     axes[0].legend(loc="best", fontsize="small")
     if has_exam:
@@ -192,8 +180,5 @@ def _draw_exams(axes: Any, groups: Mapping[str, Sequence[Result]]) -> None:
         axes.bar(places, shares, color=colour, label=f"{name}: {passed_count(group)} of {len(group)} solved the exam")
         labels += [""] * (len(shares) + 1)
     axes.axhline(PASS_SHARE, color="tab:gray", linestyle="--", linewidth=1)
-    axes.set_ylim(0, 1)
-    axes.set_xticks([])
-    axes.set_xlabel("champions")
-    axes.set_ylabel("share of the exam's starts solved")
+    axes.set(ylim=(0, 1), xticks=[], xlabel="champions", ylabel="share of the exam's starts solved")
     axes.legend(loc="lower left", fontsize="small")

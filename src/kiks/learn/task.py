@@ -264,14 +264,10 @@ class Task(Experiment):
         """Total time for which the robots of a candidate drive [s]."""
         return float(self.worlds * len(self.controllers) * self.seconds)
 
-    def split(self, candidates: Floats) -> list[Floats]:
-        """Return the part of each side of candidates [..., parameter], float64 [..., parameter] each."""
-        return np.split(candidates, [self.sides[0].parameter_count], axis=-1)[: len(self.sides)]
-
     def parameters_of(self, candidates: Floats) -> list[Floats]:
         """Return the parameters of each robot of a world, float64 [..., parameter] of candidates [..., parameter]."""
-        parts = zip(self.sides, self.split(candidates), strict=True)
-        return [part for side, part in parts for _ in range(side.robots)]
+        parts = np.split(candidates, [self.sides[0].parameter_count], axis=-1)
+        return [part for side, part in zip(self.sides, parts, strict=False) for _ in range(side.robots)]
 
     def start_poses(self, seeds: Integers) -> Floats | None:
         """Return the starts of candidates with such seeds, float64 [candidate and world, robot, 3].
