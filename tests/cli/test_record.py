@@ -93,16 +93,3 @@ def test_what_a_killed_server_has_recorded_is_made_again(tmp_path: Path) -> None
     assert "was killed, or goes on" in result.stderr
     sent = Recording(tmp_path / "run.mcap").table("wire")
     assert len(sent[sent["is_sent"]]) > 10
-
-
-def test_mistakes_end_in_one_clear_line(tmp_path: Path) -> None:
-    (tmp_path / "text.mcap").write_text("no recording")
-    for words, told in (
-        (("replay", "none.mcap"), "no such file"),
-        (("replay", "text.mcap", "--check"), "must be an MCAP file"),
-        (("export", "text.mcap", "out.csv"), "must be an MCAP file"),
-    ):
-        result = forked.run(*words, cwd=tmp_path)
-        assert result.returncode == 2
-        assert told in result.stderr
-        assert "Traceback" not in result.stderr

@@ -10,7 +10,6 @@ import pytest
 from PIL import Image
 from tests.at_length import cases
 
-import kiks
 from kiks import Arena, Khepera, ParameterError, Recording
 from kiks.export.figures import NO_ROBOT, PANELS, ROWS, figure_of, panels_of, save_figures
 from kiks.recording.analysis import odometry, time_shares
@@ -134,11 +133,3 @@ def test_the_same_recording_gives_the_same_picture(ending: str, recording: Recor
         save_figures([recording], file)
     assert files[0].read_bytes() == files[1].read_bytes()
     assert files[0].stat().st_size > 10_000
-
-
-def test_mistakes_get_a_clear_error(recording: Recording, tmp_path: Path) -> None:
-    with pytest.raises(ParameterError, match="robot must be a whole number from 1 to 1"):
-        save_figures([recording], tmp_path / "plot.png", robot=2)
-    with pytest.raises(ParameterError, match=r"must end in .png or .svg or .pdf"):
-        save_figures([recording], tmp_path / "plot.gif")
-    assert kiks.Recording(recording.log.reader.path).title == recording.title

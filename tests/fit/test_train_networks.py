@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import math
 
@@ -163,12 +162,7 @@ def test_a_file_that_holds_no_networks(tmp_path):
             {"hidden": [[[0.0] * 8] * 13] * 7 + [[[0.0] * 8] * 12 + [[1e7] * 8]]},
             r"hidden\[7\]\[12\]\[0\] must be at most 1000000",
         ),
-        ({"last": "x"}, "last must be a list, but it was 'x'"),
-        ({"range_mm": [1.0]}, "range_mm must be a number, but it was"),
-        ({"range_mm": 0}, "range_mm must be at least 1, but it was 0"),
         ({"field_of_view_deg": 1e9}, "field_of_view_deg must be at most 180"),
-        ({"direction_deg": [1.0]}, "direction_deg must have at least 8 items"),
-        ({"mount_radius_mm": [float("nan")] * 8}, r"mount_radius_mm\[0\] must be a finite number"),
     ],
 )
 def test_networks_have_their_shape(tmp_path, change, words):
@@ -178,11 +172,3 @@ def test_networks_have_their_shape(tmp_path, change, words):
         NetworkResponse.load(tmp_path / "net.json")
     with pytest.raises(ParameterError, match="networks must go to a file that can be written"):
         NetworkResponse.load().save(tmp_path / "no" / "net.json")
-
-
-def test_networks_never_change():
-    response = NetworkResponse.load()
-    with pytest.raises(TypeError, match="does not support item assignment"):
-        response.hidden[0][0] = 1.0
-    with pytest.raises(dataclasses.FrozenInstanceError):
-        response.range_mm = 1.0

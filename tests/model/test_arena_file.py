@@ -174,16 +174,6 @@ def test_a_picture_gives_the_name_and_the_scale(tmp_path):
         Arena.from_image(tmp_path / "yard.png", 0)
 
 
-def test_a_missing_file_and_a_folder_are_refused(tmp_path):
-    for name in ("none.png", "none.toml"):
-        with pytest.raises(ArenaError, match=rf"{name}' must exist, but there is no such file. Check the name"):
-            Arena.load(tmp_path / name)
-    (tmp_path / "folder.toml").mkdir()
-    for name in ("", "folder.toml"):
-        with pytest.raises(ArenaError, match=r"must be a file, but it is a folder. Name a file in it"):
-            Arena.load(tmp_path / name)
-
-
 @pytest.mark.parametrize("content", [b"", b"hello", b"\x89PNG\r\n\x1a\n", b"P5 0 0 255 ", b"BM" + bytes(60)])
 def test_what_is_no_picture_is_refused(tmp_path, content):
     (tmp_path / "a.png").write_bytes(content)
@@ -233,20 +223,6 @@ def test_size_is_checked_before_pixels_are_read(tmp_path, side):
     (tmp_path / "a.bmp").write_bytes(bitmap_header(1000, 1000))
     with pytest.raises(ArenaError, match=r"a.bmp': An arena must have at most 64 million cells, .* 1000 x 1000 pixels"):
         Arena.from_image(tmp_path / "a.bmp", 9)
-
-
-def test_small_and_full_pictures_are_refused(tmp_path):
-    Image.new("L", (99, 200)).save(tmp_path / "a.png")
-    with pytest.raises(ArenaError, match=r"a.png': An arena must be at least 100 x 100 mm, but .* 99 x 200 pixels"):
-        Arena.load(tmp_path / "a.png")
-    Image.new("L", (200, 200), 9).save(tmp_path / "b.png")
-    with pytest.raises(ArenaError, match=r"Arena 'b' must have floor, but every cell is wall"):
-        Arena.load(tmp_path / "b.png")
-
-
-def test_an_empty_picture_is_an_arena(tmp_path):
-    Image.new("L", (200, 200)).save(tmp_path / "a.png")
-    assert Arena.load(tmp_path / "a.png").find_start(27.5).x_mm == 99.5
 
 
 FULL = """
@@ -329,37 +305,26 @@ REFUSED = [
     (BOX + "picture = 'maze.png'", r"must be either a picture or a box, but picture came with size_mm. Remove"),
     (BOX + "mm_per_pixel = 1", r"mm_per_pixel must come with a picture, but there is none. Boxes have cells of 1 mm"),
     ("picture = 'sub/maze.png'\nwall_mm = 1", r"but picture came with wall_mm"),
-    ("picture = 3", r"picture must be a text, but it was 3. A picture in"),
     (
         "picture = '../maze.png'",
         r"picture must lie in the folder of the file that names it, or below, but '../maze.png' leads",
     ),
     ("picture = 'sub/../../maze.png'", r"picture must lie in the folder of the file that names it"),
     ("picture = '/etc/passwd'", r"picture must lie in the folder of .* Copy it there"),
-    ('picture = "a\\u0000b"', r"picture must match pattern .* but it was 'a"),
     ("picture = 'link.png'", r"picture must lie in the folder of the file that names it"),
     ("picture = 'none.png'", r"Picture '.*none.png' must exist"),
     ("picture = 'a.toml'", r"Picture '.*a.toml' must be a picture"),
     ("picture = ''", r"picture must lie in the folder of the file that names it, or below, but '' leads elsewhere"),
     ("size_mm = 3", r"size_mm must be two whole numbers in mm, but it was 3. Give size_mm = "),
-    ("size_mm = [300.5, 200]", r"size_mm\[0\] must be a whole number, but it was 300.5. Boxes are drawn in whole"),
     (
         f"size_mm = [1{'0' * 400}, 200]",
         r"size_mm\[0\] must be at most 1000000000, but it was 10{30,60}\.\.\.0{30,60}\. Boxes",
     ),
     ("size_mm = [100000, 200000]", r"at most 64 million cells"),
-    (BOX + "brightness = 0", r"brightness must be at least 1, but it was 0. 1 is black"),
     (BOX + "[start]\nat_mm = [50, 50]", r"start must be a list, but it was .* Head each with \[\[start\]\]"),
-    (BOX + "lamp = [1]", r"lamp 1 must be a table, but it was 1. Head each with"),
     (BOX + "[[start]]\nheading_deg = 1", r"start 1: at_mm must be given, but it is missing. Give at_mm = \[x, y\]"),
-    (
-        BOX + "[[start]]\nat_mm = [50, 50]\nheading_deg = 'up'",
-        r"start 1: heading_deg must be a number, but it was 'up'",
-    ),
     (BOX + "[[start]]\nat_mm=[50, 50]\n[[start]]\nat_mm=[1, 1]", r"start 2 must stand on floor, but at \(1, 1\) mm"),
-    (BOX + "[[lamp]]\nat_mm = [50, 50]\npower_w = true", r"lamp 1: power_w must be a number, but it was True"),
     (BOX + "[[lamp]]\nat_mm = [50, 50]\nis_on = 1", r"lamp 1: is_on must be true or false, but it was 1"),
-    (BOX + "[[lamp]]\nat_mm = [50, 50]\npower_w = -1", r"lamp 1: power_w must be greater than 0, but it was -1"),
 ]
 
 
@@ -371,12 +336,6 @@ def test_an_arena_file_that_is_wrong_says_where(folder, text, words):
         (folder / "link.png").symlink_to(outside)
     with pytest.raises(ArenaError, match=rf"(?s)^Arena file '.*a.toml'.*{words}"):
         Arena.load(write(folder, text))
-
-
-def test_an_arena_file_is_utf_8(tmp_path):
-    (tmp_path / "a.toml").write_bytes(b'name = "\xff"')
-    with pytest.raises(ArenaError, match=r"a.toml' must be TOML in UTF-8, but: "):
-        Arena.load(tmp_path / "a.toml")
 
 
 @pytest.mark.parametrize("path", ARENAS, ids=lambda path: path.stem)

@@ -17,7 +17,7 @@ from scipy.io import loadmat, savemat
 
 from kiks.errors import ArenaError, ParameterError
 from kiks.model.arena import Arena, Ball, Cylinder, Lamp, Pose
-from kiks.model.kad import PIECES_MAX, _polygon, decode_kad, encode_kad, load_kad, save_kad
+from kiks.model.kad import PIECES_MAX, _polygon, decode_kad, encode_kad, save_kad
 from kiks.model.limits import MAT_FILE_BYTES_MAX
 
 
@@ -198,10 +198,6 @@ def test_files_that_are_none_are_refused(tmp_path):
         (tmp_path / "bad.kad").write_bytes(data)
         with pytest.raises(ArenaError, match=words):
             Arena.load(tmp_path / "bad.kad")
-    with pytest.raises(ArenaError, match="must exist"):
-        load_kad(tmp_path / "none.kad")
-    with pytest.raises(ArenaError, match="folder"):
-        load_kad(tmp_path)
 
 
 def element(kind: int, data: bytes) -> bytes:

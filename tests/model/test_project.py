@@ -136,13 +136,9 @@ BASE = "kiks = 1\n[walls]\nsize_mm = [300, 300]\n"
         ("sede = 1\n" + BASE, "Did you mean 'seed'"),
         ("[[robot]]\ntrurets = []\n" + BASE.replace("kiks = 1\n", ""), "kiks must be"),
         (BASE + "[[robot]]\ntrurets = []\n", "robot 1.*Did you mean 'turrets'"),
-        (BASE + "hight = 3\n", "walls"),
-        ("seed = -1\n" + BASE, "seed"),
         ("thinking = 'fats'\n" + BASE, "thinking"),
         ("thinking = 'replay:/etc/passwd'\n" + BASE, "replay"),
-        ("baud = 9600.0\n" + BASE, "baud"),
         ("response = 'tesis'\n" + BASE, "Did you mean 'thesis'"),
-        ("noise = 1\n" + BASE, "noise"),
         ("speed = 0\n" + BASE, "speed"),
         ("speed = 'slow'\n" + BASE, "speed"),
         (BASE + "[[robot]]\nkind = 'kephera'\n", "robot 1.*Did you mean 'khepera'"),
@@ -171,8 +167,6 @@ def test_bad_bytes_are_refused(tmp_path):
         Project.from_bytes(b"\xff\xfe")
     with pytest.raises(ArenaError, match="at most"):
         Project.from_bytes(bytes(2000), bytes_max=1000)
-    with pytest.raises(ArenaError, match="must exist"):
-        Project.load(tmp_path / "none.kiks")
     with pytest.raises(ParameterError, match=r"\.kiks"):
         Project().save(tmp_path / "none.toml")
     with pytest.raises(ParameterError, match="can be written"):

@@ -1,4 +1,4 @@
-"""Films in space show the same world as those from above."""
+"""Films and photos in space show the same world as pictures from above."""
 
 from __future__ import annotations
 
@@ -11,10 +11,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from PIL import Image, ImageSequence
+from tests.at_length import at_length
 
 from kiks import Arena, Khepera, ParameterError, Recording, RobotSpec, Simulation
 from kiks.export.film import save_film
 from kiks.export.looks import robot_colour
+from kiks.export.photo import save_photo
 from kiks.export.sheet import wall_grey
 from kiks.export.space import CELLS_MAX, walls
 from kiks.model.arena import Pose
@@ -40,7 +42,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
 
 def filmed(recording: Recording, folder: Path, **values: object) -> list[Pixels]:
     file = folder / "film.webp"
-    save_film(recording, file, size=(320, 240), fps=2, view="3d", is_plain=True, **values)
+    save_film(recording, file, **{"size": (320, 240), "fps": 2, "view": "3d", "is_plain": True} | values)
     with Image.open(file) as image:
         return [np.asarray(each.convert("RGB")) for each in ImageSequence.Iterator(image)]
 
@@ -114,10 +116,76 @@ def test_boxes_of_walls_cover_what_is_wall(name: str) -> None:
     assert (cells <= grown).all()
 
 
-@pytest.mark.parametrize(("library", "extra"), [("av", "film"), ("vtk", "render")])
+# ---- photos ----
+
+
+@pytest.fixture(scope="module")
+def lit(tmp_path_factory: pytest.TempPathFactory) -> Recording:
+    """A ball on the left; a lamp on the right goes out after a second."""
+    file = tmp_path_factory.mktemp("lit") / "run.mcap"
+    sim = Simulation(Arena.box(400, 300), seed=3)
+    sim.place(1, 200, 150, 0.0)
+    sim.add_ball(80, 150)
+    sim.add_lamp(330, 150, 2.0)
+    with sim.record(file):
+        sim.run(1.0)
+        sim.lamps[0, 3] = 0
+        sim.run(1.0)
+    return Recording(file)
+
+
+def taken(recording: Recording, folder: Path, **values: object) -> NDArray[np.float64]:
+    save_photo(recording, folder / "photo.png", size=(160, 120), samples=16, **values)
+    with Image.open(folder / "photo.png") as image:
+        return np.asarray(image.convert("RGB")).astype(float)
+
+
+def test_lamps_light_the_floor(lit: Recording, tmp_path: Path) -> None:
+    bright, dark = taken(lit, tmp_path, time_s=0.5), taken(lit, tmp_path)
+    assert bright.shape == (120, 160, 3)
+    right, left = np.s_[50:80, 110:135], np.s_[50:80, 5:25]
+    assert bright[right].mean() > dark[right].mean() + 15
+    assert abs(bright[left].mean() - dark[left].mean()) < bright[right].mean() - dark[right].mean()
+    # The ball is orange, the robot in the middle green.
+    ball, robot = dark[50:75, 25:45], dark[55:65, 74:86]
+    assert (ball[..., 0] - ball[..., 2]).max() > 80
+    assert (robot[..., 1] - robot[..., 0]).max() > 15
+
+
+@at_length
+def test_photos_have_stripes_and_names_as_films(striped: Recording, tmp_path: Path) -> None:
+    black, white = (taken(striped, tmp_path, follow=number) for number in (1, 2))
+    assert black[86:89, 75:85].max() < 40, "the front of one, towards the camera"
+    assert white[86:89, 75:85].min() > 120, "the back of the other"
+    name = filmed(striped, tmp_path, size=(160, 120), follow=1)[0].astype(float)[50:64, 66:94, 0]
+    seen = black[50:64, 66:94, 0]
+    alike, mirrored = (np.corrcoef(each.ravel(), name.ravel())[0, 1] for each in (seen, seen[:, ::-1]))
+    assert alike > max(mirrored + 0.2, 0.7)
+
+
+def test_a_photo_that_cannot_be_taken_says_so(recording: Recording, tmp_path: Path) -> None:
+    for values, words in (
+        ({"time_s": 9}, "time_s must be from 0 to 2"),
+        ({"samples": 0}, "samples must be a whole number from 1 to 4096"),
+    ):
+        with pytest.raises(ParameterError, match=words):
+            save_photo(recording, tmp_path / "photo.png", **values)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("library", "extra", "options"),
+    [("av", "film", {"view": "3d"}), ("vtk", "render", {"view": "3d"}), ("mitsuba", "render", {"kind": "photo"})],
+)
 def test_the_error_for_a_missing_library_names_its_extra(
-    library: str, extra: str, recording: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    library: str,
+    extra: str,
+    options: dict[str, str],
+    recording: Recording,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setitem(sys.modules, library, None)
     with pytest.raises(ParameterError, match=rf"This needs {library}, but it cannot be imported .*\[{extra}\]"):
-        save_film(recording, tmp_path / "film.mp4", view="3d")
+        recording.export(tmp_path / ("photo.png" if "kind" in options else "film.mp4"), **options)
+    assert not list(tmp_path.iterdir())
