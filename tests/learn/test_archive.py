@@ -178,23 +178,6 @@ def test_too_many_cells_are_an_error() -> None:
         kiks.Evolution(small(axes=axes), "ga")
 
 
-# ---- the maze ----
-
-
-def test_the_fitness_of_the_maze_puts_the_goal_before_thrift_and_thrift_before_nothing() -> None:
-    task = kiks.tasks.maze()
-    assert task.fitness is not None
-    near, far = {"closest_mm": 40.0}, {"closest_mm": 101.0}
-    cheap, dear = {"turned_pulses": 1e3}, {"turned_pulses": 3e5}
-
-    def arrays(*given: dict[str, float]) -> dict[str, Any]:
-        return {name: np.array([[value]]) for each in given for name, value in each.items()}
-
-    order = [task.fitness(arrays(*each))[0] for each in ((near, cheap), (near, dear), (far, cheap))]
-    assert order == sorted(order, reverse=True)
-    assert order[1] > order[2] + 1
-
-
 # ---- commands ----
 
 

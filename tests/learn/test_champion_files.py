@@ -40,11 +40,14 @@ def end_of(champion: kiks.Champion, seconds: float = 2.0) -> str:
 @pytest.mark.parametrize("robot", ["khepera_ii", kiks.RobotSpec.load("khepera").with_changes(body__pulse_mm=0.081)])
 def test_a_champion_lives_in_its_world_again(robot: str | kiks.RobotSpec, tmp_path: Path) -> None:
     world = Project(furnished(), robots=(ProjectRobot(),) * 2, seed=12345)
-    champion = kiks.Champion(LINEAR, PARAMETERS, robot=robot, world=world)
+    found = {"task": "far", "fitness": 0.1, "measures": {"a b": 1e-9}, "generation": 3, "algorithm": "ga", "seed": 7}
+    timing = kiks.Timing(0.05, None, 0.01)
+    champion = kiks.Champion(LINEAR, PARAMETERS, robot=robot, world=world, timing=timing, **found)
     champion.save(tmp_path / "one.toml")
     again = kiks.Champion.load(tmp_path / "one.toml")
     assert again.world is not None
-    assert again.robot == robot
+    for name in ("controller", "parameters", "robot", "timing", "kiks", *found):
+        assert getattr(again, name) == getattr(champion, name)
     np.testing.assert_array_equal(again.world.arena.brightness, world.arena.brightness)
     assert (again.world.seed, len(again.world.robots)) == (12345, 2)
     sim, ports = again.simulation()
@@ -76,20 +79,30 @@ def test_a_champion_without_a_world_drives_in_the_default_box(tmp_path: Path) ->
 
 
 @pytest.mark.parametrize(
-    ("line", "message"),
+    ("before", "after", "message"),
     [
-        ('world = "../one_world.kiks"', "world must lead to a file in"),
-        ('world = "/etc/passwd"', "world must lead to a file in"),
-        ('world = "none.kiks"', "none.kiks' must exist"),
-        ('world = "broken.kiks"', "broken.kiks': kiks must be 1"),
-        ("world = 3", "world must be a text"),
+        ("champion = 1", "champion = 9", "champion must be 1, but it was 9. It is the version of the format"),
+        ("champion = 1", "champion = ", "must be TOML in UTF-8"),
+        ('kind = "linear"', 'kind = "linaer"', "Did you mean 'linear'"),
+        ("parameters = [", "parameters = [\n    1.0,", "must be given 18 parameters, but got 19"),
+        ("period_s = 0.1", "period_s = -1", "timing.period_s must be at least 0, but it was -1"),
+        ("seed = 0", "sed = 3", "Did you mean 'seed'"),
+        ('robot = "khepera"\n', "", "robot must be given, but it is missing"),
+        ("fitness = ", "fitness = nan #", "fitness must be a finite number, but it was nan"),
+        ("[controller]", "[measures.deep]\na = 1\n[controller]", "measures must be a table|measures.* must be"),
+        ("seed = 0", 'world = "../one_world.kiks"', "world must lead to a file in"),
+        ("seed = 0", 'world = "/etc/passwd"', "world must lead to a file in"),
+        ("seed = 0", 'world = "none.kiks"', "none.kiks' must exist"),
+        ("seed = 0", 'world = "broken.kiks"', "broken.kiks': kiks must be 1"),
+        ("seed = 0", "world = 3", "world must be a text"),
     ],
 )
-def test_wrong_worlds_are_errors(line: str, message: str, tmp_path: Path) -> None:
+def test_wrong_files_are_errors(before: str, after: str, message: str, tmp_path: Path) -> None:
     kiks.Champion(LINEAR, PARAMETERS).save(tmp_path / "one.toml")
     (tmp_path / "broken.kiks").write_text("kiks = 2\n")
     text = (tmp_path / "one.toml").read_text()
-    (tmp_path / "one.toml").write_text(line + "\n" + text)
+    assert before in text
+    (tmp_path / "one.toml").write_text(text.replace(before, after))
     with pytest.raises(kiks.KiksError, match=message):
         kiks.Champion.load(tmp_path / "one.toml")
 

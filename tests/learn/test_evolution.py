@@ -6,20 +6,16 @@ import os
 import signal
 import subprocess
 import sys
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from pyarrow import parquet
-from tests.at_length import cases
 from tests.learn.small import small
 
 import kiks
 from kiks import ParameterError
-from kiks.learn.algorithm_name import AlgorithmName
-from kiks.learn.experiment import cautious_mean
 
 pytestmark = pytest.mark.slow
 
@@ -35,17 +31,6 @@ def candidates_of(evolution: kiks.Evolution) -> bytes:
 
 
 # ---- seeds ----
-
-
-@pytest.mark.parametrize("algorithm", cases(AlgorithmName))
-def test_the_same_seed_gives_the_same_evolution(algorithm: str) -> None:
-    np.random.seed(1)
-    one = run(algorithm)
-    np.random.seed(2)
-    two = run(algorithm, executor=ThreadPoolExecutor(2))
-    other = run(algorithm, seed=4)
-    assert candidates_of(one) == candidates_of(two) != candidates_of(other)
-    assert one.champion.parameters == two.champion.parameters
 
 
 def test_worlds_differ_between_generations_but_trial_worlds_do_not() -> None:
@@ -269,21 +254,6 @@ def test_calls_in_the_wrong_order_are_errors() -> None:
 # ---- tasks ----
 
 
-def test_cautious_mean_weights_the_worse_half() -> None:
-    scores = np.array([[1.0, 1.0, 1.0, 1.0], [1.0, 1.0, 1.0, 0.0]])
-    assert cautious_mean(scores, 0.0).tolist() == [1.0, 0.75]
-    assert cautious_mean(scores, 1.0).tolist() == [1.0, 0.5]
-
-
-@pytest.mark.parametrize("name", list(kiks.tasks.TASKS))
-def test_ready_tasks_can_be_evaluated(name: str) -> None:
-    task = kiks.tasks.TASKS[name](seconds=0.5)
-    values = task.evaluate(np.zeros((2, task.parameter_count)), np.array([5, 5]), 1)
-    assert values.shape == (2, len(task.value_names))
-    assert np.isfinite(values).all()
-    assert (values[0] == values[1]).all()
-
-
 OWN = """
 import kiks
 
@@ -332,41 +302,6 @@ def test_wrong_tasks_are_errors() -> None:
     task = small(fitness=lambda values: values["contacts"])
     with pytest.raises(ParameterError, match="fitness must return a finite number for each of 1"):
         task.evaluate(np.zeros((1, task.parameter_count)), np.zeros(1, np.int64))
-
-
-# ---- champions ----
-
-
-def test_a_champion_equals_the_one_loaded_from_its_file(tmp_path: Path) -> None:
-    champion = run("cma").champion
-    champion.save(tmp_path / "champion.toml")
-    again = kiks.Champion.load(tmp_path / "champion.toml")
-    for name in ("parameters", "task", "fitness", "measures", "generation", "algorithm", "seed", "robot", "timing"):
-        assert getattr(again, name) == getattr(champion, name)
-    assert again.controller is champion.controller
-
-
-@pytest.mark.parametrize(
-    ("before", "after", "message"),
-    [
-        ("champion = 1", "champion = 9", "champion must be 1, but it was 9. It is the version of the format"),
-        ('kind = "linear"', 'kind = "linaer"', "Did you mean 'linear'"),
-        ("parameters = [", "parameters = [\n    1.0,", "must be given 18 parameters, but got 19"),
-        ("period_s = 0.06", "period_s = -1", "timing.period_s must be at least 0, but it was -1"),
-        ("seed = 3", "sed = 3", "Did you mean 'seed'"),
-        ('robot = "khepera"\n', "", "robot must be given, but it is missing"),
-        ("champion = 1", "champion = ", "must be TOML in UTF-8"),
-        ("fitness = ", "fitness = nan #", "fitness must be a finite number, but it was nan"),
-        ("[controller]", "[measures.deep]\na = 1\n[controller]", "measures must be a table|measures.* must be"),
-    ],
-)
-def test_wrong_champion_files_are_errors(before: str, after: str, message: str, tmp_path: Path) -> None:
-    run("cma").champion.save(tmp_path / "champion.toml")
-    text = (tmp_path / "champion.toml").read_text()
-    assert before in text
-    (tmp_path / "wrong.toml").write_text(text.replace(before, after))
-    with pytest.raises(ParameterError, match=message):
-        kiks.Champion.load(tmp_path / "wrong.toml")
 
 
 # ---- all together ----

@@ -1,4 +1,4 @@
-"""Exams: their starts are those of the wire, and neither standing still nor chance passes the ready-made ones."""
+"""Exams: their starts are those of the wire."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from tests.learn.small import ahead
 
 import kiks
 from kiks.errors import ParameterError
-from kiks.learn.exam import EXAM_SEED, PASS_SHARE, ExamResult
+from kiks.learn.exam import EXAM_SEED, IMPERFECT, PASS_SHARE, ExamResult, imperfect_robots
 from kiks.model.arena import Pose
 
 ROOM = kiks.Arena.box(500, 500)
@@ -59,15 +59,9 @@ def test_the_text_says_whether_the_exam_is_passed(solved, word):
     ("make", "message"),
     [
         (lambda: exam_of(worlds=0), "worlds must be"),
-        (
-            lambda: kiks.Exam([ROOM, ROOM], [kiks.measures.path_mm], lambda values: values, worlds=3),
-            "a multiple of the",
-        ),
-        (
-            lambda: exam_of(lambda values: values["path_mm"]).examine(kiks.Champion(ahead, (1, 1))),
-            "a bool for each of 4",
-        ),
-        (lambda: exam_of(lambda values: True).examine(kiks.Champion(ahead, (1, 1))), "solved must return a bool"),
+        (lambda: kiks.Exam([ROOM, ROOM], [kiks.measures.path_mm], bool, worlds=3), "a multiple of the"),
+        (lambda: exam_of(lambda values: values["path_mm"]).examine(SLOW), "a bool for each of 4"),
+        (lambda: exam_of(lambda values: True).examine(SLOW), "solved must return a bool"),
         (lambda: exam_of().examine("me"), "champion must be a kiks.Champion"),
         (lambda: kiks.tasks.avoid(exam=ROOM), "exam must be"),
     ],
@@ -77,16 +71,12 @@ def test_wrong_exams_are_errors(make, message):
         make()
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("name", [name for name in kiks.tasks.TASKS if kiks.tasks.load(name).exam])
-def test_neither_standing_still_nor_chance_passes(name):
-    task = kiks.tasks.load(name)
-    trained = [(each.brightness.tobytes(), each.cylinders) for each in task.arenas]
-    seen = [(each.brightness.tobytes(), each.cylinders) in trained for each in task.exam.arenas]
-    assert any(seen) == name.startswith("maze")
-    exam = replace(task.exam, worlds=len(task.exam.arenas))
-    rng = np.random.default_rng(1)
-    for scale in (0.0, 1.0, 3.0):
-        parameters = (scale * rng.standard_normal(task.parameter_count)).tolist()
-        champion = kiks.Champion(task.controller, parameters, timing=task.timing)
-        assert not exam.examine(champion, robots=task.robots).solved.all()
+def test_an_exam_with_imperfect_robots_is_that_with_each_of_them():
+    robots = imperfect_robots(SLOW)
+    assert len(robots) == IMPERFECT == len(set(robots))
+    assert robots == imperfect_robots(SLOW)
+    result = exam_of().examine(SLOW, kinds=robots)
+    assert result.solved.shape == (4 * IMPERFECT,)
+    for number, robot in enumerate(robots):
+        alone = exam_of().examine(replace(SLOW, robot=robot))
+        assert (result.values[4 * number : 4 * number + 4] == alone.values).all()

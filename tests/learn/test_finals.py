@@ -165,7 +165,9 @@ def test_a_rival_that_was_lucky_in_its_trials_loses() -> None:
 
 
 def test_chunks_and_batches_do_not_matter(monkeypatch: pytest.MonkeyPatch) -> None:
-    first = outcome(run())
+    first, other = outcome(run()), evolution_of(seed=4)
+    other.run(generations=6)
+    assert outcome(other) != first
     assert outcome(run(executor=ThreadPoolExecutor(2))) == first
     monkeypatch.setattr("kiks.learn.task.BATCH_WORLDS_MAX", 6)
     assert outcome(run()) == first

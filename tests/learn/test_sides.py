@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pickle
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -163,12 +162,6 @@ def test_wrong_tasks_are_errors() -> None:
 
 
 # ---- evolution ----
-
-
-def test_the_same_seed_gives_the_same_evolution() -> None:
-    one, two, other = run(), run(executor=ThreadPoolExecutor(2)), run(seed=4)
-    assert bytes_of(one) == bytes_of(two) != bytes_of(other)
-    assert one.champions[1].parameters == two.champions[1].parameters
 
 
 def test_candidates_meet_the_champions_of_the_last_generations() -> None:

@@ -6,10 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.learn.small import ahead
 
 import kiks
-from kiks.learn.exam import IMPERFECT, imperfect_robots
 from kiks.model.family import family
 
 KHEPERA = kiks.RobotSpec.load("khepera")
@@ -99,23 +97,3 @@ def test_champions_of_a_family_drive_its_first_robot(tmp_path: Any) -> None:
     evolution.run(generations=2)
     champion = kiks.Champion.load(tmp_path / "champion.toml")
     assert (champion.robot, champion.timing) == (robots[0], TIMINGS[0])
-
-
-# ---- exams ----
-
-
-def exam_of() -> kiks.Exam:
-    measures = [kiks.measures.path_mm]
-    return kiks.Exam([kiks.Arena.box(400, 400)], measures, lambda values: values["path_mm"] > 30, worlds=4, seconds=2)
-
-
-def test_an_exam_with_imperfect_robots_is_that_with_each_of_them() -> None:
-    champion = kiks.Champion(ahead, (3.0, 3.0))
-    robots = imperfect_robots(champion)
-    assert len(robots) == IMPERFECT == len(set(robots))
-    assert robots == imperfect_robots(champion)
-    result = exam_of().examine(champion, kinds=robots)
-    assert result.solved.shape == (4 * IMPERFECT,)
-    for number, robot in enumerate(robots):
-        alone = exam_of().examine(kiks.Champion(ahead, (3.0, 3.0), robot=robot))
-        assert (result.values[4 * number : 4 * number + 4] == alone.values).all()

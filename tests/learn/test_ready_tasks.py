@@ -1,0 +1,91 @@
+"""Tasks that come with KiKS: what their fitness and their exams are for."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import kiks
+from kiks.learn import ready_tasks
+from kiks.learn.experiment import cautious_mean
+from kiks.model.shipped import shipped_arena
+
+
+@pytest.mark.parametrize("name", list(kiks.tasks.TASKS))
+def test_ready_tasks_can_be_evaluated(name: str) -> None:
+    task = kiks.tasks.TASKS[name](seconds=0.5)
+    values = task.evaluate(np.zeros((2, task.parameter_count)), np.array([5, 5]), 1)
+    assert values.shape == (2, len(task.value_names))
+    assert np.isfinite(values).all()
+    assert (values[0] == values[1]).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [name for name in kiks.tasks.TASKS if kiks.tasks.load(name).exam])
+def test_neither_standing_still_nor_chance_passes(name: str) -> None:
+    task = kiks.tasks.load(name)
+    trained = [(each.brightness.tobytes(), each.cylinders) for each in task.arenas]
+    seen = [(each.brightness.tobytes(), each.cylinders) in trained for each in task.exam.arenas]
+    assert any(seen) == name.startswith("maze")
+    exam = replace(task.exam, worlds=len(task.exam.arenas))
+    rng = np.random.default_rng(1)
+    for scale in (0.0, 1.0, 3.0):
+        parameters = (scale * rng.standard_normal(task.parameter_count)).tolist()
+        champion = kiks.Champion(task.controller, parameters, timing=task.timing)
+        assert not exam.examine(champion, robots=task.robots).solved.all()
+
+
+def test_cautious_mean_weights_the_worse_half() -> None:
+    scores = np.array([[1.0, 1.0, 1.0, 1.0], [1.0, 1.0, 1.0, 0.0]])
+    assert cautious_mean(scores, 0.0).tolist() == [1.0, 0.75]
+    assert cautious_mean(scores, 1.0).tolist() == [1.0, 0.5]
+
+
+# ---- light ----
+
+
+def test_standing_still_earns_nothing() -> None:
+    task = kiks.tasks.light(seconds=1.0)
+    still = np.zeros((20, task.parameter_count))
+    assert not task.evaluate(still, np.arange(20), threads=1)[:, 0].any()
+
+
+def test_the_exam_starts_far_from_the_lamp_where_no_sensor_sees_it() -> None:
+    arena = shipped_arena("training/lit_unseen")
+    lamp = arena.lamps[0]
+    assert len(set(arena.starts)) == 20
+    sim = kiks.Simulation(arena)
+    dark_counts = kiks.RobotSpec.load("khepera").ambient.dark_counts
+    for start in arena.starts:
+        assert math.dist((start.x_mm, start.y_mm), (lamp.x_mm, lamp.y_mm)) >= 1000.0
+        for heading_rad in np.arange(8) * math.pi / 4:
+            sim.place(1, start.x_mm, start.y_mm, heading_rad)
+            assert set(sim.ambient(1)) == {dark_counts}
+
+
+def test_a_start_is_solved_by_staying_at_the_lamp_for_the_last_half_minute() -> None:
+    stays_s = np.array([0.0, 29.9, 30.0, 170.0])
+    names = [each.name for each in ready_tasks.light().exam.measures]
+    assert names == ["light_stay_s"]
+    np.testing.assert_array_equal(ready_tasks.light_solved({"light_stay_s": stays_s}), [False, False, True, True])
+
+
+# ---- maze ----
+
+
+def test_the_fitness_of_the_maze_puts_the_goal_before_thrift_and_thrift_before_nothing() -> None:
+    task = kiks.tasks.maze()
+    assert task.fitness is not None
+    near, far = {"closest_mm": 40.0}, {"closest_mm": 101.0}
+    cheap, dear = {"turned_pulses": 1e3}, {"turned_pulses": 3e5}
+
+    def arrays(*given: dict[str, float]) -> dict[str, Any]:
+        return {name: np.array([[value]]) for each in given for name, value in each.items()}
+
+    order = [task.fitness(arrays(*each))[0] for each in ((near, cheap), (near, dear), (far, cheap))]
+    assert order == sorted(order, reverse=True)
+    assert order[1] > order[2] + 1
