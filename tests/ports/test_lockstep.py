@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import socket
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from typing import Any
@@ -57,20 +57,29 @@ class Client:
 
 
 @contextmanager
-def clients(count: int = 2, **options: Any) -> Iterator[tuple[Served, list[Client], WallClock]]:
-    """Serve each robot over TCP to one client, with a wall clock that stands still."""
+def clients(
+    count: int = 2, come: Sequence[int] | None = None, **options: Any
+) -> Iterator[tuple[Served, list[Client], WallClock]]:
+    """Serve each robot over TCP, with a wall clock that stands still, to clients of some robots, by default of all.
+
+    `join` of the server lets another client come to a robot.
+    """
     wall = WallClock()
     if options.get("thinking") == "live":
         options["pace"] = Pace(wall_ns=wall)
     ways = {robot: [TcpEndpoint(0)] for robot in range(1, count + 1)}
     with ExitStack() as stack:
         run = stack.enter_context(served(ways, new_patience=partial(Patience, wall_ns=wall), **options))
-        every = []
-        for robot in range(1, count + 1):
-            every.append(Client(ways[robot][0]))
-            stack.callback(every[-1].close)
+
+        def join(robot: int, first: bytes = b"") -> Client:
+            client = Client(ways[robot][0])
+            stack.callback(client.close)
+            client.send(first)
             run.wait_held(robot)
-        yield run, every, wall
+            return client
+
+        run.join = join
+        yield run, [join(robot) for robot in (ways if come is None else come)], wall
 
 
 # ---- repeatability ----
@@ -120,29 +129,20 @@ def test_later_programs_begin_together_again() -> None:
             program.hang_up()
             run.wait_free(index + 1)
         now_ns = run.sim.now_ns
-        again = Client(run.server._endpoints[1][0])
-        run.wait_held(1)
-        again.send(b"H\n")
+        again = run.join(1, b"H\n")
         run.wait_rounds(5)
         assert again.has_no_reply()
         assert run.sim.now_ns == now_ns
-        other = Client(run.server._endpoints[2][0])
-        assert other.ask(b"H\n").startswith(b"h,")
+        assert run.join(2).ask(b"H\n").startswith(b"h,")
         assert again.lines.readline().startswith(b"h,")
-        again.close()
-        other.close()
 
 
 # ---- programs that are missing, hang, die or flood ----
 
 
 def test_world_begins_without_a_missing_program_after_a_warning(caplog: pytest.LogCaptureFixture) -> None:
-    wall = WallClock()
-    ways = {robot: [TcpEndpoint(0)] for robot in (1, 2, 3)}
-    with served(ways, new_patience=partial(Patience, wall_ns=wall)) as run:
-        one = Client(ways[1][0])
+    with clients(3, come=[1]) as (run, (one,), wall):
         one.send(b"H\n")
-        run.wait_held(1)
         run.wait_rounds(3)
         assert not warnings(caplog)
         wall.pass_s(1.5)
@@ -157,22 +157,14 @@ def test_world_begins_without_a_missing_program_after_a_warning(caplog: pytest.L
             "the world has begun without that of robot 2 or 3, which did not come within 10 s. A program that "
             "comes now acts from now on, and the run is not repeatable."
         ]
-        late = Client(ways[3][0])
-        late.send(b"H\n")
-        run.wait_held(3)
+        late = run.join(3, b"H\n")
         assert one.ask(b"B\n").startswith(b"b,")
         assert late.lines.readline() == b"h,0,0\r\n"
-        late.close()
-        one.close()
 
 
 def test_policy_wait_has_no_time_limit_for_a_missing_program(caplog: pytest.LogCaptureFixture) -> None:
-    wall = WallClock()
-    ways = {robot: [TcpEndpoint(0)] for robot in (1, 2)}
-    with served(ways, new_patience=partial(Patience, wall_ns=wall), when_silent="wait") as run:
-        one = Client(ways[1][0])
+    with clients(come=[1], when_silent="wait") as (run, (one,), wall):
         one.send(b"H\n")
-        run.wait_held(1)
         wall.pass_s(1.5)
         run.wait_rounds(3)
         assert warnings(caplog) == [
@@ -181,30 +173,20 @@ def test_policy_wait_has_no_time_limit_for_a_missing_program(caplog: pytest.LogC
         wall.pass_s(1000)
         run.wait_rounds(3)
         assert one.has_no_reply()
-        late = Client(ways[2][0])
-        assert late.ask(b"B\n").startswith(b"b,")
+        assert run.join(2).ask(b"B\n").startswith(b"b,")
         assert one.lines.readline() == b"h,0,0\r\n"
         assert len(warnings(caplog)) == 1
-        late.close()
-        one.close()
 
 
 def test_program_that_disconnects_before_the_start_does_not_count() -> None:
-    with served({robot: [TcpEndpoint(0)] for robot in (1, 2)}) as run:
-        ways = run.server._endpoints
+    with clients(come=[]) as (run, _, _):
         for _ in range(2):
-            first = Client(ways[1][0])
-            run.wait_held(1)
-            first.hang_up()
+            run.join(1).hang_up()
             run.wait_free(1)
-        one = Client(ways[1][0])
-        one.send(b"H\n")
+        one = run.join(1, b"H\n")
         run.wait_rounds(5)
         assert one.has_no_reply()
-        other = Client(ways[2][0])
-        assert other.ask(b"H\n") == one.lines.readline() == b"h,0,0\r\n"
-        one.close()
-        other.close()
+        assert run.join(2).ask(b"H\n") == one.lines.readline() == b"h,0,0\r\n"
 
 
 def test_remaining_commands_act_before_the_next_client() -> None:
@@ -213,8 +195,7 @@ def test_remaining_commands_act_before_the_next_client() -> None:
         run.wait_rounds(3)
         one.hang_up()
         run.wait_rounds(3)
-        again = Client(run.server._endpoints[1][0])
-        again.send(b"H\n")
+        again = run.join(1, b"H\n")
         run.wait_rounds(3)
         assert again.has_no_reply()
         # The wall clock stands still: the world waits for the other program.
@@ -223,14 +204,11 @@ def test_remaining_commands_act_before_the_next_client() -> None:
             two.send(b"B\n")
             run.wait_rounds(2)
         assert again.lines.readline() == b"h,3,4\r\n"
-        again.close()
 
 
 def test_fewer_programs_than_robots_may_begin() -> None:
-    with served({1: [TcpEndpoint(0)], 2: [TcpEndpoint(0)]}, programs=1) as run:
-        one = Client(run.server._endpoints[2][0])
+    with clients(come=[2], programs=1) as (_, (one,), _):
         assert one.ask(b"H\n") == b"h,0,0\r\n"
-        one.close()
 
 
 def test_silent_program_is_ignored_until_it_reconnects(caplog: pytest.LogCaptureFixture) -> None:
@@ -256,13 +234,11 @@ def test_silent_program_is_ignored_until_it_reconnects(caplog: pytest.LogCapture
         assert mute.lines.readline() == b"b,5.02,5.01\r\n"
         mute.hang_up()
         run.wait_free(2)
-        again = Client(run.server._endpoints[2][0])
-        run.wait_held(2)
+        again = run.join(2)
         one.send(b"H\n")
         run.wait_rounds(3)
         assert one.has_no_reply()
         assert again.ask(b"H\n") == b"h,0,0\r\n"
-        again.close()
 
 
 def test_policy_wait_waits_for_a_silent_program_with_a_warning(caplog: pytest.LogCaptureFixture) -> None:
