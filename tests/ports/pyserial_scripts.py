@@ -6,6 +6,7 @@ that knows `H`, `G` and `B`. A character takes a tenth of a second, and no timeo
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -187,42 +188,16 @@ SCRIPTS = [
     Script("serial.Serial(colour=1)"),
 ]
 
-CLOSED = [
-    "close()",
-    "read()",
-    "read(None)",
-    "readline()",
-    "readlines()",
-    "read_until()",
-    "read_all()",
-    "readinto(bytearray(3))",
-    "write(b'H')",
-    "write('H')",
-    "flush()",
-    "in_waiting",
-    "out_waiting",
-    "reset_input_buffer()",
-    "reset_output_buffer()",
-    "flushOutput()",
-    "cancel_read()",
-    "cancel_write()",
-    "send_break()",
-    "cts",
-    "dsr",
-    "ri",
-    "cd",
-    "set_low_latency_mode(True)",
-    "set_input_flow_control()",
-    "set_output_flow_control()",
-    "fileno()",
-    "fd",
-    "__setattr__('timeout', 1)",
-    "__setattr__('baudrate', 300)",
-    "__setattr__('rts', False)",
-    "__next__()",
-    "__iter__() is port",
-    "isatty()",
-]
+CLOSED = re.split(
+    r"\s{2,}",
+    """
+    close()  read()  read(None)  readline()  readlines()  read_until()  read_all()  readinto(bytearray(3))
+    write(b'H')  write('H')  flush()  in_waiting  out_waiting  reset_input_buffer()  reset_output_buffer()
+    flushOutput()  cancel_read()  cancel_write()  send_break()  cts  dsr  ri  cd  set_low_latency_mode(True)
+    set_input_flow_control()  set_output_flow_control()  fileno()  fd  __setattr__('timeout', 1)
+    __setattr__('baudrate', 300)  __setattr__('rts', False)  __next__()  __iter__() is port  isatty()
+    """.strip(),
+)
 """What is asked of a port that is closed, and of one that has never been open."""
 
 SCRIPTS += [
