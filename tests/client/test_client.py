@@ -257,14 +257,6 @@ def test_a_simulation_is_not_copied(sim: kiks.Simulation) -> None:
             copied(sim)
 
 
-def test_polling_the_time_lets_it_pass(sim: kiks.Simulation) -> None:
-    ref = kiks.kopen([-1, 9600, 1])
-    while kiks.ktime(-1) < 3.0:
-        pass
-    kiks.kclose(ref)
-    assert 3.0 <= sim.time_s < 3.2
-
-
 @pytest.mark.parametrize("robots", [-1, 1001, 1.5, "2"])
 def test_number_of_robots_is_checked(robots: object) -> None:
     with pytest.raises(kiks.ParameterError, match="robots must be a whole number from 0 to 1000, but it was"):

@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 from tests.served import GUARD_S, PROGRAMS, fresh
 
+from kiks.clock.gate import Gate
 from kiks.clock.patience import Patience
 from kiks.errors import KiksError, ParameterError
 from kiks.ports import programs as module
@@ -40,31 +41,22 @@ while True:
 STUBBORN = "import signal\nsignal.signal(signal.SIGINT, signal.SIG_IGN)\n" + FOR_EVER
 
 
-class Gate:
-    """Pauses the world, as a person does: `advance_to` waits and releases the lock."""
+class PausedGate(Gate):
+    """A gate that says when a thread waits there."""
 
     def __init__(self, sim: Simulation) -> None:
-        self._changed = threading.Condition(sim.lock)
-        self._advance = sim.loop.advance_to
-        self.is_paused = False
+        super().__init__(sim.lock, speed=None)
         self.is_waited_at = threading.Event()
-        sim.loop.advance_to = self._advance_to  # type: ignore[method-assign]
+        self._sim, sim.loop.gate = sim, self
 
-    def _advance_to(self, time_ns: int) -> None:
-        while self.is_paused:
-            self.is_waited_at.set()
-            self._changed.wait()
-        self._advance(time_ns)
+    def hold(self) -> None:
+        """Pause the world, and wait until the thread that moves it has noticed."""
+        self.pause(self._sim.now_ns)
+        assert self.is_waited_at.wait(GUARD_S)
 
-    def pause(self) -> None:
-        with self._changed:
-            self.is_waited_at.clear()
-            self.is_paused = True
-
-    def go_on(self) -> None:
-        with self._changed:
-            self.is_paused = False
-            self._changed.notify_all()
+    def _sleep(self, seconds: float) -> None:
+        self.is_waited_at.set()
+        super()._sleep(seconds)
 
 
 class Driven:
@@ -155,7 +147,7 @@ def test_robot_of_a_stopped_program_stands_still_and_is_free(
 ) -> None:
     monkeypatch.setattr(module, "GRACE_S", 0.1)
     sim = fresh()
-    gate = Gate(sim)
+    gate = PausedGate(sim)
     with driven(sim) as run:
         handle = run.programs.start(command(tmp_path, text))
         run.wait_for(lambda: printed(handle) == ["b'd\\r\\n'"])
@@ -163,8 +155,7 @@ def test_robot_of_a_stopped_program_stands_still_and_is_free(
         with pytest.raises(ParameterError, match=r"robot 1 must be free .* but program 1 \(program.py\) has it"):
             run.programs.start(handle.command)
         if is_paused:
-            gate.pause()
-            assert gate.is_waited_at.wait(GUARD_S)
+            gate.hold()
         with sim.lock:
             run.programs.stop(handle)
         assert handle.has_ended.wait(GUARD_S)
@@ -228,7 +219,7 @@ def test_output_and_errors_are_distinguished(tmp_path: Path) -> None:
 
 def test_patience_does_not_run_out_while_the_world_is_paused(tmp_path: Path) -> None:
     sim = fresh(2)
-    gate = Gate(sim)
+    gate = PausedGate(sim)
     wall_ns = [0]
 
     def patience(seconds: float) -> Patience:
@@ -236,8 +227,7 @@ def test_patience_does_not_run_out_while_the_world_is_paused(tmp_path: Path) -> 
 
     with driven(sim, [DRIVE, SLEEPER], patience_s=1e-3, new_patience=patience) as run:
         run.wait_for(lambda: sim.now_ns > 0)
-        gate.pause()
-        assert gate.is_waited_at.wait(GUARD_S)
+        gate.hold()
         gate.go_on()
         run.wait_for(lambda: not run.programs.drive)
         assert not run.programs.doubt

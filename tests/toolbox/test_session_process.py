@@ -78,6 +78,11 @@ class Session:
         assert heard[0] == "+", heard
         return heard[20:]
 
+    def open(self) -> None:
+        """Open port -1 in a new world."""
+        for request in ("set thinking none", "world default", "open 1 9600"):
+            self.ask(request)
+
     def hang_up(self) -> None:
         assert self.process.stdin is not None
         self.process.stdin.close()
@@ -228,9 +233,7 @@ def test_a_session_whose_engine_is_being_compiled_ends_with_its_program(tmp_path
 def test_a_paused_world_does_not_keep_a_session_alive(tmp_path: Path) -> None:
     """The request waits in the world, so no thread reads; the end of the pipe must be noticed anyway."""
     with started("--window", folder=tmp_path) as session:
-        session.ask("set thinking none")
-        session.ask("world default")
-        session.ask("open 1 9600")
+        session.open()
         os.write(session.to, b"pause 100000\n")  # at real speed, with a window: longer than any client waits
         os.write(session.to, b"ask 1 N\n")
         session.hang_up()
@@ -311,8 +314,7 @@ def test_an_existing_file_is_not_replaced(tmp_path: Path) -> None:
 
 def test_a_slow_answer_is_announced_and_can_be_cancelled(tmp_path: Path) -> None:
     with started(folder=tmp_path) as session:
-        for request in ("set thinking none", "world default", "open 1 9600"):
-            session.ask(request)
+        session.open()
         session.say("pause 1e6")
         for _ in range(3):
             assert session.hear_frame() == "~"
@@ -327,8 +329,7 @@ def test_a_slow_answer_is_announced_and_can_be_cancelled(tmp_path: Path) -> None
 
 def test_a_pause_is_held_until_the_program_confirms_that_it_waits(tmp_path: Path) -> None:
     with started(folder=tmp_path) as session:
-        for request in ("set thinking none", "world default", "open 1 9600"):
-            session.ask(request)
+        session.open()
         session.say("pause 1e6")
         assert session.hear_frame() == "~"
         status = Path(f"/proc/{session.number}/stat")
