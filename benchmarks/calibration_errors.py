@@ -13,14 +13,13 @@ import math
 import os
 import random
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 import kiks
 from kiks.fit.calibrate import calibrate
-from kiks.fit.placements import Instruction, SimPlacements
+from kiks.fit.placements import SimPlacements
 from kiks.fit.robot_fit import predict
 from kiks.fit.samples import Samples
 
@@ -64,13 +63,11 @@ class ByHand(SimPlacements):
         super().__init__(sim)
         self.rng = random.Random(1000 + seed)
 
-    def place(self, instruction: Instruction) -> float | None:
+    def place(self, instruction: str, gap_mm: float | None = None) -> float | None:
         """Put the robot about there and return the gap that it should have [mm]."""
         self.skew_rad = math.radians(self.rng.uniform(-8, 8))
-        if instruction.gap_mm is None:
-            return super().place(instruction)
-        super().place(replace(instruction, gap_mm=instruction.gap_mm + self.rng.uniform(-0.5, 0.5)))
-        return instruction.gap_mm
+        super().place(instruction, None if gap_mm is None else gap_mm + self.rng.uniform(-0.5, 0.5))
+        return gap_mm
 
 
 def errors(kind: str, seed: int, *, is_by_hand: bool) -> NDArray[np.float64]:

@@ -47,7 +47,7 @@ def test_odometry_follows_a_robot_that_touches_nothing() -> None:
 
 
 def test_the_shares_of_time_are_those_of_the_line(recording: Recording) -> None:
-    shares = time_shares(recording.log, 1)
+    (shares,) = time_shares(recording.log, [1])
     assert shares.window_ns == recording.log.end_ns - recording.log.begin_ns
     characters = sum(len(data) for data in recording.table("wire")["data"].tolist())
     assert shares.link_ns == pytest.approx(characters * 11e9 / 9600, rel=0.01)

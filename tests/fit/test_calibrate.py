@@ -19,7 +19,7 @@ from kiks.cli.calibrate import parse_gaps
 from kiks.cli.outputs import Command
 from kiks.fit.calibrate import Calibration, calibrate, checked_gaps, default_gaps_mm, one_turn_deg
 from kiks.fit.measurements import CalibrationError, processing_ms, rest
-from kiks.fit.placements import Instruction, SimPlacements
+from kiks.fit.placements import SimPlacements
 from kiks.fit.robot_fit import DIRECTION, predict
 from kiks.fit.samples import Samples
 from kiks.model.robot import robot_toml, save_robot
@@ -35,7 +35,7 @@ KHEPERA_II = kiks.RobotSpec.load("khepera_ii")
 def idle(spec: kiks.RobotSpec) -> tuple[list[float], float]:
     """Return the mean reading of each sensor in the open [counts], and the share of zeros in all readings."""
     sim = kiks.Simulation(robot=spec, seed=5)
-    SimPlacements(sim).place(Instruction(""))
+    SimPlacements(sim).place("")
     counts = rest(kiks.Khepera(sim.port(1)), 300)
     return counts.mean(axis=0).tolist(), float((counts == 0).mean())
 
@@ -140,9 +140,8 @@ class Misplaced(SimPlacements):
         self.errors_mm = errors_mm
         self.findings: list[str] = []
 
-    def place(self, instruction: Instruction) -> float | None:
-        gap_mm = instruction.gap_mm
-        super().place(instruction if gap_mm is None else Instruction("", gap_mm + self.errors_mm.get(gap_mm, 0.0)))
+    def place(self, instruction: str, gap_mm: float | None = None) -> float | None:
+        super().place(instruction, None if gap_mm is None else gap_mm + self.errors_mm.get(gap_mm, 0.0))
         return gap_mm
 
     def wants_repeat(self, finding: str, *, is_good: bool) -> bool:
@@ -174,8 +173,8 @@ def test_wall_out_of_sight_raises_after_all_attempts() -> None:
 
 def test_error_for_a_run_up_without_a_wall() -> None:
     class Backwards(Misplaced):
-        def place(self, instruction: Instruction) -> float | None:
-            gap_mm = super().place(instruction)
+        def place(self, instruction: str, gap_mm: float | None = None) -> float | None:
+            super().place(instruction, gap_mm)
             if gap_mm == 200:
                 self.sim.place(1, 250.0, 500.0, -math.pi / 2)
             return gap_mm
@@ -188,8 +187,8 @@ def test_error_for_a_run_up_without_a_wall() -> None:
 
 def test_error_for_an_obstacle_in_the_open() -> None:
     class Cornered(Misplaced):
-        def place(self, instruction: Instruction) -> float | None:
-            return super().place(Instruction("", instruction.gap_mm or 5.0))
+        def place(self, instruction: str, gap_mm: float | None = None) -> float | None:
+            return super().place(instruction, gap_mm or 5.0)
 
     assert "the sensors must read little in the open, but sensor" in failure(Cornered(kiks.Simulation(), {}))
 
@@ -273,7 +272,7 @@ def test_gaps_are_checked() -> None:
 def test_error_for_an_arena_without_room() -> None:
     placements = SimPlacements(kiks.Simulation(kiks.Arena.box(300, 300)))
     with pytest.raises(kiks.ParameterError, match="the arena must have room for a robot 500 mm below"):
-        placements.place(Instruction("", 500.0))
+        placements.place("", 500.0)
 
 
 @pytest.mark.parametrize("name", ["khepera", "khepera_ii"])

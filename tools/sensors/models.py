@@ -13,7 +13,7 @@ import numpy as np
 from tools.sensors.train_networks import PLACES, fan_of
 
 from kiks.engine.sensing import thesis_networks
-from kiks.fit.samples import MAXIMUM_COUNTS, Fan, Floats, Samples, nearnesses, ray_lengths_mm
+from kiks.fit.samples import MAXIMUM_COUNTS, Fan, Floats, Samples, meet, nearnesses
 from kiks.model.robot import SENSOR_COUNT
 from kiks.model.thesis_networks import BODY_RADIUS_MM, NetworkResponse
 
@@ -88,7 +88,7 @@ def enki(samples: Samples) -> Floats:
     )
     direction = np.radians([90.0, 45.0, 0.0, 0.0, -45.0, -90.0, 180.0, 180.0])
     fan = Fan(place_mm, np.add.outer(direction, np.radians([15.0, 0.0, -15.0])), 100.0)
-    length_cm = ray_lengths_mm(samples, fan) / 10.0
+    length_cm = meet(samples, fan)[0] / 10.0
 
     def answer(x: Floats) -> Floats:
         return np.where(x < 10.0, 1200.0 * (7.0 - 0.81) / (x * x + 1.8 * x + 7.0), 0.0)

@@ -14,7 +14,7 @@ from kiks.errors import ParameterError
 
 if TYPE_CHECKING:
     from kiks.client.khepera import Khepera
-    from kiks.fit.placements import Instruction, Placements
+    from kiks.fit.placements import Placements
 
 REPEAT_MAX_MM = 2000.0
 
@@ -71,19 +71,16 @@ class TerminalPlacements:
         self.asks = asks
         self.count = 0
 
-    def place(self, instruction: Instruction) -> float | None:
+    def place(self, instruction: str, gap_mm: float | None = None) -> float | None:
         """Print an instruction and wait; return the gap that the person enters, by default the marked one [mm]."""
-        from dataclasses import replace
-
         self.count += 1
-        typer.echo(f"\n{self.count}. {instruction.text}")
-        gap_mm = instruction.gap_mm
+        typer.echo(f"\n{self.count}. {instruction}")
         if self.asks and gap_mm is not None:
             gap_mm = _ask_gap("   Gap between wall and rim in mm; Enter when it stands there", gap_mm)
         elif self.asks:
             typer.prompt("   Enter when it stands there", default="", show_default=False)
         if self.hand is not None:
-            self.hand.place(replace(instruction, gap_mm=gap_mm))
+            self.hand.place(instruction, gap_mm)
         typer.echo("   Measuring; hands off ...")
         return gap_mm
 

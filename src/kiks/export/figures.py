@@ -234,7 +234,7 @@ def _draw_speeds(axes: Any, table: Table) -> None:
 
 def _draw_time(axes: Any, recording: Recording, robot: int) -> None:
     """Draw where the time went: a bar of the shares of line, robot, thinking and waiting."""
-    shares = time_shares(recording.log, robot)
+    (shares,) = time_shares(recording.log, [robot])
     begin_s = 0.0
     names = ("on the line", "robot", "thinking", "waiting")
     for name, share_ns, colour in zip(names, shares, ("C0", "C2", "C1", "lightgray"), strict=True):

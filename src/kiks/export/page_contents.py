@@ -14,7 +14,7 @@ from pygments.lexers import PythonLexer, TextLexer
 
 from kiks.errors import counted
 from kiks.export.run_frames import RunFrames
-from kiks.recording.analysis import all_time_shares
+from kiks.recording.analysis import time_shares
 from kiks.recording.recording import Recording
 from kiks.recording.tables import Table
 from kiks.sim.wire_log import TimeShares
@@ -154,7 +154,7 @@ def _numbers(recording: Recording, frames: RunFrames) -> list[RobotNumbers]:
     wire = recording.table("wire")
     replies = Counter(wire["robot"][~wire["is_sent"]].tolist())
     rows = []
-    for number, shares in zip(robots, all_time_shares(recording.log, robots), strict=True):
+    for number, shares in zip(robots, time_shares(recording.log, robots), strict=True):
         was_there = number <= frames.first.robot_count
         driven_mm = frames.last.travelled_mm(number) - (frames.first.travelled_mm(number) if was_there else 0)
         rows.append(

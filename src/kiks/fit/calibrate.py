@@ -35,7 +35,7 @@ from kiks.fit.measurements import (
     record,
     rest,
 )
-from kiks.fit.placements import Instruction, Placements
+from kiks.fit.placements import Placements
 from kiks.fit.robot_fit import DIRECTION, GAIN, Errors, Fit, check_base, fit_robot, predict
 from kiks.fit.samples import Samples
 from kiks.model.robot import SENSOR_COUNT, RobotSpec
@@ -305,17 +305,16 @@ class _Session:
         self.rests: list[Array] = []
 
     def measure(self, gaps: list[float], run_up_mm: float) -> Calibration:
-        jitter_counts = self._at(
-            Instruction("Put the robot in the open: nothing within 300 mm, no lamp, no sun."), self._measure_in_the_open
-        )
+        text = "Put the robot in the open: nothing within 300 mm, no lamp, no sun."
+        jitter_counts = self._at(text, None, self._measure_in_the_open)
         spins: list[tuple[float, Track]] = []
         for index, gap_mm in enumerate(gaps):
             text = f"Put the robot before the wall, facing it, its rim at the {gap_mm:g} mm mark."
-            spins += self._at(Instruction(text, gap_mm), partial(self._measure_spins, is_nearest=index == 0))
+            spins += self._at(text, gap_mm, partial(self._measure_spins, is_nearest=index == 0))
         self.say("Fitting ...")
         self.spec = self._rough_fit(spins)
         text = f"Put the robot before the wall, facing it squarely, its rim at the {run_up_mm:g} mm mark."
-        approach = self._at(Instruction(text, run_up_mm), partial(self._measure_approach, near_mm=gaps[1]))
+        approach = self._at(text, run_up_mm, partial(self._measure_approach, near_mm=gaps[1]))
         self.say("Fitting ...")
         return self._result(spins, approach, jitter_counts)
 
@@ -351,10 +350,10 @@ class _Session:
         base_deviation_mm = wheel_base_mm * math.hypot(turn_error_deg / 360.0, pulse_share)
         return Calibration(_rounded(spec), fit, base_deviation_mm, pulse_mm * pulse_share, jitter_counts)
 
-    def _at(self, instruction: Instruction, measure: Callable[[float], tuple[Result, str]]) -> Result:
+    def _at(self, instruction: str, marked_mm: float | None, measure: Callable[[float], tuple[Result, str]]) -> Result:
         """Have the robot placed and measure, again if a repetition is wanted; return the measurement."""
         for attempt in range(1, ATTEMPTS + 1):
-            gap_mm = self.placements.place(instruction) or 0.0
+            gap_mm = self.placements.place(instruction, marked_mm) or 0.0
             rest_count = len(self.rests)
             try:
                 result, finding = measure(gap_mm)

@@ -3,31 +3,22 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Protocol
 
 from kiks.errors import ParameterError, shown
 from kiks.sim.simulation import Simulation
 
 
-@dataclass(frozen=True)
-class Instruction:
-    """An instruction before a measurement.
-
-    Attributes:
-        text: Where the robot must stand, in words for a person.
-        gap_mm: Marked distance from a straight white wall, which it faces, to its rim [mm]; None in the open.
-    """
-
-    text: str
-    gap_mm: float | None = None
-
-
 class Placements(Protocol):
     """Carries out instructions."""
 
-    def place(self, instruction: Instruction) -> float | None:
-        """Put the robot there; return its real gap [mm]."""
+    def place(self, instruction: str, gap_mm: float | None = None) -> float | None:
+        """Put the robot there; return its real gap [mm].
+
+        Args:
+            instruction: Where the robot must stand, in words for a person.
+            gap_mm: Marked distance from a straight white wall, which it faces, to its rim [mm]; None in the open.
+        """
 
     def wants_repeat(self, finding: str, *, is_good: bool) -> bool:
         """Show a result; return True to repeat the placement and its measurement."""
@@ -47,9 +38,9 @@ class SimPlacements:
         self.robot = robot
         self.skew_rad = skew_rad
 
-    def place(self, instruction: Instruction) -> float | None:
+    def place(self, instruction: str, gap_mm: float | None = None) -> float | None:
         """Put the robot there."""
-        arena, radius_mm, gap_mm = self.sim.arena, self.sim.spec.body.radius_mm, instruction.gap_mm
+        arena, radius_mm = self.sim.arena, self.sim.spec.body.radius_mm
         x_mm, y_mm = arena.width_mm / 2, arena.height_mm / 2
         if gap_mm is not None:
             # Halve the way to the wall until the rim touches it.

@@ -138,22 +138,13 @@ def meet(samples: Samples, fan: Fan, body_radius_mm: float = BODY_RADIUS_MM) -> 
     return np.where(is_met, length, fan.range_mm), np.where(is_met, cosine, 0.0)
 
 
-def ray_lengths_mm(samples: Samples, fan: Fan) -> Floats:
-    """Return how far each ray goes before it meets the object, at most the fan's range [mm].
-
-    Returns:
-        Shape [gaps, angles, 8, rays].
-    """
-    return meet(samples, fan)[0]
-
-
 def nearnesses(samples: Samples, fan: Fan) -> Floats:
     """Return the thesis's inverted lengths as shares of the range: 1 at the sensor, 0 for nothing in range.
 
     Returns:
         Shape [gaps, angles, 8, rays].
     """
-    return 1.0 - ray_lengths_mm(samples, fan) / fan.range_mm
+    return 1.0 - meet(samples, fan)[0] / fan.range_mm
 
 
 def is_active(counts: NDArray[Any]) -> NDArray[np.bool_]:

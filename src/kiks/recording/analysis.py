@@ -43,12 +43,7 @@ def odometry(
     return np.column_stack([x_mm, y_mm, headings])
 
 
-def time_shares(log: RecordedLog, robot: int) -> TimeShares:
-    """Return where the time of a recording went on the line of a robot, by its number."""
-    return all_time_shares(log, [robot])[0]
-
-
-def all_time_shares(log: RecordedLog, robots: Sequence[int]) -> list[TimeShares]:
+def time_shares(log: RecordedLog, robots: Sequence[int]) -> list[TimeShares]:
     """Return where the time of a recording went on the lines of robots, by their numbers."""
     lines = {robot - 1: _Line() for robot in robots}
     for entry in log.entries():

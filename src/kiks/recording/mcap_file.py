@@ -75,7 +75,7 @@ TOPICS = ("/kiks/log", "/kiks/motion")
 """The channels of a recording; their numbers are 1 and 2."""
 
 
-class McapFile:
+class McapFile(FileBeside):
     """A file that grows chunk by chunk, while no other recording does there.
 
     It begins beside an earlier file, and replaces it when something has happened.
@@ -89,7 +89,7 @@ class McapFile:
 
     def __init__(self, path: str | Path) -> None:
         ending_of(path, "a recording's file", (ENDING,))
-        self._path = path
+        self._given = path
         with explained(path, "a recording"):
             target = target_of(path)
             self._folder = target.parent
@@ -99,17 +99,11 @@ class McapFile:
                     f"{str(path)!r} has {room.free_bytes / 2**20:.3g} MiB. Free some space, or choose another "
                     "place."
                 )
-            self._beside = FileBeside(target, is_only=True)
-        self._do = self._beside.attempt
-        self._writer = Writer(self._beside.file, chunk_size=RECORD_BYTES_MAX, compression=CompressionType.LZ4)
-        self._do(lambda: self._writer.start(profile=PROFILE, library=f"kiks {__version__}"))
+            super().__init__(target, is_only=True)
+        self._writer = Writer(self.file, chunk_size=RECORD_BYTES_MAX, compression=CompressionType.LZ4)
+        self.attempt(lambda: self._writer.start(profile=PROFILE, library=f"kiks {__version__}"))
         for topic in TOPICS:
             self._writer.register_channel(topic, "kiks", schema_id=0)
-
-    @property
-    def has_failed(self) -> bool:
-        """Whether something could not be written; then nothing more is."""
-        return self._beside.has_failed
 
     @property
     def is_disk_full(self) -> bool:
@@ -119,23 +113,18 @@ class McapFile:
         except OSError:  # the folder has another name now
             return False
 
-    @property
-    def is_in_place(self) -> bool:
-        """Whether it has the place of its path; else an earlier file may stand there."""
-        return self._beside.is_in_place
-
-    def take_place(self) -> None:
+    def take_place(self, *, keeps_rights: bool = True) -> None:
         """Take the place of its path, unless it has it."""
         if not self.is_in_place:
-            self._do(self._beside.take_place)
+            self.attempt(super().take_place)
 
     def attach(self, name: str, data: bytes, media_type: str, time_ns: int = 0) -> None:
         """Write a file within the file."""
-        self._do(lambda: self._writer.add_attachment(0, time_ns, name, media_type, data))
+        self.attempt(lambda: self._writer.add_attachment(0, time_ns, name, media_type, data))
 
     def describe(self, name: str, values: Mapping[str, str]) -> None:
         """Write texts by name."""
-        self._do(lambda: self._writer.add_metadata(name, dict(values)))
+        self.attempt(lambda: self._writer.add_metadata(name, dict(values)))
 
     def write(self, begin_ns: int, log: bytes, motion: bytes, *, keeps_earlier: bool = False) -> None:
         """Write a chunk, and take the place.
@@ -152,16 +141,16 @@ class McapFile:
                 self._writer.add_message(channel, begin_ns, data, begin_ns)
             self._writer.flush()  # type: ignore[no-untyped-call]
 
-        self._do(add_all)
-        if not (keeps_earlier and (self._beside.has_earlier or self.is_disk_full)):
+        self.attempt(add_all)
+        if not (keeps_earlier and (self.has_earlier or self.is_disk_full)):
             self.take_place()
 
     def close(self) -> None:
         """Write the index, and close the file; it goes if it never took its place."""
-        self._do(self._writer.finish)
-        self._do(self._beside.file.flush)
-        with explained(self._path, "a recording"):
-            self._beside.close()
+        self.attempt(self._writer.finish)
+        self.attempt(self.file.flush)
+        with explained(self._given, "a recording"):
+            super().close()
 
 
 @dataclass(frozen=True)
