@@ -223,11 +223,8 @@ def _repeatability(thinking: str, speed: float, programs: int) -> str:
             "depends on this computer; --thinking none makes it repeatable."
         )
     if programs == 1:
-        return (
-            "The world waits for each command. Repeatable to the bit for a program that waits for each reply; its "
-            "pauses take no time."
-        )
-    return (
-        f"The world begins when {programs} programs are there, and waits for the commands of each. Repeatable to the "
-        "bit for programs that wait for each reply; their pauses take no time."
-    )
+        begins, which = "waits for each command", "a program that waits for each reply; its"
+    else:
+        begins = f"begins when {programs} programs are there, and waits for the commands of each"
+        which = "programs that wait for each reply; their"
+    return f"The world {begins}. Repeatable to the bit for {which} pauses take no time."

@@ -44,7 +44,7 @@ class Lockstep:
     def __init__(self, sim: Simulation, thinking_ns: int, scheduler: ProgramScheduler) -> None:
         self._sim = sim
         self._thinking_ns = thinking_ns
-        self._clients: dict[int, Client] = {}
+        self._clients: dict[int, PortClient] = {}
         self._scheduler = scheduler
 
     def start(self) -> None:
@@ -52,7 +52,7 @@ class Lockstep:
 
     def enter(self, link: Link) -> None:
         """Add a client."""
-        client = self._clients[link.robot] = Client(link, self._sim, self._scheduler, self._thinking_ns)
+        client = self._clients[link.robot] = PortClient(link, self._sim, self._scheduler, self._thinking_ns)
         self._scheduler.join(client)
 
     def leave(self, link: Link) -> None:
@@ -80,7 +80,7 @@ class Lockstep:
         return self._clients[link.robot].is_full
 
 
-class Client(Participant):
+class PortClient(Participant):
     """The client of a link, as the scheduler sees it."""
 
     def __init__(self, link: Link, sim: Simulation, scheduler: ProgramScheduler, thinking_ns: int) -> None:

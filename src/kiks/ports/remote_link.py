@@ -191,11 +191,7 @@ class RemoteLine:
         return True
 
     def read(self, size: int | None, terminator: bytes | None, timeout_ns: int | None, poll_ns: int) -> bytes:
-        """Wait for `size` characters or a terminator; see `Line.read`.
-
-        Raises:
-            LinkError: If it could wait for ever.
-        """
+        """Wait for `size` characters or a terminator; see `Line.read`."""
         data: bytes
         data, self._taken_ns = self._ask(Kind.READ, size, terminator, timeout_ns, poll_ns)
         return data
@@ -243,11 +239,7 @@ class RemoteLine:
         self._connection.tell(Kind.SET_BAUD, self._robot, baud)
 
     def claim(self, holder: str) -> None:
-        """Take the line exclusively.
-
-        Raises:
-            LinkError: If another program holds it.
-        """
+        """Take the line exclusively."""
         self._ask(Kind.CLAIM, holder)
         self._is_claimed = True
 

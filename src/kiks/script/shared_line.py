@@ -72,11 +72,7 @@ class SharedLine:
             self._waiting.remove(task)
 
     def read(self, size: int | None, terminator: bytes | None, timeout_ns: int | None, poll_ns: int) -> bytes:
-        """Wait for `size` characters or a terminator; see `Line.read`.
-
-        Raises:
-            LinkError: If it could wait for ever.
-        """
+        """Wait for `size` characters or a terminator; see `Line.read`."""
         line, scheduler = self._line, self._scheduler
         if scheduler.is_alone:
             return line.read(size, terminator, timeout_ns, poll_ns)
@@ -119,11 +115,7 @@ class SharedLine:
             self._scheduler.wake(task, self)
 
     def claim(self, holder: str) -> None:
-        """Reserve the line for this program, which may open it several times, as on a real computer.
-
-        Raises:
-            LinkError: If another program holds it.
-        """
+        """Reserve the line for this program, which may open it several times, as on a real computer."""
         if not self._claim_count:
             self._line.claim(holder)
         self._claim_count += 1

@@ -58,11 +58,7 @@ class LocalLine:
         return True
 
     def read(self, size: int | None, terminator: bytes | None, timeout_ns: int | None, poll_ns: int) -> bytes:
-        """Wait for `size` characters or a terminator; see `Line.read`.
-
-        Raises:
-            LinkError: If the wait could have no end.
-        """
+        """Wait for `size` characters or a terminator; see `Line.read`."""
         world, advance_to, wire = self._world, self._loop.advance_to, self._wire
         begin_ns = world.now_ns
         deadline_ns = NEVER_NS if timeout_ns is None else begin_ns + timeout_ns
@@ -122,11 +118,7 @@ class LocalLine:
         self._wire.set_baud(baud)
 
     def claim(self, holder: str) -> None:
-        """Reserve the line for one program.
-
-        Raises:
-            LinkError: If another program holds it.
-        """
+        """Reserve the line for one program."""
         claim(self._wire, self._robot, holder)
         self._is_claimed = True
 
