@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import threading
 from pathlib import Path
+from typing import Any
 
 import pytest
+from tests.guard import GUARD_S, wait_until
 
 from kiks.desk.server.desk import Desk
 from kiks.model.project import Project
@@ -50,12 +53,19 @@ def test_a_page_without_that_right_opens_the_world_alone(tmp_path: Path) -> None
     desk.close()
 
 
-def test_the_world_pauses_when_the_supervisor_has_returned(tmp_path: Path) -> None:
+@pytest.mark.parametrize("how", [{"supervisor": "ends.py"}, {"seconds": 0.5}])
+def test_the_world_pauses_when_the_project_has_ended_and_may_go_on(how: dict[str, Any], tmp_path: Path) -> None:
     (tmp_path / "ends.py").write_text("def supervise(sim):\n    yield 0.5\n")
     desk = desk_in(tmp_path)
-    asyncio.run(desk.replace(Project(supervisor="ends.py")))
-    desk.sim.loop.gate = None
-    desk.sim.run(1.0)
-    assert desk.is_paused
+    asyncio.run(desk.replace(Project(**how)))
+    running = threading.Thread(target=lambda: desk.sim.run(1.0))
+    running.start()
+    wait_until(lambda: desk.is_paused)
+    assert desk.sim.time_s == 0.5
+    assert "of simulated time" in desk.news.since(0)[1][-1]
+    asyncio.run(desk.set_speed(None))
+    asyncio.run(desk.go_on())
+    running.join(GUARD_S)
+    assert desk.sim.time_s == 1.0
     desk.clear_away()
     desk.close()

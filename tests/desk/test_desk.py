@@ -38,7 +38,7 @@ def test_time_passes_at_the_chosen_speed(visitor: Visitor) -> None:
     visitor.until(lambda: visitor.desk.gate.speed == 10)
     visitor.choose("speed", "full speed")
     visitor.until(lambda: visitor.desk.gate.speed is None)
-    visitor.until(lambda: visitor.desk.meter.momentary > 10)
+    visitor.until(lambda: visitor.desk.shown.meter.momentary > 10)
     visitor.picture("as_fast_as_it_can")
     visitor.choose("speed", "0.1 x")
     visitor.until(lambda: visitor.desk.gate.speed == 0.1)

@@ -138,7 +138,7 @@ def test_drags_move_things_in_the_engine(shown: Shown) -> None:
         browser.wait_for(lambda frame: pose(frame)[2] == 1.0)
         browser.say("drop")
         browser.wait_for(lambda frame: not struct.unpack_from("<I", frame, 32 + 28)[0] & 8)
-        assert shown.desk.hands.are_empty
+        assert shown.desk.shown.hands.are_empty
 
 
 def test_two_browsers_may_drag_at_once(shown: Shown) -> None:
@@ -151,7 +151,7 @@ def test_two_browsers_may_drag_at_once(shown: Shown) -> None:
         two.say("move", x_mm=500, y_mm=300)
         one.say("move", x_mm=100, y_mm=300)
         one.wait_for(lambda frame: pose(frame, 1)[1] == 300 and pose(frame)[1] == 300)
-    while not shown.desk.hands.are_empty:
+    while not shown.desk.shown.hands.are_empty:
         pass
 
 
@@ -160,8 +160,8 @@ def test_of_the_moves_of_a_page_only_the_newest_counts(monkeypatch: pytest.Monke
     desk = Desk(sim, speed=None)
     gateway, viewer = Gateway(desk, 1), Viewer("viewer 1")
     moves: list[float] = []
-    move = desk.hands.move
-    monkeypatch.setattr(desk.hands, "move", lambda owner, x, y: (moves.append(x), move(owner, x, y)))
+    move = desk.shown.hands.move
+    monkeypatch.setattr(desk.shown.hands, "move", lambda owner, x, y: (moves.append(x), move(owner, x, y)))
 
     async def drag() -> None:
         await gateway._obey(viewer, '{"kind": "grab", "what": "robot", "index": 0}')

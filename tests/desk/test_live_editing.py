@@ -176,7 +176,7 @@ async def test_resets_keep_the_drawing(desk, editing):
     desk.sim.place(1, 400, 300, 0.0)
     await editing.draw(lambda arena: brush.rectangle(arena, 50, 50, 150, 150))
     desk.sim.place(1, 250, 200, 0.0)
-    await desk.reset()
+    await desk.do(desk.reset)
     assert desk.sim.pose(1)[:2] == (400, 300)
     await desk.start_over()
     assert desk.sim.pose(1)[:2] == (400, 300)

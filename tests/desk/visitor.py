@@ -164,7 +164,7 @@ class Visitor:
     def let_go(self) -> None:
         """Let go, and wait until the page shows where everything is."""
         self.page.mouse.up()
-        self.until(lambda: self.desk.hands.are_empty)
+        self.until(lambda: self.desk.shown.hands.are_empty)
         for robot in range(1, self.sim.robot_count + 1):
             self.until(lambda robot=robot: self.seen(robot) == pytest.approx(self.sim.pose(robot), abs=0.1))
 

@@ -112,9 +112,9 @@ def serve(
             new_patience=Patience if gate is None else gate.patience,
         )
         if shown is not None:
-            from kiks.desk.server.outside_programs import PlainPrograms
+            from kiks.desk.server.desk import OutsidePrograms
 
-            shown.desk.outside = PlainPrograms(server.drop_clients)
+            shown.desk.outside = OutsidePrograms(server.drop_clients)
         say(_repeatability(thinking, speed, sim.robot_count if programs is None else programs))
         with recorded(sim, record=record):
             server.serve()

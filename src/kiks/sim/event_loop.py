@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 from heapq import heappop, heappush
-from typing import NoReturn, Protocol
+from typing import Protocol
 
 from kiks.clock.gate import Gate
 from kiks.firmware.khepera import Firmware
@@ -94,8 +94,8 @@ class EventLoop:
         self._record_ns = NEVER_NS if self._recorder is None else -1
         self._near_ns = -1
 
-    def end_at(self, time_ns: int, end: Callable[[], NoReturn]) -> None:
-        """Let time end at an instant [ns]: when it would pass beyond, it stops there and `end` is called to raise."""
+    def end_at(self, time_ns: int, end: Callable[[], object]) -> None:
+        """Let time end at an instant [ns]: when it would pass beyond, `end` is called there, to raise or to move it."""
         self.end_ns, self._end = time_ns, end
         self._near_ns = -1
 

@@ -105,7 +105,7 @@ class Session:
             project: The project of the world.
             folder: The folder of its files.
         """
-        from kiks.desk.server.desk import Desk
+        from kiks.desk.server.desk import Desk, OutsidePrograms
 
         with self.lock:
             if self.desk is None:
@@ -123,7 +123,7 @@ class Session:
                     project_of=lambda arena: self.settings.project_of(arena),
                     log_limit=self.settings.log_lines,
                 )
-                self.desk.outside = self
+                self.desk.outside = OutsidePrograms(self.halt, self.interpreters, self.evaluate)
                 if self._has_window:
                     self._show()
             else:
@@ -254,7 +254,7 @@ class Session:
     def mark(self) -> None:
         """Take a checkpoint."""
         if self.desk is not None:
-            asyncio.run(self.desk.mark_present())
+            asyncio.run(self.desk.present.do(self.desk.mark))
 
     def reset(self) -> None:
         """Restore the checkpoint.
@@ -262,7 +262,8 @@ class Session:
         Raises:
             LinkError: If there is no world.
         """
-        asyncio.run(self._present_desk().reset_present())
+        desk = self._present_desk()
+        asyncio.run(desk.present.do(desk.reset))
 
     def present_project(self) -> Project:
         """Return the project with the present poses.

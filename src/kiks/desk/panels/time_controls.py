@@ -68,14 +68,24 @@ class TimePanel(Panel):
         self._speed.tooltip("Simulated time per real time; it never changes what robots do")
         ClockView(feed, "clock_view.css")
         self._add(
-            "bookmark_add", "mark", "Checkpoint: remember where everything stands", desk.mark, "Checkpoint taken."
+            "bookmark_add",
+            "mark",
+            "Checkpoint: remember where everything stands",
+            lambda: desk.change(desk.mark),
+            "Checkpoint taken.",
         )
         reset_tip = "Reset: move everything back to where it stood at the checkpoint, or at the start; time continues"
-        self._add("settings_backup_restore", "reset", reset_tip, desk.reset, "Everything is back where it stood.")
+        self._add(
+            "settings_backup_restore",
+            "reset",
+            reset_tip,
+            lambda: desk.change(desk.reset),
+            "Everything is back where it stood.",
+        )
         listen(acts, is_for_buttons=False)
         self.refresh()
 
-    def _add(self, icon: str, name: str, tip: str, act: Callable[[], Awaitable[None]], done: str) -> None:
+    def _add(self, icon: str, name: str, tip: str, act: Callable[[], Awaitable[object]], done: str) -> None:
         icon_button(icon, tip.partition(":")[0], name, self.acting(act, done), tip=tip, look=BAR)
 
     def _shown_speed(self) -> float:

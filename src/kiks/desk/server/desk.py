@@ -7,26 +7,26 @@ import logging
 import threading
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
 
 from kiks.clock.gate import Gate
-from kiks.desk.server.desk_world import DeskWorld, Speedometer
+from kiks.desk.server.desk_world import DeskWorld
 from kiks.desk.server.looking_back import LookingBack
-from kiks.desk.server.outside_programs import OutsidePrograms, PlainPrograms
 from kiks.desk.server.player import Player
 from kiks.desk.server.scripts import EXAMPLES
 from kiks.errors import KiksError, LinkError, ParameterError
 from kiks.model.arena import Arena
+from kiks.model.checks import CLOCK_END_NS
 from kiks.model.project import Project
 from kiks.ports.program_process import Command, Permission, commands_of, supervisor_of
 from kiks.ports.programs import Programs
-from kiks.sim.drag import Drags
 from kiks.sim.from_project import described, project_of, simulation_of
 from kiks.sim.ring_buffer import RingBuffer
 from kiks.sim.simulation import Simulation
 from kiks.sim.supervision import Supervision
+from kiks.units import ns_from_s
 
 NEWS_LIMIT = 200
 """Number of messages to people that are kept."""
@@ -37,6 +37,21 @@ LOG_LIMIT = 1000
 Done = TypeVar("Done")
 
 NewPrograms = Callable[[Simulation, Sequence[Command | None], Gate], Programs]
+
+
+@dataclass(frozen=True)
+class OutsidePrograms:
+    """Programs in a world that its desk has not started. The functions are called in the server's thread.
+
+    Attributes:
+        halt: Halts the programs: each ends its wait, or fails when it uses its robot again.
+        interpreters: Returns the names of those that evaluate commands, by their numbers.
+        evaluate: Lets an interpreter evaluate a command.
+    """
+
+    halt: Callable[[], None] = lambda: None
+    interpreters: Callable[[], dict[int, str]] = dict
+    evaluate: Callable[[int, str], None] = lambda number, command: None
 
 
 class Desk:
@@ -97,19 +112,19 @@ class Desk:
         self.scene = 0
         self.news: RingBuffer[str] = RingBuffer(NEWS_LIMIT)
         self.log: RingBuffer[str] = RingBuffer(log_limit)
-        self.outside: OutsidePrograms = PlainPrograms()
+        self.outside = OutsidePrograms()
         self.is_seen = threading.Event()
         self.looking = LookingBack(lambda: self.present, self.say)
         self._has_begun = not is_held
         self._commands = list(commands)
-        self._supervisor = supervisor
+        self._supervisor = _command_of(supervisor)
         self._home = self.folder
-        self._granted = [*commands, _command_of(supervisor)]
+        self._granted = [*commands, self._supervisor]
         self._new_programs = new_programs or self._usual_programs
         self._retired: list[Programs] = []
         self.project = described(sim) if project is None else project
         world = DeskWorld(sim, speed)
-        self._supervise(world)
+        self._set_end(world)
         self._take(world, self._commands)
 
     def _take(self, world: DeskWorld, commands: Sequence[Command | None], *, is_branch: bool = False) -> None:
@@ -147,16 +162,6 @@ class Desk:
         """Where the time of that world passes."""
         return self.shown.gate
 
-    @property
-    def hands(self) -> Drags:
-        """The things that people hold in that world."""
-        return self.shown.hands
-
-    @property
-    def meter(self) -> Speedometer:
-        """Measures how fast the time of that world passes."""
-        return self.shown.meter
-
     def keep_past(self) -> None:
         """Record the world from now on, and each later one, so that people can look back."""
         with self.present.sim.lock:
@@ -172,7 +177,7 @@ class Desk:
         self._has_begun = True
         self.programs.begin()
         if (past := self.past) is not None:
-            past.gate.ask(past.go_on)
+            past.gate.ask(past.gate.go_on)
 
     def _usual_programs(self, sim: Simulation, commands: Sequence[Command | None], gate: Gate) -> Programs:
         return Programs(
@@ -259,7 +264,7 @@ class Desk:
             LinkError: If the world cannot be replaced.
         """
         home = folder or self._home
-        await self._put(project, commands_of(project, home), supervisor_of(project, home))
+        await self._put(project, commands_of(project, home), _command_of(supervisor_of(project, home)))
         self._home = home
 
     async def start_over(self) -> None:
@@ -270,39 +275,44 @@ class Desk:
         """
         await self._put(self.project, self._commands, self._supervisor)
 
-    async def _put(self, project: Project, commands: Sequence[Command | None], supervisor: Path | None = None) -> None:
+    async def _put(self, project: Project, commands: Sequence[Command | None], supervisor: Command | None) -> None:
         """Begin the world of a project."""
         self._check_owns()
         sim = await asyncio.to_thread(simulation_of, project, self.folder)
         old, before = self.present, (self.project, self._commands, self._supervisor)
-        was_paused = old.is_paused
+        was_paused = old.gate.is_paused
         world = DeskWorld(sim, old.gate.speed)
         if was_paused and self.past is None:
             world.pause()
-        self.project, self._commands = project, self._permitted(commands)
-        (permitted,) = self._permitted([_command_of(supervisor)])
-        self._supervisor = None if permitted is None else supervisor
+        self.project = project
+        *self._commands, self._supervisor = self._permitted([*commands, supervisor])
         # Its recording ends without a wait for the thread that moves it.
         await old.do(lambda _: old.pause())
         try:
-            self._supervise(world)
+            self._set_end(world)
             self._replace(world, self._commands)
         except KiksError:
             self.project, self._commands, self._supervisor = before
             if not was_paused:
-                await old.do(lambda _: old.go_on())
+                await old.do(lambda _: old.gate.go_on())
             raise
 
-    def _supervise(self, world: DeskWorld) -> None:
-        """Let the supervisor prepare a world, and act in it; the world pauses when it has returned."""
+    def _set_end(self, world: DeskWorld) -> None:
+        """Let the supervisor prepare a world, and let the world pause where a run of the project would end."""
+        sim, seconds = world.sim, self.project.seconds
+
+        def end(_code: int, message: str) -> None:
+            self.say(message)
+            world.gate.pause(sim.now_ns)
+
+        def end_time() -> None:
+            sim.loop.end_at(CLOCK_END_NS, end_time)  # a person may let it go on
+            end(0, f"The project ends after {seconds:g} s of simulated time.")
+
         if self._supervisor is not None:
-            sim = world.sim
-
-            def end(code: int, message: str) -> None:
-                self.say(message)
-                world.gate.pause(sim.now_ns)
-
-            Supervision(sim, self._supervisor).end = end
+            Supervision(sim, self._supervisor.program).end = end
+        if seconds is not None:
+            sim.loop.end_at(ns_from_s(seconds), end_time)
 
     def _replace(self, world: DeskWorld, commands: Sequence[Command | None], *, is_branch: bool = False) -> None:
         old, programs = self.present, self.programs
@@ -341,7 +351,7 @@ class Desk:
     @property
     def is_paused(self) -> bool:
         """Whether the time of the world that is shown stands still."""
-        return self.shown.is_paused
+        return self.gate.is_paused
 
     async def pause(self) -> None:
         """Pause simulated time."""
@@ -352,7 +362,7 @@ class Desk:
         """Resume simulated time; where the past ends, the present goes on, and a recording begins again."""
         await self.looking.turn_at_the_end()
         world = self.shown
-        await world.do(lambda _: world.go_on())
+        await world.do(lambda _: world.gate.go_on())
 
     async def run_or_pause(self) -> None:
         """Resume simulated time, or pause it."""
@@ -361,12 +371,17 @@ class Desk:
     async def step(self, seconds: float) -> None:
         """Let `seconds` of simulated time pass, then pause."""
         world = self.shown
-        await world.do(lambda _: world.step(seconds))
+
+        def step(_sim: Simulation) -> None:
+            world.pause()
+            world.gate.step(seconds)
+
+        await world.do(step)
 
     async def set_speed(self, speed: float | None) -> None:
         """Set the speed [simulated seconds per real second]; None for full speed."""
         world = self.shown
-        await world.do(lambda _: world.set_speed(speed))
+        await world.do(lambda sim: world.gate.set_speed(speed, sim.now_ns))
 
     async def halt(self) -> None:
         """Stop all programs and all robots."""
@@ -405,28 +420,14 @@ class Desk:
 
     # ---- checkpoints ----
 
-    async def mark(self) -> None:
-        """Take a checkpoint for `reset`."""
-        self.check_present()
-        await self.mark_present()
+    def mark(self, sim: Simulation) -> None:
+        """Take a checkpoint of the present world for `reset`; the caller holds its lock."""
+        self._mark = sim.checkpoint()
 
-    async def mark_present(self) -> None:
-        """Do that even if the past is shown."""
-        self._mark = await self.present.do(lambda sim: sim.checkpoint())
-
-    async def reset(self) -> None:
-        """Restore the last checkpoint, or the initial state; time and programs go on."""
-        self.check_present()
-        await self.reset_present()
-
-    async def reset_present(self) -> None:
-        """Do that even if the past is shown."""
-
-        def restore(sim: Simulation) -> None:
-            self.present.drop_all()
-            sim.reset(self._mark)
-
-        await self.present.do(restore)
+    def reset(self, sim: Simulation) -> None:
+        """Restore the last checkpoint, or the initial state; time and programs go on. The caller holds the lock."""
+        self.present.drop_all()
+        sim.reset(self._mark)
 
     # ---- hands ----
 

@@ -86,11 +86,6 @@ class DeskWorld:
         self.hands = Drags(sim)
         self.meter = Speedometer()
 
-    @property
-    def is_paused(self) -> bool:
-        """Whether its time stands still."""
-        return self.gate.is_paused
-
     async def do(self, act: Callable[[Simulation], Done]) -> Done:
         """Run a function with the locked world between two events, and return or raise its outcome.
 
@@ -110,19 +105,6 @@ class DeskWorld:
     def pause(self) -> None:
         """Pause its time."""
         self.gate.pause(self.sim.now_ns)
-
-    def go_on(self) -> None:
-        """Resume its time."""
-        self.gate.go_on()
-
-    def step(self, seconds: float) -> None:
-        """Let some time pass [s of simulated time], then pause."""
-        self.pause()
-        self.gate.step(seconds)
-
-    def set_speed(self, speed: float | None) -> None:
-        """Set the speed [simulated seconds per real second]; None for full speed."""
-        self.gate.set_speed(speed, self.sim.now_ns)
 
     def drop_all(self) -> None:
         """Let all hands drop what they hold."""

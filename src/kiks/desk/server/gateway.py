@@ -169,16 +169,16 @@ class Gateway:
         self._frame_count += 1
         if self._frame_count % SHAPES_FRAMES == 0 and (shapes := describe_shapes(sim)) != self._shapes:
             self._shapes = shapes
-        desk.meter.note(sim.now_ns, is_paused=desk.is_paused)
+        desk.shown.meter.note(sim.now_ns, is_paused=desk.is_paused)
         self._describe_bar()
         return pack_frame(
             sim,
             scene=self._scene["scene"],
             is_paused=desk.is_paused,
             is_driven=desk.programs.drive and desk.past is None,
-            speed_now=desk.meter.momentary,
-            speed_average=desk.meter.average,
-            is_held=desk.hands.holds,
+            speed_now=desk.shown.meter.momentary,
+            speed_average=desk.shown.meter.average,
+            is_held=desk.shown.hands.holds,
         )
 
     def _describe_bar(self) -> None:
@@ -264,10 +264,10 @@ class Gateway:
             await desk.grab(name, message.get("what", ""), message.get("index", -1))
         elif kind == "move":
             x_mm, y_mm = _number(message, "x_mm"), _number(message, "y_mm")
-            viewer.pulls[kind] = lambda _: desk.hands.move(name, x_mm, y_mm)
+            viewer.pulls[kind] = lambda _: desk.shown.hands.move(name, x_mm, y_mm)
         elif kind == "turn":
             heading_rad = _number(message, "heading_rad")
-            viewer.pulls[kind] = lambda _: desk.hands.turn(name, heading_rad)
+            viewer.pulls[kind] = lambda _: desk.shown.hands.turn(name, heading_rad)
         elif kind == "drop":
             await self._pull(viewer)
             await desk.drop(name)

@@ -202,7 +202,7 @@ class Editing:
                 await asyncio.to_thread(lambda: then.walls.faces)
             await desk.do(lambda sim: _change(sim, now, then))
             # Resets return to here: the places of the old checkpoint may be walls by now.
-            await desk.mark()
+            await desk.do(desk.mark)
             desk.project = await desk.present_project()
             desk.tell()
         self._known = await desk.do(_known_of)

@@ -170,7 +170,7 @@ class LookingBack:
             past.meter = Speedometer()
 
     def _stop_present(self, present: DeskWorld) -> None:
-        self._was_running = not present.is_paused
+        self._was_running = not present.gate.is_paused
         present.drop_all()
         present.pause()
         self._flush()
@@ -241,4 +241,4 @@ class LookingBack:
             present = self._present()
             present.meter = Speedometer()
             if self._was_running:
-                await present.do(lambda _: present.go_on())
+                await present.do(lambda _: present.gate.go_on())

@@ -6,9 +6,9 @@ thread moves it: the thread that moves the present world waits at its gate meanw
 
 from __future__ import annotations
 
+import asyncio
 import threading
 from collections.abc import Callable
-from concurrent.futures import TimeoutError as NotYet
 from typing import NamedTuple
 
 from kiks.clock.gate import LAG_NS
@@ -81,14 +81,8 @@ class Player(DeskWorld):
     # ---- another time ----
 
     def seek(self, time_ns: int) -> None:
-        """Go to a time [ns], or where the past begins or ends; from any thread, which waits for it."""
-        future = self.gate.ask(lambda: self._seek(min(max(time_ns, self.span.begin_ns), self.span.end_ns)))
-        while True:
-            try:
-                return future.result(IDLE_S)
-            except NotYet:
-                # The thread that moves the world has ended just now.
-                self.gate.serve()
+        """Go to a time [ns], or where the past begins or ends; from a thread without an event loop, which waits."""
+        asyncio.run(self.do(lambda _: self._seek(min(max(time_ns, self.span.begin_ns), self.span.end_ns))))
 
     def _seek(self, time_ns: int) -> None:
         if not self._replay.go_to(time_ns):

@@ -11,8 +11,7 @@ import webbrowser
 from collections.abc import Callable
 from typing import Any
 
-from kiks.desk.server.desk import Desk, NewsHandler
-from kiks.desk.server.outside_programs import PlainPrograms
+from kiks.desk.server.desk import Desk, NewsHandler, OutsidePrograms
 from kiks.desk.server.server import SERVER
 from kiks.engine.code_cache import is_compiled
 from kiks.engine.compiling import LAST
@@ -179,7 +178,7 @@ def show(
     if is_alive:
         shown.drive()
     else:
-        desk.outside = PlainPrograms(desk.gate.halt)
+        desk.outside = OutsidePrograms(desk.gate.halt)
     shown.present(browser=browser)
     return shown
 
