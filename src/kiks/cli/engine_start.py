@@ -96,9 +96,6 @@ def _compile_together(numbers: Sequence[int]) -> None:
 
     All fill the same cache. This process begins with the first piece, the others with the last: neighbours in the list
     call the same kernels, and each process compiles those for itself. A piece whose process fails is left out.
-
-    Args:
-        numbers: Indices of the pieces.
     """
     from kiks.ports.program_process import python_line
 

@@ -105,13 +105,7 @@ class Command(TyperCommand):
 
 
 def leave_out(context: typer.Context, when: str, *names: str) -> None:
-    """Raise if one of some options was given where it has no effect.
-
-    Args:
-        context: That of the command.
-        when: Where that is, for people.
-        names: The options' names in the command's function.
-    """
+    """Raise if one of some options was given where it has no effect, by their names in the command's function."""
     for param in context.command.params:
         source = context.get_parameter_source(param.name or "")
         if source and source.name == "COMMANDLINE" and param.name in names:

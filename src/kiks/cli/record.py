@@ -132,12 +132,7 @@ def _command_line() -> str:
 
 
 def tell_run(sim: Simulation, doubt: str = "") -> None:
-    """Say what each robot has done, then how the run has ended: its time, seed and state.
-
-    Args:
-        sim: The world.
-        doubt: Why it might not be repeatable; nothing if it is.
-    """
+    """Say what each robot has done, then how the run has ended: its time, seed and state, or why not repeatable."""
     for number in range(1, sim.robot_count + 1):
         contacts = counted(sim.contacts(number), "contact")
         say(f"robot {number}: {sim.travelled_mm(number) / 1000:.2f} m driven, {contacts}, {sim.time_s:.3f} s")

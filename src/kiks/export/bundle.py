@@ -20,9 +20,6 @@ def bundle(entry: Path) -> str:
 
     Modules import names in braces from files beside them, and export classes, functions and constants where they
     define them. What they import while they run is left out.
-
-    Args:
-        entry: The module's file.
     """
     texts: dict[str, str] = {}
     needs: dict[str, set[str]] = {}

@@ -46,13 +46,7 @@ _STILL = {"position": {"x": 0.0, "y": 0.0, "z": 0.0}, "orientation": {"x": 0.0, 
 def save_foxglove(
     recording: Recording, path: str | Path, *, on_progress: Callable[[float], None] = lambda share: None
 ) -> None:
-    """Write a recording as an MCAP file that Foxglove shows.
-
-    Args:
-        recording: The recording.
-        path: The file, which ends in .mcap.
-        on_progress: Called now and then with the share that is done.
-    """
+    """Write a recording as an MCAP file that Foxglove shows."""
     ending_of(path, "a recording for Foxglove", (ENDING,))
     begin_ns, end_ns = recording.log.begin_ns, recording.log.end_ns
     channels: dict[str, int] = {}

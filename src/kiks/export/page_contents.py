@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shlex
 from collections import Counter
-from dataclasses import dataclass
 from typing import Any
 
 from markupsafe import Markup
@@ -17,7 +16,6 @@ from kiks.export.run_frames import RunFrames
 from kiks.recording.analysis import time_shares
 from kiks.recording.recording import Recording
 from kiks.recording.tables import Table
-from kiks.sim.wire_log import TimeShares
 from kiks.units import clock_text, s_from_ns
 from kiks.version import __version__
 
@@ -43,46 +41,10 @@ ROBOTS_MAX = 100
 """Most robots in the table of numbers."""
 
 
-@dataclass(frozen=True)
-class Program:
-    """A program's text on the page.
-
-    Attributes:
-        name: Name of its file.
-        drivers: Which of the programs it was, such as "1, 2": several may have the same text.
-        text: The text, cut if it is too long, in colours.
-        is_cut: Whether it was cut.
-    """
-
-    name: str
-    drivers: str
-    text: Markup
-    is_cut: bool
-
-
-@dataclass(frozen=True)
-class RobotNumbers:
-    """A robot's row in the table of numbers; `shares` are percent of the time."""
-
-    number: int
-    kind: str
-    driven_m: float
-    mean_mm_per_s: float
-    contacts: int
-    commands: int
-    shares: tuple[float, ...]
-
-
 def contents_of(recording: Recording, frames: RunFrames, robot: int) -> dict[str, Any]:
-    """Return what `web/run_page.html` needs to tell of a recording, by name.
-
-    Args:
-        recording: The recording.
-        frames: The frames of the run.
-        robot: Number of the robot whose wire is shown.
-    """
+    """Return what `web/run_page.html` needs to tell of a recording, by name."""
     events, programs, file = recording.table("events"), _programs(recording), recording.log.reader.path.name
-    names = ", ".join(dict.fromkeys(program.name for program in programs))
+    names = ", ".join(dict.fromkeys(program["name"] for program in programs))
     return {
         "what_ran": names or f"A run in arena {_arena(recording)}",
         "parts": (
@@ -148,8 +110,8 @@ def _facts(recording: Recording, frames: RunFrames) -> list[tuple[str, str]]:
     return [(name, value) for name, value in rows if value]
 
 
-def _numbers(recording: Recording, frames: RunFrames) -> list[RobotNumbers]:
-    """Return the table of numbers: what each robot did meanwhile."""
+def _numbers(recording: Recording, frames: RunFrames) -> list[dict[str, Any]]:
+    """Return the table of numbers: what each robot did meanwhile; shares are percent of the time."""
     robots = range(1, min(frames.last.robot_count, ROBOTS_MAX) + 1)
     wire = recording.table("wire")
     replies = Counter(wire["robot"][~wire["is_sent"]].tolist())
@@ -158,25 +120,21 @@ def _numbers(recording: Recording, frames: RunFrames) -> list[RobotNumbers]:
         was_there = number <= frames.first.robot_count
         driven_mm = frames.last.travelled_mm(number) - (frames.first.travelled_mm(number) if was_there else 0)
         rows.append(
-            RobotNumbers(
-                number=number,
-                kind=frames.last.specs[number - 1].name,
-                driven_m=driven_mm / 1000,
-                mean_mm_per_s=driven_mm / recording.duration_s if recording.duration_s else 0.0,
-                contacts=frames.last.contacts(number) - (frames.first.contacts(number) if was_there else 0),
-                commands=replies[number],
-                shares=_percents(shares),
-            )
+            {
+                "number": number,
+                "kind": frames.last.specs[number - 1].name,
+                "driven_m": driven_mm / 1000,
+                "mean_mm_per_s": driven_mm / recording.duration_s if recording.duration_s else 0.0,
+                "contacts": frames.last.contacts(number) - (frames.first.contacts(number) if was_there else 0),
+                "commands": replies[number],
+                "shares": [100 * share_ns / max(shares.window_ns, 1) for share_ns in shares],
+            }
         )
     return rows
 
 
-def _percents(shares: TimeShares) -> tuple[float, ...]:
-    return tuple(100 * share_ns / max(shares.window_ns, 1) for share_ns in shares)
-
-
-def _programs(recording: Recording) -> list[Program]:
-    """Return the programs' texts, each once."""
+def _programs(recording: Recording) -> list[dict[str, Any]]:
+    """Return the programs' texts, each once: cut if they are too long, in colours, with those that had it, "1, 2"."""
     drivers: dict[tuple[str, str], list[str]] = {}
     for numbered, text in recording.programs.items():
         number, _, name = numbered.partition("-")
@@ -189,7 +147,8 @@ def _programs(recording: Recording) -> list[Program]:
         is_coloured = name.endswith(".py") and character_count <= COLOURED_CHARACTERS_MAX
         lexer: Any = (PythonLexer if is_coloured else TextLexer)(stripnl=False, ensurenl=False)
         markup = Markup(highlight(clean, lexer, HtmlFormatter(nowrap=True)))  # it has escaped the text
-        programs.append(Program(name, ", ".join(numbers), markup, len(text) > PROGRAM_CHARACTERS_MAX))
+        is_cut = len(text) > PROGRAM_CHARACTERS_MAX
+        programs.append({"name": name, "drivers": ", ".join(numbers), "text": markup, "is_cut": is_cut})
     return programs
 
 

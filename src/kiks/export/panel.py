@@ -56,12 +56,7 @@ class Panel:
         self._draw_words(speed)
 
     def draw(self, moment: Moment, picture: Pixels) -> None:
-        """Draw it for a moment.
-
-        Args:
-            moment: The moment.
-            picture: The film's picture: it is drawn on the right side, or the clock alone if there is no room.
-        """
+        """Draw it for a moment, on the right side of the picture; the clock alone if there is no room."""
         from PIL import ImageDraw
 
         time = f"{s_from_ns(moment.time_ns):.1f} s"

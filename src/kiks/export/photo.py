@@ -74,15 +74,7 @@ def save_photo(
 
 
 class _Scene:
-    """The parts of a scene of Mitsuba.
-
-    Args:
-        mitsuba: The module.
-        moment: What is in the scene.
-
-    Attributes:
-        parts: By their names.
-    """
+    """The parts of a scene of Mitsuba."""
 
     def __init__(self, mitsuba: Any, moment: Moment) -> None:
         self._mitsuba, self._moment = mitsuba, moment

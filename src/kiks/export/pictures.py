@@ -177,11 +177,7 @@ def _type_of(path: str | Path) -> str:
 
 
 class _SvgPen:
-    """Draws what Pillow's `ImageDraw` would draw, as elements of SVG; of its methods those that a sheet uses.
-
-    Attributes:
-        elements: What was drawn.
-    """
+    """Draws what Pillow's `ImageDraw` would draw, as elements of SVG; of its methods those that a sheet uses."""
 
     def __init__(self) -> None:
         self.elements: list[str] = []

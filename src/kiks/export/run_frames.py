@@ -143,11 +143,7 @@ class RunFrames:
 
 
 def _period_ns(duration_ns: int, frame_bytes: int) -> int:
-    """Return the shortest period with which all frames have room.
-
-    Args:
-        duration_ns: Length of the run [ns].
-        frame_bytes: Size of a frame.
+    """Return the shortest period [ns] with which all frames of a run have room.
 
     Example:
         >>> _period_ns(300 * 10**9, 272), _period_ns(3600 * 10**9, 272)

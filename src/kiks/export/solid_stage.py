@@ -24,14 +24,7 @@ GROUND_PIXELS = 2000
 
 
 class SolidStage:
-    """Draws the world of a film in space, as `kiks.export.stage.Stage` does from above.
-
-    Args:
-        size: Width and height of the pictures.
-        follow: Index of the robot that stays in the middle; None: the whole arena is seen.
-        zoom: Magnification; 1 fits the whole arena.
-        has_trails: Whether robots, balls and cylinders leave trails.
-    """
+    """Draws the world of a film in space, as `kiks.export.stage.Stage`, whose arguments it has, does from above."""
 
     def __init__(self, size: tuple[int, int], *, follow: int | None, zoom: float, has_trails: bool) -> None:
         self._vtk = vtk = library("vtk", "render")

@@ -64,12 +64,7 @@ class Canvas:
 
     @contextmanager
     def patch(self, places: Sequence[Sequence[float]], margin_mm: float) -> Iterator[Sheet]:
-        """Return a sheet of the part of the picture around places, and put it back with what was drawn on it.
-
-        Args:
-            places: The places [mm].
-            margin_mm: How far around them [mm].
-        """
+        """Yield a sheet of the picture around places [mm] and a margin; what was drawn on it comes back."""
         from PIL import Image
 
         columns = [(x_mm - self.left_mm) * self.scale for x_mm, *_ in places]

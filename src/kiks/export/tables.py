@@ -41,13 +41,7 @@ def save_table(recording: Recording, path: str | Path, *, table: str = "poses", 
 
 
 def write_parquet(columns: Columns, path: str | Path, what: str) -> None:
-    """Write columns of equal length as a Parquet file.
-
-    Args:
-        columns: The columns by name.
-        path: The file.
-        what: Its name in messages.
-    """
+    """Write columns of equal length as a Parquet file."""
     pyarrow, parquet = library("pyarrow"), library("pyarrow.parquet")
     buffer = io.BytesIO()
     parquet.write_table(pyarrow.table(dict(columns)), buffer)

@@ -108,11 +108,7 @@ def record(
 
 
 def rest(robot: Khepera, sample_count: int) -> Array:
-    """Return readings of a robot that stands still, each a fresh sample [counts], shape [samples, 8].
-
-    Raises:
-        LinkError: If the robot does not answer.
-    """
+    """Return readings of a robot that stands still, each a fresh sample [counts], shape [samples, 8]."""
     robot.pause(SETTLE_S)
     readings = []
     for _ in range(sample_count):
@@ -134,11 +130,7 @@ def deviation(readings: Array) -> Array:
 
 
 def processing_ms(robot: Khepera, baud: int, exchange_count: int = 40) -> float:
-    """Return the time that the robot takes to process a command, from the median of several exchanges [ms].
-
-    Raises:
-        LinkError: If the robot does not answer.
-    """
+    """Return the time that the robot takes to process a command, from the median of several exchanges [ms]."""
     times_s = []
     characters = 0
     for _ in range(exchange_count):

@@ -127,23 +127,13 @@ class ArenaFile(Walls):
 
 
 def load_arena(path: Path) -> Arena:
-    """Read an arena file.
-
-    Args:
-        path: The TOML file; its picture lies in the same folder or below.
-    """
+    """Read an arena file, whose picture lies in the same folder or below."""
     what = f"Arena file {str(path)!r}"
     return _decode(read_file(path, what, error=ArenaError), what, path.stem, path.parent)
 
 
 def decode_arena(data: bytes, name: str = "arena", what: str = "The arena file") -> Arena:
-    """Read the bytes of an arena file that has no picture.
-
-    Args:
-        data: The bytes.
-        name: Name of the arena if the file has none.
-        what: Name of the file in messages.
-    """
+    """Read the bytes of an arena file that has no picture; it is called `name` if it does not say."""
     return _decode(data, what, name, None)
 
 
@@ -181,12 +171,7 @@ def places_of(file: Any) -> dict[str, Any]:
 
 
 def save_arena(arena: Arena, path: str | Path) -> None:
-    """Write an arena as a TOML file and, beside it, a PNG of the same name; existing files are replaced.
-
-    Args:
-        arena: The arena.
-        path: The TOML file.
-    """
+    """Write an arena as a TOML file and, beside it, a PNG of the same name; existing files are replaced."""
     path = path_of(path)
     if path.suffix.lower() != ".toml":
         raise ParameterError(f"path must end in '.toml', but it was {str(path)!r}. The picture goes beside it as .png.")

@@ -62,13 +62,7 @@ class Numbers:
 
 
 def check_numbers(name: str, numbers: Any, shape: tuple[int | None, ...] | None = None) -> npt.NDArray[np.float64]:
-    """Return finite numbers as a new float64 array.
-
-    Args:
-        name: What they are called in the message.
-        numbers: An array, or a list of numbers.
-        shape: The shape that it must have, None for any length along an axis; any shape if left out.
-    """
+    """Return finite numbers as a new float64 array; a shape has None for any length along an axis."""
     return check_array(numbers, Numbers(shape), name)
 
 
@@ -116,17 +110,7 @@ def check_array(values: object, rule: Numbers, name: str, counts: dict[str, int]
 def read_arrays(
     path: Path, rules: Mapping[str, Numbers], what: str, *, numbers_max: int = ARRAY_FILE_NUMBERS_MAX
 ) -> dict[str, npt.NDArray[Any]]:
-    """Return arrays of an .npz file; other arrays in it are ignored.
-
-    Args:
-        path: The file.
-        rules: The rule of each array.
-        what: Name of the file in messages.
-        numbers_max: Most numbers in all of them.
-
-    Returns:
-        What `check_array` returns of each.
-    """
+    """Return arrays of an .npz file, each as `check_array` does; other arrays in it are ignored."""
     data = read_file(path, what, bytes_max=8 * numbers_max + (1 << 16))
     found: dict[str, npt.NDArray[Any]] = {}
     counts: dict[str, int] = {}
@@ -148,11 +132,7 @@ def read_arrays(
 def _array(
     archive: zipfile.ZipFile, name: str, rule: Numbers, counts: dict[str, int], numbers_max: int
 ) -> npt.NDArray[Any]:
-    """Return an array of the file without conversion.
-
-    Raises:
-        ValueError: If its head is none, or something else follows than it announces.
-    """
+    """Return an array of the file without conversion."""
     if f"{name}.npy" not in archive.NameToInfo:
         raise _broken(name, rule, "is missing")
     if archive.getinfo(f"{name}.npy").compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):

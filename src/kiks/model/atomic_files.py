@@ -1,4 +1,4 @@
-"""Atomic writing of files: completely or not at all."""
+"""Atomic writing of files: completely or not at all. `what` is what messages call a file."""
 
 from __future__ import annotations
 
@@ -192,11 +192,6 @@ def check_writable(path: str | Path, what: str, *, is_new: bool = False) -> None
     """Raise if a file could not be written; for use before a long computation whose result goes there.
 
     A file is made beside it and removed: rights do not tell of disks that are full or can be read only.
-
-    Args:
-        path: The file.
-        what: Its name in messages.
-        is_new: Whether the file must not exist yet.
     """
     if is_new and os.path.lexists(path):
         raise ParameterError(f"{what} must name a new file, but {str(path)!r} exists. Choose another name.")
@@ -252,12 +247,7 @@ def explained(path: str | Path, what: str, kind: str = "file") -> Iterator[None]
 
 
 def path_of(path: object, what: str = "path") -> Path:
-    """Return a file's name as a path.
-
-    Args:
-        path: A text or a path.
-        what: What messages call it.
-    """
+    """Return a file's name, a text or a path, as a path."""
     with suppress(UnicodeEncodeError):
         if isinstance(path, str | Path) and "\0" not in str(path):
             parts = os.fsencode(path).split(b"/")
@@ -269,13 +259,7 @@ def path_of(path: object, what: str = "path") -> Path:
 
 
 def ending_of(path: object, what: str, endings: Iterable[str]) -> str:
-    """Return the ending of a file's name, in small letters.
-
-    Args:
-        path: The file.
-        what: What messages call it.
-        endings: Those that it may have.
-    """
+    """Return the ending of a file's name, in small letters, after a check that it is a known one."""
     ending = path_of(path, what).suffix.lower()
     if ending not in endings:
         raise ParameterError(f"{what} must end in {' or '.join(endings)}, but it was {shown(str(path))}.")
@@ -283,12 +267,7 @@ def ending_of(path: object, what: str, endings: Iterable[str]) -> str:
 
 
 def check_relative(text: object, what: str) -> None:
-    """Check by its text that a path stays within a folder, on any computer.
-
-    Args:
-        text: The path, with / between its parts.
-        what: What messages call it.
-    """
+    """Check by its text, with / between its parts, that a path stays within a folder, on any computer."""
     parts = text.split("/") if isinstance(text, str) else []
     is_clean = isinstance(text, str) and text.isprintable() and not set(text) & set('\\:*?"<>|') and len(text) <= 1000
     if not is_clean or not all(part not in ("", ".", "..") for part in parts):
@@ -299,13 +278,7 @@ def check_relative(text: object, what: str) -> None:
 
 
 def inside(folder: Path, text: str, what: str) -> Path:
-    """Return the path of a file in a project's folder or below it, if its text suits any computer.
-
-    Args:
-        folder: The folder.
-        text: The path of the file from there, with / between its parts.
-        what: What messages call it.
-    """
+    """Return the path of a file in a project's folder or below it, if its text suits any computer."""
     check_relative(text, what)
     return within(folder, text, what)
 
@@ -327,13 +300,7 @@ def within(folder: Path, text: str, what: str) -> Path:
 
 
 def program_in(folder: Path, name: str, what: str = "program") -> Path:
-    """Return the path of a Python program that a file or a browser names.
-
-    Args:
-        folder: The folder in which it must lie, there or below.
-        name: Its path from there, with / between its parts.
-        what: What messages call it.
-    """
+    """Return the path of a Python program in a folder or below it that a file or a browser names."""
     path = inside(folder, name, what)
     for parts in (PurePosixPath(name).parts, path.relative_to(folder.resolve()).parts):
         if not parts[-1].endswith(".py") or any(part.startswith(".") for part in parts):

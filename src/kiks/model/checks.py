@@ -1,6 +1,7 @@
 """What a caller gives: each number has a range, each object a type, and one line says so where it is another.
 
-All that enters the engine from Python passes one of these checks, so no kernel needs to ask.
+All that enters the engine from Python passes one of these checks, so no kernel needs to ask. `name` is what messages
+call the value, and `advice` what they say at the end.
 """
 
 from __future__ import annotations
@@ -27,15 +28,7 @@ HEADING_KEPT_RAD = 1e6
 def check_number(
     name: str, number: object, least: float = -math.inf, most: float = math.inf, advice: str = ""
 ) -> float:
-    """Return a finite number as a float.
-
-    Args:
-        name: What it is called in the message.
-        number: The number.
-        least: The least that it may be.
-        most: The most.
-        advice: What else the message says.
-    """
+    """Return a finite number as a float."""
     is_number = isinstance(number, int | float | Real) and not isinstance(number, bool)
     if is_number:
         try:
@@ -53,15 +46,7 @@ def check_number(
 
 
 def check_count(name: str, count: object, least: int = 0, most: int = 1_000_000, advice: str = "") -> int:
-    """Return a whole number as an int.
-
-    Args:
-        name: What it is called in the message.
-        count: The number.
-        least: The least that it may be.
-        most: The most.
-        advice: What else the message says.
-    """
+    """Return a whole number as an int."""
     if isinstance(count, int | Integral) and not isinstance(count, bool) and least <= (whole := int(count)) <= most:
         return whole
     raise ParameterError(
@@ -73,14 +58,7 @@ _Kind = TypeVar("_Kind")
 
 
 def check_kind(name: str, value: object, kind: type[_Kind], advice: str = "") -> _Kind:
-    """Return a value of a type.
-
-    Args:
-        name: What it is called in the message.
-        value: The value.
-        kind: The type.
-        advice: What else the message says.
-    """
+    """Return a value of a type."""
     if isinstance(value, kind):
         return value
     wanted = _KINDS.get(kind, f"a {kind.__module__.partition('.')[0]}.{kind.__name__}")

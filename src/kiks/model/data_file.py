@@ -3,7 +3,7 @@
 A file that users write or receive is read completely or not at all. For any error, one line names the file, the key,
 the rule, the value and what to do. No file takes much more memory than its size. A model is a class under `record`,
 with the rules beside its fields (pydantic). `check` creates one from a table. Messages are pydantic's, with a field's
-description as the advice.
+description as the advice. `what` is what they call the file, and `error` is the class that is raised.
 """
 
 from __future__ import annotations
@@ -97,15 +97,7 @@ class OneOf:
 def check(
     model: type[_Model], values: object, what: str, *, advice: str = "", error: type[KiksError] = ParameterError
 ) -> _Model:
-    """Return a record of the values of a file.
-
-    Args:
-        model: What the file holds, a class under `record`.
-        values: What was read.
-        what: What the message calls the file.
-        advice: What the message says where the field says nothing.
-        error: What is raised.
-    """
+    """Return a record of the values of a file; messages end with `advice` where the field says nothing."""
     try:
         made: _Model = adapter(model).validate_python(values)  # type: ignore[arg-type] # a class can be hashed
     except ValidationError as broken:
@@ -130,14 +122,7 @@ def as_list(values: object) -> object:
 def read_file(
     path: Path, what: str, *, bytes_max: int = DATA_FILE_BYTES_MAX, error: type[KiksError] = ParameterError
 ) -> bytes:
-    """Return the bytes of a file.
-
-    Args:
-        path: The file.
-        what: What the message calls it.
-        bytes_max: Most bytes that it may have.
-        error: What is raised.
-    """
+    """Return the bytes of a file, of which there may be at most `bytes_max`."""
     try:
         if path.is_dir():
             raise error(f"{what} must be a file, but it is a folder. Name a file in it.")

@@ -53,13 +53,7 @@ def load_kad(path: str | Path) -> Arena:
 
 
 def decode_kad(data: bytes, name: str = "arena", what: str = "The arena file") -> Arena:
-    """Read the bytes of a `.kad` file.
-
-    Args:
-        data: The bytes.
-        name: What people call the arena.
-        what: What messages call the file.
-    """
+    """Read the bytes of a `.kad` file."""
     found = read_numbers(data, what)
     if "walls" not in found:
         raise ArenaError(

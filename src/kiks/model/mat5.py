@@ -32,12 +32,7 @@ _SAVE_AGAIN = "Save it again in MATLAB with save('name.kad', 'walls', '-MAT', '-
 
 
 def read_numbers(data: bytes, what: str) -> dict[str, npt.NDArray[Any]]:
-    """Return all real numeric variables of a file, as they stand there: of any type and shape.
-
-    Args:
-        data: The bytes of the file.
-        what: What messages call it.
-    """
+    """Return all real numeric variables of a file, as they stand there: of any type and shape."""
     check_size(data, what, bytes_max=MAT_FILE_BYTES_MAX, error=ArenaError)
     order = {b"IM": "<", b"MI": ">"}.get(data[126:128])
     if order is None or struct.unpack_from(f"{order}H", data, 124)[0] != 0x0100:
@@ -51,11 +46,7 @@ def read_numbers(data: bytes, what: str) -> dict[str, npt.NDArray[Any]]:
 
 
 def _matrices(data: memoryview, order: str) -> Iterator[memoryview]:
-    """Yield the content of each matrix, unpacked.
-
-    Raises:
-        ValueError: If all of them would take more than `MAT_FILE_BYTES_MAX`.
-    """
+    """Yield the content of each matrix, unpacked."""
     left = MAT_FILE_BYTES_MAX
     for kind, content in _elements(data, order):
         parts = [(kind, content)]
@@ -70,11 +61,7 @@ def _matrices(data: memoryview, order: str) -> Iterator[memoryview]:
 
 
 def _elements(data: memoryview, order: str) -> Iterator[tuple[int, memoryview]]:
-    """Yield type and content of each element.
-
-    Raises:
-        ValueError: If one is longer than what is left.
-    """
+    """Yield type and content of each element."""
     position = 0
     while position < len(data):
         if len(data) - position < 8:
@@ -95,11 +82,7 @@ def _elements(data: memoryview, order: str) -> Iterator[tuple[int, memoryview]]:
 
 
 def _matrix(content: memoryview, order: str) -> tuple[str, npt.NDArray[Any]] | None:
-    """Return name and numbers of a matrix, None if it holds no real numbers.
-
-    Raises:
-        ValueError: If its parts do not fit together.
-    """
+    """Return name and numbers of a matrix, None if it holds no real numbers."""
     elements = _elements(content, order)
     flags = next(elements, (0, content[:0]))[1]
     if len(flags) < 8:

@@ -35,13 +35,6 @@ def draw_maze(
 ) -> tuple[npt.NDArray[np.uint8], Pose, Lamp]:
     """Draw a maze at 1 mm per pixel, with the sizes and places of kiks-behaviour.md, section 1.9. See `Arena.maze`.
 
-    Args:
-        columns: Cells side by side, without the entrance and the exit.
-        rows: Cells one above the other.
-        path_mm: Width of a passage [mm].
-        wall_mm: Thickness of a wall between passages [mm].
-        seed: The same seed, the same maze.
-
     Returns:
         The picture, uint8 [row, column] with row 0 on top; the start pose in the entrance; the lamp in the exit.
     """

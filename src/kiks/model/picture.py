@@ -48,13 +48,7 @@ def read_picture(path: Path, mm_per_pixel: float) -> npt.NDArray[np.uint8]:
 
 
 def decode_picture(data: bytes, mm_per_pixel: float, what: str = "The picture") -> npt.NDArray[np.uint8]:
-    """Read the brightness of a picture that is in memory, by the rules of `read_picture`.
-
-    Args:
-        data: The bytes of the picture's file.
-        mm_per_pixel: Edge of a pixel [mm].
-        what: Its name in messages.
-    """
+    """Read the brightness of a picture that is in memory, by the rules of `read_picture`."""
     from PIL import Image, UnidentifiedImageError
 
     check_size(data, what, bytes_max=PICTURE_FILE_BYTES_MAX, error=ArenaError)

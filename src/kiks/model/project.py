@@ -197,14 +197,7 @@ class Project:
         what: str = "The project file",
         bytes_max: int = PROJECT_FILE_BYTES_MAX,
     ) -> Project:
-        """Read what `to_bytes` returned, or a person wrote.
-
-        Args:
-            data: The bytes of the file.
-            name: What the arena is called if the file does not say.
-            what: What messages call the file.
-            bytes_max: Most bytes that it may have.
-        """
+        """Read what `to_bytes` returned, or a person wrote; the arena is called `name` if the file does not say."""
         check_size(data, what, bytes_max=bytes_max, error=ArenaError)
         table = parse_toml(data, what, error=ArenaError)
         if table.get("kiks") != _VERSION:

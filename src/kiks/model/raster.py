@@ -40,13 +40,7 @@ _WAY_REACH, _FILL_REACH = 9.0, 3.5  # surroundings of a cell that tell which way
 
 
 def cells_per_pixel(row_count: int, column_count: int, mm_per_pixel: float) -> int:
-    """Return into how many cells each edge of a pixel is cut so that no cell is larger than 1 mm.
-
-    Args:
-        row_count: Rows of the picture.
-        column_count: Columns of the picture.
-        mm_per_pixel: Edge of a pixel [mm].
-    """
+    """Return into how many cells each edge of a pixel is cut so that no cell is larger than 1 mm."""
     advice = "Most arenas are drawn with 1 mm per pixel."
     check_number("mm_per_pixel", mm_per_pixel, MM_PER_PIXEL_MIN, MM_PER_PIXEL_MAX, advice)
     shape = f"{column_count} x {row_count} pixels of {mm_per_pixel:g} mm"

@@ -406,13 +406,7 @@ def specs_of(
 
 
 def save_robot(spec: RobotSpec, path: str | Path, *, comment: str = "") -> None:
-    """Write a robot file that `RobotSpec.load` reads; an earlier file of that name is replaced in one step.
-
-    Args:
-        spec: The robot.
-        path: Where it goes, usually 'something.toml'.
-        comment: What stands above it, line by line.
-    """
+    """Write a robot file that `RobotSpec.load` reads, in one step, with a comment of some lines above it."""
     replace_file(path, robot_toml(spec, comment), "a robot")
 
 

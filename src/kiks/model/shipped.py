@@ -9,11 +9,7 @@ from kiks.model.arena import Arena
 
 
 def shipped(name: str) -> Path:
-    """Return the path of a file or folder that comes with KiKS.
-
-    Args:
-        name: Its path from the root of a checkout.
-    """
+    """Return the path of a file or folder that comes with KiKS, by its path from the root of a checkout."""
     package = Path(__file__).parents[1]
     places = (package / name, package.parents[1] / name)
     return next((place for place in places if place.exists()), places[0])

@@ -21,10 +21,6 @@ class WallTables:
     """Tables of a raster, each computed at its first use; `Arena` says what they hold.
 
     Threads that race for one may compute it twice; the arrays are equal, and one of the two is kept.
-
-    Args:
-        brightness: The raster: uint8 [row, column].
-        mm_per_cell: Edge of a cell [mm].
     """
 
     def __init__(self, brightness: npt.NDArray[np.uint8], mm_per_cell: float) -> None:

@@ -30,11 +30,7 @@ class Checked:
 
 
 def check_recording(log: RecordedLog) -> Checked:
-    """Make a recorded run again, and compare the state at each checkpoint.
-
-    Args:
-        log: The log of the recording.
-    """
+    """Make a recorded run again, and compare the state at each checkpoint."""
     equal: list[int] = []
     differing: list[int] = []
 

@@ -37,10 +37,7 @@ class Entry(NamedTuple):
 
 
 def block_of(values: Sequence[Any]) -> bytes:
-    """Return a block of entries.
-
-    Args:
-        values: The fields of all entries (see `NotedEntry`), flattened.
+    """Return a block of entries, whose fields (see `NotedEntry`) come one after the other.
 
     Example:
         >>> Columns.of_block(block_of((2, 5, 0, 5, 5, b"N")), "block").entry(0).data
@@ -71,12 +68,7 @@ class Columns(NamedTuple):
 
     @classmethod
     def of_block(cls, block: bytes, what: str) -> Columns:
-        """Return the columns of a block.
-
-        Args:
-            block: Of `block_of`.
-            what: What messages call it.
-        """
+        """Return the columns of a block of `block_of`."""
         count = _COUNT.unpack_from(block)[0] if len(block) >= _COUNT.size else -1
         begin = _COUNT.size + count * _COLUMN_COUNT * 8
         if count >= 0 and len(block) >= begin:

@@ -31,11 +31,7 @@ class Event(NamedTuple):
 
 
 class EventReader:
-    """Reads the events of a recording that may grow.
-
-    Args:
-        log: The log of the recording.
-    """
+    """Reads the events of a recording that may grow."""
 
     def __init__(self, log: RecordedLog) -> None:
         self._log = log

@@ -70,14 +70,7 @@ class Source(Protocol):
 
 
 class RecordedLog:
-    """The log of a recording, for one thread at a time.
-
-    Args:
-        reader: Reads the recording.
-
-    Attributes:
-        reader: As above.
-    """
+    """The log of a recording, for one thread at a time."""
 
     def __init__(self, reader: Source) -> None:
         self.reader = reader

@@ -45,12 +45,7 @@ RESERVE_BYTES, RESERVE_SHARE = 128 << 20, 0.05
 
 
 class Room(NamedTuple):
-    """The free space of a disk.
-
-    Attributes:
-        free_bytes: What is free.
-        reserve_bytes: How much of it recordings leave to other programs.
-    """
+    """The free space of a disk, and how much of it recordings leave to other programs."""
 
     free_bytes: int
     reserve_bytes: int
@@ -170,9 +165,6 @@ class FoundChunk:
 
 class McapReader:
     """Reads a recording's file.
-
-    Args:
-        path: The file.
 
     Attributes:
         path: The file.

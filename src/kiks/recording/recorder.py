@@ -211,11 +211,7 @@ class RunWriter:
 
 
 class _OwnTurretRecorder:
-    """Notes the state after each action of a robot with a custom turret, too, as a replay cannot run that.
-
-    Args:
-        recorder: Takes all entries.
-    """
+    """Notes the state after each action of a robot with a custom turret, too, as a replay cannot run that."""
 
     def __init__(self, recorder: RunWriter) -> None:
         self._recorder = recorder

@@ -104,13 +104,7 @@ class Recording:
         return range(1, len(self.log.state_before(self.log.end_ns).specs) + 1)
 
     def check_robot(self, robot: object, advice: str = "", name: str = "robot") -> int:
-        """Return the number of a robot.
-
-        Args:
-            robot: The number.
-            advice: What else the message says.
-            name: What it is called there.
-        """
+        """Return the number of a robot."""
         if not self.robots:
             raise ParameterError(f"{self._reader.what} must have a robot for this, but its world has none.")
         return check_count(name, robot, 1, len(self.robots), advice)
@@ -158,11 +152,7 @@ class Recording:
         return self.replay(time_s).let_go()
 
     def replay(self, time_s: float | None = None) -> Replay:
-        """Return the run from a time on, as a simulation that the recorded inputs move.
-
-        Args:
-            time_s: The time [s]; the beginning if left out.
-        """
+        """Return the run from a time on, as a simulation that the recorded inputs move."""
         return Replay(self.log, self.log.begin_ns if time_s is None else self.time_ns(time_s))
 
     def plot(self, *, robot: int = 1) -> Any:
@@ -187,12 +177,7 @@ class Recording:
         upwards.export_recording(self, path, kind=kind, **options)
 
     def time_ns(self, time_s: float, name: str = "time_s") -> int:
-        """Return a time of the recording [ns].
-
-        Args:
-            time_s: The time [s].
-            name: What messages call it.
-        """
+        """Return a time of the recording [ns]."""
         begin_s, end_s = s_from_ns(self.log.begin_ns), s_from_ns(self.log.end_ns)
         time_s = check_number(name, time_s, begin_s, end_s, "That is where the recording begins and ends.")
         return min(max(ns_from_s(time_s), self.log.begin_ns), self.log.end_ns)

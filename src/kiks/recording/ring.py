@@ -107,12 +107,7 @@ class Ring:
         return len(self._chunks) < count
 
     def copy(self, log: RecordedLog, until_ns: int) -> None:
-        """Write what another recording has up to a time [ns], or the last `COPY_BYTES_MAX` of that.
-
-        Args:
-            log: The log of the other one.
-            until_ns: The time [ns].
-        """
+        """Write what another recording has up to a time [ns], or the last `COPY_BYTES_MAX` of that."""
         self.attachments |= log.reader.attachments
         blocks, count_bytes = [], 0
         for block in reversed(log.blocks):
