@@ -29,7 +29,7 @@ pytestmark = pytest.mark.slow
 CORPUS = {path.stem: str(path) for path in sorted((PROGRAMS / "corpus").glob("*.py"))}
 EACH_ALONE, INTO_FILE = (str(PROGRAMS / f"{name}.py") for name in ("each_alone", "into_file"))
 
-AGAIN = set(share(list(CORPUS)[::3], list(CORPUS)))
+AGAIN = set(share(["reader_thread", *list(CORPUS)[::3]], list(CORPUS)))
 """Programs that run alone a second time."""
 
 AT_ONCE = 2
@@ -162,14 +162,8 @@ def served(folder: Path, robots: int) -> Iterator[list[dict[str, str]]]:
 
 def run_real(name: str, ports: Mapping[str, str]) -> str:
     """Run a program by Python alone, with pyserial itself; return what it said, errors, too."""
-    device = ports["serial port"]
-    arguments = {
-        # A pseudo terminal has no lines for DTR and RTS.
-        "control_lines": [ports["RFC 2217"]],
-        # `comports` lists what the kernel has, and KiKS adds no device to that: this one is told its port.
-        "find_port": [device],
-    }.get(name, [device])
-    command = [sys.executable, CORPUS[name], *arguments]
+    # A pseudo terminal has no lines for DTR and RTS.
+    command = [sys.executable, CORPUS[name], ports["RFC 2217" if name == "control_lines" else "serial port"]]
     done = subprocess.run(
         command,
         env=ENVIRONMENT,

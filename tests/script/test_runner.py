@@ -20,35 +20,6 @@ OPEN = "import serial\nport = serial.Serial('/dev/ttyUSB0', 9600, timeout=1)\n"
 
 # ---- threads ----
 
-READER = f"""
-import queue, threading, time
-{OPEN}
-lines, is_running = queue.Queue(), True
-def read():
-    while is_running:
-        line = port.readline()
-        if line:
-            lines.put(line)
-reader = threading.Thread(target=read)
-reader.start()
-start, count = time.time(), 0
-while time.time() - start < 20:
-    port.write(b'N\\n')
-    assert lines.get(timeout=2).startswith(b'n,')
-    count += 1
-is_running = False
-reader.join()
-print('done', round(time.time() - start, 1), count)
-"""
-
-
-def test_reader_thread_is_as_repeatable_as_a_plain_loop(run: Run) -> None:
-    ran = run(READER)
-    assert ran == run(READER)
-    assert (ran.code, ran.out.split()[:2]) == (0, ["done", "21.0"])
-    # The reader's last time-out lasts 1 s.
-    assert 21.0 <= ran.time_s < 21.1
-
 
 @pytest.mark.slow
 @pytest.mark.parametrize(

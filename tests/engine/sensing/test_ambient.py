@@ -219,21 +219,6 @@ def test_the_robot_reports_what_its_sensors_see() -> None:
     assert min(readings[6:]) > 480
 
 
-@pytest.mark.parametrize(
-    ("key", "value", "words"),
-    [
-        ("lamp_counts", (50.0, 70.0, 60.0), "a list that rises to dark_counts"),
-        ("lamp_counts", (50.0, 460.0), "a list that rises to dark_counts"),
-        ("background_counts", 460.0, "above lamp_counts, up to dark_counts"),
-        ("background_counts", 50.0, "above lamp_counts, up to dark_counts"),
-    ],
-)
-def test_an_error_names_the_wrong_parameter(key: str, value: Any, words: str) -> None:
-    with pytest.raises(kiks.ParameterError, match=rf"ambient\.{key} must be .*, but it was") as caught:
-        SPEC.with_changes(**{f"ambient__{key}": value})
-    assert words in str(caught.value)
-
-
 @pytest.mark.skipif(not (SHARED / "data/khepera-samples/light.npz").exists(), reason="needs the shared sensor data")
 def test_the_shape_of_measured_light() -> None:
     """light.npz is brightness of unknown scale from a bulb of unknown power: its shape counts, not its level.

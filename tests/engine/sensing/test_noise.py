@@ -87,17 +87,3 @@ def test_the_noise_of_kiks_2_2_0_is_data() -> None:
     quiet = KIKS2.with_changes(proximity__jitter_counts=(0.0,))
     relative = rounds(quiet, 4000, 25)[:, 2] / expected(quiet, 25)[2] - 1
     assert -relative.min() == pytest.approx(0.9 * relative.max(), abs=0.01)
-
-
-@pytest.mark.parametrize(
-    ("key", "value", "words"),
-    [
-        ("jitter_counts", (), "have at least 1 item"),
-        ("jitter_counts", (3.0, 1.0), "be a list in which none is below the one before"),
-        ("noise_down", 1.5, "be at most 1"),
-    ],
-)
-def test_an_error_names_the_wrong_parameter(key: str, value: object, words: str) -> None:
-    with pytest.raises(kiks.ParameterError) as caught:
-        KHEPERA.with_changes(**{f"proximity__{key}": value})
-    assert f"proximity.{key} must {words}, but it was {value!r}" in str(caught.value)
