@@ -205,9 +205,7 @@ class RobotPort:
         """Do nothing."""
         self._ask(lambda _: None)
 
-    def set_output_flow_control(self, enable: bool = True) -> None:
-        """Do nothing."""
-        self._ask(lambda _: None)
+    set_output_flow_control = set_input_flow_control
 
     def send_break(self, duration: float = 0.25) -> None:
         """Let the time of a break pass, in the tenths of a second that Linux makes of pyserial's quarters."""
@@ -215,29 +213,13 @@ class RobotPort:
 
     def _update_break_state(self) -> None: ...
 
-    def _update_rts_state(self) -> None: ...
+    _update_rts_state = _update_dtr_state = _update_break_state
 
-    def _update_dtr_state(self) -> None: ...
+    cts = dsr = cd = property(lambda self: self._ask(lambda _: True))
+    """Always ready, and held active by the interface box."""
 
-    @property
-    def cts(self) -> bool:
-        """Always ready."""
-        return self._ask(lambda _: True)
-
-    @property
-    def dsr(self) -> bool:
-        """Always ready."""
-        return self._ask(lambda _: True)
-
-    @property
-    def ri(self) -> bool:
-        """Never: no modem rings."""
-        return self._ask(lambda _: False)
-
-    @property
-    def cd(self) -> bool:
-        """Held active by the interface box."""
-        return self._ask(lambda _: True)
+    ri = property(lambda self: self._ask(lambda _: False))
+    """Never: no modem rings."""
 
 
 class Serial(RobotPort, serial.Serial):  # type: ignore[misc, unused-ignore]
