@@ -5,13 +5,11 @@ Its data arrive over the page's own WebSocket, not through this element; see `we
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import nicegui
-from nicegui.events import GenericEventArguments
 
 from kiks.desk.panels.widgets import WEB, FeedElement
 
@@ -30,49 +28,8 @@ LAYERS = {
 _THREE = Path(nicegui.__file__).parent / "elements" / "scene" / "dist"
 
 
-@dataclass(frozen=True)
-class Pick:
-    """The thing that a click hit.
-
-    Attributes:
-        what: 'robot', 'sensor' (of the selected robot), 'body', 'lamp' or 'floor'.
-        index: Index of the thing in frames, from 0; -1 for the floor.
-        sensor: Index of the sensor, from 0; -1 for any other thing.
-    """
-
-    what: str
-    index: int
-    sensor: int
-
-
-@dataclass(frozen=True)
-class Stroke:
-    """A stroke of a tool.
-
-    Attributes:
-        kind: 'rectangle' or 'line' (two points each), 'freehand', or 'point' (one point).
-        points: Places in the arena [mm], snapped to the grid.
-    """
-
-    kind: str
-    points: tuple[tuple[float, float], ...]
-
-
-@dataclass(frozen=True)
-class Tool:
-    """The tool of the pointer.
-
-    Attributes:
-        kind: 'hand' (drag and pick) or the kind of its strokes.
-        brush_mm: Width of a line or freehand stroke, size of a point.
-        snap_mm: Period of the grid to which points snap; 0 for none.
-        label: Text beside the pointer.
-    """
-
-    kind: Literal["hand", "rectangle", "line", "freehand", "point"] = "hand"
-    brush_mm: float = 10.0
-    snap_mm: float = 0.0
-    label: str = ""
+Points = Sequence[tuple[float, float]]
+"""Places of a stroke in the arena [mm], snapped to the grid."""
 
 
 class ArenaView(
@@ -85,8 +42,9 @@ class ArenaView(
 
     Args:
         feed: Address of the WebSocket that frames come from, seen from the page; all its components share one.
-        on_pick: Called with each click that is not a drag.
-        on_draw: Called with each stroke of a tool.
+        on_pick: Called with each click that is not a drag: with 'robot', 'sensor' (of the selected robot), 'body',
+            'lamp' or 'floor', the index of the thing, and that of the sensor, both from 0; -1 for none.
+        on_draw: Called with each stroke of a tool: its kind and points.
         on_remove: Called with the place of a thing that a person removes [mm].
     """
 
@@ -94,31 +52,31 @@ class ArenaView(
         self,
         feed: str,
         *,
-        on_pick: Callable[[Pick], Any],
-        on_draw: Callable[[Stroke], Any],
+        on_pick: Callable[[str, int, int], Any],
+        on_draw: Callable[[str, Points], Any],
         on_remove: Callable[[float, float], Any],
     ) -> None:
         super().__init__(feed, "arena_view.css")
         self._layers = {name: is_shown for name, (_, is_shown) in LAYERS.items()}
         self.change(show=self._layers, view="top", follow=-1)
-        self.set_tool(Tool())
-        self.on("pick", lambda event: on_pick(_pick(event)))
-        self.on("draw", lambda event: on_draw(_stroke(event)))
-        self.on("remove", lambda event: on_remove(float(event.args["x_mm"]), float(event.args["y_mm"])))
+        self.set_tool("hand")
+        self.on("pick", lambda e: on_pick(str(e.args["what"]), int(e.args["index"]), int(e.args["sensor"])))
+        self.on("draw", lambda e: on_draw(str(e.args["kind"]), [(float(x), float(y)) for x, y in e.args["points"]]))
+        self.on("remove", lambda e: on_remove(float(e.args["x_mm"]), float(e.args["y_mm"])))
 
     def show_layer(self, name: str, is_shown: bool) -> None:
         """Show or hide a layer."""
         self._layers = {**self._layers, name: is_shown}
         self.change(show=self._layers)
 
-    def set_tool(self, tool: Tool) -> None:
-        """Give the pointer a tool."""
-        self.change(tool=asdict(tool))
+    def set_tool(self, kind: str, *, brush_mm: float = 10.0, snap_mm: float = 0.0, label: str = "") -> None:
+        """Give the pointer a tool.
 
-
-def _pick(event: GenericEventArguments) -> Pick:
-    return Pick(str(event.args["what"]), int(event.args["index"]), int(event.args["sensor"]))
-
-
-def _stroke(event: GenericEventArguments) -> Stroke:
-    return Stroke(str(event.args["kind"]), tuple((float(x), float(y)) for x, y in event.args["points"]))
+        Args:
+            kind: 'hand' (drag and pick), or the kind of its strokes: 'rectangle' or 'line' (two points each),
+                'freehand', or 'point'.
+            brush_mm: Width of a line or freehand stroke, size of a point.
+            snap_mm: Period of the grid to which points snap; 0 for none.
+            label: Text beside the pointer.
+        """
+        self.change(tool={"kind": kind, "brush_mm": brush_mm, "snap_mm": snap_mm, "label": label})

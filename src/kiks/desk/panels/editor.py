@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Awaitable, Callable
-from dataclasses import dataclass
 from functools import partial
+from typing import NamedTuple
 
 from nicegui import ui
 
-from kiks.desk.panels.arena_view import ArenaView, Stroke, Tool
+from kiks.desk.panels.arena_view import ArenaView, Points
 from kiks.desk.panels.files import FilesPanel
 from kiks.desk.panels.new_arena import ask_for_box, ask_for_maze
 from kiks.desk.panels.shortcuts import SHORTCUTS, listen
@@ -28,9 +28,8 @@ BRUSH_MAX_MM = 100
 SNAPS: dict[float, str] = {0.0: "off", 1.0: "1 mm", 5.0: "5 mm", 10.0: "10 mm", 50.0: "50 mm"}
 
 
-@dataclass(frozen=True)
-class _ToolButton:
-    """A tool for the page, and the kind of its pointer."""
+class _ToolButton(NamedTuple):
+    """A tool for the page, and the kind of its strokes."""
 
     word: str
     icon: str
@@ -146,7 +145,7 @@ class EditorPanel(Panel):
         size_mm = 55.0 if self._tool == "robot" else 64.0 if self._tool == "ball" else 32.0
         brush_mm = size_mm if tool.pointer == "point" else float(self._brush.value or 1)
         label = "" if self._tool == "hand" else tool.word.lower()
-        self._view.set_tool(Tool(tool.pointer, brush_mm, float(self._snap.value), label))  # type: ignore[arg-type]
+        self._view.set_tool(tool.pointer, brush_mm=brush_mm, snap_mm=float(self._snap.value), label=label)
 
     def _show_brightness(self) -> None:
         grey = int(self._brightness.value)
@@ -161,20 +160,20 @@ class EditorPanel(Panel):
     # ---- steps ----
 
     @told
-    async def draw(self, stroke: Stroke) -> None:
+    async def draw(self, kind: str, points: Points) -> None:
         """Apply a stroke of the selected tool; a person sees an error if that is not possible."""
-        await self._drawn(stroke)
+        await self._drawn(kind, points)
         self.refresh()
 
-    def _drawn(self, stroke: Stroke) -> Awaitable[None]:
-        editing, tool, points = self._editing, self._tool, stroke.points
+    def _drawn(self, kind: str, points: Points) -> Awaitable[None]:
+        editing, tool = self._editing, self._tool
         if not points:
             raise ParameterError("A stroke must have a point, but it had none. Draw again.")
         grey = 0 if tool.startswith("erase") else int(self._brightness.value)
         width_mm = float(self._brush.value)
-        if stroke.kind == "rectangle":
+        if kind == "rectangle":
             return editing.draw(lambda arena: brush.rectangle(arena, *points[0], *points[-1], grey))
-        if stroke.kind in ("line", "freehand"):
+        if kind in ("line", "freehand"):
             return editing.draw(lambda arena: brush.line(arena, points, width_mm=width_mm, brightness=grey))
         (x_mm, y_mm) = points[0]
         if tool == "remove":

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from nicegui import ui
 
-from kiks.desk.panels.arena_view import ArenaView, Pick, Stroke
+from kiks.desk.panels.arena_view import ArenaView, Points
 from kiks.desk.panels.editor import EditorPanel
 from kiks.desk.panels.monitor import MonitorPanel
 from kiks.desk.panels.octave import OctavePanel
@@ -107,20 +107,20 @@ class Page:
         for each, panel in self._panels.items():
             panel.set_visible(each == name)
 
-    async def _pick(self, pick: Pick) -> None:
+    async def _pick(self, what: str, index: int, sensor: int) -> None:
         """Show the robot or sensor that was clicked."""
-        if pick.what in ("robot", "sensor"):
+        if what in ("robot", "sensor"):
             self._tabs.value = "robot"
             monitor = self._panels["robot"]
             assert isinstance(monitor, MonitorPanel)
-            monitor.show_robot(pick.index + 1)
-            if pick.what == "sensor":
-                await monitor.explain(pick.sensor)
+            monitor.show_robot(index + 1)
+            if what == "sensor":
+                await monitor.explain(sensor)
 
-    async def _draw(self, stroke: Stroke) -> None:
+    async def _draw(self, kind: str, points: Points) -> None:
         """Pass a stroke to the editor."""
         if isinstance(editor := self._panels.get("arena"), EditorPanel):
-            await editor.draw(stroke)
+            await editor.draw(kind, points)
 
     @told
     async def _remove(self, x_mm: float, y_mm: float) -> None:

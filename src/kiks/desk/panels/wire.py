@@ -5,7 +5,7 @@ from __future__ import annotations
 from nicegui import ui
 
 from kiks.desk.panels.console import ConsolePanel
-from kiks.desk.panels.widgets import LogBox, Panel, icon_button, named, offer_robots, relabel, select
+from kiks.desk.panels.widgets import LogBox, Panel, icon_button, named, offer_robots, relabel, select, with_props
 from kiks.desk.server.desk import Desk
 from kiks.sim.wire import Wire
 from kiks.sim.wire_log import Piece, TimeShares, WireLog
@@ -79,21 +79,15 @@ class WirePanel(Panel):
             self._window = select("", "wire-window", WINDOWS, 1, "How far back the bar looks, in simulated time")
             self._window.props('borderless aria-label="Window of time"')
         self._parts: dict[str, tuple[ui.element, ui.label, ui.label]] = {}
-        bars: dict[str, tuple[ui.element, ui.label]] = {}
-        labels: dict[str, ui.label] = {}
         self._bar = named(ui.row().classes("w-full no-wrap gap-0 wire-bar text-caption").props("role=img"), "wire-bar")
-        with self._bar:
-            for name in PARTS:
-                with ui.element("div").classes(f"wire-{name}").style("width: 0") as bar:
-                    bars[name] = bar, ui.label()
-        with ui.row().classes("w-full gap-x-4 gap-y-0 text-caption"):
-            for name, (word, meaning) in PARTS.items():
-                with ui.row().classes("items-center gap-1 no-wrap"):
-                    ui.element("span").classes(f"wire-part wire-{name}").props("aria-hidden=true")
-                    labels[name] = named(ui.label(word), f"share-{name}")
-                    ui.tooltip(meaning)
-        for name in PARTS:
-            self._parts[name] = *bars[name], labels[name]
+        legend = ui.row().classes("w-full gap-x-4 gap-y-0 text-caption")
+        for name, (word, meaning) in PARTS.items():
+            with self._bar, ui.element("div").classes(f"wire-{name}").style("width: 0") as bar:
+                name_in_bar = ui.label()
+            with legend, ui.row().classes("items-center gap-1 no-wrap"):
+                ui.element("span").classes(f"wire-part wire-{name}").props("aria-hidden=true")
+                self._parts[name] = bar, name_in_bar, named(ui.label(word), f"share-{name}")
+                ui.tooltip(meaning)
 
     def set_visible(self, is_visible: bool) -> None:
         """Watch the line only while the panel is visible."""
@@ -141,18 +135,15 @@ class WirePanel(Panel):
 
     def _show_shares(self, shares: TimeShares) -> None:
         whole_ns = shares.window_ns
-        told = []
         for (name, (bar, name_in_bar, label)), part_ns in zip(self._parts.items(), shares, strict=True):
             percent = 100 * part_ns / whole_ns if whole_ns else 0.0
             word = PARTS[name][0]
             text = f"{word} {percent:.1f} % ({part_ns / 1e6:.0f} ms)"
-            told.append(text)
             if label.text != text:
                 label.text = text
                 bar.style(f"width: {percent:.2f}%")
                 name_in_bar.text = word if percent > 20 else ""
-        if self._bar.props.get("aria-label") != ", ".join(told):
-            self._bar.props["aria-label"] = ", ".join(told)
+        with_props(self._bar, aria_label=", ".join(label.text for _, _, label in self._parts.values()))
 
     # ---- actions of a person ----
 
