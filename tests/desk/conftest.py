@@ -89,8 +89,6 @@ def shown(tmp_path: Path) -> Iterator[Shown]:
 
 
 @pytest.fixture
-def visitor(new_page: NewPage, shown: Shown) -> Iterator[Visitor]:
-    page = new_page()
-    yield Visitor(page, shown)
-    # Close pages before the desk: a page asks for pictures until its connection ends.
-    page.close()
+def visitor(shown: Shown, new_page: NewPage) -> Visitor:
+    """A page of the desk. Pages close before the desk: they ask for pictures until their connection ends."""
+    return Visitor(new_page(), shown)

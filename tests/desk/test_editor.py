@@ -12,35 +12,36 @@ import pytest
 from PIL import Image
 from playwright.sync_api import expect
 from tests.at_length import at_length
-from tests.desk.visitor import NewPage, Visitor
+from tests.desk.visitor import NewPage, Visitor, open_desk
 
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.show import Shown
 from kiks.model import brush
 from kiks.model.arena import Arena, Pose
 from kiks.model.project import Project
-from kiks.sim.from_project import simulation_of
 
 pytestmark = pytest.mark.slow
 
 
 @pytest.fixture
-def desk(tmp_path: Path) -> Desk:
+def shown(tmp_path: Path) -> Iterator[Shown]:
     project = Project(replace(Arena.box(600, 500), starts=(Pose(120.0, 120.0, 0.0),)))
-    desk = Desk(simulation_of(project), project=project, folder=tmp_path, owns_world=True)
-    desk.gate.pause(0)
-    return desk
+    shown = open_desk(tmp_path, project)
+    shown.desk.gate.pause(0)
+    yield shown
+    shown.close()
 
 
 @pytest.fixture
-def visitor(desk: Desk, new_page: NewPage) -> Iterator[Visitor]:
-    shown = Shown(desk, port=0)
-    shown.drive()
+def desk(shown: Shown) -> Desk:
+    return shown.desk
+
+
+@pytest.fixture
+def visitor(shown: Shown, new_page: NewPage) -> Visitor:
     visitor = Visitor(new_page(1400, 1000), shown)
     visitor.tab("arena")
-    yield visitor
-    visitor.page.close()
-    shown.close()
+    return visitor
 
 
 def click(visitor: Visitor, x_mm: float, y_mm: float) -> None:

@@ -15,7 +15,6 @@ import pytest
 from tests.at_length import share
 from tests.desk.clients import open_socket
 from tests.guard import GUARD_S
-from websockets.exceptions import InvalidStatus
 from websockets.sync.client import ClientConnection
 
 import kiks
@@ -207,14 +206,6 @@ def test_malformed_messages_get_an_error(shown: Shown, message: str) -> None:
         browser.say("ack", count=-(10**18))
         browser.say("ack", count=[[]])
         browser.frame()
-
-
-@pytest.mark.parametrize(
-    "options", [{"origin": "http://evil.example"}, {"additional_headers": {}}, {"additional_headers": {"Cookie": "="}}]
-)
-def test_requests_of_other_pages_or_without_the_token_are_refused(shown: Shown, options: dict[str, Any]) -> None:
-    with pytest.raises(InvalidStatus, match="403"), browsing(shown, **options):
-        pass
 
 
 def test_a_seek_shows_the_past_and_all_browsers_are_told(shown: Shown) -> None:

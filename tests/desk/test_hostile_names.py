@@ -9,9 +9,10 @@ from pathlib import Path
 
 import pytest
 from playwright.sync_api import expect
-from tests.desk.visitor import INSIDE, NewPage, Visitor, make_project, open_desk
+from tests.desk.visitor import INSIDE, Visitor, make_project, open_desk
 
 import kiks.desk
+from kiks.desk.server.show import Shown
 from kiks.ports.program_process import Command
 
 HOSTILE = '" nasty=1 href="javascript:window.ran=1" \' <img src=x onerror=window.ran=1>{{window.ran=1}}'
@@ -30,8 +31,8 @@ READERS = {"props", "html", "markdown", "run_javascript", "add_head_html", "add_
 
 
 @pytest.fixture
-def visitor(tmp_path: Path, new_page: NewPage) -> Iterator[Visitor]:
-    """Of a desk on which everything that has a name has a hostile one."""
+def shown(tmp_path: Path) -> Iterator[Shown]:
+    """A desk on which everything that has a name has a hostile one."""
     folder = tmp_path / HOSTILE
     folder.mkdir()
     program = folder / f"{HOSTILE}.py"
@@ -42,9 +43,7 @@ def visitor(tmp_path: Path, new_page: NewPage) -> Iterator[Visitor]:
     project.save(folder / f"{FILE}.kiks")
     (folder / f"{FILE}.py").write_text("pass\n")
     shown = open_desk(folder, project, [Command(program)])
-    page = new_page()
-    yield Visitor(page, shown)
-    page.close()
+    yield shown
     shown.close()
 
 

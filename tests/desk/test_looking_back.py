@@ -125,22 +125,14 @@ def test_a_program_that_waits_at_the_gate_goes_on_as_if_nothing_had_been() -> No
         assert sim.state_hash() == alone.state_hash()
 
 
-def test_a_world_that_stood_still_stands_still_again() -> None:
-    sim = make_sim()
-    with desk_of(sim) as desk:
-        drive(sim, 0.5)
-        run(desk.pause())
-        run(desk.looking.look_at(100_000_000))
-        run(desk.looking.back_to_now())
-        assert desk.is_paused
-        run(desk.go_on())
-
-
 def test_the_past_is_played_up_to_the_present(tmp_path: Path) -> None:
     sim, hashes = make_sim(), {}
     with desk_of(sim) as desk:
         drive(sim, 3.0, hashes)
         run(desk.pause())
+        run(desk.looking.look_at(0))
+        run(desk.looking.back_to_now())
+        assert desk.is_paused, "what stood still stands still again"
         run(desk.looking.look_at(0))
         run(desk.step(0.25))
         wait_until(lambda: desk.sim.now_ns == 250_000_000)
@@ -323,10 +315,7 @@ def recorded(file: Path) -> dict[int, str]:
 
 
 @contextmanager
-def replaying(file: Path, time_ns: int = 0) -> Iterator[Desk]:
-    recording = Recording(file)
-    desk = Desk(recording.world_at(0), project=recording.project, speed=None, owns_world=True)
-    desk.looking.show_recording(file, time_ns)
+def driven(desk: Desk) -> Iterator[Desk]:
     desk.keep_past()
     driver = Driver(desk)
     thread = threading.Thread(target=driver.run, daemon=True)
@@ -335,6 +324,15 @@ def replaying(file: Path, time_ns: int = 0) -> Iterator[Desk]:
     driver.stop()
     thread.join(GUARD_S)
     desk.close()
+
+
+@contextmanager
+def replaying(file: Path, time_ns: int = 0) -> Iterator[Desk]:
+    recording = Recording(file)
+    desk = Desk(recording.world_at(0), project=recording.project, speed=None, owns_world=True)
+    desk.looking.show_recording(file, time_ns)
+    with driven(desk):
+        yield desk
 
 
 def test_a_recording_is_shown_played_and_begun_again_at_its_end(tmp_path: Path) -> None:
@@ -422,31 +420,11 @@ def test_from_a_time_of_a_recording_a_person_goes_on(tmp_path: Path) -> None:
         assert desk.looking.span == (0, list(hashes)[10])
 
 
-def make_project(folder: Path) -> tuple[Project, list[Command | None]]:
-    (folder / "round.py").write_text(ROUND)
-    return Project(Arena.box(400, 400), seed=3), [Command(folder / "round.py")]
-
-
-@contextmanager
-def with_programs(folder: Path) -> Iterator[Desk]:
-    project, commands = make_project(folder)
-    desk = Desk(
-        simulation_of(project, folder), project=project, speed=None, folder=folder, owns_world=True, commands=commands,
-        is_held=True,
-    )  # fmt: skip
-    desk.keep_past()
-    driver = Driver(desk)
-    thread = threading.Thread(target=driver.run, daemon=True)
-    desk.begin()
-    thread.start()
-    yield desk
-    driver.stop()
-    thread.join(GUARD_S)
-    desk.close()
-
-
 def test_another_world_has_another_past(tmp_path: Path) -> None:
-    with with_programs(tmp_path) as desk:
+    (tmp_path / "round.py").write_text(ROUND)
+    project, commands = Project(Arena.box(400, 400), seed=3), [Command(tmp_path / "round.py")]
+    sim = simulation_of(project, tmp_path)
+    with driven(Desk(sim, project=project, speed=None, folder=tmp_path, owns_world=True, commands=commands)) as desk:
         first = desk.sim
         wait_until(lambda: first.now_ns > NS_PER_S)
         run(desk.start_over())

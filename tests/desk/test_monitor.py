@@ -12,6 +12,7 @@ from playwright.sync_api import expect
 from tests.at_length import at_length
 from tests.desk.visitor import NewPage, Visitor, make_project, open_desk
 
+from kiks.desk.server.show import Shown
 from kiks.model.arena_objects import Lamp, Pose
 from kiks.model.project import ProjectRobot
 
@@ -19,19 +20,22 @@ pytestmark = pytest.mark.slow
 
 
 @pytest.fixture
-def visitor(tmp_path: Path, new_page: NewPage) -> Iterator[Visitor]:
-    """Of a desk whose first robot stands by a wall, with a camera and a radio."""
+def shown(tmp_path: Path) -> Iterator[Shown]:
+    """A desk whose first robot stands by a wall, with a camera and a radio."""
     project = make_project()
     starts = (Pose(45, 240, 2.9), *project.arena.starts[1:])
     arena = replace(project.arena, starts=starts, lamps=(Lamp(200, 60, 2.0), Lamp(30, 330, 1.0)))
     robots = (ProjectRobot(turrets=("k213", "radio")), *project.robots[1:])
     shown = open_desk(tmp_path, replace(project, arena=arena, robots=robots))
-    page = new_page(1280, 1100)
-    visitor = Visitor(page, shown)
-    drawn(visitor, 3)
-    yield visitor
-    page.close()
+    yield shown
     shown.close()
+
+
+@pytest.fixture
+def visitor(shown: Shown, new_page: NewPage) -> Visitor:
+    visitor = Visitor(new_page(1280, 1100), shown)
+    drawn(visitor, 3)
+    return visitor
 
 
 def drive(visitor: Visitor) -> None:

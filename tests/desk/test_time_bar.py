@@ -20,8 +20,8 @@ pytestmark = pytest.mark.slow
 
 
 @pytest.fixture
-def replay(tmp_path: Path, new_page: NewPage) -> Iterator[Visitor]:
-    """A page of a desk with a recording of four seconds, in which something happens."""
+def played(tmp_path: Path) -> Iterator[Shown]:
+    """A desk with a recording of four seconds, in which something happens."""
     sim = Simulation(Arena.box(500, 400), robots=2, seed=2)
     sim.place(1, 100, 100, 0.5)
     sim.place(2, 350, 300, 1.0)
@@ -40,10 +40,13 @@ def replay(tmp_path: Path, new_page: NewPage) -> Iterator[Visitor]:
     desk.looking.show_recording(file, 0)
     shown = Shown(desk, port=0)
     shown.drive()
-    visitor = Visitor(new_page(), shown)
-    yield visitor
-    visitor.page.close()
+    yield shown
     shown.close()
+
+
+@pytest.fixture
+def replay(played: Shown, new_page: NewPage) -> Visitor:
+    return Visitor(new_page(), played)
 
 
 def drag_to(visitor: Visitor, share: float) -> None:

@@ -53,17 +53,6 @@ def test_a_ticket_opens_the_desk_once(new_page: NewPage, browser: Browser, shown
     other.close()
 
 
-def test_without_the_token_a_page_tells_how_to_open_the_desk(browser: Browser, shown: Shown) -> None:
-    for scheme in ("light", "dark"):
-        page = browser.new_page(viewport={"width": 1000, "height": 600}, color_scheme=scheme)
-        answer = page.goto(shown.url.split("?")[0])
-        assert answer is not None
-        assert answer.status == 403
-        assert "Open the complete address that KiKS printed" in page.inner_text("body")
-        leave_picture(page, f"refused_{scheme}")
-        page.close()
-
-
 class Notebook(ThreadingHTTPServer):
     """A server of pages that show the desk within theirs, as a notebook does.
 

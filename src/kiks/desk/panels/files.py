@@ -14,10 +14,8 @@ from kiks.desk.panels.widgets import agrees, named, number, select, text_button,
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.folder import OPENED, PICTURES, Folder, decode, encode
 from kiks.desk.server.live_editing import Editing
-from kiks.errors import ArenaError, ParameterError
-from kiks.model.arena import Arena
+from kiks.errors import ParameterError
 from kiks.model.limits import UPLOAD_BYTES_MAX
-from kiks.model.picture import decode_picture
 from kiks.model.project import Project
 from kiks.model.shipped import demonstrations
 
@@ -128,17 +126,12 @@ class FilesPanel:
 
     @told
     async def _taken(self, event: UploadEventArguments) -> None:
-        name = event.file.name
-        if event.file.size() > UPLOAD_BYTES_MAX:
-            raise ArenaError(f"A file must have at most {UPLOAD_BYTES_MAX >> 20} MiB, but {name[:100]!r} has more.")
-        data = await event.file.read()
+        name, data = event.file.name, await event.file.read()
+        project = await asyncio.to_thread(decode, name, data, self._mm_per_pixel.value)
         if PurePosixPath(name).suffix.lower() in PICTURES:
-            mm_per_pixel = self._mm_per_pixel.value
-            raster = await asyncio.to_thread(decode_picture, data, mm_per_pixel)
-            arena = Arena.from_array(raster, mm_per_pixel=mm_per_pixel, name=PurePosixPath(name).stem[:100])
-            await self._editing.begin(arena)
+            await self._editing.begin(project.arena)
         else:
-            await self._open_file(name, await asyncio.to_thread(decode, name, data))
+            await self._open_file(name, project)
 
 
 async def save_in(

@@ -161,12 +161,13 @@ def encode(project: Project, name: str) -> bytes:
     return encode_kad(project.arena) if name.lower().endswith(".kad") else project.to_bytes()
 
 
-def decode(name: str, data: bytes) -> Project:
+def decode(name: str, data: bytes, mm_per_pixel: float = 1.0) -> Project:
     """Decode an uploaded project, arena without a picture file, or picture.
 
     Args:
         name: Name of the file. Its ending tells the format; its stem becomes the name of the arena.
         data: The bytes of the file.
+        mm_per_pixel: Size of a pixel of a picture [mm].
     """
     path = PurePosixPath(name.replace("\\", "/"))
     ending, stem = ending_of(path.name[-_NAME_MAX:], "A file", OPENED), path.stem[:_NAME_MAX] or "arena"
@@ -181,4 +182,5 @@ def decode(name: str, data: bytes) -> Project:
         return Project.of_arena(decode_kad(data, stem))
     if ending == ".toml":
         return Project.of_arena(decode_arena(data, stem))
-    return Project.of_arena(Arena.from_array(decode_picture(data, 1.0), name=stem))
+    raster = decode_picture(data, mm_per_pixel)
+    return Project.of_arena(Arena.from_array(raster, mm_per_pixel=mm_per_pixel, name=stem))

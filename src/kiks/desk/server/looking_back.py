@@ -127,7 +127,7 @@ class LookingBack:
 
     async def recording(self) -> Recording:
         """Return the recording of what led to the present, with all that has happened up to now."""
-        await self._present().do(lambda _: self._flush())
+        await self._present().do(self._flush)
         if self._source is None:
             raise ParameterError("Cannot read what happened: the world is not recorded. Is the disk full?")
         return Recording(self._source)
@@ -138,7 +138,7 @@ class LookingBack:
             with suppress(KiksError):  # a replay tells people of it
                 self.marks = await asyncio.to_thread(self._reader.read)
 
-    def _flush(self) -> None:
+    def _flush(self, _sim: Simulation) -> None:
         if self._writer is not None:
             self._writer.flush()
 
@@ -163,26 +163,24 @@ class LookingBack:
             raise LinkError("Cannot look back: this world is not recorded. Start it over.")
         if (past := self.past) is None:
             present = self._present()
-            await present.do(lambda _: self._stop_present(present))
+
+            def stop(sim: Simulation) -> None:
+                self._was_running = not present.gate.is_paused
+                present.drop_all()
+                present.pause()
+                self._flush(sim)
+
+            await present.do(stop)
             await asyncio.to_thread(self._show, time_ns)
         else:
             await asyncio.to_thread(past.seek, time_ns)
             past.meter = Speedometer()
 
-    def _stop_present(self, present: DeskWorld) -> None:
-        self._was_running = not present.gate.is_paused
-        present.drop_all()
-        present.pause()
-        self._flush()
-
     def _show(self, time_ns: int) -> None:
         """Begin to show the past at a time [ns]."""
         source, present = self._source, self._present()
         assert source is not None
-        log = RecordedLog(source)
-        span = Span(log.begin_ns, log.end_ns)
-        time_ns = min(max(time_ns, span.begin_ns), span.end_ns)
-        past = Player(log, time_ns, span, speed=present.gate.speed, say=self._say)
+        past = Player(RecordedLog(source), time_ns, speed=present.gate.speed, say=self._say)
         if self._present() is present:
             self.past = past
             past.start()

@@ -36,14 +36,17 @@ class Span(NamedTuple):
     begin_ns: int
     end_ns: int
 
+    def nearest_ns(self, time_ns: int) -> int:
+        """Return the time in it that is nearest to another one [ns]."""
+        return min(max(time_ns, self.begin_ns), self.end_ns)
+
 
 class Player(DeskWorld):
     """The past of a world, played.
 
     Args:
         log: Its recording.
-        time_ns: Where it begins to be played [ns].
-        span: From when to when it goes.
+        time_ns: Where it begins to be played [ns]; at its begin or end if that is nearer.
         speed: Simulated seconds per real second; None for full speed.
         say: Called with a message for people.
 
@@ -51,13 +54,11 @@ class Player(DeskWorld):
         span: From when to when it goes.
     """
 
-    def __init__(
-        self, log: RecordedLog, time_ns: int, span: Span, *, speed: float | None, say: Callable[[str], None]
-    ) -> None:
+    def __init__(self, log: RecordedLog, time_ns: int, *, speed: float | None, say: Callable[[str], None]) -> None:
         self._log = log
-        self._replay = Replay(log, time_ns)
+        self.span = Span(log.begin_ns, log.end_ns)
+        self._replay = Replay(log, self.span.nearest_ns(time_ns))
         super().__init__(self._replay.sim, speed)
-        self.span = span
         self._say = say
         self._is_over = False
         self._changed = threading.Condition(self.sim.lock)
@@ -82,7 +83,7 @@ class Player(DeskWorld):
 
     def seek(self, time_ns: int) -> None:
         """Go to a time [ns], or where the past begins or ends; from a thread without an event loop, which waits."""
-        asyncio.run(self.do(lambda _: self._seek(min(max(time_ns, self.span.begin_ns), self.span.end_ns))))
+        asyncio.run(self.do(lambda _: self._seek(self.span.nearest_ns(time_ns))))
 
     def _seek(self, time_ns: int) -> None:
         if not self._replay.go_to(time_ns):

@@ -18,7 +18,7 @@ from kiks.desk.panels.page import Page
 from kiks.desk.server.access import HEADERS, LOOPBACK, AccessControl, LimitedConnection
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.gateway import Gateway
-from kiks.desk.server.server_log import log_plainly, note_fault
+from kiks.desk.server.server_log import log_plainly
 from kiks.desk.server.token import Token
 from kiks.errors import LinkError, ParameterError
 from kiks.model.limits import MESSAGE_BYTES_MAX
@@ -122,13 +122,14 @@ class DeskServer:
 
     def _serve(self, begun: threading.Event) -> None:
         """Run the web server in its own thread."""
+        plain = log_plainly()
         app = FastAPI(openapi_url=None)
         self._add_routes(app)
         ui.run_with(app, title="KiKS", dark=None, show_welcome_message=False, reconnect_timeout=10.0)
 
         def begin() -> None:
             self._loop = asyncio.get_running_loop()
-            self._loop.set_exception_handler(note_fault)
+            self._loop.set_exception_handler(lambda _, fault: plain.note(fault["message"], fault.get("exception")))
             begun.set()
 
         nicegui_app.on_startup(begin)
@@ -149,7 +150,6 @@ class DeskServer:
             ws_per_message_deflate=False,
             timeout_graceful_shutdown=1,
         )
-        log_plainly()
         assert self._socket is not None
         try:
             uvicorn.Server(config).run(sockets=[self._socket])
