@@ -1,7 +1,8 @@
 """Programs of Octave as processes: their output, and that they leave nothing behind.
 
 A program says values for Python with say('name', value) and takes the message of an error with caught(@() ...); both
-are in `support`. What a call must return stands beside it (`run`): `kGetSpeed(ref)  %= [[5], [5]] +- 1`. Each has a folder of its own, for its files and for what tells where its session is found.
+are in `support`. What a call must return stands beside it (`run`): `kGetSpeed(ref)  %= [[5], [5]] +- 1`. Each program
+has a folder of its own, for its files and for what tells where its session is found.
 """
 
 from __future__ import annotations

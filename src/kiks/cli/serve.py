@@ -131,17 +131,9 @@ def serve(
 class _Ports:
     """The ports of all robots.
 
-    Args:
-        sim: The simulation.
-        has_pty: Whether each robot gets a serial port.
-        link: Name of the serial port; None for the default.
+    Attributes:
         tcp: TCP port of robot 1, 0 for free ones; None for the default.
         rfc2217: The same for RFC 2217; None for no such ports.
-        host: Address at which the TCP ports listen.
-        by_character: Whether replies come over TCP character by character.
-        say: Prints a line.
-
-    Attributes:
         endpoints: The open ports by the robot's number.
     """
 

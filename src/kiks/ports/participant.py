@@ -13,7 +13,6 @@ from kiks.ports.port_names import PortNames
 from kiks.ports.program_scheduler import Participant, ProgramScheduler
 from kiks.sim.local_line import claim
 from kiks.sim.read_completion import NEVER_NS, Read, end_of_read, end_of_wait, is_complete, never_ends
-from kiks.sim.simulation import Simulation
 from kiks.units import NS_PER_S
 
 STOPPING_NS = NS_PER_S // 2
@@ -41,7 +40,6 @@ class ProgramParticipant(Participant):
         name: Its name in messages.
         rank: Its number, from 1.
         robot: Number of its own robot; 0 if it has none until it claims one.
-        sim: The world.
         scheduler: Decides when it acts.
         names: Which robot answers on which port name.
 
@@ -55,16 +53,13 @@ class ProgramParticipant(Participant):
     answer: Answer | None = None
     is_closed = False
 
-    def __init__(
-        self, name: str, rank: int, robot: int, sim: Simulation, scheduler: ProgramScheduler, names: PortNames
-    ) -> None:
+    def __init__(self, name: str, rank: int, robot: int, scheduler: ProgramScheduler, names: PortNames) -> None:
         super().__init__(name, rank)
         self.robot = robot
         self.is_here = False
         self.is_silenced = False
         self.is_stopped = False
-        self._world = sim.world
-        self._wires = sim.wires
+        self._world, self._wires = scheduler.loop.world, scheduler.loop.wires
         self._scheduler = scheduler
         self._names = names
         self._requests: deque[Request] = deque()

@@ -125,6 +125,7 @@ class ProgramScheduler:
             limit if `when_silent` is 'wait'.
 
     Attributes:
+        loop: The event loop of the world.
         participants: The programs, in the order in which they have come.
         has_begun: Whether the world has begun.
         is_repeatable: Whether the world has waited for all programs so far.
@@ -147,7 +148,7 @@ class ProgramScheduler:
         self.participants: list[Participant] = []
         self.has_begun = expected == 0
         self.is_repeatable = True
-        self._loop = sim.loop
+        self.loop = sim.loop
         self._expected = expected
         self._is_once = is_once
         self._missing = missing
@@ -195,14 +196,14 @@ class ProgramScheduler:
                 break
         else:
             return 0.0
-        if self.participants and self._seen_ns > self._loop.world.now_ns:
+        if self.participants and self._seen_ns > self.loop.world.now_ns:
             horizon_ns = min((participant.acts_from_ns for participant in self._thinking()), default=NEVER_NS)
-            self._loop.advance_to(min(self._seen_ns, horizon_ns))
+            self.loop.advance_to(min(self._seen_ns, horizon_ns))
         return self._check_patience(holders) if len(self.participants) > 1 else None
 
     def finish(self) -> None:
         """Advance the world to its end after the last program has left: commands under way still act."""
-        loop = self._loop
+        loop = self.loop
         while any(wire.pending for wire in loop.wires):
             loop.advance_to(loop.next_event_ns() or 0)
         loop.advance_to(self._seen_ns)
@@ -215,7 +216,7 @@ class ProgramScheduler:
         Returns:
             Whether it may not, and then the programs that might still act before it.
         """
-        loop = self._loop
+        loop = self.loop
         actor: Participant | None = None
         first = horizon = (NEVER_NS, 0)
         is_waited = False

@@ -47,15 +47,12 @@ class Handle(ProgramParticipant):
         connection: This end of the socket to it.
         number: Its number, from 1, in the order of starts.
         robot: Number of its own robot.
-        sim: The world.
-        scheduler: Decides when it acts.
-        names: Which robot answers on which port name.
+        scheduler: See `ProgramParticipant`.
+        names: See `ProgramParticipant`.
 
     Attributes:
-        process: Its process.
-        has_hung_up: Whether it has closed its end.
+        has_hung_up: Whether it has closed its end of the socket.
         has_ended: Set when the process has ended.
-        is_end_reported: Whether its end has been reported.
         events: The events that the selector reports of the socket.
     """
 
@@ -67,11 +64,10 @@ class Handle(ProgramParticipant):
         connection: socket.socket,
         number: int,
         robot: int,
-        sim: Simulation,
         scheduler: ProgramScheduler,
         names: PortNames,
     ) -> None:
-        super().__init__(f"program {number} ({command.name})", number, robot, sim, scheduler, names)
+        super().__init__(f"program {number} ({command.name})", number, robot, scheduler, names)
         self.command, self.number = command, number
         self.has_hung_up = self.is_end_reported = False
         self.has_ended = threading.Event()
@@ -311,7 +307,7 @@ class Programs:
         """
         with self.sim.lock:
             self._check_open(name)
-            participant = ProgramParticipant(name, rank, 0, self.sim, self._scheduler, self._names)
+            participant = ProgramParticipant(name, rank, 0, self._scheduler, self._names)
             participant.is_waited_for = False
             self._scheduler.join(participant)
             self._visitors = [each for each in self._visitors if not each.has_left] + [participant]
@@ -464,7 +460,7 @@ class Programs:
         self.permission.check(command)
         number = self._count + 1
         here, there = socket.socketpair()
-        handle = Handle(command, here, number, robot, self.sim, self._scheduler, self._names)
+        handle = Handle(command, here, number, robot, self._scheduler, self._names)
         start = Start(
             is_late=self._scheduler.has_begun,
             end_ns=self.sim.loop.end_ns,

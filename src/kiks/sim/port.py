@@ -151,9 +151,6 @@ class VirtualPort:
     Args:
         line: The way to the robot.
         program: Charges thinking and polling to the program whose port this is.
-
-    Attributes:
-        line: The way to the robot.
     """
 
     def __init__(self, line: Line, program: ProgramClock) -> None:
@@ -437,8 +434,8 @@ class VirtualPort:
 
         Args:
             data: What it has got.
-            size: How many characters at most; None: up to the terminator.
-            terminator: What ends the read; None: the size alone.
+            size: As for `Line.read`.
+            terminator: As for `Line.read`.
             begin_ns: When it began [ns].
             span: What the timeout is for.
         """

@@ -99,7 +99,6 @@ class SessionClient:
         asked: Number of the port that the present request concerns; 0 for none.
         film: The film that it makes of the world; None for none.
         turrets: The names of the turrets that are functions of the program, by their numbers.
-        awaited: The answer under way.
         last_line: Number of the line of the desk's log that it has printed last; 0 for none.
         typed: Commands for the program to evaluate that people have typed on the desk, the oldest first.
     """
