@@ -172,20 +172,6 @@ def test_odd_sizes(size: tuple[int, int], shown: tuple[int, int], recording: Rec
         assert pictures(file)[-1].shape == (height, width, 3)
 
 
-def test_a_film_of_a_killed_run_ends_with_what_there_is(recording: Recording, tmp_path: Path) -> None:
-    data = recording.log.reader.path.read_bytes()
-    cut = tmp_path / "cut.mcap"
-    cut.write_bytes(data[: len(data) * 2 // 3])
-    part = Recording(cut)
-    assert not part.is_whole
-    assert 1 < part.duration_s < SECONDS - 0.9
-    count = save_film(part, tmp_path / "film.webp", size=(320, 240), fps=10, is_plain=True)
-    assert count == int(part.duration_s * 10 + 1e-6) + 1
-    last = pictures(tmp_path / "film.webp")[-1]
-    wanted = pixel(last, *pose_at(part, (count - 1) / 10))
-    assert robot_place(last) == pytest.approx(wanted, abs=2.0)
-
-
 def test_the_same_recording_gives_the_same_film(recording: Recording, tmp_path: Path) -> None:
     for ending in ("mp4", "gif", "webp"):
         files = [tmp_path / f"{name}.{ending}" for name in ("one", "two")]

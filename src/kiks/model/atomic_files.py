@@ -266,8 +266,8 @@ def ending_of(path: object, what: str, endings: Iterable[str]) -> str:
     return ending
 
 
-def check_relative(text: object, what: str) -> None:
-    """Check by its text, with / between its parts, that a path stays within a folder, on any computer."""
+def check_relative(text: str, what: str) -> str:
+    """Return the text of a path, with / between its parts, if it stays within a folder on any computer."""
     parts = text.split("/") if isinstance(text, str) else []
     is_clean = isinstance(text, str) and text.isprintable() and not set(text) & set('\\:*?"<>|') and len(text) <= 1000
     if not is_clean or not all(part not in ("", ".", "..") for part in parts):
@@ -275,12 +275,12 @@ def check_relative(text: object, what: str) -> None:
             f"{what} must lead to a file in the project's folder or below it, with / between folders, but it was "
             f"{shown(text)}. Copy the file into that folder."
         )
+    return text
 
 
 def inside(folder: Path, text: str, what: str) -> Path:
     """Return the path of a file in a project's folder or below it, if its text suits any computer."""
-    check_relative(text, what)
-    return within(folder, text, what)
+    return within(folder, check_relative(text, what), what)
 
 
 def within(folder: Path, text: str, what: str) -> Path:

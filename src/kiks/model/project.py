@@ -8,6 +8,7 @@ from __future__ import annotations
 from base64 import b64decode, b64encode
 from collections.abc import Callable
 from dataclasses import fields, replace
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -61,15 +62,10 @@ _SETTINGS = ("seed", "thinking", "baud", "response", "noise", "speed", "seconds"
 
 def _check_kind(kind: str) -> str:
     if kind.lower().endswith(".toml"):
-        check_relative(kind, "kind")
-    elif kind not in (known := robot_names()):
+        return check_relative(kind, "kind")
+    if kind not in (known := robot_names()):
         raise ParameterError(f"must be one of {known} or a .toml file, but it was {shown(kind)}.{nearest(kind, known)}")
     return kind
-
-
-def _check_program(program: str) -> str:
-    check_relative(program, "program")
-    return program
 
 
 def _check_differ(turrets: tuple[str, ...]) -> tuple[str, ...]:
@@ -84,7 +80,7 @@ def _check_thinking(thinking: str) -> str:
     return thinking
 
 
-Program = Annotated[Text, AfterValidator(_check_program)]
+Program = Annotated[Text, AfterValidator(partial(check_relative, what="program"))]
 _Plain = Switch | Whole | Number | Text
 Change = Annotated[
     _Plain | Annotated[tuple[_Plain, ...], Field(max_length=1000)],
