@@ -221,5 +221,5 @@ def test_what_is_no_path_is_named(path: object) -> None:
     for attempt in (check_writable, lambda path, what: replace_file(path, b"", what)):
         with pytest.raises(ParameterError, match=r"^--out must be the name of a file"):
             attempt(path, "--out")
-    with pytest.raises(ParameterError, match="robot must be the name of a file"):
+    with pytest.raises(ParameterError, match=r"robot, if .*, must be the name of a file"):
         RobotSpec.load(path)  # type: ignore[arg-type]

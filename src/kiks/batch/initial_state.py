@@ -19,7 +19,7 @@ from kiks.model.array_checks import check_numbers
 from kiks.model.checks import ROBOTS_MAX, check_count
 from kiks.model.data_file import OneOf
 from kiks.model.robot import RobotSpec, specs_of
-from kiks.sim.simulation import Simulation, check_kinds
+from kiks.sim.simulation import Simulation
 
 ARENAS_LIMIT = 10_000
 """Most arenas of a batch."""
@@ -190,7 +190,6 @@ def _kinds_of(
     """Return the kinds of the robots, one row for each world, or one row for all worlds."""
 
     def row_of(row: Any) -> tuple[RobotSpec, ...]:
-        check_kinds(row, response)
         return tuple(specs_of(row, robots, response))
 
     if isinstance(robot, str | RobotSpec):

@@ -292,7 +292,7 @@ class RobotSpec:
             response: What makes counts of the rays of its proximity sensors, one of `RESPONSES`; what the file says
                 if left out.
         """
-        path, known = path_of(name_or_path, "robot"), robot_names()
+        path, known = path_of(name_or_path, "robot, if not a name such as 'khepera',"), robot_names()
         source = str(path)
         what = f"Robot file {source!r}"
         if source in known:
@@ -391,7 +391,7 @@ def specs_of(
         robots: How many there are, 0 for none; as many as kinds are named if None.
         response: What makes counts of their proximity sensors' rays; what their files say if None.
     """
-    named = [robot] if isinstance(robot, str | RobotSpec) else list(robot)
+    named: list[Any] = list(robot) if isinstance(robot, list | tuple) else [robot]
     count, least = (len(named), 1) if robots is None else (robots, 0)
     count = check_count("robots", count, least, ROBOTS_MAX, "Say how many you need.")
     if len(named) not in (1, count):

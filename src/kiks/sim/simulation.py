@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
@@ -85,7 +84,6 @@ class Simulation:
     ) -> None:
         if arena is not None:
             _check_arena(arena)
-        check_kinds(robot, response)
         seed = check_count("seed", seed, 0, 2**63 - 1, "Any small number will do.")
         self._begin(
             World(Arena.default() if arena is None else arena, specs_of(robot, robots, response), seed), thinking
@@ -279,7 +277,6 @@ class Simulation:
             >>> sim.add_robot("khepera_ii")
             2
         """
-        check_kinds(robot)
         (spec,) = specs_of(robot, 1, None)
         with self._changing() as world:
             index = world.add_robot(spec, pose)
@@ -641,23 +638,6 @@ SIMULATIONS: WeakValueDictionary[str, Simulation] = WeakValueDictionary()
 """The simulations of this process that are alive, by name, the oldest first."""
 
 _NUMBERS = count(1)
-
-
-def check_kinds(kinds: object, response: object = None) -> None:
-    """Check the argument that gives the kinds of robots.
-
-    Args:
-        kinds: The name of a kind, a robot file or a `RobotSpec`, or a list of such.
-        response: The name of a response of their proximity sensors, or None.
-    """
-    for kind in kinds if isinstance(kinds, list | tuple) else (kinds,):
-        if not isinstance(kind, str | os.PathLike | RobotSpec):
-            raise ParameterError(
-                f"robot must be the name of a kind, a robot file or a kiks.RobotSpec, but it was {shown(kind)}. "
-                "Take 'khepera'."
-            )
-    if response is not None and not isinstance(response, str):
-        raise ParameterError(f"response must be a name such as 'thesis', but it was {shown(response)}.")
 
 
 def _check_arena(arena: object) -> None:

@@ -98,7 +98,7 @@ def adapt_pygame_events(module: ModuleType, host: Host) -> Replacements:
     def wait(timeout: int = 0) -> Any:
         until_ns = world.now_ns + timeout_ns(timeout / 1000) if timeout > 0 else NEVER_NS
         while not (event := module.poll()) and world.now_ns < until_ns:
-            host.wait_for_event("an event of pygame", until_ns)
+            host.wait_for_event(until_ns)
         return event
 
     return {"pygame.event": {"post": post, "wait": wait}}

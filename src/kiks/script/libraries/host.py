@@ -10,11 +10,13 @@ from typing import Any
 from kiks.script.chance import Chance
 from kiks.script.file_waits import is_readable
 from kiks.script.refusals import refuse
-from kiks.script.thread_scheduler import STUCK, Scheduler, Task
+from kiks.script.thread_scheduler import STUCK, Scheduler
 from kiks.sim.port import VirtualPort
 
 BLINK_S = 0.02
 """How often a window is looked at while only a person can go on [s of real time]."""
+
+_EVENT = "an event of a window"
 
 
 class Host:
@@ -28,23 +30,16 @@ class Host:
 
     def __init__(self, scheduler: Scheduler, clock: VirtualPort, chance: Chance) -> None:
         self.scheduler, self.clock, self.chance = scheduler, clock, chance
-        self._waiting: list[Task] = []
 
-    def wait_for_event(self, what: str, until_ns: int) -> None:
+    def wait_for_event(self, until_ns: int) -> None:
         """Wait until something happens in a window, another thread may have caused it, or a time has come [ns]."""
-        task = self.scheduler.current
-        self._waiting.append(task)
-        try:
-            cause = self.scheduler.wait(what, until_ns=until_ns, when_stuck=True)
-        finally:
-            self._waiting.remove(task)
-        if cause is STUCK:
+        if self.scheduler.wait(_EVENT, until_ns=until_ns, when_stuck=True) is STUCK:
             # Only a person can go on.
             time.sleep(BLINK_S)
 
     def note_event(self) -> None:
         """Let the threads go on that wait for events."""
-        for task in self._waiting:
+        for task in self.scheduler.waiting_for(_EVENT):
             self.scheduler.wake(task, None)
 
 

@@ -61,7 +61,7 @@ def adapt(tkinter: ModuleType, host: Host) -> Replacements:
             while self.tk.dooneevent(_DONT_WAIT):
                 pass
             if exists(self) and not run_due():
-                host.wait_for_event("a window", due[0][0] if due else NEVER_NS)
+                host.wait_for_event(due[0][0] if due else NEVER_NS)
 
     def mainloop(self: Any, n: int = 0) -> None:
         root = self._root()
