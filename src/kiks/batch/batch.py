@@ -22,7 +22,7 @@ from kiks.batch.rollouts import Rollouts
 from kiks.control.compiled_function import Compiled, explained
 from kiks.control.controller import Controller
 from kiks.control.measure import Measure
-from kiks.control.robot_controllers import robot_controllers
+from kiks.control.robot_controllers import RobotControllers
 from kiks.control.senses import SENSES, check_senses, reading_count
 from kiks.engine.bunch import worlds_in_bunch
 from kiks.engine.scene import Scene, enter_worlds
@@ -170,7 +170,7 @@ class Batch:
             measures: The measures.
         """
         until_ns = ns_from_s(check_number("seconds", seconds, 0, SECONDS_MAX))
-        driving = robot_controllers(controller, parameters, self.world_count, self.robot_count)
+        driving = RobotControllers(controller, parameters, self.world_count, self.robot_count)
         watching = MeasureSlots(measures, driving.common_senses, driving.names)
         shape = (self.world_count, self.robot_count)
         self._reset_worlds(np.arange(self.world_count), driving.has_camera)

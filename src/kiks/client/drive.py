@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from kiks.client.khepera import Khepera
 from kiks.client.port import Port
 from kiks.control.controller import Controller, whole_speeds
-from kiks.control.robot_controllers import robot_controllers
+from kiks.control.robot_controllers import RobotControllers
 from kiks.control.senses import SENSES, reading_count
 from kiks.errors import ParameterError
 from kiks.model.checks import SECONDS_MAX, check_number
@@ -96,7 +96,7 @@ class Driver:
         if isinstance(controller, Controller):
             given = controller.check_parameters(parameters)
             parameters = given[None] if given.ndim == 2 else given  # one world
-        driving = robot_controllers(controller, parameters, 1, len(ports))
+        driving = RobotControllers(controller, parameters, 1, len(ports))
         self._senses, self._controllers = driving.senses, driving.controllers
         self._given = [driving.parameters[0, k, :count] for k, count in enumerate(driving.parameter_counts)]
         self._sensors = np.zeros((len(ports), reading_count(driving.senses)))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,84 +13,61 @@ from kiks.errors import ParameterError, shown
 from kiks.model.checks import check_kind
 
 
-class RobotControllers(NamedTuple):
+class RobotControllers:
     """Controllers and parameters of every robot of every world.
-
-    Attributes:
-        controllers: The controller of each robot.
-        parameter_counts: The number of parameters of each robot.
-        parameters: Their parameters, padded with zeros, float64 [world, robot, parameter].
-        senses: All senses: those of the controller with the most. Each other robot has the first of these.
-    """
-
-    controllers: tuple[Controller, ...]
-    parameter_counts: tuple[int, ...]
-    parameters: NDArray[np.float64]
-    senses: tuple[str, ...]
-
-    @property
-    def sense_counts(self) -> NDArray[np.int64]:
-        """Number of senses of each robot, int64 [robot]."""
-        return np.array([len(each.senses) for each in self.controllers], np.int64)
-
-    @property
-    def has_camera(self) -> NDArray[np.bool_]:
-        """Whether each robot has a camera, bool [robot]."""
-        return np.array(["camera" in each.senses for each in self.controllers])
-
-    @property
-    def common_senses(self) -> tuple[str, ...]:
-        """The senses that all robots have."""
-        return self.senses[: min(len(each.senses) for each in self.controllers)]
-
-    @property
-    def names(self) -> str:
-        """Names of the controllers, for messages."""
-        return ", ".join(dict.fromkeys(repr(each.name) for each in self.controllers))
-
-    @property
-    def memory_count(self) -> int:
-        """Largest number of numbers that a controller remembers."""
-        return max(each.memory_count for each in self.controllers)
-
-
-def robot_controllers(given: Any, parameters: Any, world_count: int, robot_count: int) -> RobotControllers:
-    """Return the controllers of robots, checked.
 
     Args:
         given: A controller for all robots, or one for each robot of a world.
         parameters: As for `kiks.Batch.run`.
         world_count: Number of worlds.
         robot_count: Number of robots in each.
+
+    Attributes:
+        controllers: The controller of each robot.
+        parameter_counts: The number of parameters of each robot.
+        parameters: Their parameters, padded with zeros, float64 [world, robot, parameter].
+        senses: All senses: those of the controller with the most. Each other robot has the first of these.
+        common_senses: The senses that all robots have.
+        sense_counts: Number of senses of each robot, int64 [robot].
+        has_camera: Whether each robot has a camera, bool [robot].
+        memory_count: Largest number of numbers that a controller remembers.
     """
-    if not isinstance(given, Sequence):
-        _check_controller(given)
-        each_given = _parameters_of_all(given, parameters, world_count, robot_count)
-        return RobotControllers((given,) * robot_count, (each_given.shape[2],) * robot_count, each_given, given.senses)
-    if len(given) != robot_count:
-        raise ParameterError(
-            f"controller must be one for all robots, or a list of {robot_count}, one for each robot of a world, but it "
-            f"was a list of {len(given)}."
-        )
-    for each in given:
-        _check_controller(each)
-    senses = max((each.senses for each in given), key=len)
-    for each in given:
-        if each.senses != senses[: len(each.senses)]:
+
+    def __init__(self, given: Any, parameters: Any, world_count: int, robot_count: int) -> None:
+        is_list = isinstance(given, Sequence)
+        self.controllers: tuple[Controller, ...] = tuple(given) if is_list else (given,) * robot_count
+        if len(self.controllers) != robot_count:
             raise ParameterError(
-                f"the senses of one controller must come first among those of the one that has the most, but "
-                f"{shown(each.name)} senses {', '.join(each.senses)} where another senses {', '.join(senses)}."
+                f"controller must be one for all robots, or a list of {robot_count}, one for each robot of a world, "
+                f"but it was a list of {len(self.controllers)}."
             )
-    rows = _parameters_of_each(given, parameters, world_count)
-    counts = tuple(row.shape[1] for row in rows)
-    padded = np.zeros((world_count, robot_count, max(counts)))
-    for robot, row in enumerate(rows):
-        padded[:, robot, : row.shape[1]] = row
-    return RobotControllers(tuple(given), counts, padded, senses)
+        for each in self.controllers:
+            check_kind("controller", each, Controller, "Write @kiks.controller over the function.")
+        self.senses = max((each.senses for each in self.controllers), key=len)
+        for each in self.controllers:
+            if each.senses != self.senses[: len(each.senses)]:
+                raise ParameterError(
+                    f"the senses of one controller must come first among those of the one that has the most, but "
+                    f"{shown(each.name)} senses {', '.join(each.senses)} where another senses {', '.join(self.senses)}."
+                )
+        if is_list:
+            rows = _parameters_of_each(self.controllers, parameters, world_count)
+            self.parameters = np.zeros((world_count, robot_count, max(row.shape[1] for row in rows)))
+            for robot, row in enumerate(rows):
+                self.parameters[:, robot, : row.shape[1]] = row
+            self.parameter_counts = tuple(row.shape[1] for row in rows)
+        else:
+            self.parameters = _parameters_of_all(given, parameters, world_count, robot_count)
+            self.parameter_counts = (self.parameters.shape[2],) * robot_count
+        sense_counts = [len(each.senses) for each in self.controllers]
+        self.common_senses, self.sense_counts = self.senses[: min(sense_counts)], np.array(sense_counts, np.int64)
+        self.has_camera = np.array(["camera" in each.senses for each in self.controllers])
+        self.memory_count = max(each.memory_count for each in self.controllers)
 
-
-def _check_controller(given: object) -> None:
-    check_kind("controller", given, Controller, "Write @kiks.controller over the function.")
+    @property
+    def names(self) -> str:
+        """Names of the controllers, for messages."""
+        return ", ".join(dict.fromkeys(repr(each.name) for each in self.controllers))
 
 
 def _parameters_of_all(

@@ -17,7 +17,7 @@ from concurrent.futures import Executor, Future
 from contextlib import suppress
 from typing import Any
 
-from kiks.errors import ParameterError, installing
+from kiks.errors import ParameterError, library
 
 LOOPBACK = "127.0.0.1"
 
@@ -114,11 +114,4 @@ def _import_ray(*, loopback_only: bool) -> Any:
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
     if loopback_only:
         os.environ.setdefault("RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER", "0")
-    try:
-        import ray
-    except ImportError as error:
-        raise ParameterError(
-            f"A Ray cluster must be reached through Ray, but it is not installed. {installing('ray')}, or leave "
-            "--cluster out."
-        ) from error
-    return ray
+    return library("ray", "ray")

@@ -125,12 +125,8 @@ def follow_fitness(values: Values) -> Floats:
 
 def follow_solved(values: Values) -> NDArray[np.bool_]:
     """Return whether the robot had a wall at its side, got along, and touched something twice at most."""
-    solved: NDArray[np.bool_] = (
-        (values["beside_wall_share"] >= FOLLOW_SHARE)
-        & (values["roaming"] >= LEAST_ROAMING)
-        & (values["contacts"] <= FOLLOW_CONTACTS)
-    )
-    return solved
+    is_beside, is_roaming = values["beside_wall_share"] >= FOLLOW_SHARE, values["roaming"] >= LEAST_ROAMING
+    return is_beside & is_roaming & (values["contacts"] <= FOLLOW_CONTACTS)
 
 
 @ready
@@ -188,8 +184,7 @@ def light_fitness(values: Values) -> Floats:
 
 def light_solved(values: Values) -> NDArray[np.bool_]:
     """Return whether the robot reached the lamp and stayed there."""
-    solved: NDArray[np.bool_] = values["light_stay_s"] >= STAY_S
-    return solved
+    return values["light_stay_s"] >= STAY_S
 
 
 @ready
