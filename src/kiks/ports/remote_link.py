@@ -159,6 +159,8 @@ class RemoteLine:
         self.lock: AbstractContextManager[Any] = connection.lock
         self._connection = connection
         self._robot = robot
+        self.think = connection.think
+        self.pass_to = self.wait_for_room = connection.pass_to
         self._is_claimed = False
         self._taken_ns = 0
         # Upper bound of the characters on the way to the robot.
@@ -173,14 +175,6 @@ class RemoteLine:
     def known_ns(self) -> int:
         """The same as far as it is known [ns]; see `Line`."""
         return self._connection.known_ns
-
-    def pass_to(self, time_ns: int) -> None:
-        """Let time pass up to a time [ns]."""
-        self._connection.pass_to(time_ns)
-
-    def think(self, time_ns: int) -> None:
-        """Let the program's thinking time pass [ns]."""
-        self._connection.think(time_ns)
 
     def send(self, data: bytes, spare: int) -> bool:
         """Put characters on the line, if it has room for them and some more; see `Line.send`."""
@@ -212,10 +206,6 @@ class RemoteLine:
     def room_ns(self, count: int) -> int:
         """Return when the line has room for some characters [ns]; a time that is over: it has."""
         return 0 if self._ahead_count + count <= BACKLOG_LIMIT else int(self._ask(Kind.ROOM, count))
-
-    def wait_for_room(self, until_ns: int) -> None:
-        """Let time pass up to a time [ns]."""
-        self.pass_to(until_ns)
 
     def wake(self) -> None:
         """Do nothing: no other thread of the program goes on while one waits."""

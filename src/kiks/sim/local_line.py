@@ -29,6 +29,7 @@ class LocalLine:
         self._robot = robot
         self._wire = loop.wires[robot - 1]
         self._is_claimed = False
+        self.pass_to = self.wait_for_room = loop.advance_to
 
     @property
     def now_ns(self) -> int:
@@ -36,10 +37,6 @@ class LocalLine:
         return self._world.now_ns
 
     known_ns = now_ns
-
-    def pass_to(self, time_ns: int) -> None:
-        """Let time pass up to a time [ns]."""
-        self._loop.advance_to(time_ns)
 
     def think(self, time_ns: int) -> None:
         """Let the time pass that the program has thought [ns]; all ports of a simulation belong to one program."""
@@ -86,10 +83,6 @@ class LocalLine:
     def room_ns(self, count: int) -> int:
         """Return when the line has room for some characters [ns]; a time that is over: it has."""
         return self._wire.line.room_ns(count)
-
-    def wait_for_room(self, until_ns: int) -> None:
-        """Let time pass up to a time [ns]."""
-        self._loop.advance_to(until_ns)
 
     def wake(self) -> None:
         """Do nothing: no other thread of the program goes on while one waits."""

@@ -54,7 +54,8 @@ HALT_MESSAGE = (
 
 _log = logging.getLogger("kiks.toolbox")
 
-Act = Callable[[SessionClient, str], str]
+Act = Callable[[SessionClient, str], str | None]
+"""A handler of requests: it gets the words after the name, and returns the result, None for an empty one."""
 
 
 def answer(client: SessionClient, line: str) -> str:
@@ -74,7 +75,7 @@ def answer(client: SessionClient, line: str) -> str:
             )
         if client.awaited.is_halted and act is not _poll:
             raise HaltError(HALT_MESSAGE)
-        result = act(client, words)
+        result = act(client, words) or ""
         if len(result) > ANSWER_MAX:
             raise ParameterError(
                 f"an answer must have at most {ANSWER_MAX} characters, but this one, to {shown(name)}, has "
@@ -105,16 +106,14 @@ def answer(client: SessionClient, line: str) -> str:
 # ---- the desk ----
 
 
-def _poll(client: SessionClient, words: str) -> str:
+def _poll(client: SessionClient, words: str) -> None:
     """Do nothing but let an idle program, at its prompt, take what people have typed; it has nothing to be halted."""
     client.take_halt()
-    return ""
 
 
-def _typed(client: SessionClient, words: str) -> str:
+def _typed(client: SessionClient, words: str) -> None:
     """Show what a typed command has printed."""
     client.session.log(unescape(words))
-    return ""
 
 
 # ---- worlds ----
@@ -130,10 +129,9 @@ def _path(text: str) -> str:
     return path
 
 
-def _set(client: SessionClient, words: str) -> str:
+def _set(client: SessionClient, words: str) -> None:
     name, _, value = words.partition(" ")
     client.session.settings = client.session.settings.changed(name, unescape(value))
-    return ""
 
 
 def _world(client: SessionClient, words: str) -> str:
@@ -163,7 +161,7 @@ def _arena(client: SessionClient, text: str) -> tuple[Arena, list[str]]:
     return settled(arena, robot.body.radius_mm)
 
 
-def _save(client: SessionClient, words: str) -> str:
+def _save(client: SessionClient, words: str) -> None:
     path = _path(words)
     project = client.session.present_project()
     suffix = Path(path).suffix.lower()
@@ -175,48 +173,41 @@ def _save(client: SessionClient, words: str) -> str:
         save_arena(project.arena, path)
     else:
         raise ParameterError(f"a world's file must end in .kad, .kiks or .toml, but it was {shown(path)}.")
-    return ""
 
 
-def _print(client: SessionClient, words: str) -> str:
+def _print(client: SessionClient, words: str) -> None:
     client.last_line = client.session.log(unescape(words))
-    return ""
 
 
-def _print_over(client: SessionClient, words: str) -> str:
+def _print_over(client: SessionClient, words: str) -> None:
     """Replace what this program has printed last, unless the log has got other lines since."""
     client.last_line = client.session.log(unescape(words), over=client.last_line)
-    return ""
 
 
-def _checkpoint(client: SessionClient, words: str) -> str:
+def _checkpoint(client: SessionClient, words: str) -> None:
     client.do(lambda sim: None)
     client.session.mark()
-    return ""
 
 
-def _record(client: SessionClient, words: str) -> str:
+def _record(client: SessionClient, words: str) -> None:
     path = Path(_path(words)) if words else None
     client.do(lambda sim: client.session.record(path))
-    return ""
 
 
-def _film(client: SessionClient, words: str) -> str:
+def _film(client: SessionClient, words: str) -> None:
     number, _, path = words.partition(" ")
     client.begin_film(port_of(number), Path(_path(path)))
-    return ""
 
 
-def _reset(client: SessionClient, words: str) -> str:
+def _reset(client: SessionClient, words: str) -> None:
     client.do(lambda sim: None)
     client.session.reset()
-    return ""
 
 
 # ---- ports ----
 
 
-def _open(client: SessionClient, words: str) -> str:
+def _open(client: SessionClient, words: str) -> None:
     number, _, rest = words.partition(" ")
     (baud,) = numbers_of(rest.split(), 1, "baud")
     if not port_of(number) or not baud > 0:
@@ -224,12 +215,10 @@ def _open(client: SessionClient, words: str) -> str:
             f"a simulated port must be -1, -2 and so on, and have a speed, but it was {shown(words)}. Open [-1 9600 1]."
         )
     client.open(port_of(number), round(baud))
-    return ""
 
 
-def _close(client: SessionClient, words: str) -> str:
+def _close(client: SessionClient, words: str) -> None:
     client.close(port_of(words))
-    return ""
 
 
 def _send(client: SessionClient, words: str) -> str:
@@ -243,9 +232,8 @@ def _ask(client: SessionClient, words: str) -> str:
     return escape(client.send(port_of(number), text + "\n"))
 
 
-def _turrets(client: SessionClient, words: str) -> str:
+def _turrets(client: SessionClient, words: str) -> None:
     client.turrets = turrets_of(words)
-    return ""
 
 
 def _order(client: SessionClient, words: str) -> str:
@@ -260,17 +248,15 @@ def _time(client: SessionClient, words: str) -> str:
     return "" if time_s is None else number_text(time_s)
 
 
-def _pass(client: SessionClient, words: str) -> str:
+def _pass(client: SessionClient, words: str) -> None:
     client.opened(port_of(words)).port.ask_ns()
-    return ""
 
 
-def _pause(client: SessionClient, words: str) -> str:
+def _pause(client: SessionClient, words: str) -> None:
     (seconds,) = numbers_of(words.split(), 1, "a pause")
     if not 0 <= seconds <= PAUSE_MAX_S:
         raise ParameterError(f"a pause must be a time from 0 to {PAUSE_MAX_S:g} s, but it was {seconds:g}.")
     client.pause(seconds)
-    return ""
 
 
 REQUESTS: dict[str, Act] = {

@@ -176,7 +176,7 @@ def ask_set_object(client: SessionClient, words: str) -> str:
     return client.do(set_object)
 
 
-def ask_spawn(client: SessionClient, words: str) -> str:
+def ask_spawn(client: SessionClient, words: str) -> None:
     """Add an object to the world."""
     kind, x, y = numbers_of(words.split(), 3, "type, x and y")
     if kind not in (LIGHT_ROW, BALL_ROW, CYLINDER_ROW):
@@ -215,10 +215,9 @@ def ask_spawn(client: SessionClient, words: str) -> str:
 
     client.do(spawn)
     _tell(client)
-    return ""
 
 
-def ask_delete(client: SessionClient, words: str) -> str:
+def ask_delete(client: SessionClient, words: str) -> None:
     """Remove the objects of some rows."""
     numbers = numbers_of(words.split(), len(words.split()), "rows")
 
@@ -235,7 +234,6 @@ def ask_delete(client: SessionClient, words: str) -> str:
 
     client.do(delete)
     _tell(client)
-    return ""
 
 
 def _tell(client: SessionClient) -> None:
