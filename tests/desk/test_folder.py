@@ -18,8 +18,6 @@ from kiks.errors import ArenaError, KiksError, ParameterError
 from kiks.model.arena import Arena, Lamp
 from kiks.model.limits import UPLOAD_BYTES_MAX
 from kiks.model.project import Project
-from kiks.model.shipped import demonstrations
-from kiks.sim.from_project import simulation_of
 
 PROJECT = Project()
 
@@ -171,10 +169,3 @@ def test_uploads_become_projects():
 def test_invalid_uploads_are_refused(name, data, words):
     with pytest.raises((ArenaError, ParameterError), match=words):
         decode(name, data)
-
-
-@pytest.mark.parametrize("name", demonstrations())
-def test_demonstrations_are_valid_worlds(name):
-    project = Project.load(demonstrations()[name])
-    sim = simulation_of(Project.from_bytes(project.to_bytes()))
-    assert sim.robot_count == len(project.robots)

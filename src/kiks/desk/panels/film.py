@@ -22,9 +22,6 @@ LAST_S = 10.0
 LENGTH_MAX_S = 300.0
 """Longest film [s]."""
 
-SHOW_S = 0.2
-"""Period at which it is shown how much of the film is done [s of real time]."""
-
 
 class FilmDialog:
     """The dialog.
@@ -47,13 +44,13 @@ class FilmDialog:
             self._kind = ui.toggle(endings := list(KINDS["film"].endings), value=endings[0]).props(
                 "dense no-caps data-testid=film-kind"
             )
-            self._bar = ui.linear_progress(0.0, show_value=False).props('aria-label="How much of the film is done"')
+            bar = ui.linear_progress(show_value=False).props('aria-label="How much of the film is done"')
+            bar.bind_value_from(self, "_done")
             with ui.row().classes("w-full justify-end"):
                 ui.button("Close", on_click=self._dialog.close).props("flat no-caps data-testid=film-close")
                 self._make_button = ui.button("Make it", icon="movie", on_click=self._make)
                 self._make_button.props("no-caps data-testid=film-make")
         self._dialog.on_value_change(self._give_up)
-        self._timer = ui.timer(SHOW_S, lambda: self._bar.set_value(self._done), active=False)
 
     @told
     async def open(self) -> None:
@@ -84,14 +81,12 @@ class FilmDialog:
         name = f"kiks-film{self._kind.value}"
         self._done, self._is_given_up = 0.0, False
         self._make_button.disable()
-        self._timer.activate()
         try:
             data = await asyncio.to_thread(
                 self._film, recording, name, start_s, end_s, speed, self._follow.value or None
             )
         finally:
-            self._timer.deactivate()
-            self._bar.set_value(0.0)
+            self._done = 0.0
             self._make_button.enable()
         ui.download.content(data, name)
 

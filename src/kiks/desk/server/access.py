@@ -5,25 +5,19 @@ from __future__ import annotations
 import asyncio
 import html
 import re
-from collections.abc import Awaitable, Callable, MutableMapping
 from pathlib import Path
-from typing import Any
 from urllib.parse import quote, urlencode, urlsplit
 
 from starlette.datastructures import Headers
 from starlette.exceptions import HTTPException
 from starlette.requests import HTTPConnection
 from starlette.responses import HTMLResponse, RedirectResponse
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocketClose
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from kiks.desk.server.token import COOKIE, Token
 from kiks.model.limits import REQUEST_BYTES_MAX
-
-Message = MutableMapping[str, Any]
-Receive = Callable[[], Awaitable[Message]]
-Send = Callable[[Message], Awaitable[None]]
-Application = Callable[[Message, Receive, Send], Awaitable[None]]
 
 LOOPBACK = frozenset({"127.0.0.1", "localhost", "::1"})
 """Host names of this computer."""
@@ -91,17 +85,17 @@ class AccessControl:
         is_local: Whether the desk is for this computer alone.
     """
 
-    def __init__(self, app: Application, key: Token, *, is_local: bool = True) -> None:
+    def __init__(self, app: ASGIApp, key: Token, *, is_local: bool = True) -> None:
         self._app = app
         self._key = key
         self._is_local = is_local
 
-    async def __call__(self, scope: Message, receive: Receive, send: Send) -> None:
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass a request to the application, or refuse it."""
         if scope["type"] not in ("http", "websocket"):
             await self._app(scope, receive, send)
             return
-        answer: Application
+        answer: ASGIApp
         try:
             answer = self._checked(HTTPConnection(scope))
         except HTTPException as refusal:
@@ -110,7 +104,7 @@ class AccessControl:
             answer = HTMLResponse(page, refusal.status_code, headers) if scope["type"] == "http" else WebSocketClose()
         await answer({**scope, "root_path": self._key.place}, receive, send)
 
-    def _checked(self, request: HTTPConnection) -> Application:
+    def _checked(self, request: HTTPConnection) -> ASGIApp:
         """Return what answers a request: the application, or a way to it; else raise the refusal."""
         self._check(request)
         if not self._knows_token(request):
@@ -160,7 +154,7 @@ class AccessControl:
         pairs = (pair.strip().partition("=") for pair in request.headers.get("cookie", "").split(";"))
         return any(each == COOKIE and self._key.fits(value) for each, _, value in pairs)
 
-    def _opens(self, scope: Message, token: str, ticket: str) -> bool:
+    def _opens(self, scope: Scope, token: str, ticket: str) -> bool:
         return self._key.fits(token) or self._key.take(ticket, scope.get("client"), scope.get("server"))
 
     def _cookie(self, headers: Headers) -> str:
@@ -175,7 +169,7 @@ class AccessControl:
         rule = "SameSite=None; Secure; Partitioned" if is_within else "SameSite=Strict"
         return f"{COOKIE}={self._key.token}; Path={self._key.place}; HttpOnly; {rule}"
 
-    async def _pass_on(self, scope: Message, receive: Receive, send: Send) -> None:
+    async def _pass_on(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Call the application; a failure of it after the client has left is none."""
         has_left = False
 

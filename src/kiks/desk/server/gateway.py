@@ -120,10 +120,10 @@ class Gateway:
         self._secret = secrets.token_urlsafe()
         self._seen: tuple[Any, ...] = ()
         self._seeking: set[asyncio.Task[None]] = set()
-        self._scene: dict[str, Any] = {}
+        # The scene, its shapes and the time bar, by their kinds.
+        self._news: dict[str, dict[str, Any]] = {}
+        self._scene_number = 0
         self._picture: tuple[Any, bytes] = (None, b"")
-        self._shapes: dict[str, Any] = {}
-        self._bar: dict[str, Any] = {}
         self._bar_source: tuple[list[Mark], dict[str, Any]] | None = None
         self._frame_count = 0
 
@@ -159,21 +159,21 @@ class Gateway:
         sim.sync()
         if (seen := (desk.scene, *scene_key(sim))) != self._seen:
             self._seen = seen
-            self._scene = describe_scene(sim, self._scene.get("scene", 0) + 1, desk.names())
-            self._scene["secret"] = self._secret
-            self._scene["has_old_coordinates"] = desk.has_old_coordinates
-            self._scene["arena"]["picture"] = f"{self.number}/arena/{self._scene['scene']}.png"
+            self._scene_number += 1
+            scene = describe_scene(sim, self._scene_number, desk.names())
+            scene["arena"]["picture"] = f"{self.number}/arena/{self._scene_number}.png"
+            looks = {"secret": self._secret, "has_old_coordinates": desk.has_old_coordinates}
+            self._news |= {"scene": {**scene, **looks}, "shapes": describe_shapes(sim)}
             if self._picture[0] is not sim.arena:
                 self._picture = sim.arena, arena_picture(sim.arena)
-            self._shapes = describe_shapes(sim)
         self._frame_count += 1
-        if self._frame_count % SHAPES_FRAMES == 0 and (shapes := describe_shapes(sim)) != self._shapes:
-            self._shapes = shapes
+        if self._frame_count % SHAPES_FRAMES == 0 and (shapes := describe_shapes(sim)) != self._news["shapes"]:
+            self._news["shapes"] = shapes
         desk.shown.meter.note(sim.now_ns, is_paused=desk.is_paused)
         self._describe_bar()
         return pack_frame(
             sim,
-            scene=self._scene["scene"],
+            scene=self._scene_number,
             is_paused=desk.is_paused,
             is_driven=desk.programs.drive and desk.past is None,
             speed_now=desk.shown.meter.momentary,
@@ -194,13 +194,13 @@ class Gateway:
         }
         if (source := (looking.marks, state)) != self._bar_source:
             self._bar_source = source
-            self._bar = {**state, "marks": [(*mark[:2], mark.text) for mark in thinned(looking.marks, span)]}
+            self._news["bar"] = {**state, "marks": [(*mark[:2], mark.text) for mark in thinned(looking.marks, span)]}
 
     def _show(self, frame: bytes) -> None:
         for viewer in self._viewers:
-            for message in (self._scene, self._shapes, self._bar):
-                if viewer.sent.get(message["kind"]) != message:
-                    viewer.sent[message["kind"]] = message
+            for kind, message in self._news.items():
+                if viewer.sent.get(kind) != message:
+                    viewer.sent[kind] = message
                     viewer.tell(message)
             if viewer.is_ready:
                 viewer.show(frame)
