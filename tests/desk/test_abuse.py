@@ -172,37 +172,17 @@ def test_malformed_websocket_frames_close_the_socket(shown: Shown, said: list[st
     assert not said
 
 
+MESSAGES = """
+9 4 42 42[] 42{} 42[1] 42[null] 42["event"] 42["event",1] 42["event",{}] 44 42["event",{"client_id":[]}] 451-[] 5
+42["handshake",{}] 42["handshake",{"client_id":1,"tab_id":{}}] 42["javascript_response",{}] 42["ack",{}] 42["log",{}] 6
+42["connect"] 42["disconnect"] 42["event",1e400] 40/nowhere, b4AAAA 41 1 420["event",{}] 2probe 42["\\ud800"]
+45999999-["event",{"_placeholder":true,"num":0}]
+"""
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    "message",
-    [
-        *(
-            "",
-            "9",
-            "4",
-            "42",
-            "42[]",
-            "42{}",
-            "42[1]",
-            "42[null]",
-            '42["event"]',
-            '42["event",1]',
-            '42["event",{}]',
-            "44",
-        ),
-        *('42["event",{"client_id":[]}]', '42["handshake",{}]', '42["handshake",{"client_id":1,"tab_id":{}}]'),
-        *(
-            '42["javascript_response",{}]',
-            '42["ack",{}]',
-            '42["log",{}]',
-            '42["connect"]',
-            '42["disconnect"]',
-            "451-[]",
-        ),
-        *("42" + "[" * 100_000, '42["event",1e400]', f'42["event",{"9" * 5000}]', "40/nowhere,", "b4AAAA", "41", "1"),
-        *('45999999-["event",{"_placeholder":true,"num":0}]', '42["\\ud800"]', '420["event",{}]', "2probe", "5", "6"),
-    ],
-    ids=lambda text: text[:40],
+    "message", ["", "42" + "[" * 100_000, f'42["event",{"9" * 5000}]', *MESSAGES.split()], ids=lambda text: text[:40]
 )
 def test_malformed_events_are_ignored(shown: Shown, caplog: pytest.LogCaptureFixture, message: str, said: Any) -> None:
     with open_socket(shown, EVENTS) as client:

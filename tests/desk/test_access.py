@@ -163,15 +163,7 @@ def test_redirect_with_the_cookie_leads_to_the_desk(path: str, query: bytes) -> 
 RAW = st.one_of(
     st.binary(max_size=40),
     st.sampled_from(
-        [
-            b"http://[",
-            b"http://[::1",
-            b"//",
-            b"http://a]b",
-            b"http://127.0.0.1:99999999",
-            b"\r\nx: y",
-            b"kiks_token=\xff",
-        ]
+        [*b"http://[ http://[::1 // http://a]b http://127.0.0.1:99999999".split(), b"\r\nx: y", b"kiks_token=\xff"]
     ),
 )
 

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from kiks.clock.gate import Gate
 from kiks.desk.server import live_editing
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.live_editing import Editing, Robot
@@ -18,7 +17,6 @@ from kiks.errors import KiksError, LinkError, ParameterError
 from kiks.model import brush
 from kiks.model.arena import Arena, Ball, Cylinder, Lamp, Pose
 from kiks.model.project import Project, ProjectRobot
-from kiks.ports.programs import Programs
 from kiks.sim.from_project import simulation_of
 from kiks.sim.simulation import Simulation
 
@@ -40,19 +38,10 @@ def desk(tmp_path: Path) -> Iterator[Desk]:
         lamps=(Lamp(50, 350),),
     )
     project = Project(arena, robots=(ProjectRobot(turrets=("k213",), name="Ada"),), seed=4)
-    hosts: list[Programs] = []
-
-    def new_programs(sim: Simulation, _commands: object, gate: Gate) -> Programs:
-        hosts.append(Programs(sim, keeps_output=True, new_patience=gate.patience))
-        return hosts[-1]
-
-    sim = simulation_of(project, tmp_path)
-    desk = Desk(sim, project=project, folder=tmp_path, owns_world=True, speed=None, new_programs=new_programs)
+    desk = Desk(simulation_of(project, tmp_path), project=project, folder=tmp_path, owns_world=True, speed=None)
     yield desk
+    desk.clear_away()
     desk.close()
-    # The driver of a desk closes the programs of replaced worlds; this desk has no driver.
-    for host in hosts[:-1]:
-        host.close()
 
 
 @pytest.fixture
