@@ -81,11 +81,6 @@ class Rig:
     angle_deg: Floats
     turn_deg: Floats
 
-    @classmethod
-    def exact(cls, gap_count: int) -> Rig:
-        """Return the rig whose tables are right."""
-        return cls(*np.zeros((3, gap_count)))
-
     def moved(self, samples: Samples) -> Samples:
         """Return the samples with the poses at which they were really taken."""
         turns = (samples.angle_deg - samples.angle_deg.mean(axis=1, keepdims=True)) / 360.0

@@ -6,7 +6,6 @@ Black is floor. Any other colour must stay wall, so each conversion below keeps 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -115,7 +114,7 @@ def _brightness(image: Image.Image) -> npt.NDArray[np.uint8]:
         for top, bottom in bands:
             grey[top:bottom] = _grey_of_deep(np.asarray(band(top, bottom)), white)
         return grey
-    turn = _grey_of_clear if image.has_transparency_data else _GREY.get(image.mode, _grey_of_colour)
+    turn = _grey_of_clear if image.has_transparency_data else _grey_of_colour
     for top, bottom in bands:
         grey[top:bottom] = turn(band(top, bottom))
     return grey
@@ -127,18 +126,13 @@ def _grey_of_clear(image: Image.Image) -> npt.NDArray[np.uint8]:
     return np.where(is_clear, np.uint8(0), _grey_of_colour(layered))
 
 
-def _grey_of_bits(image: Image.Image) -> npt.NDArray[np.uint8]:
-    return np.where(np.asarray(image), np.uint8(255), np.uint8(0))
-
-
 def _grey_of_colour(image: Image.Image) -> npt.NDArray[np.uint8]:
+    if image.mode in ("1", "L"):
+        return np.asarray(image.convert("L"))
     colours = image.convert("RGB")
     grey: npt.NDArray[np.uint8] = np.array(colours.convert("L"))
     grey[(grey == 0) & np.asarray(colours).any(axis=2)] = 1
     return grey
-
-
-_GREY: dict[str, Callable[[Image.Image], npt.NDArray[np.uint8]]] = {"1": _grey_of_bits, "L": np.asarray}
 
 
 def _white(image: Image.Image, low: float, high: float) -> float:

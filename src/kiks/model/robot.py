@@ -51,6 +51,8 @@ DeadBandPwm = Annotated[Number, Field(ge=0, lt=255)]
 Baud = Annotated[Whole, Field(ge=75, le=4_000_000, description="A Khepera's usual is 9600.")]
 Gains = Annotated[tuple[Annotated[Whole, Field(ge=0, le=32767)], ...], Field(min_length=3, max_length=3)]
 _ONE_EACH = Field(min_length=SENSOR_COUNT, max_length=SENSOR_COUNT, description="One for each sensor.")
+Angles = Annotated[tuple[Angle, ...], _ONE_EACH]
+Radii = Annotated[tuple[Annotated[Number, Field(gt=0, le=250)], ...], _ONE_EACH]
 
 
 @record
@@ -120,9 +122,9 @@ class Proximity:
     """
 
     response: Response
-    mount_angle_deg: Annotated[tuple[Angle, ...], _ONE_EACH]
-    mount_radius_mm: Annotated[tuple[Annotated[Number, Field(gt=0, le=250)], ...], _ONE_EACH]
-    direction_deg: Annotated[tuple[Angle, ...], _ONE_EACH]
+    mount_angle_deg: Angles
+    mount_radius_mm: Radii
+    direction_deg: Angles
     field_of_view_deg: Annotated[Number, Field(gt=0, le=180)]
     range_mm: Annotated[Number, Field(ge=1, le=1000)]
     gain: Annotated[tuple[Annotated[Number, Field(ge=0, le=20)], ...], _ONE_EACH]
@@ -197,7 +199,7 @@ class Ambient:
     """
 
     model: Annotated[str, OneOf(AMBIENT_MODELS)]
-    direction_deg: Annotated[tuple[Angle, ...], _ONE_EACH]
+    direction_deg: Angles
     dark_counts: Annotated[Number, Field(ge=0, le=1023)]
     noise_counts: Annotated[Number, Field(ge=0, le=1023)]
     background_counts: Annotated[Number, Field(ge=0, le=1023)]

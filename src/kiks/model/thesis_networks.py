@@ -16,7 +16,7 @@ from pydantic import Field
 
 from kiks.model.atomic_files import replace_file
 from kiks.model.data_file import Number, check, parse_json, read_file, record
-from kiks.model.robot import SENSOR_COUNT, Angle
+from kiks.model.robot import SENSOR_COUNT, Angles, Radii
 
 INPUT_COUNT, TANH_COUNT, LINEAR_COUNT = 7, 13, 7
 """Rays, neurons of the first and of the second hidden layer (thesis 3.3)."""
@@ -32,7 +32,6 @@ Numbers = NDArray[np.float64]
 Weight = Annotated[Number, Field(ge=-1e6, le=1e6)]
 Inputs = Annotated[tuple[Weight, ...], Field(min_length=INPUT_COUNT + 1, max_length=INPUT_COUNT + 1)]
 Bent = Annotated[tuple[Weight, ...], Field(min_length=TANH_COUNT + 1, max_length=TANH_COUNT + 1)]
-Angles = Annotated[tuple[Angle, ...], _ONE_EACH]
 
 
 @record
@@ -51,7 +50,7 @@ class NetworkResponse:
     """
 
     mount_angle_deg: Angles
-    mount_radius_mm: Annotated[tuple[Annotated[Number, Field(gt=0, le=250)], ...], _ONE_EACH]
+    mount_radius_mm: Radii
     direction_deg: Angles
     field_of_view_deg: Annotated[Number, Field(gt=0, le=180)]
     range_mm: Annotated[Number, Field(ge=1, le=1000)]

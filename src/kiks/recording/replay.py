@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from threading import RLock
-from typing import NamedTuple
 
 from kiks.model.checks import CLOCK_END_NS
 from kiks.recording.entries import Entry
@@ -21,20 +20,6 @@ from kiks.sim.saved_state import SavedState
 from kiks.sim.simulation import Simulation
 from kiks.sim.wire import Wire, ignore_reply
 from kiks.units import s_from_ns
-
-
-class Place(NamedTuple):
-    """Where a replay may begin.
-
-    Attributes:
-        row: The last entry that was applied.
-        row_ns: When that was [ns].
-        saved: The state after it.
-    """
-
-    row: Row
-    row_ns: int
-    saved: SavedState
 
 
 class Replay:
@@ -63,9 +48,9 @@ class Replay:
         self._on_check = on_check
         self.next_ns = NEVER_NS
         self._next: Entry | None = None
-        place = self._recorded_before(time_ns)
-        self.sim = place.saved.simulation(lock)
-        self._begin(place)
+        row, saved = self._recorded_before(time_ns)
+        self.sim = saved.simulation(lock)
+        self._begin(row, saved)
         self.sim.loop.supervisor = self
         self.sim.advance_to(time_ns)
 
@@ -81,25 +66,26 @@ class Replay:
         """
         sim = self.sim
         if not 0 <= time_ns - sim.now_ns <= CHECK_NS:
-            place = self._recorded_before(time_ns)
-            if not place.saved.can_restore(sim):
+            row, saved = self._recorded_before(time_ns)
+            if not saved.can_restore(sim):
                 return False
-            self._begin(place)
+            self._begin(row, saved)
             for wire in sim.wires:
                 wire.restart_log(sim.now_ns)
         sim.advance_to(time_ns)
         return True
 
-    def _recorded_before(self, time_ns: int) -> Place:
+    def _recorded_before(self, time_ns: int) -> tuple[Row, SavedState]:
+        """Return the last recorded state before a time [ns], and the place of its entry."""
         row = self._log.row_before(time_ns)
         saved = self._log.state_of(self._log.entry(row))
         if time_ns - saved.now_ns > CHECK_NS:
             raise self._log.damaged(f"a part is missing after {s_from_ns(saved.now_ns):.3f} s")
-        return Place(row, saved.now_ns, saved)
+        return row, saved
 
-    def _begin(self, place: Place) -> None:
-        place.saved.restore(self.sim)
-        self._row, self._row_ns = place.row, place.row_ns
+    def _begin(self, row: Row, saved: SavedState) -> None:
+        saved.restore(self.sim)
+        self._row, self._row_ns = row, saved.now_ns
         self._find_next()
 
     def let_go(self) -> Simulation:
