@@ -99,6 +99,15 @@ def test_every_response_is_that_of_the_wire(response: str) -> None:
         assert found == (rollouts.step_counts[world], batch.state_hash(world))
 
 
+@pytest.mark.parametrize("kind", ["linear", "mlp", "elman", "ctrnn", "gru", "plastic"])
+def test_controllers_that_come_with_kiks_agree(kind: str) -> None:
+    controller, timing = getattr(kiks.controllers, kind)(), kiks.Timing(0.1, 9600)
+    parameters = kiks.controllers.random_parameters(controller, 1, seed=7)[0]
+    batch = kiks.Batch(arena(), worlds=1, seed=8, timing=timing)
+    rollouts = batch.run(controller, parameters, seconds=8.0)
+    assert drive_alone(arena(), 8, timing, controller, parameters) == (rollouts.step_counts[0], batch.state_hash(0))
+
+
 def test_one_program_with_a_controller_for_each_robot() -> None:
     timing = kiks.Timing(0.1, 19200)
     batch = kiks.Batch(arena(ball=True), worlds=2, robots=3, seed=5, timing=timing)

@@ -218,37 +218,6 @@ def test_the_weights_of_a_plastic_network_stay_between_0_and_1() -> None:
             assert abs(wheels).max() <= 10.0
 
 
-READY_MADE = [
-    kiks.controllers.plastic(neurons=3),
-    kiks.controllers.linear(),
-    kiks.controllers.linear(feedback=True),
-    kiks.controllers.mlp(),
-    kiks.controllers.elman(units=3),
-    kiks.controllers.ctrnn(neurons=3),
-    kiks.controllers.gru(units=3),
-]
-
-
-@pytest.mark.parametrize("controller", READY_MADE, ids=lambda each: each.name)
-def test_batch_and_wire_agree(controller: kiks.Controller) -> None:
-    arena = kiks.Arena.box(300, 300)
-    parameters = kiks.controllers.random_parameters(controller, 1, seed=7)[0]
-    batch = kiks.Batch(arena, worlds=1, seed=8)
-    batch.run(controller, parameters, seconds=2.0)
-    sim = kiks.Simulation(arena, seed=8, thinking="none")
-    port: Any = sim.port(1)
-    hashes, send = [], port.write
-
-    def note_and_send(data: bytes) -> int:
-        hashes.append(sim.state_hash())
-        return int(send(data))
-
-    port.write = note_and_send
-    kiks.drive(port, controller, parameters, seconds=2.0)
-    # The last that is sent stops the robot.
-    assert hashes[-1] == batch.state_hash(0)
-
-
 def test_random_parameters() -> None:
     controller = kiks.controllers.linear()
     drawn = kiks.controllers.random_parameters(controller, 1000, seed=1)

@@ -101,7 +101,6 @@ def test_scores_of_drives() -> None:
 def test_place_measures() -> None:
     radius_mm = 120.0
     trace = Trace(
-        kiks.measures.coverage(arena(), square_mm=50),
         kiks.measures.goal_mm(*PLACE_MM),
         kiks.measures.reached_s(*PLACE_MM, radius_mm=radius_mm),
         kiks.measures.light_mm,
@@ -113,29 +112,27 @@ def test_place_measures() -> None:
         kiks.measures.closest_mm(*PLACE_MM),
     )
     for world in range(WORLDS):
-        squares = {(int(x // 50), int(y // 50)) for x, y in trace.places_mm[world]}
-        assert trace.values[0, world] == len(squares) / 80
         far_mm = trace.far_mm(*PLACE_MM)[world]
-        assert trace.values[1, world] == pytest.approx(far_mm[-1])
-        assert trace.values[9, world] == pytest.approx(far_mm.min())
+        assert trace.values[0, world] == pytest.approx(far_mm[-1])
+        assert trace.values[8, world] == pytest.approx(far_mm.min())
         arrived = np.flatnonzero(far_mm <= radius_mm)
-        assert trace.values[2, world] == trace.times_s[world, arrived[0] if len(arrived) else -1]
+        assert trace.values[1, world] == trace.times_s[world, arrived[0] if len(arrived) else -1]
     lamp_mm = trace.far_mm(100, 350)
-    np.testing.assert_allclose(trace.values[3], lamp_mm[:, -1])
-    np.testing.assert_allclose(trace.values[4], (lamp_mm <= radius_mm).mean(axis=1))
+    np.testing.assert_allclose(trace.values[2], lamp_mm[:, -1])
+    np.testing.assert_allclose(trace.values[3], (lamp_mm <= radius_mm).mean(axis=1))
     start_mm = np.hypot(*(trace.starts_mm - (100, 350)).T)
     made = np.maximum(1 - lamp_mm / start_mm[:, None], 0)
-    np.testing.assert_allclose(trace.values[5], made.mean(axis=1))
-    assert trace.values[5].max() > 0
+    np.testing.assert_allclose(trace.values[4], made.mean(axis=1))
+    assert trace.values[4].max() > 0
     last_away = [np.flatnonzero(np.append(True, each > radius_mm))[-1] for each in lamp_mm]
     stays_s = [trace.periods_s[world, first:].sum() for world, first in enumerate(last_away)]
-    np.testing.assert_allclose(trace.values[6], stays_s)
+    np.testing.assert_allclose(trace.values[5], stays_s)
     # Nothing has moved the cylinders since the last step, or next to nothing.
     places_mm = np.stack([trace.batch.state.bodies["x_mm"], trace.batch.state.bodies["y_mm"]], axis=-1)
     within = (np.hypot(*np.moveaxis(places_mm - PLACE_MM, -1, 0)) <= radius_mm).sum(axis=1)
-    np.testing.assert_array_equal(trace.values[7], within)
+    np.testing.assert_array_equal(trace.values[6], within)
     spread_mm = np.sqrt(((places_mm - places_mm.mean(axis=1, keepdims=True)) ** 2).sum(axis=2).mean(axis=1))
-    np.testing.assert_allclose(trace.values[8], spread_mm, atol=5.0)
+    np.testing.assert_allclose(trace.values[7], spread_mm, atol=5.0)
 
 
 def moment(**given: Any) -> Any:

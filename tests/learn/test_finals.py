@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import signal
-import subprocess
-import sys
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
@@ -14,7 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from tests.at_length import at_length, cases
+from tests.at_length import cases
 from tests.learn.small import small
 
 import kiks
@@ -199,29 +196,6 @@ def test_the_finals_of_a_complete_folder_are_not_held_again(tmp_path: Path) -> N
         again.run(generations=6, executor=executor, each_round=never)
     assert outcome(again) == outcome(whole)
     assert result_of(again).seconds == finals_of(whole).seconds
-
-
-KILLED = """
-import os, signal, sys, kiks
-def kill(number, sizes):
-    if number == 1:
-        os.kill(os.getpid(), signal.SIGKILL)
-task = kiks.tasks.avoid(seconds=1.0, worlds=3)
-evolution = kiks.Evolution(task, "cma", population=8, seed=3, folder=sys.argv[1])
-evolution.run(generations=6, each_round=kill)
-"""
-
-
-@at_length
-def test_finals_in_which_the_process_was_killed_are_held_again(tmp_path: Path) -> None:
-    ended = subprocess.run([sys.executable, "-c", KILLED, str(tmp_path / "killed")], check=False)
-    assert ended.returncode == -signal.SIGKILL
-    again = evolution_of(folder=tmp_path / "killed")
-    assert (len(again.generations), again.finals) == (6, None)
-    whole = run(folder=tmp_path / "whole")
-    again.run(generations=6)
-    assert outcome(again) == outcome(whole)
-    assert (tmp_path / "killed/champion.toml").read_bytes() == (tmp_path / "whole/champion.toml").read_bytes()
 
 
 @pytest.mark.parametrize("when", cases(["each", "each_round"]))

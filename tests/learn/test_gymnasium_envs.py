@@ -42,6 +42,11 @@ def vector(count: int = 3, **options: Any) -> KheperaVectorEnv:
     return KheperaVectorEnv(count, "Avoid", **options)
 
 
+def begun(env: Any) -> Any:
+    env.reset(seed=0)
+    return env
+
+
 def random_actions(*shape: int) -> Any:
     return np.random.default_rng(5).uniform(-1, 1, (*shape, 2)).astype(np.float32)
 
@@ -227,22 +232,6 @@ def test_arguments_change_timing_and_response() -> None:
 
 
 @pytest.mark.parametrize(
-    ("action", "message"),
-    [
-        (np.array([0.0, 1.5]), "from -1 to 1, but among them was 1.5"),
-        (np.array([0.0, np.nan]), "from -1 to 1, but among them was nan"),
-        (np.zeros(3), "two for each robot"),
-        ("ahead", "two for each robot"),
-    ],
-)
-def test_wrong_actions_are_errors(action: Any, message: str) -> None:
-    env = KheperaEnv("Avoid")
-    env.reset(seed=0)
-    with pytest.raises(ParameterError, match=message):
-        env.step(action)
-
-
-@pytest.mark.parametrize(
     ("make", "message"),
     [
         (lambda: KheperaEnv("Avoit"), "Did you mean 'Avoid'"),
@@ -254,6 +243,10 @@ def test_wrong_actions_are_errors(action: Any, message: str) -> None:
         (lambda: without_contacts(kiks.measures.path_mm, -1), "cost must be from 0 to 1e6, but it was -1"),
         (lambda: without_contacts(print), "reward must be a kiks.Measure"),  # type: ignore[arg-type]
         (lambda: KheperaEnv("Avoid").step(np.zeros(2, np.float32)), "reset"),
+        (lambda: begun(KheperaEnv("Avoid")).step(np.array([0.0, 1.5])), "from -1 to 1, but among them was 1.5"),
+        (lambda: begun(KheperaEnv("Avoid")).step(np.array([0.0, np.nan])), "from -1 to 1, but among them was nan"),
+        (lambda: begun(KheperaEnv("Avoid")).step(np.zeros(3)), "two for each robot"),
+        (lambda: begun(KheperaEnv("Avoid")).step("ahead"), "two for each robot"),
         (lambda: vector().step(np.zeros((3, 2), np.float32)), "reset"),
         (lambda: KheperaTeam(robots=40, arenas=kiks.Arena.box(500, 500)).reset(seed=1), "room for 40 robots"),
         (lambda: vector().reset(seed=[1]), "one for each of 3 worlds"),

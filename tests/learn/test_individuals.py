@@ -131,16 +131,13 @@ def test_a_task_that_cannot_be_found_is_an_error(tmp_path: Path) -> None:
     assert not list((tmp_path / "nothing").iterdir())
 
 
-@pytest.mark.parametrize(
-    ("given", "message"),
-    [
+def test_numbers_out_of_range_are_errors(tmp_path: Path) -> None:
+    task = kiks.tasks.avoid(seconds=1.0, worlds=3)
+    evolved(task, tmp_path)
+    for given, message in (
         ({"generation": 4}, "generation must be a whole number from 1 to 3"),
         ({"generation": 1, "rank": 7}, "rank must be a whole number from 1 to 6"),
         ({"generation": 1, "world": 3}, "world must be a whole number from 0 to 2"),
-    ],
-)
-def test_numbers_out_of_range_are_errors(given: dict[str, int], message: str, tmp_path: Path) -> None:
-    task = kiks.tasks.avoid(seconds=1.0, worlds=3)
-    evolved(task, tmp_path)
-    with pytest.raises(ParameterError, match=message):
-        individual_of(tmp_path, task=task, **given)
+    ):
+        with pytest.raises(ParameterError, match=message):
+            individual_of(tmp_path, task=task, **given)

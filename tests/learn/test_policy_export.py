@@ -23,16 +23,8 @@ FUNCTIONS: dict[str, Any] = {"tanh": np.tanh, "relu": lambda x: np.maximum(x, 0)
 SQUASHES: dict[str, Any] = {"tanh": np.tanh, "clip": lambda x: np.clip(x, -1, 1)}
 
 
-class Tanh:
-    """An activation as PyTorch has it."""
-
-
-class ReLU:
-    """Another."""
-
-
-class ELU:
-    """One that no controller has."""
+Tanh, ReLU, ELU = (type(name, (), {}) for name in ("Tanh", "ReLU", "ELU"))
+"""Activations as PyTorch names them; no controller has the last one."""
 
 
 def network(counts: tuple[int, ...], seed: int = 1) -> list[Layer]:
