@@ -20,8 +20,8 @@ from kiks.desk.server.show import Driver
 from kiks.errors import LinkError, ParameterError
 from kiks.model.project import Project
 from kiks.ports.program_process import Command
-from kiks.recording.check import check_recording
 from kiks.recording.mcap_file import McapReader, Room
+from kiks.recording.replay import check_recording
 from kiks.recording.ring import Ring
 from kiks.sim.from_project import simulation_of
 from kiks.units import NS_PER_S
@@ -204,12 +204,12 @@ def test_a_recording_of_the_user_goes_on_beside_the_past(tmp_path: Path) -> None
 
 
 def test_of_a_long_past_the_oldest_goes(monkeypatch: pytest.MonkeyPatch) -> None:
-    few_bytes(monkeypatch, 80_000)
+    few_bytes(monkeypatch, 16_000)
     sim, hashes = make_sim(), {}
     with desk_of(sim) as desk:
         for _ in range(20):
             drive(sim, 1.0, hashes)
-            assert file_bytes(desk) <= 80_000
+            assert file_bytes(desk) <= 16_000
             run(desk.looking.tend())
         (message,) = told(desk)
         assert "The time bar now begins at" in message
@@ -240,7 +240,8 @@ def file_bytes(desk: Desk) -> int:
 
 
 def few_bytes(monkeypatch: pytest.MonkeyPatch, bytes_max: int) -> None:
-    """Let temporary recordings have few bytes, and write each checkpoint at once."""
+    """Let temporary recordings have few bytes, and write each checkpoint at once, with its state."""
+    monkeypatch.setattr("kiks.recording.recorder.STATE_US", 0)
     monkeypatch.setattr("kiks.recording.recorder.CHUNK_S", 0.0)
     monkeypatch.setattr("kiks.recording.ring.BYTES_MAX", bytes_max)
 

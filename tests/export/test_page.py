@@ -201,8 +201,8 @@ def test_there_is_a_scene_for_each_change(rich: Path) -> None:
     run = RunFrames(Recording(rich).log)
     counts = [(len(scene["robots"]), len(scene["bodies"]), scene["arena"]["picture"]) for scene in run.scenes]
     assert counts == [(2, 1, 0), (2, 2, 0), (2, 2, 1), (3, 2, 1)]
-    assert run.equal_count == run.checkpoint_count > 10
-    assert run.state_hash == run.last.state_hash()
+    assert run.replay.equal_count == run.replay.check_count > 10
+    assert run.replay.state_hash == run.replay.sim.state_hash()
 
 
 @at_length

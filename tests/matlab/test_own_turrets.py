@@ -9,7 +9,7 @@ from tests.at_length import at_length
 from tests.matlab.octave import Octave, need_tcp, needs_octave, run
 
 from kiks import Recording
-from kiks.recording.check import check_recording
+from kiks.recording.replay import check_recording
 
 pytestmark = [needs_octave, pytest.mark.slow]
 

@@ -8,7 +8,7 @@ import pytest
 from tests.matlab.octave import Octave, needs_octave, run
 
 from kiks import Recording
-from kiks.recording.check import Checked, check_recording
+from kiks.recording.replay import check_recording
 
 pytestmark = [needs_octave, pytest.mark.slow]
 
@@ -38,7 +38,7 @@ def test_a_session_is_recorded_until_it_is_told_to_stop(tmp_path: Path) -> None:
     assert [int(row["counts"].max()) for row in recording.table("readings")][-1] == octave.said["reading"]
     assert len(recording.table("readings")) == 20
     assert any(row["kind"] == "change" for row in recording.table("events"))
-    assert check_recording(recording.log) == Checked(1 + int(recording.duration_s))
+    assert check_recording(recording.log).equal_count == 1 + int(recording.duration_s)
 
 
 FIRST = """

@@ -23,12 +23,11 @@ from kiks.export import foxglove
 from kiks.firmware.general_io import GeneralIO
 from kiks.firmware.turret import Orders, Turret
 from kiks.model.arena import Lamp
-from kiks.recording.check import Checked, check_recording
 from kiks.recording.events import EventReader
 from kiks.recording.log import RecordedLog
 from kiks.recording.mcap_file import room_of
 from kiks.recording.recorder import RunWriter
-from kiks.recording.replay import Replay
+from kiks.recording.replay import Replay, check_recording
 from kiks.recording.ring import Ring
 from kiks.sim.console import type_lines
 from kiks.sim.drag import Drags
@@ -288,14 +287,17 @@ def test_events_of_a_recording_that_grows_are_read_as_they_come(tmp_path: Path) 
             Khepera(sim.port(2)).set_speed(12, 12)
             recorder.mark(str(count))
             recorder.flush()
-            found += reader.read()
+            found += [*reader.contacts(), *reader.notes()]
             assert found[-1].kind == "bookmark"
             assert log.end_ns == sim.now_ns
             assert Replay(log, sim.now_ns).sim.state_hash() == sim.state_hash()
     RunWriter.of(sim).flush()
-    found += reader.read()
+    found += [*reader.contacts(), *reader.notes()]
     table = Recording(tmp_path / "run.mcap").table("events")
-    assert [(event.time_s, event.robot, event.kind, event.text) for event in found] == table.tolist()
+    found.sort(key=lambda event: event.time_s)
+    # Of a contact, it is known within which 40 ms it began; others begin where the recording was read before.
+    np.testing.assert_allclose([event.time_s for event in found], table["time_s"], rtol=0.0, atol=0.04)
+    assert [(event.robot, event.kind, event.text) for event in found] == [tuple(row)[1:] for row in table.tolist()]
     assert {"contact", "bookmark"} <= set(table["kind"])
 
 
@@ -326,7 +328,7 @@ def test_the_project_is_the_world_at_the_beginning(tmp_path: Path) -> None:
     assert recording.about["kiks"] == kiks.__version__
 
 
-def test_another_run_is_told_with_its_first_tick(tmp_path: Path) -> None:
+def test_another_run_is_told_with_its_first_second(tmp_path: Path) -> None:
     sim = Simulation(Arena.box(300, 300), seed=1)
     recording = recorded(sim, tmp_path / "run.mcap", lambda sim: drive(sim, 4.0))
     found = recording.log.next_input
@@ -347,9 +349,7 @@ def test_another_run_is_told_with_its_first_tick(tmp_path: Path) -> None:
     checked = check_recording(recording.log)
     assert checked.equal_count == 2
     assert checked.differs_ns == 3_000_000_000
-    assert checked.first_tick is not None
-    assert 0 < checked.first_tick * 1e7 - changed_ns[0] < 5e7
-    assert check_recording(Recording(tmp_path / "run.mcap").log) == Checked(5)
+    assert check_recording(Recording(tmp_path / "run.mcap").log).equal_count == 5
 
 
 def test_a_closed_recording_takes_no_bookmark(tmp_path: Path) -> None:
@@ -404,7 +404,7 @@ def test_a_file_that_can_grow_no_more_is_read_up_to_there(
     recorder = sim.record(tmp_path / "run.mcap")
     drive(sim, 1.0)
     try:
-        resource.setrlimit(resource.RLIMIT_FSIZE, ((tmp_path / "run.mcap").stat().st_size + 20_000, before[1]))
+        resource.setrlimit(resource.RLIMIT_FSIZE, ((tmp_path / "run.mcap").stat().st_size + 2_000, before[1]))
         drive(sim, 5.0)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
@@ -426,7 +426,7 @@ def test_a_file_that_can_grow_no_more_is_read_up_to_there(
 def test_a_recording_leaves_a_reserve_of_its_disk_free(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    file, reserve_bytes, size = tmp_path / "run.mcap", 128 << 20, 40_000
+    file, reserve_bytes, size = tmp_path / "run.mcap", 128 << 20, 5_000
 
     def disk_usage(folder: Path) -> SimpleNamespace:
         assert folder == tmp_path

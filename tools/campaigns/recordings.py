@@ -21,12 +21,11 @@ from kiks.engine.state import BODY, ROBOT
 from kiks.export.figures import save_figures
 from kiks.export.film import save_film
 from kiks.export.page import save_page
-from kiks.recording import motion as motion_block
-from kiks.recording.check import check_recording
 from kiks.recording.entries import Columns, Entry, block_of
 from kiks.recording.log import HASH_LENGTH
 from kiks.recording.mcap_file import McapFile, McapReader
 from kiks.recording.recorder import PROGRAMS, RunRecorder
+from kiks.recording.replay import check_recording
 from kiks.recording.tables import TABLES
 from kiks.sim.run_log import Kind
 
@@ -38,12 +37,12 @@ class Parts:
     Args:
         attachments: Its attachments, by name.
         told: Its metadata.
-        blocks: For each chunk the entries of the log, and the motion.
+        blocks: For each chunk the entries of the log.
     """
 
     attachments: dict[str, bytes]
     told: dict[str, str]
-    blocks: list[tuple[list[Entry] | bytes, bytes]] = field(default_factory=list)
+    blocks: list[list[Entry] | bytes] = field(default_factory=list)
 
     @classmethod
     def of(cls, path: Path) -> Parts:
@@ -51,8 +50,7 @@ class Parts:
         reader = McapReader(path)
         parts = cls(dict(reader.attachments), dict(reader.told))
         for block in reader.blocks:
-            log, motion = reader.read(block)
-            parts.blocks.append((list(Columns.of_block(log, "log").entries()), motion))
+            parts.blocks.append(list(Columns.of_block(reader.read(block), "log").entries()))
         return parts
 
     def save(self, path: Path) -> None:
@@ -61,28 +59,27 @@ class Parts:
         for name, data in self.attachments.items():
             file.attach(name, data, "application/json")
         file.describe("run", self.told)
-        for entries, motion in self.blocks:
+        for entries in self.blocks:
             time_ns, log = 0, entries
             if not isinstance(entries, bytes):
                 time_ns = min(max(entries[0].time_ns, 0), 2**63) if entries else 0
                 log = block_of([value for entry in entries for value in entry])
-            file.write(time_ns, log, motion)
+            file.write(time_ns, log)
         file.close()
 
     def with_entry(self, is_meant: Callable[[Entry], bool], change: Callable[[Entry], Entry]) -> Parts:
         """Return these parts with the entries changed that are meant."""
-        blocks = [([change(each) if is_meant(each) else each for each in rows], motion) for rows, motion in self.blocks]
+        blocks = [[change(each) if is_meant(each) else each for each in rows] for rows in self.blocks]
         return replace(self, blocks=blocks)
-
-    def with_motion(self, name: str, value: float) -> Parts:
-        """Return these parts with a field of all robots' or all bodies' records in the motion set to a number."""
-        return replace(self, blocks=[(entries, _seen_with(motion, name, value)) for entries, motion in self.blocks])
 
     def with_records(self, name: str, value: float) -> Parts:
         """Return these parts with a field of all robots' or all bodies' records in all states set to a number."""
-        return self.with_entry(
-            lambda entry: entry.kind in (Kind.STATE, Kind.CHECK), lambda entry: _set(entry, name, value)
-        )
+        return self.with_entry(has_state, lambda entry: _set(entry, name, value))
+
+
+def has_state(entry: Entry) -> bool:
+    """Return whether an entry has a state."""
+    return entry.kind == Kind.STATE or (entry.kind == Kind.CHECK and len(entry.data) > HASH_LENGTH)
 
 
 def _set(entry: Entry, name: str, value: float) -> Entry:
@@ -99,23 +96,6 @@ def _set(entry: Entry, name: str, value: float) -> Entry:
             if name in each.dtype.names:
                 each[name] = np.float64(value).astype(each.dtype[name].base)
     return entry._replace(data=entry.data[:end] + bytes(records))
-
-
-def _seen_with(motion: bytes, name: str, value: float) -> bytes:
-    """Return a block of motion with a field of its records set to a number."""
-    data, offset = bytearray(motion), 0
-    while offset + motion_block._HEAD.size <= len(data):
-        samples, robots, bodies = motion_block._HEAD.unpack_from(data, offset)
-        offset += motion_block._HEAD.size + samples * 8
-        for kind, count in ((motion_block.WRITTEN, samples * robots), (BODY, samples * bodies)):
-            if offset + count * kind.itemsize > len(data):
-                return motion
-            records: Any = np.frombuffer(data, kind, count, offset)
-            if name in records.dtype.names:
-                with np.errstate(invalid="ignore"):
-                    records[name] = np.float64(value).astype(records.dtype[name].base)
-            offset += count * kind.itemsize
-    return bytes(data)
 
 
 @cache
@@ -155,11 +135,11 @@ def strange_recording(rng: random.Random) -> bytes:
     """Return a recording with a few hostile parts, whose checksums are right."""
     parts = sound_parts()
     for _ in range(rng.choice((1, 1, 1, 2, 3))):
-        parts = rng.choice(
-            (_attachment, _state_text, _state_bytes, _field, _numbers, _numbers, _rows, _motion, _seen, _seen, _program)
-        )(rng, parts)
+        parts = rng.choice((_attachment, _state_text, _state_bytes, _field, _numbers, _numbers, _rows, _program))(
+            rng, parts
+        )
     if rng.random() < 0.03:
-        parts = rng.choice((many_parts, many_entries))(parts)
+        parts = many_entries(parts)
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "strange.mcap"
         parts.save(file)
@@ -173,7 +153,7 @@ def _attachment(rng: random.Random, parts: Parts) -> Parts:
 
 
 def _is_state(rng: random.Random) -> Callable[[Entry], bool]:
-    return lambda entry: entry.kind in (Kind.STATE, Kind.CHECK) and rng.random() < 0.5
+    return lambda entry: has_state(entry) and rng.random() < 0.5
 
 
 def _state_text(rng: random.Random, parts: Parts) -> Parts:
@@ -217,29 +197,18 @@ def _rows(rng: random.Random, parts: Parts) -> Parts:
     """Return parts with other rows, blocks or data of entries."""
     blocks = list(parts.blocks)
     choice, number = rng.random(), rng.randrange(len(blocks))
-    entries, motion = blocks[number]
+    entries = blocks[number]
     if choice < 0.2:
         del blocks[number]
     elif choice < 0.4:
         blocks.insert(rng.randrange(len(blocks)), blocks[number])
     elif choice < 0.6:
-        blocks[number] = (rng.sample(entries, rng.randint(0, len(entries))), motion)
+        blocks[number] = rng.sample(entries, rng.randint(0, len(entries)))
     else:
-        changed = [each._replace(data=mutated(rng, each.data)) if rng.random() < 0.3 else each for each in entries]
-        blocks[number] = (changed, motion)
+        blocks[number] = [
+            each._replace(data=mutated(rng, each.data)) if rng.random() < 0.3 else each for each in entries
+        ]
     return replace(parts, blocks=blocks or parts.blocks)
-
-
-def _motion(rng: random.Random, parts: Parts) -> Parts:
-    return replace(parts, blocks=[(entries, mutated(rng, motion)) for entries, motion in parts.blocks])
-
-
-def _seen(rng: random.Random, parts: Parts) -> Parts:
-    """Return parts with a number in the motion set to another."""
-    kind: Any = motion_block.WRITTEN if rng.random() < 0.6 else BODY
-    return parts.with_motion(
-        rng.choice(kind.names), float(rng.choice([n for n in NUMBERS if not isinstance(n, int) or abs(n) < 2**1000]))
-    )
 
 
 def _program(rng: random.Random, parts: Parts) -> Parts:
@@ -249,19 +218,13 @@ def _program(rng: random.Random, parts: Parts) -> Parts:
     return replace(parts, attachments={**parts.attachments, f"{PROGRAMS}1-{name}": text})
 
 
-def many_parts(parts: Parts) -> Parts:
-    """Return parts with a motion of millions of empty samples, which a few kilobytes hold."""
-    empty = np.array([1, 0, 0], "<u4").tobytes() + bytes(8)
-    return replace(parts, blocks=[*parts.blocks[:-1], (parts.blocks[-1][0], empty * 2_000_000)])
-
-
 def many_entries(parts: Parts) -> Parts:
     """Return parts with a million empty lines of output."""
     columns = np.zeros((6, 1_000_000), "<i8")
     columns[0] = Kind.TEXT
     columns[1] = max((each.time_ns for each in parts.blocks[-1][0] if isinstance(each, Entry)), default=0)
     block = np.uint32(columns.shape[1]).tobytes() + columns.tobytes()
-    return replace(parts, blocks=[*parts.blocks, (block, b"")])
+    return replace(parts, blocks=[*parts.blocks, block])
 
 
 def use(path: Path) -> None:

@@ -12,7 +12,7 @@ from kiks.cli.engine_start import ready_engine
 from kiks.cli.options import say
 from kiks.cli.outputs import leave_out
 from kiks.errors import ParameterError, counted
-from kiks.units import TICK_NS, s_from_ns
+from kiks.units import s_from_ns
 from kiks.version import __version__
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ def replay(
 
 def _check(recording: Recording, file: Path) -> int:
     """Check a recording, and say what was found; return the exit code."""
-    from kiks.recording.check import check_recording
+    from kiks.recording.replay import check_recording
 
     found = check_recording(recording.log)
     if found.differs_ns is None and not found.equal_count:
@@ -74,11 +74,7 @@ def _check(recording: Recording, file: Path) -> int:
         )
         return 0
     where = f"{counted(found.equal_count, 'checkpoint')} equal, that of {s_from_ns(found.differs_ns):.3f} s differs."
-    tick = ""
-    if found.first_tick is not None:
-        tick_s = s_from_ns(found.first_tick * TICK_NS)
-        tick = f" Tick {found.first_tick} (at {tick_s:.2f} s) is the first that moves a robot otherwise."
-    typer.echo(f"Another run: {where}{tick}")
+    typer.echo(f"Another run: {where}")
     if version != __version__:
         typer.echo(f"KiKS {version} has recorded it, and this is KiKS {__version__}.")
     return 1

@@ -100,7 +100,7 @@ def _of_moments(recording: Recording) -> Iterator[Message]:
 
 
 def _of_events(recording: Recording) -> Iterator[Message]:
-    for event in EventReader(recording.log).read():
+    for event in EventReader(recording.log).notes():
         if event.kind in ("output", "bookmark"):
             name, time_ns = (f"robot {event.robot}" if event.robot else "bookmark"), ns_from_s(event.time_s)
             line = {"level": _LEVEL_INFO, "message": event.text, "name": name, "file": "", "line": 0}

@@ -77,7 +77,7 @@ def _arena(recording: Recording) -> str:
 
 def _kinds(frames: RunFrames) -> str:
     """Return which robots there are in the end."""
-    kinds = Counter(spec.name for spec in frames.last.specs)
+    kinds = Counter(spec.name for spec in frames.replay.sim.specs)
     return ", ".join(f"{count} x {kind}" if count > 1 else kind for kind, count in kinds.items()) or "no robot"
 
 
@@ -90,8 +90,10 @@ def _facts(recording: Recording, frames: RunFrames) -> list[tuple[str, str]]:
         if sim.turrets(number)
     ]
     things = Counter(body["what"] for body in frames.scenes[0]["bodies"]) + Counter(lamp=len(sim.lamps))
-    made_again = f"{frames.equal_count} of {counted(frames.checkpoint_count, 'checkpoint')} the same, to the bit"
-    if not frames.checkpoint_count:
+    made_again = (
+        f"{frames.replay.equal_count} of {counted(frames.replay.check_count, 'checkpoint')} the same, to the bit"
+    )
+    if not frames.replay.check_count:
         made_again = "it has no checkpoint"
     rows = [
         ("Duration", f"{recording.duration_s:.3f} s of simulated time"),
@@ -101,7 +103,7 @@ def _facts(recording: Recording, frames: RunFrames) -> list[tuple[str, str]]:
         ("Also in it", ", ".join(counted(count, what) for what, count in things.items())),
         ("Seed", str(recording.start.head.seed)),
         ("Thinking time", about.get("thinking", "")),
-        ("State at the end", frames.state_hash),
+        ("State at the end", frames.replay.state_hash),
         ("Made again for this page", made_again),
         ("Recorded by", f"KiKS {about.get('kiks', 'of an unknown version')}"),
         ("Page made by", f"KiKS {__version__}"),
@@ -112,20 +114,20 @@ def _facts(recording: Recording, frames: RunFrames) -> list[tuple[str, str]]:
 
 def _numbers(recording: Recording, frames: RunFrames) -> list[dict[str, Any]]:
     """Return the table of numbers: what each robot did meanwhile; shares are percent of the time."""
-    robots = range(1, min(frames.last.robot_count, ROBOTS_MAX) + 1)
+    robots = range(1, min(frames.replay.sim.robot_count, ROBOTS_MAX) + 1)
     wire = recording.table("wire")
     replies = Counter(wire["robot"][~wire["is_sent"]].tolist())
     rows = []
     for number, shares in zip(robots, time_shares(recording.log, robots), strict=True):
         was_there = number <= frames.first.robot_count
-        driven_mm = frames.last.travelled_mm(number) - (frames.first.travelled_mm(number) if was_there else 0)
+        driven_mm = frames.replay.sim.travelled_mm(number) - (frames.first.travelled_mm(number) if was_there else 0)
         rows.append(
             {
                 "number": number,
-                "kind": frames.last.specs[number - 1].name,
+                "kind": frames.replay.sim.specs[number - 1].name,
                 "driven_m": driven_mm / 1000,
                 "mean_mm_per_s": driven_mm / recording.duration_s if recording.duration_s else 0.0,
-                "contacts": frames.last.contacts(number) - (frames.first.contacts(number) if was_there else 0),
+                "contacts": frames.replay.sim.contacts(number) - (frames.first.contacts(number) if was_there else 0),
                 "commands": replies[number],
                 "shares": [100 * share_ns / max(shares.window_ns, 1) for share_ns in shares],
             }

@@ -1,7 +1,6 @@
 """The frames and messages that browsers of a desk would get of a recorded run, at a fixed period.
 
-The run is made again for it, and compared with the recording at each checkpoint. Where it differs, it goes on from the
-recorded state, so the frames always show the run that was recorded.
+The run is made again for it.
 """
 
 from __future__ import annotations
@@ -17,9 +16,7 @@ from typing import Any
 import numpy as np
 
 from kiks.export.frames import arena_picture, describe_scene, describe_shapes, pack_frame, scene_key
-from kiks.recording.check import is_same
-from kiks.recording.entries import Entry
-from kiks.recording.log import HASH_LENGTH, RecordedLog
+from kiks.recording.log import RecordedLog
 from kiks.recording.replay import Replay
 from kiks.sim.simulation import Simulation
 from kiks.units import TICK_NS, s_from_ns
@@ -47,51 +44,36 @@ class RunFrames:
         pictures: Walls, as PNG.
         shapes: Messages of `describe_shapes`, and from which frame on each holds.
         first: The world at the beginning.
-        last: The world at the end.
-        checkpoint_count: Number of checkpoints.
-        equal_count: How many of them were the same, to the bit.
-        state_hash: The recorded hash of the state at the last checkpoint.
+        replay: The run made again, at its end.
     """
 
     def __init__(self, log: RecordedLog, on_progress: Callable[[float], None] = lambda share: None) -> None:
-        self._log = log
         self.frames: list[bytes] = []
         self.scenes: list[dict[str, Any]] = []
         self.pictures: list[bytes] = []
         self.shapes: list[tuple[int, dict[str, Any]]] = []
-        self.checkpoint_count = self.equal_count = 0
-        self.state_hash = ""
         self._key: tuple[Any, ...] = ()
         self._arena: Any = None
         self.first = Replay(log, log.begin_ns).sim
-        self._replay = Replay(log, log.begin_ns, self._compare)
+        self.replay = Replay(log, log.begin_ns)
         self._take()
         begin_ns, end_ns = log.begin_ns, log.end_ns
         self.period_ns = _period_ns(end_ns - begin_ns, len(self.frames[0]))
         for time_ns in range(begin_ns + self.period_ns, end_ns, self.period_ns):
-            self._replay.sim.advance_to(time_ns)
+            self.replay.sim.advance_to(time_ns)
             self._take()
             if len(self.frames) % 100 == 0:
                 on_progress((time_ns - begin_ns) / (end_ns - begin_ns))
-        while self._replay.advance():
+        while self.replay.advance():
             pass
-        self._replay.sim.advance_to(end_ns)
+        self.replay.sim.advance_to(end_ns)
         if end_ns > begin_ns:
             self._take()
-        self.last = self._replay.sim
         on_progress(1.0)
-
-    def _compare(self, checkpoint: Entry) -> None:
-        self.state_hash = checkpoint.data[:HASH_LENGTH].decode("ascii", "replace")
-        self.checkpoint_count += 1
-        if is_same(checkpoint, self._replay.sim):
-            self.equal_count += 1
-        else:
-            self._log.state_of(checkpoint).restore(self._replay.sim)
 
     def _take(self) -> None:
         """Add a frame of the present state."""
-        sim = self._replay.sim
+        sim = self.replay.sim
         with sim.lock:
             sim.sync()
             if self._key != (key := scene_key(sim)):

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.recording.log import RecordedLog
+from kiks.recording.rerun import run_again
 from kiks.sim.run_log import Kind
 from kiks.sim.wire_log import Span, TimeShares, share_time
 
@@ -46,7 +47,7 @@ def odometry(
 def time_shares(log: RecordedLog, robots: Sequence[int]) -> list[TimeShares]:
     """Return where the time of a recording went on the lines of robots, by their numbers."""
     lines = {robot - 1: _Line() for robot in robots}
-    for entry in log.entries():
+    for entry in (entry for piece in run_again(log) for entry in piece.entries):
         line = lines.get(entry.robot)
         if line is None:
             continue

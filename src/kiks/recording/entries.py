@@ -43,14 +43,14 @@ def block_of(values: Sequence[Any]) -> bytes:
         >>> Columns.of_block(block_of((2, 5, 0, 5, 5, b"N")), "block").entry(0).data
         b'N'
     """
-    *columns, data = (values[place::_COLUMN_COUNT] for place in range(_COLUMN_COUNT))
+    *columns, data = (values[place::FIELD_COUNT] for place in range(FIELD_COUNT))
     # A struct takes numbers faster than `array` and numpy do.
     numbers = struct.Struct(f"<{len(data)}q")
     packed = (numbers.pack(*column) for column in (*columns, map(len, data)))
     return b"".join((_COUNT.pack(len(data)), *packed, *data))
 
 
-_COLUMN_COUNT = 6
+FIELD_COUNT = 6
 _COUNT = struct.Struct("<I")
 
 
@@ -70,9 +70,9 @@ class Columns(NamedTuple):
     def of_block(cls, block: bytes, what: str) -> Columns:
         """Return the columns of a block of `block_of`."""
         count = _COUNT.unpack_from(block)[0] if len(block) >= _COUNT.size else -1
-        begin = _COUNT.size + count * _COLUMN_COUNT * 8
+        begin = _COUNT.size + count * FIELD_COUNT * 8
         if count >= 0 and len(block) >= begin:
-            columns = np.frombuffer(block, "<i8", count * _COLUMN_COUNT, _COUNT.size).reshape(_COLUMN_COUNT, count)
+            columns = np.frombuffer(block, "<i8", count * FIELD_COUNT, _COUNT.size).reshape(FIELD_COUNT, count)
             lengths = columns[-1]
             limits = ((0, 2**31), (0, CLOCK_END_NS), (0, ROBOTS_MAX - 1), *[(-(2**63), 2**63 - 1)] * 2, (0, len(block)))
             is_sound = (

@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.recording.log import RecordedLog
+from kiks.recording.motion import Motion
+from kiks.recording.rerun import run_again
 from kiks.sim.run_log import Kind
 from kiks.units import TICK_NS, s_from_ns
 
@@ -37,16 +39,17 @@ class EventReader:
         self._log = log
         self._block = log.blocks.start
         self._has_begun = False
+        self._until_ns = -1
         self._contacts: NDArray[np.int64] = np.zeros(0, np.int64)
 
-    def read(self) -> list[Event]:
-        """Return the events since the last call, in their order."""
+    def notes(self) -> list[Event]:
+        """Return what was noted since the last call, in its order: all but contacts."""
         events: list[Event] = []
         blocks = self._log.blocks
         self._block = max(self._block, blocks.start)
         while self._block < blocks.stop:
-            # Both of one block at once: an error leaves no half of it behind.
-            events += sorted([*self._of_entries(), *self._of_motion()], key=lambda event: event.time_s)
+            # All of one block at once: an error leaves no half of it behind.
+            events += sorted(self._of_entries(), key=lambda event: event.time_s)
             self._block += 1
         return events
 
@@ -57,20 +60,32 @@ class EventReader:
                 yield Event(time_s, entry.robot + 1, "output", entry.data.decode("utf-8", "replace"))
             elif entry.kind == Kind.MARK:
                 yield Event(time_s, 0, "bookmark", entry.data.decode("utf-8", "replace"))
-            elif entry.kind in (Kind.STATE, Kind.CHECK):
+            elif entry.kind == Kind.STATE:
                 # The first state is the beginning.
-                if self._has_begun and entry.kind == Kind.STATE:
+                if self._has_begun:
                     yield Event(time_s, 0, "change", "")
                 self._has_begun = True
+            elif entry.kind == Kind.CHECK:
+                self._has_begun = True
 
-    def _of_motion(self) -> Iterator[Event]:
+    def contacts(self) -> list[Event]:
+        """Return the contacts since the last call; for them, the run is made again."""
+        events: list[Event] = []
+        end_ns = self._log.end_ns
+        if end_ns > self._until_ns:
+            for piece in run_again(self._log, max(self._until_ns, self._log.begin_ns), end_ns):
+                for motion in piece.motion:
+                    events += self._of_motion(motion)
+            self._until_ns = end_ns
+        return events
+
+    def _of_motion(self, motion: Motion) -> Iterator[Event]:
         """Yield an event for each robot that has begun to touch something between two samples."""
-        for motion in self._log.motion_of(self._block):
-            records: Any = motion.robots
-            counts: NDArray[np.int64] = records["contact_count"].astype(np.int64)
-            before = counts[:1].copy()
-            known = min(len(self._contacts), counts.shape[1])
-            before[0, :known] = self._contacts[:known]
-            self._contacts = counts[-1]
-            for sample, robot in np.argwhere(np.diff(counts, axis=0, prepend=before) > 0).tolist():
-                yield Event(s_from_ns(int(motion.ticks[sample]) * TICK_NS), robot + 1, "contact", "")
+        records: Any = motion.robots
+        counts: NDArray[np.int64] = records["contact_count"].astype(np.int64)
+        before = counts[:1].copy()
+        known = min(len(self._contacts), counts.shape[1])
+        before[0, :known] = self._contacts[:known]
+        self._contacts = counts[-1]
+        for sample, robot in np.argwhere(np.diff(counts, axis=0, prepend=before) > 0).tolist():
+            yield Event(s_from_ns(int(motion.ticks[sample]) * TICK_NS), robot + 1, "contact", "")

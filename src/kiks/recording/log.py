@@ -13,20 +13,18 @@ from numpy.typing import NDArray
 from kiks.errors import ParameterError
 from kiks.recording.entries import Columns, Entry, block_of
 from kiks.recording.mcap_file import FoundChunk
-from kiks.recording.motion import Motion
-from kiks.recording.motion import decode as decode_motion
 from kiks.recording.recorder import LINES_MAX
 from kiks.sim.run_log import LAST_INPUT, Kind
 from kiks.sim.saved_state import LAYOUT, SavedState, WorldFiles
-from kiks.units import TICK_NS, s_from_ns
+from kiks.units import s_from_ns
 from kiks.version import __version__
 
 HASH_LENGTH = 16
 """Characters of a hash, before the state of a checkpoint."""
 
-ENTRY_BYTES, PART_BYTES = 1, 64
-"""Fewest bytes of a chunk, packed as it is, for each entry beyond `LINES_MAX`, and for each time that things come or
-go: a recording of KiKS has four times as many, and work is in proportion to the size of a file."""
+ENTRY_BYTES = 1
+"""Fewest bytes of a chunk, packed as it is, for each entry beyond `LINES_MAX`: a recording of KiKS has four times as
+many, and work is in proportion to the size of a file."""
 
 BLOCKS_KEPT = 4
 """Blocks of the log that are kept when they were read."""
@@ -65,8 +63,8 @@ class Source(Protocol):
     def chunk(self, block: int) -> FoundChunk:
         """Return where a chunk is, by its number."""
 
-    def read(self, block: int) -> tuple[bytes, bytes]:
-        """Return log and motion of a chunk; nothing for what it has not."""
+    def read(self, block: int) -> bytes:
+        """Return the log of a chunk; nothing if it has none."""
 
 
 class RecordedLog:
@@ -76,6 +74,7 @@ class RecordedLog:
         self.reader = reader
         self._files = WorldFiles(reader.attachments, reader.what)
         self._blocks: OrderedDict[int, Columns] = OrderedDict()
+        self._first = -1
         if "layout" not in reader.told or not reader.blocks:
             raise ParameterError(
                 f"{reader.what} must be a recording of KiKS, but it is another MCAP file, or the run was killed at its "
@@ -89,15 +88,19 @@ class RecordedLog:
 
     @property
     def blocks(self) -> range:
-        """The numbers of its blocks."""
-        return self.reader.blocks
+        """The numbers of its blocks, from the first one on that has a state: no run can be made again before that."""
+        blocks = self.reader.blocks
+        if self._first not in blocks:
+            self._first = next((block for block in blocks if _is_state(self._block(block)).any()), blocks.stop)
+        return range(self._first, blocks.stop)
 
     @property
     def begin_ns(self) -> int:
         """When it begins [ns]: at its first state."""
+        if not self.blocks:
+            raise self.damaged("it has no state")
         columns = self._block(self.blocks.start)
-        times_ns = columns.time_ns[_is_state(columns)]
-        return int(times_ns[0] if len(times_ns) else columns.time_ns[0])
+        return int(columns.time_ns[_is_state(columns)][0])
 
     @property
     def end_ns(self) -> int:
@@ -105,39 +108,35 @@ class RecordedLog:
         columns = self._block(self.blocks[-1])
         return int(columns.time_ns[columns.kind <= LAST_INPUT].max(initial=columns.time_ns[0]))
 
-    def motion(self) -> Iterator[Motion]:
-        """Yield the records of robots and bodies, after every third or fourth tick."""
-        for block in self.blocks:
-            yield from self.motion_of(block)
-
-    def motion_of(self, block: int) -> Iterator[Motion]:
-        """Yield those records of a block."""
-        yield from decode_motion(self.reader.read(block)[1], self.reader.what, self._most(block, PART_BYTES))
-
-    def entries(self) -> Iterator[Entry]:
-        """Yield all entries of the log."""
-        for block in self.blocks:
-            yield from self.entries_of(block)
+    def entries_from(self, time_ns: int) -> Iterator[Entry]:
+        """Yield the entries from a time on [ns], by time."""
+        for block in range(self._block_before(time_ns), self.blocks.stop):
+            for entry in sorted(self.entries_of(block), key=lambda entry: entry.time_ns):
+                if entry.time_ns >= time_ns:
+                    yield entry
 
     def entries_of(self, block: int) -> Sequence[Entry]:
         """Return the entries of a block."""
         return self._block(block).entries()
 
-    def until(self, block: int, time_ns: int) -> tuple[bytes, bytes]:
-        """Return log and motion of a block, as bytes, up to a time [ns]."""
-        log = block_of([value for entry in self.entries_of(block) if entry.time_ns <= time_ns for value in entry])
-        return log, b"".join(motion.until(-(-time_ns // TICK_NS)) for motion in self.motion_of(block))
+    def until(self, block: int, time_ns: int) -> bytes:
+        """Return the log of a block, as bytes, up to a time [ns]."""
+        return block_of([value for entry in self.entries_of(block) if entry.time_ns <= time_ns for value in entry])
 
     def row_before(self, time_ns: int) -> Row:
         """Return the place of the last checkpoint at or before a time [ns], or of the first state."""
-        blocks, begin_ns = self.blocks, self.begin_ns
-        last = max((block for block in blocks if self.reader.chunk(block).begin_ns <= time_ns), default=blocks.start)
-        for block in range(last, blocks.start - 1, -1):
+        begin_ns = self.begin_ns
+        for block in range(self._block_before(time_ns), self.blocks.start - 1, -1):
             columns = self._block(block)
             rows = np.flatnonzero(_is_state(columns) & (columns.time_ns <= max(time_ns, begin_ns)))
             if len(rows):
                 return Row(block, int(rows[-1]))
         raise self.damaged("it has no state")
+
+    def _block_before(self, time_ns: int) -> int:
+        """Return the number of the last block that begins at or before a time [ns], or of the first one."""
+        blocks = self.blocks
+        return max((block for block in blocks if self.reader.chunk(block).begin_ns <= time_ns), default=blocks.start)
 
     def entry(self, row: Row) -> Entry:
         """Return the entry at a place."""
@@ -159,6 +158,10 @@ class RecordedLog:
             begin = 0
         return None
 
+    def has_state(self, entry: Entry) -> bool:
+        """Return whether an entry has a state."""
+        return entry.kind == Kind.STATE or (entry.kind == Kind.CHECK and len(entry.data) > HASH_LENGTH)
+
     def state_of(self, entry: Entry) -> SavedState:
         """Return the state of an entry."""
         data = entry.data[HASH_LENGTH:] if entry.kind == Kind.CHECK else entry.data
@@ -174,17 +177,15 @@ class RecordedLog:
     def _block(self, number: int) -> Columns:
         """Return a block of the log."""
         if number not in self._blocks:
-            columns = Columns.of_block(self.reader.read(number)[0], self.reader.what)
-            if not 0 < len(columns.kind) <= self._most(number, ENTRY_BYTES) + LINES_MAX:
+            columns = Columns.of_block(self.reader.read(number), self.reader.what)
+            # A few may be in the smallest chunk.
+            entries_max = 16 + self.reader.chunk(number).length // ENTRY_BYTES + LINES_MAX
+            if not 0 < len(columns.kind) <= entries_max:
                 raise self.damaged(f"a part has {len(columns.kind)} entries")
             self._blocks[number] = columns
             if len(self._blocks) > BLOCKS_KEPT:
                 self._blocks.popitem(last=False)
         return self._blocks[number]
-
-    def _most(self, number: int, bytes_each: int) -> int:
-        """Return how many things there may be in a chunk."""
-        return 16 + self.reader.chunk(number).length // bytes_each
 
     def damaged(self, why: str) -> ParameterError:
         """Return the error that says why it is not whole."""
@@ -192,5 +193,6 @@ class RecordedLog:
 
 
 def _is_state(columns: Columns) -> NDArray[np.bool_]:
-    is_state: NDArray[np.bool_] = (columns.kind == Kind.CHECK) | (columns.kind == Kind.STATE)
+    is_kept = (columns.kind == Kind.CHECK) & (columns.length > HASH_LENGTH)
+    is_state: NDArray[np.bool_] = is_kept | (columns.kind == Kind.STATE)
     return is_state

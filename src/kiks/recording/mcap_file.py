@@ -66,8 +66,8 @@ def room_of(folder: Path) -> Room:
     return Room(disk.free, min(RESERVE_BYTES, int(disk.total * RESERVE_SHARE)))
 
 
-TOPICS = ("/kiks/log", "/kiks/motion")
-"""The channels of a recording; their numbers are 1 and 2."""
+TOPIC = "/kiks/log"
+"""The channel of a recording; its number is 1."""
 
 
 class McapFile(FileBeside):
@@ -97,8 +97,7 @@ class McapFile(FileBeside):
             super().__init__(target, is_only=True)
         self._writer = Writer(self.file, chunk_size=RECORD_BYTES_MAX, compression=CompressionType.LZ4)
         self.attempt(lambda: self._writer.start(profile=PROFILE, library=f"kiks {__version__}"))
-        for topic in TOPICS:
-            self._writer.register_channel(topic, "kiks", schema_id=0)
+        self._writer.register_channel(TOPIC, "kiks", schema_id=0)
 
     @property
     def is_disk_full(self) -> bool:
@@ -121,19 +120,17 @@ class McapFile(FileBeside):
         """Write texts by name."""
         self.attempt(lambda: self._writer.add_metadata(name, dict(values)))
 
-    def write(self, begin_ns: int, log: bytes, motion: bytes, *, keeps_earlier: bool = False) -> None:
+    def write(self, begin_ns: int, log: bytes, *, keeps_earlier: bool = False) -> None:
         """Write a chunk, and take the place.
 
         Args:
             begin_ns: Its time [ns].
             log: A block of entries.
-            motion: A block of samples.
             keeps_earlier: Whether not to take that of an earlier file, or any on a full disk.
         """
 
         def add_all() -> None:
-            for channel, data in enumerate((log, motion), 1):
-                self._writer.add_message(channel, begin_ns, data, begin_ns)
+            self._writer.add_message(1, begin_ns, log, begin_ns)
             self._writer.flush()  # type: ignore[no-untyped-call]
 
         self.attempt(add_all)
@@ -239,11 +236,10 @@ class McapReader:
         """Return where a chunk is, by its number."""
         return self.chunks[block]
 
-    def read(self, block: int) -> tuple[bytes, bytes]:
-        """Return log and motion of a chunk; nothing for what it has not."""
-        messages = [record for record in self._inside(self.chunks[block]) if record[0] == Opcode.MESSAGE]
-        parts = {_MESSAGE.unpack_from(record)[2]: record[_MESSAGE.size :] for record in messages}
-        return parts.get(1, b""), parts.get(2, b"")
+    def read(self, block: int) -> bytes:
+        """Return the log of a chunk; nothing if it has none."""
+        messages = (record for record in self._inside(self.chunks[block]) if record[0] == Opcode.MESSAGE)
+        return next((record[_MESSAGE.size :] for record in messages if _MESSAGE.unpack_from(record)[2] == 1), b"")
 
     def _inside(self, chunk: FoundChunk) -> Iterator[bytes]:
         """Yield the records in a chunk, each with its head. None is smaller than an empty message."""

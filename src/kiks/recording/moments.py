@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import tee
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,10 +14,10 @@ from kiks.engine.state import ROBOT
 from kiks.recording.entries import Entry
 from kiks.recording.log import RecordedLog
 from kiks.recording.motion import ticks_of
+from kiks.recording.rerun import Piece, run_again
 from kiks.recording.tables import reading_of
-from kiks.sim.run_log import Kind
 from kiks.sim.saved_state import SavedState
-from kiks.units import TICK_NS
+from kiks.units import NS_PER_S, TICK_NS
 
 LEAP_MM = 50.0
 """What moves that far within a tick was moved by a hand [mm]: no robot drives 5 m/s."""
@@ -69,12 +70,12 @@ def moments(log: RecordedLog, times_ns: Sequence[int]) -> Iterator[Moment]:
         log: The log of the recording.
         times_ns: The times [ns], at least one, in their order, within the recording.
     """
-    block, latest = log.row_before(times_ns[0]).block, _Latest()
-    # The last tick before a block may stand in the one before.
-    ticks, entries = _ticks(log, max(block - 1, log.blocks.start)), _entries(log, block)
-    now, later, entry = next(ticks, None), next(ticks, None), next(entries, None)
-    if now is None:
-        raise log.damaged("it has no motion")
+    # What programs have read last may have been read a little before.
+    begin_ns = max(times_ns[0] - NS_PER_S, log.begin_ns)
+    latest = _Latest(log.state_before(begin_ns))
+    for_ticks, for_entries = tee(run_again(log, begin_ns, times_ns[-1]))
+    ticks, entries = _ticks(for_ticks), (entry for piece in for_entries for entry in piece.entries)
+    now, later, entry = next(ticks), next(ticks, None), next(entries, None)
     for number, time_ns in enumerate(times_ns):
         passed = []
         while later is not None and later.number * TICK_NS <= time_ns:
@@ -83,8 +84,6 @@ def moments(log: RecordedLog, times_ns: Sequence[int]) -> Iterator[Moment]:
         while entry is not None and entry.time_ns <= time_ns:
             latest.add(log, entry)
             entry = next(entries, None)
-        if latest.saved is None:
-            raise log.damaged("it has no state")
         poses, places = _between(now, later, time_ns)
         bodies: Any = now.bodies.copy()
         bodies["x_mm"], bodies["y_mm"] = places.T
@@ -95,28 +94,22 @@ def moments(log: RecordedLog, times_ns: Sequence[int]) -> Iterator[Moment]:
 class _Latest:
     """The latest of what entries say."""
 
-    def __init__(self) -> None:
-        self.saved: SavedState | None = None
+    def __init__(self, saved: SavedState) -> None:
+        self.saved = saved
         self.readings: dict[int, Sequence[int]] = {}
 
     def add(self, log: RecordedLog, entry: Entry) -> None:
-        if entry.kind in (Kind.STATE, Kind.CHECK):
+        if log.has_state(entry):
             self.saved = log.state_of(entry)
         elif (reading := reading_of(entry)) is not None and reading[0] == "N":
             self.readings[entry.robot] = reading[1]
 
 
-def _entries(log: RecordedLog, first_block: int) -> Iterator[Entry]:
-    """Yield the entries from a block on."""
-    for block in range(first_block, log.blocks.stop):
-        yield from log.entries_of(block)
-
-
-def _ticks(log: RecordedLog, first_block: int) -> Iterator[Tick]:
-    """Yield the ticks from a block on."""
+def _ticks(pieces: Iterable[Piece]) -> Iterator[Tick]:
+    """Yield the ticks of pieces of a run."""
     last_tick = -1
-    for block in range(first_block, log.blocks.stop):
-        for motion in log.motion_of(block):
+    for piece in pieces:
+        for motion in piece.motion:
             ticks = ticks_of(motion, last_tick)
             last_tick = int(motion.ticks[-1])
             rows = zip(ticks.ticks.tolist(), ticks.poses, ticks.places, ticks.samples.tolist(), strict=True)

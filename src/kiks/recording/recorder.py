@@ -1,4 +1,7 @@
-"""Records a run while it goes on: its inputs, a checkpoint each second, and the motion.
+"""Records a run while it goes on: its inputs, the hash of its state each second, and now and then the state.
+
+Replies, motion and contacts follow from that, and whoever wants them makes the run again (`kiks.recording.rerun`). So
+nothing is done for each tick, and little for each command.
 
 A writer only reads the simulation. It reads the state where the run stops anyway or may stop without a difference, so
 that a run is the same with it, to the bit. Each simulation has one writer at most, which writes into one store or more:
@@ -19,9 +22,8 @@ from kiks.ending import postponing_endings
 from kiks.errors import ParameterError
 from kiks.model.atomic_files import path_of
 from kiks.model.checks import check_kind
-from kiks.recording.entries import block_of
+from kiks.recording.entries import FIELD_COUNT, block_of
 from kiks.recording.mcap_file import McapFile
-from kiks.recording.motion import MotionWatcher
 from kiks.sim.read_completion import NEVER_NS
 from kiks.sim.run_log import ACT, CHECK, MARK, STATE, TEXT, Clock, NotedEntry
 from kiks.sim.saved_state import LAYOUT, WorldFiles, state_bytes
@@ -34,6 +36,15 @@ _log = logging.getLogger("kiks.recording")
 
 CHECK_NS = NS_PER_S
 """Simulated time between two checkpoints [ns]."""
+
+STATE_US = 150_000
+"""Real time that it takes to make the run again from one state to the next, about [us]. A jump to any time of a
+recording takes no longer."""
+
+ROBOT_US, ENTRY_US, BYTES_A_US = 60, 12, 28
+"""What a simulated second of a robot, and an input with its reply, cost to make again, about [us], and how much of a
+recording is read in a microsecond [bytes]. They are no measurements of this run, so that a recording is the same on any
+computer."""
 
 CHUNK_S = 0.1
 """Least real time between two chunks [s]. A crash costs what came after the last chunk: at most a second of a world in
@@ -58,13 +69,12 @@ class Store(Protocol):
     def attach(self, name: str, data: bytes) -> None:
         """Write a file that belongs to the run."""
 
-    def write(self, begin_ns: int, log: bytes, motion: bytes) -> bool:
+    def write(self, begin_ns: int, log: bytes) -> bool:
         """Write a chunk.
 
         Args:
             begin_ns: Its time [ns].
             log: Of `block_of`.
-            motion: Of `MotionWatcher.take`.
 
         Returns:
             Whether the next chunk can be written, too; else the store has ended.
@@ -79,7 +89,6 @@ class RunWriter:
 
     Attributes:
         next_ns: When the next checkpoint is due [ns].
-        note: Takes an entry.
         clock: The world's.
         change_count: Of the world, when its changes were noted last.
         stores: Where it writes.
@@ -98,17 +107,16 @@ class RunWriter:
         self.clock: Clock = self._world
         # In one list: a tuple for each entry would make Python's garbage collection slow.
         self._entries: list[int | bytes] = []
-        self.note: Callable[[NotedEntry], object] = self._entries.extend
+        self._counted = self._work_us = 0
+        self._noted_ns = -1
+        self._has_acted = False
         self._waiting_bytes = 0
         self._chunk_ns = sim.now_ns
         self._chunk_at_s = 0.0
         self._files = WorldFiles(on_new=self._attach)
         self._lines: deque[tuple[int, int, str]] = deque(maxlen=LINES_MAX)
-        sim.sync()
-        self._motion = MotionWatcher(self._world.state)
         self.next_ns = (sim.now_ns // CHECK_NS + 1) * CHECK_NS
         self.note_state()
-        sim.world.watch(self._motion)
         sim.loop.recorder = self
 
     def add(self, store: Store) -> None:
@@ -117,8 +125,7 @@ class RunWriter:
             if self.stores:
                 # A chunk that begins with a state, which is the first one of the new store.
                 self.flush()
-                self._note_check()
-                self._motion.look(self._world.state)
+                self._note_check(has_state=True)
             for name, data in self._files.files.items():
                 store.attach(name, data)
             self.stores = (*self.stores, store)
@@ -137,7 +144,6 @@ class RunWriter:
                 self.next_ns = NEVER_NS
                 for wire in self._sim.wires:
                     wire.recorder = None
-                self._world.unwatch(self._motion)
 
     def flush(self) -> None:
         """Write all that has happened up to now, with the present state."""
@@ -145,10 +151,24 @@ class RunWriter:
             if self.stores:
                 self.note_changes()
                 self._note_check()
-                self._motion.look(self._world.state)
                 self._write_chunk()
 
     # ---- from outside ----
+
+    def note(self, entry: NotedEntry) -> None:
+        """Note an input, or when a program has thought."""
+        time_ns = entry[1]
+        if self._has_acted:
+            self._has_acted = False
+            if time_ns == self._noted_ns:
+                # The replay does the same in the same order.
+                self._entries += (ACT, time_ns, 0, 0, 0, b"")
+        self._noted_ns = time_ns
+        self._entries += entry
+
+    def note_act(self, entry: NotedEntry) -> None:
+        """Remember that a robot has done something, which the replay finds out by itself."""
+        self._has_acted = True
 
     def note_changes(self) -> None:
         """Note what was changed from outside."""
@@ -166,6 +186,7 @@ class RunWriter:
         data = state_bytes(sim, self._files)
         self.note((STATE, world.now_ns, 0, 0, 0, data))
         self._waiting_bytes += len(data)
+        self._work_us = 0
 
     # ---- what people and programs say ----
 
@@ -175,53 +196,59 @@ class RunWriter:
 
     def mark(self, note: str) -> None:
         """Set a bookmark at this time; the caller holds the lock."""
-        self.note((MARK, self._world.now_ns, 0, 0, 0, note.encode()))
+        self._entries += (MARK, self._world.now_ns, 0, 0, 0, note.encode())
 
     # ---- chunks ----
 
     def check(self) -> None:
         """Note the state, after all events up to `next_ns`, and choose a later `next_ns`."""
-        self._note_check()
+        count = len(self._entries)
+        self._work_us += ROBOT_US * self._sim.robot_count + ENTRY_US * (count - self._counted) // FIELD_COUNT
+        self._note_check(has_state=self._work_us >= STATE_US)
+        self._counted = len(self._entries)
         self.next_ns += CHECK_NS
         is_full = self._waiting_bytes > WAITING_BYTES_MAX or len(self._lines) > LINES_MAX // 2
         if is_full or monotonic() >= self._chunk_at_s:
             with postponing_endings():
                 self._write_chunk()
 
-    def _note_check(self) -> None:
-        data = state_bytes(self._sim, self._files)
-        state_hash = self._world.state.hash().encode()
-        self.note((CHECK, self._world.now_ns, 0, 0, 0, state_hash + data))
-        # Motion has 25 samples in this time.
-        self._waiting_bytes += 25 * len(data)
+    def _note_check(self, *, has_state: bool = False) -> None:
+        self._sim.sync()
+        data = self._world.state.hash().encode()
+        if has_state:
+            data += state_bytes(self._sim, self._files)
+            self._waiting_bytes += len(data)
+            self._work_us = 0
+        self.note((CHECK, self._world.now_ns, 0, 0, 0, data))
 
     def _write_chunk(self) -> None:
         """Write what waits."""
         while self._lines:
             now_ns, robot, line = self._lines.popleft()
-            self.note((TEXT, now_ns, robot, 0, 0, line.encode("utf-8", "replace")))
-        log, motion = block_of(self._entries), self._motion.take()
+            self._entries += (TEXT, now_ns, robot, 0, 0, line.encode("utf-8", "replace"))
+        log = block_of(self._entries)
         self._entries.clear()
+        self._counted = 0
+        self._work_us += len(log) // BYTES_A_US
         begin_ns, self._chunk_ns = self._chunk_ns, self._world.now_ns
         for store in self.stores:
-            if not store.write(begin_ns, log, motion):
+            if not store.write(begin_ns, log):
                 self.remove(store)
         self._waiting_bytes = 0
         self._chunk_at_s = monotonic() + CHUNK_S
 
 
 class _OwnTurretRecorder:
-    """Notes the state after each action of a robot with a custom turret, too, as a replay cannot run that."""
+    """Notes what a robot with a custom turret does, and the state after it, as a replay cannot run that."""
 
     def __init__(self, recorder: RunWriter) -> None:
         self._recorder = recorder
         self.clock: Clock = recorder.clock
-        self.note: Callable[[NotedEntry], object] = self._note
+        self.note: Callable[[NotedEntry], object] = recorder.note
 
-    def _note(self, entry: NotedEntry) -> None:
+    def note_act(self, entry: NotedEntry) -> None:
         self._recorder.note(entry)
-        if entry[0] == ACT:
-            self._recorder.note_state()
+        self._recorder.note_state()
 
 
 def description_of(sim: Simulation) -> dict[str, str]:
@@ -318,10 +345,10 @@ class RunRecorder:
         """Write a file that belongs to the run."""
         self._file.attach(name, data, "application/json", self._sim.now_ns)
 
-    def write(self, begin_ns: int, log: bytes, motion: bytes) -> bool:
+    def write(self, begin_ns: int, log: bytes) -> bool:
         """Write a chunk; see `Store`."""
         has_begun = (self._sim.now_ns, self._sim.world.change_count) != self._began
-        self._file.write(begin_ns, log, motion, keeps_earlier=not has_begun)
+        self._file.write(begin_ns, log, keeps_earlier=not has_begun)
         if self._file.has_failed or self._file.is_disk_full:
             self._end()
             if self._error is None:

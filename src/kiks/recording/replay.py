@@ -11,7 +11,7 @@ from threading import RLock
 
 from kiks.model.checks import CLOCK_END_NS
 from kiks.recording.entries import Entry
-from kiks.recording.log import RecordedLog, Row
+from kiks.recording.log import HASH_LENGTH, RecordedLog, Row
 from kiks.recording.recorder import CHECK_NS
 from kiks.sim.port import BAUD_MAX, BAUD_MIN
 from kiks.sim.read_completion import NEVER_NS
@@ -25,30 +25,32 @@ from kiks.units import s_from_ns
 class Replay:
     """A recorded run from a time on, as a `kiks.sim.event_loop.Supervisor` of its simulation.
 
+    At each checkpoint it compares its state with the recorded one. Where it differs, it goes on from the recorded one,
+    if that is there.
+
     Args:
         log: The log of a recording.
         time_ns: Where it begins [ns].
-        on_check: Called with each checkpoint that has been reached.
         lock: That of a simulation whose place this one takes; a new one if left out.
 
     Attributes:
         sim: The simulation.
         next_ns: When the next input is due [ns].
+        equal_count: Number of checkpoints that were the same, to the bit.
+        check_count: Number of checkpoints that it has passed.
+        differs_ns: Time of the first one that was not the same [ns]; None if all were.
+        state_hash: The recorded hash of the state at the last one.
+        on_change: Called before and after a state is taken from the recording.
     """
 
-    def __init__(
-        self,
-        log: RecordedLog,
-        time_ns: int = 0,
-        on_check: Callable[[Entry], None] = lambda checkpoint: None,
-        *,
-        lock: RLock | None = None,
-    ) -> None:
+    def __init__(self, log: RecordedLog, time_ns: int = 0, *, lock: RLock | None = None) -> None:
         self._log = log
-        self._on_check = on_check
-        self.next_ns = NEVER_NS
-        self._next: Entry | None = None
-        row, saved = self._recorded_before(time_ns)
+        self.on_change: Callable[[], None] = lambda: None
+        self.equal_count = self.check_count = 0
+        self.differs_ns: int | None = None
+        self.state_hash = ""
+        row = log.row_before(time_ns)
+        saved = log.state_of(log.entry(row))
         self.sim = saved.simulation(lock)
         self._begin(row, saved)
         self.sim.loop.supervisor = self
@@ -65,8 +67,9 @@ class Replay:
             fewer of them, nothing has changed, and another replay can begin there.
         """
         sim = self.sim
-        if not 0 <= time_ns - sim.now_ns <= CHECK_NS:
-            row, saved = self._recorded_before(time_ns)
+        row = self._log.row_before(time_ns)
+        if time_ns < sim.now_ns or row > self._row:
+            saved = self._log.state_of(self._log.entry(row))
             if not saved.can_restore(sim):
                 return False
             self._begin(row, saved)
@@ -75,18 +78,15 @@ class Replay:
         sim.advance_to(time_ns)
         return True
 
-    def _recorded_before(self, time_ns: int) -> tuple[Row, SavedState]:
-        """Return the last recorded state before a time [ns], and the place of its entry."""
-        row = self._log.row_before(time_ns)
-        saved = self._log.state_of(self._log.entry(row))
-        if time_ns - saved.now_ns > CHECK_NS:
-            raise self._log.damaged(f"a part is missing after {s_from_ns(saved.now_ns):.3f} s")
-        return row, saved
-
     def _begin(self, row: Row, saved: SavedState) -> None:
-        saved.restore(self.sim)
+        self._restore(saved)
         self._row, self._row_ns = row, saved.now_ns
         self._find_next()
+
+    def _restore(self, saved: SavedState) -> None:
+        self.on_change()
+        saved.restore(self.sim)
+        self.on_change()
 
     def let_go(self) -> Simulation:
         """Return the simulation, which goes on without the recording from now on; its programs have hung up."""
@@ -113,7 +113,8 @@ class Replay:
 
     def _find_next(self) -> bool:
         """Find the next input, if there is one; return whether robots act before it."""
-        self._next, self.next_ns, has_acted = None, NEVER_NS, False
+        self._next: Entry | None = None
+        self.next_ns, has_acted = NEVER_NS, False
         if (found := self._log.next_input(self._row)) is not None:
             self._next_row, self._next, has_acted = found
             self.next_ns = self._next.time_ns
@@ -137,9 +138,21 @@ class Replay:
                 sim.sync()
                 for each in sim.wires:
                     each.line.forget()  # unread replies would fill the line
-                self._on_check(entry)
+                self._compare(entry)
             case Kind.STATE:
-                self._log.state_of(entry).restore(sim)
+                sim.sync()
+                self._restore(self._log.state_of(entry))
+
+    def _compare(self, checkpoint: Entry) -> None:
+        self.check_count += 1
+        self.state_hash = checkpoint.data[:HASH_LENGTH].decode("ascii", "replace")
+        if self.sim.state_hash() == self.state_hash:
+            self.equal_count += 1
+            return
+        if self.differs_ns is None:
+            self.differs_ns = checkpoint.time_ns
+        if self._log.has_state(checkpoint):
+            self._restore(self._log.state_of(checkpoint))
 
     def _apply_to(self, wire: Wire, entry: Entry) -> None:
         match entry.kind:
@@ -155,3 +168,15 @@ class Replay:
                 wire.set_baud(entry.number)
             case Kind.DROP:
                 wire.drop_after(entry.number, entry.other)
+
+
+def check_recording(log: RecordedLog) -> Replay:
+    """Make a recorded run again, up to its end or the first checkpoint at which it is another one; return the replay.
+
+    Args:
+        log: The log of the recording.
+    """
+    replay = Replay(log, log.begin_ns)
+    while replay.differs_ns is None and replay.advance():
+        pass
+    return replay

@@ -7,7 +7,6 @@ not grow, the next one goes to its beginning, and the oldest chunks make room.
 from __future__ import annotations
 
 import os
-import struct
 import tempfile
 import threading
 import weakref
@@ -28,8 +27,6 @@ BYTES_MAX = 256 << 20
 
 COPY_BYTES_MAX = 64 << 20
 """Most bytes of another recording that a ring begins with."""
-
-_HEAD = struct.Struct("<I")  # bytes of the log
 
 
 class Ring:
@@ -70,9 +67,9 @@ class Ring:
         """Keep a file that belongs to the run."""
         self.attachments[name] = data
 
-    def write(self, begin_ns: int, log: bytes, motion: bytes) -> bool:
+    def write(self, begin_ns: int, log: bytes) -> bool:
         """Write a chunk; return whether that was possible."""
-        data = lz4.frame.compress(b"".join((_HEAD.pack(len(log)), log, motion)))
+        data = lz4.frame.compress(log)
         try:
             with self._lock:
                 self._append(begin_ns, data)
@@ -116,8 +113,8 @@ class Ring:
                 blocks.append(block)
                 count_bytes += chunk.length
         for block in reversed(blocks):
-            parts = log.reader.read(block) if block != blocks[0] else log.until(block, until_ns)
-            self.write(log.reader.chunk(block).begin_ns, *parts)
+            part = log.reader.read(block) if block != blocks[0] else log.until(block, until_ns)
+            self.write(log.reader.chunk(block).begin_ns, part)
 
     # ---- as a source ----
 
@@ -137,14 +134,13 @@ class Ring:
             raise ParameterError(f"{self.what} has gone on: that time was dropped. Choose a later time.")
         return self._chunks[block]
 
-    def read(self, block: int) -> tuple[bytes, bytes]:
-        """Return log and motion of a chunk."""
+    def read(self, block: int) -> bytes:
+        """Return the log of a chunk."""
         with self._lock:
             chunk = self._chunk(block)
             packed = os.pread(self._file, chunk.length, chunk.offset)
-        data = lz4.frame.decompress(packed)
-        middle = _HEAD.size + _HEAD.unpack_from(data)[0]
-        return data[_HEAD.size : middle], data[middle:]
+        log: bytes = lz4.frame.decompress(packed)
+        return log
 
 
 def _check_room() -> None:

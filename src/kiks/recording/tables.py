@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,8 @@ from kiks.model.limits import TEXT_COLUMN_BYTES_MAX
 from kiks.recording.entries import Entry
 from kiks.recording.events import EventReader
 from kiks.recording.log import RecordedLog
-from kiks.recording.motion import ticks_of
+from kiks.recording.motion import Motion, ticks_of
+from kiks.recording.rerun import run_again
 from kiks.sim.run_log import Kind
 from kiks.units import TICK_NS, s_from_ns
 
@@ -46,6 +47,14 @@ def _seconds(ticks: NDArray[np.int64]) -> NDArray[np.float64]:
     return ticks * TICK_NS / 1e9
 
 
+def _motion(log: RecordedLog) -> Iterator[Motion]:
+    return (motion for piece in run_again(log) for motion in piece.motion)
+
+
+def _entries(log: RecordedLog) -> Iterator[Entry]:
+    return (entry for piece in run_again(log) for entry in piece.entries)
+
+
 def _joined(parts: list[Table], kind: np.dtype[np.void]) -> Table:
     return np.concatenate(parts) if parts else np.zeros(0, kind)
 
@@ -53,7 +62,7 @@ def _joined(parts: list[Table], kind: np.dtype[np.void]) -> Table:
 def poses(log: RecordedLog) -> Table:
     """Return where robots were after each tick of 10 ms: time_s, robot, x_mm, y_mm, heading_rad (not wrapped)."""
     parts, last_tick = [], -1
-    for motion in log.motion():
+    for motion in _motion(log):
         ticks, places, *_ = ticks_of(motion, last_tick)
         last_tick = int(motion.ticks[-1])
         rows = np.zeros(places.shape[:2], _POSES)
@@ -72,7 +81,7 @@ def wheels(log: RecordedLog) -> Table:
     backwards together [mm].
     """
     parts = []
-    for motion in log.motion():
+    for motion in _motion(log):
         records: Any = motion.robots
         rows = np.zeros(records.shape, _WHEELS)
         rows["time_s"], rows["robot"] = _seconds(motion.ticks)[:, None], np.arange(1, records.shape[1] + 1)
@@ -89,7 +98,7 @@ def wheels(log: RecordedLog) -> Table:
 def readings(log: RecordedLog) -> Table:
     """Return what programs read of proximity (N) and light (O) sensors: time_s, robot, command, counts [8]."""
     rows = []
-    for entry in log.entries():
+    for entry in _entries(log):
         if (reading := reading_of(entry)) is not None:
             rows.append((s_from_ns(entry.time_ns), entry.robot + 1, *reading))
     return np.array(rows, _READINGS)
@@ -106,7 +115,7 @@ def reading_of(entry: Entry) -> tuple[str, tuple[int, ...]] | None:
 def wire(log: RecordedLog) -> Table:
     """Return the characters on all lines: time_s of the first one, robot, is_sent (to the robot), data."""
     rows = []
-    for entry in log.entries():
+    for entry in _entries(log):
         if entry.data and entry.kind in (Kind.SEND, Kind.TYPE):
             rows.append((s_from_ns(entry.other), entry.robot + 1, True, entry.data))
         elif entry.data and entry.kind == Kind.ACT:
@@ -121,7 +130,8 @@ def events(log: RecordedLog) -> Table:
 
     `kiks.recording.events.Event` says which kinds there are.
     """
-    rows = EventReader(log).read()
+    reader = EventReader(log)
+    rows = [*reader.notes(), *reader.contacts()]
     rows.sort(key=lambda row: row.time_s)
     longest = _longest(log, [4 * len(row.text) for row in rows]) // 4
     kind = np.dtype([("time_s", "f8"), ("robot", "i4"), ("kind", "U8"), ("text", f"U{max(longest, 1)}")])

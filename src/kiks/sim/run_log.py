@@ -1,8 +1,10 @@
-"""What is noted of a run that is recorded: entries of these kinds, in their order."""
+"""What is noted of a run that is recorded: entries of these kinds, in their order.
+
+A run is its inputs: replies, motion and contacts follow from them, so nobody writes them down.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from enum import IntEnum
 from typing import Protocol
 
@@ -11,18 +13,20 @@ class Kind(IntEnum):
     """What an entry is.
 
     The first ones are the inputs, which make the run again. A state is what was changed in any other way than over a
-    line, by a hand or a program: all that the simulation was after it. A check is the same at each whole second, so
-    that a replay may begin there and can be compared.
+    line, by a hand or a program: all that the simulation was after it. A check comes at each whole second, so that a
+    replay can be compared there; now and then it has the state, so that a replay may begin there.
     """
 
     STATE = 0  # data: of `state_bytes`
-    CHECK = 1  # data: 16 characters of the hash, then of `state_bytes`
+    CHECK = 1  # data: 16 characters of the hash, then nothing or that of `state_bytes`
     SEND = 2  # data: characters for the robot; number, other: when they are sent, and when the first begins [ns]
     TYPE = 3  # the same, typed by a person, who gets the replies in place of the host
     HANG_UP = 4
     SET_BAUD = 5  # number: [bit/s]
     DROP = 6  # number, other: `until_ns` and `now_ns` of `Wire.drop_after`
-    ACT = 16  # the robot has done what was due; data: the reply; number, other: when it starts, a character [ns]
+    ACT = 16  # the robot has done what was due; data: the reply; number, other: when it starts, a character [ns].
+    # Only those of robots whose turrets a replay may not have are written, and one without data that stands for all
+    # between two inputs of one instant.
     THINK = 17  # number, other: from when to when the program thought [ns]
     TEXT = 18  # data: a line that the robot's program printed, in UTF-8
     MARK = 19  # data: a person's note, in UTF-8
@@ -48,9 +52,13 @@ class WireRecorder(Protocol):
     """Takes entries of a wire.
 
     Attributes:
-        note: Takes one. It may be a method of a list, as most entries come from wires, and a call costs more.
         clock: The world's.
     """
 
-    note: Callable[[NotedEntry], object]
     clock: Clock
+
+    def note(self, entry: NotedEntry, /) -> object:
+        """Take an input, or when a program has thought."""
+
+    def note_act(self, entry: NotedEntry, /) -> object:
+        """Take what a robot has done."""

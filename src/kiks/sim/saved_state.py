@@ -196,7 +196,7 @@ class SavedState:
             np.frombuffer(rest[robots_end:bodies_end], BODY)[None],
             np.frombuffer(rest[bodies_end:]).reshape(-1, 4),
         )
-        check_records(saved.robots, saved.bodies, (saved.arena.width_mm, saved.arena.height_mm), what)
+        _check_records(saved.robots, saved.bodies, (saved.arena.width_mm, saved.arena.height_mm), what)
         ticks = -(-head.now_ns // TICK_NS)
         _check_range(np.array(head.tick_count), ticks, ticks, f"tick_count of {what}")
         _check_range(np.nan_to_num(saved.lamps), -_NUMBER_MAX, _NUMBER_MAX, f"lamps of {what}")
@@ -340,13 +340,13 @@ _BEYOND_MM = 1000.0
 _TIMES = ("camera_taken_ns", "radio_starts_ns", "radio_ends_ns", "radio_ended_ns", "battle_ns")
 
 
-def check_records(robots: NDArray[Any], bodies: NDArray[Any], size_mm: tuple[float, float], what: str) -> None:
+def _check_records(robots: NDArray[Any], bodies: NDArray[Any], size_mm: tuple[float, float], what: str) -> None:
     """Check what kernels and pictures trust, as a file may hold anything.
 
     Args:
-        robots: Records of robots, or their first fields, shape [instant, robot].
-        bodies: Records of bodies, shape [instant, body].
-        size_mm: Width and height of the arena [mm], at most.
+        robots: Records of robots, shape [1, robot].
+        bodies: Records of bodies, shape [1, body].
+        size_mm: Width and height of the arena [mm].
         what: What messages call them.
     """
     limits: dict[str, tuple[float, float] | None] = {

@@ -140,12 +140,13 @@ class Wire:
                 log.answer(reply, start_ns, self.line.character_ns, now_ns)
             if (recorder := self.recorder) is not None:
                 sent_ns = now_ns if start_ns is None else start_ns
-                recorder.note((ACT, now_ns, self._index, sent_ns, self.line.character_ns, reply))
+                recorder.note_act((ACT, now_ns, self._index, sent_ns, self.line.character_ns, reply))
             if self.firmware.baud != self.line.baud:
                 self.line.set_baud(self.firmware.baud)
         else:
             self.firmware.run_demo(now_ns)
-            self._note(ACT, now_ns, self.line.character_ns)
+            if (recorder := self.recorder) is not None:
+                recorder.note_act((ACT, now_ns, self._index, now_ns, self.line.character_ns, b""))
         self._plan()
 
     def _note(self, kind: int, number: int = 0, other: int = 0) -> None:

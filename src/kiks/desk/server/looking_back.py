@@ -96,7 +96,7 @@ class LookingBack:
         """Show a recording from a time on [ns]; the present world stands still until a person goes on from there."""
         self._use(McapReader(file))
         assert self._reader is not None
-        self.marks = self._reader.read()
+        self.marks = self._reader.read(has_contacts=True)
         self._present().pause()
         self.has_present = False
         self._show(time_ns)
@@ -134,9 +134,13 @@ class LookingBack:
 
     async def tend(self) -> None:
         """Read what has happened; called about once a second."""
-        if self._reader is not None:
+        await self._read_marks(has_contacts=self.past is not None)
+
+    async def _read_marks(self, *, has_contacts: bool) -> None:
+        """Read what has happened; contacts only for people who look back, as the run is made again for them."""
+        if (reader := self._reader) is not None:
             with suppress(KiksError):  # a replay tells people of it
-                self.marks = await asyncio.to_thread(self._reader.read)
+                self.marks = await asyncio.to_thread(lambda: reader.read(has_contacts=has_contacts))
 
     def _flush(self, _sim: Simulation) -> None:
         if self._writer is not None:
@@ -205,6 +209,9 @@ class LookingBack:
             LinkError: If there is no past.
         """
         world = self.past or self._present()
+        if self.past is None:
+            await self._present().do(lambda _: self._flush())
+        await self._read_marks(has_contacts=True)
         mark = next_mark(self.marks, world.sim.now_ns, is_before=is_before)
         if mark is not None:
             await self._stand_at(ns_from_s(mark.time_s))

@@ -69,10 +69,14 @@ class MarkReader:
         self._latest: dict[tuple[str, int], tuple[float, int]] = {}
         self._lock = threading.Lock()
 
-    def read(self) -> list[Mark]:
-        """Read what has happened since the last call, and return all of it, from the beginning of the recording on."""
+    def read(self, *, has_contacts: bool) -> list[Mark]:
+        """Read what has happened since the last call, and return all of it, from the beginning of the recording on.
+
+        Args:
+            has_contacts: Whether to read contacts, too: for them, the run is made again.
+        """
         with self._lock:
-            for event in self._events.read():
+            for event in (*self._events.notes(), *(self._events.contacts() if has_contacts else ())):
                 self._add(event)
             begin_s = s_from_ns(self._log.begin_ns)
             self._marks = {number: mark for number, mark in self._marks.items() if mark.time_s >= begin_s}

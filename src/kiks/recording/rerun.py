@@ -1,0 +1,111 @@
+"""What a recorded run did: replies and motion, which its recording does not hold, as the run is made again."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+from kiks.recording.entries import Entry
+from kiks.recording.log import RecordedLog
+from kiks.recording.motion import Motion, MotionWatcher
+from kiks.recording.replay import Replay
+from kiks.sim.run_log import Clock, Kind, NotedEntry
+from kiks.sim.turret_host import name_of
+from kiks.units import NS_PER_S, s_from_ns
+from kiks.version import __version__
+
+_log = logging.getLogger("kiks.recording")
+
+PIECE_NS = 10 * NS_PER_S
+"""Longest piece of a run that is held in memory at once [ns]."""
+
+
+class Piece(NamedTuple):
+    """A piece of a run.
+
+    Attributes:
+        entries: What was recorded and what robots did, by time.
+        motion: Samples of robots and bodies; the last one is of the piece's end.
+    """
+
+    entries: Sequence[Entry]
+    motion: Sequence[Motion]
+
+
+def run_again(log: RecordedLog, begin_ns: int | None = None, end_ns: int | None = None) -> Iterator[Piece]:
+    """Make a recorded run again, and yield what it does, piece by piece.
+
+    It warns if the run is another one now, as one of another version of KiKS may be.
+
+    Args:
+        log: The log of the recording.
+        begin_ns: From when on [ns]; from its beginning if left out.
+        end_ns: Up to when [ns]; to its end if left out.
+    """
+    begin_ns = log.begin_ns if begin_ns is None else begin_ns
+    end_ns = log.end_ns if end_ns is None else end_ns
+    observer = _Observer(log, begin_ns)
+    recorded = log.entries_from(begin_ns)
+    entry = next(recorded, None)
+    while True:
+        until_ns = min(begin_ns + PIECE_NS, end_ns)
+        entries = observer.run_to(until_ns)
+        while entry is not None and entry.time_ns <= until_ns:
+            if entry.kind != Kind.ACT or entry.data:
+                entries.append(entry)
+            entry = next(recorded, None)
+        entries.sort(key=lambda entry: entry.time_ns)
+        yield Piece(entries, observer.motion.take())
+        if (begin_ns := until_ns) >= end_ns:
+            break
+    if observer.replay.differs_ns is not None:
+        _log.warning(
+            "%s was made by KiKS %s, and this is KiKS %s, which makes another run from %.0f s on.",
+            log.reader.what,
+            log.reader.told.get("kiks", "?"),
+            __version__,
+            s_from_ns(observer.replay.differs_ns),
+        )
+
+
+class _Observer:
+    """Watches a replay: collects replies, as the recorder of its wires, and motion.
+
+    Args:
+        log: The log of the recording.
+        begin_ns: Where it begins [ns].
+    """
+
+    def __init__(self, log: RecordedLog, begin_ns: int) -> None:
+        self._acts: list[Entry] = []
+        self.replay = Replay(log, begin_ns)
+        self.sim = self.replay.sim
+        self.clock: Clock = self.sim.world
+        self.sim.sync()
+        self.motion = MotionWatcher(self.sim.world.state)
+        self.sim.world.watch(self.motion)
+        self.replay.on_change = self._look
+        self._look()
+
+    def run_to(self, time_ns: int) -> list[Entry]:
+        """Let the run go on up to a time [ns]; return what robots have done."""
+        self.sim.advance_to(time_ns)
+        self.sim.sync()
+        self._look()
+        acts, self._acts = self._acts, []
+        return acts
+
+    def _look(self) -> None:
+        """Take a sample, and listen to wires that are new; what their turrets of users answer was recorded."""
+        self.motion.look(self.sim.world.state)
+        for wire in self.sim.wires:
+            has_own = any(name_of(turret) is None for turret in wire.firmware.fitted)
+            wire.recorder = None if has_own else self
+
+    def note(self, entry: NotedEntry) -> None:
+        """Take an input, which was recorded."""
+
+    def note_act(self, entry: NotedEntry) -> None:
+        """Take what a robot has done."""
+        self._acts.append(Entry(*entry))
