@@ -129,14 +129,14 @@ def figure_of_run(sim: Simulation, *, robot: int = 1) -> Any:
 
 def _drawings(recording: Recording, robot: int) -> dict[str, Callable[[Any], None]]:
     """Return functions that draw the rows on axes, by the names of `PANELS`: of a run without a robot, paths alone."""
-    poses, wheels = recording.table("poses"), recording.table("wheels")
+    poses, wheels, readings = recording.tables("poses", "wheels", "readings")
     paths = {"paths": lambda axes: _draw_paths(axes, recording, poses, wheels)}
     if not recording.robots:
         return paths
     recording.check_robot(robot)
     return paths | {
         "places": lambda axes: _draw_heat(axes, recording.start.arena, poses),
-        "readings": lambda axes: _draw_readings(axes, recording.table("readings", robot)),
+        "readings": lambda axes: _draw_readings(axes, readings[readings["robot"] == robot]),
         "speeds": lambda axes: _draw_speeds(axes, wheels[wheels["robot"] == robot]),
         "time": lambda axes: _draw_time(axes, recording, robot),
     }

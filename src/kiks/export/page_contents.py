@@ -43,7 +43,8 @@ ROBOTS_MAX = 100
 
 def contents_of(recording: Recording, frames: RunFrames, robot: int) -> dict[str, Any]:
     """Return what `web/run_page.html` needs to tell of a recording, by name."""
-    events, programs, file = recording.table("events"), _programs(recording), recording.log.reader.path.name
+    events, wire = recording.tables("events", "wire")
+    programs, file = _programs(recording), recording.log.reader.path.name
     names = ", ".join(dict.fromkeys(program["name"] for program in programs))
     return {
         "what_ran": names or f"A run in arena {_arena(recording)}",
@@ -58,13 +59,13 @@ def contents_of(recording: Recording, frames: RunFrames, robot: int) -> dict[str
         "end_s": s_from_ns(recording.log.end_ns),
         "robot_count": max(len(scene["robots"]) for scene in frames.scenes),
         "facts": _facts(recording, frames),
-        "numbers": _numbers(recording, frames),
+        "numbers": _numbers(recording, frames, wire),
         "events": [(*row[:3], _cut(row[3])) for row in events[:MOMENTS_MAX].tolist()],
         "more_events": max(len(events) - MOMENTS_MAX, 0),
         "kinds": sorted(set(events["kind"].tolist())),
         "moments": [[round(time_s, 3), kind] for time_s, kind in events[["time_s", "kind"]][:MARKS_MAX].tolist()],
         "programs": programs,
-        "wire": _wire(recording.table("wire", robot)) if recording.robots else [],
+        "wire": _wire(wire[wire["robot"] == robot]),
         "command": recording.about.get("command", ""),
         "check": shlex.join(["kiks", "replay", "--check", file]),
         "watch": shlex.join(["kiks", "replay", file]),
@@ -112,10 +113,9 @@ def _facts(recording: Recording, frames: RunFrames) -> list[tuple[str, str]]:
     return [(name, value) for name, value in rows if value]
 
 
-def _numbers(recording: Recording, frames: RunFrames) -> list[dict[str, Any]]:
+def _numbers(recording: Recording, frames: RunFrames, wire: Table) -> list[dict[str, Any]]:
     """Return the table of numbers: what each robot did meanwhile; shares are percent of the time."""
     robots = range(1, min(frames.replay.sim.robot_count, ROBOTS_MAX) + 1)
-    wire = recording.table("wire")
     replies = Counter(wire["robot"][~wire["is_sent"]].tolist())
     rows = []
     for number, shares in zip(robots, time_shares(recording.log, robots), strict=True):

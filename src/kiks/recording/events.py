@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from kiks.recording.entries import Entry
 from kiks.recording.log import RecordedLog
-from kiks.recording.motion import Motion
-from kiks.recording.rerun import run_again
+from kiks.recording.rerun import Piece, run_again
 from kiks.sim.run_log import Kind
 from kiks.units import TICK_NS, s_from_ns
 
@@ -32,6 +31,32 @@ class Event(NamedTuple):
     text: str
 
 
+def notes_of(entries: Sequence[Entry], *, has_begun: bool) -> Iterator[Event]:
+    """Yield what was noted: lines of output, bookmarks, changes by hand.
+
+    Args:
+        entries: Entries of a log.
+        has_begun: Whether there were entries before; the first state of all is no change.
+    """
+    for entry in entries:
+        time_s = s_from_ns(entry.time_ns)
+        if entry.kind == Kind.TEXT:
+            yield Event(time_s, entry.robot + 1, "output", entry.data.decode("utf-8", "replace"))
+        elif entry.kind == Kind.MARK:
+            yield Event(time_s, 0, "bookmark", entry.data.decode("utf-8", "replace"))
+        elif entry.kind == Kind.STATE and has_begun:
+            yield Event(time_s, 0, "change", "")
+        has_begun = has_begun or entry.kind in (Kind.STATE, Kind.CHECK)
+
+
+def contacts_of(piece: Piece) -> Iterator[Event]:
+    """Yield an event for each robot that has begun to touch something between two samples."""
+    for motion in piece.motion:
+        records: Any = motion.robots
+        for sample, robot in np.argwhere(np.diff(records["contact_count"], axis=0) > 0).tolist():
+            yield Event(s_from_ns(int(motion.ticks[sample + 1]) * TICK_NS), robot + 1, "contact", "")
+
+
 class EventReader:
     """Reads the events of a recording that may grow."""
 
@@ -40,52 +65,19 @@ class EventReader:
         self._block = log.blocks.start
         self._has_begun = False
         self._until_ns = -1
-        self._contacts: NDArray[np.int64] = np.zeros(0, np.int64)
 
     def notes(self) -> list[Event]:
-        """Return what was noted since the last call, in its order: all but contacts."""
+        """Return what was noted since the last call: all but contacts."""
         events: list[Event] = []
         blocks = self._log.blocks
-        self._block = max(self._block, blocks.start)
-        while self._block < blocks.stop:
-            # All of one block at once: an error leaves no half of it behind.
-            events += sorted(self._of_entries(), key=lambda event: event.time_s)
-            self._block += 1
-        return events
-
-    def _of_entries(self) -> Iterator[Event]:
-        for entry in self._log.entries_of(self._block):
-            time_s = s_from_ns(entry.time_ns)
-            if entry.kind == Kind.TEXT:
-                yield Event(time_s, entry.robot + 1, "output", entry.data.decode("utf-8", "replace"))
-            elif entry.kind == Kind.MARK:
-                yield Event(time_s, 0, "bookmark", entry.data.decode("utf-8", "replace"))
-            elif entry.kind == Kind.STATE:
-                # The first state is the beginning.
-                if self._has_begun:
-                    yield Event(time_s, 0, "change", "")
-                self._has_begun = True
-            elif entry.kind == Kind.CHECK:
-                self._has_begun = True
+        for block in range(max(self._block, blocks.start), blocks.stop):
+            events += notes_of(self._log.entries_of(block), has_begun=self._has_begun)
+            self._block, self._has_begun = block + 1, True
+        return sorted(events, key=lambda event: event.time_s)
 
     def contacts(self) -> list[Event]:
         """Return the contacts since the last call; for them, the run is made again."""
-        events: list[Event] = []
-        end_ns = self._log.end_ns
-        if end_ns > self._until_ns:
-            for piece in run_again(self._log, max(self._until_ns, self._log.begin_ns), end_ns):
-                for motion in piece.motion:
-                    events += self._of_motion(motion)
-            self._until_ns = end_ns
-        return events
-
-    def _of_motion(self, motion: Motion) -> Iterator[Event]:
-        """Yield an event for each robot that has begun to touch something between two samples."""
-        records: Any = motion.robots
-        counts: NDArray[np.int64] = records["contact_count"].astype(np.int64)
-        before = counts[:1].copy()
-        known = min(len(self._contacts), counts.shape[1])
-        before[0, :known] = self._contacts[:known]
-        self._contacts = counts[-1]
-        for sample, robot in np.argwhere(np.diff(counts, axis=0, prepend=before) > 0).tolist():
-            yield Event(s_from_ns(int(motion.ticks[sample]) * TICK_NS), robot + 1, "contact", "")
+        begin_ns, self._until_ns = max(self._until_ns, self._log.begin_ns), self._log.end_ns
+        if begin_ns >= self._until_ns:
+            return []
+        return [event for piece in run_again(self._log, begin_ns, self._until_ns) for event in contacts_of(piece)]

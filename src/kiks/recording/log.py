@@ -110,7 +110,7 @@ class RecordedLog:
 
     def entries_from(self, time_ns: int) -> Iterator[Entry]:
         """Yield the entries from a time on [ns], by time."""
-        for block in range(self._block_before(time_ns), self.blocks.stop):
+        for block in range(self._block_at(time_ns - 1), self.blocks.stop):
             for entry in sorted(self.entries_of(block), key=lambda entry: entry.time_ns):
                 if entry.time_ns >= time_ns:
                     yield entry
@@ -126,14 +126,14 @@ class RecordedLog:
     def row_before(self, time_ns: int) -> Row:
         """Return the place of the last checkpoint at or before a time [ns], or of the first state."""
         begin_ns = self.begin_ns
-        for block in range(self._block_before(time_ns), self.blocks.start - 1, -1):
+        for block in range(self._block_at(time_ns), self.blocks.start - 1, -1):
             columns = self._block(block)
             rows = np.flatnonzero(_is_state(columns) & (columns.time_ns <= max(time_ns, begin_ns)))
             if len(rows):
                 return Row(block, int(rows[-1]))
         raise self.damaged("it has no state")
 
-    def _block_before(self, time_ns: int) -> int:
+    def _block_at(self, time_ns: int) -> int:
         """Return the number of the last block that begins at or before a time [ns], or of the first one."""
         blocks = self.blocks
         return max((block for block in blocks if self.reader.chunk(block).begin_ns <= time_ns), default=blocks.start)

@@ -116,6 +116,16 @@ class Recording:
 
     # ---- tables ----
 
+    def tables(self, *names: str) -> list[NDArray[np.void]]:
+        """Return several tables, by names of `table`, in the time of one: the run is made again for them."""
+        for name in names:
+            if name not in tables.TABLES:
+                raise ParameterError(
+                    f"name must be one of {', '.join(map(repr, tables.TABLES))}, but it was {shown(name)}."
+                    f"{nearest(str(name), list(tables.TABLES))}"
+                )
+        return tables.tables(self.log, names)
+
     def table(self, name: str, robot: int | None = None) -> NDArray[np.void]:
         """Return a table: an array of records.
 
@@ -129,14 +139,9 @@ class Recording:
             >>> Recording("run.mcap").table("poses")["x_mm"].mean()  # doctest: +SKIP
             312.4
         """
-        if name not in tables.TABLES:
-            raise ParameterError(
-                f"name must be one of {', '.join(map(repr, tables.TABLES))}, but it was {shown(name)}."
-                f"{nearest(str(name), list(tables.TABLES))}"
-            )
         if robot is not None:
             self.check_robot(robot, "Leave it out for all.")
-        table = tables.TABLES[name](self.log)
+        (table,) = self.tables(name)
         return table if robot is None else table[table["robot"] == robot]
 
     # ---- the world at a time ----

@@ -26,11 +26,13 @@ class Piece(NamedTuple):
 
     Attributes:
         entries: What was recorded and what robots did, by time.
-        motion: Samples of robots and bodies; the last one is of the piece's end.
+        motion: Samples of robots and bodies, from its beginning to its end.
+        after_tick: The last tick of the piece before; -1 for the first piece.
     """
 
     entries: Sequence[Entry]
     motion: Sequence[Motion]
+    after_tick: int
 
 
 def run_again(log: RecordedLog, begin_ns: int | None = None, end_ns: int | None = None) -> Iterator[Piece]:
@@ -47,7 +49,7 @@ def run_again(log: RecordedLog, begin_ns: int | None = None, end_ns: int | None 
     end_ns = log.end_ns if end_ns is None else end_ns
     observer = _Observer(log, begin_ns)
     recorded = log.entries_from(begin_ns)
-    entry = next(recorded, None)
+    entry, after_tick = next(recorded, None), -1
     while True:
         until_ns = min(begin_ns + PIECE_NS, end_ns)
         entries = observer.run_to(until_ns)
@@ -56,7 +58,8 @@ def run_again(log: RecordedLog, begin_ns: int | None = None, end_ns: int | None 
                 entries.append(entry)
             entry = next(recorded, None)
         entries.sort(key=lambda entry: entry.time_ns)
-        yield Piece(entries, observer.motion.take())
+        yield Piece(entries, observer.take(), after_tick)
+        after_tick = observer.sim.world.state.tick_count
         if (begin_ns := until_ns) >= end_ns:
             break
     if observer.replay.differs_ns is not None:
@@ -95,6 +98,12 @@ class _Observer:
         self._look()
         acts, self._acts = self._acts, []
         return acts
+
+    def take(self) -> list[Motion]:
+        """Return the samples since the last call, of which the last one is the first one of the next call."""
+        motion = self.motion.take()
+        self._look()
+        return motion
 
     def _look(self) -> None:
         """Take a sample, and listen to wires that are new; what their turrets of users answer was recorded."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from kiks.errors import ParameterError
 from kiks.model.limits import TEXT_COLUMN_BYTES_MAX
 from kiks.recording.entries import Entry
-from kiks.recording.events import EventReader
+from kiks.recording.events import contacts_of, notes_of
 from kiks.recording.log import RecordedLog
-from kiks.recording.motion import Motion, ticks_of
-from kiks.recording.rerun import run_again
+from kiks.recording.motion import ticks_of
+from kiks.recording.rerun import Piece, run_again
 from kiks.sim.run_log import Kind
 from kiks.units import TICK_NS, s_from_ns
 
@@ -43,65 +43,81 @@ _READINGS = np.dtype([("time_s", "f8"), ("robot", "i4"), ("command", "U1"), ("co
 _COUNTS = re.compile(rb"[0-9]{1,9}(,[0-9]{1,9}){7}")
 
 
+def tables(log: RecordedLog, names: Sequence[str]) -> list[Table]:
+    """Return tables of a recording; the run is made again once for all of them.
+
+    Args:
+        log: The log of the recording.
+        names: Of `TABLES`.
+    """
+    parts: list[list[Any]] = [[] for _ in names]
+    for piece in run_again(log):
+        for name, found in zip(names, parts, strict=True):
+            found.extend(TABLES[name].parts_of(piece))
+    return [_made(log, name, found) for name, found in zip(names, parts, strict=True)]
+
+
+def _made(log: RecordedLog, name: str, parts: list[Any]) -> Table:
+    """Return a table of its parts: arrays, or rows by time, whose last column is as wide as its longest text."""
+    columns: Any = TABLES[name].columns
+    if not parts or isinstance(parts[0], np.ndarray):
+        return np.concatenate([np.zeros(0, columns), *parts])
+    parts.sort(key=lambda row: row[0])
+    if not columns[-1].itemsize:
+        last = columns.names[-1]
+        longest = max(len(row[-1]) for row in parts)
+        columns = np.dtype([*columns.descr[:-1], (last, f"{columns[last].char}{max(longest, 1)}")])
+        if columns[last].itemsize * len(parts) > TEXT_COLUMN_BYTES_MAX:
+            raise ParameterError(
+                f"{log.reader.what} must have texts that fit into a table, but one has {longest} characters, and there "
+                f"are {len(parts)} rows. Read them piece by piece, by `kiks.recording.rerun.run_again`."
+            )
+    return np.array(parts, columns)
+
+
 def _seconds(ticks: NDArray[np.int64]) -> NDArray[np.float64]:
     return ticks * TICK_NS / 1e9
 
 
-def _motion(log: RecordedLog) -> Iterator[Motion]:
-    return (motion for piece in run_again(log) for motion in piece.motion)
-
-
-def _entries(log: RecordedLog) -> Iterator[Entry]:
-    return (entry for piece in run_again(log) for entry in piece.entries)
-
-
-def _joined(parts: list[Table], kind: np.dtype[np.void]) -> Table:
-    return np.concatenate(parts) if parts else np.zeros(0, kind)
-
-
-def poses(log: RecordedLog) -> Table:
-    """Return where robots were after each tick of 10 ms: time_s, robot, x_mm, y_mm, heading_rad (not wrapped)."""
-    parts, last_tick = [], -1
-    for motion in _motion(log):
+def poses(piece: Piece) -> Iterator[Table]:
+    """Yield where robots were after each tick of 10 ms: time_s, robot, x_mm, y_mm, heading_rad (not wrapped)."""
+    last_tick = piece.after_tick
+    for motion in piece.motion:
         ticks, places, *_ = ticks_of(motion, last_tick)
         last_tick = int(motion.ticks[-1])
         rows = np.zeros(places.shape[:2], _POSES)
         rows["time_s"], rows["robot"] = _seconds(ticks)[:, None], np.arange(1, places.shape[1] + 1)
         for index, name in enumerate(("x_mm", "y_mm", "heading_rad")):
             rows[name] = places[:, :, index]
-        parts.append(rows.ravel())
-    return _joined(parts, _POSES)
+        yield rows.ravel()
 
 
-def wheels(log: RecordedLog) -> Table:
-    """Return what wheels did, every 40 ms.
+def wheels(piece: Piece) -> Iterator[Table]:
+    """Yield what wheels did, every 40 ms.
 
     Columns are encoder counts since the start [pulses], speeds that the program asked for and that the robot measured
     [pulses/10 ms], whether it touches something, how often it has begun to, and how far it has driven, forwards and
     backwards together [mm].
     """
-    parts = []
-    for motion in _motion(log):
-        records: Any = motion.robots
+    for motion in piece.motion:
+        is_new = motion.ticks > piece.after_tick
+        records: Any = motion.robots[is_new]
         rows = np.zeros(records.shape, _WHEELS)
-        rows["time_s"], rows["robot"] = _seconds(motion.ticks)[:, None], np.arange(1, records.shape[1] + 1)
+        rows["time_s"], rows["robot"] = _seconds(motion.ticks[is_new])[:, None], np.arange(1, records.shape[1] + 1)
         for wheel, side in enumerate(("left", "right")):
             rows[f"{side}_pulses"] = records["pulse_count"][:, :, wheel]
             rows[f"{side}_setpoint"] = records["speed_setpoint"][:, :, wheel]
             rows[f"{side}_speed"] = records["measured_speed"][:, :, wheel]
         rows["is_touching"], rows["contacts"] = records["is_touching"] != 0, records["contact_count"]
         rows["driven_mm"] = records["forwards_mm"] + records["backwards_mm"]
-        parts.append(rows.ravel())
-    return _joined(parts, _WHEELS)
+        yield rows.ravel()
 
 
-def readings(log: RecordedLog) -> Table:
-    """Return what programs read of proximity (N) and light (O) sensors: time_s, robot, command, counts [8]."""
-    rows = []
-    for entry in _entries(log):
+def readings(piece: Piece) -> Iterator[tuple[Any, ...]]:
+    """Yield what programs read of proximity (N) and light (O) sensors: time_s, robot, command, counts [8]."""
+    for entry in piece.entries:
         if (reading := reading_of(entry)) is not None:
-            rows.append((s_from_ns(entry.time_ns), entry.robot + 1, *reading))
-    return np.array(rows, _READINGS)
+            yield s_from_ns(entry.time_ns), entry.robot + 1, *reading
 
 
 def reading_of(entry: Entry) -> tuple[str, tuple[int, ...]] | None:
@@ -112,48 +128,41 @@ def reading_of(entry: Entry) -> tuple[str, tuple[int, ...]] | None:
     return None
 
 
-def wire(log: RecordedLog) -> Table:
-    """Return the characters on all lines: time_s of the first one, robot, is_sent (to the robot), data."""
-    rows = []
-    for entry in _entries(log):
+def wire(piece: Piece) -> Iterator[tuple[Any, ...]]:
+    """Yield the characters on all lines: time_s of the first one, robot, is_sent (to the robot), data."""
+    for entry in piece.entries:
         if entry.data and entry.kind in (Kind.SEND, Kind.TYPE):
-            rows.append((s_from_ns(entry.other), entry.robot + 1, True, entry.data))
+            yield s_from_ns(entry.other), entry.robot + 1, True, entry.data
         elif entry.data and entry.kind == Kind.ACT:
-            rows.append((s_from_ns(entry.number), entry.robot + 1, False, entry.data))
-    rows.sort(key=lambda row: row[0])
-    longest = _longest(log, [len(row[3]) for row in rows])
-    return np.array(rows, np.dtype([("time_s", "f8"), ("robot", "i4"), ("is_sent", "?"), ("data", f"S{longest}")]))
+            yield s_from_ns(entry.number), entry.robot + 1, False, entry.data
 
 
-def events(log: RecordedLog) -> Table:
-    """Return what happened: time_s, robot (0 for none), kind, text.
+def events(piece: Piece) -> Iterator[tuple[Any, ...]]:
+    """Yield what happened: time_s, robot (0 for none), kind, text.
 
     `kiks.recording.events.Event` says which kinds there are.
     """
-    reader = EventReader(log)
-    rows = [*reader.notes(), *reader.contacts()]
-    rows.sort(key=lambda row: row.time_s)
-    longest = _longest(log, [4 * len(row.text) for row in rows]) // 4
-    kind = np.dtype([("time_s", "f8"), ("robot", "i4"), ("kind", "U8"), ("text", f"U{max(longest, 1)}")])
-    return np.array(rows, kind)
+    yield from notes_of(piece.entries, has_begun=piece.after_tick >= 0)
+    yield from contacts_of(piece)
 
 
-def _longest(log: RecordedLog, lengths: Sequence[int]) -> int:
-    """Return the greatest of the lengths of a column's texts, at least 1."""
-    longest = max(lengths, default=1)
-    if longest * len(lengths) > TEXT_COLUMN_BYTES_MAX:
-        raise ParameterError(
-            f"{log.reader.what} must have texts that fit into a table, but one has {longest} bytes, and there are "
-            f"{len(lengths)} rows. Read `entries()` one by one."
-        )
-    return longest
+class TableKind(NamedTuple):
+    """A kind of table.
+
+    Attributes:
+        parts_of: Yields the arrays or rows of a piece of a run.
+        columns: The type of a row; a last column of texts gets the width that it needs.
+    """
+
+    parts_of: Callable[[Piece], Iterator[Any]]
+    columns: Any
 
 
-TABLES: Mapping[str, Callable[[RecordedLog], Table]] = {
-    "poses": poses,
-    "wheels": wheels,
-    "readings": readings,
-    "wire": wire,
-    "events": events,
+TABLES: Mapping[str, TableKind] = {
+    "poses": TableKind(poses, _POSES),
+    "wheels": TableKind(wheels, _WHEELS),
+    "readings": TableKind(readings, _READINGS),
+    "wire": TableKind(wire, np.dtype([("time_s", "f8"), ("robot", "i4"), ("is_sent", "?"), ("data", "S0")])),
+    "events": TableKind(events, np.dtype([("time_s", "f8"), ("robot", "i4"), ("kind", "U8"), ("text", "U0")])),
 }
 """The tables by name."""
