@@ -178,9 +178,10 @@ class RecordedLog:
         """Return a block of the log."""
         if number not in self._blocks:
             columns = Columns.of_block(self.reader.read(number), self.reader.what)
+            lines, inputs = np.bincount(columns.kind != Kind.TEXT, minlength=2)
             # A few may be in the smallest chunk.
-            entries_max = 16 + self.reader.chunk(number).length // ENTRY_BYTES + LINES_MAX
-            if not 0 < len(columns.kind) <= entries_max:
+            most = 16 + self.reader.chunk(number).length // ENTRY_BYTES
+            if not 0 < lines + inputs <= most + LINES_MAX or inputs > most:
                 raise self.damaged(f"a part has {len(columns.kind)} entries")
             self._blocks[number] = columns
             if len(self._blocks) > BLOCKS_KEPT:

@@ -210,7 +210,7 @@ class LookingBack:
         """
         world = self.past or self._present()
         if self.past is None:
-            await self._present().do(lambda _: self._flush())
+            await self._present().do(self._flush)
         await self._read_marks(has_contacts=True)
         mark = next_mark(self.marks, world.sim.now_ns, is_before=is_before)
         if mark is not None:
