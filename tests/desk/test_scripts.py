@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 
 from kiks.desk.server.scripts import (
     EXAMPLES,
+    ProgramFolder,
     encode_script,
     find_mistake,
     offered,
-    programs_of,
     read_script,
     split_arguments,
 )
@@ -27,15 +27,15 @@ def test_own_programs_and_examples_are_offered(tmp_path: Path) -> None:
         (tmp_path / name).write_text("")
     (tmp_path / "folder.py").mkdir()
     (tmp_path / "folder.py" / "below.py").write_text("")
-    labels = [*offered(programs_of(tmp_path)).values()]
+    labels = [*offered(ProgramFolder(tmp_path)).values()]
     assert labels[:3] == ["a.py", "b.py", "example: avoid"]
     examples = len(demonstrations()) - 1  # all but soccer, whose program lies elsewhere
     assert len(labels) == 2 + examples
-    assert len(offered(programs_of(tmp_path / "nowhere"))) == examples
+    assert len(offered(ProgramFolder(tmp_path / "nowhere"))) == examples
 
 
 def test_programs_are_saved_in_the_folder_alone_and_read_again(tmp_path: Path) -> None:
-    folder = programs_of(tmp_path)
+    folder = ProgramFolder(tmp_path)
     assert folder.save(encode_script("print('grün')\n"), " mine ", "a program") == "mine.py"
     assert read_script(tmp_path / "mine.py") == "print('grün')\n"
     assert folder.full_name("text.txt") == "text.txt.py"

@@ -10,17 +10,9 @@ from nicegui import ui
 
 from kiks.desk.panels.files import save_in
 from kiks.desk.panels.widgets import LogBox, Panel, icon_button, named, offer_robots, select, told, with_props
+from kiks.desk.server import scripts
 from kiks.desk.server.desk import Desk
-from kiks.desk.server.scripts import (
-    EXAMPLES,
-    NEW,
-    encode_script,
-    find_mistake,
-    offered,
-    programs_of,
-    read_script,
-    split_arguments,
-)
+from kiks.desk.server.scripts import EXAMPLES, NEW
 from kiks.ports.program_process import Command
 from kiks.ports.programs import Handle
 
@@ -57,7 +49,7 @@ class ProgramsPanel(Panel):
 
     def __init__(self, desk: Desk) -> None:
         super().__init__(desk, REFRESH_S)
-        self._folder = programs_of(desk.folder)
+        self._folder = scripts.ProgramFolder(desk.folder)
         self._drawn: object = None
         self._shown: Handle | None = None
         self._script: Path | None = None
@@ -189,7 +181,7 @@ class ProgramsPanel(Panel):
 
     def _offer(self) -> None:
         """Update the list of programs."""
-        self._choice.set_options(offered(self._folder))
+        self._choice.set_options(scripts.offered(self._folder))
 
     @told
     async def _open(self) -> None:
@@ -198,7 +190,7 @@ class ProgramsPanel(Panel):
         if script is None or script == self._script:
             return
         draft = self._drafts.get(script)
-        self._text = read_script(script) if draft is None else None
+        self._text = scripts.read_script(script) if draft is None else None
         if draft is None and script.parent == self._folder.path:
             self._folder.open(script.name)
         self._edit(script, script.name, draft or self._text or "")
@@ -222,9 +214,9 @@ class ProgramsPanel(Panel):
     async def _stored(self) -> Path | None:
         """Save the program under its name and return its file; None if another one would be replaced and is to stay."""
         script, text, folder = self._script, self._editor.value or "", self._folder
-        if script is not None and script.parent == EXAMPLES and text == read_script(script):
+        if script is not None and script.parent == EXAMPLES and text == scripts.read_script(script):
             return script
-        name, data = self._name.value or "", encode_script(text)
+        name, data = self._name.value or "", scripts.encode_script(text)
 
         async def encoded() -> bytes:
             return data
@@ -250,9 +242,9 @@ class ProgramsPanel(Panel):
 
     async def _run(self) -> None:
         """Check the program, save it and run it."""
-        self._mistake.text = find_mistake(self._editor.value or "")
+        self._mistake.text = scripts.find_mistake(self._editor.value or "")
         if not self._mistake.text:
-            arguments = split_arguments(self._arguments.value or "")
+            arguments = scripts.split_arguments(self._arguments.value or "")
             if (script := await self._stored()) is not None:
                 await self._start(Command(script, arguments), self._robot.value or 1)
 

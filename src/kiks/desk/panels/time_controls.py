@@ -15,17 +15,8 @@ class ClockView(FeedElement, component=WEB / "clock_view.js", esm={"kiks-desk": 
     """The simulated clock and its speed."""
 
 
-SPEEDS: dict[float, str] = {
-    0.1: "0.1 x",
-    0.25: "0.25 x",
-    0.5: "0.5 x",
-    1.0: "real time",
-    2.0: "2 x",
-    5.0: "5 x",
-    10.0: "10 x",
-    50.0: "50 x",
-    0.0: "full speed",
-}
+SPEEDS = {speed: f"{speed:g} x" for speed in (0.1, 0.25, 0.5, 1.0, 2.0, 5.0, 10.0, 50.0)}
+SPEEDS |= {1.0: "real time", 0.0: "full speed"}
 """Speeds [simulated seconds per real second]; 0 stands for no limit."""
 
 STEPS: dict[float, str] = {0.01: "10 ms", 0.1: "100 ms", 1.0: "1 s", 10.0: "10 s"}

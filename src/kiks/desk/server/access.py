@@ -110,12 +110,14 @@ class AccessControl:
         if not self._knows_token(request):
             query = dict(request.query_params)
             token, ticket = query.pop("token", ""), query.pop("ticket", "")
-            if request.scope["type"] != "http" or not self._opens(request.scope, token, ticket):
+            key, scope = self._key, request.scope
+            is_page = scope["type"] == "http"
+            if not is_page or not (key.fits(token) or key.take(ticket, scope.get("client"), scope.get("server"))):
                 raise HTTPException(
                     403, "The desk must be opened with its token, but the address has none or another one"
                 )
-            path = request.scope["path"].removeprefix(self._key.place).lstrip("/")
-            address = f"{self._key.place}/{quote(path)}" + (f"?{urlencode(query)}" if query else "")
+            path = scope["path"].removeprefix(key.place).lstrip("/")
+            address = f"{key.place}/{quote(path)}" + (f"?{urlencode(query)}" if query else "")
             headers = {"set-cookie": self._cookie(request.headers), "cache-control": "no-store"}
             return RedirectResponse(address, 303, headers)
         if (timer := request.scope.get("state", {}).get(TIMER)) is not None:
@@ -153,9 +155,6 @@ class AccessControl:
         # Other servers of this computer may set cookies of the same name: a dictionary would hold one of them.
         pairs = (pair.strip().partition("=") for pair in request.headers.get("cookie", "").split(";"))
         return any(each == COOKIE and self._key.fits(value) for each, _, value in pairs)
-
-    def _opens(self, scope: Scope, token: str, ticket: str) -> bool:
-        return self._key.fits(token) or self._key.take(ticket, scope.get("client"), scope.get("server"))
 
     def _cookie(self, headers: Headers) -> str:
         """Return the cookie with the token; pages of other sites never send it, and other servers never get it.

@@ -30,25 +30,23 @@ _RESERVED = {"con", "prn", "aux", "nul", *(f"{port}{number}" for port in ("com",
 
 
 class Folder:
-    """The folder in which a desk opens and saves files of a sort.
+    """The folder in which a desk opens and saves files.
 
     Args:
         path: The folder.
+
+    Attributes:
         opened: Endings of files that can be opened.
         saved: Endings of files that can be saved; the first one is the default.
         depth_max: How deep its subfolders may lie; 0 for files of the folder alone.
     """
 
-    def __init__(
-        self,
-        path: str | Path,
-        opened: tuple[str, ...] = OPENED,
-        saved: tuple[str, ...] = SAVED,
-        *,
-        depth_max: int = 3,
-    ) -> None:
+    opened: tuple[str, ...] = OPENED
+    saved: tuple[str, ...] = SAVED
+    depth_max = 3
+
+    def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
-        self._opened, self._saved, self._depth_max = opened, saved, depth_max
         self._known = {name: self._version(name) for name in self.names()}
 
     def names(self) -> list[str]:
@@ -65,15 +63,15 @@ class Folder:
                 name = entry.relative_to(self.path).as_posix()
                 if entry.name.startswith(".") or not self._is_inside(name):
                     continue
-                if entry.is_dir() and not entry.is_symlink() and depth < self._depth_max:
+                if entry.is_dir() and not entry.is_symlink() and depth < self.depth_max:
                     waiting.append((entry, depth + 1))
-                elif entry.suffix.lower() in self._opened and entry.is_file():
+                elif entry.suffix.lower() in self.opened and entry.is_file():
                     found.append(name)
         return sorted(found, key=str.lower)[:LISTED_MAX]
 
     def open(self, name: str) -> Path:
         """Return the path of a file that is read now."""
-        path = self._path(name, self._opened)
+        path = self._path(name, self.opened)
         self._known[name] = self._version(name)
         return path
 
@@ -87,7 +85,7 @@ class Folder:
             may_replace: Whether to replace an existing file as it was when it was opened, saved or asked about here.
         """
         full = self.full_name(name)
-        path = self._path(full, self._saved)
+        path = self._path(full, self.saved)
         if path.exists() and not (may_replace and self.is_known(full)):
             raise ParameterError(f"The name must be new, but {full!r} exists. Choose another one, or replace it.")
         replace_file(path, data, what)
@@ -97,7 +95,7 @@ class Folder:
     def question(self, name: str) -> str:
         """Return what a person is to be asked before a file is saved under a name; nothing if it would be a new one."""
         full = self.full_name(name)
-        if not self._path(full, self._saved).exists():
+        if not self._path(full, self.saved).exists():
             return ""
         was_known, self._known[full] = self.is_known(full), self._version(full)
         fact = "exists" if was_known else "was changed elsewhere since you opened or saved it here"
@@ -118,11 +116,11 @@ class Folder:
     def full_name(self, name: str) -> str:
         """Add the default ending to a name without a known ending."""
         typed = name.strip()
-        return typed if PurePosixPath(typed).suffix.lower() in self._opened else f"{typed}{self._saved[0]}"
+        return typed if PurePosixPath(typed).suffix.lower() in self.opened else f"{typed}{self.saved[0]}"
 
     def _path(self, name: str, endings: tuple[str, ...]) -> Path:
         check_name(name, endings)
-        if name.count("/") > self._depth_max:
+        if name.count("/") > self.depth_max:
             raise ParameterError(f"The name must lead less deep into folders, but it was {name!r}. Leave some out.")
         path = inside(self.path, name, "The name")
         if path.is_dir():

@@ -26,9 +26,11 @@ with serial.Serial("/dev/ttyUSB0", 9600, timeout=1) as port:
 """Text of a new program."""
 
 
-def programs_of(folder: Path) -> Folder:
-    """Return a folder whose files are programs; those in folders below it are not offered."""
-    return Folder(folder, (".py",), (".py",), depth_max=0)
+class ProgramFolder(Folder):
+    """A folder whose files are programs; those in folders below it are not offered."""
+
+    opened = saved = (".py",)
+    depth_max = 0
 
 
 def offered(folder: Folder) -> dict[Path, str]:
