@@ -7,6 +7,7 @@ import threading
 import time
 import tracemalloc
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from importlib import resources
 from pathlib import Path
@@ -353,22 +354,20 @@ def test_two_programs_drive_two_robots_in_one_world(session: Session) -> None:
     def run() -> tuple[list[str], list[str], str]:
         first = begun(session, "seed 4", "programs 2", world=f"matrix {matrix_text(codes)}")
         second = Asker(session, 2)
-        told: dict[int, list[str]] = {1: [], 2: []}
 
-        def loop(ask: Asker, number: int) -> None:
+        def loop(ask: Asker) -> list[str]:
             ask("open 1 9600")
+            told = []
             for step in range(60):
-                told[number] += [ask("ask 1 N"), ask(f"ask 1 D,{3 + number},{step % 6}"), ask("time 1")]
+                told += [ask("ask 1 N"), ask(f"ask 1 D,{3 + ask.client.number},{step % 6}"), ask("time 1")]
             ask("close 1")
+            return told
 
-        threads = [threading.Thread(target=loop, args=(ask, number)) for number, ask in ((1, first), (2, second))]
-        for thread in threads:
-            thread.start()
-        for thread in threads:
-            thread.join(GUARD_S)
+        with ThreadPoolExecutor() as pool:
+            told = list(pool.map(loop, (first, second)))
         for ask in (first, second):
             ask.client.leave()
-        return told[1], told[2], Asker(session)("state")
+        return *told, Asker(session)("state")
 
     runs = [run() for _ in range(3)]
     assert len(runs[0][0]) == len(runs[0][1]) == 180
@@ -648,9 +647,8 @@ def test_an_interrupted_film_is_given_up(tmp_path: Path) -> None:
 def halt(session: Session) -> None:
     """Press Halt: in another thread than that of a program."""
     desk = session.desk
-    presses = threading.Thread(target=lambda: asyncio.run(desk.halt()))
-    presses.start()
-    presses.join(GUARD_S)
+    with ThreadPoolExecutor() as pool:
+        pool.submit(lambda: asyncio.run(desk.halt())).result(GUARD_S)
 
 
 def set_points(session: Session) -> list[list[int]]:
@@ -694,24 +692,20 @@ def test_halt_stops_every_program_at_its_next_request(session: Session) -> None:
     codes[249, 129], codes[249, 369] = -360, -90
     first = begun(session, world=f"matrix {matrix_text(codes)}")
     second = Asker(session, 2)
-    told: list[str] = []
 
     def loop(ask: Asker) -> None:
         ask("open 1 9600")
         while (answer := ask.told("ask 1 D,5,5"))[0] == "+":
             pass
-        told.append(answer[0])
-        told.append(ask.refused("ask 1 D,9,9"))
+        assert answer[0] == "."
+        assert "port -1 must be open" in ask.refused("ask 1 D,9,9")
 
-    threads = [threading.Thread(target=loop, args=(ask,)) for ask in (first, second)]
-    for thread in threads:
-        thread.start()
-    wait_until(lambda: set_points(session) == [[5, 5], [5, 5]])
-    halt(session)
-    for thread in threads:
-        thread.join(GUARD_S)
-    assert told.count(".") == 2
-    assert sum("port -1 must be open" in text for text in told) == 2
+    with ThreadPoolExecutor() as pool:
+        loops = [pool.submit(loop, ask) for ask in (first, second)]
+        wait_until(lambda: set_points(session) == [[5, 5], [5, 5]])
+        halt(session)
+        for each in loops:
+            each.result(GUARD_S)
     wait_until(lambda: set_points(session) == [[0, 0], [0, 0]])
     first("open 1 9600")
 
