@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from pathlib import Path
 from time import perf_counter_ns
-from typing import Protocol
 
 from kiks.errors import ParameterError
 from kiks.model.atomic_files import replace_file
@@ -19,17 +18,18 @@ DIGITS_MAX = 13
 """Most digits of a time [ns]: no program thinks for three hours, and a simulation of years would seem to hang."""
 
 
-class Thinking(Protocol):
-    """A policy: `enter` is called when the program calls a port, `leave` when the port returns."""
+class Thinking:
+    """A policy: `enter` is called when the program calls a port, `leave` when the port returns. This one is free."""
 
     def enter(self, *, is_command: bool) -> int:
         """Return the time to charge at a call [ns]; `is_command`: whether it sends, as the first call since a reply."""
+        return 0
 
     def leave(self) -> None:
         """Note that the program goes on."""
 
 
-class ThinkingFixed:
+class ThinkingFixed(Thinking):
     """The same time before every command; 0 is `none`."""
 
     def __init__(self, time_ns: int) -> None:
@@ -39,11 +39,8 @@ class ThinkingFixed:
         """Return the fixed time before a command, 0 otherwise."""
         return self.time_ns if is_command else 0
 
-    def leave(self) -> None:
-        """Do nothing."""
 
-
-class ThinkingLive:
+class ThinkingLive(Thinking):
     """The measured time times a factor for another computer (2: half as fast as this one)."""
 
     def __init__(self, factor: float) -> None:
@@ -62,7 +59,7 @@ class ThinkingLive:
         self._left_ns = perf_counter_ns()
 
 
-class ThinkingReplay:
+class ThinkingReplay(Thinking):
     """The times of an earlier run, in their order; 0 after the last."""
 
     def __init__(self, measured_ns: list[int]) -> None:
@@ -71,9 +68,6 @@ class ThinkingReplay:
     def enter(self, *, is_command: bool) -> int:
         """Return the next recorded time."""
         return next(self._times, 0)
-
-    def leave(self) -> None:
-        """Do nothing."""
 
 
 def parse_thinking(text: str) -> Thinking:

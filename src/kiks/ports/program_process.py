@@ -311,12 +311,12 @@ class Labels:
     def __init__(self, names: Sequence[str]) -> None:
         self._lock = threading.Lock()
         self._has_unfinished = False
-        self._width = max(len(_label(number, name)) for number, name in enumerate(names, 1))
+        self._width = max(len(f"{number} {name}") for number, name in enumerate(names, 1))
         self.are_terminals = {is_error: os.isatty(stream) for is_error, stream in _STREAMS.items()}
 
     def writer(self, number: int, name: str) -> OutputWriter:
         """Return the writer for a program's output."""
-        return _LabelledWriter(self, number, _label(number, name).ljust(self._width))
+        return _LabelledWriter(self, number, f"{number} {name}".ljust(self._width))
 
     def say(self, text: str) -> None:
         """Print a line of KiKS between those of the programs."""
@@ -361,10 +361,6 @@ class _LabelledWriter(OutputWriter):
         if self._labels.are_terminals[is_error]:
             self._labels.write(self._heads[is_error] + text, is_error=is_error, is_unfinished=True)
         return self._labels.are_terminals[is_error]
-
-
-def _label(number: int, name: str) -> str:
-    return f"{number} {name}"
 
 
 def _read_output(pipes: dict[IO[bytes], bool], writer: OutputWriter, hear: Callable[[str], None]) -> None:
