@@ -11,9 +11,12 @@ from tools.sensors import train_networks
 
 from kiks.engine import numbers
 from kiks.engine.compiling import callable_kernel
+from kiks.engine.parameters import pack
 from kiks.engine.sensing import thesis_networks as kernels
+from kiks.engine.sensing.responses import respond_all
 from kiks.errors import ParameterError
 from kiks.fit.samples import Samples
+from kiks.model.robot import RobotSpec
 from kiks.model.thesis_networks import THESIS, NetworkResponse
 
 SIZES = sorted(train_networks.SIZES)
@@ -118,8 +121,15 @@ def test_tanh():
         assert abs(tanh(x)) <= 1.0
 
 
+def respond(response, seen):
+    """Return the counts for nearnesses by a response of the thesis, shape [samples, 8]."""
+    kinds, out = pack(RobotSpec.load("khepera", response=response)), np.empty(seen.shape[:2])
+    lengths_mm = (1.0 - seen) * kinds["range_mm"]
+    respond_all(kernels.networks_for(response), kinds, lengths_mm, np.ones_like(seen), out)
+    return out
+
+
 def test_the_table_is_the_mean_of_the_networks():
-    response = NetworkResponse.load()
     table = kernels.networks_for("fast")["table"][0]
     assert table.shape == (6**7,)
     assert table[0] == 0.0
@@ -128,19 +138,18 @@ def test_the_table_is_the_mean_of_the_networks():
     rng = np.random.default_rng(0)
     levels = rng.integers(0, 6, (50, 7))
     seen = np.repeat((levels / 5.0)[:, None], 8, axis=1)
-    out, looked_up = np.empty((50, 8)), np.empty((50, 8))
-    kernels.respond_networks(kernels.pack_networks(response), False, seen, out)
+    out = respond("thesis", seen)
     # Anything that rounds to the same level is the same entry.
     nearby = np.clip(seen + rng.uniform(-0.09, 0.09, seen.shape), 0.0, 1.0)
-    kernels.respond_networks(kernels.networks_for("fast"), True, nearby, looked_up)
-    np.testing.assert_allclose(looked_up, np.repeat(out.mean(axis=1)[:, None], 8, axis=1), rtol=1e-5, atol=1e-3)
+    np.testing.assert_allclose(
+        respond("fast", nearby), np.repeat(out.mean(axis=1)[:, None], 8, axis=1), rtol=1e-5, atol=1e-3
+    )
 
 
 def test_kernels_against_numpy():
     response = NetworkResponse.load()
     seen = np.random.default_rng(1).random((200, 8, 7))
-    out = np.empty((200, 8))
-    kernels.respond_networks(kernels.pack_networks(response), False, seen, out)
+    out = respond("thesis", seen)
     for sensor in range(8):
         hidden, middle, last = (each[sensor] for each in response.weights)
         network = train_networks.Network((hidden, middle, last[None]), (True, False, False))

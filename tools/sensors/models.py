@@ -10,11 +10,14 @@ import math
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 from tools.sensors.train_networks import PLACES, fan_of
 
+from kiks.engine.parameters import pack
 from kiks.engine.sensing import thesis_networks
+from kiks.engine.sensing.responses import respond_all
 from kiks.fit.samples import MAXIMUM_COUNTS, Fan, Floats, Samples, meet, nearnesses
-from kiks.model.robot import SENSOR_COUNT
+from kiks.model.robot import SENSOR_COUNT, RobotSpec
 from kiks.model.thesis_networks import BODY_RADIUS_MM, NetworkResponse
 
 Model = Callable[[Samples], Floats]
@@ -54,20 +57,21 @@ def default(samples: Samples, response: str | None = None) -> Floats:
 def thesis(samples: Samples, response: NetworkResponse | None = None) -> Floats:
     """Answer with the thesis's networks; those that come with KiKS if left out."""
     response = response or NetworkResponse.load()
-    seen = nearnesses(samples, fan_of(response))
-    counts = np.empty(samples.counts.shape, np.float64)
-    packed = thesis_networks.pack_networks(response)
-    thesis_networks.respond_networks(packed, False, seen.reshape(-1, *seen.shape[2:]), counts.reshape(-1, SENSOR_COUNT))
-    return counts
+    return _answer("thesis", samples, response, thesis_networks.pack_networks(response))
 
 
 def fast(samples: Samples) -> Floats:
     """Answer with the thesis's table of 6^7 entries, made from the networks that come with KiKS."""
-    response = NetworkResponse.load()
-    seen = nearnesses(samples, fan_of(response))
+    return _answer("fast", samples, NetworkResponse.load(), thesis_networks.networks_for("fast"))
+
+
+def _answer(name: str, samples: Samples, response: NetworkResponse, packed: NDArray[np.void]) -> Floats:
+    lengths_mm, cosines = (part.reshape(-1, *part.shape[2:]) for part in meet(samples, fan_of(response)))
+    packed.setflags(write=False)  # a kernel that takes arrays of two types is compiled twice
+    kind = pack(RobotSpec.load("khepera", response=name))
+    kind["range_mm"] = response.range_mm
     counts = np.empty(samples.counts.shape, np.float64)
-    packed = thesis_networks.networks_for("fast")
-    thesis_networks.respond_networks(packed, True, seen.reshape(-1, *seen.shape[2:]), counts.reshape(-1, SENSOR_COUNT))
+    respond_all(packed, kind, lengths_mm, cosines, counts.reshape(-1, SENSOR_COUNT))
     return counts
 
 

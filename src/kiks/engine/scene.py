@@ -119,7 +119,7 @@ class Scene:
         )
         self.record["widest_mm"] = max(kinds["radius_mm"].max(initial=0.0), state.bodies["radius_mm"].max(initial=0.0))
         self._take_walls(arenas[0])
-        enter_all_worlds(self.record)
+        enter_worlds(self.record, np.arange(world_count))
 
     def _keep(self, **arrays: NDArray[Any]) -> None:
         """Keep arrays, and write where they are into the record."""
@@ -145,16 +145,8 @@ class Scene:
 
 
 @entry
-def enter_all_worlds(record: Any) -> Any:
-    """Update the grids of all worlds: for Python, after it has moved something."""
-    scene = open_scene(record[0])
-    for world in range(scene.robots.shape[0]):
-        enter_all(scene, world)
-
-
-@entry
 def enter_worlds(record: Any, worlds: Any) -> Any:
-    """Update the grids of some worlds, int64 [world]."""
+    """Update the grids of some worlds, int64 [world]: for Python, after it has moved something."""
     scene = open_scene(record[0])
     for world in worlds:
         enter_all(scene, world)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from kiks.engine.parameters import RAY_COUNT
-from kiks.engine.sensing import explain
+from kiks.engine.sensing import ambient, explain
 from kiks.engine.sensing.observe import NOTHING
 from kiks.model.checks import check_count
 from kiks.model.robot import SENSOR_COUNT
@@ -298,10 +298,10 @@ def _state_of(world: World, how: int, hider: int) -> str:
     if how == explain.HIDDEN:
         return f"hidden by {world.free_space.name_of(hider)}"
     return {
-        explain.SHINING: "seen",
+        ambient.FACING: "seen",
+        ambient.BEHIND: "behind the sensor",
+        ambient.BEHIND_BODY: "behind the robot itself",
         explain.OFF: "off",
-        explain.BEHIND: "behind the sensor",
-        explain.BEHIND_BODY: "behind the robot itself",
     }[how]
 
 

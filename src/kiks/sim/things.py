@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.engine.scalar_math import sin_cos
-from kiks.engine.scene import enter_all_worlds
+from kiks.engine.scene import enter_worlds
 from kiks.engine.state import BALL, BODY, CYLINDER
 from kiks.errors import ArenaError, KiksError, ParameterError, shown
 from kiks.model.arena import Arena, Ball, Cylinder, Lamp
@@ -17,7 +17,7 @@ from kiks.model.array_checks import check_numbers
 from kiks.model.checks import check_count, check_heading, check_kind, check_number
 from kiks.model.free_disc import OVERLAP_MM
 from kiks.sim.free_space import PRESSED_MM
-from kiks.sim.world import World
+from kiks.sim.world import ITSELF, World
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ class Things:
         record["holder"] = record["is_lifted"] = 0
         record["x_mm"], record["y_mm"], record["trail"][:] = x_mm, y_mm, (x_mm, y_mm)
         record["velocity_x"], record["velocity_y"] = speed_mm_s * cosine, speed_mm_s * sine
-        enter_all_worlds(world.scene)
+        enter_worlds(world.scene, ITSELF)
 
     def remove_body(self, body: int) -> None:
         """Remove a ball or cylinder."""

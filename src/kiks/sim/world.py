@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from kiks.clock.own_lock import OwnLock
 from kiks.engine import step
 from kiks.engine.parameters import PARAMETERS, pack
-from kiks.engine.scene import Scene, enter_all_worlds
+from kiks.engine.scene import Scene, enter_worlds
 from kiks.engine.sensing import observe, proximity
 from kiks.engine.sensing.thesis_networks import networks_for
 from kiks.engine.state import State
@@ -34,6 +34,9 @@ SLICE_TICKS = (100, 10_000)
 
 SLICE_MOVES = 100_000
 """Ticks of one kernel call times the things that move: some milliseconds, after which Python can react to Ctrl-C."""
+
+ITSELF = np.zeros(1, np.int64)
+"""The one world of a scene."""
 
 NEVER_TICK = 2**62
 """A tick that never comes."""
@@ -240,7 +243,7 @@ class World:
         radius_mm = self.specs[index].body.radius_mm
         self.free_space.check_free(f"the place of robot {index + 1}", x_mm, y_mm, radius_mm, but=index)
         self.put_robot(index, x_mm, y_mm, heading_rad)
-        enter_all_worlds(self.scene)
+        enter_worlds(self.scene, ITSELF)
 
     def put_robot(self, index: int, x_mm: float, y_mm: float, heading_rad: float) -> None:
         """Write a robot's pose into the state, whatever is there."""

@@ -8,9 +8,8 @@ from tools.sensors.models import MAXIMUM_COUNTS
 
 from kiks.engine.parameters import pack
 from kiks.engine.sensing.responses import respond_all
-from kiks.engine.sensing.thesis_networks import networks_for, pack_networks, respond_networks
+from kiks.engine.sensing.thesis_networks import networks_for
 from kiks.model.robot import RobotSpec
-from kiks.model.thesis_networks import NetworkResponse
 
 # Seven inverted lengths [mm], the leftmost first, and the reading; several readings of one pattern are a mean.
 PATTERNS = np.array(
@@ -46,22 +45,12 @@ PATTERNS = np.array(
 INVERTED_MM = np.repeat(PATTERNS[:, None, :7], 8, axis=1)
 
 
-def networks():
-    counts = np.empty((len(PATTERNS), 8))
-    respond_networks(pack_networks(NetworkResponse.load()), False, INVERTED_MM / 50.0, counts)
-    return counts
-
-
-def reflection():
-    """Each ray taken to meet its surface squarely, as the patterns do not tell."""
-    counts = np.empty((len(PATTERNS), 8))
+@pytest.mark.parametrize("response", ["thesis", "reflection"])
+def test_what_was_large_there_is_large_here(response):
+    """Each ray is taken to meet its surface squarely, as the patterns do not tell."""
+    robot, counts = RobotSpec.load("khepera", response=response), np.empty((len(PATTERNS), 8))
     cosines = np.where(INVERTED_MM > 0.0, 1.0, 0.0)
-    respond_all(networks_for(), pack(RobotSpec.load("khepera")), 50.0 - INVERTED_MM, cosines, counts)
-    return counts
-
-
-@pytest.mark.parametrize("answer", [networks, reflection])
-def test_what_was_large_there_is_large_here(answer):
-    counts = answer().mean(axis=1)
-    assert np.corrcoef(counts, PATTERNS[:, 7])[0, 1] >= 0.8
-    assert counts[PATTERNS[:, 7] > 800].min() > 0.9 * MAXIMUM_COUNTS
+    respond_all(networks_for(response), pack(robot), 50.0 - INVERTED_MM, cosines, counts)
+    means = counts.mean(axis=1)
+    assert np.corrcoef(means, PATTERNS[:, 7])[0, 1] >= 0.8
+    assert means[PATTERNS[:, 7] > 800].min() > 0.9 * MAXIMUM_COUNTS

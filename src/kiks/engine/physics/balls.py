@@ -16,7 +16,7 @@ import math
 from typing import Any
 
 from kiks.engine.compiling import kernel
-from kiks.engine.physics.contact import SETTLED_MM, clearance_mm, outward, push_out
+from kiks.engine.physics.contact import SETTLED_MM, clearance_mm, push_out, slope
 
 BOUNCE = 0.95
 """Restitution between two bodies."""
@@ -54,7 +54,7 @@ def roll(ground: Any, body: Any, duration_s: Any) -> Any:
     body.velocity_x *= slower / speed
     body.velocity_y *= slower / speed
     if clearance_mm(ground, wanted_x, wanted_y) < body.radius_mm - SETTLED_MM:
-        nx, ny = outward(ground, wanted_x, wanted_y)
+        nx, ny, _ = slope(ground, wanted_x, wanted_y)
         wanted_x, wanted_y = push_out(ground, body.radius_mm, x, y, wanted_x, wanted_y)
         towards = body.velocity_x * nx + body.velocity_y * ny
         if towards < 0.0:

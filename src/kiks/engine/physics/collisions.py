@@ -21,7 +21,7 @@ from kiks.engine.bunch import robot_in
 from kiks.engine.compiling import kernel
 from kiks.engine.grid import disc_at, list_pairs
 from kiks.engine.physics.balls import collide, kick, remember_place, roll, speed_of
-from kiks.engine.physics.contact import PIECES_MAX, clearance_mm, outward
+from kiks.engine.physics.contact import PIECES_MAX, clearance_mm, slope
 from kiks.engine.physics.grasp import REACH, carry_along, is_dragged, keep_holds, return_held, turn_back
 from kiks.engine.physics.motion import draw_slip, give_way, move, room_left, room_of
 from kiks.engine.simd.lanes import floor
@@ -295,7 +295,7 @@ def resolve_overlaps(scene: Any, world: Any, room: Any, near_count: Any, pair_co
                 depth = radius - clearance_mm(scene.ground, x, y)
                 room.discs[disc].is_pushed = depth > 0.0
                 if depth > 0.0:
-                    nx, ny = outward(scene.ground, x, y)
+                    nx, ny, _ = slope(scene.ground, x, y)
                     shift(scene, world, disc, depth * nx, depth * ny)
                     worst = max(worst, depth)
         if worst <= RESOLVED_MM:

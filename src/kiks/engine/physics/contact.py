@@ -71,13 +71,6 @@ def clearance_mm(ground: Any, x: Any, y: Any) -> Any:
 
 
 @kernel
-def outward(ground: Any, x: Any, y: Any) -> Any:
-    """Return the unit vector away from the nearest wall; (0, 0) without one."""
-    nx, ny, _ = slope(ground, x, y)
-    return nx, ny
-
-
-@kernel
 def slope(ground: Any, x: Any, y: Any) -> Any:
     """Return the unit vector away from the nearest wall, and the gain of clearance per path along it.
 

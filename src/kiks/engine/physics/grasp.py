@@ -16,7 +16,7 @@ from typing import Any
 
 from kiks.engine.compiling import kernel
 from kiks.engine.numbers import sin_cos
-from kiks.engine.physics.contact import clearance_mm, outward
+from kiks.engine.physics.contact import clearance_mm, slope
 from kiks.engine.physics.motion import between_nought_and
 
 REACH = 3.0
@@ -67,7 +67,7 @@ def keep_holds(scene: Any, world: Any, room: Any) -> Any:
         robot = robots[world, body.holder - 1]
         depth = body.radius_mm - clearance_mm(scene.ground, body.x_mm, body.y_mm)
         if depth > 0.0:
-            nx, ny = outward(scene.ground, body.x_mm, body.y_mm)
+            nx, ny, _ = slope(scene.ground, body.x_mm, body.y_mm)
             body.x_mm += depth * nx
             body.y_mm += depth * ny
         error = pull_together(robot, kinds[robot.kind], body)

@@ -26,7 +26,7 @@ from kiks.engine.numbers import power, sin_cos, uniform
 from kiks.engine.physics.motion import moment_of
 from kiks.engine.scene import open_scene
 from kiks.engine.sensing.disc_rays import moved_at, moved_of, note_tracks, see_all
-from kiks.engine.sensing.proximity import quantize, sampled_pose
+from kiks.engine.sensing.proximity import on_body, quantize, sampled_pose
 from kiks.engine.sensing.rays import is_lit
 from kiks.model.robot import SENSOR_COUNT
 
@@ -107,10 +107,8 @@ def expected_ambient(
 def mount_of(parameters: Any, x: Any, y: Any, heading: Any, sensor: Any) -> Any:
     """Return the place of a sensor [mm], the same relative to the robot's centre [mm], and its axis."""
     sine, cosine = sin_cos(heading)
-    out_x = parameters.mount_x_mm[sensor] * cosine - parameters.mount_y_mm[sensor] * sine
-    out_y = parameters.mount_x_mm[sensor] * sine + parameters.mount_y_mm[sensor] * cosine
-    axis_x = parameters.axis_cos[sensor] * cosine - parameters.axis_sin[sensor] * sine
-    axis_y = parameters.axis_cos[sensor] * sine + parameters.axis_sin[sensor] * cosine
+    out_x, out_y = on_body(0.0, 0.0, sine, cosine, parameters.mount_x_mm[sensor], parameters.mount_y_mm[sensor])
+    axis_x, axis_y = on_body(0.0, 0.0, sine, cosine, parameters.axis_cos[sensor], parameters.axis_sin[sensor])
     return x + out_x, y + out_y, out_x, out_y, axis_x, axis_y
 
 

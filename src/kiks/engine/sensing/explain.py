@@ -11,7 +11,7 @@ from kiks.engine.numbers import stream_of, uniform
 from kiks.engine.parameters import RAY_COUNT
 from kiks.engine.physics.motion import moment_of
 from kiks.engine.scene import open_scene
-from kiks.engine.sensing.ambient import STREAM_AMBIENT, expected_ambient, face, is_burning, mount_of
+from kiks.engine.sensing.ambient import FACING, STREAM_AMBIENT, expected_ambient, face, is_burning, mount_of
 from kiks.engine.sensing.disc_rays import PER_DISC, PER_TRACK, disc_of, other_tracks, see_all
 from kiks.engine.sensing.observe import WALL, gaze_robot
 from kiks.engine.sensing.proximity import (
@@ -35,8 +35,8 @@ from kiks.engine.sensing.responses import REFLECTION, respond
 from kiks.engine.simd.lanes import LANES, lane_of, load, store
 from kiks.engine.simd.stack_arrays import stack_floats
 
-SHINING, BEHIND, BEHIND_BODY, HIDDEN, OFF = 0, 1, 2, 3, 4
-"""Effect of a lamp on a sensor; the first three values are those of `kiks.engine.sensing.ambient.face`."""
+HIDDEN, OFF = 3, 4
+"""Effects of a lamp on a sensor that `kiks.engine.sensing.ambient.face` does not know."""
 
 
 @kernel
@@ -122,7 +122,7 @@ def explain_ambient(scene: Any, robot: Any, sensor: Any, tick_count: Any, time_n
         tick_count: Ticks done.
         time_ns: Time of the reading [ns].
         out: Output: distance of a lamp from the sensor [mm], cosine of its angle off the sensor's axis, and the
-            expected count without it, float64 [lamp, 3]. Effect of a lamp on the sensor (`SHINING`, ...), and the disc
+            expected count without it, float64 [lamp, 3]. Effect of a lamp on the sensor (`FACING`, ...), and the disc
             that hides it, `WALL` for a wall, int64 [lamp, 2].
 
     Returns:
@@ -144,7 +144,7 @@ def explain_ambient(scene: Any, robot: Any, sensor: Any, tick_count: Any, time_n
         reasons[number, 1] = WALL
         if not is_burning(lamps, number):
             how = OFF
-        elif how == SHINING:
+        elif how == FACING:
             lamp_x, lamp_y = lamps[number, 0], lamps[number, 1]
             if not is_lit(walls, seen, count, mount[0], mount[1], lamp_x, lamp_y):
                 how = HIDDEN

@@ -11,13 +11,11 @@ from kiks.engine.numbers import sin_cos
 from kiks.engine.physics.motion import moment_of
 from kiks.engine.scene import open_scene
 from kiks.engine.sensing.disc_rays import PER_DISC, disc_of, meet_discs, other_tracks, see_all
+from kiks.engine.sensing.observe import WALL
 from kiks.engine.sensing.proximity import pose_at
 from kiks.engine.sensing.rays import brightness_met, cast
 
 _ANYWHERE_MM = 1e6
-
-WALL = -1
-"""Hit of a ray that hit no disc."""
 
 
 @entry

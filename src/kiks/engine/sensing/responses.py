@@ -39,8 +39,8 @@ def darkness(brightness: Any) -> Any:
 
 @kernel
 def reflectance(brightness: Any) -> Any:
-    """Return the reflectance of a surface (`kiks.model.materials`), 0 for no hit."""
-    return BLACK_REFLECTANCE + brightness * ((1.0 - BLACK_REFLECTANCE) / 255.0) if brightness > 0.0 else 0.0
+    """Return the reflectance of a surface (`kiks.model.materials`), 0 for no hit; of one or eight."""
+    return choose(brightness > 0.0, BLACK_REFLECTANCE + brightness * ((1.0 - BLACK_REFLECTANCE) / 255.0), 0.0)
 
 
 @kernel
@@ -55,9 +55,7 @@ def ramp(share: Any, rounding: Any) -> Any:
 def reflection_count(parameters: Any, sensor: Any, lengths_mm: Any, cosines: Any, brightnesses: Any) -> Any:
     """Return the count for the light that returns to a sensor; its rays are `Lanes`."""
     near = cosines / (lengths_mm + parameters.behind_mm)
-    shares = BLACK_REFLECTANCE + brightnesses * ((1.0 - BLACK_REFLECTANCE) / 255.0)
-    shares = choose(brightnesses > 0.0, shares, 0.0)
-    returned = load(parameters.ray_weight[sensor]) * shares * near * near * near
+    returned = load(parameters.ray_weight[sensor]) * reflectance(brightnesses) * near * near * near
     light = total(returned)
     threshold = parameters.threshold[sensor]
     share = (1.0 + threshold) * parameters.gain[sensor] * light - threshold

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from kiks.engine.compiling import entry, inlined, kernel
 from kiks.engine.numbers import TANH_IS_1, tanh_fraction
-from kiks.engine.simd.lanes import LANES, floor, load, store, total
+from kiks.engine.simd.lanes import LANES, floor, load, total
 from kiks.engine.simd.stack_arrays import stack_narrow
 from kiks.model.robot import SENSOR_COUNT
 from kiks.model.thesis_networks import INPUT_COUNT, TANH_COUNT, NetworkResponse
@@ -102,26 +102,6 @@ def fill_table(networks: Any, table: Any) -> Any:
         for sensor in range(SENSOR_COUNT):
             mean += network_count(networks[0], sensor, seen)
         table[index] = mean / SENSOR_COUNT
-
-
-@entry
-def respond_networks(networks: Any, by_table: Any, seen: Any, out: Any) -> Any:
-    """Write the counts of networks, or of their table, for many nearnesses.
-
-    Args:
-        networks: Records of `NETWORKS`, shape [1].
-        by_table: Whether to look counts up in the table.
-        seen: Nearnesses, shape [samples, 8, 7].
-        out: Output: counts, shape [samples, 8].
-    """
-    rays = stack_narrow(LANES)
-    store(rays, 0.0)
-    for sample in range(seen.shape[0]):
-        for sensor in range(seen.shape[1]):
-            for ray in range(INPUT_COUNT):
-                rays[ray] = seen[sample, sensor, ray]
-            counts = table_count(networks[0].table, rays) if by_table else network_count(networks[0], sensor, rays)
-            out[sample, sensor] = counts
 
 
 def pack_networks(response: NetworkResponse) -> NDArray[np.void]:

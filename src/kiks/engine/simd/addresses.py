@@ -108,13 +108,19 @@ def _array(context: Any, builder: Any, kind: Any, place: Any) -> Any:
     size, content = context.get_value_type(types.intp), context.get_data_type(kind.dtype)
     place = builder.bitcast(place, size.as_pointer())
     address, *shape = (builder.load(builder.gep(place, [size(k)])) for k in range(1 + kind.ndim))
+    return array_in(context, builder, kind, builder.inttoptr(address, content.as_pointer()), shape)
+
+
+def array_in(context: Any, builder: Any, kind: Any, data: Any, shape: Any) -> Any:
+    """Return the array of a type that lies in some memory, without gaps."""
+    size, content = context.get_value_type(types.intp), context.get_data_type(kind.dtype)
     strides = [size(context.get_abi_sizeof(content))]
     for length in reversed(shape[1:]):
         strides.insert(0, builder.mul(strides[0], length))
     array = _arrays.make_array(kind)(context, builder)
     _arrays.populate_array(
         array,
-        data=builder.inttoptr(address, content.as_pointer()),
+        data=data,
         shape=_pack(builder, shape),
         strides=_pack(builder, strides),
         itemsize=strides[-1],

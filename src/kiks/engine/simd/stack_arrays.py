@@ -10,13 +10,11 @@ from typing import Any
 
 from llvmlite import ir
 from numba import extending, types
-from numba.core import cgutils
-from numba.np import arrayobj
+
+from kiks.engine.simd.addresses import array_in
 
 # Numba annotates these in part, and not as they are used in kernels.
 _intrinsic: Any = extending.intrinsic
-_arrays: Any = arrayobj
-_pack: Any = cgutils.pack_array
 
 _CACHE_LINE = 64  # bytes
 
@@ -32,19 +30,8 @@ def _on_the_stack(element_type: Any, *kinds: Any) -> Any:
         with builder.goto_entry_block():
             memory = builder.alloca(ir.ArrayType(content, count))
             memory.align = _CACHE_LINE
-        size = context.get_value_type(types.intp)
-        bytes_each = size(context.get_abi_sizeof(content))
-        array = _arrays.make_array(array_type)(context, builder)
-        _arrays.populate_array(
-            array,
-            data=builder.bitcast(memory, content.as_pointer()),
-            shape=_pack(builder, [size(count)]),
-            strides=_pack(builder, [bytes_each]),
-            itemsize=bytes_each,
-            meminfo=None,
-            parent=None,
-        )
-        return array._getvalue()
+        shape = [context.get_value_type(types.intp)(count)]
+        return array_in(context, builder, array_type, builder.bitcast(memory, content.as_pointer()), shape)
 
     return array_type(*kinds), generate
 
