@@ -59,12 +59,7 @@ def calibrate(
 
 
 class TerminalPlacements:
-    """Asks the person at the terminal to put the robot in place.
-
-    Args:
-        hand: Moves a simulated robot; None for a real one.
-        asks: False to take every default.
-    """
+    """Asks the person at the terminal to put the robot in place; a hand moves a simulated one."""
 
     def __init__(self, hand: Placements | None = None, *, asks: bool = True) -> None:
         self.hand = hand

@@ -28,11 +28,7 @@ MaxWall = Annotated[
 
 
 class Limits:
-    """The limits of a run.
-
-    Args:
-        seconds: Simulated time of a program [s]; None for no limit.
-        max_wall_s: Real time [s]; None for no limit.
+    """The limits of a run, in simulated and in real time [s]; None for no limit.
 
     Attributes:
         doubt: Why the run is not repeatable; empty if a limit of real time has not ended it.

@@ -169,14 +169,9 @@ def scene_key(sim: Simulation) -> tuple[Any, ...]:
 
 
 def describe_scene(sim: Simulation, scene: int, names: Sequence[str] | None = None) -> dict[str, Any]:
-    """Return the message to browsers with all data that frames leave out.
+    """Return the message to browsers with all data that frames leave out; robots without names have numbers.
 
     Positions of sensors, directions of rays and shapes are in the robot's frame, x ahead and y to the left.
-
-    Args:
-        sim: The world.
-        scene: Number of the scene.
-        names: Names of the robots; their numbers if left out.
     """
     arena = sim.arena
     return {

@@ -61,12 +61,7 @@ def css(colour: Colour) -> str:
 
 
 def robot_shapes(body: Body, colour: str = "") -> list[Shape]:
-    """Return the shapes of a robot without turrets, from the lowest to the nose; x is ahead.
-
-    Args:
-        body: The robot's body.
-        colour: The robot's own colour, which its ring has.
-    """
+    """Return the shapes of a robot without turrets, from the lowest to the nose; x is ahead, the ring has `colour`."""
     radius_mm, size = body.radius_mm, body.radius_mm / _RADIUS_MM
     wheel_mm = body.wheel_base_mm / 2 / size - 1.5
     rim_mm = radius_mm - (STRIPES_MM if body.stripe_count else 0.0)

@@ -156,14 +156,7 @@ def walls(arena: Arena) -> dict[Colour, list[Solid]]:
 
 
 def camera_places(moment: Moment, follow: int | None, zoom: float, aspect: float) -> tuple[Point, Point]:
-    """Return what a camera in the south looks at, and where it is [mm].
-
-    Args:
-        moment: What it sees.
-        follow: Index of the robot in the middle; None for the arena.
-        zoom: Magnification; 1 fits the whole arena.
-        aspect: Width of the picture by its height.
-    """
+    """Return what a camera in the south looks at, the arena or a followed robot, and where it is [mm]."""
     arena = moment.saved.arena
     x_mm, y_mm = arena.width_mm / 2, arena.height_mm / 2
     if follow is not None and follow < len(moment.poses):

@@ -50,14 +50,7 @@ BODY_TRAIL_MM = 2.4
 
 
 class Canvas:
-    """A picture on which things are drawn, in millimetres.
-
-    Args:
-        pixels: The picture.
-        scale: Pixels of it a millimetre.
-        left_mm: Place of its left side [mm].
-        top_mm: Place of its upper side [mm].
-    """
+    """A picture on which things are drawn, in millimetres, as on a `Sheet`."""
 
     def __init__(self, pixels: Pixels, scale: float, left_mm: float, top_mm: float) -> None:
         self.pixels, self.scale, self.left_mm, self.top_mm = pixels, scale, left_mm, top_mm

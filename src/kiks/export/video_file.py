@@ -27,15 +27,7 @@ _CONTAINERS = {MP4: {"movflags": "+faststart"}, GIF: {"loop": "0"}, WEBP: {"loop
 
 
 class VideoFile:
-    """A film's file; the end of `with` writes what is left.
-
-    Args:
-        path: The file.
-        ending: Its kind.
-        size: Width and height of the pictures.
-        fps: Pictures per second.
-        samples: Some of the pictures, whose colours a GIF has; others need none.
-    """
+    """A film's file, whose end of `with` writes what is left. A GIF has the colours of some samples of its pictures."""
 
     def __init__(self, path: Path, ending: str, size: tuple[int, int], fps: int, samples: Iterable[Pixels]) -> None:
         import av

@@ -25,13 +25,7 @@ class Placements(Protocol):
 
 
 class SimPlacements:
-    """Places a simulated robot in front of the upper wall of its arena, or in the middle.
-
-    Args:
-        sim: The simulation.
-        robot: Number of the robot, from 1.
-        skew_rad: Error of the heading at the wall [rad], as by a hand.
-    """
+    """Places a simulated robot in front of the upper wall of its arena, askew as by a hand, or in the middle."""
 
     def __init__(self, sim: Simulation, robot: int = 1, *, skew_rad: float = 0.0) -> None:
         self.sim = sim

@@ -86,15 +86,7 @@ def checked_places(
     brightness: npt.NDArray[np.uint8],
     mm_per_cell: float,
 ) -> tuple[_Place, ...]:
-    """Return the entries as a tuple of `kind`, after a check of their places.
-
-    Args:
-        label: Name of an entry in messages; a "lamp" may hang over a wall, everything else stands on floor.
-        kind: `Pose`, `Lamp`, `Ball` or `Cylinder`.
-        entries: The entries, or plain tuples of the same values.
-        brightness: The arena's raster, uint8 [row, column], row 0 at the bottom.
-        mm_per_cell: Edge of a cell [mm].
-    """
+    """Return the entries as a tuple of `kind`. All stand on floor; what messages call "lamp" may hang over a wall."""
     places: list[_Place] = []
     model: Any = kind
     try:

@@ -36,12 +36,6 @@ class Ring:
         sim: The simulation.
         say: Called with messages for people, from any thread.
 
-    Attributes:
-        what: What messages call it.
-        path: What stands for the name of a file.
-        told: What it says of the run.
-        attachments: Names and contents of the files that belong to the run.
-
     Raises:
         OSError: If there is no temporary folder.
     """
