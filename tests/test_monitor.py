@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import errno
 import importlib
 import io
 from pathlib import Path
@@ -128,6 +129,15 @@ def test_ctrl_c_ends_cleanly(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     assert result.exit_code == 0
     assert "2 samples" in result.output
     sim.port(1).claim("the next one")
+
+
+def test_the_log_is_not_blamed_for_a_reader_that_has_gone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def gone() -> None:
+        raise BrokenPipeError(errno.EPIPE, "Broken pipe")
+
+    sim = kiks.Simulation(seed=1)
+    monkeypatch.setattr(command, "_pacer", lambda robot: gone)
+    assert "the log" not in str(run(sim.url(1), "--csv", tmp_path / "log.csv").exception)
 
 
 def test_a_robot_that_is_not_there_is_named() -> None:

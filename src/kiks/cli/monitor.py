@@ -160,9 +160,19 @@ def _log(path: Path | None) -> Iterator[Callable[[str], object]]:
     if path is None:
         yield lambda line: None
         return
-    with explained(path, "the log"), open(path, "x", encoding="utf-8", buffering=1) as file:
-        print(",".join(COLUMNS), file=file)
-        yield lambda line: print(line, file=file)
+    with explained(path, "the log"):
+        file = open(path, "x", encoding="utf-8", buffering=1)  # noqa: SIM115  (closed below)
+
+    def write(line: str) -> None:
+        with explained(path, "the log"):
+            print(line, file=file)
+
+    try:
+        write(",".join(COLUMNS))
+        yield write
+    finally:
+        with suppress(OSError):  # `write` has reported a full disk
+            file.close()
 
 
 @contextmanager
