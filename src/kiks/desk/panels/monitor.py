@@ -103,11 +103,11 @@ class MonitorPanel(Panel):
             await self._explain(self._reading)
 
     def _describe_turrets(self, sim: Simulation) -> str:
-        turrets = sim.turrets(self._choice.value) if self._choice.value else ()
-        numbers = (f" (turret {turret.number})" if turret.number >= 0 else "" for turret in turrets)
-        return "\n".join(
-            f"{turret.name}{number}: {turret.status()}" for turret, number in zip(turrets, numbers, strict=True)
-        )
+        robot = self._choice.value or 0
+        turrets = sim.turrets(robot) if 1 <= robot <= sim.robot_count else ()
+        numbers = [f" (turret {turret.number})" if turret.number >= 0 else "" for turret in turrets]
+        rows = zip(turrets, numbers, strict=True)
+        return "\n".join(f"{turret.name}{number}: {turret.status()}" for turret, number in rows)
 
     async def _ask(self, event: GenericEventArguments) -> None:
         which: Literal["proximity", "ambient"] = "ambient" if event.args["which"] == "ambient" else "proximity"
