@@ -41,7 +41,8 @@ class Simulation:
 
     Time passes only when a program waits for a reply on a port, or calls `run`.
 
-    This class holds the lock, brings the world up to date, and calls its parts, which do neither.
+    This class holds the lock, brings the world up to date, and calls its parts, which do neither. Robots are numbered
+    from 1, sensors from 0, in the order of the answers to `N` and `O`.
 
     Args:
         arena: Where the robots drive; the classic 500 x 650 mm box if left out.
@@ -207,11 +208,7 @@ class Simulation:
         return s_from_ns(self.world.now_ns)
 
     def run(self, seconds: float) -> None:
-        """Let simulated time pass: robots drive on, and commands on the line act when they are due.
-
-        Args:
-            seconds: How long [s], at most 1e9.
-        """
+        """Let simulated time pass [s, at most 1e9]: robots drive on, and commands on the line act when they are due."""
         passing_ns = ns_from_s(check_number("seconds", seconds, 0, SECONDS_MAX, "Time never runs backwards."))
         with self.lock:
             self.loop.advance_to(self.now_ns + passing_ns)
@@ -252,7 +249,7 @@ class Simulation:
         """Move a robot elsewhere; its wheels and counters do not change.
 
         Args:
-            robot: Number of the robot, from 1.
+            robot: Its number.
             x_mm: From the arena's lower left corner to the right.
             y_mm: From the arena's lower left corner upwards.
             heading_rad: Counter-clockwise from the x axis; wrapped to one turn beyond a million. A multiple of 0.5
@@ -289,7 +286,7 @@ class Simulation:
         r"""Put a turret on a robot; it answers to `T,<its number>,...` from now on (docs/turrets.md).
 
         Args:
-            robot: Number of the robot, from 1.
+            robot: Its number.
             turret: 'k213' (the linear camera), 'gripper', 'radio', 'io' (General I/O), 'battle', or one of your own.
 
         Returns:
@@ -312,11 +309,7 @@ class Simulation:
         return tuple(self.wires[self.index_of(robot)].firmware.fitted)
 
     def port(self, robot: int) -> SimPort:
-        """Return the computer's end of a robot's line: one object, always the same until it is closed.
-
-        Args:
-            robot: Number of the robot, from 1.
-        """
+        """Return the computer's end of a robot's line: one object, always the same until it is closed."""
         index = self.index_of(robot)
         if index not in self._ports or self._ports[index].line is CLOSED:
             self._ports[index] = SimPort(self, robot)
@@ -349,11 +342,7 @@ class Simulation:
     # ---- walls, balls, cylinders and lamps ----
 
     def set_arena(self, arena: Arena) -> None:
-        """Replace the walls; time, robots, programs, balls, cylinders and lamps stay as they are.
-
-        Args:
-            arena: The walls; lamps, balls, cylinders and starts in it are ignored.
-        """
+        """Replace the walls alone by those of an arena."""
         _check_arena(arena)
         # These take a while: they are computed before other threads have to wait.
         free_space = FreeSpace(arena, self.world.specs, self.world.state)
@@ -382,13 +371,7 @@ class Simulation:
             return self.things.add_body(Ball, x_mm, y_mm, changes)
 
     def add_cylinder(self, x_mm: float, y_mm: float, **changes: Any) -> int:
-        """Add a cylinder at rest; return its number.
-
-        Args:
-            x_mm: Its centre [mm].
-            y_mm: Its centre [mm].
-            **changes: `radius_mm`, `friction_mm_s2` or `brightness` (1..255 or a material), where not the usual ones.
-        """
+        """Add a cylinder at rest; return its number. See `add_ball`."""
         with self._changing():
             return self.things.add_body(Cylinder, x_mm, y_mm, changes)
 
@@ -450,7 +433,7 @@ class Simulation:
         """Return what the eight proximity sensors would read if all were sampled at this instant.
 
         Args:
-            robot: Number of the robot, from 1.
+            robot: Its number.
             noise: True for the counts that command `N` would report now, with noise and rounding.
         """
         index = self.index_of(robot)
@@ -460,23 +443,15 @@ class Simulation:
     def proximity_at(self, robot: int, poses: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return what `proximity` would return if a robot stood at other poses, float64 [pose, 8].
 
-        Nothing checks whether the robot fits there: a fit asks thousands of times.
-
-        Args:
-            robot: Number of the robot, from 1.
-            poses: float64 [pose, 3]: x_mm, y_mm, heading_rad.
+        Nothing checks whether the robot fits there: a fit asks thousands of times. Poses are float64 [pose, 3]: x_mm,
+        y_mm, heading_rad.
         """
         index = self.index_of(robot)
         with self._up_to_date() as world:
             return proximity_at(world, index, poses)
 
     def ambient(self, robot: int, *, noise: bool = False) -> list[float]:
-        """Return what the eight light sensors would read if all were sampled at this instant.
-
-        Args:
-            robot: Number of the robot, from 1.
-            noise: True for the counts that command `O` would report now, with noise and rounding.
-        """
+        """Return the same for the light sensors, or the counts of command `O`."""
         index = self.index_of(robot)
         with self._up_to_date():
             return [float(count) for count in self._sensors.ambient(index, noise)]
@@ -495,10 +470,6 @@ class Simulation:
     def explain(self, robot: int, sensor: int) -> Explanation:
         """Return why command `N` returns what it returns for a proximity sensor at this instant.
 
-        Args:
-            robot: Number of the robot, from 1.
-            sensor: Index of the sensor in the answer to `N`, from 0.
-
         Example:
             >>> sim = Simulation(Arena.box(200, 200))
             >>> sim.place(1, 40.0, 100.0, 3.14159)
@@ -512,12 +483,7 @@ class Simulation:
             return explain_proximity(world, robot, sensor)
 
     def explain_light(self, robot: int, sensor: int) -> LightExplanation:
-        """Return why command `O` returns what it returns for a light sensor at this instant.
-
-        Args:
-            robot: Number of the robot, from 1.
-            sensor: Index of the sensor in the answer to `O`, from 0.
-        """
+        """Return the same for command `O` and a light sensor."""
         with self._up_to_date() as world:
             return explain_ambient(world, robot, sensor)
 
@@ -548,10 +514,7 @@ class Simulation:
         return record_simulation(self, file)
 
     def plot(self, *, robot: int = 1) -> Any:
-        """Draw the run that is being recorded: paths and odometry, readings, speeds, and where the time went.
-
-        Args:
-            robot: Number of the robot whose readings, speeds and time are drawn.
+        """Draw the run that is being recorded: paths, and a robot's odometry, readings, speeds and time.
 
         Returns:
             A Matplotlib figure, which notebooks show.

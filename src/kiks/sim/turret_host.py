@@ -91,7 +91,7 @@ class Turrets:
         first = sum(each.memory_count for each in firmware.fitted)
         advice = f"All turrets of a robot share {MEMORY_COUNT} numbers."
         check_count("memory_count of a turret", fitted.memory_count, 0, MEMORY_COUNT - first, advice)
-        site = RobotSite(self, index, fitted, first)
+        site = _RobotSite(self, index, fitted, first)
         fitted.fit(site)
         firmware.fit(fitted)
         if isinstance(fitted, Radio):
@@ -101,7 +101,7 @@ class Turrets:
         return fitted
 
 
-class RobotSite:
+class _RobotSite:
     """A `kiks.firmware.turret.Site`: the back of a robot of a simulation.
 
     Args:
@@ -119,50 +119,41 @@ class RobotSite:
 
     @property
     def robot(self) -> int:
-        """Number of the robot, from 1."""
         return self._index + 1
 
     @property
     def spec(self) -> RobotSpec:
-        """The kind of the robot."""
         return self._world.specs[self._index]
 
     @property
     def record(self) -> Any:
-        """The robot's record of `kiks.engine.state.ROBOT`."""
         return self._world.state.robots[0, self._index]
 
     @property
     def memory(self) -> Any:
-        """Numbers that the turret may keep, float64 [`Turret.memory_count`]."""
         return self.record["turret_memory"][self._first : self._first + self._count]
 
     @property
     def arena_mm(self) -> tuple[float, float]:
-        """Width and height of the arena [mm]."""
         return float(self._world.arena.width_mm), float(self._world.arena.height_mm)
 
     @property
     @contextmanager
     def lock(self) -> Iterator[None]:
-        """Hold it while you change something from outside the simulation."""
         with self._world.lock:
             yield
             self._world.note_change()
 
     @property
     def time_ns(self) -> int:
-        """The simulated time [ns]."""
         return self._world.now_ns
 
     def pose(self) -> tuple[float, float, float]:
-        """Return where the robot is: x_mm, y_mm, heading_rad."""
         with self._world.lock:
             self._sync()
             return self._world.pose(self._index)
 
     def ray(self, angle_rad: float = 0.0) -> Met:
-        """Return what is in a direction, counter-clockwise from ahead."""
         world = self._world
         self._sync()
         ticks, now_ns = world.state.tick_count, world.now_ns
@@ -176,29 +167,24 @@ class RobotSite:
         return Met(distance_mm, brightness, body=int(body["number"]))
 
     def random(self, index: int = 0, time_ns: int | None = None) -> float:
-        """Return a number in [0, 1) that belongs to this seed, robot, turret, time (the present one) and index."""
         time_ns = self._world.now_ns if time_ns is None else time_ns
         return float(uniform(self._world.seed, 0, self._index, self._stream, time_ns, index))
 
     def poses(self) -> list[tuple[float, float, float]]:
-        """Return where all robots are, robot 1 first."""
         with self._world.lock:
             self._sync()
             return [self._world.pose(index) for index in range(self._world.robot_count)]
 
     def bodies(self) -> Any:
-        """Return the balls and cylinders, records of `kiks.engine.state.BODY`."""
         with self._world.lock:
             self._sync()
             return self._world.bodies()
 
     def held_body(self) -> Any:
-        """Return the record of what a gripper holds or has between its jaws, None for nothing."""
         row = find_object(self._world.scene, self._index)
         return None if row < 0 else self._world.state.bodies[0, row]
 
     def turrets(self, kind: type[AnyTurret]) -> dict[int, AnyTurret]:
-        """Return the turrets of a kind on all robots, by the robots' numbers, in rising order."""
         found = enumerate((firmware.fitted for firmware in self._firmwares), 1)
         return {robot: each for robot, fitted in found for each in fitted if isinstance(each, kind)}
 
