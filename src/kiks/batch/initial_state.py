@@ -81,7 +81,11 @@ class InitialState:
         named = _kinds_of(robot, worlds, robots, response)
         self.specs = list(dict.fromkeys(spec for row in named for spec in row))
         numbers = {spec: number for number, spec in enumerate(self.specs)}
-        self._check_firmware()
+        if len({(spec.firmware.processing_ms, spec.quirks.d_reply_trailing_comma) for spec in self.specs}) > 1:
+            raise ParameterError(
+                "the robots of one batch must have the same firmware.processing_ms and quirks, but they differ. "
+                "Make a batch for each."
+            )
         self.kinds = np.zeros(len(self.specs), PARAMETERS)
         for number, spec in enumerate(self.specs):
             self.kinds[number : number + 1] = pack(spec)
@@ -100,15 +104,6 @@ class InitialState:
         self.lamps = np.zeros((len(self.arenas), lamp_count, 4))
         for lamps, model in zip(self.lamps, self._models, strict=True):
             lamps[: len(model.lamps)] = model.lamps
-
-    def _check_firmware(self) -> None:
-        """Raise a ParameterError unless all kinds take the same time on the line."""
-        answers = {(spec.firmware.processing_ms, spec.quirks.d_reply_trailing_comma) for spec in self.specs}
-        if len(answers) > 1:
-            raise ParameterError(
-                "the robots of one batch must have the same firmware.processing_ms and quirks, but they differ. "
-                "Make a batch for each."
-            )
 
     def check_seeds(self, seeds: ArrayLike, count: int) -> NDArray[np.int64]:
         """Return seeds as int64 [count]."""

@@ -406,7 +406,6 @@ def policy(
 
 
 def _tag(given: Any) -> str | None:
-    """Return the kind of a recipe."""
     if not isinstance(given, Mapping):
         return None
     return str(given["kind"]) if "kind" in given else "function" if "function" in given else None

@@ -24,7 +24,7 @@ from kiks.model.atomic_files import inside, path_of, replace_files
 from kiks.model.checks import ROBOTS_MAX, check_count
 from kiks.model.data_file import Number, Rule, Text, Whole, as_list, check, parse_toml, read_file, record
 from kiks.model.limits import CHAMPION_FILE_BYTES_MAX
-from kiks.model.project import Project, ProjectRobot
+from kiks.model.project import Project, ProjectRobot, Seed
 from kiks.model.robot import RobotSpec, robot_names, robot_toml, specs_of
 from kiks.sim.from_project import simulation_of
 from kiks.sim.simulation import Simulation
@@ -40,7 +40,6 @@ PARAMETERS_MAX = 1_000_000
 Parameters = Annotated[tuple[Number, ...], BeforeValidator(as_list), Field(max_length=PARAMETERS_MAX)]
 Measures = Annotated[dict[Text, Number], Field(max_length=1000)]
 Generation = Annotated[Whole, Field(ge=0, lt=2**63)]
-Seed = Annotated[Whole, Field(ge=0, lt=2**63)]
 Kind = Annotated[Text | RobotSpec, Rule("the name of a robot, a robot file or a kiks.RobotSpec")]
 
 
@@ -187,7 +186,7 @@ class Champion:
         if self.world is not None:
             robots = tuple(replace(each, kind=named["robot"]) for each in self.world.robots)
             named["world"] = beside("world.kiks", replace(self.world, robots=robots).to_bytes())
-        files[target] = self._text(recipe, named | _code_of(self.controller))
+        files[target] = self._text(recipe, named | fingerprints({"code": self.controller}))
         replace_files(files, "a champion")
 
     def _text(self, recipe: Mapping[str, Any], named: Mapping[str, str]) -> str:
@@ -220,16 +219,11 @@ class Champion:
         given["robot"] = _robot_of(read.robot, path.parent)
         controller = controller_of(read.controller, path.parent)
         # Another Python compiles the same code differently.
-        if sys.implementation.cache_tag in read.code and read.code != _code_of(controller)["code"]:
+        if sys.implementation.cache_tag in read.code and read.code != fingerprints({"": controller})[""]:
             logging.getLogger("kiks.learn").warning(
                 "The controller of %r, or what it imports, has changed: it may drive differently.", str(path)
             )
         return cls(**given | {"controller": controller})
-
-
-def _code_of(controller: Controller) -> dict[str, str]:
-    """Return the fingerprint of a controller."""
-    return fingerprints({"code": controller})
 
 
 def _robot_of(name: str, folder: Path) -> str | RobotSpec:

@@ -178,7 +178,6 @@ class Evolution:
         return self._own
 
     def _trials(self) -> list[Floats]:
-        """Return the rows of the trials, if there is a rival."""
         return [] if self._rival is None else [np.tile(self._rival.parameters, (TRIALS, 1))]
 
     def _rows(self) -> Floats:

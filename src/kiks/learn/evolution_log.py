@@ -26,6 +26,7 @@ from kiks.learn.task import Axis
 from kiks.model.array_checks import Numbers, read_arrays
 from kiks.model.atomic_files import make_folder, path_of, replace_file
 from kiks.model.data_file import Rule, Text, Whole, check, parse_json, read_file, record
+from kiks.model.project import Seed
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -58,7 +59,7 @@ class Identity:
 
     task: Text
     algorithm: Text
-    seed: Annotated[Whole, Field(ge=0, lt=2**63)]
+    seed: Seed
     population: Annotated[Whole, Field(ge=1, le=1_000_000)]
     controller: Text
     task_digest: Digest

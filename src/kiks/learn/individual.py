@@ -46,7 +46,6 @@ def individual_of(
 
 
 def _task_of(folder: Folder, identity: Identity, given: Task | None) -> Task:
-    """Return the task of an evolution."""
     name, file = identity.task, identity.task_file
     where = f"the task {shown(name)} of the evolution in {str(folder.path)!r}"
     if given is not None:

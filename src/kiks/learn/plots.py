@@ -70,7 +70,6 @@ def _draw_fitness(axes: Any, evolution: Evolution, side: int, baselines: Baselin
 
 
 def _draw_baselines(axes: Any, baselines: Baselines) -> None:
-    """Draw baselines as horizontal lines."""
     axes.axhline(baselines.random, color="tab:gray", linestyle="--", linewidth=1, label="random controllers, median")
     axes.axhline(baselines.standing, color="tab:gray", linestyle=":", linewidth=1, label="standing still")
 
@@ -102,7 +101,6 @@ def _draw_archive(figure: Any, axes: Any, archive: Archive, champion: Champion) 
 
 
 def _cell(axis: Axis) -> float:
-    """Return how wide a cell of an axis is."""
     return (axis.high - axis.low) / axis.cells
 
 

@@ -50,9 +50,8 @@ _UNCOUNTED = {"name", "side", "reward", "goal", "about", "file", "algorithm", "p
 
 Seconds = Annotated[Number, Field(ge=SECONDS_MIN, le=SECONDS_MAX)]
 
-Kind = Text | RobotSpec
 Kinds = Annotated[
-    Kind | Annotated[tuple[Kind, ...], Field(min_length=1)],
+    Text | RobotSpec | Annotated[tuple[Text | RobotSpec, ...], Field(min_length=1)],
     Rule("the name of a robot, a robot file or a kiks.RobotSpec, or a list of them"),
 ]
 Evolvable = Annotated[Controller, Field(description="Write @kiks.controller(parameters=COUNT) over the function.")]
