@@ -60,11 +60,7 @@ _ANNOTATION = 6
 
 
 class CodeCache:
-    """The cache that Numba asks for the machine code of a function, in place of its own.
-
-    Args:
-        function: The function, of a module.
-    """
+    """The cache that Numba asks for the machine code of a function, in place of its own."""
 
     cache_path = ""
 

@@ -188,9 +188,6 @@ class _StandIn:
     """The definition and the owner that a changed function has meanwhile.
 
     They live for ever, as a call may be under way when the change is taken back; the next change takes them again.
-
-    Args:
-        function: The function.
     """
 
     def __init__(self, function: BuiltinFunctionType) -> None:

@@ -87,12 +87,7 @@ class _Entries:
 
 
 class FileSystem:
-    """The file system of a program.
-
-    Args:
-        scheduler: The program's threads.
-        ports: Names of the ports that it finds.
-    """
+    """The file system of a program, with the names of the ports that it finds."""
 
     def __init__(self, scheduler: Scheduler, ports: Sequence[str]) -> None:
         self._scheduler = scheduler

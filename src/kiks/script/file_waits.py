@@ -50,12 +50,7 @@ def is_readable(descriptor: int, timeout_ms: int) -> bool:
 
 
 class _PortFile:
-    """The descriptor of a port: the end of a terminal, whose other end has sent what has arrived at the port.
-
-    Args:
-        line: The port's line.
-        port: The port of `serial`.
-    """
+    """The descriptor of a port: the end of a terminal, whose other end has sent what has arrived at the port."""
 
     def __init__(self, line: SharedLine, port: Any) -> None:
         self.line = line

@@ -32,9 +32,6 @@ _real_get, _real_put = _queue.SimpleQueue.get, _queue.SimpleQueue.put
 class WaitingRoom:
     """The threads that wait for objects.
 
-    Args:
-        scheduler: The program's threads.
-
     Attributes:
         waiters: The threads, by the identity of an object, which they keep alive.
     """

@@ -34,11 +34,7 @@ _HARMLESS = frozenset({signal.SIGCHLD, signal.SIGCONT, signal.SIGURG, signal.SIG
 
 
 class Signals:
-    """The signal handlers and the alarm of a program.
-
-    Args:
-        scheduler: The program's threads.
-    """
+    """The signal handlers and the alarm of a program."""
 
     def __init__(self, scheduler: Scheduler) -> None:
         self._scheduler = scheduler

@@ -84,11 +84,7 @@ def watched(scheduler: Scheduler) -> Iterator[None]:
 
 
 class _Watch:
-    """The watchdog's thread.
-
-    Args:
-        scheduler: The threads of the program.
-    """
+    """The watchdog's thread."""
 
     def __init__(self, scheduler: Scheduler) -> None:
         self._scheduler = scheduler

@@ -48,9 +48,6 @@ class Drags:
     What is held stays where the hand is, though its wheels turn and others push: `keep` puts it back, and has to be
     called again and again while time passes (`Gate.keep`). All of it is called with the simulation's lock held.
 
-    Args:
-        sim: The world.
-
     Example:
         >>> from kiks import Arena, Simulation
         >>> sim = Simulation(Arena.box(500, 500))

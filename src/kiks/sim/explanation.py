@@ -203,13 +203,7 @@ class LightExplanation:
 
 
 def explain_proximity(world: World, robot: int, sensor: int) -> Explanation:
-    """Return why N returns what it returns for a sensor in a world whose ticks are done.
-
-    Args:
-        world: The world.
-        robot: Number of the robot, from 1.
-        sensor: Index of the sensor, from 0.
-    """
+    """Return why N returns what it returns for a sensor in a world whose ticks are done."""
     index = world.index_of(robot)
     _check_sensor(sensor)
     all_rays, without = np.empty((SENSOR_COUNT, 3, RAY_COUNT)), np.empty(RAY_COUNT)

@@ -31,11 +31,6 @@ others, and none is ever deeper than this."""
 class FreeSpace:
     """Tells what is in the way of a robot or body in an arena, and where robots may start.
 
-    Args:
-        arena: The walls.
-        specs: What each robot is.
-        state: Where everything is.
-
     Attributes:
         ground: What the engine needs to find the distance to the nearest wall.
     """

@@ -14,9 +14,6 @@ Item = TypeVar("Item")
 class RingBuffer(Generic[Item]):
     """Keeps the newest entries and drops older ones. Entries are numbered from 0.
 
-    Args:
-        limit: How many entries are kept.
-
     Example:
         >>> ring = RingBuffer(3)
         >>> ring.add("abcde")

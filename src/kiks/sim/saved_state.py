@@ -269,12 +269,7 @@ class SavedState:
 
 
 def state_bytes(sim: Simulation, files: WorldFiles) -> bytes:
-    """Return all that a simulation is now: a line of JSON, then the records.
-
-    Args:
-        sim: The simulation.
-        files: Where the files are that this names.
-    """
+    """Return all that a simulation is now: a line of JSON, then the records; `files` gets the files that it names."""
     with sim.lock:
         sim.sync()
         world = sim.world

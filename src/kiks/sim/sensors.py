@@ -14,11 +14,7 @@ from kiks.sim.world import World
 
 
 class Sensors:
-    """Reads sensors by the engine's kernels; the ticks that have begun are done.
-
-    Args:
-        world: The world.
-    """
+    """Reads sensors by the engine's kernels; the ticks that have begun are done."""
 
     def __init__(self, world: World) -> None:
         self._world = world

@@ -21,10 +21,6 @@ class Supervision:
     The file has a generator `supervise(sim)`. Its first part runs at once. Then it yields the time until it acts again
     [s of simulated time]; when it returns then, the run ends. `close` runs its `finally`, which may print a result.
 
-    Args:
-        sim: The world.
-        file: The Python file.
-
     Attributes:
         next_ns: When it acts next [ns].
         end: Called with an exit code and a message when it has returned, or failed; raises to end the run.

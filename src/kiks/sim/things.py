@@ -38,9 +38,6 @@ class Checkpoint:
 class Things:
     """The balls, cylinders and lamps of a world; at first those of its arena.
 
-    Args:
-        world: The world.
-
     Attributes:
         body_count: Bodies created so far, i.e. the last number.
     """

@@ -86,12 +86,7 @@ def table_count(table: Any, seen: Any) -> Any:
 
 @entry
 def fill_table(networks: Any, table: Any) -> Any:
-    """Write the mean of all sensors' networks for each pattern into `table`, float32 of the shape [6^7].
-
-    Args:
-        networks: Records of `NETWORKS`, shape [1].
-        table: Where the means go.
-    """
+    """Write the mean of all sensors' networks, a record of `NETWORKS` [1], for each pattern into `table`, f4 [6^7]."""
     seen = stack_narrow(LANES)
     for index in range(table.shape[0]):
         digits = index

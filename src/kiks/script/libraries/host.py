@@ -20,13 +20,7 @@ _EVENT = "an event of a window"
 
 
 class Host:
-    """The parts that an adapter works with.
-
-    Args:
-        scheduler: The program's threads.
-        clock: A port of its world, for the time.
-        chance: Its random numbers.
-    """
+    """The parts that an adapter works with."""
 
     def __init__(self, scheduler: Scheduler, clock: VirtualPort, chance: Chance) -> None:
         self.scheduler, self.clock, self.chance = scheduler, clock, chance
