@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import logging
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from time import monotonic
 from types import TracebackType
@@ -90,6 +90,7 @@ class RunWriter:
     Attributes:
         next_ns: When the next checkpoint is due [ns].
         clock: The world's.
+        has_acted: Whether a robot has done something since the last input.
         change_count: Of the world, when its changes were noted last.
         stores: Where it writes.
     """
@@ -109,7 +110,7 @@ class RunWriter:
         self._entries: list[int | bytes] = []
         self._counted = self._work_us = 0
         self._noted_ns = -1
-        self._has_acted = False
+        self.has_acted = False
         self._waiting_bytes = 0
         self._chunk_ns = sim.now_ns
         self._chunk_at_s = 0.0
@@ -143,7 +144,7 @@ class RunWriter:
                 self._sim.loop.recorder = None
                 self.next_ns = NEVER_NS
                 for wire in self._sim.wires:
-                    wire.recorder = None
+                    wire.recorder = wire.on_act = None
 
     def flush(self) -> None:
         """Write all that has happened up to now, with the present state."""
@@ -158,17 +159,18 @@ class RunWriter:
     def note(self, entry: NotedEntry) -> None:
         """Note an input, or when a program has thought."""
         time_ns = entry[1]
-        if self._has_acted:
-            self._has_acted = False
+        if self.has_acted:
+            self.has_acted = False
             if time_ns == self._noted_ns:
                 # The replay does the same in the same order.
                 self._entries += (ACT, time_ns, 0, 0, 0, b"")
         self._noted_ns = time_ns
         self._entries += entry
 
-    def note_act(self, entry: NotedEntry) -> None:
-        """Remember that a robot has done something, which the replay finds out by itself."""
-        self._has_acted = True
+    def _note_own(self, entry: NotedEntry) -> None:
+        """Note what a robot with a turret of a user's own does, and the state after it: a replay cannot run that."""
+        self.note(entry)
+        self.note_state()
 
     def note_changes(self) -> None:
         """Note what was changed from outside."""
@@ -182,7 +184,7 @@ class RunWriter:
         self.change_count, self._lamps = world.change_count, world.lamps.tobytes()
         for wire in sim.wires:
             has_own = any(name_of(turret) is None for turret in wire.firmware.fitted)
-            wire.recorder = _OwnTurretRecorder(self) if has_own else self
+            wire.recorder, wire.on_act = self, self._note_own if has_own else None
         data = state_bytes(sim, self._files)
         self.note((STATE, world.now_ns, 0, 0, 0, data))
         self._waiting_bytes += len(data)
@@ -236,19 +238,6 @@ class RunWriter:
                 self.remove(store)
         self._waiting_bytes = 0
         self._chunk_at_s = monotonic() + CHUNK_S
-
-
-class _OwnTurretRecorder:
-    """Notes what a robot with a custom turret does, and the state after it, as a replay cannot run that."""
-
-    def __init__(self, recorder: RunWriter) -> None:
-        self._recorder = recorder
-        self.clock: Clock = recorder.clock
-        self.note: Callable[[NotedEntry], object] = recorder.note
-
-    def note_act(self, entry: NotedEntry) -> None:
-        self._recorder.note(entry)
-        self._recorder.note_state()
 
 
 def description_of(sim: Simulation) -> dict[str, str]:

@@ -10,7 +10,7 @@ from kiks.recording.entries import Entry
 from kiks.recording.log import RecordedLog
 from kiks.recording.motion import Motion, MotionWatcher
 from kiks.recording.replay import Replay
-from kiks.sim.run_log import Clock, Kind, NotedEntry
+from kiks.sim.run_log import Kind, NotedEntry
 from kiks.sim.turret_host import name_of
 from kiks.units import NS_PER_S, s_from_ns
 from kiks.version import __version__
@@ -73,7 +73,7 @@ def run_again(log: RecordedLog, begin_ns: int | None = None, end_ns: int | None 
 
 
 class _Observer:
-    """Watches a replay: collects replies, as the recorder of its wires, and motion.
+    """Watches a replay: collects what robots do, and motion.
 
     Args:
         log: The log of the recording.
@@ -84,7 +84,6 @@ class _Observer:
         self._acts: list[Entry] = []
         self.replay = Replay(log, begin_ns)
         self.sim = self.replay.sim
-        self.clock: Clock = self.sim.world
         self.sim.sync()
         self.motion = MotionWatcher(self.sim.world.state)
         self.sim.world.watch(self.motion)
@@ -110,11 +109,7 @@ class _Observer:
         self.motion.look(self.sim.world.state)
         for wire in self.sim.wires:
             has_own = any(name_of(turret) is None for turret in wire.firmware.fitted)
-            wire.recorder = None if has_own else self
+            wire.on_act = None if has_own else self._hear
 
-    def note(self, entry: NotedEntry) -> None:
-        """Take an input, which was recorded."""
-
-    def note_act(self, entry: NotedEntry) -> None:
-        """Take what a robot has done."""
+    def _hear(self, entry: NotedEntry) -> None:
         self._acts.append(Entry(*entry))

@@ -49,16 +49,15 @@ class Clock(Protocol):
 
 
 class WireRecorder(Protocol):
-    """Takes entries of a wire.
+    """Takes the inputs of wires.
 
     Attributes:
         clock: The world's.
+        has_acted: Set when a robot does something.
     """
 
     clock: Clock
+    has_acted: bool
 
     def note(self, entry: NotedEntry, /) -> object:
         """Take an input, or when a program has thought."""
-
-    def note_act(self, entry: NotedEntry, /) -> object:
-        """Take what a robot has done."""

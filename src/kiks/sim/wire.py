@@ -14,7 +14,7 @@ from kiks.firmware.receiver import LINE_LIMIT
 from kiks.model.checks import CLOCK_END_NS
 from kiks.model.data_file import Switch, Whole, record
 from kiks.model.robot import Baud
-from kiks.sim.run_log import ACT, DROP, HANG_UP, SEND, SET_BAUD, THINK, TYPE, WireRecorder
+from kiks.sim.run_log import ACT, DROP, HANG_UP, SEND, SET_BAUD, THINK, TYPE, NotedEntry, WireRecorder
 from kiks.sim.wire_log import TimeShares, WireLog
 from kiks.units import ns_from_s
 
@@ -72,6 +72,7 @@ class Wire:
         holder: Name of the program that has opened the port; None while it is free.
         log: Records what goes over the line; None while it is not watched.
         recorder: Records the whole run; None while nothing does.
+        on_act: Called with what the robot does, an entry of the kind ACT; None while nobody listens.
         pending: Commands on their way: when each acts [ns], its line, and what takes the reply in place of the host.
         thinks_since_ns: Since when a real program has the port, whose every gap counts as thinking [ns]; else None.
         next_ns: When the robot does something next [ns], or None while it only waits for characters.
@@ -88,6 +89,7 @@ class Wire:
         self.pending: deque[tuple[int, bytes, Hear | None]] = deque()
         self.log: WireLog | None = None
         self.recorder: WireRecorder | None = None
+        self.on_act: Callable[[NotedEntry], object] | None = None
         self._watcher_count = 0
         self.thinks_since_ns: int | None = None
         self._last_act_ns = 0
@@ -126,6 +128,8 @@ class Wire:
 
     def act(self, now_ns: int) -> None:
         """Do what is due."""
+        if (recorder := self.recorder) is not None:
+            recorder.has_acted = True
         if self.pending and self.pending[0][0] <= now_ns:
             _, line, hear = self.pending.popleft()
             reply = self.firmware.execute(line, now_ns)
@@ -138,15 +142,15 @@ class Wire:
             self._orphan_count = max(self._orphan_count - 1, 0)
             if (log := self.log) is not None and start_ns is not None:
                 log.answer(reply, start_ns, self.line.character_ns, now_ns)
-            if (recorder := self.recorder) is not None:
+            if self.on_act is not None:
                 sent_ns = now_ns if start_ns is None else start_ns
-                recorder.note_act((ACT, now_ns, self._index, sent_ns, self.line.character_ns, reply))
+                self.on_act((ACT, now_ns, self._index, sent_ns, self.line.character_ns, reply))
             if self.firmware.baud != self.line.baud:
                 self.line.set_baud(self.firmware.baud)
         else:
             self.firmware.run_demo(now_ns)
-            if (recorder := self.recorder) is not None:
-                recorder.note_act((ACT, now_ns, self._index, now_ns, self.line.character_ns, b""))
+            if self.on_act is not None:
+                self.on_act((ACT, now_ns, self._index, now_ns, self.line.character_ns, b""))
         self._plan()
 
     def _note(self, kind: int, number: int = 0, other: int = 0) -> None:
