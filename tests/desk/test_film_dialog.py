@@ -67,7 +67,7 @@ def test_mistakes_are_told(visitor: Visitor, tmp_path: Path) -> None:
         expect(visitor.at("film-make")).to_be_visible()
         end_s = visitor.at("film-end").input_value()
         for name, value, words in (
-            ("end", "-1", "end_s must be from"),
+            ("end", "0", "a film must end after it begins"),
             ("end", "", "A film needs a beginning, an end and a speed"),
             ("start", "1e6", "start_s must be from"),
             ("speed", "0", "speed must be from 0.001 to 1000"),

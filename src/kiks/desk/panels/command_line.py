@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Awaitable, Callable
 from typing import Any
 
-from nicegui import events, ui
+from nicegui import ui
 
 from kiks.desk.panels.widgets import icon_button, named, told
 from kiks.errors import KiksError
@@ -85,16 +85,12 @@ class CommandLine:
         self._send = send
         self._history = History()
         with ui.row().classes("w-full items-end no-wrap gap-2"):
-            self._input = (
-                ui.input(label, placeholder=example, on_change=lambda: on_change())
-                .classes("col")
-                .props("dense autocomplete=off autocapitalize=off spellcheck=false")
-                .on("keydown.enter", self._take_enter, js_handler=TAKE)
-                .on("keydown.up.prevent", self._back)
-                .on("keydown.down.prevent", self._forth)
-                .tooltip(f"{tip}; the arrow keys recall earlier ones")
-            )
-            named(self._input, name)
+            self._input = named(ui.input(label, placeholder=example, on_change=lambda: on_change()), name)
+            self._input.classes("col").props("dense autocomplete=off autocapitalize=off spellcheck=false")
+            self._input.tooltip(f"{tip}; the arrow keys recall earlier ones")
+            self._input.on("keydown.enter", lambda event: self._take(str(event.args)), js_handler=TAKE)
+            self._input.on("keydown.up.prevent", lambda: self._input.set_value(self._history.back(self.text)))
+            self._input.on("keydown.down.prevent", lambda: self._input.set_value(self._history.forth()))
             icon_button("send", verb, f"{name}-send", self._take_click, tip=verb_tip)
 
     @property
@@ -106,9 +102,6 @@ class CommandLine:
         """Put a text into the input for completion."""
         self._input.value = text
         self._input.run_method("focus")
-
-    async def _take_enter(self, event: events.GenericEventArguments) -> None:
-        await self._take(str(event.args))
 
     async def _take_click(self) -> None:
         text, self._input.value = self.text, ""
@@ -123,9 +116,3 @@ class CommandLine:
         except KiksError:
             self._input.value = self.text or text
             raise
-
-    def _back(self) -> None:
-        self._input.value = self._history.back(self.text)
-
-    def _forth(self) -> None:
-        self._input.value = self._history.forth()

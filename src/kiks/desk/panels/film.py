@@ -13,7 +13,6 @@ from kiks.desk.server.desk import Desk
 from kiks.errors import ParameterError, library
 from kiks.export.film import FPS, save_film
 from kiks.export.kinds import KINDS
-from kiks.recording.recording import Recording
 from kiks.units import s_from_ns
 
 LAST_S = 10.0
@@ -79,35 +78,29 @@ class FilmDialog:
             )
         recording = await self._desk.looking.recording()
         name = f"kiks-film{self._kind.value}"
+
+        def film() -> bytes:
+            with tempfile.TemporaryDirectory(prefix="kiks-film-") as folder:
+                save_film(
+                    recording,
+                    Path(folder, name),
+                    fps=FPS,
+                    speed=speed,
+                    start_s=start_s,
+                    # What is shown is rounded.
+                    end_s=min(end_s, s_from_ns(recording.log.end_ns)),
+                    follow=self._follow.value or None,
+                    on_progress=self._show,
+                )
+                return Path(folder, name).read_bytes()
+
         self._done, self._is_given_up = 0.0, False
         self._make_button.disable()
         try:
-            data = await asyncio.to_thread(
-                self._film, recording, name, start_s, end_s, speed, self._follow.value or None
-            )
+            ui.download.content(await asyncio.to_thread(film), name)
         finally:
             self._done = 0.0
             self._make_button.enable()
-        ui.download.content(data, name)
-
-    def _film(
-        self, recording: Recording, name: str, start_s: float, end_s: float, speed: float, follow: int | None
-    ) -> bytes:
-        """Make a film, in a thread of its own, and return its file."""
-        with tempfile.TemporaryDirectory(prefix="kiks-film-") as folder:
-            path = Path(folder, name)
-            save_film(
-                recording,
-                path,
-                fps=FPS,
-                speed=speed,
-                start_s=start_s,
-                # What is shown is rounded.
-                end_s=min(end_s, s_from_ns(recording.log.end_ns)),
-                follow=follow,
-                on_progress=self._show,
-            )
-            return path.read_bytes()
 
     def _show(self, share: float) -> None:
         self._done = share

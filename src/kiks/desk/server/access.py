@@ -17,6 +17,7 @@ from starlette.websockets import WebSocketClose
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
 from kiks.desk.server.token import COOKIE, Token
+from kiks.errors import shown
 from kiks.model.limits import REQUEST_BYTES_MAX
 
 LOOPBACK = frozenset({"127.0.0.1", "localhost", "::1"})
@@ -135,14 +136,14 @@ class AccessControl:
             came_from = host if origin is None else urlsplit(origin).netloc
         except ValueError:
             raise HTTPException(
-                400, f"Host and origin must be those of a page, but they were {_short(host)} and {_short(origin)}"
+                400, f"Host and origin must be those of a page, but they were {shown(host)} and {shown(origin)}"
             ) from None
         if came_from != host:
             raise HTTPException(
-                403, f"Requests must come from the desk's own page, but this one came from {_short(origin)}"
+                403, f"Requests must come from the desk's own page, but this one came from {shown(origin)}"
             )
         if self._is_local and name not in LOOPBACK:
-            raise HTTPException(403, f"The desk's host must be a name of this computer, but it was {_short(host)}")
+            raise HTTPException(403, f"The desk's host must be a name of this computer, but it was {shown(host)}")
         is_open_ended = "transfer-encoding" in headers or not re.fullmatch("[0-9]{1,18}", length)
         if is_open_ended or int(length) > REQUEST_BYTES_MAX:
             raise HTTPException(
@@ -183,8 +184,3 @@ class AccessControl:
         except Exception:
             if not has_left:
                 raise
-
-
-def _short(text: str | None) -> str:
-    """Return a text of a client, escaped and shortened for display."""
-    return ascii(text)[:80]
