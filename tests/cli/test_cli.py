@@ -48,6 +48,17 @@ def test_every_command_has_help_with_an_example(command: str) -> None:
     assert f"Example: kiks {command}" in result.stdout
 
 
+@pytest.mark.parametrize("words", [("--help",), ("arena", "info", ARENA), ("schema", "project")])
+def test_a_full_disk_behind_the_output_is_one_line(words: tuple[str, ...]) -> None:
+    with Path("/dev/full").open("w") as full:
+        result = subprocess.run([*KIKS, *words], stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert result.returncode == 2
+    assert result.stderr.splitlines()[-1] == (
+        "kiks: Cannot go on: No space left on device. Is there room for the output?"
+    )
+    assert "Traceback" not in result.stderr
+
+
 NEEDS_NO_ENGINE = "heavy = {'numba', 'scipy', 'numpy', 'pydantic', 'PIL', 'rich', 'nicegui'} & set(sys.modules)\n"
 NEEDS_NO_ENGINE += "assert not heavy, heavy"
 

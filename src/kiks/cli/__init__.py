@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 
 import typer
@@ -24,7 +25,7 @@ from kiks.cli.schema import schema
 from kiks.cli.serve import serve
 from kiks.cli.session import session
 from kiks.cli.warmup import warmup
-from kiks.ending import INTERRUPTED, leave_threads
+from kiks.ending import INTERRUPTED, leave_threads, tell
 from kiks.errors import KiksError
 from kiks.ports.file_descriptors import raise_limit
 from kiks.version import __version__
@@ -78,6 +79,11 @@ def main() -> None:
         app()
     except KiksError as error:
         typer.echo(f"kiks: {error}", err=True)
+        sys.exit(2)
+    except OSError as error:
+        # The error of a file has its own line; this is one of the standard output, such as a full disk.
+        tell(f"Cannot go on: {error.strerror or error}. Is there room for the output?")
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # what is still in its buffer
         sys.exit(2)
     except KeyboardInterrupt:
         sys.exit(INTERRUPTED)
