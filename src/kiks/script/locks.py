@@ -11,6 +11,7 @@ import _thread
 import concurrent.futures.thread
 import itertools
 import queue
+import sys
 import threading
 import weakref
 from collections import deque
@@ -283,6 +284,12 @@ def replacements(scheduler: Scheduler) -> dict[str, dict[str, Any]]:
     def get_ident() -> int:
         return scheduler.current.ident
 
+    # Running executors: those of this process are not the program's.
+    executors: dict[str, dict[str, Any]] = {
+        concurrent.futures.thread.__name__: {"_shutdown": False, "_threads_queues": weakref.WeakKeyDictionary()}
+    }
+    if (processes := "concurrent.futures.process") in sys.modules:  # nobody waits for its import in vain
+        executors[processes] = {"_global_shutdown": False, "_threads_wakeups": weakref.WeakKeyDictionary()}
     real_is_set, real_is_owned = threading.Event.is_set, threading.Condition._is_owned  # type: ignore[attr-defined]
     return {
         "_thread": {"get_ident": get_ident},
@@ -295,6 +302,5 @@ def replacements(scheduler: Scheduler) -> dict[str, dict[str, Any]]:
         },
         "threading.Event": {"is_set": for_program(scheduler, Reading(is_set, real_is_set), real_is_set)},
         "threading.Condition": {"_is_owned": is_owned},
-        # Running executors: those of this process are not the program's.
-        concurrent.futures.thread.__name__: {"_shutdown": False, "_threads_queues": weakref.WeakKeyDictionary()},
+        **executors,
     }
