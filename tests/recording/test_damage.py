@@ -260,6 +260,7 @@ def test_no_state_lies_about_itself(change: Callable[[Head], None], words: str, 
         (Kind.SEND, {"kind": Kind.SET_BAUD, "number": 0}),
         (Kind.SEND, {"kind": -1}),
         (Kind.SEND, {"kind": Kind.STATE}),
+        (Kind.STATE, {"kind": Kind.TEXT}),
     ],
 )
 def test_no_entry_of_the_log_holds_anything(kind: Kind, changes: dict[str, int], file: Path) -> None:

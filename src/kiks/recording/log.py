@@ -91,14 +91,14 @@ class RecordedLog:
         """The numbers of its blocks, from the first one on that has a state: no run can be made again before that."""
         blocks = self.reader.blocks
         if self._first not in blocks:
-            self._first = next((block for block in blocks if _is_state(self._block(block)).any()), blocks.stop)
+            self._first = next((block for block in blocks if _is_state(self._block(block)).any()), -1)
+            if self._first < 0:
+                raise self.damaged("it has no state")
         return range(self._first, blocks.stop)
 
     @property
     def begin_ns(self) -> int:
         """When it begins [ns]: at its first state."""
-        if not self.blocks:
-            raise self.damaged("it has no state")
         columns = self._block(self.blocks.start)
         return int(columns.time_ns[_is_state(columns)][0])
 
