@@ -21,8 +21,8 @@ from kiks.engine.state import BODY, ROBOT
 from kiks.export.figures import save_figures
 from kiks.export.film import save_film
 from kiks.export.page import save_page
-from kiks.recording.entries import Columns, Entry, block_of
-from kiks.recording.log import HASH_LENGTH
+from kiks.recording.entries import Entry, block_of, entries_of
+from kiks.recording.log import HASH_LENGTH, has_state
 from kiks.recording.mcap_file import McapFile, McapReader
 from kiks.recording.recorder import PROGRAMS, RunRecorder
 from kiks.recording.replay import check_recording
@@ -50,7 +50,7 @@ class Parts:
         reader = McapReader(path)
         parts = cls(dict(reader.attachments), dict(reader.told))
         for block in reader.blocks:
-            parts.blocks.append(list(Columns.of_block(reader.read(block), "log").entries()))
+            parts.blocks.append(entries_of(reader.read(block), "log", 1000, 1000))
         return parts
 
     def save(self, path: Path) -> None:
@@ -75,11 +75,6 @@ class Parts:
     def with_records(self, name: str, value: float) -> Parts:
         """Return these parts with a field of all robots' or all bodies' records in all states set to a number."""
         return self.with_entry(has_state, lambda entry: _set(entry, name, value))
-
-
-def has_state(entry: Entry) -> bool:
-    """Return whether an entry has a state."""
-    return entry.kind == Kind.STATE or (entry.kind == Kind.CHECK and len(entry.data) > HASH_LENGTH)
 
 
 def _set(entry: Entry, name: str, value: float) -> Entry:

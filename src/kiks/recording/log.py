@@ -7,14 +7,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
 from kiks.errors import ParameterError
-from kiks.recording.entries import Columns, Entry, block_of
+from kiks.recording.entries import Entry, block_of, entries_of
 from kiks.recording.mcap_file import FoundChunk
 from kiks.recording.recorder import LINES_MAX
-from kiks.sim.run_log import LAST_INPUT, Kind
+from kiks.sim.run_log import ACT, CHECK, LAST_INPUT, STATE
 from kiks.sim.saved_state import LAYOUT, SavedState, WorldFiles
 from kiks.units import s_from_ns
 from kiks.version import __version__
@@ -73,7 +70,7 @@ class RecordedLog:
     def __init__(self, reader: Source) -> None:
         self.reader = reader
         self._files = WorldFiles(reader.attachments, reader.what)
-        self._blocks: OrderedDict[int, Columns] = OrderedDict()
+        self._blocks: OrderedDict[int, list[Entry]] = OrderedDict()
         self._first = -1
         if "layout" not in reader.told or not reader.blocks:
             raise ParameterError(
@@ -91,7 +88,7 @@ class RecordedLog:
         """The numbers of its blocks, from the first one on that has a state: no run can be made again before that."""
         blocks = self.reader.blocks
         if self._first not in blocks:
-            self._first = next((block for block in blocks if _is_state(self._block(block)).any()), -1)
+            self._first = next((block for block in blocks if any(map(has_state, self.entries_of(block)))), -1)
             if self._first < 0:
                 raise self.damaged("it has no state")
         return range(self._first, blocks.stop)
@@ -99,14 +96,13 @@ class RecordedLog:
     @property
     def begin_ns(self) -> int:
         """When it begins [ns]: at its first state."""
-        columns = self._block(self.blocks.start)
-        return int(columns.time_ns[_is_state(columns)][0])
+        return next(entry.time_ns for entry in self.entries_of(self.blocks.start) if has_state(entry))
 
     @property
     def end_ns(self) -> int:
         """When it ends [ns]: at its last checkpoint."""
-        columns = self._block(self.blocks[-1])
-        return int(columns.time_ns[columns.kind <= LAST_INPUT].max(initial=columns.time_ns[0]))
+        entries = self.entries_of(self.blocks[-1])
+        return max((entry.time_ns for entry in entries if entry.kind <= LAST_INPUT), default=entries[0].time_ns)
 
     def entries_from(self, time_ns: int) -> Iterator[Entry]:
         """Yield the entries from a time on [ns], by time."""
@@ -117,7 +113,12 @@ class RecordedLog:
 
     def entries_of(self, block: int) -> Sequence[Entry]:
         """Return the entries of a block."""
-        return self._block(block).entries()
+        if block not in self._blocks:
+            inputs_max = 16 + self.reader.chunk(block).length // ENTRY_BYTES  # a few in the smallest chunk
+            self._blocks[block] = entries_of(self.reader.read(block), self.reader.what, inputs_max, LINES_MAX)
+            if len(self._blocks) > BLOCKS_KEPT:
+                self._blocks.popitem(last=False)
+        return self._blocks[block]
 
     def until(self, block: int, time_ns: int) -> bytes:
         """Return the log of a block, as bytes, up to a time [ns]."""
@@ -127,10 +128,10 @@ class RecordedLog:
         """Return the place of the last checkpoint at or before a time [ns], or of the first state."""
         begin_ns = self.begin_ns
         for block in range(self._block_at(time_ns), self.blocks.start - 1, -1):
-            columns = self._block(block)
-            rows = np.flatnonzero(_is_state(columns) & (columns.time_ns <= max(time_ns, begin_ns)))
-            if len(rows):
-                return Row(block, int(rows[-1]))
+            entries = self.entries_of(block)
+            for row in range(len(entries) - 1, -1, -1):
+                if has_state(entries[row]) and entries[row].time_ns <= max(time_ns, begin_ns):
+                    return Row(block, row)
         raise self.damaged("it has no state")
 
     def _block_at(self, time_ns: int) -> int:
@@ -140,7 +141,7 @@ class RecordedLog:
 
     def entry(self, row: Row) -> Entry:
         """Return the entry at a place."""
-        return self._block(row.block).entry(row.row)
+        return self.entries_of(row.block)[row.row]
 
     def next_input(self, row: Row) -> tuple[Row, Entry, bool] | None:
         """Return the next input after a place, None after the last one.
@@ -150,21 +151,17 @@ class RecordedLog:
         """
         has_acted, begin = False, row.row + 1
         for block in range(row.block, self.blocks.stop):
-            kinds = self._block(block).kind
-            for next_row in range(begin, len(kinds)):
-                if kinds[next_row] <= LAST_INPUT:
-                    return Row(block, next_row), self._block(block).entry(next_row), has_acted
-                has_acted = has_acted or kinds[next_row] == Kind.ACT
+            entries = self.entries_of(block)
+            for next_row in range(begin, len(entries)):
+                if (entry := entries[next_row]).kind <= LAST_INPUT:
+                    return Row(block, next_row), entry, has_acted
+                has_acted = has_acted or entry.kind == ACT
             begin = 0
         return None
 
-    def has_state(self, entry: Entry) -> bool:
-        """Return whether an entry has a state."""
-        return entry.kind == Kind.STATE or (entry.kind == Kind.CHECK and len(entry.data) > HASH_LENGTH)
-
     def state_of(self, entry: Entry) -> SavedState:
         """Return the state of an entry."""
-        data = entry.data[HASH_LENGTH:] if entry.kind == Kind.CHECK else entry.data
+        data = entry.data[HASH_LENGTH:] if entry.kind == CHECK else entry.data
         saved = SavedState.from_bytes(data, self._files, f"{self.reader.what}: state")
         if saved.now_ns != entry.time_ns:
             raise self.damaged(f"a state of {s_from_ns(saved.now_ns):.3f} s is at {s_from_ns(entry.time_ns):.3f} s")
@@ -174,26 +171,11 @@ class RecordedLog:
         """Return the last recorded state at or before a time [ns]."""
         return self.state_of(self.entry(self.row_before(time_ns)))
 
-    def _block(self, number: int) -> Columns:
-        """Return a block of the log."""
-        if number not in self._blocks:
-            columns = Columns.of_block(self.reader.read(number), self.reader.what)
-            lines, inputs = np.bincount(columns.kind != Kind.TEXT, minlength=2)
-            # A few may be in the smallest chunk.
-            most = 16 + self.reader.chunk(number).length // ENTRY_BYTES
-            if not 0 < lines + inputs <= most + LINES_MAX or inputs > most:
-                raise self.damaged(f"a part has {len(columns.kind)} entries")
-            self._blocks[number] = columns
-            if len(self._blocks) > BLOCKS_KEPT:
-                self._blocks.popitem(last=False)
-        return self._blocks[number]
-
     def damaged(self, why: str) -> ParameterError:
         """Return the error that says why it is not whole."""
         return ParameterError(f"{self.reader.what} must be whole, but {why}. Take another copy of it.")
 
 
-def _is_state(columns: Columns) -> NDArray[np.bool_]:
-    is_kept = (columns.kind == Kind.CHECK) & (columns.length > HASH_LENGTH)
-    is_state: NDArray[np.bool_] = is_kept | (columns.kind == Kind.STATE)
-    return is_state
+def has_state(entry: Entry) -> bool:
+    """Return whether an entry has a state."""
+    return entry.kind == STATE or (entry.kind == CHECK and len(entry.data) > HASH_LENGTH)

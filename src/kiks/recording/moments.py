@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from kiks.engine.sensing.proximity import pose_of
 from kiks.engine.state import ROBOT
 from kiks.recording.entries import Entry
-from kiks.recording.log import RecordedLog
+from kiks.recording.log import RecordedLog, has_state
 from kiks.recording.motion import ticks_of
 from kiks.recording.rerun import Piece, run_again
 from kiks.recording.tables import reading_of
@@ -99,7 +99,7 @@ class _Latest:
         self.readings: dict[int, Sequence[int]] = {}
 
     def add(self, log: RecordedLog, entry: Entry) -> None:
-        if log.has_state(entry):
+        if has_state(entry):
             self.saved = log.state_of(entry)
         elif (reading := reading_of(entry)) is not None and reading[0] == "N":
             self.readings[entry.robot] = reading[1]

@@ -11,7 +11,7 @@ from threading import RLock
 
 from kiks.model.checks import CLOCK_END_NS
 from kiks.recording.entries import Entry
-from kiks.recording.log import HASH_LENGTH, RecordedLog, Row
+from kiks.recording.log import HASH_LENGTH, RecordedLog, Row, has_state
 from kiks.recording.recorder import CHECK_NS
 from kiks.sim.port import BAUD_MAX, BAUD_MIN
 from kiks.sim.read_completion import NEVER_NS
@@ -151,7 +151,7 @@ class Replay:
             return
         if self.differs_ns is None:
             self.differs_ns = checkpoint.time_ns
-        if self._log.has_state(checkpoint):
+        if has_state(checkpoint):
             self._restore(self._log.state_of(checkpoint))
 
     def _apply_to(self, wire: Wire, entry: Entry) -> None:
