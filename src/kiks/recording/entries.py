@@ -55,7 +55,9 @@ FIELD_COUNT = 6
 _COUNT = struct.Struct("<I")
 
 
-def entries_of(block: bytes, what: str, inputs_max: int, lines_max: int) -> list[Entry]:
+def entries_of(
+    block: bytes, what: str, inputs_max: int, lines_max: int, kinds: Sequence[int] | None = None
+) -> list[Entry]:
     """Return the entries of a block of `block_of`.
 
     Args:
@@ -63,6 +65,7 @@ def entries_of(block: bytes, what: str, inputs_max: int, lines_max: int) -> list
         what: What messages call it.
         inputs_max: Most entries that it may have besides lines of output.
         lines_max: Most lines of output.
+        kinds: Those that are wanted; all if left out.
     """
     count = _COUNT.unpack_from(block)[0] if len(block) >= _COUNT.size else -1
     begin = _COUNT.size + count * FIELD_COUNT * 8
@@ -79,6 +82,9 @@ def entries_of(block: bytes, what: str, inputs_max: int, lines_max: int) -> list
     line_count = np.count_nonzero(columns[0] == Kind.TEXT)
     if not count or line_count > lines_max or count - line_count > inputs_max:
         raise ParameterError(f"{what} must be whole, but a part has {count} entries. Take another copy of it.")
+    if kinds is not None:
+        is_wanted = np.isin(columns[0], kinds)
+        columns, ends = columns[:, is_wanted], ends[is_wanted]
     return [
         Entry(kind, time_ns, robot, number, other, block[end - length : end])
         for kind, time_ns, robot, number, other, length, end in zip(*columns.tolist(), ends.tolist(), strict=True)

@@ -71,7 +71,7 @@ class EventReader:
         events: list[Event] = []
         blocks = self._log.blocks
         for block in range(max(self._block, blocks.start), blocks.stop):
-            events += notes_of(self._log.entries_of(block), has_begun=self._has_begun)
+            events += notes_of(self._log.notes_of(block), has_begun=self._has_begun)
             self._block, self._has_begun = block + 1, True
         return sorted(events, key=lambda event: event.time_s)
 

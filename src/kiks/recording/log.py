@@ -11,7 +11,7 @@ from kiks.errors import ParameterError
 from kiks.recording.entries import Entry, block_of, entries_of
 from kiks.recording.mcap_file import FoundChunk
 from kiks.recording.recorder import LINES_MAX
-from kiks.sim.run_log import ACT, CHECK, LAST_INPUT, STATE
+from kiks.sim.run_log import ACT, CHECK, LAST_INPUT, MARK, STATE, TEXT
 from kiks.sim.saved_state import LAYOUT, SavedState, WorldFiles
 from kiks.units import s_from_ns
 from kiks.version import __version__
@@ -114,11 +114,18 @@ class RecordedLog:
     def entries_of(self, block: int) -> Sequence[Entry]:
         """Return the entries of a block."""
         if block not in self._blocks:
-            inputs_max = 16 + self.reader.chunk(block).length // ENTRY_BYTES  # a few in the smallest chunk
-            self._blocks[block] = entries_of(self.reader.read(block), self.reader.what, inputs_max, LINES_MAX)
+            self._blocks[block] = self._read(block)
             if len(self._blocks) > BLOCKS_KEPT:
                 self._blocks.popitem(last=False)
         return self._blocks[block]
+
+    def notes_of(self, block: int) -> list[Entry]:
+        """Return the entries of a block that people care for: lines of output, bookmarks and changes by hand."""
+        return self._read(block, (STATE, TEXT, MARK))
+
+    def _read(self, block: int, kinds: Sequence[int] | None = None) -> list[Entry]:
+        inputs_max = 16 + self.reader.chunk(block).length // ENTRY_BYTES  # a few in the smallest chunk
+        return entries_of(self.reader.read(block), self.reader.what, inputs_max, LINES_MAX, kinds)
 
     def until(self, block: int, time_ns: int) -> bytes:
         """Return the log of a block, as bytes, up to a time [ns]."""
