@@ -65,7 +65,7 @@ SCRIPTS = [
     Script(ASK + "port.timeout = 0.35; said = port.readline()", 0.9),
     Script(ASK + "port.timeout = 0.35; said = port.readline(), port.readline()", 1.25),
     Script(ASK + "port.timeout = 0.35; said = port.readline(4), port.readline(0), port.readline(None)", 0.9),
-    Script(ASK + "sleep(0.55); port.timeout = 0.05; said = port.readline(), port.readline()", 0.65),
+    Script(ASK + "sleep(0.53); port.timeout = 0.05; said = port.readline(), port.readline()", 0.65),
     Script(ASK + "sleep(1.05); port.timeout = 0; said = port.readline(), port.readline()", 1.05),
     Script(SLOW + "port.timeout = 0.35; said = port.readlines()", 1.25),
     Script(SLOW + "port.timeout = 1.35; said = port.readlines()", 3.55),
