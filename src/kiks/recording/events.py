@@ -77,7 +77,9 @@ class EventReader:
 
     def contacts(self) -> list[Event]:
         """Return the contacts since the last call; for them, the run is made again."""
-        begin_ns, self._until_ns = max(self._until_ns, self._log.begin_ns), self._log.end_ns
-        if begin_ns >= self._until_ns:
+        begin_ns, end_ns = max(self._until_ns, self._log.begin_ns), self._log.end_ns
+        if begin_ns >= end_ns:
             return []
-        return [event for piece in run_again(self._log, begin_ns, self._until_ns) for event in contacts_of(piece)]
+        events = [event for piece in run_again(self._log, begin_ns, end_ns) for event in contacts_of(piece)]
+        self._until_ns = end_ns  # after it: what an error has cut short is read again
+        return events

@@ -1,7 +1,7 @@
 """Records a run while it goes on: its inputs, the hash of its state each second, and now and then the state.
 
-Replies, motion and contacts follow from that, and whoever wants them makes the run again (`kiks.recording.rerun`). So
-nothing is done for each tick, and little for each command.
+Replies, motion and contacts follow from that: `kiks.recording.rerun` makes the run again to get them. So the writer
+does nothing for each tick, and little for each command.
 
 A writer only reads the simulation. It reads the state where the run stops anyway or may stop without a difference, so
 that a run is the same with it, to the bit. Each simulation has one writer at most, which writes into one store or more:
@@ -28,7 +28,7 @@ from kiks.sim.read_completion import NEVER_NS
 from kiks.sim.run_log import ACT, CHECK, MARK, STATE, TEXT, Clock, NotedEntry
 from kiks.sim.saved_state import LAYOUT, WorldFiles, state_bytes
 from kiks.sim.simulation import Simulation
-from kiks.sim.turret_host import name_of
+from kiks.sim.turret_host import has_user_turret
 from kiks.units import NS_PER_S, s_from_ns
 from kiks.version import __version__
 
@@ -183,8 +183,7 @@ class RunWriter:
         sim, world = self._sim, self._world
         self.change_count, self._lamps = world.change_count, world.lamps.tobytes()
         for wire in sim.wires:
-            has_own = any(name_of(turret) is None for turret in wire.firmware.fitted)
-            wire.recorder, wire.on_act = self, self._note_own if has_own else None
+            wire.recorder, wire.on_act = self, self._note_own if has_user_turret(wire.firmware) else None
         data = state_bytes(sim, self._files)
         self.note((STATE, world.now_ns, 0, 0, 0, data))
         self._waiting_bytes += len(data)

@@ -11,7 +11,7 @@ from kiks.recording.log import RecordedLog
 from kiks.recording.motion import Motion, MotionWatcher
 from kiks.recording.replay import Replay
 from kiks.sim.run_log import Kind, NotedEntry
-from kiks.sim.turret_host import name_of
+from kiks.sim.turret_host import has_user_turret
 from kiks.units import NS_PER_S, s_from_ns
 from kiks.version import __version__
 
@@ -108,8 +108,7 @@ class _Observer:
         """Take a sample, and listen to wires that are new; what their turrets of users answer was recorded."""
         self.motion.look(self.sim.world.state)
         for wire in self.sim.wires:
-            has_own = any(name_of(turret) is None for turret in wire.firmware.fitted)
-            wire.on_act = None if has_own else self._hear
+            wire.on_act = None if has_user_turret(wire.firmware) else self._hear
 
     def _hear(self, entry: NotedEntry) -> None:
         self._acts.append(Entry(*entry))

@@ -288,7 +288,7 @@ def replacements(scheduler: Scheduler) -> dict[str, dict[str, Any]]:
     executors: dict[str, dict[str, Any]] = {
         concurrent.futures.thread.__name__: {"_shutdown": False, "_threads_queues": weakref.WeakKeyDictionary()}
     }
-    if (processes := "concurrent.futures.process") in sys.modules:  # nobody waits for its import in vain
+    if (processes := "concurrent.futures.process") in sys.modules:  # importing it would make each start slower
         executors[processes] = {"_global_shutdown": False, "_threads_wakeups": weakref.WeakKeyDictionary()}
     real_is_set, real_is_owned = threading.Event.is_set, threading.Condition._is_owned  # type: ignore[attr-defined]
     return {

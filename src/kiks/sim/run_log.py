@@ -1,6 +1,6 @@
 """What is noted of a run that is recorded: entries of these kinds, in their order.
 
-A run is its inputs: replies, motion and contacts follow from them, so nobody writes them down.
+A run is its inputs. Replies, motion and contacts follow from them, so a recording leaves them out.
 """
 
 from __future__ import annotations

@@ -217,6 +217,11 @@ def name_of(turret: Turret) -> str | None:
     return next((name for name, known in TURRETS.items() if kind == known), None)
 
 
+def has_user_turret(firmware: Firmware) -> bool:
+    """Return whether a robot has a turret of a user's own, whose program a replay may not have."""
+    return any(name_of(turret) is None for turret in firmware.fitted)
+
+
 def described(turret: Turret) -> dict[str, Any]:
     """Return the fields of a `TurretOfUser`."""
     return {name: getattr(turret, name, None) for name in ("number", "name", "revision", "memory_count")}

@@ -72,7 +72,7 @@ class Wire:
         holder: Name of the program that has opened the port; None while it is free.
         log: Records what goes over the line; None while it is not watched.
         recorder: Records the whole run; None while nothing does.
-        on_act: Called with what the robot does, an entry of the kind ACT; None while nobody listens.
+        on_act: Called with what the robot does, an entry of the kind ACT; None if unused.
         pending: Commands on their way: when each acts [ns], its line, and what takes the reply in place of the host.
         thinks_since_ns: Since when a real program has the port, whose every gap counts as thinking [ns]; else None.
         next_ns: When the robot does something next [ns], or None while it only waits for characters.
