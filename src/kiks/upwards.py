@@ -7,7 +7,8 @@ heavy libraries are loaded only where they are used.
 from __future__ import annotations
 
 import importlib
-from typing import Any
+from types import TracebackType
+from typing import Any, Protocol, Self
 
 
 class Hook:
@@ -29,6 +30,31 @@ class Hook:
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
         """Call the function."""
         return getattr(importlib.import_module(self._module), self._name)(*args, **kwargs)
+
+
+class Recorder(Protocol):
+    """Records a simulation into a file until `close`, or the end of `with`."""
+
+    def __enter__(self) -> Self: ...
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None, /
+    ) -> None: ...
+
+    def mark(self, note: str) -> None:
+        """Write a bookmark."""
+
+    def close(self) -> None:
+        """End the recording."""
+
+
+class View(Protocol):
+    """A simulation that is shown in a browser until `close`."""
+
+    url: str
+
+    def close(self) -> None:
+        """End it."""
 
 
 load_arena_file = Hook("kiks.model.project", "load_arena_file")

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from kiks.cli.outputs import Command, output
+from kiks.errors import counted
 
 if TYPE_CHECKING:
     from kiks.model.arena import Arena
@@ -21,7 +22,7 @@ Out = Annotated[
     ),
 ]
 
-arena = typer.Typer(help="Create arenas, or describe one.", no_args_is_help=True, rich_markup_mode=None)
+arena = typer.Typer(help="List the arenas, create one, or describe one.", no_args_is_help=True, rich_markup_mode=None)
 
 
 @arena.command(cls=Command)
@@ -62,11 +63,24 @@ def new(
     _save(box, out)
 
 
+@arena.command("list", cls=Command)
+def list_() -> None:
+    """List the arenas that come with KiKS, which every command and `Arena.load` know by name."""
+    from kiks.model.shipped import shipped_arena, shipped_arenas
+
+    for name in shipped_arenas():
+        if "/" not in name:
+            place = shipped_arena(name)
+            things = {"start": place.starts, "lamp": place.lamps, "ball": place.balls, "cylinder": place.cylinders}
+            contents = ", ".join(counted(len(each), thing) for thing, each in things.items() if each)
+            typer.echo(f"{name:<10} {place.width_mm:g} x {place.height_mm:g} mm, {contents}")
+
+
 @arena.command(cls=Command)
-def info(file: Annotated[Path, typer.Argument(metavar="ARENA", help="Arena file (.toml) or picture.")]) -> None:
+def info(file: Annotated[Path, typer.Argument(metavar="ARENA", help="An arena's name, file or picture.")]) -> None:
     """Print an arena's size and contents, and whether a Khepera fits at the starts.
 
-    Example: kiks arena info examples/arenas/maze.toml
+    Example: kiks arena info maze
     """
     import math
 

@@ -60,7 +60,7 @@ def desk(
     Drag robots, watch their sensors and their lines, type commands, draw arenas, write and run programs. Ctrl-C ends
     the desk.
 
-    Example: kiks desk --arena examples/arenas/maze.toml
+    Example: kiks desk --arena maze
     """
     ready_engine()
     from kiks.desk.server.access import LOOPBACK

@@ -36,7 +36,9 @@ class World:
 
     arena: Annotated[
         str | None,
-        typer.Option(help="Arena (.toml, .kad), picture, or project's world (.kiks); the classic box if none."),
+        typer.Option(
+            help="Arena by name (kiks arena list), .toml, .kad, picture, or a project's .kiks; the classic box if none."
+        ),
     ] = None
     robots: Annotated[
         int | None,

@@ -97,8 +97,8 @@ def run(
     projects that come with KiKS, and leave a picture: avoid, camera, clean, first_steps, follow, maze, pictures, race,
     soccer, square, swarm, to_the_light.
 
-    Example: kiks run --arena examples/arenas/maze.toml --map /dev/ttyUSB0=1 wander.py
-    Example: kiks demo follow --arena examples/arenas/office.toml --seconds 300
+    Example: kiks run --arena maze --map /dev/ttyUSB0=1 wander.py
+    Example: kiks demo follow --arena office --seconds 300
     """
     show_log()
     if not desk:

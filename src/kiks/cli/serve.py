@@ -67,7 +67,7 @@ def serve(
 
     The program opens the printed port in place of that of a real robot. Ctrl-C ends the server.
 
-    Example: kiks serve --arena examples/arenas/maze.toml --link /tmp/khepera
+    Example: kiks serve --arena maze --link /tmp/khepera
     """
     from kiks.clock.patience import Patience
     from kiks.ports.server import Server

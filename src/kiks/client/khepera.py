@@ -69,6 +69,9 @@ class Khepera:
         if isinstance(self.port, VirtualPort) and self.port.timeout is None:
             self.port.timeout = TIMEOUT_S
 
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} on {self.port!r}>"
+
     def close(self) -> None:
         """Close the port. The robot keeps its last speed: nothing on board stops it. Other methods then raise."""
         self.port.close()

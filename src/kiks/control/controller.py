@@ -17,7 +17,7 @@ from kiks.control.recipes import recipe_of
 from kiks.control.senses import check_senses, reading_count
 from kiks.engine.compiling import entry, kernel
 from kiks.engine.physics.motor import SPEED_MAX
-from kiks.errors import ParameterError, shown
+from kiks.errors import ParameterError, counted, shown
 from kiks.model.array_checks import check_numbers
 from kiks.model.checks import check_count
 
@@ -74,6 +74,12 @@ class Controller(Compiled):
         self.memory_count = check_count("memory", memory)
         self.parameter_count = None if parameters is None else check_count("parameters", parameters)
         self.recipe = recipe_of(function)
+
+    def __repr__(self) -> str:
+        count = (
+            "any number of parameters" if self.parameter_count is None else counted(self.parameter_count, "parameter")
+        )
+        return f"<{type(self).__name__} {self.name!r}: {', '.join(self.senses)}; {count}>"
 
     @property
     def sizes(self) -> dict[str, int | None]:

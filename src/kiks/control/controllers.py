@@ -47,6 +47,24 @@ from kiks.errors import ParameterError, shown
 from kiks.model.checks import check_count, check_kind
 from kiks.model.data_file import Number, OneOf, Rule, Switch, Whole, adapter, check
 
+__all__ = [
+    "ctrnn",
+    "elman",
+    "from_recipe",
+    "gru",
+    "linear",
+    "mlp",
+    "plastic",
+    "policy",
+    "random_parameters",
+    "recipe_for",
+]
+
+
+def __dir__() -> list[str]:
+    return __all__
+
+
 SPEED_LIMIT = 10.0
 """Default speed of an output of 1 [pulses/10 ms]: 80 mm/s."""
 

@@ -97,6 +97,9 @@ class Measure(Compiled):
         self.result = result
         self.senses = check_senses(senses)
 
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.name!r}>"
+
     @property
     def sizes(self) -> dict[str, int | None]:
         """How many numbers its notes are."""

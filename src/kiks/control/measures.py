@@ -21,6 +21,41 @@ from kiks.model.arena import Arena
 from kiks.model.checks import check_kind, check_number
 from kiks.model.data_file import Number, OneOf
 
+__all__ = [
+    "avoidance",
+    "beside_wall_share",
+    "closeness",
+    "closest_mm",
+    "contacts",
+    "coverage",
+    "escaped_share",
+    "final_x_mm",
+    "final_y_mm",
+    "gathered",
+    "goal_mm",
+    "largest_group",
+    "light_approach",
+    "light_mm",
+    "light_stay_s",
+    "near_light_share",
+    "neighbour_mm",
+    "net_mm",
+    "path_mm",
+    "reached_s",
+    "roaming",
+    "speed_pulses",
+    "spread_mm",
+    "straightness",
+    "touching_share",
+    "turned_pulses",
+    "wall_following",
+]
+
+
+def __dir__() -> list[str]:
+    return __all__
+
+
 FULL_SPEED = 10.0
 """Speed that counts as 1 [pulses/10 ms]: 80 mm/s, at which Floreano and Mondada's robot drove at most."""
 

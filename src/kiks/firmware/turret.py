@@ -146,6 +146,9 @@ class Turret:
     memory_count: int = 0
     site: Site
 
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: turret {self.number}, {self.name!r}>"
+
     def fit(self, site: Site) -> None:
         """Fit the turret to a robot; the power is on."""
         self.site = site

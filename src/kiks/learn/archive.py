@@ -89,6 +89,10 @@ class Archive:
             raise ParameterError(f"an archive must have at most 2^53 cells, but it had {self.cell_count}.")
         self._elites: dict[tuple[int, ...], Elite] = {}
 
+    def __repr__(self) -> str:
+        axes = " x ".join(axis.measure for axis in self.axes)
+        return f"<{type(self).__name__}: {len(self._elites)} elites in {self.cell_count} cells of {axes}>"
+
     def add(self, candidates: Floats, values: Floats, generation: int) -> None:
         """Take candidates: each stays that is better than the elite of its cell.
 

@@ -106,6 +106,10 @@ class Champion:
     __eq__ = object.__eq__
     __hash__ = object.__hash__
 
+    def __repr__(self) -> str:
+        task = f" of {self.task!r}" if self.task else ""
+        return f"<{type(self).__name__}{task}: {self.controller!r}, fitness {self.fitness:g}>"
+
     def __post_init__(self) -> None:
         self.controller.check_parameters(self.parameters)
 

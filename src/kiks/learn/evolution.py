@@ -26,7 +26,7 @@ from typing import Any, TypeGuard
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kiks.errors import ParameterError, shown
+from kiks.errors import ParameterError, counted, shown
 from kiks.learn import seeds
 from kiks.learn.algorithms import Algorithm, Setting, make_algorithm
 from kiks.learn.archive import Archive
@@ -146,6 +146,9 @@ class Evolution:
         self._folder = None if folder is None else Folder(folder)
         if self._folder is not None:
             self._resume(self._folder)
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} of {self.task.name!r}: {counted(len(self.generations), 'generation')}>"
 
     @property
     def archive(self) -> Archive | None:

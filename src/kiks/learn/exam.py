@@ -18,7 +18,7 @@ from pydantic import Field
 from kiks.batch.batch import Batch
 from kiks.batch.initial_state import Arenas, Starts
 from kiks.control.measure import Measure
-from kiks.errors import ParameterError, shown
+from kiks.errors import ParameterError, counted, shown
 from kiks.learn.champion import Champion
 from kiks.learn.evaluation import Floats
 from kiks.learn.experiment import Experiment
@@ -109,6 +109,9 @@ class Exam(Experiment):
     # Functions cannot be compared: an exam equals itself only.
     __eq__ = object.__eq__
     __hash__ = object.__hash__
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {counted(self.worlds, 'start')} of {self.seconds:g} s, {self.goal!r}>"
 
     def examine(self, champion: Champion, *, robots: int = 1, kinds: Sequence[RobotSpec] | None = None) -> ExamResult:
         """Let a champion drive from all starts, with the timing of its own control loop.

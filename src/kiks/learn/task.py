@@ -16,7 +16,7 @@ from kiks.batch.loop_timing import Timing
 from kiks.control.controller import Controller
 from kiks.control.controllers import SPEED_LIMIT
 from kiks.control.measure import Measure
-from kiks.errors import ParameterError, shown
+from kiks.errors import ParameterError, counted, shown
 from kiks.learn.algorithm_name import AlgorithmName
 from kiks.learn.champion import Champion
 from kiks.learn.evaluation import Floats, Integers, check_candidates
@@ -209,6 +209,10 @@ class Task(Experiment):
     # Functions cannot be compared: a task equals itself only.
     __eq__ = object.__eq__
     __hash__ = object.__hash__
+
+    def __repr__(self) -> str:
+        worlds = counted(self.worlds, "world")
+        return f"<{type(self).__name__} {self.name!r}: {self.controller!r} in {worlds} of {self.seconds:g} s>"
 
     def __post_init__(self) -> None:
         Experiment.__post_init__(self)

@@ -24,6 +24,11 @@ from kiks.model.robot import robot_names
 
 __all__ = ["TASKS", "avoid", "disperse", "follow", "football", "gather", "light", "load", "maze", "pursuit"]
 
+
+def __dir__() -> list[str]:
+    return __all__
+
+
 Name = Annotated[
     Text,
     Field(pattern=r"^\w[\w .-]{0,59}$", description="The folder of its evolution has this name."),

@@ -158,7 +158,16 @@ class Arena:
 
     @classmethod
     def load(cls, path: str | Path) -> Arena:
-        """Read an arena file (.toml), a project's arena (.kiks), one of the Matlab KiKS (.kad), or a 1 mm picture."""
+        """Read an arena.
+
+        Args:
+            path: The name of one that comes with KiKS (`kiks arena list`), or a file: an arena file (.toml), a project
+                (.kiks), an arena of the Matlab KiKS (.kad), or a picture of 1 mm a pixel.
+
+        Example:
+            >>> Arena.load("office").name
+            'Office'
+        """
         arena: Arena = upwards.load_arena_file(path_of(path))
         return arena
 

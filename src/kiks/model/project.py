@@ -14,7 +14,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field, InstanceOf
 
-from kiks.errors import ArenaError, KiksError, ParameterError, nearest, shown
+from kiks.errors import ArenaError, KiksError, ParameterError, counted, nearest, shown
 from kiks.model.arena import Arena
 from kiks.model.arena_file import (
     Balls,
@@ -49,6 +49,7 @@ from kiks.model.kad import load_kad
 from kiks.model.limits import PROJECT_FILE_BYTES_MAX
 from kiks.model.picture import decode_picture, encode_picture
 from kiks.model.robot import Baud, Brightness, Response, robot_names
+from kiks.model.shipped import shipped_arenas
 from kiks.model.thinking_policy import split_thinking
 from kiks.model.turrets import TURRETS
 
@@ -158,6 +159,9 @@ class Project:
     speed: Speed | None = 1.0
     seconds: Seconds | None = None
     supervisor: Program | None = None
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {counted(len(self.robots), 'robot')} in {self.arena!r}, seed {self.seed}>"
 
     def __post_init__(self) -> None:
         for name in ("starts", "lamps", "balls", "cylinders"):
@@ -295,5 +299,12 @@ _READERS: dict[str, Callable[[Path], Arena]] = {
 
 
 def load_arena_file(path: Path) -> Arena:
-    """Read an arena file, a project's arena, a `.kad` file of the Matlab KiKS, or a picture of 1 mm cells."""
+    """Read an arena that comes with KiKS, or a file: see `Arena.load`."""
+    if not path.suffix and not path.exists():
+        known = shipped_arenas()
+        if path.as_posix() not in known:
+            names = ", ".join(name for name in known if "/" not in name)
+            hint = nearest(str(path), known)
+            raise ArenaError(f"An arena must be a file or one of {names}, but there is no {shown(str(path))}.{hint}")
+        path = known[path.as_posix()]
     return _READERS.get(path.suffix.lower(), Arena.from_image)(path)

@@ -285,6 +285,10 @@ class RobotSpec:
     curve: Curve | None = None
     reflection: Reflection | None = None
 
+    def __repr__(self) -> str:
+        size = f"{self.body.diameter_mm:g} mm, response {self.proximity.response!r}"
+        return f"<{type(self).__name__} {self.name!r}: {size}>"
+
     @staticmethod
     def load(name_or_path: str | Path, *, response: str | None = None) -> RobotSpec:
         """Return a robot that comes with KiKS ('khepera', 'khepera_ii') or one from a file ('mine.toml').

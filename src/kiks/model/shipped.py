@@ -17,8 +17,15 @@ def shipped(name: str) -> Path:
 
 @cache
 def shipped_arena(name: str) -> Arena:
-    """Return an arena of `examples/arenas`, such as 'maze' or 'training/rooms'; the same object each time."""
-    return Arena.load(shipped(f"examples/arenas/{name}.toml"))
+    """Return an arena that comes with KiKS, such as 'maze' or 'training/rooms'; the same object each time."""
+    return Arena.load(shipped_arenas()[name])
+
+
+@cache
+def shipped_arenas() -> dict[str, Path]:
+    """Return the files of the arenas that come with KiKS, by name; those for training are in a folder of their own."""
+    root = shipped("examples/arenas")
+    return {path.relative_to(root).with_suffix("").as_posix(): path for path in sorted(root.rglob("*.toml"))}
 
 
 def demonstrations() -> dict[str, Path]:

@@ -284,6 +284,9 @@ class RunRecorder:
             if not (self._is_open or self._file.is_in_place):
                 self.close()  # which says why
 
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} to {str(self.path)!r}{'' if self._is_open else ', ended'}>"
+
     def __enter__(self) -> RunRecorder:
         """Return itself."""
         return self

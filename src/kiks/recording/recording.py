@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kiks import upwards
-from kiks.errors import ParameterError, nearest, shown
+from kiks.errors import ParameterError, counted, nearest, shown
 from kiks.model.checks import check_count, check_number
 from kiks.model.project import Project
 from kiks.recording import tables
@@ -23,6 +23,9 @@ from kiks.sim.from_project import described
 from kiks.sim.saved_state import SavedState
 from kiks.sim.simulation import Simulation
 from kiks.units import ns_from_s, s_from_ns
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 class Recording:
@@ -57,12 +60,19 @@ class Recording:
         self.about: Mapping[str, str] = self._reader.told
 
     def __repr__(self) -> str:
-        return f"<{self._reader.what}: {len(self.robots)} robots, {self.duration_s:.3f} s>"
+        return f"<{self._reader.what}: {counted(len(self.robots), 'robot')}, {self.duration_s:.3f} s>"
 
     def _repr_png_(self) -> tuple[bytes, dict[str, int]] | None:
         """Return its figures, which notebooks show; nothing without Matplotlib."""
         picture: tuple[bytes, dict[str, int]] | None = upwards.draw_for_notebook(self)
         return picture
+
+    def __enter__(self) -> Recording:
+        """Return itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Do nothing: a recording holds no file open."""
 
     # ---- what ran ----
 
@@ -160,7 +170,7 @@ class Recording:
         """Return the run from a time on, as a simulation that the recorded inputs move."""
         return Replay(self.log, self.log.begin_ns if time_s is None else self.time_ns(time_s))
 
-    def plot(self, *, robot: int = 1) -> Any:
+    def plot(self, *, robot: int = 1) -> Figure:
         """Draw the run: paths and odometry, where robots were, readings, speeds, and where the time went.
 
         Args:
@@ -169,7 +179,8 @@ class Recording:
         Returns:
             A Matplotlib figure, which notebooks show.
         """
-        return upwards.plot_recordings([self], robot=robot)
+        figure: Figure = upwards.plot_recordings([self], robot=robot)
+        return figure
 
     def export(self, path: str | Path, *, kind: str | None = None, **options: Any) -> None:
         """Write a film, a picture, figures, a photo, a table or a page of it: see `kiks.export.kinds.export`.

@@ -56,6 +56,9 @@ class Replay:
         self.sim.loop.supervisor = self
         self.sim.advance_to(time_ns)
 
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} of {self._log.reader.what}: {self.sim!r}>"
+
     def go_to(self, time_ns: int) -> bool:
         """Go to another time of the recording, back or on, with the same simulation.
 

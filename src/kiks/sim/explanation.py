@@ -90,6 +90,9 @@ class Explanation:
     maximum_counts: float
     count: int
 
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: sensor {self.sensor} ({self.name}) of robot {self.robot} reads {self.count}>"
+
     @property
     def expected_counts(self) -> float:
         """The sensor's mean reading here, before noise and rounding."""
@@ -180,6 +183,10 @@ class LightExplanation:
     step_counts: float
     maximum_counts: float
     count: int
+
+    def __repr__(self) -> str:
+        name = f"light sensor {self.sensor} ({self.name}) of robot {self.robot}"
+        return f"<{type(self).__name__}: {name} reads {self.count}>"
 
     def text(self) -> str:
         """Return it in plain sentences, one a line."""

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from functools import partial
 from itertools import count
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from weakref import WeakValueDictionary
 
 import numpy as np
@@ -33,7 +33,10 @@ from kiks.sim.things import Checkpoint, Things
 from kiks.sim.turret_host import Turrets
 from kiks.sim.world import World
 from kiks.units import ns_from_s, s_from_ns
-from kiks.upwards import draw_for_notebook, plot_simulation, record_simulation, show_in_browser
+from kiks.upwards import Recorder, View, draw_for_notebook, plot_simulation, record_simulation, show_in_browser
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 class Simulation:
@@ -500,7 +503,7 @@ class Simulation:
 
     # ---- the run as a whole ----
 
-    def record(self, file: str | Path) -> Any:
+    def record(self, file: str | Path) -> Recorder:
         """Record the run to a file from now on, until `close()` or the end of `with`; `kiks.Recording` reads it.
 
         The run is the same, to the bit. docs/recording.md says what can be done with the file.
@@ -511,15 +514,17 @@ class Simulation:
         Returns:
             A `kiks.recording.recorder.RunRecorder`, with `mark(note)` for bookmarks.
         """
-        return record_simulation(self, file)
+        recorder: Recorder = record_simulation(self, file)
+        return recorder
 
-    def plot(self, *, robot: int = 1) -> Any:
+    def plot(self, *, robot: int = 1) -> Figure:
         """Draw the run that is being recorded: paths, and a robot's odometry, readings, speeds and time.
 
         Returns:
             A Matplotlib figure, which notebooks show.
         """
-        return plot_simulation(self, robot=robot)
+        figure: Figure = plot_simulation(self, robot=robot)
+        return figure
 
     def record_paths(self, every_s: float = 0.1, *, points_max: int | None = None) -> None:
         """Record the paths of all robots, balls and cylinders from now on; earlier records are dropped.
@@ -563,7 +568,7 @@ class Simulation:
 
     def show(
         self, *, speed: float | None = 1.0, is_alive: bool = False, port: int | None = None, browser: bool = True
-    ) -> Any:
+    ) -> View:
         """Show this simulation in a browser and print its address; in a notebook, below the cell.
 
         The run stays the same, to the bit, unless a user changes something.
@@ -580,7 +585,8 @@ class Simulation:
         Raises:
             LinkError: If the page cannot be served there.
         """
-        return show_in_browser(self, speed=speed, is_alive=is_alive, port=port, browser=browser)
+        view: View = show_in_browser(self, speed=speed, is_alive=is_alive, port=port, browser=browser)
+        return view
 
 
 class SimPort(VirtualPort):
@@ -595,6 +601,10 @@ class SimPort(VirtualPort):
         super().__init__(LocalLine(sim.loop, robot), sim.program)
         self.sim = sim
         self.robot = robot
+
+    def __repr__(self) -> str:
+        state = "" if self.is_open else ", closed"
+        return f"<{type(self).__name__}: robot {self.robot} of {self.sim.name}, {self.baudrate} bit/s{state}>"
 
 
 SIMULATIONS: WeakValueDictionary[str, Simulation] = WeakValueDictionary()

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from kiks.engine.parameters import RAY_COUNT
 from kiks.engine.sensing import observe
-from kiks.errors import ParameterError
+from kiks.errors import ParameterError, counted
 from kiks.model.array_checks import check_numbers
 from kiks.model.checks import check_heading
 from kiks.model.robot import SENSOR_COUNT
@@ -41,6 +41,10 @@ class Snapshot:
     met: NDArray[np.int64]
     proximity: NDArray[np.int64]
     ambient: NDArray[np.int64]
+
+    def __repr__(self) -> str:
+        robots, things = len(self.poses), len(self.places)
+        return f"<{type(self).__name__}: {counted(robots, 'robot')}, {counted(things, 'thing')}>"
 
 
 def look(world: World) -> Snapshot:

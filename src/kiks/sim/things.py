@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from kiks.engine.scalar_math import sin_cos
 from kiks.engine.scene import enter_worlds
 from kiks.engine.state import BALL, BODY, CYLINDER
-from kiks.errors import ArenaError, KiksError, ParameterError, shown
+from kiks.errors import ArenaError, KiksError, ParameterError, counted, shown
 from kiks.model.arena import Arena, Ball, Cylinder, Lamp
 from kiks.model.array_checks import check_numbers
 from kiks.model.checks import check_count, check_heading, check_kind, check_number
@@ -33,6 +33,10 @@ class Checkpoint:
     poses: NDArray[np.float64]
     bodies: NDArray[np.void]
     lamps: NDArray[np.float64]
+
+    def __repr__(self) -> str:
+        robots, things = len(self.poses), self.bodies.shape[1] + len(self.lamps)
+        return f"<{type(self).__name__}: {counted(robots, 'robot')}, {counted(things, 'thing')}>"
 
 
 class Things:
