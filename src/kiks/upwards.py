@@ -60,6 +60,9 @@ class View(Protocol):
 load_arena_file = Hook("kiks.model.project", "load_arena_file")
 """Reads an arena from a file by its suffix."""
 
+copy_simulation = Hook("kiks.sim.saved_state", "reduced")
+"""Returns how `copy` and `pickle` make a simulation in the same state."""
+
 draw_for_notebook = Hook("kiks.export.notebook", "for_notebook")
 """Draws an arena, a simulation, or the figures of a recording for a notebook."""
 

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import copy
 import fcntl
 import math
 import os
-import pickle
 import resource
 import socket
 from collections.abc import Callable
@@ -249,12 +247,6 @@ def test_a_wrong_timeout_leaves_no_reply_unread(sim: kiks.Simulation, timeout: f
         kiks.ksend("N\n", ref, timeout)
     assert kiks.ksend("D,1,1\n", ref) == "d"
     kiks.kclose(ref)
-
-
-def test_a_simulation_is_not_copied(sim: kiks.Simulation) -> None:
-    for copied in (copy.deepcopy, copy.copy, pickle.dumps):
-        with pytest.raises(kiks.ParameterError, match="a simulation cannot be copied or pickled"):
-            copied(sim)
 
 
 @pytest.mark.parametrize("robots", [-1, 1001, 1.5, "2"])

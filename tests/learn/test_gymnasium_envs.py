@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
 import subprocess
 import sys
 from dataclasses import replace
@@ -297,3 +299,35 @@ def test_an_episode_of_a_team_ends_for_all_robots_at_once() -> None:
     assert rewards["robot_1"] > rewards["robot_2"]
     with pytest.raises(ParameterError, match="the episode is over"):
         team.step(actions)
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))])
+@pytest.mark.parametrize(
+    "made",
+    [
+        lambda: gymnasium.make("kiks/Follow-v0"),
+        lambda: gymnasium.make_vec("kiks/Light-v0", num_envs=5),
+        lambda: KheperaTeam("Gather", robots=2),
+        lambda: KheperaEnv(small_task()),
+    ],
+    ids=["single", "vector", "team", "measures of a user"],
+)
+def test_a_copy_of_an_environment_goes_on_as_it_does(made: Any, copied: Any) -> None:
+    env = made()
+    env.reset(seed=3)
+
+    def steps(env: Any, count: int) -> list[Any]:
+        seen = []
+        for number in range(count):
+            if isinstance(env, KheperaTeam):
+                actions: Any = {name: np.full(2, 0.1 * number, np.float32) for name in env.agents}
+            else:
+                actions = np.full(env.action_space.shape, 0.1 * number, np.float32)
+            seen.append(env.step(actions))
+        return [*seen, env.reset()]
+
+    steps(env, 3)
+    twin = copied(env)
+    expected = steps(env, 5)
+    for one, other in zip(expected, steps(twin, 5), strict=True):
+        np.testing.assert_equal(other, one)

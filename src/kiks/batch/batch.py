@@ -119,15 +119,16 @@ class Batch:
         self._initial_state = initial = InitialState(arena, worlds, robot, robots, response)
         self.arenas, self.arena_indices = initial.arenas, initial.arena_indices
         self.specs, self.networks = initial.specs, initial.networks
-        self.world_count, self.robot_count = initial.state.robots.shape
+        self.world_count, self.robot_count = len(self.arena_indices), initial.robot_count
         self.threads = check_count("threads", (os.cpu_count() or 1) if threads is None else threads, 1, 4096)
         self.senses = check_senses(senses)
-        self.state = initial.state
+        self.state = State.empty(
+            world_count=self.world_count, robot_count=self.robot_count, body_count=initial.body_count
+        )
         self._lamps = initial.lamps[self.arena_indices]
         self.seeds = initial.seeds_of(seed)
         self._starts = initial.starts_of(self.seeds, starts)
-        scene = Scene(self.state, initial.kinds, self.arenas, self.networks, self._lamps, self.seeds)
-        self._scenes = [scene.in_arena(arena) for arena in self.arenas]
+        self._scenes = self._make_scenes()
         self._watching = MeasureSlots(measures, self.senses, "the batch")
         shape = self.state.robots.shape
         self.notes = np.zeros((*shape, self._watching.note_count))
@@ -142,6 +143,19 @@ class Batch:
         self._worlds = Worlds._make(parts)
         self._is_sensed = False
         self._reset_worlds(np.arange(self.world_count), self._worlds.has_camera)
+
+    def _make_scenes(self) -> list[Scene]:
+        kinds = self._initial_state.kinds
+        scene = Scene(self.state, kinds, self.arenas, self.networks, self._lamps, self.seeds)
+        return [scene.in_arena(arena) for arena in self.arenas]
+
+    def __getstate__(self) -> dict[str, Any]:
+        with self._lock:
+            return {name: part for name, part in vars(self).items() if name not in ("_lock", "_pool", "_scenes")}
+
+    def __setstate__(self, parts: dict[str, Any]) -> None:
+        vars(self).update(parts)
+        self._lock, self._scenes = threading.RLock(), self._make_scenes()
 
     def __repr__(self) -> str:
         robots = counted(self.robot_count, "robot")

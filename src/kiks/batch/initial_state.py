@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from collections.abc import Iterable, Sequence
 from typing import Annotated, Any
@@ -62,7 +63,8 @@ class InitialState:
         specs: The kinds of robots.
         kinds: Their constants, records of `PARAMETERS`, shape [kind].
         networks: The tables for their responses (`kiks.engine.sensing.thesis_networks`).
-        state: A state with room for all worlds.
+        robot_count: Number of robots in each world.
+        body_count: Number of balls and cylinders in each world.
         lamps: The lamps of each arena, float64 [arena, lamp, 4]; where there are fewer, the others are off.
     """
 
@@ -98,12 +100,22 @@ class InitialState:
                 f"the arenas of one batch must hold the same number of balls and cylinders, but they hold "
                 f"{sorted(body_counts)}. Make a batch for each number."
             )
-        self.state = State.empty(world_count=worlds, robot_count=robots, body_count=body_counts.pop())
+        self.robot_count, self.body_count = robots, body_counts.pop()
+        self._given = self.arenas, worlds, robot, robots, response
         self._kind_numbers = np.array([[numbers[spec] for spec in row] for row in named], np.int64)
         lamp_count = max(len(model.lamps) for model in self._models)
         self.lamps = np.zeros((len(self.arenas), lamp_count, 4))
         for lamps, model in zip(self.lamps, self._models, strict=True):
             lamps[: len(model.lamps)] = model.lamps
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> InitialState:
+        other = object.__new__(type(self))
+        # Worlds may change their arenas; nothing else changes.
+        vars(other).update(vars(self), arena_indices=copy.deepcopy(self.arena_indices, memo))
+        return other
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return InitialState, self._given, {"arena_indices": self.arena_indices}
 
     def check_seeds(self, seeds: ArrayLike, count: int) -> NDArray[np.int64]:
         """Return seeds as int64 [count]."""
@@ -139,8 +151,7 @@ class InitialState:
             worlds: Indices of the worlds; all if left out.
         """
         chosen = np.arange(len(self.arena_indices)) if worlds is None else worlds
-        robot_count = self.state.robots.shape[1]
-        shape = (len(chosen), robot_count, 3)
+        shape = (len(chosen), self.robot_count, 3)
         if starts is None:
             poses = np.zeros(shape)
             for k, world in enumerate(chosen):

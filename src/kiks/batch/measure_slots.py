@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Sequence
 from itertools import accumulate, pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,6 +44,9 @@ class MeasureSlots:
                 )
         self._ends = list(accumulate((each.note_count for each in self.measures), initial=0))
         self.note_count = self._ends[-1]
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: part for name, part in vars(self).items() if name != "watchers"}  # which are addresses
 
     @functools.cached_property
     def watchers(self) -> NDArray[np.int64]:

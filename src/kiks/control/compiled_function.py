@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import inspect
 import linecache
+import pickle
 import re
 import traceback
 from collections.abc import Callable, Iterable
@@ -15,7 +16,7 @@ from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar, overload
 from kiks.control.checked_code import checked, is_trusted
 
 # isort: split
-from numba import extending, types
+from numba import cloudpickle, extending, types
 
 from kiks.errors import KiksError, ParameterError, counted, shown
 
@@ -28,6 +29,15 @@ _Made = TypeVar("_Made", covariant=True)
 
 RETURNS = "it returns something, where it must write into its arguments and return nothing."
 """What is wrong with a function that returns its values."""
+
+
+@functools.lru_cache(maxsize=256)
+def _unpickled(kind: type[Compiled], parts: bytes) -> Compiled:
+    """Return a compiled function: the same for the same bytes, so that a process compiles it once."""
+    made = kind.__new__(kind)
+    vars(made).update(pickle.loads(parts))
+    made.kernel = checked(made.function)
+    return made
 
 
 class Compiled:
@@ -64,6 +74,15 @@ class Compiled:
         self.function = function
         self.name = function.__name__
         self.kernel = checked(function)
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Compiled:
+        return self  # as it never changes
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        parts = {name: part for name, part in vars(self).items() if name != "kernel"}
+        # By value, as another process may not have the user's file.
+        dumps: Any = cloudpickle.dumps
+        return _unpickled, (type(self), dumps(parts))
 
     @property
     def sizes(self) -> dict[str, int | None]:

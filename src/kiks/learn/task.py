@@ -229,6 +229,9 @@ class Task(Experiment):
     def __reduce__(self) -> tuple[Any, ...]:
         return _unpickled, (_pickled(self),)
 
+    def __deepcopy__(self, memo: dict[int, Any]) -> Task:
+        return self  # as it never changes
+
     @cached_property
     def sides(self) -> tuple[Side, ...]:
         """Its sides: one or two."""

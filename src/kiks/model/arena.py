@@ -115,6 +115,9 @@ class Arena:
         parts = (self.brightness, self.mm_per_cell, self.name, self.starts, self.lamps, self.balls, self.cylinders)
         return Arena, parts
 
+    def __deepcopy__(self, memo: dict[int, Any]) -> Arena:
+        return self  # as it never changes
+
     @classmethod
     def from_array(cls, brightness: npt.NDArray[Any], *, mm_per_pixel: float = 1.0, name: str = "array") -> Arena:
         """Make an arena of an array that looks like a picture.

@@ -289,6 +289,9 @@ class RobotSpec:
         size = f"{self.body.diameter_mm:g} mm, response {self.proximity.response!r}"
         return f"<{type(self).__name__} {self.name!r}: {size}>"
 
+    def __deepcopy__(self, memo: dict[int, Any]) -> RobotSpec:
+        return self  # as it never changes
+
     @staticmethod
     def load(name_or_path: str | Path, *, response: str | None = None) -> RobotSpec:
         """Return a robot that comes with KiKS ('khepera', 'khepera_ii') or one from a file ('mine.toml').

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from kiks.clock.program_clock import ProgramClock
 from kiks.engine.physics.gripper import ARM_MAX, JAWS_MAX
 from kiks.engine.state import BALL, BODY, CYLINDER, ROBOT
 from kiks.errors import ParameterError, shown
@@ -213,13 +214,18 @@ class SavedState:
         robots: Any = self.robots[0]
         return np.column_stack([robots["x_mm"], robots["y_mm"], robots["heading_rad"]])
 
-    def simulation(self, lock: RLock | None = None) -> Simulation:
+    def simulation(
+        self, lock: RLock | None = None, thinking: str = "none", program: ProgramClock | None = None
+    ) -> Simulation:
         """Return a simulation in this state.
 
         Args:
             lock: See `World`.
+            thinking: See `Simulation`.
+            program: The clock of the program on its ports; a new one if left out.
         """
-        sim = Simulation.of_world(World(self.arena, self.specs, self.head.seed, self.poses, lock))
+        world = World(self.arena, self.specs, self.head.seed, self.poses, lock)
+        sim = Simulation.of_world(world, thinking, program)
         self.restore(sim)
         return sim
 
@@ -294,6 +300,48 @@ def state_bytes(sim: Simulation, files: WorldFiles) -> bytes:
         }
         parts = json.dumps(head).encode(), b"\n", state.robots.tobytes(), state.bodies.tobytes(), lamps.tobytes()
         return b"".join(parts)
+
+
+# ---- copies ----
+
+
+class _SharedParts(WorldFiles):
+    """Arenas and kinds of robots by names of their own, without files: they never change."""
+
+    def __init__(self, parts: Mapping[str, Arena | RobotSpec] | None = None) -> None:
+        super().__init__(what="a copied simulation")
+        self.parts = self._parts = dict(parts or {})
+
+    def name_of(self, part: Arena | RobotSpec) -> str:
+        """Return the name of a part, and keep it."""
+        name = next((name for name, known in self.parts.items() if known is part), str(len(self.parts)))
+        self.parts[name] = part
+        return name
+
+
+def reduced(sim: Simulation) -> tuple[Any, ...]:
+    """Return how `copy` and `pickle` make a simulation that goes on as this one does."""
+    with sim.lock:
+        sim.sync()
+        for number, wire in enumerate(sim.wires, 1):
+            if wire.line.reply_end_ns is not None:
+                raise ParameterError(
+                    f"a simulation must have no unread replies to be copied, but robot {number} has sent some. "
+                    "Read them first."
+                )
+            for turret in wire.firmware.fitted:
+                if name_of(turret) is None:
+                    raise ParameterError(
+                        f"a simulation must have no turrets of a user's own to be copied, but robot {number} has "
+                        f"{turret!r}. Make another with the same seed, or go back with checkpoint()."
+                    )
+        parts = _SharedParts()
+        return _copied, (state_bytes(sim, parts), parts.parts, sim.thinking, sim.program)
+
+
+def _copied(data: bytes, parts: Mapping[str, Arena | RobotSpec], thinking: str, program: ProgramClock) -> Simulation:
+    shared = _SharedParts(parts)
+    return SavedState.from_bytes(data, shared, "a copied simulation").simulation(None, thinking, program)
 
 
 # ---- records in files ----

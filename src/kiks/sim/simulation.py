@@ -33,7 +33,15 @@ from kiks.sim.things import Checkpoint, Things
 from kiks.sim.turret_host import Turrets
 from kiks.sim.world import World
 from kiks.units import ns_from_s, s_from_ns
-from kiks.upwards import Recorder, View, draw_for_notebook, plot_simulation, record_simulation, show_in_browser
+from kiks.upwards import (
+    Recorder,
+    View,
+    copy_simulation,
+    draw_for_notebook,
+    plot_simulation,
+    record_simulation,
+    show_in_browser,
+)
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -65,6 +73,9 @@ class Simulation:
         program: What the computing of the program on its ports costs.
         name: The name in its ports' URLs.
 
+    A copy, by `copy.deepcopy` or `pickle`, goes on as the simulation would. Nobody records or watches it, and it has no
+    supervisor.
+
     Example:
         >>> sim = Simulation(Arena.box(500, 500), seed=1)
         >>> port = sim.port(1)
@@ -94,15 +105,15 @@ class Simulation:
         )
 
     @classmethod
-    def of_world(cls, world: World) -> Simulation:
-        """Return the simulation of a world at its start."""
+    def of_world(cls, world: World, thinking: str = "none", program: ProgramClock | None = None) -> Simulation:
+        """Return the simulation of a world at its start; the computing on its ports costs what `program` says."""
         sim = cls.__new__(cls)
-        sim._begin(world, "none")
+        sim._begin(world, thinking, program)
         return sim
 
-    def _begin(self, world: World, thinking: str) -> None:
+    def _begin(self, world: World, thinking: str, program: ProgramClock | None = None) -> None:
         self.thinking = thinking
-        self.program = ProgramClock(thinking)
+        self.program = ProgramClock(thinking) if program is None else program
         self.world = world
         self.things = Things(self.world)
         self._sensors = Sensors(self.world)
@@ -133,10 +144,9 @@ class Simulation:
         robots = counted(self.robot_count, "robot")
         return f"<{type(self).__name__}: {robots} in {shown(self.arena.name)} at {self.time_s:.3f} s, seed {self.seed}>"
 
-    def __reduce__(self) -> Any:
-        raise ParameterError(
-            "a simulation cannot be copied or pickled. Make another with the same seed, or go back with checkpoint()."
-        )
+    def __reduce__(self) -> tuple[Any, ...]:
+        parts: tuple[Any, ...] = copy_simulation(self)
+        return parts
 
     def _repr_png_(self) -> tuple[bytes, dict[str, int]]:
         """Return a picture of it as it stands, which notebooks show."""
@@ -601,6 +611,12 @@ class SimPort(VirtualPort):
         super().__init__(LocalLine(sim.loop, robot), sim.program)
         self.sim = sim
         self.robot = robot
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Simulation.port, (self.sim, self.robot), {"timeout": self.timeout, "write_timeout": self.write_timeout}
+
+    def __setstate__(self, timeouts: dict[str, float | None]) -> None:
+        self.timeout, self.write_timeout = timeouts["timeout"], timeouts["write_timeout"]
 
     def __repr__(self) -> str:
         state = "" if self.is_open else ", closed"

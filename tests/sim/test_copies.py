@@ -1,0 +1,93 @@
+"""A copy of a simulation goes on as the simulation does, and neither changes the other."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+import kiks
+from kiks.firmware.turret import Turret
+
+
+def begun(thinking: str = "fixed:2") -> tuple[kiks.Simulation, list[kiks.Khepera]]:
+    sim = kiks.Simulation(kiks.Arena.load("pillars"), robots=2, seed=3, thinking=thinking)
+    sim.fit(1, "gripper")
+    sim.add_lamp(100, 100)
+    robots = [kiks.Khepera(sim.port(number)) for number in (1, 2)]
+    for robot in robots:
+        robot.set_speed(5, 4)
+        robot.proximity()
+    sim.run(0.5)
+    return sim, robots
+
+
+def gone_on(sim: kiks.Simulation, robots: list[kiks.Khepera]) -> tuple[Any, ...]:
+    """Drive on; return all that a program and a user see."""
+    seen = []
+    for number in range(10):
+        for robot in robots:
+            robot.set_speed(number, 5)
+            seen.append(robot.proximity())
+            robot.pause(0.033)
+    sim.run(1.0)
+    return seen, sim.state_hash(), sim.time_s, sim.lamps.tolist(), sim.contacts(1), sim.arena, sim.spec.name
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, copy.copy, lambda sim: pickle.loads(pickle.dumps(sim))])
+def test_a_copy_goes_on_as_its_original(copied: Callable[[Any], Any]) -> None:
+    sim, robots = begun()
+    twin = copied(sim)
+    before = sim.state_hash()
+    there = gone_on(twin, [kiks.Khepera(twin.port(number)) for number in (1, 2)])
+    assert sim.state_hash() == before != twin.state_hash()
+    *here, _, _ = gone_on(sim, robots)
+    assert here == list(there[:-2])
+
+
+def test_robots_are_copied_with_their_simulation() -> None:
+    sim, robots = begun()
+    robots[0].port.timeout = 0.25
+    twin, twins = copy.deepcopy((sim, robots))
+    assert (twins[0].port.sim, twins[0].port.timeout) == (twin, 0.25)
+    assert gone_on(sim, robots)[:4] == gone_on(twin, twins)[:4]
+
+
+def test_a_command_on_its_way_is_answered_in_the_copy() -> None:
+    sim, robots = begun("none")
+    robots[0].port.write(b"N\n")
+    twin, (first, _) = copy.deepcopy((sim, robots))
+    assert first.port.readline() == robots[0].port.readline()
+    assert twin.state_hash() == sim.state_hash()
+
+
+def test_unread_replies_are_refused() -> None:
+    sim, robots = begun()
+    robots[1].port.write(b"N\n")
+    sim.run(0.1)
+    with pytest.raises(
+        kiks.ParameterError, match="must have no unread replies to be copied, but robot 2 has sent some"
+    ):
+        pickle.dumps(sim)
+
+
+def test_turrets_of_a_user_are_refused() -> None:
+    class Dice(Turret):
+        number, name = 24, "Dice"
+
+    sim, _ = begun()
+    sim.fit(2, Dice())
+    with pytest.raises(
+        kiks.ParameterError, match="no turrets of a user's own to be copied, but robot 2 has <Dice: turr"
+    ):
+        copy.deepcopy(sim)
+
+
+def test_what_never_changes_is_shared() -> None:
+    sim, _ = begun()
+    assert copy.deepcopy(sim).arena is sim.arena
+    for thing in (sim.arena, sim.spec, kiks.measures.contacts, kiks.controllers.linear(), kiks.tasks.avoid()):
+        assert copy.deepcopy(thing) is thing
