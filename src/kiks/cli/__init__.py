@@ -13,6 +13,7 @@ from kiks.cli.champion import champion
 from kiks.cli.compare import compare
 from kiks.cli.desk import desk
 from kiks.cli.evolve import evolve
+from kiks.cli.examples import DemoCommand, examples
 from kiks.cli.export import export
 from kiks.cli.fit import fit
 from kiks.cli.matlab import matlab
@@ -32,14 +33,14 @@ from kiks.version import __version__
 
 app = typer.Typer(
     help="KiKS Is a Khepera Simulator: programs for a real Khepera robot run on a simulated one, unchanged.",
-    no_args_is_help=True,
-    add_completion=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
 for _command in (
     desk,
     run,
+    examples,
     evolve,
     champion,
     compare,
@@ -55,7 +56,7 @@ for _command in (
     warmup,
 ):
     app.command(cls=RunCommand if _command is run else Command)(with_options(_command))
-app.command("demo", cls=RunCommand)(with_options(run))
+app.command("demo", cls=DemoCommand)(with_options(run))
 app.add_typer(arena, name="arena")
 
 
@@ -65,11 +66,23 @@ def _print_version(wanted: bool) -> None:
         raise typer.Exit
 
 
-@app.callback()
+WELCOME = f"""KiKS {__version__}: programs for a Khepera robot drive a simulated one. Try:
+
+  kiks demo avoid --desk      watch a robot in the browser, and drag it about
+  kiks run my_program.py      run a program of yours that talks to a Khepera with pyserial
+  kiks examples first         get programs and arenas to change, in the folder first
+
+kiks --help lists all commands, kiks COMMAND --help explains one."""
+
+
+@app.callback(invoke_without_command=True)
 def _options(
+    context: typer.Context,
     version: bool = typer.Option(False, "--version", callback=_print_version, is_eager=True, help="Show the version."),
 ) -> None:
     show_log(is_quiet=True)
+    if context.invoked_subcommand is None:
+        typer.echo(WELCOME)
 
 
 def main() -> None:

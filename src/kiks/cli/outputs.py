@@ -69,6 +69,17 @@ class Command(TyperCommand):
         self._outputs = [(param, found) for param, found in marked if found]
         if not all(is_new for _, (*_, is_new) in self._outputs):
             self.params.append(typer.main.get_command(_forcing).params[0])
+        for param in self.params:
+            _say_plainly(param)
+
+    def collect_usage_pieces(self, ctx: Any) -> list[str]:
+        """Return the words after the command's name in its usage: what may be left out stands in brackets."""
+        pieces = ["[OPTIONS]"] if any(param.param_type_name == "option" for param in self.params) else []
+        for param in self.params:
+            if param.param_type_name == "argument":
+                word = _name(param) + "..." * (param.nargs != 1)
+                pieces.append(word if param.required else f"[{word}]")
+        return pieces
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Also check what is told twice, and the outputs."""
@@ -115,7 +126,21 @@ def leave_out(context: typer.Context, when: str, *names: str) -> None:
 
 
 def _name(param: Any) -> str:
-    return str(param.opts[0] if param.opts[0].startswith("-") else param.opts[0].upper())
+    if param.param_type_name == "option":
+        return str(param.opts[0])
+    return str(param.metavar or param.name.upper()).removesuffix("...")
+
+
+def _say_plainly(param: Any) -> None:
+    """Let the help name what a parameter takes as people do, in place of a type of Python."""
+    if param.param_type_name == "argument":
+        param.metavar = _name(param) + "..." * (param.nargs != 1)
+        param.display_type_rich = lambda ctx: ""
+    elif not getattr(param, "is_flag", False):
+        words = {"int": "N", "float": "NUMBER", "path": "FILE", "": "TEXT"}
+        param.display_type_rich = lambda ctx: param.metavar or next(
+            word for kind, word in words.items() if kind in param.display_type(ctx)
+        )
 
 
 def _files(value: object) -> Iterator[Path]:
