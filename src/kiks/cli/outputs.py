@@ -138,8 +138,8 @@ def _say_plainly(param: Any) -> None:
         param.display_type_rich = lambda ctx: ""
     elif not getattr(param, "is_flag", False):
         words = {"int": "N", "float": "NUMBER", "path": "FILE", "": "TEXT"}
-        param.display_type_rich = lambda ctx: param.metavar or next(
-            word for kind, word in words.items() if kind in param.display_type(ctx)
+        param.display_type_rich = lambda ctx: (
+            param.metavar or next(word for kind, word in words.items() if kind in param.display_type(ctx))
         )
 
 
