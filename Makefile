@@ -70,8 +70,10 @@ lint: setup
 types: setup
 	$(BIN)/mypy
 
+# The site, in build/docs. Needs no network; a warning, such as of a link that leads nowhere, is an error.
 docs: setup
-	$(BIN)/python docs/make_commands.py
+	$(BIN)/python docs/pages/protocol.py
+	$(BIN)/sphinx-build -q -W --keep-going docs build/docs
 
 benchmarks: setup
 	for name in wire sensors crowd programs desk batch evolve environments octave start; do $(BIN)/python benchmarks/$$name.py; done

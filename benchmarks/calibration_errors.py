@@ -1,4 +1,4 @@
-"""How well `kiks calibrate` finds the hidden parameters of simulated robots: the table of docs/calibration.md.
+"""How well `kiks calibrate` finds the hidden parameters of simulated robots: the table of docs/howto/calibration.md.
 
     .venv/bin/python benchmarks/calibration_errors.py
 

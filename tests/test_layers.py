@@ -1,4 +1,4 @@
-"""Imports point down only, folder by folder and file by file (docs/design.md, section 2)."""
+"""Imports point down only, folder by folder and file by file (docs/explanation/design.md, section 2)."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def test_imports_point_down(path: Path) -> None:
     here = layer(path)
     if here in ("__init__", "__main__"):
         return
-    assert here in LAYERS, f"{path} lies in no layer: give it a place in LAYERS and in docs/design.md"
+    assert here in LAYERS, f"{path} lies in no layer: give it a place in LAYERS and in docs/explanation/design.md"
     for name in imports(path):
         parts = name.split(".")
         if parts[0] != "kiks" or len(parts) < 2 or parts[1] not in LAYERS:

@@ -1,6 +1,6 @@
 """Compare proximity sensors with a real Khepera's: KiKS's models and those of other simulators, on measured samples.
 
-python tools/accuracy.py --page docs/accuracy.md
+python tools/accuracy.py --page docs/explanation/accuracy.md
 python tools/accuracy.py --networks networks.json
 """
 
@@ -49,7 +49,7 @@ def accuracy(
         Path | None, typer.Option(help="Folder for pictures (needs Matplotlib).", callback=written_folder)
     ] = None,
     page: Annotated[
-        Path | None, typer.Option(help="Write the card as Markdown here: docs/accuracy.md.", callback=written_file)
+        Path | None, typer.Option(help="Write the page here: docs/explanation/accuracy.md.", callback=written_file)
     ] = None,
     networks: Annotated[
         Path | None, typer.Option(help="Train the thesis's networks and write them here.", callback=written_file)

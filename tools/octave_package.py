@@ -1,7 +1,7 @@
 """Build the Octave package: python tools/octave_package.py FOLDER makes FOLDER/kiks-VERSION.tar.gz for `pkg install`.
 
-Everything in it comes from elsewhere: the functions from matlab/, and the page from docs/matlab.md, whose table gives
-the categories that `pkg describe -verbose kiks` lists. Licence and version are those of KiKS.
+Everything in it comes from elsewhere: the functions from matlab/, and the page from docs/howto/matlab.md, whose table
+gives the categories that `pkg describe -verbose kiks` lists. Licence and version are those of KiKS.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from kiks.version import __version__
 
 ROOT = Path(__file__).parent.parent
 TOOLBOX = ROOT / "matlab"
-PAGE = ROOT / "docs" / "matlab.md"
+PAGE = ROOT / "docs" / "howto" / "matlab.md"
 
 DESCRIPTION = """\
 Name: kiks
@@ -54,7 +54,7 @@ def version() -> str:
 
 
 def index() -> str:
-    """Return the list of functions by categories, as docs/matlab.md has it, and the demos."""
+    """Return the list of functions by categories, as docs/howto/matlab.md has it, and the demos."""
     page = PAGE.read_text(encoding="utf-8")
     table = page[page.index("## Functions") :].split("\n\n")[1]
     rows = re.findall(r"^\| (\w.*?) \| (.*)\|$", table, re.MULTILINE)

@@ -77,7 +77,7 @@ def test_tables_are_complete_and_say_what_orders_do() -> None:
 
 def test_every_order_has_a_transcript_and_a_line_in_the_documents() -> None:
     sent = "".join(path.read_text(encoding="ascii") for path in FOLDER.glob("*.txt"))
-    page = (ROOT / "docs" / "turrets.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "howto" / "turrets.md").read_text(encoding="utf-8")
     for number, orders in ORDERS.items():
         for letter in (*orders, b"B"):
             order = f"T,{number},{letter.decode()}"

@@ -25,7 +25,7 @@ from kiks.model.robot import RobotSpec
 
 pytestmark = pytest.mark.slow
 
-PAGE = Path(__file__).parents[2] / "docs" / "accuracy.md"
+PAGE = Path(__file__).parents[2] / "docs" / "explanation" / "accuracy.md"
 NUMBER = re.compile(r"[+-]?\d+(?:\.\d+)?")
 TOLERANCE = 1.0  # counts or mm: what rounding and another processor's last bits may change
 
@@ -46,11 +46,10 @@ def card():
 @needs_data
 def test_the_page_tells_the_truth(card):
     written, found = PAGE.read_text(encoding="utf-8"), page(card)
-    assert NUMBER.sub("#", written) == NUMBER.sub("#", found), "run python tools/accuracy.py --page docs/accuracy.md"
+    advice = "run python tools/accuracy.py --page docs/explanation/accuracy.md"
+    assert NUMBER.sub("#", written) == NUMBER.sub("#", found), advice
     for old, new in zip(NUMBER.findall(written), NUMBER.findall(found), strict=True):
-        assert float(new) == pytest.approx(float(old), abs=TOLERANCE), (
-            "run python tools/accuracy.py --page docs/accuracy.md"
-        )
+        assert float(new) == pytest.approx(float(old), abs=TOLERANCE), advice
 
 
 @at_length

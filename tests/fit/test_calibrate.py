@@ -41,7 +41,7 @@ def idle(spec: kiks.RobotSpec) -> tuple[list[float], float]:
 
 
 def check(found: kiks.RobotSpec, hidden: kiks.RobotSpec) -> None:
-    """Fail unless the robots agree within the errors that docs/calibration.md promises."""
+    """Fail unless the robots agree within the errors that docs/howto/calibration.md promises."""
     assert found.proximity.direction_deg == pytest.approx(hidden.proximity.direction_deg, abs=2.0)
     assert half_distances_mm(found, hidden) == pytest.approx(half_distances_mm(hidden, hidden), abs=1.0)
     assert found.body.pulse_mm == pytest.approx(hidden.body.pulse_mm, rel=0.005)
@@ -83,7 +83,7 @@ def test_response_with_directions_of_its_own_is_rejected(response: str) -> None:
 
 @pytest.mark.parametrize("name", ["khepera", "khepera_ii"])
 def test_guide_lists_the_default_gaps(name: str) -> None:
-    guide = (Path(__file__).parents[2] / "docs" / "calibration.md").read_text(encoding="utf-8")
+    guide = (Path(__file__).parents[2] / "docs" / "howto" / "calibration.md").read_text(encoding="utf-8")
     assert ", ".join(f"{gap:g}" for gap in default_gaps_mm(kiks.RobotSpec.load(name))) + " and" in guide
 
 

@@ -110,6 +110,6 @@ def test_wrong_files_are_errors_of_one_short_line(text: str, message: str, folde
 def test_the_example_is_a_task_and_is_quoted_in_the_documentation() -> None:
     root = Path(__file__).parents[2]
     text = (root / "examples/office_task.toml").read_text(encoding="utf-8")
-    assert f"```toml\n{text}```" in (root / "docs/evolution.md").read_text(encoding="utf-8")
+    assert f"```toml\n{text}```" in (root / "docs/howto/evolution.md").read_text(encoding="utf-8")
     task = kiks.tasks.load(str(root / "examples/office_task.toml"))
     assert (task.name, task.controller.name, task.arenas[0].name) == ("office_task", "mlp", "Office")

@@ -1,4 +1,4 @@
-"""docs/matlab.md is correct: its program runs, its functions exist, its constants are preferences."""
+"""docs/howto/matlab.md is correct: its program runs, its functions exist, its constants are preferences."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from tests.matlab.octave import A_PROCESS, ROOT, TOOLBOX, needs_octave, run
 
-PAGE = (ROOT / "docs" / "matlab.md").read_text(encoding="utf-8")
+PAGE = (ROOT / "docs" / "howto" / "matlab.md").read_text(encoding="utf-8")
 
 
 def public_functions() -> set[str]:

@@ -107,7 +107,7 @@ def test_rays_matter_before_a_wall_and_those_that_meet_nothing_do_not(response):
 
 
 def test_reflections_contributions_are_those_of_its_formula():
-    """The light of all rays but one, and the rounded share of it above the threshold (docs/sensors.md)."""
+    """The light of all rays but one, and the rounded share of it above the threshold (docs/explanation/sensors.md)."""
     sim = Simulation(Arena.box(400, 400))
     sim.place(1, 58.0, 200.0, math.pi)
     (parameters,) = sim.world.kinds

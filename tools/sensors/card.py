@@ -207,16 +207,16 @@ def _unseen(tables: Mapping[str, Samples]) -> dict[str, dict[str, Score]]:
 
 
 def page(card: Card) -> str:
-    """Return the page `docs/accuracy.md`: the card in Markdown."""
+    """Return the page `docs/explanation/accuracy.md`: the card in Markdown."""
     cells = int(sum(is_active(table.counts[:, HALVES[HELD_OUT]]).sum() for table in card.tables.values()))
     lines = [
         "# How true the proximity sensors are",
         "",
-        "`python tools/accuracy.py --page docs/accuracy.md` makes this page from readings of a real Khepera. They are",
-        "in `data/khepera-samples` of the shared folder, with a README that names their source. The robot stood at 20",
-        "gaps from 5 to 43 mm in front of a wall and of a cylinder of its own size, and turned in steps of 2 degrees.",
-        "A test fails when these figures differ from those of the program. [Samples](samples.md) tells how to fit",
-        "readings of your own.",
+        "`python tools/accuracy.py --page docs/explanation/accuracy.md` makes this page from readings of a real",
+        "Khepera. They are in `data/khepera-samples` of the shared folder, with a README that names their source.",
+        "The robot stood at 20 gaps from 5 to 43 mm in front of a wall and of a cylinder of its own size, and",
+        "turned in steps of 2 degrees. A test fails when these figures differ from those of the program.",
+        "[Samples](../howto/samples.md) tells how to fit readings of your own.",
         "",
         "## Absolute errors [counts]",
         "",

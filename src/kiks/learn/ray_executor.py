@@ -2,7 +2,7 @@
 
 A Ray cluster runs any code for any client that reaches it. So a cluster that is started here listens on the loopback
 address alone, without Ray's dashboard; a cluster of several computers belongs on a private network
-(docs/distributed.md).
+(docs/howto/distributed.md).
 """
 
 from __future__ import annotations

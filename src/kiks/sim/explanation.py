@@ -24,7 +24,7 @@ RESPONSES = {
     "fast": "the thesis's table, which takes lengths in steps of 10 mm",
     "curve": "counts against distance as they were measured on a real robot",
 }
-"""One-line description of each sensor model (docs/sensors.md)."""
+"""One-line description of each sensor model (docs/explanation/sensors.md)."""
 
 
 @dataclass(frozen=True)

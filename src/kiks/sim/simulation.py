@@ -62,7 +62,8 @@ class Simulation:
         thinking: What the program's own computing costs: 'none', 'fixed:MS', 'live', 'live:FACTOR' or 'replay:FILE'.
         robot: Kind of all robots: a name that `RobotSpec.load` knows, a file, or a `RobotSpec`; or a list of such, one
             for each robot.
-        response: Proximity sensor model, such as 'thesis' (docs/sensors.md); the robot file's own if left out.
+        response: Proximity sensor model, such as 'thesis' (docs/explanation/sensors.md); that of the robot's file if
+            left out.
 
     Attributes:
         world: The arena with all that stands and moves in it.
@@ -296,7 +297,7 @@ class Simulation:
             return index + 1
 
     def fit(self, robot: int, turret: str | Turret) -> Turret:
-        r"""Put a turret on a robot; it answers to `T,<its number>,...` from now on (docs/turrets.md).
+        r"""Put a turret on a robot; it answers to `T,<its number>,...` from now on (docs/howto/turrets.md).
 
         Args:
             robot: Its number.
@@ -516,7 +517,7 @@ class Simulation:
     def record(self, file: str | Path) -> Recorder:
         """Record the run to a file from now on, until `close()` or the end of `with`; `kiks.Recording` reads it.
 
-        The run is the same, to the bit. docs/recording.md says what can be done with the file.
+        The run is the same, to the bit. docs/howto/recording.md says what can be done with the file.
 
         Args:
             file: The file, which ends in .mcap; an earlier one is replaced.
