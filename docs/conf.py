@@ -2,19 +2,97 @@
 
 from __future__ import annotations
 
+import contextlib
+import re
+import sys
+import typing
+from pathlib import Path
+
+from sphinx.ext.napoleon import GoogleDocstring
+
 import kiks
+
+sys.path.insert(0, str(Path(__file__).with_name("pages")))
+import commands
+import files
 
 project = "KiKS"
 copyright = "KiKS contributors"
 version = release = kiks.__version__
 
-extensions = ["myst_parser", "sphinx_copybutton", "sphinx_design"]
-# What is for developers only, and texts that other pages include.
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "sphinx.ext.napoleon",
+    "sphinx_copybutton",
+    "sphinx_design",
+]
+# What is for developers only, and the programs that make pages.
 exclude_patterns = ["next.md", "pages"]
+
+# A reference to something of KiKS must lead somewhere. Those to other libraries would need the network.
 nitpicky = True
+nitpick_ignore_regex = [("py:.*", r"(?!kiks\.).*|kiks\.(?!controllers|measures|tasks)[a-z_]+\..*")]
 
 myst_enable_extensions = ["colon_fence"]
 myst_heading_anchors = 3
 
+# What users write as `kiks.measures` lies elsewhere, where autodoc does not look.
+for name in ("controllers", "measures", "tasks"):
+    sys.modules[f"kiks.{name}"] = getattr(kiks, name)
+autodoc_member_order = "bysource"
+autodoc_typehints = "description"
+autodoc_typehints_description_target = "documented"
+autodoc_typehints_format = "short"
+napoleon_use_rtype = False
+napoleon_use_ivar = True
+default_role = "code"
+
 html_theme = "furo"
 html_title = f"KiKS {release}"
+
+
+PUBLIC = {
+    f"{each.__module__}.{each.__name__}": f"kiks.{each.__name__}"
+    for each in (getattr(kiks, name) for name in kiks.__all__)
+    if isinstance(each, type)
+}
+"""For the place of each public class the name that users write."""
+
+
+def lead_to_public_names(app, env, node, contnode):
+    """Lead a type in a signature to its public name."""
+    name = PUBLIC.get(node.get("reftarget"))
+    if name is not None:
+        domain = env.domains.python_domain
+        return domain.resolve_xref(env, node["refdoc"], app.builder, "class", name, node, contnode)
+
+
+def without_rules(app, obj, bound_method):
+    """Leave the rules of Pydantic out of the types in signatures: texts say them."""
+    with contextlib.suppress(TypeError, NameError, AttributeError):
+        obj.__annotations__ = typing.get_type_hints(obj)
+
+
+def prepare(app, what, name, obj, options, lines):
+    """Read the sections of properties and measures, whose first line napoleon takes for a type, and link pages."""
+    if what in ("property", "attribute", "data"):
+        lines[:] = ["..", "", *GoogleDocstring(lines, app.config, app, "function", name, obj, options).lines()]
+    lines[:] = [re.sub(r"`?docs/(\w+/\w+)\.md`?", r":doc:`/\1`", line) for line in lines]
+
+
+def write_pages(app):
+    """Write the pages that are made from what commands and files say of themselves, if they have changed."""
+    for name, made in {"commands": commands.page(), "files": files.page()}.items():
+        path = Path(app.srcdir) / "reference" / f"{name}.md"
+        if not path.exists() or path.read_text(encoding="utf-8") != made:
+            path.write_text(made, encoding="utf-8")
+
+
+def setup(app):
+    """Connect the functions above; `prepare` comes before napoleon."""
+    app.connect("builder-inited", write_pages)
+    app.connect("missing-reference", lead_to_public_names)
+    app.connect("autodoc-before-process-signature", without_rules)
+    app.connect("autodoc-process-docstring", prepare, priority=400)

@@ -9,6 +9,7 @@ import pytest
 from tests import forked
 from tests.at_length import cases
 
+import kiks
 from kiks.cli import app
 
 pytestmark = pytest.mark.slow
@@ -82,3 +83,10 @@ def test_commands_and_targets_exist(page: Path) -> None:
     # Paths that a page names in code must exist.
     for path in re.findall(r"\b(?:examples|docs|benchmarks|tests|src)/[\w./-]+\.\w+", text):
         assert (ROOT / path).exists(), f"{page.name} names {path}"
+
+
+def test_the_python_reference_has_every_public_name() -> None:
+    text = "".join(page.read_text(encoding="utf-8") for page in (ROOT / "docs/reference").glob("*.md"))
+    found = set(re.findall(r"^\.\. auto(?:class|function|data|module):: ([\w.]+)$", text, flags=re.MULTILINE))
+    names = set(kiks.__all__) - {"__version__", "controllers", "measures", "tasks"}
+    assert names | set(dir(kiks.measures)) | {"kiks.controllers", "kiks.measures", "kiks.tasks"} <= found

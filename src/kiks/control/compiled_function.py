@@ -71,6 +71,7 @@ class Compiled:
                 f"a {self.what} must be a function {wanted}, but {function.__name__} takes {count} arguments. "
                 f"Let it take these {len(self.arguments)}."
             )
+        functools.update_wrapper(self, function, updated=())  # type: ignore[arg-type]  # for `help` and the reference
         self.function = function
         self.name = function.__name__
         self.kernel = checked(function)

@@ -316,7 +316,7 @@ def plastic(
     with on-line self-organization and behavioral fitness, Neural Networks 13, 2000). Senders x are the inputs, cut to
     0 to 1, the last activities of the neurons, and a 1. A synapse has a sign and a weight w from 0 to 1; all weights
     are 0 at the start. In a call, a neuron's activity y becomes f(4 sum of sign w x), f being the logistic function.
-    Then w grows by its rate times
+    Then w grows by its rate times::
 
         plain Hebb     (1 - w) x y
         postsynaptic   (1 - w) x y - w (1 - x) y
@@ -324,7 +324,7 @@ def plastic(
         covariance     (1 - w) F if F > 0, else w F, with F = tanh(4 (1 - |x - y|) - 2)
 
     The speed of a wheel is 2 y - 1. Two bits name the rule, in this order 00, 01, 10, 11. A parameter above 0 is the
-    bit 1 or the sign +. A parameter r makes the rate |r| / (1 + |r|).
+    bit 1 or the sign +. A parameter r makes the rate `|r| / (1 + |r|)`.
 
     Parameters per synapse: three matrices [N + neurons + 1, neuron], of rates, of first bits, of second bits; the sign
     is that of r. Per neuron: the sign of each sender, N + neurons + 1, for all synapses that lead away from it; then of

@@ -16,6 +16,7 @@ from __future__ import annotations
 import builtins
 import ctypes
 import dis
+import functools
 import hashlib
 import importlib
 import io
@@ -45,8 +46,8 @@ _BY_NAME = {*sys.stdlib_module_names, "kiks", "numpy", "numba", "scipy"}
 _DOORS = {"__import__", "eval", "exec", "globals", "input", "open", "vars"}
 """Functions of Python that lead to what no code names."""
 
-_LABELS = {"kernel", "recipe"}
-"""Attributes of controllers and measures that follow from the others, or name a file."""
+_LABELS = {"kernel", "recipe", "__wrapped__", *functools.WRAPPER_ASSIGNMENTS}
+"""Attributes of controllers and measures that follow from the others, name a file, or are for people."""
 
 _WITHOUT = ", without "
 
