@@ -12,7 +12,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
-from _thread import allocate_lock, get_ident, start_new_thread
+from _thread import allocate_lock, get_ident, interrupt_main, start_new_thread
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
@@ -34,9 +34,13 @@ LIMIT_GRACE_S = 2.0
 """Time that what runs has to end after its time is over [s]."""
 
 _AGAIN_S = 0.01
-_LIMIT = signal.SIGRTMAX - 2
-_HEARD = signal.SIGRTMAX - 3
-_ENDINGS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+_HAS_OWN_SIGNALS = hasattr(signal, "SIGRTMAX")
+"""Whether there are signals for what one thread tells another: not on macOS and Windows, where compiled code that does
+not return hears no Ctrl-C."""
+
+_LIMIT = signal.SIGRTMAX - 2 if _HAS_OWN_SIGNALS else signal.SIGTERM
+_HEARD = signal.SIGRTMAX - 3 if _HAS_OWN_SIGNALS else signal.SIGTERM
+_ENDINGS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 _CODE = "code that did not return, such as a controller without an end: there is no summary"
 _STUCK = f"stopped in the middle of {_CODE}."
 
@@ -44,7 +48,8 @@ _STUCK = f"stopped in the middle of {_CODE}."
 def end_at_once() -> None:
     """Let Ctrl-C, SIGTERM and SIGHUP end the process where it stands, with one line; for the start of a process."""
     _handle(lambda _number, _frame: leave(INTERRUPTED, "stopped."))
-    _Guard().start()
+    if _HAS_OWN_SIGNALS:
+        _Guard().start()
 
 
 def leave_threads() -> None:
@@ -94,7 +99,7 @@ def postponing_endings() -> Iterator[None]:
     """Let what ends the process act after this instead of in its middle; in other threads it never does."""
     noted: list[int] = []
     try:
-        with noting_endings(noted.append, _LIMIT):
+        with noting_endings(noted.append, *[_LIMIT] * _HAS_OWN_SIGNALS):
             yield
     finally:
         for number in noted:
@@ -195,18 +200,21 @@ def ended_after(seconds: float | None, end: Callable[[], object]) -> Iterator[No
     def watch() -> None:
         if is_over.acquire(timeout=seconds):
             return
-        signal.pthread_kill(main, _LIMIT)
+        if _HAS_OWN_SIGNALS:
+            signal.pthread_kill(main, _LIMIT)
         if not is_over.acquire(timeout=LIMIT_GRACE_S):
             leave(OUT_OF_TIME, f"stopped after {seconds:g} s of real time, in the middle of {_CODE}.")
 
-    signal.signal(_LIMIT, lambda _number, _frame: end())
+    if _HAS_OWN_SIGNALS:
+        signal.signal(_LIMIT, lambda _number, _frame: end())
     start_new_thread(watch, ())
     try:
         yield
     finally:
         is_over.release()
         # It may be on its way.
-        signal.signal(_LIMIT, lambda _number, _frame: None)
+        if _HAS_OWN_SIGNALS:
+            signal.signal(_LIMIT, lambda _number, _frame: None)
 
 
 def _interrupt() -> None:
@@ -215,5 +223,8 @@ def _interrupt() -> None:
 
     for name in (signal.SIGINT, signal.SIGTERM):
         if signal.getsignal(name) is signal.default_int_handler:
-            signal.pthread_kill(threading.main_thread().ident or 0, name)
+            if hasattr(signal, "pthread_kill"):
+                signal.pthread_kill(threading.main_thread().ident or 0, name)
+            else:
+                interrupt_main(name)
             return

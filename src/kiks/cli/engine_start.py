@@ -97,6 +97,7 @@ def _compile_together(numbers: Sequence[int]) -> None:
     All fill the same cache. This process begins with the first piece, the others with the last: neighbours in the list
     call the same kernels, and each process compiles those for itself. A piece whose process fails is left out.
     """
+    from kiks.ports.file_descriptors import processor_count
     from kiks.ports.program_process import python_line
 
     left = deque(numbers)
@@ -115,7 +116,7 @@ def _compile_together(numbers: Sequence[int]) -> None:
     streams: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
     with contextlib.ExitStack() as stack:
         feeders = []
-        for _ in range(min(len(os.sched_getaffinity(0)), _MOST_PROCESSES) - 1):
+        for _ in range(min(processor_count(), _MOST_PROCESSES) - 1):
             helper = stack.enter_context(subprocess.Popen(line, **streams))
             stack.callback(helper.kill)
             feeders.append(threading.Thread(target=feed, args=(helper,), daemon=True))

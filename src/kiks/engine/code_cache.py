@@ -35,7 +35,7 @@ from numba.core.compiler import CompileResult
 
 from kiks.engine.processor import processor
 from kiks.errors import ParameterError
-from kiks.model.atomic_files import replace_file
+from kiks.model.atomic_files import PLAINLY, replace_file
 
 KERNEL_FOLDERS = ("engine", "control", "batch")
 """Folders beside one another whose files hold kernels."""
@@ -231,7 +231,7 @@ def _payload(path: Path, key: object) -> Any:
     A damaged file is deleted, unless it came with KiKS.
     """
     folder, is_own = str(path.parent), path.parent.parent != SHIPPED
-    with _IfAllowed(), open(os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOFOLLOW), "rb") as file:
+    with _IfAllowed(), open(os.open(path, os.O_RDONLY | PLAINLY), "rb") as file:
         if not (_is_safe(os.fstat(file.fileno())) and _is_believed(path.parent)):
             if is_own:
                 _tell(
@@ -263,14 +263,15 @@ class _IfAllowed:
 
 def _is_safe(about: os.stat_result) -> bool:
     """Return whether no other user but the superuser can write something."""
-    return about.st_uid in (0, _user()) and not about.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+    # Windows keeps the homes of users apart by other means than these bits.
+    return _user() is None or (about.st_uid in (0, _user()) and not about.st_mode & (stat.S_IWGRP | stat.S_IWOTH))
 
 
 def _is_believed(folder: Path) -> bool:
     """Return whether there is a folder whose files no other user but the superuser can replace."""
     with _IfAllowed():
         # A link of another user could lead to a folder of ours that holds files of theirs.
-        return all(each.lstat().st_uid in (0, _user()) and _is_safe(each.stat()) for each in _made(folder))
+        return all(each.lstat().st_uid in (0, _user() or 0) and _is_safe(each.stat()) for each in _made(folder))
     return False
 
 
@@ -293,8 +294,9 @@ def _made(folder: Path) -> list[Path]:
     return [each for each in (folder.parent, folder) if each is folder or each.name == "kiks"]
 
 
-def _user() -> int:
-    return os.geteuid()
+def _user() -> int | None:
+    """Return the number of this user; None on a system without such."""
+    return os.geteuid() if hasattr(os, "geteuid") else None
 
 
 def _digest(data: bytes) -> bytes:

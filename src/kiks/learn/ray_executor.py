@@ -18,6 +18,7 @@ from contextlib import suppress
 from typing import Any
 
 from kiks.errors import ParameterError, library
+from kiks.ports.file_descriptors import processor_count
 
 LOOPBACK = "127.0.0.1"
 
@@ -88,7 +89,7 @@ def _connect(ray: Any, address: str | None) -> None:
     handler = signal.getsignal(signal.SIGTERM)
     try:
         if address is None:
-            local = {"num_cpus": len(os.sched_getaffinity(0)), "include_dashboard": False, "_node_ip_address": LOOPBACK}
+            local = {"num_cpus": processor_count(), "include_dashboard": False, "_node_ip_address": LOOPBACK}
             ray.init("local", job_config=job, log_to_driver=False, **local)
         else:
             host, _, port = address.rpartition(":")

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
-import fcntl
+import importlib
 import os
 import stat
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, closing, contextmanager, suppress
 from pathlib import Path, PurePosixPath
-from typing import IO, BinaryIO, cast
+from typing import IO, Any, BinaryIO, cast
 
 from kiks.errors import KiksError, ParameterError, shown
+
+fcntl: Any = None
+with suppress(ModuleNotFoundError):  # Windows has none: there files are written as on a drive without locks
+    fcntl = importlib.import_module("fcntl")
+
+PLAINLY = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
+"""How a file is opened that may be anything: not where a link leads, and without a wait for the other end of a pipe."""
 
 NAME_BYTES_MAX, PATH_BYTES_MAX = 255, 4000
 """Most bytes of a file's name, and of a path, less than Linux allows."""
@@ -74,7 +81,7 @@ class FileBeside:
 
     def __init__(self, target: Path, mode: int = 0o666, *, is_only: bool = False) -> None:
         for path in target.parent.glob(_PREFIX + "[0-9a-f]" * 16):
-            with suppress(OSError), open(os.open(path, os.O_RDWR | os.O_NOFOLLOW | os.O_NONBLOCK), "rb") as file:
+            with suppress(OSError), open(os.open(path, os.O_RDWR | PLAINLY), "rb") as file:
                 if lock(file.fileno(), path):
                     path.unlink()
         self._target = target
@@ -176,6 +183,8 @@ def lock(file: int, path: Path, *, waits: bool = False) -> bool:
         BlockingIOError: If it is locked already.
         OSError: If it cannot be locked.
     """
+    if fcntl is None:
+        raise OSError(None, "this system has no such locks")
     fcntl.flock(file, fcntl.LOCK_EX | (0 if waits else fcntl.LOCK_NB))
     with suppress(FileNotFoundError):
         return os.path.samestat(os.fstat(file), os.lstat(path))
@@ -185,7 +194,8 @@ def lock(file: int, path: Path, *, waits: bool = False) -> bool:
 def _release(file: IO[bytes]) -> None:
     """Close a file without its lock, which a process that was forked meanwhile may hold, too."""
     with suppress(OSError), file:
-        fcntl.flock(file, fcntl.LOCK_UN)
+        if fcntl is not None:
+            fcntl.flock(file, fcntl.LOCK_UN)
 
 
 def check_writable(path: str | Path, what: str, *, is_new: bool = False) -> None:

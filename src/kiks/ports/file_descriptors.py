@@ -1,6 +1,7 @@
-"""File descriptors: a server that has run out of them logs one line and goes on, and new clients wait.
+"""What the system lets a process have: file descriptors and processors.
 
-Each connection and each pseudo-terminal takes descriptors, and their number is limited.
+Each connection and each pseudo-terminal takes descriptors, and their number is limited. A server that has run out of
+them logs one line and goes on, and new clients wait.
 """
 
 from __future__ import annotations
@@ -8,13 +9,19 @@ from __future__ import annotations
 import contextlib
 import errno
 import functools
+import importlib
 import logging
-import resource
+import os
 import select
 import socket
 from collections.abc import Iterator
+from typing import Any
 
 from kiks.errors import LinkError
+
+resource: Any = None
+with contextlib.suppress(ModuleNotFoundError):  # Windows has none
+    resource = importlib.import_module("resource")
 
 WANTED = 1 << 14
 """Descriptors that a process asks for at its start: enough for a thousand robots with three ports and a client each."""
@@ -30,6 +37,8 @@ _log = logging.getLogger("kiks.ports")
 
 def raise_limit() -> None:
     """Raise the limit of descriptors of this process to the largest allowed one, up to `WANTED`."""
+    if resource is None:
+        return
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     wanted = WANTED if hard == resource.RLIM_INFINITY else min(WANTED, hard)
     if soft != resource.RLIM_INFINITY and soft < wanted:
@@ -39,6 +48,8 @@ def raise_limit() -> None:
 
 def shortage() -> str:
     """Return the limit that was reached and how to raise it, as text."""
+    if resource is None:
+        return "this process has none left. Close some."
     limit, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
     return f"this process may have {limit}, and all are in use. Allow more: ulimit -n {max(4 * limit, 4096)}."
 
@@ -90,3 +101,9 @@ def accept(listener: socket.socket) -> socket.socket | None:
 def _warn_of_shortage() -> None:
     """Log the shortage, once in a process."""
     _log.warning("a client needs a file descriptor: %s Clients wait until some are free.", shortage())
+
+
+def processor_count() -> int:
+    """Return how many processors this process may use."""
+    # macOS and Windows do not say it of a process.
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -64,7 +64,7 @@ _READS_ONLY = (
 )
 """Instructions of Python that change nothing."""
 
-_SIGNAL = signal.SIGRTMAX - 1
+_SIGNAL = signal.SIGRTMAX - 1 if sys.platform == "linux" else 0
 
 
 @contextmanager

@@ -22,6 +22,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator
 
+from kiks.ports.file_descriptors import processor_count
 from kiks.ports.messages import AwaitedAnswer
 
 LINE_MAX = 1 << 26
@@ -54,7 +55,7 @@ HANDSHAKE_S = 20.0
 POLL_MS = 1000
 """Period at which the end of the parent process is polled [ms of real time]."""
 
-SPIN_NS = 1_000_000 if len(os.sched_getaffinity(0)) > 1 else 0
+SPIN_NS = 1_000_000 if processor_count() > 1 else 0
 """Time for which the next request is polled without sleeping [ns of real time]: a program in a loop sends it within
 that time, and a wake-up takes a third of a whole exchange. On a single core the program needs the processor itself."""
 

@@ -68,7 +68,8 @@ class Token:
         """
         if ticket not in self._tickets or client is None or server is None:
             return False
-        if user_of(client, server) not in (os.getuid(), 0):
+        user = user_of(client, server)
+        if user is None or user not in (os.getuid(), 0):
             return False
         self._tickets.discard(ticket)
         return True
