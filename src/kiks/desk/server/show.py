@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import html
 import logging
-import os
 import sys
 import threading
 import webbrowser
 from collections.abc import Callable
 from typing import Any
 
+from kiks.desk.screen import has_screen
 from kiks.desk.server.desk import Desk, NewsHandler, OutsidePrograms
 from kiks.desk.server.server import SERVER
 from kiks.engine.code_cache import is_compiled
@@ -58,11 +58,6 @@ class Driver:
         """End `run`; from any thread."""
         self._is_over.set()
         self._desk.present.gate.close()
-
-
-def has_screen() -> bool:
-    """Return whether this computer has a screen for this process."""
-    return sys.platform in ("win32", "darwin") or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
 _log = logging.getLogger("kiks.desk")
