@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kiks.engine.compiling import entry
-from kiks.engine.grid import CROWD, PAIRS_PER_DISC, Grid, enter_all, squares_of
+from kiks.engine.grid import CROWD, NEIGHBOURS, PAIRS_PER_DISC, SIGHT_SLACK_MM, Grid, enter_all, squares_of
 from kiks.engine.parameters import PARAMETERS
 from kiks.engine.physics.contact import Ground
 from kiks.engine.sensing.rays import Walls, walls_of
@@ -36,6 +36,7 @@ _ARRAYS: dict[str, tuple[Any, int]] = {
     "entries": (_COUNT, 2),
     "spots": (_NUMBER, 3),
     "pairs": (_COUNT, 3),
+    "neighbours": (_COUNT, 3),
     "places": (_NUMBER, 3),
     "crowds": (CROWD, 1),
     "clearance": (_NARROW, 2),
@@ -49,7 +50,7 @@ _ARRAYS: dict[str, tuple[Any, int]] = {
 
 SCENE = np.dtype(
     [address_field(name, dimensions) for name, (_, dimensions) in _ARRAYS.items()]
-    + [("widest_mm", np.float64), ("cell_mm", np.float64), ("pad", np.int64)]
+    + [("widest_mm", np.float64), ("sight_mm", np.float64), ("cell_mm", np.float64), ("pad", np.int64)]
 )
 """The record that stands for a scene."""
 
@@ -111,6 +112,7 @@ class Scene:
             entries=np.zeros((world_count, disc_count), np.int32),
             spots=np.zeros((world_count, disc_count, 3)),
             pairs=np.zeros((world_count, PAIRS_PER_DISC * disc_count if has_company else 0, 2), np.int32),
+            neighbours=np.zeros((world_count, robot_count, NEIGHBOURS if has_company else 0), np.int32),
             places=np.zeros((world_count, disc_count, 2)),
             crowds=np.zeros(world_count, CROWD),
             networks=networks,
@@ -118,6 +120,7 @@ class Scene:
             seeds=np.asarray(seeds, np.int64),
         )
         self.record["widest_mm"] = max(kinds["radius_mm"].max(initial=0.0), state.bodies["radius_mm"].max(initial=0.0))
+        self.record["sight_mm"] = kinds["ray_reach_mm"].max(initial=0.0) + SIGHT_SLACK_MM
         self._take_walls(arenas[0])
         enter_worlds(self.record, np.arange(world_count))
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from kiks.engine.compiling import entry, inlined, kernel, spliced
-from kiks.engine.grid import find_near
+from kiks.engine.grid import find_around
 from kiks.engine.numbers import at_instant, draw, sin_cos, stream_of
 from kiks.engine.physics.motion import moment_of, pose_between
 from kiks.engine.scene import open_scene
@@ -368,7 +368,7 @@ def track_around(scene: Any, world: Any, robot: Any, x: Any, y: Any, tracks: Any
     parameters = scene.kinds[state.kind]
     found = stack_integers(_FOUND_LIMIT)
     reach_mm = parameters.ray_reach_mm + moved_of(state)
-    count = find_near(scene, world, x, y, reach_mm + MOVED_MM, robot, found)
+    count = find_around(scene, world, x, y, reach_mm + MOVED_MM, robot, found)
     return follow(scene, world, found, count, x, y, reach_mm, tracks) if count > 0 else 0
 
 
