@@ -9,9 +9,11 @@ from kiks.engine.bunch import (
     give_back,
     make_lanes,
     make_room,
+    note_ways,
     robot_in,
     set_end,
-    show_moves,
+    show_places,
+    square_of_move,
     take,
     wake_all,
     whose,
@@ -23,7 +25,7 @@ from kiks.engine.physics.gripper import tend_grippers
 from kiks.engine.physics.motion import move, note_contact, remember_pose, room_left, room_of
 from kiks.engine.physics.motor import control_motors, latch_encoders, turn_motors
 from kiks.engine.scene import open_scene
-from kiks.engine.simd.lanes import LANES, load
+from kiks.engine.simd.lanes import LANES, greatest, load, root, wide
 from kiks.engine.simd.masks import anywhere, everywhere, holds, opposite
 from kiks.engine.simd.records import copy_lanes, copy_record8, one_of, open_record8
 from kiks.engine.simd.stack_arrays import stack_integers
@@ -62,25 +64,33 @@ def advance_bunch(scene: Any, bunch: Any, until: Any) -> Any:
         until: The tick that each of its worlds is to reach, int64; a world that has reached it does no tick.
     """
     set_end(scene, bunch, until)
-    # A world without a robot is alone in its bunch.
-    while turn_wheels(bunch) or (bunch.robots.shape[0] == 0 and bunch.ticks[0] < until[0]):
+    while True:
+        is_any, wheels_mm = turn_wheels(bunch)
+        # A world without a robot is alone in its bunch.
+        if not is_any and (bunch.robots.shape[0] > 0 or bunch.ticks[0] >= until[0]):
+            break
         for k in range(until.shape[0]):
             if bunch.ticks[k] < until[k] and (bunch.has_company or bunch.has_grippers):
-                meet_others(scene, bunch, k)
-        move_freely(scene, bunch)
+                meet_others(scene, bunch, k, wheels_mm)
+        longest_mm = move_freely(scene, bunch)
         for k in range(until.shape[0]):
             if bunch.ticks[k] < until[k]:
                 if bunch.has_company:
-                    show_moves(scene, bunch, k)
+                    note_ways(scene, bunch, k, longest_mm)
                 if bunch.has_grippers:
+                    show_places(scene, bunch, k)
                     carry_lifted(scene, bunch.worlds[k])
                 bunch.ticks[k] += 1
 
 
 @inlined
 def turn_wheels(bunch: Any) -> Any:
-    """Phases: the motors of all robots turn their wheels; return whether any robot has a tick to do."""
-    is_any = False
+    """Phases: the motors of all robots turn their wheels.
+
+    Returns:
+        Whether any robot has a tick to do; the longest way of a wheel in it [mm].
+    """
+    is_any, longest = False, wide(0.0)
     for place in range(bunch.robots.shape[0]):
         eight, parameters = open_record8(bunch.robots[place]), open_record8(bunch.kinds[place])
         is_due = eight.tick_count < eight.until
@@ -95,18 +105,19 @@ def turn_wheels(bunch: Any) -> Any:
             left, right = turn_motors(eight, parameters, 0), turn_motors(eight, parameters, 1)
             eight.left_pulses, eight.right_pulses = left, right
             eight.way_mm = max(abs(left), abs(right)) * parameters.pulse_mm
-    return is_any
+            longest = max(longest, eight.way_mm)
+    return is_any, greatest(longest)
 
 
 @inlined
-def meet_others(scene: Any, bunch: Any, k: Any) -> Any:
+def meet_others(scene: Any, bunch: Any, k: Any, wheels_mm: Any) -> Any:
     """Phases: grippers move, and the things of a world that may collide move; the other robots have not moved yet."""
     world, room = bunch.worlds[k], bunch.room
     remember_places(scene, world, room, k)
     if bunch.has_grippers and tend_grippers(scene, world):
         scene.grid.crowds[world].slack_mm = -1.0
         wake_all(scene, room, k)
-    near_count, pair_count, longest_mm = find_near_things(scene, bunch, k)
+    near_count, pair_count, longest_mm = find_near_things(scene, bunch, k, wheels_mm)
     robot_count = scene.robots.shape[1]
     for place in range(near_count):
         if room.near[place] < robot_count:
@@ -122,7 +133,12 @@ def meet_others(scene: Any, bunch: Any, k: Any) -> Any:
 
 @inlined
 def move_freely(scene: Any, bunch: Any) -> Any:
-    """Phases: the robots that can touch nothing but walls move; the contacts of all are counted."""
+    """Phases: the robots that can touch nothing but walls move; the contacts of all are counted.
+
+    Returns:
+        The longest way of a robot [mm].
+    """
+    longest = wide(0.0)  # its square
     for place in range(bunch.robots.shape[0]):
         eight, parameters = open_record8(bunch.robots[place]), open_record8(bunch.kinds[place])
         is_due = eight.tick_count < eight.until
@@ -141,7 +157,9 @@ def move_freely(scene: Any, bunch: Any) -> Any:
             is_touching = (is_near & (eight.is_touching_discs > 0.0)) | (opposite(is_near) & is_touching)
             eight.is_near = 0.0
         eight.room_mm = room_left(room_mm, eight.x_mm - eight.trail[0, 0], eight.y_mm - eight.trail[0, 1])
+        longest = max(longest, square_of_move(eight))
         note_contact(eight, is_touching)
         eight.tick_count = eight.tick_count + 1.0
         if not everywhere(is_due):
             copy_lanes(open_record8(bunch.before[place]), eight, opposite(is_due))
+    return root(greatest(longest))
