@@ -123,7 +123,7 @@ class Crowd:
         robots["trail"] = np.stack([robots["x_mm"], robots["y_mm"], robots["heading_rad"]], axis=-1)[:, None]
         self.count = count
         self.tick = 0
-        self._out = np.zeros(8, np.int64)
+        self._out = np.zeros(8)
         self.run(1 if count == max(COUNTS) else WARM_STEPS)
 
     def run(self, step_count: int) -> None:

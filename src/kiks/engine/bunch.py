@@ -13,6 +13,8 @@ from collections import namedtuple
 from typing import Any
 
 import numpy as np
+from numba import types
+from numba.np.numpy_support import from_dtype
 
 from kiks.engine.compiling import inlined, kernel, spliced
 from kiks.engine.grid import PAIRS_PER_DISC, count_discs, disc_at, enter_all, has_changed, note_moves, note_places
@@ -51,6 +53,16 @@ Room: Any = namedtuple("Room", ("discs", "near", "pairs", "awake", "awake_counts
 * awake_counts: their numbers, int64 [world of the bunch].
 """
 
+
+def _list(element: Any) -> Any:
+    return types.Array(element, 1, "C")
+
+
+_tuple: Any = types.NamedTuple
+_integers = _list(types.int64)
+
+ROOM = _tuple((_list(from_dtype(DISC)), *(_integers,) * 4), Room)
+"""Numba's type of a `Room`."""
 
 FEW_DISCS = 16
 """Discs up to which scratch memory lies on the stack."""
@@ -98,6 +110,15 @@ Bunch: Any = namedtuple(
 * has_company: whether worlds hold anything that moves besides a lone robot;
 * has_grippers: whether any robot has a gripper.
 """
+
+BUNCH = _tuple(
+    (
+        *(_integers, _integers, *(_list(from_dtype(each)) for each in (EIGHT, EIGHT, EIGHT_KINDS)), _integers),
+        *(ROOM, types.boolean, types.boolean),
+    ),
+    Bunch,
+)
+"""Numba's type of a `Bunch`."""
 
 
 def worlds_in_bunch(robot_count: int) -> int:

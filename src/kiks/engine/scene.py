@@ -15,13 +15,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kiks.engine.compiling import entry
+from kiks.engine.compiling import entry, make_ready
 from kiks.engine.grid import CROWD, NEIGHBOURS, PAIRS_PER_DISC, SIGHT_SLACK_MM, Grid, enter_all, squares_of
 from kiks.engine.parameters import PARAMETERS
 from kiks.engine.physics.contact import Ground
 from kiks.engine.sensing.rays import Walls, walls_of
 from kiks.engine.sensing.thesis_networks import NETWORKS
-from kiks.engine.simd.addresses import address_field, address_of_array, opener
+from kiks.engine.simd.addresses import ArrayRecord, address_field, address_of_array, opener
 from kiks.engine.state import BODY, ROBOT, State
 from kiks.model.arena import Arena
 
@@ -48,6 +48,9 @@ _ARRAYS: dict[str, tuple[Any, int]] = {
     "seeds": (_INTEGER, 1),
 }
 
+MEETING = "meeting"
+"""The part of the engine that a lone robot without a gripper does not need."""
+
 SCENE = np.dtype(
     [address_field(name, dimensions) for name, (_, dimensions) in _ARRAYS.items()]
     + [("widest_mm", np.float64), ("sight_mm", np.float64), ("cell_mm", np.float64), ("pad", np.int64)]
@@ -55,9 +58,12 @@ SCENE = np.dtype(
 """The record that stands for a scene."""
 
 
-open_scene = opener(
+OPEN_SCENE = ArrayRecord(
     SCENE, {name: element for name, (element, _) in _ARRAYS.items()}, {"grid": Grid, "ground": Ground, "walls": Walls}
 )
+"""Numba's type of an open scene."""
+
+open_scene = opener(OPEN_SCENE)
 """Return the open scene, whose names are those of `SCENE`, from the record that Python hands to a kernel.
 
 * robots: records of `ROBOT`, shape [world, robot];
@@ -119,6 +125,8 @@ class Scene:
             lamps=lamps,
             seeds=np.asarray(seeds, np.int64),
         )
+        if has_company or state.robots["has_gripper"].any():
+            make_ready(MEETING)
         self.record["widest_mm"] = max(kinds["radius_mm"].max(initial=0.0), state.bodies["radius_mm"].max(initial=0.0))
         self.record["sight_mm"] = kinds["ray_reach_mm"].max(initial=0.0) + SIGHT_SLACK_MM
         self._take_walls(arenas[0])

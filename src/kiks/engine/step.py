@@ -4,27 +4,27 @@ from __future__ import annotations
 
 from typing import Any
 
+from numba import types
+
 from kiks.engine.bunch import (
+    BUNCH,
     copy_motion,
     give_back,
     make_lanes,
     make_room,
     note_ways,
-    robot_in,
     set_end,
     show_places,
     square_of_move,
     take,
-    wake_all,
     whose,
 )
-from kiks.engine.compiling import entry, inlined, kernel
-from kiks.engine.physics.collisions import collide_near_things, find_near_things, remember_places
+from kiks.engine.compiling import entry, inlined, kernel, linked
+from kiks.engine.meeting import meet_others
 from kiks.engine.physics.grasp import carry_lifted
-from kiks.engine.physics.gripper import tend_grippers
 from kiks.engine.physics.motion import move, note_contact, remember_pose, room_left, room_of
 from kiks.engine.physics.motor import control_motors, latch_encoders, turn_motors
-from kiks.engine.scene import open_scene
+from kiks.engine.scene import OPEN_SCENE, open_scene
 from kiks.engine.simd.lanes import LANES, greatest, load, root, wide
 from kiks.engine.simd.masks import anywhere, everywhere, holds, opposite
 from kiks.engine.simd.records import copy_lanes, copy_record8, one_of, open_record8
@@ -54,7 +54,7 @@ def advance_world(scene: Any, tick: Any, tick_count: Any, lanes: Any, room: Any)
     give_back(scene, bunch)
 
 
-@kernel
+@linked(types.void(OPEN_SCENE, BUNCH, types.int64[::1]))
 def advance_bunch(scene: Any, bunch: Any, until: Any) -> Any:
     """Let time pass in the worlds of a bunch.
 
@@ -69,9 +69,8 @@ def advance_bunch(scene: Any, bunch: Any, until: Any) -> Any:
         # A world without a robot is alone in its bunch.
         if not is_any and (bunch.robots.shape[0] > 0 or bunch.ticks[0] >= until[0]):
             break
-        for k in range(until.shape[0]):
-            if bunch.ticks[k] < until[k] and (bunch.has_company or bunch.has_grippers):
-                meet_others(scene, bunch, k, wheels_mm)
+        if bunch.has_company or bunch.has_grippers:
+            meet_others(scene, bunch, until, wheels_mm)
         longest_mm = move_freely(scene, bunch)
         for k in range(until.shape[0]):
             if bunch.ticks[k] < until[k]:
@@ -107,28 +106,6 @@ def turn_wheels(bunch: Any) -> Any:
             eight.way_mm = max(abs(left), abs(right)) * parameters.pulse_mm
             longest = max(longest, eight.way_mm)
     return is_any, greatest(longest)
-
-
-@inlined
-def meet_others(scene: Any, bunch: Any, k: Any, wheels_mm: Any) -> Any:
-    """Phases: grippers move, and the things of a world that may collide move; the other robots have not moved yet."""
-    world, room = bunch.worlds[k], bunch.room
-    remember_places(scene, world, room, k)
-    if bunch.has_grippers and tend_grippers(scene, world):
-        scene.grid.crowds[world].slack_mm = -1.0
-        wake_all(scene, room, k)
-    near_count, pair_count, longest_mm = find_near_things(scene, bunch, k, wheels_mm)
-    robot_count = scene.robots.shape[1]
-    for place in range(near_count):
-        if room.near[place] < robot_count:
-            one, robot = robot_in(scene, bunch, k, room.near[place])
-            copy_motion(one, robot)
-    if near_count > 0:
-        collide_near_things(scene, world, room, near_count, pair_count, longest_mm)
-    for place in range(near_count):
-        if room.near[place] < robot_count:
-            one, _ = robot_in(scene, bunch, k, room.near[place])
-            one.is_near, one.is_touching_discs = 1.0, room.discs[room.near[place]].is_touching
 
 
 @inlined

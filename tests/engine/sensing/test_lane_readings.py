@@ -63,7 +63,7 @@ def assert_equal_readings(scene, robots, rng):
     """Return all readings, at some time in the last tick."""
     tick = int(rng.integers(TICKS))
     time_ns = max(tick * 10_000_000 - int(rng.integers(10_000_000)), 0)
-    together, one_by_one = np.empty((robots, 8), np.int64), np.empty((robots, 8), np.int64)
+    together, one_by_one = np.empty((robots, 8)), np.empty((robots, 8))
     for robot in range(robots):
         read_proximity(scene.record, robot, tick, time_ns, True, together[robot])
         read_one_by_one(scene.record, 0, robot, tick, time_ns, one_by_one[robot])

@@ -26,7 +26,7 @@ from kiks.engine.sensing.proximity import (
     make_tracing,
     pose_at,
     rays_of,
-    sense_proximity,
+    sense_linked,
     track_around,
     view_of,
 )
@@ -113,8 +113,8 @@ def read_all(scene: Any, tick_count: Any, time_ns: Any, proximity: Any, ambient:
         scene: The scene (`kiks.engine.scene.Scene.record`).
         tick_count: Ticks done.
         time_ns: When the robots read.
-        proximity: int64 [robot, 8].
-        ambient: int64 [robot, 8].
+        proximity: float64 [robot, 8].
+        ambient: float64 [robot, 8].
     """
     scene = open_scene(scene[0])
     readers = make_readers()
@@ -123,7 +123,7 @@ def read_all(scene: Any, tick_count: Any, time_ns: Any, proximity: Any, ambient:
         for k in range(count):
             readers.worlds[k], readers.robots[k] = 0, first + k
             readers.ticks[k], readers.times_ns[k] = tick_count, time_ns
-        sense_proximity(scene, readers, count, True, proximity[first : first + READERS])
+        sense_linked(scene, readers, count, True, proximity[first : first + READERS])
     for robot in range(proximity.shape[0]):
         sense_ambient(scene, 0, robot, tick_count, time_ns, True, ambient[robot])
 
