@@ -37,7 +37,7 @@ _njit: Any = njit
 _intrinsic: Any = extending.intrinsic
 _Library: Any = codegen.JITCodeLibrary
 _Pipeline: Any = compiler.Compiler
-_Listener: Any = event.Listener
+_Listener: Any = event.TimingListener
 _register: Any = event.register
 _is_null: Any = cgutils.is_null
 
@@ -90,17 +90,18 @@ _UNCOUNTED: dict[str, Any] = _PART | {"_nrt": False}
 
 
 class _Compiling(_Listener):  # type: ignore[misc, unused-ignore]
-    """Notices when something is compiled: says so, once, and lets no garbage be looked for meanwhile.
+    """Notices when something is compiled: says so, once, measures it, and lets no garbage be looked for meanwhile.
 
     The compiler makes some million objects, which live long: to look through them takes an eighth of its time.
     """
 
-    depth, had_garbage_collected = 0, False
+    had_garbage_collected = False
 
     def on_start(self, event: Any) -> None:
         """Begin."""
-        self.depth += 1
-        if self.depth == 1:
+        is_first = not self._depth
+        super().on_start(event)
+        if is_first:
             if line := _LINES.get(event.data["dispatcher"]._compiler.pipeline_class):
                 tell(line)
             self.had_garbage_collected = gc.isenabled()
@@ -108,15 +109,22 @@ class _Compiling(_Listener):  # type: ignore[misc, unused-ignore]
 
     def on_end(self, event: Any) -> None:
         """End; Numba calls it whatever has happened."""
-        self.depth = max(self.depth - 1, 0)  # a signal may come before the beginning
-        if not self.depth and self.had_garbage_collected:
+        if self._depth:  # a signal may have come before the beginning
+            super().on_end(event)
+        if not self._depth and self.had_garbage_collected:
             gc.enable()
 
 
 # The lock of Numba's compiler lets one thread in, and that one waits until what it compiles within is done.
-_register("numba:compile", _Compiling())
+_compiling = _Compiling()
+_register("numba:compile", _compiling)
 
 _LINES = {_WholePipeline: "Compiling the engine for this computer: once, half a minute or so ..."}
+
+
+def compiling_s() -> float:
+    """Return how long this process has been compiling [s]: no measured speed counts that."""
+    return float(_compiling.duration) if _compiling.done else 0.0
 
 
 def announce(pipeline_class: Any, line: str) -> None:
