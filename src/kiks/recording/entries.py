@@ -14,6 +14,7 @@ import numpy as np
 from kiks.errors import ParameterError
 from kiks.model.checks import CLOCK_END_NS, ROBOTS_MAX
 from kiks.sim.run_log import Kind
+from kiks.sim.saved_state import LAYOUT
 
 
 class Entry(NamedTuple):
@@ -44,6 +45,9 @@ ENTRIES_MAX = 100_000
 _COUNT = struct.Struct("<I")
 _COLUMNS = "BqHqqI"
 """Types of the columns of a block, those of fields, the last one for the lengths of data."""
+
+RECORDED_LAYOUT = f"{LAYOUT} {_COLUMNS}"
+"""What the fields of entries and of states are: files with others are of another version."""
 
 _ENTRY_BYTES = struct.calcsize(f"<{_COLUMNS}")
 

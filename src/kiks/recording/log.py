@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import NamedTuple, Protocol
 
 from kiks.errors import ParameterError
-from kiks.recording.entries import Entry, block_of, entries_of
+from kiks.recording.entries import RECORDED_LAYOUT, Entry, block_of, entries_of
 from kiks.recording.mcap_file import FoundChunk
 from kiks.sim.run_log import ACT, CHECK, LAST_INPUT, MARK, STATE, TEXT
-from kiks.sim.saved_state import LAYOUT, SavedState, WorldFiles
+from kiks.sim.saved_state import SavedState, WorldFiles
 from kiks.units import s_from_ns
 from kiks.version import __version__
 
@@ -72,7 +72,7 @@ class RecordedLog:
                 f"{reader.what} must be a recording of KiKS, but it is another MCAP file, or the run was killed at its "
                 "very beginning. `--record FILE` makes one."
             )
-        if reader.told["layout"] != LAYOUT:
+        if reader.told["layout"] != RECORDED_LAYOUT:
             raise ParameterError(
                 f"Cannot read {reader.what}: KiKS {reader.told.get('kiks', '?')} recorded it with other fields than "
                 f"KiKS {__version__} has. Read it with that version."

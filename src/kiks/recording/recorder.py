@@ -22,11 +22,11 @@ from kiks.ending import postponing_endings
 from kiks.errors import ParameterError
 from kiks.model.atomic_files import path_of
 from kiks.model.checks import check_kind
-from kiks.recording.entries import ENTRIES_MAX, FIELD_COUNT, block_of, characters_in
+from kiks.recording.entries import ENTRIES_MAX, FIELD_COUNT, RECORDED_LAYOUT, block_of, characters_in
 from kiks.recording.mcap_file import McapFile
 from kiks.sim.read_completion import NEVER_NS
 from kiks.sim.run_log import ACT, CHECK, MARK, STATE, TEXT, Clock, NotedEntry
-from kiks.sim.saved_state import LAYOUT, WorldFiles, state_bytes
+from kiks.sim.saved_state import WorldFiles, state_bytes
 from kiks.sim.simulation import Simulation
 from kiks.sim.turret_host import has_user_turret
 from kiks.units import NS_PER_S, s_from_ns
@@ -236,7 +236,7 @@ class RunWriter:
 
 def description_of(sim: Simulation) -> dict[str, str]:
     """Return what a recording says of itself: the version, its records' fields, the policy of thinking, the arena."""
-    return {"kiks": __version__, "layout": LAYOUT, "thinking": sim.thinking, "arena": sim.arena.name}
+    return {"kiks": __version__, "layout": RECORDED_LAYOUT, "thinking": sim.thinking, "arena": sim.arena.name}
 
 
 class RunRecorder:
