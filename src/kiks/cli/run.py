@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from functools import partial
@@ -214,6 +215,9 @@ def _run_one(sim: Simulation, command: Command, told: dict[str, int], record: Pa
     """Run a program in this process; return its exit code."""
     from kiks.script.runner import run_here
 
+    # What is loaded by now stays to the end of the process: no collection looks at it again, not even those at the end,
+    # which would take a third of the time of a short run.
+    gc.freeze()
     try:
         with noting_output(sim):
             return run_here(
