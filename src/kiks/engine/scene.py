@@ -40,6 +40,7 @@ _ARRAYS: dict[str, tuple[Any, int]] = {
     "places": (_NUMBER, 3),
     "crowds": (CROWD, 1),
     "clearance": (_NARROW, 2),
+    "rooms": (_NARROW, 2),
     "brightness": (_BYTE, 2),
     "leaps": (_SMALL, 2),
     "faces": (_COUNT, 2),
@@ -139,8 +140,8 @@ class Scene:
         self._arrays |= arrays
 
     def _take_walls(self, arena: Arena) -> None:
-        clearance, brightness, leaps, faces, cell_mm, pad = walls_of(arena)
-        self._keep(clearance=clearance, brightness=brightness, leaps=leaps, faces=faces)
+        clearance, rooms, brightness, leaps, faces, cell_mm, pad = walls_of(arena)
+        self._keep(clearance=clearance, rooms=rooms, brightness=brightness, leaps=leaps, faces=faces)
         self.record["cell_mm"], self.record["pad"] = cell_mm, pad
 
     def set_lamps(self, lamps: NDArray[np.float64]) -> None:

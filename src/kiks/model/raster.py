@@ -34,6 +34,9 @@ MM_PER_PIXEL_MIN, MM_PER_PIXEL_MAX = 0.1, 100.0
 LEAPS_PER_CELL = 16
 """Units of `Arena.leaps` in the edge of a cell."""
 
+ROOM_CELLS = 16
+"""Edge of a block of `Arena.rooms` [cells]."""
+
 FACE_UNITS = (1023.0, 1023.0, 256.0)
 """Units of the three parts of `Arena.faces`: in a vector's length, twice, and in the edge of a cell."""
 
@@ -117,6 +120,12 @@ def free_leaps(surface: npt.NDArray[np.uint8]) -> npt.NDArray[np.int16]:
     leaps = np.minimum(apart * LEAPS_PER_CELL, np.iinfo(np.int16).max).astype(np.int16)
     np.negative(surface, out=leaps, where=surface > 0, dtype=np.int16)
     return leaps
+
+
+def block_rooms(clearance: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+    """Return the least clearance in each block of `ROOM_CELLS` x `ROOM_CELLS` cells; the last ones may be smaller."""
+    rows, columns = (np.arange(0, size, ROOM_CELLS) for size in clearance.shape)
+    return np.minimum.reduceat(np.minimum.reduceat(clearance, rows, axis=0), columns, axis=1)
 
 
 def wall_faces(

@@ -37,6 +37,7 @@ from kiks.engine.simd.lanes import LANES, floor, greatest, lane_of, load, store
 from kiks.engine.simd.masks import anywhere, choose
 from kiks.engine.simd.rasters import pick
 from kiks.engine.simd.stack_arrays import stack_floats, stack_integers, stack_narrow
+from kiks.model.raster import ROOM_CELLS
 from kiks.model.robot import SENSOR_COUNT
 from kiks.units import SENSOR_ROUND_NS, SENSOR_SLOT_NS
 
@@ -175,7 +176,7 @@ def begin_rays(
     """
     per_cell = 1.0 / walls.cell_mm
     view = view_of(parameters, poses)
-    room_mm = room_around(walls, poses)
+    room_mm = room_around(walls, parameters, poses)
     is_near = poses[0] < poses[0]
     # One look-up often shows that no wall is near any sensor; eight would wait for the memory eight times.
     if room_mm <= parameters.watch_reach_mm:
@@ -243,18 +244,23 @@ def end_rays(walls: Any, parameters: Any, has_faces: Any, tracing: Any, k: Any, 
 
 
 @inlined
-def room_around(walls: Any, poses: Any) -> Any:
+def room_around(walls: Any, parameters: Any, poses: Any) -> Any:
     """Return a distance from a robot within which no look-up finds a wall, from any of its poses [mm].
 
     That is the clearance, less the way to the other poses and less three diagonals of cells, as places and distances
-    are rounded to cells.
+    are rounded to cells. The least one in its block is enough, if it is beyond all rays: the table of blocks is in the
+    processor's cache, the raster is not.
     """
     x, y, _ = poses
     centre_x, centre_y = lane_of(x, 0), lane_of(y, 0)
     moved_mm = _DIAGONAL * greatest(max(abs(x - centre_x), abs(y - centre_y)))
     per_cell = 1.0 / walls.cell_mm
-    clearance_mm = pick(walls.clearance, centre_x * per_cell + walls.pad, centre_y * per_cell + walls.pad)
-    return clearance_mm - moved_mm - 3.0 * _DIAGONAL * walls.cell_mm
+    column, row = centre_x * per_cell + walls.pad, centre_y * per_cell + walls.pad
+    less_mm, per_block = moved_mm + 3.0 * _DIAGONAL * walls.cell_mm, 1.0 / ROOM_CELLS
+    room_mm = pick(walls.rooms, column * per_block, row * per_block) - less_mm
+    if room_mm <= parameters.ray_reach_mm:
+        room_mm = pick(walls.clearance, column, row) - less_mm
+    return room_mm
 
 
 @inlined
