@@ -32,8 +32,8 @@ from kiks.engine.sensing.disc_rays import (
 )
 from kiks.engine.sensing.ray_packets import WAY_SIZE, enter, met, nothing_met, step_all
 from kiks.engine.sensing.rays import leap_at
-from kiks.engine.sensing.responses import REFLECTION, respond
-from kiks.engine.simd.lanes import LANES, floor, greatest, lane_of, load, store
+from kiks.engine.sensing.responses import REFLECTION, light_of, reflection_count, respond
+from kiks.engine.simd.lanes import LANES, floor, greatest, lane_of, load, store, wide
 from kiks.engine.simd.masks import anywhere, choose
 from kiks.engine.simd.rasters import pick
 from kiks.engine.simd.stack_arrays import stack_floats, stack_integers, stack_narrow
@@ -307,12 +307,20 @@ def expected_counts(scene: Any, parameters: Any, tracing: Any, k: Any, counts: A
 
     Its rays have been followed; arguments as for `end_rays`.
     """
-    has_faces = parameters.response == REFLECTION
-    store(counts, load(parameters.baseline_counts))
+    is_reflection = parameters.response == REFLECTION
+    store(counts, wide(0.0))
     for sensor in range(SENSOR_COUNT):
         if tracing.packet_of[SENSOR_COUNT * k + sensor] != NOT_NEAR:
-            hits = end_rays(scene.walls, parameters, has_faces, tracing, k, sensor)
-            counts[sensor] += respond(scene.networks, parameters, sensor, *hits)
+            hits = end_rays(scene.walls, parameters, is_reflection, tracing, k, sensor)
+            if is_reflection:
+                counts[sensor] = light_of(parameters, sensor, *hits)
+            else:
+                counts[sensor] = respond(scene.networks, parameters, sensor, *hits)
+    above = load(counts)
+    if is_reflection:
+        above = reflection_count(parameters, load(parameters.threshold), load(parameters.gain), above)
+        above = choose(load(tracing.packet_of, SENSOR_COUNT * k) != NOT_NEAR, above, 0.0)
+    store(counts, load(parameters.baseline_counts) + above)
 
 
 @kernel
