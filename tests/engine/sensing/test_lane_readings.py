@@ -112,7 +112,7 @@ def test_neighbours_are_known_while_things_move():
             sim.run(0.01 * int(rng.integers(1, 6)))
             sim.sync()
         tick = sim.world.state.tick_count
-        together, one_by_one = np.empty((2, 30, 8), np.int64)
+        together, one_by_one = np.empty((2, 30, 8))
         for robot in range(30):
             read_proximity(sim.world.scene, robot, tick, sim.now_ns, True, together[robot])
             read_one_by_one(sim.world.scene, 0, robot, tick, sim.now_ns, one_by_one[robot])
