@@ -103,7 +103,7 @@ def project_of(sim: Simulation, project: Project) -> Project:
         project: Where all the rest comes from.
     """
     with sim.lock:
-        poses, bodies, lamps = sim.poses(), sim.bodies(), sim.lamps.copy()
+        poses, bodies, lamps = sim.poses(), sim.bodies(), sim.world.lamps.copy()
         arena, radii_mm = sim.arena, [spec.body.radius_mm for spec in sim.specs]
     starts = [rounded_pose(*pose) for pose in poses.tolist()]
     discs = [(pose.x_mm, pose.y_mm, radius_mm) for pose, radius_mm in zip(starts, radii_mm, strict=True)]
