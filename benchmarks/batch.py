@@ -7,7 +7,8 @@ eight sensors (56 rays, the response, noise), the controller, and five ticks of 
   of 1 m x 1 m with 30 walls in it; `batch.reflection_...` with the default response, `batch.fast_...` with the table.
 * `batch.full_steps_per_s_all`: the same on all cores, in wall time; `batch.second_core_adds`: what a second one adds.
 * `batch.link_...`: with the default response and the loop of 0.1 s over a line of 9600 baud, which is ten ticks.
-* `batch.bodies10_...`: with ten balls in each world; `batch.swarmN_...`: N robots in a world of 1, 3 or 7 m.
+* `batch.bodies10_...`: with ten balls in each world; `batch.swarmN_...`: N robots in a square of 1, 3 or 7 m
+  (benchmarks/crowd.py).
 * `batch.worlds_N_...`, `batch.arena_Nm_...`, `batch.bodies_N_...`: how it goes with their number, default response.
 * `batch.megabytes_10000`: how much memory 10,000 worlds add, and what a further minute of runs adds to that.
 * `batch.kheperax8_steps_per_s`: Kheperax with 8 lasers in its standard maze (benchmarks/kheperax_peer.py), 100 and
@@ -34,6 +35,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from crowd import IDEAL, crowd, vehicle
 from PIL import Image, ImageDraw
 
 import kiks
@@ -55,17 +57,6 @@ MAZE = (
     *((0.355, 0.0, 0.525, 0.185), (0.25, 0.5, 0.75, 0.215), (1.0, 0.25, 0.435, 0.55), (0.0, 0.8, 0.0, 1.0)),
 )
 """Its walls inside (Kheperax 0.2.0, `maze_maps`, "standard")."""
-
-IDEAL = kiks.Timing(0.05, None)
-
-
-@kiks.controller
-def vehicle(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
-    """Drive, and turn away from what is near."""
-    left = sensors[0] * 4 + sensors[1] * 6 - sensors[2] * 6 - sensors[3] * 18 - sensors[4] * 6 - sensors[5] * 4
-    right = -sensors[0] * 4 - sensors[1] * 6 - sensors[2] * 14 - sensors[3] * 8 + sensors[4] * 6 + sensors[5] * 4
-    wheels[0] = 8.0 + left / 200.0
-    wheels[1] = 8.0 + right / 200.0
 
 
 def box(size_mm: int, body_count: int = 0) -> kiks.Arena:
@@ -132,11 +123,6 @@ def worlds(arena: kiks.Arena, count: int, *, response: str | None = None, **opti
     )
 
 
-def swarm(size_mm: int, robots: int, count: int) -> kiks.Batch:
-    """Return worlds of one thread with many robots in a square without walls inside."""
-    return kiks.Batch(kiks.Arena.box(size_mm, size_mm), count, robots=robots, timing=IDEAL, threads=1, seed=1)
-
-
 def megabytes() -> float:
     """Return the largest memory that this process has had [MB]."""
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
@@ -186,11 +172,10 @@ def main() -> None:
             "reflection": rate(worlds(arena, count), seconds),
             "fast": rate(worlds(arena, count, response="fast"), seconds),
             "link": rate(worlds(arena, count, timing=kiks.Timing(0.1, 9600)), 2 * seconds),
-            # As long as each other: a run begins with a reset, whose share would depend on its length.
             "bodies10": rate(worlds(box(1000, 10), 64), seconds / 2),
-            "swarm10": rate(swarm(1000, 10, 8), seconds / 2),
-            "swarm100": rate(swarm(3000, 100, 2), seconds / 2),
-            "swarm1000": rate(swarm(7000, 1000, 1), seconds / 2),
+            "swarm10": crowd("10_1m"),
+            "swarm100": crowd("100_3m"),
+            "swarm1000": crowd("1000_7m"),
         },
     )
     rows += [(f"batch.{name}_steps_per_s_core", value, "robot-steps/CPU s") for name, value in found.items()]

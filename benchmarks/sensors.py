@@ -73,13 +73,13 @@ class Ride:
 
 
 def read_proximity(ride: Ride) -> None:
-    out = np.zeros(SENSOR_COUNT, np.int64)
+    out = np.zeros(SENSOR_COUNT)
     for scene in ride.scenes:
         proximity.read_proximity(scene.record, 0, TICK, TICK * TICK_NS, True, out)
 
 
 def read_ambient(ride: Ride) -> None:
-    out = np.zeros(SENSOR_COUNT, np.int64)
+    out = np.zeros(SENSOR_COUNT)
     for scene in ride.scenes:
         ambient.read_ambient(scene.record, 0, TICK, TICK * TICK_NS, True, out)
 

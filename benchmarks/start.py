@@ -6,6 +6,7 @@ its beginning to the end of what it is named for:
 * `start.demo_s`: the follow-wall demo in the office has made its first step, and only its kernels are compiled;
 * `start.clone_s`: the same after all kernels of the engine, as `kiks run` compiles them at its first start;
 * `start.all_s`: all kernels are compiled, those of batches as well, as `kiks warmup` does;
+* `start.batch_s`: the first batch has run, after all kernels of the engine: it compiles its own;
 * `start.wheel_s`: the demo's first step, from a copy of the package that brings the kernels, as `make wheel` packs it;
 * `start.again_s`: the demo's first step at the second start in a clone.
 
@@ -38,6 +39,10 @@ robot.proximity()
 robot.set_speed(5, 5)
 """
 ENGINE = "from kiks.cli.engine_start import ready_engine\nready_engine()\n"
+BATCH = """
+import kiks
+kiks.Batch(kiks.Arena.box(1000, 1000), 8).run(kiks.controllers.linear(), [0.0] * 18, seconds=1)
+"""
 ALL = "from kiks.cli.warmup import warmup\nwarmup()\n"
 
 
@@ -81,6 +86,7 @@ def main() -> None:
         times = {
             "demo": start_s(DEMO, source, folder / "demo"),
             "clone": start_s(ENGINE + DEMO, source, folder / "clone"),
+            "batch": start_s(BATCH, source, folder / "clone"),
             "all": start_s(ALL, source, folder / "all"),
             "again": start_s(ENGINE + DEMO, source, folder / "all"),
         }

@@ -39,7 +39,7 @@ def compile_like(folder: Path) -> None:
     import kiks.sim.simulation  # noqa: F401  # they define the types of signatures
 
     for path in sorted(folder.glob("*.code")):
-        module, name = path.name.rsplit("-", 1)[0].rsplit(".", 1)
+        module, name = path.name.rsplit("-", 2)[0].rsplit(".", 1)
         head, _, rest = path.read_bytes().partition(b"\n")
         signature, _ = pickle.loads(rest[: int(head.split(b" ")[1])])
         getattr(importlib.import_module(module), name).compile(tuple(signature))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from collections.abc import Callable
 
 import pytest
 
@@ -14,52 +15,51 @@ HELP = "from kiks.cli.engine_start import help_to_compile; help_to_compile()"
 PIECE_COUNT = 6
 
 
-@pytest.fixture
-def done(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """The numbers of the pieces that this process has compiled, in order; the pieces do nothing else."""
-    numbers: list[int] = []
+def pieces_noting(done: list[int]) -> list[Callable[[], None]]:
+    """Return pieces that do nothing but note their numbers."""
 
-    def piece(number: int) -> object:
-        return lambda: numbers.append(number)
+    def piece(number: int) -> Callable[[], None]:
+        def note() -> None:
+            done.append(number)
 
-    monkeypatch.setattr(engine_start, "_PIECES", tuple(map(piece, range(PIECE_COUNT))))
-    return numbers
+        return note
+
+    return [piece(number) for number in range(PIECE_COUNT)]
 
 
-def test_one_processor_gets_no_second_process(done: list[int], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_one_processor_gets_no_second_process(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0})
     monkeypatch.setattr(subprocess, "Popen", None)
-    engine_start._compile_together(range(PIECE_COUNT))
+    done: list[int] = []
+    engine_start._compile_together(pieces_noting(done))
     assert done == []
 
 
 @pytest.mark.parametrize("processors", [2, 3, 64])
-def test_a_process_that_fails_takes_one_piece_from_the_end(
-    done: list[int], processors: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_process_that_fails_takes_one_piece_from_the_end(processors: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(os, "sched_getaffinity", lambda _: set(range(processors)))
     monkeypatch.setattr(sys, "executable", "/bin/false")
-    engine_start._compile_together(range(PIECE_COUNT))
+    done: list[int] = []
+    engine_start._compile_together(pieces_noting(done))
     helpers = min(processors, engine_start._MOST_PROCESSES) - 1
     assert done == list(range(len(done)))
     assert len(done) >= PIECE_COUNT - helpers
 
 
 def test_a_helper_answers_each_order_and_ends_with_its_input() -> None:
-    number = engine_start._PIECES.index(engine_start._read_light)
     with subprocess.Popen(
         [sys.executable, "-c", HELP], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     ) as helper:
         assert helper.stdin is not None
         assert helper.stdout is not None
         for _ in range(2):
-            print(number, file=helper.stdin, flush=True)
+            print(engine_start._read_light.__name__, file=helper.stdin, flush=True)
             assert helper.stdout.readline() == "\n"
         helper.stdin.close()
         assert helper.wait() == 0
 
 
-def test_time_passes_in_the_first_piece_of_the_engine_alone() -> None:
+def test_time_passes_in_the_first_pieces_alone() -> None:
     """Else two processes would compile ticks, which take longest."""
     from kiks.sim.simulation import Simulation
 
@@ -72,7 +72,8 @@ def test_time_passes_in_the_first_piece_of_the_engine_alone() -> None:
             return sims[-1]
 
         patch.setattr(engine_start, "_simulation", remembered)
-        for number in engine_start._OF_ENGINE[1:]:
-            engine_start._PIECES[number]()
-    assert len(sims) == len(engine_start._OF_ENGINE) - 1
+        pieces = engine_start._PIECES[engine_start._PIECES.index(engine_start.compile_batch) + 1 :]
+        for piece in pieces:
+            piece()
+    assert len(sims) == len(pieces) > 3
     assert all(sim.time_s == 0 for sim in sims)

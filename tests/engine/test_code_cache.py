@@ -20,7 +20,7 @@ import pytest
 from tests.model.test_atomic_files import full_disk
 from tests.stranger import STRANGER, as_stranger, needs_root
 
-from kiks.engine import code_cache
+from kiks.engine import code_cache, compiling
 from kiks.engine.code_cache import is_compiled
 from kiks.engine.compiling import LAST, entry
 
@@ -47,7 +47,8 @@ def _fresh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
     (tmp_path / "temporary").mkdir()
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
-    code_cache._tell.cache_clear()
+    code_cache.tell.cache_clear()
+    monkeypatch.setattr(compiling, "_LINES", {})
 
 
 def test_the_second_call_comes_from_the_disk(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
@@ -62,7 +63,8 @@ def test_the_second_call_comes_from_the_disk(tmp_path: Path, caplog: pytest.LogC
 def test_a_start_that_was_interrupted_has_not_compiled_all() -> None:
     folder = next(code_cache.cache_folders())
     folder.mkdir(parents=True)
-    (folder / "kiks.engine.step.advance-0123456789abcdef.code").touch()
+    digest = code_cache.digest_of("kiks.engine.step")
+    (folder / f"kiks.engine.step.advance-{digest}-0123456789abcdef.code").touch()
     assert is_compiled("advance")
     assert not is_compiled(LAST)
 
@@ -238,30 +240,76 @@ def test_concurrent_writes_of_programs_are_all_kept() -> None:
     assert [call(1), call(1.5)] == [True, True]
 
 
-def test_only_a_changed_syntax_tree_of_the_sources_has_a_folder_of_its_own(tmp_path: Path) -> None:
-    kernels = b'"""A file."""\nfrom kiks.units import X\ndef f(a):\n    """Return a number."""\n    return a + X\n'
-    constants = b'"""Units."""\nY = 2\nX = 1 + Y\n"""A number."""\nZ = 3\n'
+KERNELS = {
+    "kiks.engine.f": b'"""A file."""\nfrom kiks.units import X\ndef f(a):\n    """A number."""\n    return a + X\n',
+    "kiks.engine.g": b"from kiks.engine.f import f\n@linked(types.void())\ndef g(): f(1)\ndef h(): f(2)\n",
+    "kiks.engine.entries": b"from kiks.engine import g\n@entry\ndef e(): g.h()\n",
+    "kiks.engine.calls": b"from kiks.engine.g import g\n@entry\ndef c(): g()\n",
+    "kiks.engine.motor": b"from kiks.units import Z\ndef move(): return Z\n",
+    "kiks.engine.simd.lanes": b"def add(): pass\n",
+    "kiks.units": b'"""Units."""\nY = 2\nX = 1 + Y\n"""A number."""\nZ = 3\n',
+}
 
-    def syntax(kernels: bytes, constants: bytes) -> str:
-        return code_cache._syntax({"kiks.engine.f": kernels, "kiks.units": constants})
 
-    whole = syntax(kernels, constants)
-    assert syntax(kernels.replace(b"number", b"sum") + b"# a comment", constants + b"def g(): pass\n") == whole
-    assert syntax(kernels, constants.replace(b"Z = 3", b"Z = 4")) == whole
-    assert syntax(kernels, constants.replace(b"Y = 2", b"Y = 3")) != whole
-    assert syntax(kernels.replace(b"a + X", b"X + a"), constants) != whole
-    digest = code_cache._syntax_digest()
+@pytest.mark.parametrize(
+    ("module", "old", "new", "changed"),
+    [
+        ("engine.f", b"A number", b"A sum", ""),
+        ("engine.f", b"a + X", b"a + X  # a comment", ""),
+        ("engine.f", b"a + X", b"X + a", "f g entries"),
+        ("engine.g", b"f(1)", b"f(3)", "g entries"),
+        ("engine.calls", b"g()\n", b"g(4)\n", "calls"),
+        ("engine.motor", b"return Z", b"return -Z", "motor"),
+        ("engine.simd.lanes", b"pass", b"return", "f g entries calls motor simd.lanes"),
+        ("units", b"Y = 2", b"Y = 3", "f g entries"),
+        ("units", b"Z = 3", b"Z = 4", "motor"),
+        ("units", b"Z = 3", b"Z = 3\ndef g(): pass", ""),
+    ],
+)
+def test_a_change_concerns_what_is_compiled_from_it(module: str, old: bytes, new: bytes, changed: str) -> None:
+    name = f"kiks.{module}"
+    assert old in KERNELS[name]
+    before, after = code_cache._syntax(KERNELS), code_cache._syntax(KERNELS | {name: KERNELS[name].replace(old, new)})
+    assert {each for each in before if before[each] != after[each]} == {
+        f"kiks.engine.{each}" for each in changed.split()
+    }
+
+
+def test_the_camera_is_no_part_of_the_motors() -> None:
+    kernels = code_cache._digests()
+    assert {"kiks.engine.physics.motor", "kiks.engine.sensing.camera", "kiks.batch.loop"} <= set(kernels)
+    sources = code_cache._sources()
+    before = code_cache._syntax(sources)
+    for changed, wanted in (("sensing.camera", "sensing.camera"), ("physics.collisions", "physics.collisions meeting")):
+        name = f"kiks.engine.{changed}"
+        after = code_cache._syntax(sources | {name: sources[name] + b"\ndef another(): pass\n"})
+        assert {each for each in before if before[each] != after[each]} == {f"kiks.engine.{k}" for k in wanted.split()}
+
+
+def test_the_digests_of_the_sources_are_computed_once(tmp_path: Path) -> None:
+    digests = code_cache._digests.__wrapped__()
     (known,) = (tmp_path / "cache" / "kiks").glob("sources-*")
-    assert known.read_bytes() == digest
-    known.write_bytes(b"0" * 64)
-    assert code_cache._syntax_digest() == b"0" * 64
+    text = known.read_bytes()
+    known.write_bytes(text.replace(digests["kiks.engine.step"].encode(), b"0" * 16))
+    assert code_cache._digests.__wrapped__()["kiks.engine.step"] == "0" * 16
     known.write_bytes(b"..")
-    assert code_cache._syntax_digest() == digest
+    assert code_cache._digests.__wrapped__() == digests
+    assert known.read_bytes() == text
+
+
+def test_code_that_calls_a_kernel_with_other_arguments_than_it_takes_is_compiled_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(code_cache, "_AT_LOAD", {"numba.dynamic": lambda: None})
+    monkeypatch.setattr(code_cache, "_linked_in", lambda library: ["numba.dynamic"])
+    assert [call(), call()] == [False, True]
+    monkeypatch.setattr(code_cache, "_AT_LOAD", {})
+    assert not call()
 
 
 def test_kernels_in_a_file_have_names_of_their_own() -> None:
     for path in (Path(code_cache.__file__).parents[1]).rglob("*.py"):
-        names = re.findall(r"^@entry\ndef (\w+)", path.read_text(), re.M)
+        names = re.findall(r"^@(?:entry|linked.*)\ndef (\w+)", path.read_text(), re.M)
         assert len(names) == len(set(names))
 
 

@@ -231,3 +231,10 @@ def test_the_picture_is_the_raster_with_the_top_row_first():
     cells[50:, :3] = 255
     picture = np.array(Image.open(io.BytesIO(arena_picture(Arena.from_array(cells)))))
     assert (picture == cells).all()
+
+
+def test_a_world_that_is_shown_does_not_ask_at_each_instant_whether_its_lamps_were_written_to() -> None:
+    sim = Simulation(Arena.box(300, 300), seed=1)
+    describe_scene(sim, 0)
+    pack_frame(sim, scene=0)
+    assert not sim.world.lamps_exposed

@@ -19,6 +19,7 @@ from kiks.export.bundle import bundle
 from kiks.export.page import WEB, save_page
 from kiks.export.run_frames import RunFrames
 from kiks.recording.entries import Entry
+from kiks.recording.mcap_file import McapReader
 from kiks.recording.recorder import RunRecorder
 from kiks.recording.replay import Replay
 
@@ -240,7 +241,8 @@ def test_frames_keep_to_the_recording_where_the_run_differs(
 
 def test_what_a_killed_run_has_written_becomes_a_page(short: Path, tmp_path: Path) -> None:
     cut = tmp_path / "cut.mcap"
-    cut.write_bytes(short.read_bytes()[: short.stat().st_size // 2])
+    last = McapReader(short).chunks[-1]
+    cut.write_bytes(short.read_bytes()[: last.offset + last.length])
     found = Tags(page_of(cut, tmp_path))
     assert "was killed" in found.text
     assert f"{Recording(cut).duration_s:.3f} s of simulated time" in found.text

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from kiks.errors import ArenaError, ParameterError
 from kiks.model.arena import PAD, Arena, Ball, Cylinder, Lamp, Pose
 from kiks.model.materials import REFLECTANCES
+from kiks.model.raster import LEAPS_PER_CELL
 
 ROBOT_MM = 27.5
 
@@ -73,6 +74,19 @@ def test_clearance_is_the_exact_distance_to_the_nearest_wall_cell(seed, share):
         row, column = rng.integers(arena.clearance.shape[0]), rng.integers(arena.clearance.shape[1])
         expected = math.sqrt(((rows - row) ** 2 + (columns - column) ** 2).min())
         assert arena.clearance[row, column] == np.float32(expected)
+
+
+@settings(max_examples=10)
+@given(seed=st.integers(0, 2**32), share=st.sampled_from([0.0, 0.0005, 0.01, 0.3, 0.98]))
+def test_leap_is_the_gap_between_the_square_of_a_cell_and_that_of_the_nearest_wall_cell(seed, share):
+    arena = Arena.from_array(random_picture(seed, share=share), mm_per_pixel=1.0)
+    rows, columns = np.nonzero(arena.surface)
+    rng = np.random.default_rng(seed)
+    for _ in range(50):
+        row, column = rng.integers(arena.leaps.shape[0]), rng.integers(arena.leaps.shape[1])
+        up, right = (np.maximum(abs(gap) - 1, 0) for gap in (rows - row, columns - column))
+        leap = math.floor(LEAPS_PER_CELL * math.sqrt((up**2 + right**2).min()))
+        assert arena.leaps[row, column] == (-int(arena.surface[row, column]) or leap)
 
 
 def test_the_world_outside_is_wall():

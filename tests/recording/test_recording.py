@@ -23,6 +23,8 @@ from kiks.export import foxglove
 from kiks.firmware.general_io import GeneralIO
 from kiks.firmware.turret import Orders, Turret
 from kiks.model.arena import Lamp
+from kiks.model.checks import CLOCK_END_NS, ROBOTS_MAX
+from kiks.recording.entries import Entry, block_of, characters_in, entries_of
 from kiks.recording.events import EventReader
 from kiks.recording.log import RecordedLog
 from kiks.recording.mcap_file import room_of
@@ -31,6 +33,7 @@ from kiks.recording.replay import Replay, check_recording
 from kiks.recording.ring import Ring
 from kiks.sim.console import type_lines
 from kiks.sim.drag import Drags
+from kiks.sim.run_log import Kind
 from kiks.sim.things import Checkpoint
 
 SECONDS = 6.3
@@ -226,6 +229,31 @@ def test_a_hand_that_drags_while_the_world_runs(tmp_path: Path) -> None:
     check_again(recording, sim.state_hash())
 
 
+def test_a_block_gives_back_its_entries() -> None:
+    rng = np.random.default_rng(1)
+    rows = [
+        Entry(
+            int(rng.choice(list(Kind))),
+            *(int(rng.integers(0, most, endpoint=True)) for most in (CLOCK_END_NS, ROBOTS_MAX - 1)),
+            *rng.integers(-(2**63), 2**63 - 1, 2).tolist(),
+            rng.bytes(rng.integers(0, 300)),
+        )
+        for _ in range(1000)
+    ]
+    block = block_of([value for row in rows for value in row])
+    assert entries_of(block, "block") == rows
+    assert entries_of(block, "block", [Kind.SEND]) == [row for row in rows if row.kind == Kind.SEND]
+    assert characters_in(block) == sum(len(row.data) for row in rows)
+
+
+def test_what_is_too_much_for_a_block_goes_into_several(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("kiks.recording.recorder.ENTRIES_MAX", 7)
+    sim = Simulation(Arena.box(400, 400), seed=2)
+    recording = recorded(sim, tmp_path / "run.mcap", lambda sim: drive(sim, 3.0))
+    assert len(recording.log.blocks) > 10
+    check_again(recording, sim.state_hash())
+
+
 def test_tables_tell_what_happened(tmp_path: Path) -> None:
     sim = Simulation(Arena.box(300, 300), robots=2, seed=1)
     read: list[list[int]] = []
@@ -404,7 +432,7 @@ def test_a_file_that_can_grow_no_more_is_read_up_to_there(
     recorder = sim.record(tmp_path / "run.mcap")
     drive(sim, 1.0)
     try:
-        resource.setrlimit(resource.RLIMIT_FSIZE, ((tmp_path / "run.mcap").stat().st_size + 2_000, before[1]))
+        resource.setrlimit(resource.RLIMIT_FSIZE, ((tmp_path / "run.mcap").stat().st_size + 1_000, before[1]))
         drive(sim, 5.0)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)

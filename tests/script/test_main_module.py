@@ -140,3 +140,13 @@ def test_a_module_that_does_not_start_is_one_line(
     with pytest.raises(ParameterError, match=re.escape(message)):
         parse_words(["-m", module])
     assert "package" not in sys.modules
+
+
+@pytest.mark.slow
+def test_an_open_file_in_a_cycle_with_its_functions_loses_nothing(home: Path) -> None:
+    """Python clears the globals before it looks for garbage, and so the file is flushed before it is closed."""
+    (home / "open.py").write_text("import sys\nf = open(sys.argv[1], 'w')\nf.write('all')\ndef file(): return f\n")
+    for words in (["open.py", "alone.txt"], ["open.py shared.txt", "open.py other.txt"]):
+        kiks = run(home, "-m", "kiks", "run", *words)
+        assert kiks.returncode == 0, kiks.stderr
+    assert [(home / f"{name}.txt").read_text() for name in ("alone", "shared", "other")] == ["all"] * 3

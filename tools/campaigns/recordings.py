@@ -50,7 +50,7 @@ class Parts:
         reader = McapReader(path)
         parts = cls(dict(reader.attachments), dict(reader.told))
         for block in reader.blocks:
-            parts.blocks.append(entries_of(reader.read(block), "log", 1000, 1000))
+            parts.blocks.append(entries_of(reader.read(block), "log"))
         return parts
 
     def save(self, path: Path) -> None:
@@ -181,7 +181,8 @@ def _field(rng: random.Random, parts: Parts) -> Parts:
 
 def _numbers(rng: random.Random, parts: Parts) -> Parts:
     place = rng.choice(("kind", "time_ns", "robot", "number", "other"))
-    value = rng.choice([number for number in NUMBERS if isinstance(number, int) and -(2**63) <= number < 2**63])
+    low, high = {"kind": (0, 255), "robot": (0, 65535)}.get(place, (-(2**63), 2**63 - 1))
+    value = rng.choice([number for number in NUMBERS if isinstance(number, int) and low <= number <= high])
     kind = rng.choice(list(Kind))
     if place == "kind" and rng.random() < 0.5:
         value = int(rng.choice(list(Kind)))
@@ -215,11 +216,8 @@ def _program(rng: random.Random, parts: Parts) -> Parts:
 
 def many_entries(parts: Parts) -> Parts:
     """Return parts with a million empty lines of output."""
-    columns = np.zeros((6, 1_000_000), "<i8")
-    columns[0] = Kind.TEXT
-    columns[1] = max((each.time_ns for each in parts.blocks[-1][0] if isinstance(each, Entry)), default=0)
-    block = np.uint32(columns.shape[1]).tobytes() + columns.tobytes()
-    return replace(parts, blocks=[*parts.blocks, block])
+    time_ns = max((each.time_ns for each in parts.blocks[-1] if isinstance(each, Entry)), default=0)
+    return replace(parts, blocks=[*parts.blocks, block_of([Kind.TEXT, time_ns, 0, 0, 0, b""] * 1_000_000)])
 
 
 def use(path: Path) -> None:

@@ -1,9 +1,8 @@
 """Controllers and measures as the loop of a batch calls them: machine code at an address.
 
-Compiling the loop with the whole engine in it takes half a minute. A new controller or another choice of measures must
-not cost that again. So the loop is compiled once, stays in the cache, and calls functions by address. Each measure is
-compiled by itself. For a controller, a small function around it is compiled, which the loop calls once per bunch of
-worlds.
+Compiling the loop takes some seconds. A new controller or another choice of measures must not cost that again. So the
+loop is compiled once, stays in the cache, and calls functions by address. Each measure is compiled by itself. For a
+controller, a small function around it is compiled, which the loop calls once per bunch of worlds.
 """
 
 from __future__ import annotations
@@ -13,7 +12,7 @@ from collections.abc import Sequence
 from itertools import groupby
 from typing import Any
 
-from kiks.engine.compiling import callable_kernel
+from kiks.engine.compiling import address_of, callable_kernel
 
 # isort: split
 import numpy as np
@@ -23,7 +22,7 @@ from numba.np import arrayobj
 from numba.np.numpy_support import from_dtype
 from numpy.typing import NDArray
 
-from kiks.control.compiled_function import address_of, caller_of, compiled_for
+from kiks.control.compiled_function import caller_of, compiled_for
 from kiks.control.controller import ARGUMENTS, Controller
 from kiks.control.measure import Moment
 from kiks.engine.state import BODY

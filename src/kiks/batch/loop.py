@@ -48,7 +48,7 @@ def sense(scene: Any, worlds: Any, bunch: Any, is_on: Any, times_ns: Any, reader
         is_on: Their mask, bool [W].
         times_ns: Buffer for the time of each world [ns], int64 [W].
         readers: Buffer for the robots that are read together (`kiks.engine.sensing.proximity.Readers`).
-        counts: Buffer for their readings, int64 [`READERS`, 8].
+        counts: Buffer for their readings, float64 [`READERS`, 8].
     """
     line, numbers = worlds.line, bunch.worlds
     for k in range(numbers.shape[0]):
@@ -89,7 +89,7 @@ def read_sense(scene: Any, worlds: Any, code: Any, first: Any, readers: Any, cou
         first: Place of its first reading among the sensors of a robot.
         readers: Which robots, and when (`kiks.engine.sensing.proximity.Readers`).
         count: Their number.
-        counts: Buffer for readings, int64 [`READERS`, 8].
+        counts: Buffer for readings, float64 [`READERS`, 8].
     """
     if code == PROXIMITY:
         sense_proximity(scene, readers, count, True, counts)
@@ -172,11 +172,16 @@ def act(scene: Any, worlds: Any, bunch: Any, is_on: Any, times_ns: Any) -> Any:
                     wheels[numbers[k], robot, wheel] = whole_speed(wheels[numbers[k], robot, wheel])
             sort_commands(wheels, numbers[k], worlds.turns)
     for turn in range(wheels.shape[1]):
+        is_later = turn == 0
         for k in range(numbers.shape[0]):
             if is_on[k]:
                 length = command_length(wheels, numbers[k], worlds.turns[numbers[k], turn])
-                times_ns[k] = acts_at(line, worlds.sensed_ns[numbers[k]], length)
-        pass_to(scene, worlds, bunch, times_ns)
+                acts_ns = acts_at(line, worlds.sensed_ns[numbers[k]], length)
+                is_later = is_later or acts_ns > times_ns[k]
+                times_ns[k] = acts_ns
+        # Most of a thousand commands are as long as the one before.
+        if is_later:
+            pass_to(scene, worlds, bunch, times_ns)
         for k in range(numbers.shape[0]):
             if is_on[k]:
                 robot = worlds.turns[numbers[k], turn]
@@ -300,7 +305,7 @@ def roll_out_block(
     deciders, watchers = callbacks
     all_numbers, all_times_ns, all_on = stack_integers(LANES), stack_integers(LANES), stack_booleans(LANES)
     ticks = stack_integers(LANES)
-    readers, counts = make_readers(), stack_integers(_READINGS).reshape((READERS, SENSOR_COUNT))
+    readers, counts = make_readers(), stack_floats(_READINGS).reshape((READERS, SENSOR_COUNT))
     for first in range(0, block.shape[0], size):
         count = min(size, block.shape[0] - first)
         numbers, times_ns, is_on = all_numbers[:count], all_times_ns[:count], all_on[:count]

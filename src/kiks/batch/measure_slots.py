@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.batch.callbacks import MEASURE
-from kiks.control.compiled_function import address_of
 from kiks.control.measure import Measure
+from kiks.engine.compiling import address_of
 from kiks.errors import ParameterError, shown
 from kiks.model.checks import check_kind
 

@@ -62,7 +62,6 @@ def desk(
 
     Example: kiks desk --arena maze
     """
-    ready_engine()
     from kiks.desk.server.access import LOOPBACK
     from kiks.desk.server.desk import Desk
     from kiks.ports.program_process import commands_of, supervisor_of
@@ -82,7 +81,7 @@ def desk(
     )
     commands = commands_of(project, home)
     commands[: len(begin)] = begin
-    sim = simulation_of(project, home)
+    sim = simulation_of(project, home, ready=ready_engine)
     shown = Desk(
         sim,
         project=project,

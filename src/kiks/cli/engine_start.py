@@ -1,4 +1,4 @@
-"""Compiles the engine at the first start, and tells the user who waits for it."""
+"""Compiles the engine at the first start, on all processors. The compiler itself says so (`kiks.engine.compiling`)."""
 
 from __future__ import annotations
 
@@ -9,46 +9,48 @@ import subprocess
 import sys
 import threading
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any
-
-import typer
 
 if TYPE_CHECKING:
     from kiks.sim.simulation import Simulation
 
 
 def ready_engine(*, as_needed: bool = False) -> None:
-    """Compile the engine if it is not in the cache, and print a line before that.
+    """Compile the engine if it is not in the cache.
 
     Args:
-        as_needed: Whether to compile only what one robot among walls needs, in half of the time.
+        as_needed: Whether to compile only what one robot among walls needs, in a third of the time.
     """
     from kiks.engine.code_cache import is_compiled
     from kiks.engine.compiling import LAST
 
-    if not is_compiled("advance" if as_needed else LAST):
-        typer.echo("Compiling the engine for this computer: once, a minute or so ...", err=True)
-        if not as_needed:
-            _compile_together(_OF_ENGINE)
-            compile_everything()
     if as_needed:
+        if not is_compiled("advance"):
+            _compile_together((_roam, _sense))
         # Now, as compiling within the run would take from the chance of its program.
         _roam()
+        _sense()
+    elif not is_compiled(LAST):
+        _compile_together([piece for piece in _PIECES if piece is not compile_batch])
+        compile_everything()
 
 
 def ready_batch() -> None:
-    """Compile the engine, and print a line if the batch, which is compiled at its first run, is not in the cache."""
+    """Compile the engine and the batch if they are not in the cache."""
     from kiks.engine.code_cache import is_compiled
 
-    ready_engine()
     if not is_compiled("roll_out"):
-        typer.echo("Compiling the batch for this computer: once, half a minute or so ...", err=True)
+        compile_all()
 
 
 def compile_all() -> None:
     """Compile the engine and the batch, side by side, where there are processors for it."""
-    _compile_together(range(len(_PIECES)))
+    from kiks.engine.code_cache import is_compiled
+    from kiks.engine.compiling import LAST
+
+    if not (is_compiled(LAST) and is_compiled("roll_out")):
+        _compile_together(_PIECES)
     compile_everything()
     compile_batch()
 
@@ -58,8 +60,9 @@ def compile_everything() -> None:
     from kiks.model.arena import Arena
     from kiks.sim.simulation import Simulation
 
-    for number in _OF_ENGINE:
-        _PIECES[number]()
+    for piece in _PIECES:
+        if piece is not compile_batch:
+            piece()
     Simulation(Arena.box(200, 200), response="fast")  # last, for it calls `kiks.engine.compiling.LAST`
 
 
@@ -77,30 +80,30 @@ def compile_batch() -> None:
 
 
 def help_to_compile() -> None:
-    """Compile the pieces whose numbers come in, a line each; answer each with a line, and end with the input."""
-    orders: queue.SimpleQueue[int] = queue.SimpleQueue()
+    """Call the functions whose names come in, a line each; answer each with a line, and end with the input."""
+    orders: queue.SimpleQueue[str] = queue.SimpleQueue()
 
     def receive() -> None:
         for line in sys.stdin:
-            orders.put(int(line))
+            orders.put(line.strip())
         os._exit(0)
 
     threading.Thread(target=receive, daemon=True).start()
     while True:
-        _PIECES[orders.get()]()
+        globals()[orders.get()]()
         print(flush=True)
 
 
-def _compile_together(numbers: Sequence[int]) -> None:
+def _compile_together(pieces: Iterable[Callable[[], None]]) -> None:
     """Compile pieces by this process and one more for each other processor; do nothing where there is no other.
 
-    All fill the same cache. This process begins with the first piece, the others with the last: neighbours in the list
-    call the same kernels, and each process compiles those for itself. A piece whose process fails is left out.
+    All fill the same cache. This process begins with the first piece, the others with the last: each piece needs the
+    machine code of those before it rather than of those after it. A piece whose process fails is left out.
     """
     from kiks.ports.file_descriptors import processor_count
     from kiks.ports.program_process import python_line
 
-    left = deque(numbers)
+    left = deque(pieces)
 
     def feed(helper: subprocess.Popen[bytes]) -> None:
         assert helper.stdin
@@ -108,7 +111,7 @@ def _compile_together(numbers: Sequence[int]) -> None:
         with contextlib.suppress(IndexError, OSError, ValueError):
             while True:
                 # A buffer would keep what a dead process does not take, and then could not be closed.
-                os.write(helper.stdin.fileno(), b"%d\n" % left.pop())
+                os.write(helper.stdin.fileno(), f"{left.pop().__name__}\n".encode())
                 if not helper.stdout.readline():
                     break
 
@@ -125,7 +128,7 @@ def _compile_together(numbers: Sequence[int]) -> None:
             return
         with contextlib.suppress(IndexError):
             while True:
-                _PIECES[left.popleft()]()
+                left.popleft()()
         for feeder in feeders:
             feeder.join()
 
@@ -141,9 +144,12 @@ def _roam() -> None:
     from kiks.client.khepera import Khepera
 
     robot = Khepera(_simulation().port(1))
-    robot.proximity()
     robot.set_speed(1, 1)
     robot.pause(0.1)
+
+
+def _sense() -> None:
+    _simulation().proximity(1)
 
 
 def _drive() -> None:
@@ -185,16 +191,13 @@ def _read_light() -> None:
     _simulation().ambient(1)
 
 
-def _read_proximity() -> None:
+def _read_elsewhere() -> None:
     sim = _simulation()
-    sim.proximity(1)
     sim.proximity_at(1, sim.poses())
 
 
-_PIECES = (_drive, _take_image, _look, _explain, _read_light, _read_proximity, compile_batch)
-"""What one process compiles in one go. The longest are at the ends: time passes in them, and ticks take longest."""
-
-_OF_ENGINE = tuple(number for number, piece in enumerate(_PIECES) if piece is not compile_batch)
+_PIECES = (_roam, _drive, compile_batch, _look, _explain, _take_image, _read_elsewhere, _read_light, _sense)
+"""What one process compiles in one go."""
 
 _MOST_PROCESSES = 4
 """More would compile the same kernels again rather than others."""

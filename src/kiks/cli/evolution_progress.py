@@ -35,7 +35,7 @@ class Progress:
         self._bars = Bars(*columns, console=self._console, transient=True, disable=not self._console.is_terminal)
         self._bar = self._bars.add_task("preparing", total=1.0)
         self._before = len(evolution.generations)
-        self._begin_s = self._last_s = perf_counter()
+        self._begin_s, self._last_s = perf_counter(), _working_s()
         self._told_s = -EVERY_S
 
     def __enter__(self) -> Self:
@@ -49,8 +49,9 @@ class Progress:
     def each(self, evolution: Evolution) -> None:
         """Show how far it is; called after each generation."""
         now_s, count = perf_counter(), len(evolution.generations)
-        passed_s, rate = now_s - self._begin_s, evolution.driven_s / max(now_s - self._last_s, 1e-9)
-        self._last_s = now_s
+        working_s = _working_s()
+        passed_s, rate = now_s - self._begin_s, evolution.driven_s / max(working_s - self._last_s, 1e-9)
+        self._last_s = working_s
         shares = [passed_s / self._seconds] if self._seconds else []
         if self._generations:
             shares.append((count - self._before) / max(self._generations - self._before, 1))
@@ -69,6 +70,13 @@ class Progress:
         self._bars.update(self._bar, completed=number / len(sizes), description=said)
         if not self._console.is_terminal and not number:
             typer.echo(f"Finals: {sizes[0]} candidates in {len(sizes)} rounds")
+
+
+def _working_s() -> float:
+    """Return a time [s] that stands still while something is compiled."""
+    from kiks.engine.compiling import compiling_s
+
+    return perf_counter() - compiling_s()
 
 
 def _metric(number: float) -> str:

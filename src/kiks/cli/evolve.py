@@ -80,7 +80,6 @@ def evolve(
         for name in tasks.TASKS:
             typer.echo(f"{name:10} {tasks.load(name).about}")
         return
-    ready_batch()
     if seeds is not None:
         leave_out(context, "with --seeds", "record")
     chosen = tasks.load(task)
@@ -112,6 +111,7 @@ def evolve(
                     from kiks.learn.ray_executor import RayExecutor
 
                     executor = stack.enter_context(RayExecutor(None if cluster == "local" else cluster))
+                ready_batch()
                 with Progress(evolution, until, seconds) as progress:
                     evolution.run(
                         generations=until,

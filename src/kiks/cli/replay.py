@@ -38,10 +38,10 @@ def replay(
     """
     if check:
         leave_out(context, "with --check", "start", "speed")
-    ready_engine()
     from kiks.recording.recording import Recording
 
     recording = Recording(file)
+    ready_engine()
     if not recording.is_whole:
         say(f"the run that wrote {str(file)!r} was killed, or goes on: this is what it has written so far.")
     if check:

@@ -70,6 +70,8 @@ def serve(
     Example: kiks serve --arena maze --link /tmp/khepera
     """
     from kiks.clock.patience import Patience
+    from kiks.clock.thinking import parse_thinking
+    from kiks.ports.program_scheduler import check_policy
     from kiks.ports.server import Server
     from kiks.sim.from_project import simulation_of
 
@@ -89,9 +91,9 @@ def serve(
     project, home = world.project()
     if any(each.program for each in project.robots):
         say(f"The programs of {world.arena} do not start here; other programs may connect. kiks run starts them.")
-    sim = simulation_of(project, home, kinds=world.robot or (), thinking="none")
-    if not quiet:
-        ready_engine()
+    parse_thinking(thinking)
+    check_policy(silence.when_silent, silence.patience)
+    sim = simulation_of(project, home, kinds=world.robot or (), thinking="none", ready=ready_engine)
     compile_everything()  # or load it, so that the first program does not wait for it
     ports = _Ports(sim, pty, link, tcp, rfc2217, host, by_character, say)
     server = None

@@ -76,7 +76,7 @@ def session(
 def _serve(
     heartbeat: Heartbeat, window: bool | None, *, exchange: Exchange | None = None, listen: Path | None = None
 ) -> None:
-    from kiks.desk.server.show import has_screen
+    from kiks.desk.screen import has_screen
     from kiks.toolbox.session import Session
     from kiks.toolbox.session_files import write_session_file
     from kiks.toolbox.session_process import SessionProcess

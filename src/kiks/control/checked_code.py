@@ -12,7 +12,7 @@ from collections.abc import Callable
 from types import ModuleType
 from typing import Any
 
-from kiks.engine.compiling import callable_kernel
+from kiks.engine.compiling import announce, callable_kernel
 
 # isort: split
 from numba.core import callconv, compiler, compiler_machinery, cpu, dispatcher, ir, lowering, typed_passes
@@ -159,3 +159,6 @@ class _Checked(_compiler.CompilerBase):  # type: ignore[misc, unused-ignore]
         passes.passes = [(ours if each is plain else each, why) for each, why in passes.passes]
         passes.finalize()
         return [passes]
+
+
+announce(_Checked, "Compiling functions of yours: some seconds at each start ...")

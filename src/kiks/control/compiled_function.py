@@ -14,6 +14,7 @@ from traceback import FrameSummary
 from typing import Any, Concatenate, ParamSpec, Protocol, TypeVar, overload
 
 from kiks.control.checked_code import checked, is_trusted
+from kiks.engine import compiling
 
 # isort: split
 from numba import cloudpickle, extending, types
@@ -174,16 +175,10 @@ def compiled_for(function: Any, argument_types: tuple[Any, ...]) -> Any:
     Raises:
         Exception: If it cannot be compiled, or returns something: Numba raises of many kinds.
     """
-    function.compile(argument_types)
-    result = function.overloads[argument_types]
+    result = compiling.compiled_for(function, argument_types)
     if result.signature.return_type != types.none:
         raise TypeError(RETURNS)
     return result
-
-
-def address_of(result: Any) -> int:
-    """Return the address of what `compiled_for` has compiled, for `caller_of`; valid while the function lives."""
-    return int(result.library.get_pointer_to_function(result.fndesc.llvm_func_name))
 
 
 def caller_of(argument_types: tuple[Any, ...]) -> Any:
@@ -194,14 +189,10 @@ def caller_of(argument_types: tuple[Any, ...]) -> Any:
         assert tuple(arguments) == argument_types, f"arguments must have the types {argument_types}, not {arguments}"
 
         def generate(context: Any, builder: Any, signature: Any, values: Any) -> Any:
-            convention = context.call_conv
-            function_type = convention.get_function_type(types.none, argument_types).as_pointer()
+            function_type = context.call_conv.get_function_type(types.none, argument_types).as_pointer()
             function = builder.inttoptr(values[0], function_type)
             given = [builder.extract_value(values[1], k) for k in range(len(argument_types))]
-            status, _ = convention.call_function(builder, function, types.none, argument_types, given)
-            with builder.if_then(status.is_error, likely=False):
-                convention.return_status_propagate(builder, status)
-            return context.get_dummy_value()
+            return compiling.call_at(function, types.none(*argument_types), context, builder, given)
 
         return types.none(types.int64, arguments), generate
 

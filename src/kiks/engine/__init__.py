@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import sys
 import warnings
+from importlib import import_module
 from typing import Any
 
 from kiks.errors import ParameterError, shown
@@ -25,6 +26,7 @@ def _load_numba() -> None:
             warnings.filterwarnings("ignore", "A Numba config file")
             import numba
 
+        _load_array_functions()
         config: Any = numba.config
         config._config_fname = os.devnull
         if config.DISABLE_JIT:
@@ -42,6 +44,22 @@ def _load_numba() -> None:
         del modules["yaml"]
         if yaml is not None:
             modules["yaml"] = yaml
+
+
+def _load_array_functions() -> None:
+    """Import Numba's functions of arrays, which import SciPy's linear algebra only to see whether it is there.
+
+    SciPy comes with KiKS, no kernel needs its linear algebra, and to import that takes a seventh of the time to the
+    first reading of a sensor. Functions of users that need it import it when they are compiled.
+    """
+    from numba.np import linalg
+
+    look = linalg.ensure_blas
+    linalg.ensure_blas = lambda: None
+    try:
+        import_module("numba.np.arraymath")
+    finally:
+        linalg.ensure_blas = look
 
 
 _load_numba()

@@ -2,8 +2,8 @@
 
 Robots of one world or of several fill the lanes in the order of their worlds and numbers, so hardly a lane stays empty.
 While a bunch exists, its lanes hold what moves in the robots. Their records in the scene follow where others need them:
-the poses after each tick, if other things share the world; what collisions change, of robots that may collide; the
-tracks, before sensors are read; all the rest at the end.
+the poses before neighbours are searched; what collisions change, of robots that may collide; the tracks, before sensors
+are read; all the rest at the end.
 """
 
 from __future__ import annotations
@@ -13,9 +13,11 @@ from collections import namedtuple
 from typing import Any
 
 import numpy as np
+from numba import types
+from numba.np.numpy_support import from_dtype
 
 from kiks.engine.compiling import inlined, kernel, spliced
-from kiks.engine.grid import PAIRS_PER_DISC, count_discs, enter_all, has_changed, note_moves, note_places
+from kiks.engine.grid import PAIRS_PER_DISC, count_discs, disc_at, enter_all, has_changed, note_moves, note_places
 from kiks.engine.simd.lanes import LANES
 from kiks.engine.simd.records import EIGHT, EIGHT_KINDS, fill_lanes, load_lane, one_of, open_record8, store_lane
 from kiks.engine.simd.stack_arrays import stack_integers, stack_records
@@ -51,6 +53,16 @@ Room: Any = namedtuple("Room", ("discs", "near", "pairs", "awake", "awake_counts
 * awake_counts: their numbers, int64 [world of the bunch].
 """
 
+
+def _list(element: Any) -> Any:
+    return types.Array(element, 1, "C")
+
+
+_tuple: Any = types.NamedTuple
+_integers = _list(types.int64)
+
+ROOM = _tuple((_list(from_dtype(DISC)), *(_integers,) * 4), Room)
+"""Numba's type of a `Room`."""
 
 FEW_DISCS = 16
 """Discs up to which scratch memory lies on the stack."""
@@ -98,6 +110,15 @@ Bunch: Any = namedtuple(
 * has_company: whether worlds hold anything that moves besides a lone robot;
 * has_grippers: whether any robot has a gripper.
 """
+
+BUNCH = _tuple(
+    (
+        *(_integers, _integers, *(_list(from_dtype(each)) for each in (EIGHT, EIGHT, EIGHT_KINDS)), _integers),
+        *(ROOM, types.boolean, types.boolean),
+    ),
+    Bunch,
+)
+"""Numba's type of a `Bunch`."""
 
 
 def worlds_in_bunch(robot_count: int) -> int:
@@ -200,16 +221,33 @@ def robot_in(scene: Any, bunch: Any, k: Any, number: Any) -> Any:
     return one_of(eight, place % LANES), scene.robots[bunch.worlds[k], number]
 
 
+@inlined
+def place_of(scene: Any, bunch: Any, k: Any, disc: Any) -> Any:
+    """Return the place of a disc in a world of the bunch, and its radius [mm]."""
+    robot_count = scene.robots.shape[1]
+    if disc < robot_count:
+        place = k * robot_count + disc
+        its = one_of(open_record8(bunch.kinds[place // LANES]), place % LANES)
+        one, _ = robot_in(scene, bunch, k, disc)
+        return one.x_mm, one.y_mm, its.radius_mm
+    return disc_at(scene, bunch.worlds[k], disc)
+
+
 @kernel
-def show_moves(scene: Any, bunch: Any, k: Any) -> Any:
-    """Write the poses of a world's robots to the scene, and note how far its things have moved in this tick."""
-    world, room, body_count = bunch.worlds[k], bunch.room, scene.bodies.shape[1]
-    longest, second = 0.0, 0.0  # squares of the two longest ways
+def show_places(scene: Any, bunch: Any, k: Any) -> Any:
+    """Write the poses of a world's robots to the scene."""
     for number in range(scene.robots.shape[1]):
         one, robot = robot_in(scene, bunch, k, number)
         copy_pose(one, robot)
-        square = square_of_move(one)
-        longest, second = max(longest, square), max(second, min(longest, square))
+
+
+@kernel
+def note_ways(scene: Any, bunch: Any, k: Any, longest_mm: Any) -> Any:
+    """Note how far the things of a world have moved in this tick, its robots at most so far [mm]."""
+    world, room, body_count = bunch.worlds[k], bunch.room, scene.bodies.shape[1]
+    # Squares of the two longest ways.
+    longest = longest_mm * longest_mm
+    second = longest if scene.robots.shape[1] > 1 else 0.0
     for place in range(room.awake_counts[k]):
         square = square_of_move(scene.bodies[world, room.awake[body_count * k + place]])
         longest, second = max(longest, square), max(second, min(longest, square))
@@ -218,7 +256,7 @@ def show_moves(scene: Any, bunch: Any, k: Any) -> Any:
 
 @inlined
 def square_of_move(thing: Any) -> Any:
-    """Return the square of how far a robot or body has moved since the last tick boundary that it remembers [mm^2]."""
+    """Return the square of how far a body, or robots, have moved since the last tick boundary [mm^2]."""
     dx, dy = thing.x_mm - thing.trail[0, 0], thing.y_mm - thing.trail[0, 1]
     return dx * dx + dy * dy
 

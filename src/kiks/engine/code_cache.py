@@ -5,9 +5,10 @@ and one that another user has written runs that user's code.
 Method: each file holds one function for one signature, and the digests of what is in it. It is read only if it and its
 folder belong to this user or the superuser and others cannot write there. A damaged file is deleted and its function
 compiled again; damaged is what has not its digests, and nothing else.
-The name of the folder is a digest of all that the code depends on, so files of another version are never read. Neither
-paths nor times are part of it: the files fit the same sources on another computer. A wheel can bring some. Of the
-sources it has the syntax trees without docstrings, so a changed comment compiles nothing again.
+The name of the folder is a digest of compilers and processor, and the name of a file has one of the sources that its
+function is compiled from, so files of another version are never read. Neither paths nor times are part of them: the
+files fit the same sources on another computer. A wheel can bring some. Of the sources they have the syntax trees
+without docstrings: a changed comment compiles nothing again, and a changed kernel only what it is compiled into.
 """
 
 from __future__ import annotations
@@ -50,10 +51,13 @@ SHIPPED = Path(__file__).parent / "compiled"
 _numba: Any = serialize
 _Result: Any = CompileResult
 
-_FORMAT = b"kiks-code-1"
+_FORMAT = b"kiks-code-2"
 _HEAD = re.compile(_FORMAT + rb" ([0-9]{1,12}) ([0-9a-f]{64}) ([0-9a-f]{64})")
-_DIGEST = re.compile(rb"[0-9a-f]{64}")
+_DIGESTS = re.compile(r"(?:[\w.]+ [0-9a-f]{16}\n)+")
 _ENDING = ".code"
+
+_EVERYWHERE = ("kiks.engine.__init__", "kiks.engine.compiling", "kiks.engine.simd.")
+"""Modules of which kernels are made that do not import them: they say how to compile, and what operators do."""
 
 _ANNOTATION = 6
 """Where Numba puts the annotated source among the parts of a compiled function."""
@@ -65,7 +69,7 @@ class CodeCache:
     cache_path = ""
 
     def __init__(self, function: Callable[..., Any]) -> None:
-        self._name = f"{function.__module__}.{function.__qualname__}"
+        self._module, self._name = function.__module__, f"{function.__module__}.{function.__qualname__}"
 
     def enable(self) -> None:
         """Do nothing; Numba asks for it."""
@@ -78,7 +82,12 @@ class CodeCache:
         key = _key(signature, context.codegen())
         for path in _files(self._name):
             if (payload := _payload(path, key)) is not None:
-                return _Result._rebuild(context, *payload)
+                parts, linked = payload
+                if any(name not in _AT_LOAD for name in linked):
+                    continue  # it calls a kernel with other arguments than the kernel takes by now
+                for name in linked:
+                    _AT_LOAD[name]()
+                return _Result._rebuild(context, *parts)
         return None
 
     def save_overload(self, signature: Any, compiled: Any) -> None:
@@ -88,9 +97,10 @@ class CodeCache:
         key = _numba.dumps(_key(signature, compiled.library.codegen))
         parts = list(compiled._reduce())
         parts[_ANNOTATION] = ""  # a text for people, which names the folder of the sources
-        payload = _numba.dumps(tuple(parts))
+        payload = _numba.dumps((tuple(parts), _linked_in(compiled.library)))
         head = b" ".join((_FORMAT, str(len(key)).encode(), _digest(key), _digest(payload)))
-        data, name = head + b"\n" + key + payload, f"{self._name}-{_digest(key)[:16].decode()}{_ENDING}"
+        name = f"{self._name}-{digest_of(self._module)}-{_digest(key)[:16].decode()}{_ENDING}"
+        data = head + b"\n" + key + payload
         troubles = []
         for folder in cache_folders():
             try:
@@ -108,10 +118,23 @@ class CodeCache:
         else:
             result = "each start compiles it"
         if troubles:
-            _tell(
+            tell(
                 f"The compiled engine cannot be kept in {' or '.join(troubles)}, so {result}. "
                 "Set NUMBA_CACHE_DIR to a folder of yours with room."
             )
+
+
+_AT_LOAD: dict[str, Callable[[], None]] = {}
+
+
+def at_load(name: str, ready: Callable[[], None]) -> None:
+    """Call a function before machine code is loaded that refers to a symbol of this name."""
+    _AT_LOAD[name] = ready
+
+
+def _linked_in(library: Any) -> list[str]:
+    """Return the symbols among those of `at_load` that machine code refers to."""
+    return [each.name for each in library._final_module.global_variables if each.name in _AT_LOAD]
 
 
 def is_compiled(name: str) -> bool:
@@ -140,64 +163,104 @@ def _roots() -> Iterator[Path]:
 
 @functools.cache
 def _version() -> str:
-    """Return a digest of all that machine code depends on: sources, compilers, Python, processor."""
+    """Return a digest of what all machine code depends on beside the sources: compilers, Python, processor."""
     config: Any = numba.config
     settings = processor(), config.OPT, bool(config.BOUNDSCHECK)
     versions = numba.__version__, llvmlite.__version__, np.__version__, sys.implementation.cache_tag
-    return _digest(repr((_syntax_digest(), settings, versions)).encode())[:16].decode()
+    return _digest(repr((settings, versions)).encode())[:16].decode()
 
 
-def _syntax_digest() -> bytes:
-    """Return a digest of the syntax trees of all sources of kernels and of their constants.
+def digest_of(module: str) -> str:
+    """Return a digest of the sources that the kernels of a module are compiled from; of all for a module of others."""
+    digests = _digests()
+    return digests.get(module) or _digest(repr(digests).encode())[:16].decode()
 
-    To parse the sources takes a fifth of a second. So the digest lies in a file beside the folders of code, under the
+
+@functools.cache
+def _digests() -> dict[str, str]:
+    """Return the digests of all modules of kernels.
+
+    To parse the sources takes a fifth of a second. So the digests lie in a file beside the folders of code, under the
     digest of the sources' bytes.
     """
-    package = Path(__file__).parent.parent
-    globs = (*(f"{folder}/**/*.py" for folder in KERNEL_FOLDERS), *CONSTANT_FILES)
-    paths = [path for each in globs for path in sorted(package.glob(each))]
-    sources = {".".join(path.relative_to(package.parent).with_suffix("").parts): path.read_bytes() for path in paths}
+    sources = _sources()
     # Each version of Python writes syntax trees in its own way.
     name = f"sources-{_digest(repr((sys.version_info, sources)).encode())[:32].decode()}"
     for file in (root / name for root in (SHIPPED, *_roots())):
         with _IfAllowed():
-            if _is_believed(file.parent) and _is_safe(file.lstat()) and _DIGEST.fullmatch(digest := file.read_bytes()):
-                return digest
-    digest = _digest(_syntax(sources).encode())
+            is_believed = _is_believed(file.parent) and _is_safe(file.lstat())
+            if is_believed and _DIGESTS.fullmatch(text := file.read_bytes().decode(errors="replace")):
+                return dict(line.split() for line in text.splitlines())
+    syntax = _syntax(sources)
+    digests = {module: _digest(text.encode())[:16].decode() for module, text in syntax.items()}
+    data = "".join(f"{module} {digest}\n" for module, digest in digests.items()).encode()
     for root in _roots():
         with contextlib.suppress(ParameterError), _IfAllowed():
             _make_own(root)
-            replace_file(root / name, digest, rights=0o644)
-    return digest
+            replace_file(root / name, data, rights=0o644)
+    return digests
 
 
-def _syntax(sources: dict[str, bytes]) -> str:
-    """Return what kernels are compiled from as text: syntax trees without docstrings and places.
+def _sources() -> dict[str, bytes]:
+    """Return the sources of the kernels and of their constants, by the names of their modules."""
+    package = Path(__file__).parent.parent
+    globs = (*(f"{folder}/**/*.py" for folder in KERNEL_FOLDERS), *CONSTANT_FILES)
+    paths = [path for each in globs for path in sorted(package.glob(each))]
+    return {".".join(path.relative_to(package.parent).with_suffix("").parts): path.read_bytes() for path in paths}
+
+
+def _syntax(sources: dict[str, bytes]) -> dict[str, str]:
+    """Return what the kernels of each module are compiled from, as text: syntax trees without docstrings and places.
+
+    These are its tree, those of the modules from which it imports more than linked kernels, and so on; those that give
+    operators another meaning without being imported; and the constants that all of them import from elsewhere.
 
     Args:
         sources: Those of the kernels and of their constants, by the names of their modules.
     """
     trees = {name: ast.parse(source) for name, source in sources.items()}
-    found: dict[tuple[str, str], ast.stmt] = {}
+    kernels = [name for name in trees if name.split(".")[1] in KERNEL_FOLDERS]
+    functions = [(name, each) for name in kernels for each in trees[name].body if isinstance(each, ast.FunctionDef)]
+    linked = {(name, each.name) for name, each in functions if "linked" in _names(*each.decorator_list)}
+    needs: dict[str, set[str]] = {name: {name} for name in kernels}
+    constants: dict[str, dict[tuple[str, str], ast.stmt]] = {name: {} for name in kernels}
 
-    def find(module: str, name: str) -> None:
+    def find(found: dict[tuple[str, str], ast.stmt], module: str, name: str) -> None:
         """Find the constant of a module, and those that it is made of."""
         for statement in trees[module].body if module in trees and (module, name) not in found else ():
             if isinstance(statement, ast.ImportFrom) and name in (each.name for each in statement.names):
-                find(statement.module or "", name)
+                find(found, statement.module or "", name)
             elif isinstance(statement, ast.Assign) and name in _names(*statement.targets):
                 found[module, name] = statement
                 for other in _names(statement.value):
-                    find(module, other)
+                    find(found, module, other)
 
-    kernels = [tree for name, tree in trees.items() if name.split(".")[1] in KERNEL_FOLDERS]
-    for node in (node for tree in kernels for node in ast.walk(tree)):
-        if isinstance(node, ast.ImportFrom):
-            for each in node.names:
-                find(node.module or "", each.name)
-        if isinstance(body := getattr(node, "body", None), list):
-            node.body = [each for each in body if not _is_text(each)]  # type: ignore[attr-defined]
-    return "".join(map(ast.dump, [*kernels, *(found[key] for key in sorted(found))]))
+    for name in kernels:
+        for node in ast.walk(trees[name]):
+            if isinstance(node, ast.Import):
+                needs[name].update(each.name for each in node.names)
+            if isinstance(node, ast.ImportFrom):
+                for each in node.names:
+                    find(constants[name], node.module or "", each.name)
+                    if (node.module, each.name) not in linked:
+                        needs[name] |= {node.module or "", f"{node.module}.{each.name}"}
+            if isinstance(body := getattr(node, "body", None), list):
+                node.body = [each for each in body if not _is_text(each)]  # type: ignore[attr-defined]
+    texts = {
+        name: "".join(map(ast.dump, [trees[name], *(constants[name][key] for key in sorted(constants[name]))]))
+        for name in kernels
+    }
+    everywhere = {name for name in kernels if name.startswith(_EVERYWHERE)}
+    return {name: "".join(texts[each] for each in sorted(_closure(everywhere | {name}, needs))) for name in kernels}
+
+
+def _closure(names: set[str], needs: dict[str, set[str]]) -> set[str]:
+    """Return names with those that they need, directly or not."""
+    new = names
+    while new:
+        new = {other for name in new for other in needs[name] if other in needs} - names
+        names = names | new
+    return names
 
 
 def _names(*trees: ast.AST) -> set[str]:
@@ -217,12 +280,15 @@ def _key(signature: Any, codegen: Any) -> tuple[Any, ...]:
 
 
 def _files(name: str) -> Iterator[Path]:
-    """Yield the files of a function."""
+    """Yield the files of a function that fit the sources."""
     for folder in (SHIPPED / _version(), *cache_folders()):
         found: list[Path] = []
         with _IfAllowed():
-            found = sorted(folder.glob(f"{name}-*{_ENDING}"))
-        yield from found
+            found = sorted(folder.glob(f"{name}-*-*{_ENDING}"))
+        for path in found:
+            whole, digest, _ = path.name.rsplit("-", 2)
+            if digest == digest_of(whole.rpartition(".")[0]):
+                yield path
 
 
 def _payload(path: Path, key: object) -> Any:
@@ -234,7 +300,7 @@ def _payload(path: Path, key: object) -> Any:
     with _IfAllowed(), open(os.open(path, os.O_RDONLY | PLAINLY), "rb") as file:
         if not (_is_safe(os.fstat(file.fileno())) and _is_believed(path.parent)):
             if is_own:
-                _tell(
+                tell(
                     "The compiled engine must be in files that you alone can write, but others can write those in "
                     f"{folder!r}. It is compiled again; set NUMBA_CACHE_DIR to a folder of yours."
                 )
@@ -246,7 +312,7 @@ def _payload(path: Path, key: object) -> Any:
             # Only now it is sure that these are pickles of ours.
             return pickle.loads(payload) if pickle.loads(own_key) == key else None
         if is_own:
-            _tell(f"Damaged files in {folder!r} are thrown away; what they held is compiled again.")
+            tell(f"Damaged files in {folder!r} are thrown away; what they held is compiled again.")
             path.unlink()
     return None
 
@@ -304,6 +370,6 @@ def _digest(data: bytes) -> bytes:
 
 
 @functools.cache
-def _tell(text: str) -> None:
+def tell(text: str) -> None:
     """Say something once, not for each function."""
     logging.getLogger("kiks.engine").warning(text)

@@ -5,9 +5,9 @@ lists the discs square by square, row by row, and `spots` beside it their x, y a
 each square begins and where a row ends. So the discs of a row of squares are one stretch of memory, and `find_near`
 reads one for each row that a circle touches. A robot among a thousand is hardly more expensive than one alone.
 
-`pairs` lists the discs that are near each other, with some slack: only when things have moved that far, the grid is
-written anew and searched again. Until then a search adds that path to its reach. Grid and pairs follow from the places
-of the discs and are no part of the state.
+`pairs` lists the discs that are near each other, and `neighbours` those that the sensors of each robot might see, both
+with some slack: only when things have moved that far, the grid is written anew and searched again. Until then a search
+adds that path to its reach. All of this follows from the places of the discs and is no part of the state.
 """
 
 from __future__ import annotations
@@ -29,24 +29,35 @@ NEAR_LIMIT = 128
 PAIRS_PER_DISC = 32
 """Space for pairs per disc: discs that do not overlap cannot have as many neighbours of their own size or larger."""
 
+NEIGHBOURS = 40
+"""Numbers of a robot's list of neighbours: how many there are, -1 if they are too many for the list, and then they."""
+
+SIGHT_SLACK_MM = 60.0
+"""How much farther than its sensors a robot's list of neighbours reaches [mm]."""
+
 _ROUNDED_MM = 1e-6  # more than the rounding of the ways in a tick
 
-Grid: Any = namedtuple("Grid", ("begins", "entries", "spots", "pairs", "places", "crowds", "widest_mm"))
+Grid: Any = namedtuple(
+    "Grid", ("begins", "entries", "spots", "pairs", "neighbours", "places", "crowds", "widest_mm", "sight_mm")
+)
 """The grid of each world.
 
 * begins: int32 [world, row, column + 1];
 * entries: discs, int32 [world, disc];
 * spots: x, y and radius of the entries [mm], float64 [world, disc, 3];
 * pairs: discs that are near each other, the lower number first and in rising order, int32 [world, pair, 2];
+* neighbours: of each robot, in rising order, int32 [world, robot, `NEIGHBOURS`];
 * places: where the discs were when kernels last moved them [mm], float64 [world, disc, 2];
 * crowds: records of `CROWD`, shape [world];
-* widest_mm: the largest radius [mm].
+* widest_mm: the largest radius [mm];
+* sight_mm: how far from a robot's centre the edges of its neighbours are, at most, when they are listed [mm].
 """
 
 CROWD = np.dtype(
     [
         ("pair_count", "i8"),
         ("slack_mm", "f8"),  # distance by which two discs may still approach before pairs must be listed again
+        ("sight_mm", "f8"),  # up to where neighbours have been listed, -1 if they have not
         ("moved_mm", "f8"),  # longest path that a disc can have made since the grid was written
     ]
 )
@@ -116,9 +127,9 @@ def enter_all(scene: Any, world: Any) -> Any:
             spots[world, place, 0], spots[world, place, 1], spots[world, place, 2] = x, y, radius
     crowd = scene.grid.crowds[world]
     crowd.moved_mm = 0.0
-    # Pairs are listed when things move.
+    # Pairs and neighbours are listed when things move.
     crowd.pair_count = 0
-    crowd.slack_mm = -1.0
+    crowd.slack_mm = crowd.sight_mm = -1.0
 
 
 @kernel
@@ -156,6 +167,25 @@ def find_near(scene: Any, world: Any, x: Any, y: Any, reach_mm: Any, itself: Any
 
 
 @inlined
+def find_around(scene: Any, world: Any, x: Any, y: Any, reach_mm: Any, robot: Any, found: Any) -> Any:
+    """Do what `find_near` does for a robot, from its list of neighbours if that reaches as far."""
+    if scene.grid.entries.shape[1] == 1:
+        return 0
+    crowd, neighbours = scene.grid.crowds[world], scene.grid.neighbours
+    here_x, here_y, _ = disc_at(scene, world, robot)
+    # Both the robot and the others have moved since then.
+    far_mm = reach_mm + 2.0 * crowd.moved_mm + abs(x - here_x) + abs(y - here_y)
+    if not far_mm <= crowd.sight_mm or neighbours[world, robot, 0] < 0:
+        return find_near(scene, world, x, y, reach_mm, robot, found)
+    count, far = 0, reach_mm + scene.grid.widest_mm
+    for k in range(1, neighbours[world, robot, 0] + 1):
+        other_x, other_y, _ = disc_at(scene, world, neighbours[world, robot, k])
+        found[count] = neighbours[world, robot, k]
+        count += (other_x - x) * (other_x - x) + (other_y - y) * (other_y - y) < far * far
+    return count
+
+
+@inlined
 def put_in_order(numbers: Any, count: Any) -> Any:
     """Sort the first `count` numbers, which are few or nearly in order."""
     for k in range(1, count):
@@ -168,21 +198,32 @@ def put_in_order(numbers: Any, count: Any) -> Any:
 
 @kernel
 def list_pairs(scene: Any, world: Any, reach_mm: Any) -> Any:
-    """Write the grid anew, and list all pairs of discs with a gap of at most `reach_mm`.
+    """Write the grid anew, and list all pairs of discs with a gap of at most `reach_mm`, and all neighbours of robots.
 
-    The pairs are in the order of the discs' numbers, so nothing depends on when they are listed.
+    They are in the order of the discs' numbers, so nothing depends on when they are listed.
     """
     enter_all(scene, world)
-    crowd, pairs = scene.grid.crowds[world], scene.grid.pairs
+    crowd, pairs, neighbours = scene.grid.crowds[world], scene.grid.pairs, scene.grid.neighbours
     found = stack_integers(NEAR_LIMIT)
-    for disc in range(count_discs(scene)[1]):
+    robot_count, disc_count = count_discs(scene)
+    for disc in range(disc_count):
         if is_on_floor(scene, world, disc):
             x, y, radius = disc_at(scene, world, disc)
-            for k in range(find_near(scene, world, x, y, radius + reach_mm, disc, found)):
-                if found[k] > disc and crowd.pair_count < pairs.shape[1]:
+            near_mm, is_robot = radius + reach_mm, disc < robot_count
+            count = find_near(scene, world, x, y, max(near_mm, scene.grid.sight_mm * is_robot), disc, found)
+            if is_robot:
+                neighbours[world, disc, 0] = count if count < NEIGHBOURS else -1
+                for k in range(min(count, NEIGHBOURS - 1)):
+                    neighbours[world, disc, k + 1] = found[k]
+                if count == NEAR_LIMIT:
+                    count = find_near(scene, world, x, y, near_mm, disc, found)
+            for k in range(count):
+                other_x, other_y, other_radius = disc_at(scene, world, found[k])
+                dx, dy, far = other_x - x, other_y - y, near_mm + other_radius
+                if found[k] > disc and dx * dx + dy * dy < far * far and crowd.pair_count < pairs.shape[1]:
                     pairs[world, crowd.pair_count, 0], pairs[world, crowd.pair_count, 1] = disc, found[k]
                     crowd.pair_count += 1
-    crowd.slack_mm = reach_mm
+    crowd.slack_mm, crowd.sight_mm = reach_mm, scene.grid.sight_mm
 
 
 @kernel

@@ -15,13 +15,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from kiks.engine.compiling import entry
-from kiks.engine.grid import CROWD, PAIRS_PER_DISC, Grid, enter_all, squares_of
+from kiks.engine.compiling import entry, make_ready
+from kiks.engine.grid import CROWD, NEIGHBOURS, PAIRS_PER_DISC, SIGHT_SLACK_MM, Grid, enter_all, squares_of
 from kiks.engine.parameters import PARAMETERS
 from kiks.engine.physics.contact import Ground
 from kiks.engine.sensing.rays import Walls, walls_of
 from kiks.engine.sensing.thesis_networks import NETWORKS
-from kiks.engine.simd.addresses import address_field, address_of_array, opener
+from kiks.engine.simd.addresses import ArrayRecord, address_field, address_of_array, opener
 from kiks.engine.state import BODY, ROBOT, State
 from kiks.model.arena import Arena
 
@@ -36,9 +36,11 @@ _ARRAYS: dict[str, tuple[Any, int]] = {
     "entries": (_COUNT, 2),
     "spots": (_NUMBER, 3),
     "pairs": (_COUNT, 3),
+    "neighbours": (_COUNT, 3),
     "places": (_NUMBER, 3),
     "crowds": (CROWD, 1),
     "clearance": (_NARROW, 2),
+    "rooms": (_NARROW, 2),
     "brightness": (_BYTE, 2),
     "leaps": (_SMALL, 2),
     "faces": (_COUNT, 2),
@@ -47,16 +49,22 @@ _ARRAYS: dict[str, tuple[Any, int]] = {
     "seeds": (_INTEGER, 1),
 }
 
+MEETING = "meeting"
+"""The part of the engine that a lone robot without a gripper does not need."""
+
 SCENE = np.dtype(
     [address_field(name, dimensions) for name, (_, dimensions) in _ARRAYS.items()]
-    + [("widest_mm", np.float64), ("cell_mm", np.float64), ("pad", np.int64)]
+    + [("widest_mm", np.float64), ("sight_mm", np.float64), ("cell_mm", np.float64), ("pad", np.int64)]
 )
 """The record that stands for a scene."""
 
 
-open_scene = opener(
+OPEN_SCENE = ArrayRecord(
     SCENE, {name: element for name, (element, _) in _ARRAYS.items()}, {"grid": Grid, "ground": Ground, "walls": Walls}
 )
+"""Numba's type of an open scene."""
+
+open_scene = opener(OPEN_SCENE)
 """Return the open scene, whose names are those of `SCENE`, from the record that Python hands to a kernel.
 
 * robots: records of `ROBOT`, shape [world, robot];
@@ -111,13 +119,17 @@ class Scene:
             entries=np.zeros((world_count, disc_count), np.int32),
             spots=np.zeros((world_count, disc_count, 3)),
             pairs=np.zeros((world_count, PAIRS_PER_DISC * disc_count if has_company else 0, 2), np.int32),
+            neighbours=np.zeros((world_count, robot_count, NEIGHBOURS if has_company else 0), np.int32),
             places=np.zeros((world_count, disc_count, 2)),
             crowds=np.zeros(world_count, CROWD),
             networks=networks,
             lamps=lamps,
             seeds=np.asarray(seeds, np.int64),
         )
+        if has_company or state.robots["has_gripper"].any():
+            make_ready(MEETING)
         self.record["widest_mm"] = max(kinds["radius_mm"].max(initial=0.0), state.bodies["radius_mm"].max(initial=0.0))
+        self.record["sight_mm"] = kinds["ray_reach_mm"].max(initial=0.0) + SIGHT_SLACK_MM
         self._take_walls(arenas[0])
         enter_worlds(self.record, np.arange(world_count))
 
@@ -128,8 +140,8 @@ class Scene:
         self._arrays |= arrays
 
     def _take_walls(self, arena: Arena) -> None:
-        clearance, brightness, leaps, faces, cell_mm, pad = walls_of(arena)
-        self._keep(clearance=clearance, brightness=brightness, leaps=leaps, faces=faces)
+        clearance, rooms, brightness, leaps, faces, cell_mm, pad = walls_of(arena)
+        self._keep(clearance=clearance, rooms=rooms, brightness=brightness, leaps=leaps, faces=faces)
         self.record["cell_mm"], self.record["pad"] = cell_mm, pad
 
     def set_lamps(self, lamps: NDArray[np.float64]) -> None:

@@ -4,26 +4,28 @@ from __future__ import annotations
 
 from typing import Any
 
+from numba import types
+
 from kiks.engine.bunch import (
+    BUNCH,
     copy_motion,
     give_back,
     make_lanes,
     make_room,
-    robot_in,
+    note_ways,
     set_end,
-    show_moves,
+    show_places,
+    square_of_move,
     take,
-    wake_all,
     whose,
 )
-from kiks.engine.compiling import entry, inlined, kernel
-from kiks.engine.physics.collisions import collide_near_things, find_near_things, remember_places
+from kiks.engine.compiling import entry, inlined, kernel, linked
+from kiks.engine.meeting import meet_others
 from kiks.engine.physics.grasp import carry_lifted
-from kiks.engine.physics.gripper import tend_grippers
 from kiks.engine.physics.motion import move, note_contact, remember_pose, room_left, room_of
 from kiks.engine.physics.motor import control_motors, latch_encoders, turn_motors
-from kiks.engine.scene import open_scene
-from kiks.engine.simd.lanes import LANES, load
+from kiks.engine.scene import OPEN_SCENE, open_scene
+from kiks.engine.simd.lanes import LANES, greatest, load, root, wide
 from kiks.engine.simd.masks import anywhere, everywhere, holds, opposite
 from kiks.engine.simd.records import copy_lanes, copy_record8, one_of, open_record8
 from kiks.engine.simd.stack_arrays import stack_integers
@@ -52,7 +54,7 @@ def advance_world(scene: Any, tick: Any, tick_count: Any, lanes: Any, room: Any)
     give_back(scene, bunch)
 
 
-@kernel
+@linked(types.void(OPEN_SCENE, BUNCH, types.int64[::1]))
 def advance_bunch(scene: Any, bunch: Any, until: Any) -> Any:
     """Let time pass in the worlds of a bunch.
 
@@ -62,25 +64,32 @@ def advance_bunch(scene: Any, bunch: Any, until: Any) -> Any:
         until: The tick that each of its worlds is to reach, int64; a world that has reached it does no tick.
     """
     set_end(scene, bunch, until)
-    # A world without a robot is alone in its bunch.
-    while turn_wheels(bunch) or (bunch.robots.shape[0] == 0 and bunch.ticks[0] < until[0]):
-        for k in range(until.shape[0]):
-            if bunch.ticks[k] < until[k] and (bunch.has_company or bunch.has_grippers):
-                meet_others(scene, bunch, k)
-        move_freely(scene, bunch)
+    while True:
+        is_any, wheels_mm = turn_wheels(bunch)
+        # A world without a robot is alone in its bunch.
+        if not is_any and (bunch.robots.shape[0] > 0 or bunch.ticks[0] >= until[0]):
+            break
+        if bunch.has_company or bunch.has_grippers:
+            meet_others(scene, bunch, until, wheels_mm)
+        longest_mm = move_freely(scene, bunch)
         for k in range(until.shape[0]):
             if bunch.ticks[k] < until[k]:
                 if bunch.has_company:
-                    show_moves(scene, bunch, k)
+                    note_ways(scene, bunch, k, longest_mm)
                 if bunch.has_grippers:
+                    show_places(scene, bunch, k)
                     carry_lifted(scene, bunch.worlds[k])
                 bunch.ticks[k] += 1
 
 
 @inlined
 def turn_wheels(bunch: Any) -> Any:
-    """Phases: the motors of all robots turn their wheels; return whether any robot has a tick to do."""
-    is_any = False
+    """Phases: the motors of all robots turn their wheels.
+
+    Returns:
+        Whether any robot has a tick to do; the longest way of a wheel in it [mm].
+    """
+    is_any, longest = False, wide(0.0)
     for place in range(bunch.robots.shape[0]):
         eight, parameters = open_record8(bunch.robots[place]), open_record8(bunch.kinds[place])
         is_due = eight.tick_count < eight.until
@@ -95,34 +104,18 @@ def turn_wheels(bunch: Any) -> Any:
             left, right = turn_motors(eight, parameters, 0), turn_motors(eight, parameters, 1)
             eight.left_pulses, eight.right_pulses = left, right
             eight.way_mm = max(abs(left), abs(right)) * parameters.pulse_mm
-    return is_any
-
-
-@inlined
-def meet_others(scene: Any, bunch: Any, k: Any) -> Any:
-    """Phases: grippers move, and the things of a world that may collide move; the other robots have not moved yet."""
-    world, room = bunch.worlds[k], bunch.room
-    remember_places(scene, world, room, k)
-    if bunch.has_grippers and tend_grippers(scene, world):
-        scene.grid.crowds[world].slack_mm = -1.0
-        wake_all(scene, room, k)
-    near_count, pair_count, longest_mm = find_near_things(scene, bunch, k)
-    robot_count = scene.robots.shape[1]
-    for place in range(near_count):
-        if room.near[place] < robot_count:
-            one, robot = robot_in(scene, bunch, k, room.near[place])
-            copy_motion(one, robot)
-    if near_count > 0:
-        collide_near_things(scene, world, room, near_count, pair_count, longest_mm)
-    for place in range(near_count):
-        if room.near[place] < robot_count:
-            one, _ = robot_in(scene, bunch, k, room.near[place])
-            one.is_near, one.is_touching_discs = 1.0, room.discs[room.near[place]].is_touching
+            longest = max(longest, eight.way_mm)
+    return is_any, greatest(longest)
 
 
 @inlined
 def move_freely(scene: Any, bunch: Any) -> Any:
-    """Phases: the robots that can touch nothing but walls move; the contacts of all are counted."""
+    """Phases: the robots that can touch nothing but walls move; the contacts of all are counted.
+
+    Returns:
+        The longest way of a robot [mm].
+    """
+    longest = wide(0.0)  # its square
     for place in range(bunch.robots.shape[0]):
         eight, parameters = open_record8(bunch.robots[place]), open_record8(bunch.kinds[place])
         is_due = eight.tick_count < eight.until
@@ -141,7 +134,9 @@ def move_freely(scene: Any, bunch: Any) -> Any:
             is_touching = (is_near & (eight.is_touching_discs > 0.0)) | (opposite(is_near) & is_touching)
             eight.is_near = 0.0
         eight.room_mm = room_left(room_mm, eight.x_mm - eight.trail[0, 0], eight.y_mm - eight.trail[0, 1])
+        longest = max(longest, square_of_move(eight))
         note_contact(eight, is_touching)
         eight.tick_count = eight.tick_count + 1.0
         if not everywhere(is_due):
             copy_lanes(open_record8(bunch.before[place]), eight, opposite(is_due))
+    return root(greatest(longest))

@@ -119,7 +119,7 @@ def pack_frame(
     robots["encoders"] = (records["pulse_count"] + records["counter_offset"]).astype(np.int32)
     robots["distances_mm"] = sim.distances_mm()
     robots["proximity"], robots["ambient"] = seen.proximity, seen.ambient
-    bodies, lamps, cameras = _pack_bodies(sim, seen.places), sim.lamps.astype("<f4"), _pack_cameras(sim)
+    bodies, lamps, cameras = _pack_bodies(sim, seen.places), sim.world.lamps.astype("<f4"), _pack_cameras(sim)
     head: Any = np.zeros(1, HEAD)
     head["version"], head["kind"] = VERSION, KIND
     head["flags"] = PAUSED * is_paused + PROGRAM_DRIVES * is_driven
@@ -164,7 +164,7 @@ def _pack_cameras(sim: Simulation) -> NDArray[np.void]:
 def scene_key(sim: Simulation) -> tuple[Any, ...]:
     """Return what changes when a scene message no longer holds: the world, walls, robots, turrets, lamps or bodies."""
     turret_count = sum(len(wire.firmware.fitted) for wire in sim.wires)
-    counts = sim.robot_count, turret_count, len(sim.lamps)
+    counts = sim.robot_count, turret_count, len(sim.world.lamps)
     return sim, sim.arena, *counts, *sim.world.state.bodies["number"][0].tolist()
 
 

@@ -90,7 +90,7 @@ def _facts(recording: Recording, frames: RunFrames) -> list[tuple[str, str]]:
         for number in range(1, sim.robot_count + 1)
         if sim.turrets(number)
     ]
-    things = Counter(body["what"] for body in frames.scenes[0]["bodies"]) + Counter(lamp=len(sim.lamps))
+    things = Counter(body["what"] for body in frames.scenes[0]["bodies"]) + Counter(lamp=len(sim.world.lamps))
     made_again = (
         f"{frames.replay.equal_count} of {counted(frames.replay.check_count, 'checkpoint')} the same, to the bit"
     )

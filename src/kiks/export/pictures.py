@@ -76,7 +76,7 @@ class Picture:
     @classmethod
     def of_simulation(cls, sim: Simulation) -> Picture:
         """Return the picture of a simulation as it stands."""
-        return cls(sim.arena, sim.lamps, sim.bodies(), sim.poses(), [spec.body for spec in sim.specs])
+        return cls(sim.arena, sim.world.lamps, sim.bodies(), sim.poses(), [spec.body for spec in sim.specs])
 
     @classmethod
     def of_arena(cls, arena: Arena) -> Picture:

@@ -131,6 +131,12 @@ class K213(Turret):
         super().fit(site)
         site.record["camera_period"], site.record["camera_taken_ns"] = 0, -1
 
+    def due_ns(self, now_ns: int) -> int:
+        """Return when its last picture up to a time [ns] is due; -1 if it has taken that."""
+        record = self.site.record
+        instant_ns = now_ns - now_ns % PERIODS_NS[record["camera_period"]]
+        return instant_ns if instant_ns > record["camera_taken_ns"] else -1
+
     @property
     def period_ns(self) -> int:
         """Pictures are taken when the time is a multiple of this [ns]."""
@@ -158,8 +164,9 @@ class K213(Turret):
 
     def look(self, instant_ns: int) -> None:
         """Take a picture."""
-        self.site.record["camera_pixels"], self.site.record["camera_light"] = self.take(instant_ns)
-        self.site.record["camera_taken_ns"] = instant_ns
+        record = self.site.record
+        record["camera_pixels"], record["camera_light"] = self.take(instant_ns)
+        record["camera_taken_ns"] = instant_ns
 
     def set_period(self, code: int) -> None:
         """Set the reading period to that of a code of order U."""

@@ -250,6 +250,11 @@ class Arena:
         return self._tables.clearance
 
     @property
+    def rooms(self) -> npt.NDArray[np.float32]:
+        """The least `clearance` in each block of 16 x 16 cells [mm]: far from walls, one look-up in a small table."""
+        return self._tables.rooms
+
+    @property
     def leaps(self) -> npt.NDArray[np.int16]:
         """Free distance from any point of a cell in any direction [1/16 cells], and the brightness of walls.
 

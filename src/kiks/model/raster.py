@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import importlib.util
 import math
+from collections.abc import Callable
+from functools import cache
+from importlib.machinery import PathFinder
 from itertools import product
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -28,6 +33,9 @@ MM_PER_PIXEL_MIN, MM_PER_PIXEL_MAX = 0.1, 100.0
 
 LEAPS_PER_CELL = 16
 """Units of `Arena.leaps` in the edge of a cell."""
+
+ROOM_CELLS = 16
+"""Edge of a block of `Arena.rooms` [cells]."""
 
 FACE_UNITS = (1023.0, 1023.0, 256.0)
 """Units of the three parts of `Arena.faces`: in a vector's length, twice, and in the edge of a cell."""
@@ -59,15 +67,14 @@ def cells_per_pixel(row_count: int, column_count: int, mm_per_pixel: float) -> i
     return cells
 
 
-def clearance_mm(surface: npt.NDArray[np.uint8], mm_per_cell: float) -> npt.NDArray[np.float32]:
+def clearance_mm(surface: npt.NDArray[Any], mm_per_cell: float) -> npt.NDArray[np.float32]:
     """Return the distance to the nearest wall cell, between centres [mm].
 
     SciPy tells which wall cell is nearest; the distances are ours, in blocks that stay in the processor's cache,
     because SciPy's own come in float64 and take three times as long.
     """
-    from scipy.ndimage import distance_transform_edt
-
-    nearest = distance_transform_edt(surface == 0, return_distances=False, return_indices=True)
+    nearest = np.zeros((2, *surface.shape), np.int32)
+    _feature_transform()((surface == 0).astype(np.int8), None, nearest)
     rows, columns = (np.arange(count, dtype=np.int32) for count in surface.shape)
     clearance = np.empty(surface.shape, np.float32)
     for first in range(0, len(rows), _BLOCK_ROWS):
@@ -78,18 +85,47 @@ def clearance_mm(surface: npt.NDArray[np.uint8], mm_per_cell: float) -> npt.NDAr
     return clearance
 
 
+@cache
+def _feature_transform() -> Callable[[npt.NDArray[np.int8], None, npt.NDArray[np.int32]], None]:
+    """Return SciPy's function that writes down row and column of the zero nearest to each cell.
+
+    `scipy.ndimage` takes an eighth of the time to the first reading of a sensor to import, and this function is in one
+    file of it, which needs nothing else.
+    """
+    import scipy
+
+    spec = PathFinder.find_spec("_nd_image", [f"{folder}/ndimage" for folder in scipy.__path__])
+    if spec is None or spec.loader is None:
+        from scipy.ndimage import _nd_image
+
+        return _nd_image.euclidean_feature_transform  # type: ignore[no-any-return]
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module.euclidean_feature_transform  # type: ignore[no-any-return]
+
+
 def free_leaps(surface: npt.NDArray[np.uint8]) -> npt.NDArray[np.int16]:
     """Return how far it is from anywhere in a cell to the edge of the nearest wall cell [1/`LEAPS_PER_CELL` cells].
 
     That is how far their squares are apart: as far as the centre of the one is from that of the nearest cell that is a
     wall or touches one. Rounded down; walls have their brightness, negative.
     """
-    from scipy.ndimage import maximum_filter
-
-    apart = clearance_mm(maximum_filter(surface, 3), 1.0)
+    above, near = surface > 0, surface > 0
+    above[1:] |= near[:-1]
+    above[:-1] |= near[1:]
+    near[:] = above
+    near[:, 1:] |= above[:, :-1]
+    near[:, :-1] |= above[:, 1:]
+    apart = clearance_mm(near, 1.0)
     leaps = np.minimum(apart * LEAPS_PER_CELL, np.iinfo(np.int16).max).astype(np.int16)
     np.negative(surface, out=leaps, where=surface > 0, dtype=np.int16)
     return leaps
+
+
+def block_rooms(clearance: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+    """Return the least clearance in each block of `ROOM_CELLS` x `ROOM_CELLS` cells; the last ones may be smaller."""
+    rows, columns = (np.arange(0, size, ROOM_CELLS) for size in clearance.shape)
+    return np.minimum.reduceat(np.minimum.reduceat(clearance, rows, axis=0), columns, axis=1)
 
 
 def wall_faces(

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from kiks.model.raster import PAD, clearance_mm, free_leaps, wall_faces
+from kiks.model.raster import PAD, block_rooms, clearance_mm, free_leaps, wall_faces
 
 SHARED_CELLS = 1_000_000
 """Largest raster whose tables other arenas with the same raster share [cells]."""
@@ -35,6 +35,11 @@ class WallTables:
     def clearance(self) -> npt.NDArray[np.float32]:
         """See `Arena.clearance`."""
         return _read_only(clearance_mm(self.surface, self._mm_per_cell))
+
+    @cached_property
+    def rooms(self) -> npt.NDArray[np.float32]:
+        """See `Arena.rooms`."""
+        return _read_only(block_rooms(self.clearance))
 
     @cached_property
     def leaps(self) -> npt.NDArray[np.int16]:

@@ -142,20 +142,25 @@ _MARSHAL_VERSION = 2
 """Later ones look for objects that occur twice, which takes half as long again."""
 
 
-def packed(message: Request | Answer) -> bytes:
-    """Return a message as bytes."""
-    data = marshal.dumps(tuple(message), _MARSHAL_VERSION)
+def packed(message: tuple[Any, ...]) -> bytes:
+    """Return the fields of a message as bytes."""
+    data = marshal.dumps(message, _MARSHAL_VERSION)
     return _LENGTH.pack(len(data)) + data
 
 
-def take_messages(buffer: bytearray) -> list[Any]:
-    """Remove and return the complete messages at the beginning of a buffer, as tuples of their fields."""
-    messages, start, size = [], 0, len(buffer)
-    while start + 4 <= size:
-        end = start + 4 + _LENGTH.unpack_from(buffer, start)[0]
-        if end > size:
-            break
-        messages.append(marshal.loads(buffer[start + 4 : end]))
-        start = end
-    del buffer[:start]
-    return messages
+class Inbox:
+    """Makes messages of the bytes of a connection, which come in any pieces."""
+
+    def __init__(self) -> None:
+        self._rest = b""
+
+    def take(self, data: bytes) -> list[Any]:
+        """Take bytes; return the messages that are complete with them, as tuples of their fields."""
+        if self._rest:
+            data = self._rest + data
+        messages, start, size = [], 0, len(data)
+        while start + 4 <= size and (end := start + 4 + _LENGTH.unpack_from(data, start)[0]) <= size:
+            messages.append(marshal.loads(data[start + 4 : end]))
+            start = end
+        self._rest = data[start:]
+        return messages

@@ -16,7 +16,7 @@ from kiks.clock.thinking import parse_thinking
 from kiks.ending import INTERRUPTED, noting_endings
 from kiks.errors import KiksError, ParameterError
 from kiks.ports.file_descriptors import opening
-from kiks.ports.messages import RECEIVE_SIZE, Answer, Request, Start, packed, take_messages
+from kiks.ports.messages import RECEIVE_SIZE, Answer, Inbox, Request, Start, packed
 from kiks.ports.participant import ProgramParticipant
 from kiks.ports.port_names import PortNames
 from kiks.ports.program_process import Command, Labels, OutputLine, Permission, Process, chance_seed
@@ -49,11 +49,11 @@ class Handle(ProgramParticipant):
         robot: Number of its own robot.
         scheduler: See `ProgramParticipant`.
         names: See `ProgramParticipant`.
+        selector: Tells when the connection is ready.
 
     Attributes:
         has_hung_up: Whether it has closed its end of the socket.
         has_ended: Set when the process has ended.
-        events: The events that the selector reports of the socket.
     """
 
     process: Process
@@ -66,16 +66,18 @@ class Handle(ProgramParticipant):
         robot: int,
         scheduler: ProgramScheduler,
         names: PortNames,
+        selector: selectors.BaseSelector,
     ) -> None:
         super().__init__(f"program {number} ({command.name})", number, robot, scheduler, names)
         self.command, self.number = command, number
         self.has_hung_up = self.is_end_reported = False
         self.has_ended = threading.Event()
-        self.events = 0
         self._socket = connection
         self._socket.setblocking(False)
-        self._received = bytearray()
-        self._unsent = bytearray()
+        self._inbox = Inbox()
+        self._unsent = b""
+        self._selector = selector
+        selector.register(connection, selectors.EVENT_READ, self.exchange)
 
     # ---- the process ----
 
@@ -118,44 +120,58 @@ class Handle(ProgramParticipant):
         """Close the connection."""
         self._socket.close()
 
-    def fileno(self) -> int:
-        """Return the socket's descriptor."""
-        return self._socket.fileno()
+    def exchange(self, events: int) -> None:
+        """Send and take what the connection is ready for."""
+        if events & selectors.EVENT_WRITE:
+            self._send(self._unsent)
+        if events & selectors.EVENT_READ and self._receive() is False:
+            self.hang_up()
 
-    def receive(self) -> bool:
-        """Take the requests that have arrived; return False when the program has hung up."""
-        try:
-            received = self._socket.recv(RECEIVE_SIZE)
-        except BlockingIOError:
-            return True
-        except OSError:
-            received = b""
-        if not received:
-            self.leave()
-            return False
-        self._received += received
-        for fields in take_messages(self._received):
-            self.add_request(Request(*fields))
-        return True
+    def hang_up(self) -> None:
+        """Take the last requests of the program, which sends no more."""
+        if self.has_hung_up:
+            return
+        while self._receive():
+            pass
+        self.has_hung_up = True
+        self._selector.unregister(self._socket)
+        self.leave()
+        if self.has_left:
+            self.close()
 
     def reply(self, answer: Answer) -> None:
         """Send an answer; bytes that the program does not take yet wait."""
-        self._unsent += packed(answer)
-        self.flush()
+        self._send(self._unsent + packed(tuple(answer)))
 
-    @property
-    def has_unsent(self) -> bool:
-        """Whether bytes of an answer wait; call `flush` when the socket is writable."""
-        return bool(self._unsent)
+    def drop(self) -> None:
+        """Disconnect the program, and kill its process."""
+        super().drop()
+        self.process.kill()
 
-    def flush(self) -> None:
-        """Send the waiting bytes that the program takes."""
+    def _send(self, data: bytes) -> None:
+        had_unsent = bool(self._unsent)
         try:
-            del self._unsent[: self._socket.send(self._unsent)]
+            self._unsent = data[self._socket.send(data) :]
         except BlockingIOError:
-            pass
+            self._unsent = data
         except OSError:
-            self._unsent.clear()
+            self._unsent = b""
+        has_unsent = bool(self._unsent)
+        if has_unsent is not had_unsent and not self.has_hung_up:
+            events = selectors.EVENT_READ | (selectors.EVENT_WRITE if has_unsent else 0)
+            self._selector.modify(self._socket, events, self.exchange)
+
+    def _receive(self) -> bool | None:
+        """Take requests that have arrived; return None if there are none, and False if the program has hung up."""
+        try:
+            received = self._socket.recv(RECEIVE_SIZE)
+        except BlockingIOError:
+            return None
+        except OSError:
+            received = b""
+        for fields in self._inbox.take(received):
+            self.add_request(Request._make(fields))
+        return bool(received)
 
 
 class _OverError(Exception):
@@ -210,6 +226,7 @@ class Programs:
         self.sim = sim
         self.permission = Permission(None)
         self.handles: list[Handle] = []
+        self._unreported: list[Handle] = []
         self._visitors: list[ProgramParticipant] = []
         self._is_moving = False
         self._moved = threading.Condition(sim.lock)
@@ -240,7 +257,7 @@ class Programs:
             self._selector = selectors.DefaultSelector()
         self._wake_receiver.setblocking(False)
         self._wake_sender.setblocking(False)
-        self._selector.register(self._wake_receiver, selectors.EVENT_READ)
+        self._selector.register(self._wake_receiver, selectors.EVENT_READ, self._take_ends)
 
     def begin(self) -> None:
         """Start the programs that begin together; does nothing if they have been started."""
@@ -361,7 +378,7 @@ class Programs:
             # The programs get the signal, too, and may still stop their robots.
             with noting_endings(lambda _number: self._note_signal()):
                 loop.on_slice = self._check_signals
-                while any(not handle.is_end_reported for handle in self.handles) or self._scheduler.participants:
+                while self._scheduler.participants or any(not handle.is_end_reported for handle in self.handles):
                     self._check_signals()
                     self.round(IDLE_S)
         except _OverError:
@@ -401,26 +418,12 @@ class Programs:
         """
         with self.sim.lock:
             wait_s = self.move()
-            over = self._check_processes()
-        wait_s = wait_limit_s if wait_s is None else min(wait_s, wait_limit_s)
-        ready = self._selector.select(wait_s)
-        with self.sim.lock:
-            for key, events in ready:
-                if key.data is None:
-                    self._clear_wake()
-                elif events & selectors.EVENT_WRITE:
-                    key.data.flush()
-                if key.data is not None and events & selectors.EVENT_READ and not key.data.receive():
-                    self._hang_up(key.data)
-            handled = [key.data for key, _ in ready]
-            for handle in over:
-                # A child process of the program may still hold the connection.
-                if handle not in handled and not handle.has_hung_up:
-                    handle.leave()
-                    self._hang_up(handle)
-            ended = self._new_ends()
-        for handle in ended:
-            self._report_end(handle)
+        ready = self._selector.select(wait_limit_s if wait_s is None else min(wait_s, wait_limit_s))
+        if ready:
+            with self.sim.lock:
+                for key, events in ready:
+                    key.data(events)
+        self._report_ends()
 
     def close(self) -> None:
         """End all processes, report how programs have ended, and close the connections."""
@@ -429,8 +432,8 @@ class Programs:
             if handle.has_hung_up:
                 handle.has_ended.wait(GRACE_S)  # the process ends by itself and will have an exit code
             handle.process.kill()
-        for handle in self._new_ends():
-            self._report_end(handle)
+        self._take_ends()
+        self._report_ends()
         for handle in self.handles:
             handle.process.wait()
             handle.close()
@@ -460,7 +463,7 @@ class Programs:
         self.permission.check(command)
         number = self._count + 1
         here, there = socket.socketpair()
-        handle = Handle(command, here, number, robot, self._scheduler, self._names)
+        handle = Handle(command, here, number, robot, self._scheduler, self._names, self._selector)
         start = Start(
             is_late=self._scheduler.has_begun,
             end_ns=self.sim.loop.end_ns,
@@ -484,6 +487,7 @@ class Programs:
                     hear=lambda line: self._record_line(robot, line),
                 )
             except KiksError:
+                handle.hang_up()
                 handle.close()
                 raise
         # A running world does not wait for the imports of a new program.
@@ -506,59 +510,33 @@ class Programs:
         handle.has_ended.set()
         self._wake()
 
-    def _check_processes(self) -> list[Handle]:
-        """Kill silenced programs, update the selector, return programs whose process has ended."""
-        over = []
+    def _take_ends(self, _events: int = 0) -> None:
+        """Hang up on programs that have ended: a child process of theirs may still hold the connection."""
+        with contextlib.suppress(OSError):
+            self._wake_receiver.recv(1 << 10)
         for handle in self.handles:
-            if handle.is_silenced and handle.is_running:
-                handle.process.kill()
-            if handle.is_stopped and handle.process.code is not None:
-                handle.disconnect()
-                handle.has_ended.set()
-            if not handle.has_hung_up:
-                self._listen_to(handle)
-                if not handle.is_running:
-                    over.append(handle)
-        return over
-
-    def _listen_to(self, handle: Handle) -> None:
-        events = selectors.EVENT_READ | (selectors.EVENT_WRITE if handle.has_unsent else 0)
-        if not handle.events:
-            self._selector.register(handle, events, handle)
-        elif events != handle.events:
-            self._selector.modify(handle, events, handle)
-        handle.events = events
-
-    def _hang_up(self, handle: Handle) -> None:
-        self._selector.unregister(handle)
-        handle.has_hung_up = True
-        if handle.has_left:
-            handle.close()
-
-    def _new_ends(self) -> list[Handle]:
-        """Return the programs that have ended since the last call."""
-        ended = [
-            handle
-            for handle in self.handles
-            if handle.has_hung_up and not handle.is_running and not handle.is_end_reported
-        ]
+            if not handle.is_running:
+                handle.hang_up()
+        ended = [each for each in self.handles if each.has_hung_up and not each.is_running and not each.is_end_reported]
         for handle in ended:
             handle.is_end_reported = True
+        self._unreported += ended
         self._drop_replaced()
-        return ended
 
     def _drop_replaced(self) -> None:
         """Drop programs whose end has been reported and whose robot has had another program since."""
         last = {handle.robot: handle for handle in self.handles}
         self.handles = [each for each in self.handles if last[each.robot] is each or not each.is_end_reported]
 
-    def _report_end(self, handle: Handle) -> None:
-        """Report how a program has ended."""
-        self._say(f"{handle.name} {'was stopped' if handle.is_stopped else f'has ended {handle.how}'}.")
-        left = [other for other in self.handles if other.is_running and other.is_here]
-        if left and not any(other.is_waited_for for other in left):
-            names = ", ".join(other.name for other in left)
-            _log.warning("%s, which the world does not wait for, still runs. Ctrl-C ends it.", names)
+    def _report_ends(self) -> None:
+        """Report how programs have ended."""
+        while self._unreported:
+            handle = self._unreported.pop(0)
+            self._say(f"{handle.name} {'was stopped' if handle.is_stopped else f'has ended {handle.how}'}.")
+            left = [other for other in self.handles if other.is_running and other.is_here]
+            if left and not any(other.is_waited_for for other in left):
+                names = ", ".join(other.name for other in left)
+                _log.warning("%s, which the world does not wait for, still runs. Ctrl-C ends it.", names)
 
     def _missing(self) -> str:
         return ", ".join(each.name for each in self.handles if not each.is_here) or "a program elsewhere"
@@ -568,15 +546,13 @@ class Programs:
         with contextlib.suppress(OSError):
             self._wake_sender.send(b"!")
 
-    def _clear_wake(self) -> None:
-        with contextlib.suppress(OSError):
-            self._wake_receiver.recv(1 << 10)
-
     def _note_signal(self) -> None:
         self._signals += 1
 
     def _check_signals(self) -> None:
         """End `run` after Ctrl-C, when programs and world have had their time, or at the second one, or as told."""
+        if not (self._over or self._signals):
+            return
         share = 1.0 if any(handle.is_running for handle in self.handles) else WORLD_SHARE
-        if self._over or self._signals > 1 or (self._signals and self._grace.left_s(share=share) == 0):
+        if self._over or self._signals > 1 or self._grace.left_s(share=share) == 0:
             raise _OverError

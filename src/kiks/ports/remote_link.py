@@ -19,7 +19,7 @@ from typing import Any
 from kiks.clock.own_lock import OwnLock
 from kiks.clock.serial_timing import BACKLOG_LIMIT
 from kiks.errors import LinkError
-from kiks.ports.messages import RECEIVE_SIZE, WINDOW, Answer, Kind, Request, packed, take_messages
+from kiks.ports.messages import RECEIVE_SIZE, WINDOW, Answer, Inbox, Kind, Request, packed
 from kiks.sim.read_completion import NEVER_NS, Read
 from kiks.units import TICK_NS
 
@@ -123,12 +123,13 @@ class SocketConnection(Connection):
 
     def __init__(self, connection: socket.socket, *, is_late: bool = False, end_ns: int = NEVER_NS) -> None:
         super().__init__(OwnLock(), is_late=is_late, end_ns=end_ns)
-        self._socket = connection
-        self._received = bytearray()
+        # Of the socket as it is now: `script/socket_waits.py` gives sockets other methods while a program runs.
+        self._send_all, self._receive = connection.sendall, connection.recv
+        self._inbox = Inbox()
 
     def _transmit(self, request: Request) -> None:
         try:
-            self._socket.sendall(packed(request))
+            self._send_all(packed(tuple(request)))
         except OSError:
             # While it exits, Python clears objects in any order: a port may be closed after this socket.
             if not sys.is_finalizing():
@@ -136,20 +137,15 @@ class SocketConnection(Connection):
 
     def _wait(self, ticket: int) -> Answer:
         while True:
-            self._receive()
-            for fields in take_messages(self._received):
-                answer = Answer(*fields)
-                if answer.ticket == ticket:
-                    return answer
-
-    def _receive(self) -> None:
-        try:
-            received = self._socket.recv(RECEIVE_SIZE)
-        except OSError:
-            received = b""
-        if not received:
-            _end()
-        self._received += received
+            try:
+                received = self._receive(RECEIVE_SIZE)
+            except OSError:
+                received = b""
+            if not received:
+                _end()
+            for fields in self._inbox.take(received):
+                if fields[0] == ticket:
+                    return Answer._make(fields)
 
 
 class RemoteLine:

@@ -14,6 +14,7 @@ import numpy as np
 from kiks.errors import ParameterError
 from kiks.model.checks import CLOCK_END_NS, ROBOTS_MAX
 from kiks.sim.run_log import Kind
+from kiks.sim.saved_state import LAYOUT
 
 
 class Entry(NamedTuple):
@@ -36,58 +37,79 @@ class Entry(NamedTuple):
     data: bytes
 
 
+FIELD_COUNT = 6
+
+ENTRIES_MAX = 100_000
+"""Most entries of a block: what reading it costs is in proportion to its size, packed."""
+
+_COUNT = struct.Struct("<I")
+_COLUMNS = "BqHqqI"
+"""Types of the columns of a block, those of fields, the last one for the lengths of data."""
+
+RECORDED_LAYOUT = f"{LAYOUT} {_COLUMNS}"
+"""What the fields of entries and of states are: files with others are of another version."""
+
+_ENTRY_BYTES = struct.calcsize(f"<{_COLUMNS}")
+
+
 def block_of(values: Sequence[Any]) -> bytes:
     """Return a block of entries, whose fields (see `NotedEntry`) come one after the other.
 
+    Times are written as the time since the entry before, and numbers as the time since that of the entry, which most
+    of them are: packed, little is left of them.
+
     Example:
-        >>> [entry] = entries_of(block_of((2, 5, 0, 5, 5, b"N")), "block", 1, 0)
+        >>> [entry] = entries_of(block_of((2, 5, 0, 5, 5, b"N")), "block")
         >>> entry.data
         b'N'
     """
     *columns, data = (values[place::FIELD_COUNT] for place in range(FIELD_COUNT))
-    # A struct takes numbers faster than `array` and numpy do.
-    numbers = struct.Struct(f"<{len(data)}q")
-    packed = (numbers.pack(*column) for column in (*columns, map(len, data)))
+    # A struct takes numbers faster than `array` and numpy do, and in the processor's own order of bytes once more.
+    kind, time_ns, robot, number, other, length = (
+        np.frombuffer(struct.pack(f"{len(data)}{code}", *column), code)
+        for code, column in zip(_COLUMNS, (*columns, map(len, data)), strict=True)
+    )
+    parts = kind, np.diff(time_ns, prepend=0), robot, number - time_ns, other - time_ns, length
+    packed = (part.astype(f"<{code}").tobytes() for code, part in zip(_COLUMNS, parts, strict=True))
     return b"".join((_COUNT.pack(len(data)), *packed, *data))
 
 
-FIELD_COUNT = 6
-_COUNT = struct.Struct("<I")
+def characters_in(block: bytes) -> int:
+    """Return how long the data of all entries of a block are together."""
+    (count,) = _COUNT.unpack_from(block)
+    return len(block) - _COUNT.size - int(count) * _ENTRY_BYTES
 
 
-def entries_of(
-    block: bytes, what: str, inputs_max: int, lines_max: int, kinds: Sequence[int] | None = None
-) -> list[Entry]:
+def entries_of(block: bytes, what: str, kinds: Sequence[int] | None = None) -> list[Entry]:
     """Return the entries of a block of `block_of`.
 
     Args:
         block: The block.
         what: What messages call it.
-        inputs_max: Most entries that it may have besides lines of output.
-        lines_max: Most lines of output.
         kinds: Those that are wanted; all if left out.
     """
-    count = _COUNT.unpack_from(block)[0] if len(block) >= _COUNT.size else -1
-    begin = _COUNT.size + count * FIELD_COUNT * 8
-    if not 0 < begin <= len(block):
-        raise _damaged(what)
-    columns = np.frombuffer(block, "<i8", count * FIELD_COUNT, _COUNT.size).reshape(FIELD_COUNT, count)
-    limits = ((0, 2**31), (0, CLOCK_END_NS), (0, ROBOTS_MAX - 1), *[(-(2**63), 2**63 - 1)] * 2, (0, len(block)))
-    for column, (low, high) in zip(columns, limits, strict=True):
-        if not ((column >= low) & (column <= high)).all():
-            raise _damaged(what)
-    ends = begin + columns[-1].cumsum()
-    if len(block) != (ends[-1] if count else begin):
-        raise _damaged(what)
-    line_count = np.count_nonzero(columns[0] == Kind.TEXT)
-    if not count or line_count > lines_max or count - line_count > inputs_max:
+    count = _COUNT.unpack_from(block)[0] if len(block) >= _COUNT.size else 0
+    if not 0 < count <= ENTRIES_MAX:
         raise ParameterError(f"{what} must be whole, but a part has {count} entries. Take another copy of it.")
+    if (end := _COUNT.size + count * _ENTRY_BYTES) > len(block):
+        raise _damaged(what)
+    columns, place = [], _COUNT.size
+    for code in _COLUMNS:
+        columns.append(np.frombuffer(block, f"<{code}", count, place))
+        place += columns[-1].nbytes
+    kind, time_ns, robot, number, other, length = columns
+    time_ns = time_ns.cumsum()
+    ends = end + length.cumsum()
+    is_sound = (kind <= max(Kind)) & (time_ns >= 0) & (time_ns <= CLOCK_END_NS) & (robot < ROBOTS_MAX)
+    if not is_sound.all() or len(block) != ends[-1]:
+        raise _damaged(what)
+    columns = [kind, time_ns, robot, number + time_ns, other + time_ns, length, ends]
     if kinds is not None:
-        is_wanted = np.isin(columns[0], kinds)
-        columns, ends = columns[:, is_wanted], ends[is_wanted]
+        is_wanted = np.isin(kind, kinds)
+        columns = [column[is_wanted] for column in columns]
     return [
         Entry(kind, time_ns, robot, number, other, block[end - length : end])
-        for kind, time_ns, robot, number, other, length, end in zip(*columns.tolist(), ends.tolist(), strict=True)
+        for kind, time_ns, robot, number, other, length, end in zip(*(each.tolist() for each in columns), strict=True)
     ]
 
 

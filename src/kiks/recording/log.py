@@ -8,20 +8,15 @@ from pathlib import Path
 from typing import NamedTuple, Protocol
 
 from kiks.errors import ParameterError
-from kiks.recording.entries import Entry, block_of, entries_of
+from kiks.recording.entries import RECORDED_LAYOUT, Entry, block_of, entries_of
 from kiks.recording.mcap_file import FoundChunk
-from kiks.recording.recorder import LINES_MAX
 from kiks.sim.run_log import ACT, CHECK, LAST_INPUT, MARK, STATE, TEXT
-from kiks.sim.saved_state import LAYOUT, SavedState, WorldFiles
+from kiks.sim.saved_state import SavedState, WorldFiles
 from kiks.units import s_from_ns
 from kiks.version import __version__
 
 HASH_LENGTH = 16
 """Characters of a hash, before the state of a checkpoint."""
-
-ENTRY_BYTES = 1
-"""Fewest bytes of a chunk, packed as it is, for each entry beyond `LINES_MAX`: a recording of KiKS has four times as
-many, and work is in proportion to the size of a file."""
 
 BLOCKS_KEPT = 4
 """Blocks of the log that are kept when they were read."""
@@ -77,7 +72,7 @@ class RecordedLog:
                 f"{reader.what} must be a recording of KiKS, but it is another MCAP file, or the run was killed at its "
                 "very beginning. `--record FILE` makes one."
             )
-        if reader.told["layout"] != LAYOUT:
+        if reader.told["layout"] != RECORDED_LAYOUT:
             raise ParameterError(
                 f"Cannot read {reader.what}: KiKS {reader.told.get('kiks', '?')} recorded it with other fields than "
                 f"KiKS {__version__} has. Read it with that version."
@@ -124,8 +119,7 @@ class RecordedLog:
         return self._read(block, (STATE, TEXT, MARK))
 
     def _read(self, block: int, kinds: Sequence[int] | None = None) -> list[Entry]:
-        inputs_max = 16 + self.reader.chunk(block).length // ENTRY_BYTES  # a few in the smallest chunk
-        return entries_of(self.reader.read(block), self.reader.what, inputs_max, LINES_MAX, kinds)
+        return entries_of(self.reader.read(block), self.reader.what, kinds)
 
     def until(self, block: int, time_ns: int) -> bytes:
         """Return the log of a block, as bytes, up to a time [ns]."""

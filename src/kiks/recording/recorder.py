@@ -1,7 +1,7 @@
 """Records a run while it goes on: its inputs, the hash of its state each second, and now and then the state.
 
 Replies, motion and contacts follow from that: `kiks.recording.rerun` makes the run again to get them. So the writer
-does nothing for each tick, and little for each command.
+does nothing for each tick, and extends a list for each command.
 
 A writer only reads the simulation. It reads the state where the run stops anyway or may stop without a difference, so
 that a run is the same with it, to the bit. Each simulation has one writer at most, which writes into one store or more:
@@ -12,21 +12,21 @@ from __future__ import annotations
 
 import logging
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from time import monotonic
 from types import TracebackType
-from typing import Protocol
+from typing import Protocol, cast
 
 from kiks.ending import postponing_endings
 from kiks.errors import ParameterError
 from kiks.model.atomic_files import path_of
 from kiks.model.checks import check_kind
-from kiks.recording.entries import FIELD_COUNT, block_of
+from kiks.recording.entries import ENTRIES_MAX, FIELD_COUNT, RECORDED_LAYOUT, block_of, characters_in
 from kiks.recording.mcap_file import McapFile
 from kiks.sim.read_completion import NEVER_NS
 from kiks.sim.run_log import ACT, CHECK, MARK, STATE, TEXT, Clock, NotedEntry
-from kiks.sim.saved_state import LAYOUT, WorldFiles, state_bytes
+from kiks.sim.saved_state import WorldFiles, state_bytes
 from kiks.sim.simulation import Simulation
 from kiks.sim.turret_host import has_user_turret
 from kiks.units import NS_PER_S, s_from_ns
@@ -37,14 +37,13 @@ _log = logging.getLogger("kiks.recording")
 CHECK_NS = NS_PER_S
 """Simulated time between two checkpoints [ns]."""
 
-STATE_US = 150_000
-"""Real time that it takes to make the run again from one state to the next, about [us]. A jump to any time of a
-recording takes no longer."""
+STATE_US = 75_000
+"""Real time that it takes to make the run again since the last state, about [us], after which a chunk begins with the
+state. A jump to any time of a recording takes no longer than that and one chunk."""
 
-ROBOT_US, ENTRY_US, BYTES_A_US = 60, 12, 28
-"""What a simulated second of a robot, and an input with its reply, cost to make again, about [us], and how much of a
-recording is read in a microsecond [bytes]. They are no measurements of this run, so that a recording is the same on any
-computer."""
+ROBOT_US, CHARACTER_US = 60, 3
+"""What a simulated second of a robot, and a character for it with its share of the reply, cost to make again, about
+[us]."""
 
 CHUNK_S = 0.1
 """Least real time between two chunks [s]. A crash costs what came after the last chunk: at most a second of a world in
@@ -90,7 +89,7 @@ class RunWriter:
     Attributes:
         next_ns: When the next checkpoint is due [ns].
         clock: The world's.
-        has_acted: Whether a robot has done something since the last input.
+        note: Notes an input, or when a program has thought: a function of C, as that comes in all exchanges.
         change_count: Of the world, when its changes were noted last.
         stores: Where it writes.
     """
@@ -108,9 +107,8 @@ class RunWriter:
         self.clock: Clock = self._world
         # In one list: a tuple for each entry would make Python's garbage collection slow.
         self._entries: list[int | bytes] = []
-        self._counted = self._work_us = 0
-        self._noted_ns = -1
-        self.has_acted = False
+        self.note: Callable[[NotedEntry], object] = self._entries.extend
+        self._work_us = 0.0
         self._waiting_bytes = 0
         self._chunk_ns = sim.now_ns
         self._chunk_at_s = 0.0
@@ -156,16 +154,11 @@ class RunWriter:
 
     # ---- from outside ----
 
-    def note(self, entry: NotedEntry) -> None:
-        """Note an input, or when a program has thought."""
-        time_ns = entry[1]
-        if self.has_acted:
-            self.has_acted = False
-            if time_ns == self._noted_ns:
-                # The replay does the same in the same order.
-                self._entries += (ACT, time_ns, 0, 0, 0, b"")
-        self._noted_ns = time_ns
-        self._entries += entry
+    def note_act(self) -> None:
+        """Note that a robot acts now, if something was noted at this instant: a replay does both in this order."""
+        now_ns = self._world.now_ns
+        if now_ns == (self._entries[1 - FIELD_COUNT] if self._entries else self._chunk_ns):
+            self.note((ACT, now_ns, 0, 0, 0, b""))
 
     def _note_own(self, entry: NotedEntry) -> None:
         """Note what a robot with a turret of a user's own does, and the state after it: a replay cannot run that."""
@@ -197,21 +190,20 @@ class RunWriter:
 
     def mark(self, note: str) -> None:
         """Set a bookmark at this time; the caller holds the lock."""
-        self._entries += (MARK, self._world.now_ns, 0, 0, 0, note.encode())
+        self.note((MARK, self._world.now_ns, 0, 0, 0, note.encode()))
 
     # ---- chunks ----
 
     def check(self) -> None:
         """Note the state, after all events up to `next_ns`, and choose a later `next_ns`."""
-        count = len(self._entries)
-        self._work_us += ROBOT_US * self._sim.robot_count + ENTRY_US * (count - self._counted) // FIELD_COUNT
-        self._note_check(has_state=self._work_us >= STATE_US)
-        self._counted = len(self._entries)
+        self._note_check()
         self.next_ns += CHECK_NS
         is_full = self._waiting_bytes > WAITING_BYTES_MAX or len(self._lines) > LINES_MAX // 2
         if is_full or monotonic() >= self._chunk_at_s:
             with postponing_endings():
                 self._write_chunk()
+                if self._work_us >= STATE_US:
+                    self._note_check(has_state=True)
 
     def _note_check(self, *, has_state: bool = False) -> None:
         self._sim.sync()
@@ -226,22 +218,25 @@ class RunWriter:
         """Write what waits."""
         while self._lines:
             now_ns, robot, line = self._lines.popleft()
-            self._entries += (TEXT, now_ns, robot, 0, 0, line.encode("utf-8", "replace"))
-        log = block_of(self._entries)
-        self._entries.clear()
-        self._counted = 0
-        self._work_us += len(log) // BYTES_A_US
-        begin_ns, self._chunk_ns = self._chunk_ns, self._world.now_ns
-        for store in self.stores:
-            if not store.write(begin_ns, log):
-                self.remove(store)
+            self.note((TEXT, now_ns, robot, 0, 0, line.encode("utf-8", "replace")))
+        entries, begin_ns, now_ns = self._entries, self._chunk_ns, self._world.now_ns
+        self._work_us += ROBOT_US * self._sim.robot_count * s_from_ns(now_ns - begin_ns)
+        while entries:  # hardly ever more than once
+            log = block_of(entries[: ENTRIES_MAX * FIELD_COUNT])
+            del entries[: ENTRIES_MAX * FIELD_COUNT]
+            self._work_us += CHARACTER_US * characters_in(log)
+            for store in self.stores:
+                if not store.write(begin_ns, log):
+                    self.remove(store)
+            begin_ns = cast(int, entries[1]) if entries else now_ns
+        self._chunk_ns = now_ns
         self._waiting_bytes = 0
         self._chunk_at_s = monotonic() + CHUNK_S
 
 
 def description_of(sim: Simulation) -> dict[str, str]:
     """Return what a recording says of itself: the version, its records' fields, the policy of thinking, the arena."""
-    return {"kiks": __version__, "layout": LAYOUT, "thinking": sim.thinking, "arena": sim.arena.name}
+    return {"kiks": __version__, "layout": RECORDED_LAYOUT, "thinking": sim.thinking, "arena": sim.arena.name}
 
 
 class RunRecorder:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import gc
 import json
 import os
 import signal
@@ -38,6 +39,8 @@ def main(descriptor: int, start: Start) -> int:
     os.set_inheritable(descriptor, False)
     connection = SocketConnection(socket.socket(fileno=descriptor), is_late=start.is_late, end_ns=start.end_ns)
     policy = ProgramClock(start.thinking)
+    # What is loaded by now stays to the end: no collection looks at it again.
+    gc.freeze()
 
     try:
         # Blocked since the start of the process; what came meanwhile acts here.

@@ -13,6 +13,8 @@ from importlib.machinery import SourceFileLoader, SourcelessFileLoader
 from pathlib import Path
 from pkgutil import get_importer
 from types import ModuleType
+from typing import Any
+from warnings import catch_warnings
 
 
 @contextmanager
@@ -44,6 +46,18 @@ def main_module(program: Path, arguments: list[str], module: str) -> Iterator[Ca
         yield run
     finally:
         sys.argv, sys.path[:], sys.modules["__main__"] = before
+        _clear(vars(main))
+
+
+def _clear(names: dict[str, Any]) -> None:
+    """Let go of the globals of a program as Python does at its end (`_PyModule_ClearDict`).
+
+    As garbage in a cycle with its functions, an open file would lose what it has not written yet.
+    """
+    with catch_warnings(action="ignore", category=ResourceWarning):
+        for name in sorted(names, key=lambda name: not (name.startswith("_") and not name.startswith("__"))):
+            if name != "__builtins__":
+                names[name] = None
 
 
 def _run_file(path: str, main: ModuleType) -> None:

@@ -40,13 +40,12 @@ class Cameras:
         After a change of the period the engine may have passed an instant already: no picture is taken of the past.
         """
         world = self._world
-        now_ns = world.now_ns
-        instants = [(now_ns - now_ns % each.period_ns, index) for index, each in self._fitted.items()]
-        for instant_ns, index in sorted(instants):
-            fitted = self._fitted[index]
-            if instant_ns > fitted.taken_ns and instant_ns >= world.state.tick_count * TICK_NS:
-                world.tick_to(instant_ns)
-                fitted.look(instant_ns)
+        now_ns, fitted = world.now_ns, self._fitted
+        due = [(due_ns, index) for index, each in fitted.items() if (due_ns := each.due_ns(now_ns)) >= 0]
+        for due_ns, index in sorted(due):
+            if due_ns >= world.state.tick_count * TICK_NS:
+                world.tick_to(due_ns)
+                fitted[index].look(due_ns)
 
     def retake(self) -> None:
         """Take those pictures again that were taken at this instant, before something was moved."""

@@ -135,7 +135,7 @@ class Drags:
 
     def _counts(self) -> dict[str, int]:
         """Return how many there are of each kind of thing."""
-        return {"robot": self._sim.robot_count, "body": len(self._bodies()), "lamp": len(self._sim.lamps)}
+        return {"robot": self._sim.robot_count, "body": len(self._bodies()), "lamp": len(self._sim.world.lamps)}
 
     def _bodies(self) -> Any:
         return self._sim.world.state.bodies[0]
@@ -147,7 +147,7 @@ class Drags:
         if what == "body":
             body = self._bodies()[index]
             return Held(what, index, float(body["x_mm"]), float(body["y_mm"]))
-        return Held(what, index, float(self._sim.lamps[index, 0]), float(self._sim.lamps[index, 1]))
+        return Held(what, index, float(self._sim.world.lamps[index, 0]), float(self._sim.lamps[index, 1]))
 
     def _slide(self, held: Held, x_mm: float, y_mm: float) -> tuple[float, float]:
         """Return how far a thing gets towards a place, in small steps that overlap nothing else."""

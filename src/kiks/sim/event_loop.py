@@ -35,6 +35,9 @@ class Recorder(WireRecorder, Protocol):
 
     next_ns: int
 
+    def note_act(self) -> None:
+        """Note that a robot acts now, maybe between two inputs of this instant."""
+
     def note_changes(self) -> None:
         """Note what was changed from outside."""
 
@@ -160,6 +163,8 @@ class EventLoop:
             due_ns, index = event
             if due_ns > world.now_ns:
                 world.now_ns = due_ns
+            elif self._recorder is not None:
+                self._recorder.note_act()
             self._sync()
             wires[index].act(world.now_ns)
         if time_ns > world.now_ns:

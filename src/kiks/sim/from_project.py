@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from kiks.clock.thinking import parse_thinking
 from kiks.engine.state import BALL
 from kiks.model.arena import Ball, Cylinder, Lamp, Pose
 from kiks.model.atomic_files import inside
@@ -25,6 +26,7 @@ def simulation_of(
     *,
     kinds: Sequence[str | RobotSpec] = (),
     thinking: str | None = None,
+    ready: Callable[[], object] = lambda: None,
 ) -> Simulation:
     """Return the world of a project at its start, with turrets fitted and lines set; programs are not begun.
 
@@ -33,6 +35,7 @@ def simulation_of(
         folder: Where it lies: robot files and replays are looked up from there.
         kinds: Kinds of robots in place of the project's: one for all or one for each. Files among them lie anywhere.
         thinking: What programs' computing costs, in place of what the project says; a replay lies anywhere.
+        ready: Called when all files are read, before the engine is needed.
 
     Example:
         >>> from kiks.model.project import ProjectRobot
@@ -47,6 +50,8 @@ def simulation_of(
     else:
         specs = [spec_of(robot, project, home) for robot in project.robots]
     thinking = thinking_of(project, home) if thinking is None else thinking
+    parse_thinking(thinking)
+    ready()
     sim = Simulation(project.arena, seed=project.seed, thinking=thinking, robots=len(specs), robot=specs)
     for number, (robot, wire) in enumerate(zip(project.robots, sim.wires, strict=True), start=1):
         for turret in robot.turrets:
@@ -98,7 +103,7 @@ def project_of(sim: Simulation, project: Project) -> Project:
         project: Where all the rest comes from.
     """
     with sim.lock:
-        poses, bodies, lamps = sim.poses(), sim.bodies(), sim.lamps.copy()
+        poses, bodies, lamps = sim.poses(), sim.bodies(), sim.world.lamps.copy()
         arena, radii_mm = sim.arena, [spec.body.radius_mm for spec in sim.specs]
     starts = [rounded_pose(*pose) for pose in poses.tolist()]
     discs = [(pose.x_mm, pose.y_mm, radius_mm) for pose, radius_mm in zip(starts, radii_mm, strict=True)]

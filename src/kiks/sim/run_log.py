@@ -5,6 +5,7 @@ A run is its inputs. Replies, motion and contacts follow from them, so a recordi
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from enum import IntEnum
 from typing import Protocol
 
@@ -25,8 +26,8 @@ class Kind(IntEnum):
     SET_BAUD = 5  # number: [bit/s]
     DROP = 6  # number, other: `until_ns` and `now_ns` of `Wire.drop_after`
     ACT = 16  # the robot has done what was due; data: the reply; number, other: when it starts, a character [ns].
-    # Only those of robots whose turrets a replay may not have are written, and one without data that stands for all
-    # between two inputs of one instant.
+    # Only those of robots whose turrets a replay may not have are written, and one without data for each between two
+    # inputs of one instant.
     THINK = 17  # number, other: from when to when the program thought [ns]
     TEXT = 18  # data: a line that the robot's program printed, in UTF-8
     MARK = 19  # data: a person's note, in UTF-8
@@ -53,11 +54,8 @@ class WireRecorder(Protocol):
 
     Attributes:
         clock: The world's.
-        has_acted: Set when a robot does something.
+        note: Takes an input, or when a program has thought.
     """
 
     clock: Clock
-    has_acted: bool
-
-    def note(self, entry: NotedEntry, /) -> object:
-        """Take an input, or when a program has thought."""
+    note: Callable[[NotedEntry], object]

@@ -52,9 +52,9 @@ def look(world: World) -> Snapshot:
     robots, ticks, now_ns = world.robot_count, world.state.tick_count, world.now_ns
     poses, places = world.places()
     lengths_mm, cosines, brightnesses, met = trace_rays(world, 0, robots)
-    proximity, ambient = (np.empty((robots, SENSOR_COUNT), np.int64) for _ in range(2))
+    proximity, ambient = (np.empty((robots, SENSOR_COUNT)) for _ in range(2))
     observe.read_all(world.scene, ticks, now_ns, proximity, ambient)
-    return Snapshot(poses, places, lengths_mm, cosines, brightnesses, met, proximity, ambient)
+    return Snapshot(poses, places, lengths_mm, cosines, brightnesses, met, proximity.astype(int), ambient.astype(int))
 
 
 def trace_rays(

@@ -94,6 +94,7 @@ class Turrets:
         site = _RobotSite(self, index, fitted, first)
         fitted.fit(site)
         firmware.fit(fitted)
+        self.world.rebuild_scene()  # a lone robot needs more of the engine with a gripper
         if isinstance(fitted, Radio):
             self._radios = site.turrets(Radio)
         elif isinstance(fitted, K213):

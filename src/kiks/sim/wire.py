@@ -128,8 +128,6 @@ class Wire:
 
     def act(self, now_ns: int) -> None:
         """Do what is due."""
-        if (recorder := self.recorder) is not None:
-            recorder.has_acted = True
         if self.pending and self.pending[0][0] <= now_ns:
             _, line, hear = self.pending.popleft()
             reply = self.firmware.execute(line, now_ns)

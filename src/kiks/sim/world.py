@@ -207,13 +207,7 @@ class World:
 
     def index_of(self, robot: int) -> int:
         """Return the index of a robot by its number."""
-        if not isinstance(robot, int | np.integer) or not 1 <= robot <= self.robot_count:
-            numbers = {0: "no robot", 1: "robot 1"}.get(self.robot_count, f"robots 1 to {self.robot_count}")
-            raise ParameterError(
-                f"robot must be the number of an existing robot, but it was {shown(robot)}. This simulation "
-                f"has {numbers}."
-            )
-        return int(robot) - 1
+        return index_of_robot(robot, self.robot_count)
 
     def pose(self, index: int) -> tuple[float, float, float]:
         """Return where a robot is at this instant: x_mm, y_mm, heading_rad."""
@@ -285,3 +279,13 @@ class World:
         robots: Any = self.state.robots[0]
         straight = np.hypot(robots["x_mm"] - robots["start_x_mm"], robots["y_mm"] - robots["start_y_mm"])
         return np.column_stack([robots["forwards_mm"], robots["backwards_mm"], straight])
+
+
+def index_of_robot(robot: int, count: int) -> int:
+    """Return the index of a robot by its number, among so many."""
+    if not isinstance(robot, int | np.integer) or not 1 <= robot <= count:
+        numbers = {0: "no robot", 1: "robot 1"}.get(count, f"robots 1 to {count}")
+        raise ParameterError(
+            f"robot must be the number of an existing robot, but it was {shown(robot)}. This simulation has {numbers}."
+        )
+    return int(robot) - 1

@@ -130,7 +130,7 @@ def ask_objects(client: SessionClient, words: str) -> str:
     """Return a row for each lamp, ball and cylinder: type, x, y, speed, angle."""
 
     def objects(sim: Simulation) -> str:
-        rows = [(LIGHT_ROW, *user_place(sim.arena, *lamp[:2]), 0.0, 0.0) for lamp in sim.lamps.tolist()]
+        rows = [(LIGHT_ROW, *user_place(sim.arena, *lamp[:2]), 0.0, 0.0) for lamp in sim.world.lamps.tolist()]
         for body in sim.bodies():
             x, y = user_place(sim.arena, float(body["x_mm"]), float(body["y_mm"]))
             velocity = float(body["velocity_x"]), float(body["velocity_y"])
@@ -197,7 +197,7 @@ def ask_spawn(client: SessionClient, words: str) -> None:
             yield x_mm, y_mm
         elif kind != LIGHT_ROW:
             yield width_mm / 2, height_mm / 2
-        there = len(sim.lamps) + len(sim.bodies())
+        there = len(sim.world.lamps) + len(sim.bodies())
         for attempt in range(ATTEMPTS):
             shares = [uniform(sim.seed, 0, there, STREAM_SPAWN, attempt, axis) for axis in (1, 2)]
             place = shares[0] * width_mm, shares[1] * height_mm
@@ -222,7 +222,7 @@ def ask_delete(client: SessionClient, words: str) -> None:
     numbers = numbers_of(words.split(), len(words.split()), "rows")
 
     def delete(sim: Simulation) -> None:
-        lamp_count, bodies = len(sim.lamps), sim.bodies()
+        lamp_count, bodies = len(sim.world.lamps), sim.bodies()
         for number in numbers:
             _check_row(number, lamp_count + len(bodies))
         # From below, so that the rows above stay where they are.

@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 import numpy as np
 import pytest
 from tests.at_length import share
 from tests.engine.one_by_one import read_one_by_one
 
 from kiks.engine.parameters import pack
+from kiks.engine.physics.motor import set_speed
 from kiks.engine.scene import Scene
 from kiks.engine.sensing.proximity import read_proximity
 from kiks.engine.sensing.thesis_networks import networks_for
 from kiks.engine.state import State
+from kiks.errors import KiksError
+from kiks.model.arena import Arena
+from kiks.model.arena_objects import Ball
 from kiks.model.robot import RESPONSES, RobotSpec
+from kiks.sim.simulation import Simulation
 
 pytestmark = pytest.mark.slow  # they compile the sensors once more
 
@@ -63,7 +70,7 @@ def assert_equal_readings(scene, robots, rng):
     """Return all readings, at some time in the last tick."""
     tick = int(rng.integers(TICKS))
     time_ns = max(tick * 10_000_000 - int(rng.integers(10_000_000)), 0)
-    together, one_by_one = np.empty((robots, 8), np.int64), np.empty((robots, 8), np.int64)
+    together, one_by_one = np.empty((robots, 8)), np.empty((robots, 8))
     for robot in range(robots):
         read_proximity(scene.record, robot, tick, time_ns, True, together[robot])
         read_one_by_one(scene.record, 0, robot, tick, time_ns, one_by_one[robot])
@@ -88,3 +95,27 @@ def test_all_responses_in_one_world(make_random_arena):
     kinds, networks = kinds_of(*RESPONSES)
     rng = np.random.default_rng(3)
     assert_equal_readings(random_world(make_random_arena(4), kinds, networks, 40, 10, rng), 40, rng)
+
+
+def test_neighbours_are_known_while_things_move():
+    """Lists of neighbours serve until things have moved too far, or somebody has moved one."""
+    box, balls = Arena.box(700, 500), tuple(Ball(60.0 + 75.0 * k, 240.0, 12.0) for k in range(8))
+    sim = Simulation(Arena(box.brightness, box.mm_per_cell, "box", balls=balls), robots=30, seed=4)
+    rng, highest = np.random.default_rng(4), 0
+    for number in range(share(40, 300)):
+        for robot in range(30 if number % 20 == 0 else 0):
+            set_speed(sim.world.state.robots, 0, robot, int(rng.integers(-30, 60)), int(rng.integers(-30, 60)))
+        if number % 3 == 2:
+            with suppress(KiksError):  # something may be there already
+                sim.place(1 + number % 30, float(rng.uniform(40, 660)), float(rng.uniform(40, 460)), 1.0)
+        else:
+            sim.run(0.01 * int(rng.integers(1, 6)))
+            sim.sync()
+        tick = sim.world.state.tick_count
+        together, one_by_one = np.empty((2, 30, 8))
+        for robot in range(30):
+            read_proximity(sim.world.scene, robot, tick, sim.now_ns, True, together[robot])
+            read_one_by_one(sim.world.scene, 0, robot, tick, sim.now_ns, one_by_one[robot])
+        np.testing.assert_array_equal(together, one_by_one)
+        highest = max(highest, together.max())
+    assert highest > 100

@@ -9,8 +9,10 @@ from collections.abc import Callable
 from typing import TypeVar
 
 from kiks.clock.gate import Gate
+from kiks.engine.compiling import compiling_s
 from kiks.sim.drag import Drags
 from kiks.sim.simulation import Simulation
+from kiks.units import ns_from_s
 
 RETRY_S = 0.02
 """Period at which a request is offered again while no thread moves the world [s]."""
@@ -19,6 +21,11 @@ WINDOW_NS = 1_000_000_000
 """Window of the momentary speed [ns of real time]."""
 
 Done = TypeVar("Done")
+
+
+def working_ns() -> int:
+    """Return a monotonic time [ns] that stands still while something is compiled."""
+    return time.monotonic_ns() - ns_from_s(compiling_s())
 
 
 class Speedometer:
@@ -41,7 +48,7 @@ class Speedometer:
         (5.0, 5.0)
     """
 
-    def __init__(self, *, wall_ns: Callable[[], int] = time.monotonic_ns) -> None:
+    def __init__(self, *, wall_ns: Callable[[], int] = working_ns) -> None:
         self.average = 0.0
         self.momentary = 0.0
         self._wall_ns = wall_ns

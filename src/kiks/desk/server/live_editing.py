@@ -240,7 +240,7 @@ class Editing:
 
 
 def _known_of(sim: Simulation) -> tuple[Any, ...]:
-    return sim, sim.arena, sim.bodies()["number"].tolist(), len(sim.lamps)
+    return sim, sim.arena, sim.bodies()["number"].tolist(), len(sim.world.lamps)
 
 
 def _with_change(now: Content, here: Content, there: Content) -> Content:

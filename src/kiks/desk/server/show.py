@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import html
 import logging
-import os
 import sys
 import threading
 import webbrowser
 from collections.abc import Callable
 from typing import Any
 
+from kiks.desk.screen import has_screen
 from kiks.desk.server.desk import Desk, NewsHandler, OutsidePrograms
 from kiks.desk.server.server import SERVER
-from kiks.engine.code_cache import is_compiled
-from kiks.engine.compiling import LAST
 from kiks.export.frames import pack_frame
 from kiks.model.checks import check_count, check_kind
 from kiks.sim.simulation import Simulation
@@ -60,13 +58,6 @@ class Driver:
         self._desk.present.gate.close()
 
 
-def has_screen() -> bool:
-    """Return whether this computer has a screen for this process."""
-    return sys.platform in ("win32", "darwin") or bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
-
-
-_log = logging.getLogger("kiks.desk")
-
 STOP_S = 10.0
 """Timeout of the end of the world's thread [s]."""
 
@@ -90,8 +81,6 @@ class Shown:
 
     def __init__(self, desk: Desk, *, host: str = "127.0.0.1", port: int | None = None) -> None:
         self.desk = desk
-        if not is_compiled(LAST):
-            _log.warning("Compiling the engine for this computer: once, a minute or so ...")
         with desk.sim.lock:
             # Compile the code for frames before the first browser waits for it.
             pack_frame(desk.sim, scene=0)

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from kiks.engine.bunch import robot_in
+from kiks.engine.bunch import place_of, robot_in, show_places
 from kiks.engine.compiling import kernel
 from kiks.engine.grid import disc_at, list_pairs
 from kiks.engine.physics.balls import collide, kick, remember_place, roll, speed_of
@@ -75,13 +75,14 @@ def remember_places(scene: Any, world: Any, room: Any, k: Any) -> Any:
 
 
 @kernel
-def find_near_things(scene: Any, bunch: Any, k: Any) -> Any:
+def find_near_things(scene: Any, bunch: Any, k: Any, wheels_mm: Any) -> Any:
     """Phase: find the things that may collide in a tick, or roll.
 
     Args:
         scene: The scene.
         bunch: The bunch (`kiks.engine.bunch`).
         k: A world of it.
+        wheels_mm: The longest way of a wheel in all its worlds [mm].
 
     Returns:
         The numbers of near discs and of pairs, and the longest path of any of them [mm].
@@ -89,19 +90,25 @@ def find_near_things(scene: Any, bunch: Any, k: Any) -> Any:
     world, room = bunch.worlds[k], bunch.room
     robots, bodies, crowd = scene.robots, scene.bodies, scene.grid.crowds[world]
     robot_count = robots.shape[1]
-    fastest_mm, held_mm, near_count = 0.0, 0.0, 0
+    bodies_mm, held_mm, near_count = 0.0, 0.0, 0
     awake = room.awake[bodies.shape[1] * k :][: room.awake_counts[k]]
-    for number in range(robot_count):
-        fastest_mm = max(fastest_mm, robot_in(scene, bunch, k, number)[0].way_mm)
     for row in awake:
         body = bodies[world, row]
-        fastest_mm = max(fastest_mm, speed_of(body) * TICK_S)
+        bodies_mm = max(bodies_mm, speed_of(body) * TICK_S)
         if is_dragged(body):
             held_mm = max(held_mm, REACH * robot_in(scene, bunch, k, body.holder - 1)[0].way_mm)
-    fastest_mm = max(fastest_mm, held_mm)
-    nearer_mm = HASTE * fastest_mm + TOUCHING_MM
+    bodies_mm = max(bodies_mm, held_mm)
+    nearer_mm = HASTE * max(wheels_mm, bodies_mm) + TOUCHING_MM
     if crowd.slack_mm < nearer_mm:
+        show_places(scene, bunch, k)
         list_pairs(scene, world, max(min(max(SLACK_TICKS * nearer_mm, SLACK_MM[0]), SLACK_MM[1]), nearer_mm))
+    if crowd.pair_count == 0 and awake.shape[0] == 0:
+        return 0, 0, 0.0
+    # What is near depends on this world alone.
+    fastest_mm = bodies_mm
+    for number in range(robot_count):
+        fastest_mm = max(fastest_mm, robot_in(scene, bunch, k, number)[0].way_mm)
+    nearer_mm = HASTE * fastest_mm + TOUCHING_MM
     for row in awake:
         body = bodies[world, row]
         if speed_of(body) > 0.0 or is_dragged(body):
@@ -112,8 +119,8 @@ def find_near_things(scene: Any, bunch: Any, k: Any) -> Any:
     pair_count = 0
     for place in range(crowd.pair_count):
         first, second = np.int64(scene.grid.pairs[world, place, 0]), np.int64(scene.grid.pairs[world, place, 1])
-        x, y, radius = disc_at(scene, world, first)
-        other_x, other_y, other_radius = disc_at(scene, world, second)
+        x, y, radius = place_of(scene, bunch, k, first)
+        other_x, other_y, other_radius = place_of(scene, bunch, k, second)
         dx, dy, apart = other_x - x, other_y - y, radius + other_radius + nearer_mm
         if dx * dx + dy * dy < apart * apart:
             near_count = add_near(scene, bunch, k, first, near_count)

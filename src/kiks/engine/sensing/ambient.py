@@ -19,12 +19,13 @@ import math
 from typing import Any
 
 import numpy as np
+from numba import types
 
-from kiks.engine.compiling import allocating, entry, inlined, kernel
+from kiks.engine.compiling import allocating, entry, inlined, kernel, linked
 from kiks.engine.grid import count_discs, disc_at, is_on_floor
 from kiks.engine.numbers import power, sin_cos, uniform
 from kiks.engine.physics.motion import moment_of
-from kiks.engine.scene import open_scene
+from kiks.engine.scene import OPEN_SCENE, open_scene
 from kiks.engine.sensing.disc_rays import moved_at, moved_of, note_tracks, see_all
 from kiks.engine.sensing.proximity import on_body, quantize, sampled_pose
 from kiks.engine.sensing.rays import is_lit
@@ -167,7 +168,7 @@ def distance_from_way(robot: Any, lamp: Any, x: Any, y: Any) -> Any:
     return math.sqrt(aside_x * aside_x + aside_y * aside_y)
 
 
-@allocating
+@linked(types.void(OPEN_SCENE, *(types.int64,) * 4, types.boolean, types.float64[::1]), _nrt=True)
 def sense_ambient(scene: Any, world: Any, robot: Any, tick_count: Any, time_ns: Any, is_noisy: Any, out: Any) -> Any:
     """Write the eight counts that command O returns at a time into `out`, each sampled at its own instant.
 
@@ -178,7 +179,7 @@ def sense_ambient(scene: Any, world: Any, robot: Any, tick_count: Any, time_ns: 
         tick_count: Ticks done.
         time_ns: Time of the reading [ns].
         is_noisy: False for the expected counts at the present pose, without rounding.
-        out: int64, or float64 for expected counts, shape [8].
+        out: float64, shape [8].
     """
     state, lamps = scene.robots[world, robot], scene.lamps[world]
     parameters = scene.kinds[state.kind]

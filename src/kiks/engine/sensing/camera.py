@@ -24,11 +24,12 @@ import math
 from typing import Any
 
 import numpy as np
+from numba import types
 
-from kiks.engine.compiling import allocating, entry, kernel
+from kiks.engine.compiling import entry, kernel, linked
 from kiks.engine.numbers import at_instant, draw, sin_cos, stream_of
 from kiks.engine.physics.motion import moment_of
-from kiks.engine.scene import open_scene
+from kiks.engine.scene import OPEN_SCENE, open_scene
 from kiks.engine.sensing.disc_rays import meet_discs, other_tracks, see_all
 from kiks.engine.sensing.proximity import pose_at
 from kiks.engine.sensing.rays import ENDLESS, brightness_met, cast, cast_many, free_cells
@@ -146,7 +147,7 @@ def darken_edges(grey: Any, chance: Any) -> Any:
             grey[p] = ceiling + _NOISE * (2.0 * chance[p] - 1.0)
 
 
-@allocating
+@linked(types.int64(OPEN_SCENE, *(types.int64,) * 4, types.boolean, types.float64[::1]), _nrt=True)
 def take_image_in(scene: Any, world: Any, robot: Any, tick_count: Any, time_ns: Any, is_noisy: Any, out: Any) -> Any:
     """Write the image of a robot's camera at a time into `out` and return its light level.
 

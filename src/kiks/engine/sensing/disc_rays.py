@@ -5,9 +5,9 @@ of the two there. The ray enters a disc of radius r at b - w with w^2 = r^2 - h^
 and the disc's normal has the cosine w/r.
 
 A reading first lists the tracks of nearby discs: their places at the last tick boundaries. Each sensor has an instant
-of its own, and from the tracks it gets the discs that it sees: four numbers for each, column, row and radius [cells],
-and shade. A shade above 0 is the brightness of a plain disc. One below 0 is that of a striped robot: it holds the
-number of stripes and the heading (`shade_of`), so plain discs cost nothing more.
+of its own, and from the tracks it gets the discs that it sees, each with column, row and radius [cells], and shade. A
+shade above 0 is the brightness of a plain disc. One below 0 is that of a striped robot: it holds the number of stripes
+and the heading (`shade_of`), so plain discs cost nothing more.
 
 Stripes: n black and n white ones stand around a robot, the middle of a black one ahead. So the point at the angle a
 from ahead is black where cos(n a) > 0. With z = cos(a) + i sin(a), that is the real part of z^n: multiplications alone,
@@ -24,9 +24,8 @@ import numpy as np
 from kiks.engine.compiling import allocating, inlined, kernel
 from kiks.engine.grid import count_discs, is_on_floor
 from kiks.engine.numbers import sin_cos
-from kiks.engine.simd.lanes import LANES, root, store, wide
-from kiks.engine.simd.masks import anywhere, choose, holds
-from kiks.engine.simd.stack_arrays import stack_floats
+from kiks.engine.simd.lanes import LANES, root, store
+from kiks.engine.simd.masks import anywhere, choose
 from kiks.engine.state import TRAIL_LENGTH
 
 SEEN_LIMIT = 96
@@ -35,11 +34,14 @@ SEEN_LIMIT = 96
 PER_DISC = 4
 """Numbers per visible disc."""
 
-SEEN_SIZE = 384
-"""Numbers for the discs that a sensor sees."""
+PER_SEEN = 32
+"""Numbers of a disc that eight sensors may see: for each sensor column, row, and 1 if it sees it; radius, and shade."""
 
-ALL_SEEN_SIZE = 3072
-"""Numbers for those that eight sensors see: the first `SEEN_SIZE` are of the first sensor."""
+SEEN_TOGETHER = 128
+"""Most such discs of robots that are read together."""
+
+SEEN_SIZE = PER_SEEN * SEEN_TOGETHER
+"""Numbers for them."""
 
 PER_TRACK = 2 * (TRAIL_LENGTH + 1) + 3
 """Numbers of a track: x and y [mm] now and at the past tick boundaries, radius [mm], shade, and the disc."""
@@ -167,26 +169,20 @@ def place_then(tracks: Any, k: Any, moment: Any) -> Any:
     return later_x + back * (earlier_x - later_x), later_y + back * (earlier_y - later_y)
 
 
-@inlined
-def note_disc(walls: Any, tracks: Any, k: Any, x: Any, y: Any, place: Any, seen: Any) -> Any:
-    """Write the disc of a track, which was at (x, y) [mm], into `seen`."""
-    per_cell = 1.0 / walls.cell_mm
-    seen[place], seen[place + 1] = x * per_cell + walls.pad, y * per_cell + walls.pad
-    seen[place + 2] = tracks[PER_TRACK * k + _RADIUS] * per_cell
-    seen[place + 3] = tracks[PER_TRACK * k + _SHADE]
-
-
 @kernel
 def see_all(walls: Any, tracks: Any, count: Any, moment: Any, seen: Any) -> Any:
     """List where all discs were at a moment; `seen` is float64 [`PER_DISC` * `count` at least]."""
+    per_cell = 1.0 / walls.cell_mm
     for k in range(count):
         x, y = place_then(tracks, k, moment)
-        note_disc(walls, tracks, k, x, y, PER_DISC * k, seen)
+        its = PER_DISC * k
+        seen[its], seen[its + 1] = x * per_cell + walls.pad, y * per_cell + walls.pad
+        seen[its + 2], seen[its + 3] = tracks[PER_TRACK * k + _RADIUS] * per_cell, tracks[PER_TRACK * k + _SHADE]
 
 
 @kernel
-def see(walls: Any, tracks: Any, first: Any, end: Any, moments: Any, view: Any, seen: Any, counts: Any) -> Any:
-    """List the discs that each of eight sensors sees.
+def see(walls: Any, tracks: Any, first: Any, end: Any, moments: Any, view: Any, seen: Any, place: Any) -> Any:
+    """Add the discs that any of eight sensors sees to a list.
 
     Args:
         walls: The walls as rays see them, for their scale.
@@ -196,12 +192,14 @@ def see(walls: Any, tracks: Any, first: Any, end: Any, moments: Any, view: Any, 
         moments: The time of each sensor, `Lanes` (`kiks.engine.physics.motion.moment_of`).
         view: The places of the sensors, x and y [mm]; the directions, cosine and sine, of the leftmost and of the
             rightmost rays; all `Lanes`; and the range [mm] (`kiks.engine.sensing.proximity.view_of`).
-        seen: Output: a list of discs for each sensor, float64 [`ALL_SEEN_SIZE`].
-        counts: Output: their numbers, float64 [8].
+        seen: The list, float64 [`PER_SEEN` per disc].
+        place: Number of discs in it.
+
+    Returns:
+        The new number of discs, and a mask of the sensors that see any of the new ones.
     """
     x, y, left, right, reach_mm = view[:5]
-    store(counts, wide(0.0))
-    xs, ys = stack_floats(LANES), stack_floats(LANES)
+    per_cell, is_any = 1.0 / walls.cell_mm, x < x
     for k in range(first, end):
         disc_x, disc_y = place_then(tracks, k, moments)
         radius = tracks[PER_TRACK * k + _RADIUS]
@@ -210,23 +208,49 @@ def see(walls: Any, tracks: Any, first: Any, end: Any, moments: Any, view: Any, 
         beyond_left, beyond_right = dy * left[0] - dx * left[1], dx * right[1] - dy * right[0]
         is_seen = (dx * dx + dy * dy < far * far) & (max(beyond_left, beyond_right) < radius)
         if anywhere(is_seen):
-            store(xs, disc_x)
-            store(ys, disc_y)
-            for sensor in range(counts.shape[0]):
-                if holds(is_seen, sensor):
-                    place = SEEN_SIZE * sensor + PER_DISC * np.int64(counts[sensor])
-                    note_disc(walls, tracks, k, xs[sensor], ys[sensor], place, seen)
-                    counts[sensor] += 1.0
+            its = PER_SEEN * place
+            store(seen, disc_x * per_cell + walls.pad, its)
+            store(seen, disc_y * per_cell + walls.pad, its + LANES)
+            store(seen, choose(is_seen, 1.0, 0.0), its + 2 * LANES)
+            seen[its + 3 * LANES] = radius * per_cell
+            seen[its + 3 * LANES + 1] = tracks[PER_TRACK * k + _SHADE]
+            place += 1
+            is_any = is_any | is_seen
+    return place, is_any
 
 
 @inlined
-def enter_disc(seen: Any, k: Any, column: Any, row: Any, cosine: Any, sine: Any) -> Any:
-    """Return the length at which a ray enters a disc (0 from inside), the cosine of its incidence, and if it does."""
-    dx, dy, radius = seen[PER_DISC * k] - column, seen[PER_DISC * k + 1] - row, seen[PER_DISC * k + 2]
+def sees(seen: Any, k: Any, sensor: Any) -> Any:
+    """Return whether a sensor sees a disc of the list of `see`."""
+    return seen[PER_SEEN * k + 2 * LANES + sensor] > 0.0
+
+
+@inlined
+def seen_by(seen: Any, k: Any, sensor: Any) -> Any:
+    """Return column, row, radius and shade of a disc of the list of `see`, as a sensor sees it."""
+    its = PER_SEEN * k
+    return seen[its + sensor], seen[its + LANES + sensor], seen[its + 3 * LANES], seen[its + 3 * LANES + 1]
+
+
+@inlined
+def meet_disc(disc: Any, column: Any, row: Any, cosine: Any, sine: Any, length: Any, squarely: Any, shade: Any) -> Any:
+    """Follow a ray to a disc, column, row, radius and shade; other arguments and results are those of `meet_discs`."""
+    disc_column, disc_row, radius, its_shade = disc
+    dx, dy = disc_column - column, disc_row - row
     along, aside = cosine * dx + sine * dy, sine * dx - cosine * dy
     square = radius * radius - aside * aside
     half = root(max(0.0, square))
-    return max(0.0, along - half), half / radius, (square > 0.0) & (along + half > 0.0)
+    # From inside it is met at once.
+    begin = max(0.0, along - half)
+    is_first = (square > 0.0) & (along + half > 0.0) & (begin < length)
+    squarely = choose(is_first, half / radius, squarely)
+    shade = choose(is_first, its_shade, shade)
+    if its_shade < 0.0:
+        per_radius = 1.0 / radius
+        ahead = (column + begin * cosine - disc_column) * per_radius
+        aside = (row + begin * sine - disc_row) * per_radius
+        shade = choose(is_first, stripe_at(its_shade, ahead, aside), shade)
+    return choose(is_first, begin, length), squarely, shade
 
 
 @kernel
@@ -236,7 +260,7 @@ def meet_discs(
     """Follow a ray to the first disc that it meets, or eight rays of one origin, in lanes.
 
     Args:
-        seen: The discs.
+        seen: The discs (`see_all`).
         count: Number of discs.
         column: Origin [cells].
         row: Origin [cells].
@@ -250,17 +274,9 @@ def meet_discs(
         Length, cosine and brightness up to the wall or the first disc before it.
     """
     for k in range(count):
-        begin, cosine_in, is_met = enter_disc(seen, k, column, row, cosine, sine)
-        is_first = is_met & (begin < length)
-        squarely = choose(is_first, cosine_in, squarely)
-        its_shade = seen[PER_DISC * k + 3]
-        shade = choose(is_first, its_shade, shade)
-        if its_shade < 0.0:
-            per_radius = 1.0 / seen[PER_DISC * k + 2]
-            ahead = (column + begin * cosine - seen[PER_DISC * k]) * per_radius
-            aside = (row + begin * sine - seen[PER_DISC * k + 1]) * per_radius
-            shade = choose(is_first, stripe_at(its_shade, ahead, aside), shade)
-        length = choose(is_first, begin, length)
+        its = PER_DISC * k
+        disc = seen[its], seen[its + 1], seen[its + 2], seen[its + 3]
+        length, squarely, shade = meet_disc(disc, column, row, cosine, sine, length, squarely, shade)
     return length, squarely, shade
 
 

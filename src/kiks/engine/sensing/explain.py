@@ -76,12 +76,12 @@ def explain_proximity(scene: Any, robot: Any, sensor: Any, tick_count: Any, time
     gaze_robot(scene, robot, True, tick_count, instants_ns, poses, tracing, rays, met)
     disc_count = track_around(scene, 0, robot, state.x_mm, state.y_mm, tracing.tracks)
     follow_rays(walls, tracing, begin_rays(walls, parameters, False, moments, poses, disc_count, tracing, 0, 0))
-    expected_counts(scene, parameters, disc_count, tracing, 0, counts)
+    expected_counts(scene, parameters, tracing, 0, counts)
     expected = counts[sensor]
     without[:] = parameters.baseline_counts[sensor]
     if tracing.packet_of[sensor] != NOT_NEAR:
         has_faces = parameters.response == REFLECTION
-        hits = end_rays(walls, parameters, has_faces, disc_count, tracing, 0, sensor)
+        hits = end_rays(walls, parameters, has_faces, tracing, 0, sensor)
         for ray in range(RAY_COUNT):
             without[ray] += respond_without(scene, parameters, sensor, hits, ray)
             cosines[ray] = rays[sensor, 1, ray]

@@ -15,7 +15,7 @@ from kiks.engine.parameters import RAY_COUNT
 from kiks.engine.physics.motion import moment_of
 from kiks.engine.scene import open_scene
 from kiks.engine.sensing.ambient import sense_ambient
-from kiks.engine.sensing.disc_rays import SEEN_SIZE, disc_of, meet_discs, see
+from kiks.engine.sensing.disc_rays import disc_of, meet_disc, see, seen_by, sees
 from kiks.engine.sensing.proximity import (
     READERS,
     begin_rays,
@@ -26,7 +26,7 @@ from kiks.engine.sensing.proximity import (
     make_tracing,
     pose_at,
     rays_of,
-    sense_proximity,
+    sense_linked,
     track_around,
     view_of,
 )
@@ -68,18 +68,18 @@ def gaze_robot(
     disc_count = track_around(scene, 0, robot, state.x_mm, state.y_mm, tracing.tracks)
     follow_rays(walls, tracing, begin_rays(walls, parameters, True, moments, poses, disc_count, tracing, 0, 0))
     for sensor in range(met.shape[0]):
-        hits = end_rays(walls, parameters, has_faces, disc_count, tracing, 0, sensor)
+        hits = end_rays(walls, parameters, has_faces, tracing, 0, sensor)
         for ray in range(RAY_COUNT):
             for part in range(3):
                 rays[sensor, part, ray] = lane_of(hits[part], ray)
             met[sensor, ray] = WALL if rays[sensor, 2, ray] > 0.0 else NOTHING
     view, nothing = view_of(parameters, poses), (wide(_FAR_MM), wide(1.0), wide(0.0))
     for k in range(disc_count):
-        see(walls, tracing.tracks, k, k + 1, moments, view, tracing.seen, tracing.seen_counts)
+        count, _ = see(walls, tracing.tracks, k, k + 1, moments, view, tracing.seen, 0)
         for sensor in range(met.shape[0]):
-            if tracing.seen_counts[sensor] > 0.0:
+            if count > 0 and sees(tracing.seen, 0, sensor):
                 origin, directions = rays_of(walls, parameters, tracing, 0, sensor)
-                alone, _, shades = meet_discs(tracing.seen[SEEN_SIZE * sensor :], 1, *origin, *directions, *nothing)
+                alone, _, shades = meet_disc(seen_by(tracing.seen, 0, sensor), *origin, *directions, *nothing)
                 for ray in range(RAY_COUNT):
                     is_this = lane_of(alone, ray) * walls.cell_mm <= rays[sensor, 0, ray]
                     if is_this and lane_of(shades, ray) > 0.0 and met[sensor, ray] != NOTHING:
@@ -113,8 +113,8 @@ def read_all(scene: Any, tick_count: Any, time_ns: Any, proximity: Any, ambient:
         scene: The scene (`kiks.engine.scene.Scene.record`).
         tick_count: Ticks done.
         time_ns: When the robots read.
-        proximity: int64 [robot, 8].
-        ambient: int64 [robot, 8].
+        proximity: float64 [robot, 8].
+        ambient: float64 [robot, 8].
     """
     scene = open_scene(scene[0])
     readers = make_readers()
@@ -123,7 +123,7 @@ def read_all(scene: Any, tick_count: Any, time_ns: Any, proximity: Any, ambient:
         for k in range(count):
             readers.worlds[k], readers.robots[k] = 0, first + k
             readers.ticks[k], readers.times_ns[k] = tick_count, time_ns
-        sense_proximity(scene, readers, count, True, proximity[first : first + READERS])
+        sense_linked(scene, readers, count, True, proximity[first : first + READERS])
     for robot in range(proximity.shape[0]):
         sense_ambient(scene, 0, robot, tick_count, time_ns, True, ambient[robot])
 
@@ -174,6 +174,6 @@ def read_from(scene: Any, robot: Any, tick_count: Any, time_ns: Any, poses: Any,
         pose = wide(x), wide(y), wide(heading)
         packet_count = begin_rays(scene.walls, parameters, False, moments, pose, disc_count, tracing, 0, 0)
         follow_rays(scene.walls, tracing, packet_count)
-        expected_counts(scene, parameters, disc_count, tracing, 0, out[k])
+        expected_counts(scene, parameters, tracing, 0, out[k])
         for sensor in range(out.shape[1]):
             out[k, sensor] = min(out[k, sensor], parameters.maximum_counts)

@@ -32,10 +32,11 @@ _FLAT = 1e-24  # square of a direction's part along an axis below which a ray ne
 ENDLESS = 1e9
 """Length of rays that only a wall ends [cells]: the border of the world is nearer."""
 
-Walls: Any = namedtuple("Walls", ("clearance", "brightness", "leaps", "faces", "cell_mm", "pad"))
+Walls: Any = namedtuple("Walls", ("clearance", "rooms", "brightness", "leaps", "faces", "cell_mm", "pad"))
 """The walls as rays see them.
 
 * clearance: distance of cells to the nearest wall [mm], 0 in a wall, float32 [rows, columns];
+* rooms: the least clearance in blocks of cells [mm], float32 (`kiks.model.arena.Arena.rooms`);
 * brightness: brightness of cells, 0 for floor, uint8 [rows, columns];
 * leaps: how far one may go from anywhere in a cell, int16 [rows, columns] (`kiks.model.arena.Arena.leaps`);
 * faces: the smooth surface of the wall beside free cells that touch one, int32 [rows, columns] (`Arena.faces` there);
@@ -46,7 +47,8 @@ Walls: Any = namedtuple("Walls", ("clearance", "brightness", "leaps", "faces", "
 
 def walls_of(arena: Arena) -> tuple[Any, ...]:
     """Return the parts of `Walls`; a plain tuple, which Numba opens faster."""
-    return arena.clearance, arena.surface, arena.leaps, arena.faces, float(arena.mm_per_cell), PAD
+    tables = arena.clearance, arena.rooms, arena.surface, arena.leaps, arena.faces
+    return *tables, float(arena.mm_per_cell), PAD
 
 
 @kernel

@@ -45,20 +45,22 @@ def reflectance(brightness: Any) -> Any:
 
 @kernel
 def ramp(share: Any, rounding: Any) -> Any:
-    """Return the positive part of a number, with a parabola between -rounding and +rounding."""
-    if share <= -rounding:
-        return 0.0
-    return share if share >= rounding else (share + rounding) * (share + rounding) / (4.0 * rounding)
+    """Return the positive part of a number, or of eight, with a parabola between -rounding and +rounding."""
+    bent = (share + rounding) * (share + rounding) / (4.0 * rounding)
+    return choose(share <= -rounding, 0.0, choose(share >= rounding, share, bent))
 
 
-@kernel
-def reflection_count(parameters: Any, sensor: Any, lengths_mm: Any, cosines: Any, brightnesses: Any) -> Any:
-    """Return the count for the light that returns to a sensor; its rays are `Lanes`."""
+@inlined
+def light_of(parameters: Any, sensor: Any, lengths_mm: Any, cosines: Any, brightnesses: Any) -> Any:
+    """Return the light that returns to a sensor; its rays are `Lanes`."""
     near = cosines / (lengths_mm + parameters.behind_mm)
-    returned = load(parameters.ray_weight[sensor]) * reflectance(brightnesses) * near * near * near
-    light = total(returned)
-    threshold = parameters.threshold[sensor]
-    share = (1.0 + threshold) * parameters.gain[sensor] * light - threshold
+    return total(load(parameters.ray_weight[sensor]) * reflectance(brightnesses) * near * near * near)
+
+
+@inlined
+def reflection_count(parameters: Any, threshold: Any, gain: Any, light: Any) -> Any:
+    """Return the count for the light that returns to a sensor, or to eight, from its threshold and gain."""
+    share = (1.0 + threshold) * gain * light - threshold
     rounded = ramp(share, parameters.faint) - ramp(share - 1.0, parameters.bright)
     return parameters.maximum_counts * max(rounded, 0.0)
 
@@ -90,7 +92,8 @@ def curve_count(parameters: Any, sensor: Any, lengths: Any, shades: Any) -> Any:
 def respond(networks: Any, parameters: Any, sensor: Any, lengths_mm: Any, cosines: Any, brightnesses: Any) -> Any:
     """Return the expected counts of a sensor above its baseline by its robot's response; the rays are `Lanes`."""
     if parameters.response == REFLECTION:
-        return reflection_count(parameters, sensor, lengths_mm, cosines, brightnesses)
+        light = light_of(parameters, sensor, lengths_mm, cosines, brightnesses)
+        return reflection_count(parameters, parameters.threshold[sensor], parameters.gain[sensor], light)
     gain = parameters.gain[sensor]
     if parameters.response == THESIS or parameters.response == FAST:
         seen = stack_narrow(LANES)

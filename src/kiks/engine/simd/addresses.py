@@ -53,15 +53,16 @@ class ArrayRecord(types.Type):  # type: ignore[misc, unused-ignore]
     """Numba's type of a record that stands for arrays; kernels pass it on as one address.
 
     Args:
-        record: Numba's type of the record.
+        record: The record.
         elements: Element types of the arrays, by name; other fields are plain numbers.
         groups: Named tuples of fields that kernels read as one, by name.
     """
 
-    def __init__(self, record: Any, elements: dict[str, Any], groups: dict[str, Any]) -> None:
-        self.record, self.groups = record, groups
+    def __init__(self, record: np.dtype[np.void], elements: dict[str, Any], groups: dict[str, Any]) -> None:
+        self.record: Any = from_dtype(record)
+        self.groups = groups
         self.elements = {name: from_dtype(np.dtype(element)) for name, element in elements.items()}
-        digest = hashlib.sha256(str((record, sorted(self.elements), sorted(groups))).encode()).hexdigest()[:12]
+        digest = hashlib.sha256(str((self.record, sorted(self.elements), sorted(groups))).encode()).hexdigest()[:12]
         super().__init__(name=f"ArrayRecord({digest})")
 
     def kind_of(self, name: str) -> Any:
@@ -130,9 +131,8 @@ def array_in(context: Any, builder: Any, kind: Any, data: Any, shape: Any) -> An
     return array._getvalue()
 
 
-def opener(record: np.dtype[np.void], elements: dict[str, Any], groups: dict[str, Any]) -> Any:
-    """Return what opens a record in a kernel: then its names are the arrays; arguments as for `ArrayRecord`."""
-    opened = ArrayRecord(from_dtype(record), elements, groups)
+def opener(opened: ArrayRecord) -> Any:
+    """Return what opens a record in a kernel: then its names are the arrays."""
 
     @_intrinsic
     def open_record(typing: Any, closed: Any) -> Any:
