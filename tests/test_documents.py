@@ -27,14 +27,26 @@ def blocks(page: Path, language: str) -> list[str]:
     return re.findall(rf"^```{language}\n(.*?)^```", page.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
 
 
-PROGRAMS = [(page.name, code) for page in PAGES for code in blocks(page, "python")]
-OF_README = sum(page == PAGES[0].name for page, _ in PROGRAMS)
+PROGRAM = re.compile(r"^```python\n(.*?)^```(?:\n\n```text\n(.*?)^```)?", flags=re.MULTILINE | re.DOTALL)
+"""A program, and what it prints if the page shows that."""
+
+# tests/test_tutorials.py runs the tutorials.
+PROGRAMS = [
+    (page.name, *found)
+    for page in PAGES
+    if page.parent.name != "tutorials"
+    for found in PROGRAM.findall(page.read_text(encoding="utf-8"))
+]
+OF_README = sum(page == PAGES[0].name for page, _, _ in PROGRAMS)
 
 
-@pytest.mark.parametrize(("page", "code"), cases(PROGRAMS, OF_README), ids=lambda value: value[:20].replace("\n", " "))
-def test_programs_run(page: str, code: str) -> None:
+@pytest.mark.parametrize(
+    ("page", "code", "shown"), cases(PROGRAMS, OF_README), ids=lambda value: value[:20].replace("\n", " ")
+)
+def test_programs_run(page: str, code: str, shown: str) -> None:
     result = forked.run(code=code, cwd=ROOT)
     assert result.returncode == 0, f"{page}: {result.stderr}"
+    assert not shown or result.stdout == shown
 
 
 def test_the_first_program_keeps_clear_of_the_walls() -> None:
