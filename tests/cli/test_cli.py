@@ -16,6 +16,7 @@ from tests.at_length import at_length, cases
 
 from kiks.cli import app
 from kiks.errors import ParameterError
+from kiks.model.shipped import demonstrations
 from kiks.version import PYTHONS
 
 pytestmark = pytest.mark.slow
@@ -40,12 +41,76 @@ def state_of(text: str) -> str:
 
 
 @pytest.mark.parametrize(
-    "command", ["desk", "demo", "run", "champion", "replay", "export", "serve", "monitor", "calibrate", "fit", "warmup"]
+    "command",
+    [
+        "desk",
+        "demo",
+        "run",
+        "champion",
+        "replay",
+        "export",
+        "serve",
+        "monitor",
+        "calibrate",
+        "fit",
+        "warmup",
+        "doctor",
+        "examples",
+    ],
 )
 def test_every_command_has_help_with_an_example(command: str) -> None:
     result = kiks(command, "--help")
     assert result.returncode == 0
     assert f"Example: kiks {command}" in result.stdout
+
+
+def test_the_command_alone_says_what_to_try() -> None:
+    said = kiks().stdout
+    assert re.findall("^  (kiks .*?)  ", said, flags=re.MULTILINE) == [
+        "kiks demo avoid --desk",
+        "kiks run my_program.py",
+        "kiks examples first",
+    ]
+    assert kiks("-h").stdout == kiks("--help").stdout
+
+
+def test_demonstrations_are_listed() -> None:
+    listed = kiks("demo").stdout
+    assert listed == kiks("demo", "--list").stdout
+    assert re.findall(r"^  (\w+) +\S", listed, flags=re.MULTILINE) == [*demonstrations()]
+    assert all(len(line) > 25 for line in listed.splitlines() if line.startswith("  "))
+
+
+def test_examples_are_copied_into_a_new_folder(tmp_path: Path) -> None:
+    assert "Try: kiks run first/demos/avoid.py" in kiks("examples", "first", cwd=tmp_path).stdout
+    assert (tmp_path / "first" / "programs" / "wander.py").is_file()
+    assert not [*tmp_path.rglob("__pycache__")]
+    result = kiks("examples", "first", cwd=tmp_path)
+    assert (result.returncode, result.stderr.splitlines()) == (
+        2,
+        ["kiks: OUT must be a new folder, but 'first' exists. Choose another name."],
+    )
+
+
+def test_arenas_are_listed_and_known_by_name() -> None:
+    names = [line.split()[0] for line in kiks("arena", "list").stdout.splitlines()]
+    assert names == ["default", "maze", "office", "pillars", "pitch", "track"]
+    assert kiks("arena", "info", "office").stdout == kiks("arena", "info", ARENA).stdout
+    result = kiks("arena", "info", "offise")
+    assert (result.returncode, result.stderr.splitlines()) == (
+        2,
+        [
+            "kiks: An arena must be a file or one of default, maze, office, pillars, pitch, track, but there is no "
+            "'offise'. Did you mean 'office'?"
+        ],
+    )
+
+
+def test_the_doctor_says_what_is_there_and_how_fast_it_is() -> None:
+    said = forked.run("doctor").stdout
+    assert re.search(r"^KiKS \S+ in .*\nPython 3\.", said)
+    assert "found    extra learn, for evolution" in said
+    assert re.search(r"A program drives \d{2,} times as fast as the robot: \d+ % of the reference", said)
 
 
 @pytest.mark.parametrize("words", [("--help",), ("arena", "info", ARENA), ("schema", "project")])

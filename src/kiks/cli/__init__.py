@@ -12,6 +12,7 @@ from kiks.cli.calibrate import calibrate
 from kiks.cli.champion import champion
 from kiks.cli.compare import compare
 from kiks.cli.desk import desk
+from kiks.cli.doctor import doctor
 from kiks.cli.evolve import evolve
 from kiks.cli.examples import DemoCommand, examples
 from kiks.cli.export import export
@@ -54,6 +55,7 @@ for _command in (
     fit,
     schema,
     warmup,
+    doctor,
 ):
     app.command(cls=RunCommand if _command is run else Command)(with_options(_command))
 app.command("demo", cls=DemoCommand)(with_options(run))

@@ -99,6 +99,7 @@ def run(
     soccer, square, swarm, to_the_light.
 
     Example: kiks run --arena maze --map /dev/ttyUSB0=1 wander.py
+
     Example: kiks demo follow --arena office --seconds 300
     """
     show_log()
