@@ -182,7 +182,7 @@ def test_what_is_no_picture_is_refused(tmp_path, content):
 
 
 @pytest.mark.parametrize(
-    ("name", "words"), [("a.jpg", "JPEG. Lossy"), ("a.webp", "WEBP. Lossy"), ("a.gif", "GIF. Save")]
+    ("name", "words"), [("a.jpg", "JPEG. Lossy"), ("a.webp", "WEBP. Lossy"), ("a.tga", "TGA. Save")]
 )
 def test_other_types_are_refused(tmp_path, name, words):
     Image.fromarray(grey_picture()).save(tmp_path / name)
@@ -351,3 +351,58 @@ def test_all_floor_of_an_example_arena_can_be_reached_from_its_free_starts(path)
 
 def test_the_default_arena_is_also_a_picture():
     assert np.array_equal(Arena.load(EXAMPLES / "default.toml").brightness, Arena.default().brightness)
+
+
+def with_black_walls(tmp_path):
+    """Write a picture with black walls around a white floor, grey where nothing is known; return where walls are."""
+    grey = np.full((120, 150), 254, np.uint8)
+    grey[:10], grey[:, :20], grey[-5:] = 0, 0, 205
+    Image.fromarray(grey).save(tmp_path / "room.png")
+    return grey[::-1] != 254
+
+
+def test_a_picture_with_black_walls_is_turned_round(tmp_path):
+    walls = with_black_walls(tmp_path)
+    arena = Arena.load(write(tmp_path, 'picture = "room.png"\ninvert = true'))
+    walls[:5] = False  # grey, which only a map of ROS knows to be unknown
+    assert np.array_equal(arena.brightness == 255, walls)
+    with pytest.raises(
+        ArenaError, match=r"room for a robot 55 mm .* walls are black: an arena file with invert = true"
+    ):
+        Arena.load(tmp_path / "room.png").find_start(27.5)
+    with pytest.raises(ArenaError, match="invert must come with a picture"):
+        Arena.load(write(tmp_path, "size_mm = [500, 650]\ninvert = true"))
+
+
+def test_what_a_map_of_ros_does_not_know_to_be_free_is_wall(tmp_path):
+    walls = with_black_walls(tmp_path)
+    (tmp_path / "map.yaml").write_text(
+        "image: room.png\nresolution: 0.002\norigin: [0.0, 0.0, 0.0]\n"
+        "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
+    )
+    arena = Arena.load(tmp_path / "map.yaml")
+    assert (arena.width_mm, arena.height_mm, arena.name) == (300, 240, "map")
+    assert np.array_equal(arena.brightness[::2, ::2] > 0, walls)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("image: [room.png\n", "must be YAML, but: while parsing a flow sequence"),
+        ("- a\n", "must be a table"),
+        ("image: ../room.png\nresolution: 0.01\noccupied_thresh: 0.65\nfree_thresh: 0.2\n", "image"),
+        ("image: room.png\nresolution: 0.01\noccupied_thresh: 0.65\nfree_thresh: 2\n", "free_thresh must be at most 1"),
+        ("image: &a [*a, *a]\nresolution: 0.01\noccupied_thresh: 0.65\nfree_thresh: 0.2\n", "image must be a text"),
+    ],
+)
+def test_a_damaged_map_of_ros_is_one_line(tmp_path, text, message):
+    (tmp_path / "map.yaml").write_text(text)
+    with pytest.raises(ArenaError, match=message) as refusal:
+        Arena.load(tmp_path / "map.yaml")
+    assert "\n" not in str(refusal.value)
+
+
+@pytest.mark.parametrize(("name", "options"), [("a.gif", {}), ("a.webp", {"lossless": True})])
+def test_other_lossless_pictures_are_read(tmp_path, name, options):
+    Image.fromarray(grey_picture()).save(tmp_path / name, **options)
+    assert np.array_equal(read(tmp_path / name), grey_picture())

@@ -39,6 +39,9 @@ _KINDS = (
     ("cylinders", "cylinder", Cylinder),
 )
 
+MOSTLY_WALL = 0.6
+"""Share of walls beyond which a picture has probably its colours the other way round."""
+
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Arena:
@@ -165,7 +168,7 @@ class Arena:
 
         Args:
             path: The name of one that comes with KiKS (`kiks arena list`), or a file: an arena file (.toml), a project
-                (.kiks), an arena of the Matlab KiKS (.kad), or a picture of 1 mm a pixel.
+                (.kiks), an arena of the Matlab KiKS (.kad), a map of ROS (.yaml), or a picture of 1 mm a pixel.
 
         Example:
             >>> Arena.load("office").name
@@ -307,13 +310,19 @@ class Arena:
                     "Move the start pose away from the wall.",
                 )
                 if self.starts
-                else ("its widest place has room for", "Draw wider passages or give a larger mm_per_pixel.")
+                else ("its widest place has room for", self._advice())
             )
             raise ArenaError(
                 f"Arena {shown(self.name)} must have room for a robot {2 * radius_mm:g} mm across, but {where} "
                 f"{room_mm:.1f} mm only. {advice}"
             )
         return pose
+
+    def _advice(self) -> str:
+        """Return what is likely to be wrong with an arena in which a robot has no room."""
+        if (self.brightness > 0).mean() > MOSTLY_WALL:
+            return "In most other programs walls are black: an arena file with invert = true turns the picture round."
+        return "Draw wider passages or give a larger mm_per_pixel."
 
     def _widest_place(self) -> Pose:
         inside = self.clearance[PAD:-PAD, PAD:-PAD]

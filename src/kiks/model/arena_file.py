@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 from pydantic import Field
 
 from kiks.errors import ArenaError, KiksError, ParameterError
@@ -19,6 +20,9 @@ from kiks.model.box import PartMm, SideMm
 from kiks.model.data_file import Coordinate, Number, Point, Rule, Switch, Text, check, parse_toml, read_file, record
 from kiks.model.picture import encode_picture, read_picture
 from kiks.model.raster import MM_PER_PIXEL_MAX, MM_PER_PIXEL_MIN
+
+MIDDLE = 128
+"""Grey from which on an inverted picture is floor."""
 
 Pitch = Annotated[
     Number,
@@ -109,6 +113,7 @@ class ArenaFile(Walls):
     name: Text | None = None
     picture: Annotated[Text, Field(description="A picture in the file's folder or below it.")] | None = None
     mm_per_pixel: Pitch | None = None
+    invert: Annotated[Switch, Field(description="true where walls are black and the floor is white.")] | None = None
     start: Starts = ()
     lamp: Lamps = ()
     ball: Balls = ()
@@ -119,6 +124,8 @@ class ArenaFile(Walls):
             self.check_is_alone("picture")
         elif self.mm_per_pixel is not None:
             raise ParameterError("mm_per_pixel must come with a picture, but there is none. Boxes have cells of 1 mm.")
+        elif self.invert is not None:
+            raise ParameterError("invert must come with a picture, but there is none. Remove it.")
         elif self.size_mm is None:
             raise ParameterError(
                 "an arena must have a picture or a size, but it has neither. "
@@ -140,18 +147,23 @@ def decode_arena(data: bytes, name: str = "arena", what: str = "The arena file")
 def _decode(data: bytes, what: str, name: str, folder: Path | None) -> Arena:
     file = check(ArenaFile, parse_toml(data, what, error=ArenaError), what, error=ArenaError)
     try:
-        arena = file.box() if file.picture is None else _picture_arena(file.picture, file.mm_per_pixel or 1.0, folder)
+        arena = file.box() if file.picture is None else _picture_arena(file, folder)
         return replace(arena, name=name if file.name is None else file.name, **places_of(file))
     except KiksError as error:
         raise ArenaError(f"{what}: {error}") from None
 
 
-def _picture_arena(picture: str, mm_per_pixel: float, folder: Path | None) -> Arena:
-    if folder is None:
+def _picture_arena(file: ArenaFile, folder: Path | None) -> Arena:
+    if folder is None or file.picture is None:
         raise ArenaError(
             "an arena that comes alone must have no picture beside it, but it names one. Open that picture instead."
         )
-    return Arena.from_array(read_picture(within(folder, picture, "picture"), mm_per_pixel), mm_per_pixel=mm_per_pixel)
+    mm_per_pixel = file.mm_per_pixel or 1.0
+    brightness = read_picture(within(folder, file.picture, "picture"), mm_per_pixel)
+    if file.invert:
+        # White is often 254, and edges are smoothed.
+        brightness = np.where(brightness < MIDDLE, 255 - brightness, 0).astype(np.uint8)
+    return Arena.from_array(brightness, mm_per_pixel=mm_per_pixel)
 
 
 def places_of(file: Any) -> dict[str, Any]:

@@ -21,12 +21,12 @@ from kiks.model.raster import cells_per_pixel
 if TYPE_CHECKING:
     from PIL import Image
 
-PICTURE_TYPES = ("PNG", "TIFF", "PPM", "BMP")
-"""The types that are read, in Pillow's words; PPM includes PGM and PBM."""
+PICTURE_TYPES = ("PNG", "TIFF", "PPM", "BMP", "GIF", "WEBP")
+"""The types that are read, in Pillow's words; PPM includes PGM and PBM. A WebP must be lossless."""
 
 _BAND_PIXELS = 1 << 20
 _LOSSY = "Lossy compression smears walls into the floor. "
-_LOSSY_TYPES = ("JPEG", "MPO", "JPEG2000", "WEBP", "AVIF")
+_LOSSY_TYPES = ("JPEG", "MPO", "JPEG2000", "AVIF")
 _SAVE_AS = "Save the arena as PNG, TIF, PGM or BMP."
 _SAVE_AGAIN = "Save it again, or fetch it again."
 _TILE_WIDTH, _TILE_LENGTH = 322, 323  # tags of TIFF 6.0, section 15
@@ -56,7 +56,7 @@ def decode_picture(data: bytes, mm_per_pixel: float, what: str = "The picture") 
         warnings.simplefilter("ignore")
         try:
             with Image.open(BytesIO(data)) as image:
-                _check_type(image)
+                _check_type(image, data)
                 cells_per_pixel(image.height, image.width, mm_per_pixel)
                 _check_tiles(image)
                 return _brightness(image)
@@ -81,9 +81,10 @@ def encode_picture(brightness: npt.NDArray[np.uint8], *, compress_level: int = 6
     return file.getvalue()
 
 
-def _check_type(image: Image.Image) -> None:
+def _check_type(image: Image.Image, data: bytes) -> None:
     kind = f"of type {image.format}"
-    is_lossy = image.format in _LOSSY_TYPES
+    # The chunk with the pixels of a lossless WebP is VP8L, of another VP8 (RFC 9649, section 2).
+    is_lossy = image.format in _LOSSY_TYPES or (image.format == "WEBP" and b"VP8L" not in data[12:4096])
     if image.format == "TIFF" and image.info.get("compression") in ("jpeg", "tiff_jpeg", "webp"):
         kind, is_lossy = f"a TIFF compressed with {image.info['compression']}", True
     if is_lossy or image.format not in PICTURE_TYPES:

@@ -49,6 +49,7 @@ from kiks.model.kad import load_kad
 from kiks.model.limits import PROJECT_FILE_BYTES_MAX
 from kiks.model.picture import decode_picture, encode_picture
 from kiks.model.robot import Baud, Brightness, Response, robot_names
+from kiks.model.ros_map import load_ros_map
 from kiks.model.shipped import shipped_arenas
 from kiks.model.thinking_policy import split_thinking
 from kiks.model.turrets import TURRETS
@@ -295,6 +296,8 @@ _READERS: dict[str, Callable[[Path], Arena]] = {
     ".toml": load_arena,
     ".kiks": lambda path: Project.load(path).arena,
     ".kad": load_kad,
+    ".yaml": load_ros_map,
+    ".yml": load_ros_map,
 }
 
 
