@@ -12,19 +12,57 @@ from typing import Any
 
 
 class KiksError(Exception):
-    """Base of all errors that KiKS raises on purpose."""
+    """Base of all errors that KiKS raises on purpose.
+
+    Example:
+        >>> import kiks
+        >>> try:
+        ...     kiks.Arena.load("nowhere")
+        ... except kiks.KiksError as error:
+        ...     print(type(error).__name__)
+        ArenaError
+    """
 
 
 class ParameterError(KiksError, ValueError):
-    """A value does not keep the rule that its name states."""
+    """A value does not keep the rule that its name states.
+
+    Example:
+        >>> import kiks
+        >>> try:
+        ...     kiks.Simulation(robots=-1)
+        ... except kiks.ParameterError as error:
+        ...     print(error)
+        robots must be a whole number from 0 to 1000, but it was -1. Say how many you need.
+    """
 
 
 class ArenaError(KiksError):
-    """A picture or a file is no arena."""
+    """A picture or a file is no arena.
+
+    Example:
+        >>> import kiks
+        >>> try:
+        ...     kiks.Arena.load("offic")
+        ... except kiks.ArenaError as error:
+        ...     print(str(error).rpartition(". ")[2])
+        Did you mean 'office'?
+    """
 
 
 class LinkError(KiksError, OSError):
-    """A port is unknown, busy or closed, or the robot's answer is not the one expected."""
+    """A port is unknown, busy or closed, or the robot's answer is not the one expected.
+
+    Example:
+        >>> import kiks
+        >>> robot = kiks.Khepera(kiks.Simulation(seed=1).port(1))
+        >>> robot.close()
+        >>> try:
+        ...     robot.proximity()
+        ... except kiks.LinkError as error:
+        ...     print(error)
+        a port must be open to be used, but this one is closed. Open it again, or close it later.
+    """
 
 
 class HaltError(LinkError):

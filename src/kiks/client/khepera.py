@@ -23,6 +23,12 @@ class Status(NamedTuple):
         on_target: True once a position move has ended.
         mode: 0 speed, 1 position, 2 PWM.
         error: Command minus measurement [pulses/10 ms, or pulses in position mode].
+
+    Example:
+        >>> import kiks
+        >>> sim = kiks.Simulation(seed=1)
+        >>> kiks.Khepera(sim.port(1)).status()
+        (Status(on_target=False, mode=0, error=0), Status(on_target=False, mode=0, error=0))
     """
 
     on_target: bool

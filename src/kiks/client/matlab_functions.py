@@ -76,6 +76,14 @@ def ksend(text: str, ref: Sequence[float], timeout: float | None = None) -> str:
 
     Raises:
         LinkError: If the port is not open.
+
+    Example:
+        >>> import kiks
+        >>> sim = kiks.Simulation(seed=1)
+        >>> ref = kiks.kopen([-1, 9600, 1])
+        >>> kiks.ksend("B\n", ref)
+        'b,5.02,5.01'
+        >>> kiks.kclose(ref)
     """
     check_kind("text", text, str, r'Write ksend("N\n", ref).')
     robot = _open_robot(ref)
@@ -97,7 +105,14 @@ def ksend(text: str, ref: Sequence[float], timeout: float | None = None) -> str:
 
 
 def kclose(ref: Sequence[float]) -> None:
-    """Close a port; `[]` closes every simulated one. Does nothing if it is not open. The robot drives on."""
+    """Close a port; `[]` closes every simulated one. Does nothing if it is not open. The robot drives on.
+
+    Example:
+        >>> import kiks
+        >>> sim = kiks.Simulation(seed=1)
+        >>> ref = kiks.kopen([-1, 9600, 1])
+        >>> kiks.kclose(ref)
+    """
     if isinstance(ref, list | tuple) and not ref:
         numbers = [number for number in _OPEN if number < 0]
     else:
@@ -112,13 +127,30 @@ def ktime(port: int | Sequence[float]) -> float | None:
 
     Args:
         port: The port's number, or the result of `kopen`.
+
+    Example:
+        >>> import kiks
+        >>> sim = kiks.Simulation(seed=1)
+        >>> ref = kiks.kopen([-1, 9600, 1])
+        >>> kiks.pause(0.5)
+        >>> round(kiks.ktime(-1), 1)
+        0.5
+        >>> kiks.kclose(ref)
     """
     robot, opened_s = _OPEN.get(_number_of(port), (None, 0.0))
     return None if robot is None else robot.time_s - opened_s
 
 
 def pause(seconds: float) -> None:
-    """Let time pass [s]: simulated time if a simulated port was opened last, else real time."""
+    """Let time pass [s]: simulated time if a simulated port was opened last, else real time.
+
+    Example:
+        >>> import kiks
+        >>> sim = kiks.Simulation(seed=1)
+        >>> ref = kiks.kopen([-1, 9600, 1])
+        >>> kiks.pause(0.5)  # of simulated time
+        >>> kiks.kclose(ref)
+    """
     robot, _ = next(reversed(_OPEN.values()), (None, 0.0))
     if robot is not None:
         robot.pause(seconds)

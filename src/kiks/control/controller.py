@@ -108,7 +108,7 @@ class Controller(Compiled):
             raise self.refused(TypeError(RETURNS))
 
     def check_parameters(self, parameters: ArrayLike) -> NDArray[np.float64]:
-        """Return parameters as float64, their last axis one controller's."""
+        """Return parameters as float64 [..., parameter]."""
         given = check_numbers("parameters", parameters)
         given = given.reshape(1) if given.ndim == 0 else given
         if self.parameter_count not in (None, given.shape[-1]):

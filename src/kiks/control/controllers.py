@@ -223,6 +223,11 @@ def ctrnn(
         time_constant_s: T of a parameter of 0 [s].
         senses: Its senses, of 'proximity', 'ambient' and 'camera'.
         speed_limit: The highest speed [pulses/10 ms].
+
+    Example:
+        >>> import kiks
+        >>> kiks.controllers.ctrnn(neurons=6).parameter_count
+        96
     """
     sense_count, take_senses = reading_count(senses), senses_as_inputs(senses)
     bias_first, senses_first = neurons, 2 * neurons
@@ -270,6 +275,11 @@ def gru(*, units: Units = 4, senses: Senses = ("proximity",), speed_limit: Speed
         units: Number of units.
         senses: Its senses, of 'proximity', 'ambient' and 'camera'.
         speed_limit: The highest speed [pulses/10 ms].
+
+    Example:
+        >>> import kiks
+        >>> kiks.controllers.gru(units=4).parameter_count
+        166
     """
     sense_count, take_senses = reading_count(senses), senses_as_inputs(senses)
     input_count, gate_count = sense_count + units, 2 * units
@@ -470,7 +480,13 @@ def controller_of(recipe: Recipe, folder: str | Path) -> Controller:
 
 
 def recipe_for(controller: Controller, folder: str | Path = ".") -> dict[str, Any]:
-    """Return the recipe of a controller for a file in a folder: JSON-able, with paths relative to there."""
+    """Return the recipe of a controller for a file in a folder: JSON-able, with paths relative to there.
+
+    Example:
+        >>> import kiks
+        >>> kiks.controllers.recipe_for(kiks.controllers.elman(units=3))
+        {'kind': 'elman', 'units': 3, 'senses': ['proximity'], 'speed_limit': 10.0}
+    """
     check_kind("controller", controller, Controller)
     if controller.recipe is None:
         raise ParameterError(
@@ -482,7 +498,13 @@ def recipe_for(controller: Controller, folder: str | Path = ".") -> dict[str, An
 
 
 def random_parameters(controller: Controller, count: int, *, seed: int) -> NDArray[np.float64]:
-    """Return random parameters to begin with, of normal distribution (0, 1), float64 [count, parameter]."""
+    """Return random parameters to begin with, of normal distribution (0, 1), float64 [count, parameter].
+
+    Example:
+        >>> import kiks
+        >>> kiks.controllers.random_parameters(kiks.controllers.linear(), 3, seed=1).shape
+        (3, 18)
+    """
     check_kind("controller", controller, Controller)
     if controller.parameter_count is None:
         raise ParameterError(

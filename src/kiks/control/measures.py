@@ -106,32 +106,77 @@ def mean(notes: NDArray[np.float64]) -> NDArray[np.float64]:
 
 @measure
 def path_mm(moment: Any, notes: Any) -> None:
-    """How far it has driven, ahead and back together [mm]."""
+    """How far it has driven, ahead and back together [mm].
+
+    Example:
+        >>> import kiks
+        >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 1, seed=1)
+        >>> ahead = [0.5, 0.5] + [0.0] * 16
+        >>> rollouts = batch.run(kiks.controllers.linear(), ahead, seconds=2, measures=[kiks.measures.path_mm])
+        >>> round(rollouts.values.item(), 2)
+        74.56
+    """
     notes[0] = moment.path_mm
 
 
 @measure
 def net_mm(moment: Any, notes: Any) -> None:
-    """How far it is from its start, straight [mm]."""
+    """How far it is from its start, straight [mm].
+
+    Example:
+        >>> import kiks
+        >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 1, seed=1)
+        >>> ahead = [0.5, 0.5] + [0.0] * 16
+        >>> rollouts = batch.run(kiks.controllers.linear(), ahead, seconds=2, measures=[kiks.measures.net_mm])
+        >>> round(rollouts.values.item(), 2)
+        74.56
+    """
     notes[0] = distance_mm(moment, moment.start_x_mm, moment.start_y_mm)
 
 
 @measure(notes=2, result=mean)
 def straightness(moment: Any, notes: Any) -> None:
-    """`net_mm` as a share of `path_mm`: 1 for a straight line, 0 for a circle."""
+    """`net_mm` as a share of `path_mm`: 1 for a straight line, 0 for a circle.
+
+    Example:
+        >>> import kiks
+        >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 1, seed=1)
+        >>> arc = [0.5, 0.4] + [0.0] * 16
+        >>> rollouts = batch.run(kiks.controllers.linear(), arc, seconds=2, measures=[kiks.measures.straightness])
+        >>> round(rollouts.values.item(), 2)
+        1.0
+    """
     notes[0], notes[1] = distance_mm(moment, moment.start_x_mm, moment.start_y_mm), moment.path_mm
 
 
 @measure(notes=2, result=mean)
 def speed_pulses(moment: Any, notes: Any) -> None:
-    """Mean of the wheels' speeds, ahead positive [pulses/10 ms]."""
+    """Mean of the wheels' speeds, ahead positive [pulses/10 ms].
+
+    Example:
+        >>> import kiks
+        >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 1, seed=1)
+        >>> ahead = [0.5, 0.5] + [0.0] * 16
+        >>> rollouts = batch.run(kiks.controllers.linear(), ahead, seconds=2, measures=[kiks.measures.speed_pulses])
+        >>> round(rollouts.values.item(), 2)
+        5.0
+    """
     notes[0] += 0.5 * (moment.wheels[0] + moment.wheels[1])
     notes[1] += 1.0
 
 
 @measure
 def turned_pulses(moment: Any, notes: Any) -> None:
-    """Commanded path of both wheels, forwards or backwards [pulses]: an approximation of the energy used."""
+    """Commanded path of both wheels, forwards or backwards [pulses]: an approximation of the energy used.
+
+    Example:
+        >>> import kiks
+        >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 1, seed=1)
+        >>> ahead = [0.5, 0.5] + [0.0] * 16
+        >>> rollouts = batch.run(kiks.controllers.linear(), ahead, seconds=2, measures=[kiks.measures.turned_pulses])
+        >>> round(rollouts.values.item(), 2)
+        1934.08
+    """
     notes[0] += 100.0 * moment.period_s * (abs(moment.wheels[0]) + abs(moment.wheels[1]))
 
 
@@ -140,6 +185,14 @@ def roaming(moment: Any, notes: Any) -> None:
     """Mean speed at which it gets away from where it was in the last two seconds: 1 for 80 mm/s, 0 on the spot.
 
     A robot that shuttles or spins drives fast and gets nowhere: there `path_mm` grows, and this does not.
+
+    Example:
+        >>> import kiks
+        >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 1, seed=1)
+        >>> ahead = [0.5, 0.5] + [0.0] * 16
+        >>> rollouts = batch.run(kiks.controllers.linear(), ahead, seconds=2, measures=[kiks.measures.roaming])
+        >>> round(rollouts.values.item(), 2)
+        0.17
     """
     away_mm = moved_lately_mm(moment, notes)
     notes[0] += min(away_mm / (ROAMING_S * FULL_SPEED_MM_S), 1.0)
@@ -151,13 +204,31 @@ def roaming(moment: Any, notes: Any) -> None:
 
 @measure
 def contacts(moment: Any, notes: Any) -> None:
-    """How often it has met something."""
+    """How often it has met something.
+
+    Example:
+        >>> import kiks
+        >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 1, seed=1)
+        >>> ahead = [0.5, 0.5] + [0.0] * 16
+        >>> rollouts = batch.run(kiks.controllers.linear(), ahead, seconds=10, measures=[kiks.measures.contacts])
+        >>> round(rollouts.values.item(), 2)
+        1.0
+    """
     notes[0] = moment.contact_count
 
 
 @measure(notes=2, result=mean)
 def touching_share(moment: Any, notes: Any) -> None:
-    """Share of control steps in which it touched something, or had within 0.2 s."""
+    """Share of control steps in which it touched something, or had within 0.2 s.
+
+    Example:
+        >>> import kiks
+        >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 1, seed=1)
+        >>> ahead = [0.5, 0.5] + [0.0] * 16
+        >>> rollouts = batch.run(kiks.controllers.linear(), ahead, seconds=10, measures=[kiks.measures.touching_share])
+        >>> round(rollouts.values.item(), 2)
+        0.46
+    """
     notes[0] += 1.0 if moment.is_touching else 0.0
     notes[1] += 1.0
 
@@ -170,6 +241,14 @@ def avoidance(moment: Any, notes: Any) -> None:
     the highest proximity count; each from 0 to 1, a speed of 80 mm/s and 1023 counts being 1 (Floreano and Mondada,
     Automatic creation of an autonomous agent, From Animals to Animats 3, 1994, equation 1). That only driving ahead
     counts is our reading of it: of absolute speeds, shuttling on the spot would be best.
+
+    Example:
+        >>> import kiks
+        >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 1, seed=1)
+        >>> ahead = [0.5, 0.5] + [0.0] * 16
+        >>> rollouts = batch.run(kiks.controllers.linear(), ahead, seconds=2, measures=[kiks.measures.avoidance])
+        >>> round(rollouts.values.item(), 2)
+        0.5
     """
     highest = 0.0
     for k in range(8):
@@ -192,6 +271,15 @@ def wall_following(side: Side = "left", *, counts: Counts = 50.0) -> Measure:
     Args:
         side: 'left' or 'right'.
         counts: Proximity of the sensor on that side from which on a wall is at its side.
+
+    Example:
+        >>> import kiks
+        >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 1, seed=1)
+        >>> ahead = [0.5, 0.5] + [0.0] * 16
+        >>> measures = [kiks.measures.wall_following("left")]
+        >>> rollouts = batch.run(kiks.controllers.linear(), ahead, seconds=10, measures=measures)
+        >>> round(rollouts.values.item(), 2)
+        0.0
     """
     sensor = SIDE_SENSORS[side]
 
@@ -218,6 +306,15 @@ def beside_wall_share(side: Side = "left", *, counts: Counts = 50.0) -> Measure:
     Args:
         side: 'left' or 'right'.
         counts: Proximity of the sensor on that side from which on a wall is at its side.
+
+    Example:
+        >>> import kiks
+        >>> batch = kiks.Batch(kiks.Arena.load("maze"), 1, seed=1)
+        >>> ahead = [0.5, 0.5] + [0.0] * 16
+        >>> measures = [kiks.measures.beside_wall_share("left")]
+        >>> rollouts = batch.run(kiks.controllers.linear(), ahead, seconds=2, measures=measures)
+        >>> round(rollouts.values.item(), 2)
+        0.0
     """
     sensor = SIDE_SENSORS[side]
 
@@ -234,13 +331,31 @@ def beside_wall_share(side: Side = "left", *, counts: Counts = 50.0) -> Measure:
 
 @measure
 def final_x_mm(moment: Any, notes: Any) -> None:
-    """Where it is [mm]; with `final_y_mm` a description of what it did, for novelty and quality-diversity search."""
+    """Where it is [mm]; with `final_y_mm` a description of what it did, for novelty and quality-diversity search.
+
+    Example:
+        >>> import kiks
+        >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 1, seed=1)
+        >>> arc = [0.5, 0.4] + [0.0] * 16
+        >>> rollouts = batch.run(kiks.controllers.linear(), arc, seconds=2, measures=[kiks.measures.final_x_mm])
+        >>> round(rollouts.values.item(), 2)
+        259.06
+    """
     notes[0] = moment.x_mm
 
 
 @measure
 def final_y_mm(moment: Any, notes: Any) -> None:
-    """Where it is [mm]."""
+    """Where it is [mm].
+
+    Example:
+        >>> import kiks
+        >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 1, seed=1)
+        >>> arc = [0.5, 0.4] + [0.0] * 16
+        >>> rollouts = batch.run(kiks.controllers.linear(), arc, seconds=2, measures=[kiks.measures.final_y_mm])
+        >>> round(rollouts.values.item(), 2)
+        315.62
+    """
     notes[0] = moment.y_mm
 
 
@@ -250,6 +365,15 @@ def coverage(arena: Arena, *, square_mm: float = 100.0) -> Measure:
     Args:
         arena: The arena; squares that are all wall count, too.
         square_mm: Edge of a square [mm].
+
+    Example:
+        >>> import kiks
+        >>> arena = kiks.Arena.box(500, 500)
+        >>> batch = kiks.Batch(arena, 1, seed=1)
+        >>> ahead = [0.5, 0.5] + [0.0] * 16
+        >>> rollouts = batch.run(kiks.controllers.linear(), ahead, seconds=2, measures=[kiks.measures.coverage(arena)])
+        >>> round(rollouts.values.item(), 2)
+        0.08
     """
     check_kind("arena", arena, Arena)
     edge_mm = check_number("square_mm", square_mm, 1, PLACE_LIMIT_MM)
@@ -280,7 +404,17 @@ def _coverage(columns: int, rows: int, edge_mm: float) -> Measure:
 
 @made_once
 def goal_mm(x_mm: Place, y_mm: Place) -> Measure:
-    """How far it is from a place [mm]."""
+    """How far it is from a place [mm].
+
+    Example:
+        >>> import kiks
+        >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 1, seed=1)
+        >>> ahead = [0.5, 0.5] + [0.0] * 16
+        >>> measures = [kiks.measures.goal_mm(250, 300)]
+        >>> rollouts = batch.run(kiks.controllers.linear(), ahead, seconds=2, measures=measures)
+        >>> round(rollouts.values.item(), 2)
+        24.07
+    """
 
     @measure
     def goal_mm(moment: Any, notes: Any) -> None:
@@ -291,7 +425,17 @@ def goal_mm(x_mm: Place, y_mm: Place) -> Measure:
 
 @made_once
 def closest_mm(x_mm: Place, y_mm: Place) -> Measure:
-    """How near it has come to a place, at best [mm]."""
+    """How near it has come to a place, at best [mm].
+
+    Example:
+        >>> import kiks
+        >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 1, seed=1)
+        >>> ahead = [0.5, 0.5] + [0.0] * 16
+        >>> measures = [kiks.measures.closest_mm(250, 300)]
+        >>> rollouts = batch.run(kiks.controllers.linear(), ahead, seconds=2, measures=measures)
+        >>> round(rollouts.values.item(), 2)
+        0.51
+    """
 
     @measure(notes=2)
     def closest_mm(moment: Any, notes: Any) -> None:
@@ -304,7 +448,17 @@ def closest_mm(x_mm: Place, y_mm: Place) -> Measure:
 
 @made_once
 def reached_s(x_mm: Place, y_mm: Place, *, radius_mm: Radius = 50.0) -> Measure:
-    """When it first came within a radius of a place [s]; if it never did, how long it has tried."""
+    """When it first came within a radius of a place [s]; if it never did, how long it has tried.
+
+    Example:
+        >>> import kiks
+        >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 1, seed=1)
+        >>> ahead = [0.5, 0.5] + [0.0] * 16
+        >>> measures = [kiks.measures.reached_s(250, 300)]
+        >>> rollouts = batch.run(kiks.controllers.linear(), ahead, seconds=2, measures=measures)
+        >>> round(rollouts.values.item(), 2)
+        0.13
+    """
 
     @measure(notes=2)
     def reached_s(moment: Any, notes: Any) -> None:
@@ -324,6 +478,14 @@ def escaped_share(*, radius_mm: Radius = 57.0) -> Measure:
 
     Args:
         radius_mm: The radius [mm].
+
+    Example:
+        >>> import kiks
+        >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 1, robots=2, seed=1)
+        >>> arc = [0.5, 0.4] + [0.0] * 16
+        >>> rollouts = batch.run(kiks.controllers.linear(), arc, seconds=2, measures=[kiks.measures.escaped_share()])
+        >>> rollouts.values[0, :, 0].round(2)
+        array([1., 1.])
     """
 
     @measure(notes=3, result=mean)
@@ -343,7 +505,16 @@ def escaped_share(*, radius_mm: Radius = 57.0) -> Measure:
 
 @measure
 def light_mm(moment: Any, notes: Any) -> None:
-    """How far the nearest lamp that burns is [mm]; infinite if there is none."""
+    """How far the nearest lamp that burns is [mm]; infinite if there is none.
+
+    Example:
+        >>> import kiks
+        >>> batch = kiks.Batch(kiks.Arena.load("office"), 1, seed=1)
+        >>> ahead = [0.5, 0.5] + [0.0] * 16
+        >>> rollouts = batch.run(kiks.controllers.linear(), ahead, seconds=2, measures=[kiks.measures.light_mm])
+        >>> round(rollouts.values.item(), 2)
+        271.2
+    """
     notes[0] = nearest_lamp_mm(moment)
 
 
@@ -352,6 +523,14 @@ def light_approach(moment: Any, notes: Any) -> None:
     """Mean share of the way to the nearest lamp that it has made: 0 if it stands still, near 1 if it soon stays there.
 
     The way is the straight one from its start. A robot that is farther away than its start has made 0.
+
+    Example:
+        >>> import kiks
+        >>> batch = kiks.Batch(kiks.Arena.load("office"), 1, seed=1)
+        >>> ahead = [0.5, 0.5] + [0.0] * 16
+        >>> rollouts = batch.run(kiks.controllers.linear(), ahead, seconds=2, measures=[kiks.measures.light_approach])
+        >>> round(rollouts.values.item(), 2)
+        0.03
     """
     start_mm = from_lamp_mm(moment, moment.start_x_mm, moment.start_y_mm)
     if 0.0 < start_mm < np.inf:
@@ -361,7 +540,17 @@ def light_approach(moment: Any, notes: Any) -> None:
 
 @made_once
 def light_stay_s(radius_mm: Radius = 100.0) -> Measure:
-    """How long it has been within a radius of a lamp that burns, without a break until the end [s]; 0 if it is not."""
+    """How long it has been within a radius of a lamp that burns, without a break until the end [s]; 0 if it is not.
+
+    Example:
+        >>> import kiks
+        >>> batch = kiks.Batch(kiks.Arena.load("office"), 1, seed=1)
+        >>> ahead = [0.5, 0.5] + [0.0] * 16
+        >>> measures = [kiks.measures.light_stay_s(300)]
+        >>> rollouts = batch.run(kiks.controllers.linear(), ahead, seconds=2, measures=measures)
+        >>> round(rollouts.values.item(), 2)
+        1.93
+    """
 
     @measure
     def light_stay_s(moment: Any, notes: Any) -> None:
@@ -372,7 +561,17 @@ def light_stay_s(radius_mm: Radius = 100.0) -> Measure:
 
 @made_once
 def near_light_share(radius_mm: Radius = 100.0) -> Measure:
-    """Share of control steps in which it was within a radius of a lamp that burns."""
+    """Share of control steps in which it was within a radius of a lamp that burns.
+
+    Example:
+        >>> import kiks
+        >>> batch = kiks.Batch(kiks.Arena.load("office"), 1, seed=1)
+        >>> ahead = [0.5, 0.5] + [0.0] * 16
+        >>> measures = [kiks.measures.near_light_share(300)]
+        >>> rollouts = batch.run(kiks.controllers.linear(), ahead, seconds=2, measures=measures)
+        >>> round(rollouts.values.item(), 2)
+        1.0
+    """
 
     @measure(notes=2, result=mean)
     def near_light_share(moment: Any, notes: Any) -> None:
@@ -384,7 +583,17 @@ def near_light_share(radius_mm: Radius = 100.0) -> Measure:
 
 @made_once
 def gathered(x_mm: Place, y_mm: Place, *, radius_mm: Radius = 150.0) -> Measure:
-    """How many balls and cylinders have their middle within a radius of a place."""
+    """How many balls and cylinders have their middle within a radius of a place.
+
+    Example:
+        >>> import kiks
+        >>> batch = kiks.Batch(kiks.Arena.load("pillars"), 1, seed=1)
+        >>> ahead = [0.5, 0.5] + [0.0] * 16
+        >>> measures = [kiks.measures.gathered(300, 300)]
+        >>> rollouts = batch.run(kiks.controllers.linear(), ahead, seconds=2, measures=measures)
+        >>> round(rollouts.values.item(), 2)
+        2.0
+    """
 
     @measure
     def gathered(moment: Any, notes: Any) -> None:
@@ -398,7 +607,17 @@ def gathered(x_mm: Place, y_mm: Place, *, radius_mm: Radius = 150.0) -> Measure:
 
 @made_once
 def largest_group(radius_mm: Radius = 100.0) -> Measure:
-    """Largest number of balls and cylinders that have their middles within a radius of one of them, itself included."""
+    """Largest number of balls and cylinders that have their middles within a radius of one of them, itself included.
+
+    Example:
+        >>> import kiks
+        >>> batch = kiks.Batch(kiks.Arena.load("pillars"), 1, seed=1)
+        >>> ahead = [0.5, 0.5] + [0.0] * 16
+        >>> measures = [kiks.measures.largest_group(200)]
+        >>> rollouts = batch.run(kiks.controllers.linear(), ahead, seconds=2, measures=measures)
+        >>> round(rollouts.values.item(), 2)
+        2.0
+    """
 
     @measure
     def largest_group(moment: Any, notes: Any) -> None:
@@ -418,6 +637,14 @@ def closeness(moment: Any, notes: Any) -> None:
     """How close balls and cylinders are, the mean of 1 / (1 + (d / 100 mm)^2) over pairs at a distance d; 0 of none.
 
     It grows most when things that are near each other come nearer, so it pays for each step towards a group.
+
+    Example:
+        >>> import kiks
+        >>> batch = kiks.Batch(kiks.Arena.load("pillars"), 1, seed=1)
+        >>> ahead = [0.5, 0.5] + [0.0] * 16
+        >>> rollouts = batch.run(kiks.controllers.linear(), ahead, seconds=2, measures=[kiks.measures.closeness])
+        >>> round(rollouts.values.item(), 2)
+        0.24
     """
     count = moment.bodies.shape[0]
     total = 0.0
@@ -431,7 +658,16 @@ def closeness(moment: Any, notes: Any) -> None:
 
 @measure
 def neighbour_mm(moment: Any, notes: Any) -> None:
-    """How far the nearest other robot is, from middle to middle [mm]; 0 of a lone robot."""
+    """How far the nearest other robot is, from middle to middle [mm]; 0 of a lone robot.
+
+    Example:
+        >>> import kiks
+        >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 1, robots=2, seed=1)
+        >>> arc = [0.5, 0.4] + [0.0] * 16
+        >>> rollouts = batch.run(kiks.controllers.linear(), arc, seconds=2, measures=[kiks.measures.neighbour_mm])
+        >>> rollouts.values[0, :, 0].round(2)
+        array([118.83, 118.83])
+    """
     nearest = np.inf
     for other in range(moment.poses.shape[0]):
         if other != moment.robot:
@@ -442,7 +678,16 @@ def neighbour_mm(moment: Any, notes: Any) -> None:
 
 @measure
 def spread_mm(moment: Any, notes: Any) -> None:
-    """How far balls and cylinders are from the middle of them all [mm], root mean square; 0 of none."""
+    """How far balls and cylinders are from the middle of them all [mm], root mean square; 0 of none.
+
+    Example:
+        >>> import kiks
+        >>> batch = kiks.Batch(kiks.Arena.load("pillars"), 1, seed=1)
+        >>> ahead = [0.5, 0.5] + [0.0] * 16
+        >>> rollouts = batch.run(kiks.controllers.linear(), ahead, seconds=2, measures=[kiks.measures.spread_mm])
+        >>> round(rollouts.values.item(), 2)
+        89.44
+    """
     count = moment.bodies.shape[0]
     x_mm, y_mm, squares = 0.0, 0.0, 0.0
     for body in moment.bodies:

@@ -87,6 +87,14 @@ class Champion:
         timing: Timing of its control loop.
         kiks: Version of KiKS that found it.
         world: The world in which it lives: arena, number of robots, starts and seed. None if it is not known.
+
+    Example:
+        >>> import kiks
+        >>> champion = kiks.Champion(kiks.controllers.linear(), [0.5, 0.5] + [0.0] * 16)
+        >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+        >>> steps = champion.drive(sim.port(1), seconds=2)
+        >>> round(sim.travelled_mm(1))
+        78
     """
 
     controller: Controller

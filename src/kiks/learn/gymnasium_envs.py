@@ -54,6 +54,15 @@ class KheperaEnv(gymnasium.Env[Floats32, Floats32]):
         task: The environment: a task with a reward, or the name of one of `kiks.learn.environments`.
         render_mode: 'rgb_array' for pictures from above, None for none.
         **changes: Changed arguments of the task, such as `arenas` or `timing`; and `response` as for `Episodes`.
+
+    Example:
+        >>> import numpy as np
+        >>> from kiks.learn.gymnasium_envs import KheperaEnv
+        >>> env = KheperaEnv("Avoid")
+        >>> seen, info = env.reset(seed=1)
+        >>> seen, reward, terminated, truncated, info = env.step(np.array([0.5, 0.5], np.float32))
+        >>> seen.shape, terminated, truncated
+        ((8,), False, False)
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 10}  # noqa: RUF012  (a class attribute in Gymnasium)
@@ -98,6 +107,15 @@ class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[An
         render_mode: 'rgb_array' for pictures from above, None for none.
         threads: Number of threads; the number of cores if left out. Results do not depend on it.
         **changes: As for `KheperaEnv`.
+
+    Example:
+        >>> import numpy as np
+        >>> from kiks.learn.gymnasium_envs import KheperaVectorEnv
+        >>> envs = KheperaVectorEnv(4, "Avoid")
+        >>> seen, info = envs.reset(seed=1)
+        >>> seen, rewards, *_ = envs.step(np.full((4, 2), 0.5, np.float32))
+        >>> seen.shape, rewards.shape
+        ((4, 8), (4,))
     """
 
     metadata = {**KheperaEnv.metadata, "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
@@ -155,7 +173,15 @@ class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[An
         return self.episodes.observations()[:, 0], self._infos()
 
     def step(self, actions: Floats32) -> tuple[Floats32, NDArray[Any], NDArray[Any], NDArray[Any], dict[str, Any]]:
-        """Let all robots act and read their sensors; ended worlds reset according to the autoreset mode."""
+        """Let all robots act and read their sensors; ended worlds reset according to the autoreset mode.
+
+        Args:
+            actions: Speeds of the wheels from -1 to 1, shares of the speed limit, float32 [world, 2].
+
+        Returns:
+            Observations, float32 [world, sensor]; rewards [world]; whether each world has reached its end [world], and
+            whether it was truncated [world]; and what Gymnasium calls info.
+        """
         if self.autoreset_mode is AutoresetMode.DISABLED and self._done.any():
             raise ParameterError(
                 "worlds that have ended must be reset before the next step, but "

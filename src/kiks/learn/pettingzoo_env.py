@@ -32,6 +32,16 @@ class KheperaTeam(ParallelEnv[str, Floats32, Floats32]):  # type: ignore[misc, u
         max_cycles: Number of steps after which an episode is truncated.
         render_mode: 'rgb_array' for pictures from above, None for none.
         **changes: As for `kiks.learn.gymnasium_envs.KheperaEnv`.
+
+    Example:
+        >>> import numpy as np
+        >>> from kiks.learn.pettingzoo_env import KheperaTeam
+        >>> team = KheperaTeam("Gather", robots=3)
+        >>> seen, infos = team.reset(seed=1)
+        >>> actions = {agent: np.array([0.5, 0.5], np.float32) for agent in team.agents}
+        >>> seen, rewards, *_ = team.step(actions)
+        >>> sorted(rewards)
+        ['robot_1', 'robot_2', 'robot_3']
     """
 
     metadata: ClassVar[dict[str, Any]] = {"name": "kiks_team_v0", "render_modes": ["rgb_array"], "render_fps": 10}

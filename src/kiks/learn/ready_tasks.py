@@ -85,7 +85,14 @@ def avoid_fitness(values: Values) -> Floats:
 
 @ready
 def avoid() -> Task:
-    """The task to drive fast and straight, explore, and touch nothing (Floreano and Mondada 1994)."""
+    """The task to drive fast and straight, explore, and touch nothing (Floreano and Mondada 1994).
+
+    Example:
+        >>> import kiks
+        >>> task = kiks.tasks.avoid()
+        >>> [measure.name for measure in task.measures], task.parameter_count
+        (['avoidance', 'roaming', 'contacts', 'path_mm', 'straightness'], 18)
+    """
     return Task(
         "avoid",
         training("pillars", "corridors", "wedges"),
@@ -135,6 +142,12 @@ def follow(side: str = "left") -> Task:
 
     Args:
         side: The side of the robot on which the wall is: 'left' or 'right'.
+
+    Example:
+        >>> import kiks
+        >>> task = kiks.tasks.follow()
+        >>> [measure.name for measure in task.measures], task.parameter_count
+        (['wall_following', 'beside_wall_share', 'contacts', 'path_mm'], 22)
     """
     return Task(
         # The sides are two tasks: a folder of the one must not be continued as the other.
@@ -192,6 +205,12 @@ def light() -> Task:
     """The task to find the lamp, go to it and stay there.
 
     In the exam the robot starts at least 1 m from the lamp, in the shadow of walls.
+
+    Example:
+        >>> import kiks
+        >>> task = kiks.tasks.light()
+        >>> [measure.name for measure in task.measures], task.parameter_count
+        (['light_approach', 'near_light_share', 'light_mm', 'contacts', 'path_mm'], 78)
     """
     default = controllers.mlp(hidden=(4,), senses=("proximity", "ambient"), speed_limit=LIGHT_SPEED_LIMIT)
     return Task(
@@ -247,6 +266,12 @@ def gather() -> Task:
     A robot that senses proximity alone cannot know where the middle of a room is, but it notices what is near others
     (Maris and te Boekhorst, Exploiting physical constraints: heap formation through behavioral error in a group of
     robots, 1996).
+
+    Example:
+        >>> import kiks
+        >>> task = kiks.tasks.gather()
+        >>> [measure.name for measure in task.measures], task.parameter_count
+        (['largest_group', 'closeness', 'contacts', 'path_mm'], 22)
     """
     default = controllers.mlp(hidden=(), feedback=True, speed_limit=GATHER_SPEED_LIMIT)
     return Task(
@@ -320,7 +345,14 @@ def disperse_solved(values: Values) -> NDArray[np.bool_]:
 
 @ready
 def disperse() -> Task:
-    """The task of twenty robots, all with one controller, to spread out from a heap."""
+    """The task of twenty robots, all with one controller, to spread out from a heap.
+
+    Example:
+        >>> import kiks
+        >>> task = kiks.tasks.disperse()
+        >>> [measure.name for measure in task.measures], task.parameter_count
+        (['neighbour_mm', 'contacts', 'path_mm'], 22)
+    """
     return Task(
         "disperse",
         (heap(1400, 700, 700, 1), heap(1600, 400, 500, 2)),
@@ -382,6 +414,12 @@ def maze() -> Task:
 
     The way leads away from the goal first. So an algorithm that follows fitness ends behind the first wall, and the
     default is MAP-Elites, which looks for ways to all places.
+
+    Example:
+        >>> import kiks
+        >>> task = kiks.tasks.maze()
+        >>> [measure.name for measure in task.measures], task.parameter_count
+        (['closest_mm', 'final_x_mm', 'final_y_mm', 'turned_pulses'], 90)
     """
     goal_mm = measures.closest_mm(*MAZE_GOAL_MM)
     return Task(
@@ -452,6 +490,12 @@ def pursuit() -> Task:
 
     Both have proximity sensors, the predator has the camera K213, too. The prey's fitness is the share of the time for
     which it was not caught, the predator's is the rest. What the robots do after the first contact does not count.
+
+    Example:
+        >>> import kiks
+        >>> task = kiks.tasks.pursuit()
+        >>> [measure.name for measure in task.measures], task.parameter_count
+        (['escaped_share', 'path_mm', 'contacts'], 76)
     """
     predator = controllers.mlp(hidden=(), senses=("proximity", "camera"), feedback=True, speed_limit=PREDATOR_SPEED)
     prey = controllers.mlp(hidden=(), feedback=True, speed_limit=PREY_SPEED)
@@ -489,6 +533,12 @@ def football() -> Task:
     Both have proximity sensors and the camera K213. Half of the fitness are goals, 1 for one of its own and -1 for one
     of the other side; half is the mean place of the ball, from 1 at the goal line of the other side to -1 at its own.
     What one side gains, the other loses. A game ends with the first goal.
+
+    Example:
+        >>> import kiks
+        >>> task = kiks.tasks.football()
+        >>> [measure.name for measure in task.measures], task.parameter_count
+        (['goals', 'ball_ahead', 'path_mm'], 108)
     """
     player = controllers.mlp(hidden=(), senses=("proximity", "camera"), feedback=True, speed_limit=PLAYER_SPEED)
     arenas = game.kick_offs()

@@ -73,6 +73,11 @@ class Axis:
         low: Its lower end.
         high: Its upper end; values beyond an end belong to the last cell.
         cells: Number of cells.
+
+    Example:
+        >>> import kiks
+        >>> kiks.Axis("path_mm", 0, 2000, cells=10)
+        Axis(measure='path_mm', low=0.0, high=2000.0, cells=10)
     """
 
     measure: Text
@@ -96,6 +101,11 @@ class Side:
             [candidate]; more is better. Left out, it is `cautious_mean` of the first measure.
         robot: Kind of its robots: a name, a robot file or a `RobotSpec`; or several, which worlds take in turn.
         robots: Number of its robots in each world.
+
+    Example:
+        >>> import kiks
+        >>> kiks.Side("prey", kiks.controllers.linear(speed_limit=12), robots=2).parameter_count
+        18
     """
 
     name: SideName

@@ -78,6 +78,11 @@ def load(name: str | Path, controller: Controller | None = None) -> Task:
     Args:
         name: A key of `TASKS`, or a path that ends in .toml or .py.
         controller: Replaces the task's own controller.
+
+    Example:
+        >>> import kiks
+        >>> kiks.tasks.load("maze").seconds
+        70.0
     """
     name = str(path_of(name, "the name of a task"))
     if name in TASKS:

@@ -127,7 +127,7 @@ class Recording:
     # ---- tables ----
 
     def tables(self, *names: str) -> list[NDArray[np.void]]:
-        """Return several tables, by names of `table`, in the time of one: the run is made again for them."""
+        """Return several tables, [row] each, by names of `table`, in the time of one: the run is repeated for them."""
         for name in names:
             if name not in tables.TABLES:
                 raise ParameterError(
@@ -137,7 +137,7 @@ class Recording:
         return tables.tables(self.log, names)
 
     def table(self, name: str, robot: int | None = None) -> NDArray[np.void]:
-        """Return a table: an array of records.
+        """Return a table: an array of records, [row].
 
         Args:
             name: 'poses': where robots were, tick by tick. 'wheels': counters, speeds and contacts, every 40 ms.

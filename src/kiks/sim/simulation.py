@@ -264,10 +264,10 @@ class Simulation:
 
         Args:
             robot: Its number.
-            x_mm: From the arena's lower left corner to the right.
-            y_mm: From the arena's lower left corner upwards.
-            heading_rad: Counter-clockwise from the x axis; wrapped to one turn beyond a million. A multiple of 0.5
-                from 10 on is an error: it is a heading in degrees.
+            x_mm: From the arena's lower left corner to the right [mm].
+            y_mm: From the arena's lower left corner upwards [mm].
+            heading_rad: Counter-clockwise from the x axis [rad]; wrapped to one turn beyond a million. A multiple of
+                0.5 from 10 on is an error: it is a heading in degrees.
         """
         index = self.index_of(robot)
         with self._changing() as world:
@@ -408,7 +408,7 @@ class Simulation:
             x_mm: Where its centre goes [mm].
             y_mm: Where its centre goes [mm].
             speed_mm_s: How fast it rolls from there [mm/s].
-            heading_rad: Where to.
+            heading_rad: In which direction it rolls, counter-clockwise from the x axis [rad].
         """
         with self._changing():
             self.things.move_body(body, x_mm, y_mm, speed_mm_s, heading_rad)
