@@ -127,8 +127,7 @@ def test_everything_has_a_name_and_enough_contrast(visitor: Visitor, theme: str)
     visitor.picture(f"help_{theme.lower()}")
 
 
-@at_length
-@pytest.mark.parametrize(("width", "height"), [(800, 600), (1024, 768)])
+@pytest.mark.parametrize(("width", "height"), cases([(390, 844), (768, 1024), (800, 600), (1024, 768)]))
 def test_small_windows_stay_usable(new_page: NewPage, shown: Shown, width: int, height: int) -> None:
     visitor = Visitor(new_page(width, height), shown)
     for tab in TABS:

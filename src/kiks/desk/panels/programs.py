@@ -34,6 +34,11 @@ MAY_NOT = (
 )
 """Shown in place of the editor, whose programs would not start (`kiks.ports.program_process`)."""
 
+NOT_OWN = (
+    "Another program owns this world and drives its robots. Start yours there, or open a desk of your own: kiks desk."
+)
+"""Shown in place of the editor where the world is not the desk's own."""
+
 CSS = ".program-error { color: #b00020 } .body--dark .program-error { color: #ff9a90 }"
 
 ICONS = {"running": "play_circle", "stopping": "hourglass_top", "stopped": "stop_circle", "silenced": "volume_off"}
@@ -60,7 +65,7 @@ class ProgramsPanel(Panel):
             if desk.may_run_programs:
                 self._build_editor()
             else:
-                named(ui.label(MAY_NOT).classes("text-body2"), "may-not")
+                named(ui.label(MAY_NOT if desk.owns_world else NOT_OWN).classes("text-body2"), "may-not")
             self._list = named(ui.column().classes("w-full gap-1"), "programs")
             with ui.expansion("Output", value=True).classes("w-full").props("dense"):
                 label = "What the program has printed"
@@ -87,7 +92,7 @@ class ProgramsPanel(Panel):
             self._log.add(self._shown.output, lambda line: (line.text, "program-error" if line.is_error else ""))
 
     def _draw_list(self, handles: list[Handle]) -> None:
-        if not handles:
+        if not handles and self._desk.owns_world:
             ui.label("No program runs.").classes("text-body2")
         for handle in handles:
             is_shown = handle is self._shown
