@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.metadata
-import importlib.util
 import shutil
 import sys
 from pathlib import Path
@@ -40,6 +38,8 @@ def doctor() -> None:
 
     Example: kiks doctor
     """
+    import importlib.metadata
+    import importlib.util
     import platform
 
     from kiks.engine.code_cache import cache_folders, is_compiled
