@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from kiks.errors import ArenaError, ParameterError
 from kiks.model.arena import PAD, Arena, Ball, Cylinder, Lamp, Pose
 from kiks.model.materials import REFLECTANCES
-from kiks.model.raster import LEAPS_PER_CELL
+from kiks.model.raster import LEAPS_PER_CELL, ROOM_CELLS
 
 ROBOT_MM = 27.5
 
@@ -87,6 +87,21 @@ def test_leap_is_the_gap_between_the_square_of_a_cell_and_that_of_the_nearest_wa
         up, right = (np.maximum(abs(gap) - 1, 0) for gap in (rows - row, columns - column))
         leap = math.floor(LEAPS_PER_CELL * math.sqrt((up**2 + right**2).min()))
         assert arena.leaps[row, column] == (-int(arena.surface[row, column]) or leap)
+
+
+@settings(max_examples=10)
+@given(
+    seed=st.integers(0, 2**32),
+    shape=st.tuples(st.integers(100, 140), st.integers(100, 140)),
+    share=st.sampled_from([0.0, 0.0005, 0.01]),
+)
+def test_room_is_the_least_clearance_of_a_block(seed, shape, share):
+    arena = Arena.from_array(random_picture(seed, shape, share), mm_per_pixel=1.0)
+    least = {}
+    for (row, column), clearance in np.ndenumerate(arena.clearance):
+        block = row // ROOM_CELLS, column // ROOM_CELLS
+        least[block] = min(least.get(block, math.inf), clearance)
+    assert dict(np.ndenumerate(arena.rooms)) == least
 
 
 def test_the_world_outside_is_wall():

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.engine.parameters import AHEAD, RAY_COUNT
+from kiks.engine.sensing.observe import NOTHING
 from kiks.engine.state import BALL, MODE_POSITION, MODE_SPEED, PIXEL_COUNT
 from kiks.export.looks import body_colour, robot_hue, robot_shapes
 from kiks.firmware.gripper import Gripper
@@ -107,7 +108,8 @@ def pack_frame(
     robots["pose"] = seen.poses
     robots["measured_speed"] = records["measured_speed"]
     robots["commanded_speed"] = _commanded(records)
-    robots["flags"] = (records["is_touching"] != 0) * TOUCHING + (records["led"] != 0) @ (LED_0, LED_1)
+    leds = records["led"] != 0
+    robots["flags"] = (records["is_touching"] != 0) * TOUCHING | leds[:, 0] * LED_0 | leds[:, 1] * LED_1
     for index, wire in enumerate(sim.wires):
         if wire.holder is not None:
             robots["flags"][index] |= LINE_IN_USE
@@ -117,21 +119,17 @@ def pack_frame(
     robots["contact_count"] = records["contact_count"]
     # The robot's own counters wrap at 32 bits, too.
     robots["encoders"] = (records["pulse_count"] + records["counter_offset"]).astype(np.int32)
-    robots["distances_mm"] = sim.distances_mm()
+    robots["distances_mm"] = sim.world.distances_mm()
     robots["proximity"], robots["ambient"] = seen.proximity, seen.ambient
     bodies, lamps, cameras = _pack_bodies(sim, seen.places), sim.world.lamps.astype("<f4"), _pack_cameras(sim)
-    head: Any = np.zeros(1, HEAD)
-    head["version"], head["kind"] = VERSION, KIND
-    head["flags"] = PAUSED * is_paused + PROGRAM_DRIVES * is_driven
-    head["scene"], head["time_s"] = scene, sim.time_s
     # A speed may be infinite or NaN; then 0 is shown.
-    head["speed_now"], head["speed_average"] = (
-        speed if math.isfinite(speed) else 0.0 for speed in (speed_now, speed_average)
-    )
-    head["robot_count"], head["body_count"] = len(robots), len(bodies)
-    head["lamp_count"], head["camera_count"] = len(lamps), len(cameras)
-    rays = np.where(np.isinf(seen.lengths_mm), NO_HIT, np.rint(seen.lengths_mm / RAY_UNIT_MM).clip(0, NO_HIT - 1))
-    return b"".join(part.tobytes() for part in (head, robots, bodies, lamps, cameras, rays.astype("<u2")))
+    speeds = (speed if math.isfinite(speed) else 0.0 for speed in (speed_now, speed_average))
+    counts = (len(part) for part in (robots, bodies, lamps, cameras))
+    flags = PAUSED * is_paused + PROGRAM_DRIVES * is_driven
+    head = np.array((VERSION, KIND, flags, scene, sim.time_s, *speeds, *counts), HEAD)
+    lengths = np.minimum(np.maximum(np.rint(seen.lengths_mm / RAY_UNIT_MM), 0), NO_HIT - 1)
+    lengths[seen.met == NOTHING] = NO_HIT
+    return b"".join(part.tobytes() for part in (head, robots, bodies, lamps, cameras, lengths.astype("<u2")))
 
 
 def _commanded(records: Any) -> NDArray[np.float64]:
@@ -154,9 +152,14 @@ def _pack_cameras(sim: Simulation) -> NDArray[np.void]:
     robots = [
         index for index, wire in enumerate(sim.wires) if any(isinstance(each, K213) for each in wire.firmware.fitted)
     ]
-    records: Any = sim.world.state.robots[0, robots]
     cameras: Any = np.zeros(len(robots), CAMERA)
-    cameras["robot"], cameras["light"], cameras["pixels"] = robots, records["camera_light"], records["camera_pixels"]
+    if robots:
+        records: Any = sim.world.state.robots[0, robots]
+        cameras["robot"], cameras["light"], cameras["pixels"] = (
+            robots,
+            records["camera_light"],
+            records["camera_pixels"],
+        )
     packed: NDArray[np.void] = cameras
     return packed
 

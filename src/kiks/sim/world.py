@@ -277,8 +277,10 @@ class World:
     def distances_mm(self) -> NDArray[np.float64]:
         """Return how far robots have come, float64 [robot, 3] [mm]: forwards, backwards, straight from their start."""
         robots: Any = self.state.robots[0]
-        straight = np.hypot(robots["x_mm"] - robots["start_x_mm"], robots["y_mm"] - robots["start_y_mm"])
-        return np.column_stack([robots["forwards_mm"], robots["backwards_mm"], straight])
+        distances_mm = np.empty((len(robots), 3))
+        distances_mm[:, 0], distances_mm[:, 1] = robots["forwards_mm"], robots["backwards_mm"]
+        np.hypot(robots["x_mm"] - robots["start_x_mm"], robots["y_mm"] - robots["start_y_mm"], out=distances_mm[:, 2])
+        return distances_mm
 
 
 def index_of_robot(robot: int, count: int) -> int:

@@ -101,11 +101,21 @@ class DeskWorld:
         future = self.gate.ask(lambda: act(self.sim))
         if future.done():
             return future.result()
-        # The thread that moves the world serves the request, unless it has just stopped.
-        served = asyncio.wrap_future(future)
-        while not (await asyncio.wait([served], timeout=RETRY_S))[0]:
+        loop = asyncio.get_running_loop()
+        alarm: asyncio.TimerHandle
+
+        def serve() -> None:
+            nonlocal alarm
             self.gate.serve()
-        return served.result()
+            alarm = loop.call_later(RETRY_S, serve)
+
+        # The thread that moves the world serves the request, unless it has just stopped. This thread waits for nothing
+        # else, as each time it wakes up it takes the interpreter from that one.
+        alarm = loop.call_later(RETRY_S, serve)
+        try:
+            return await asyncio.wrap_future(future)
+        finally:
+            alarm.cancel()
 
     # ---- between two events of the world, with its lock held ----
 

@@ -20,6 +20,7 @@ from kiks.desk.server.live_editing import Editing
 from kiks.desk.server.marks import Mark, thinned
 from kiks.errors import KiksError, ParameterError
 from kiks.export.frames import arena_picture, describe_scene, describe_shapes, pack_frame, scene_key
+from kiks.model.arena import Arena
 from kiks.model.checks import SECONDS_MAX
 from kiks.sim.simulation import Simulation
 from kiks.units import ns_from_s, s_from_ns
@@ -123,7 +124,8 @@ class Gateway:
         # The scene, its shapes and the time bar, by their kinds.
         self._news: dict[str, dict[str, Any]] = {}
         self._scene_number = 0
-        self._picture: tuple[Any, bytes] = (None, b"")
+        self._arena: Arena | None = None
+        self._picture: tuple[Arena | None, bytes] = (None, b"")
         self._bar_source: tuple[list[Mark], dict[str, Any]] | None = None
         self._frame_count = 0
 
@@ -143,7 +145,9 @@ class Gateway:
                 await asyncio.sleep(DRAG_FRAME_S)
             self._has_moved = False
             self._wake.clear()
-            await asyncio.gather(*(self._pull(viewer) for viewer in self._viewers))
+            # A task for each browser would wake this thread up more often, and stop the world's for that.
+            for viewer in tuple(self._viewers):
+                await self._pull(viewer)
             if any(viewer.is_ready for viewer in self._viewers):
                 self._show(await self.desk.do(self._look))
         tending.cancel()
@@ -164,8 +168,7 @@ class Gateway:
             scene["arena"]["picture"] = f"{self.number}/arena/{self._scene_number}.png"
             looks = {"secret": self._secret, "has_old_coordinates": desk.has_old_coordinates}
             self._news |= {"scene": {**scene, **looks}, "shapes": describe_shapes(sim)}
-            if self._picture[0] is not sim.arena:
-                self._picture = sim.arena, arena_picture(sim.arena)
+            self._arena = sim.arena
         self._frame_count += 1
         if self._frame_count % SHAPES_FRAMES == 0 and (shapes := describe_shapes(sim)) != self._news["shapes"]:
             self._news["shapes"] = shapes
@@ -212,7 +215,10 @@ class Gateway:
             viewer.tell({"kind": "gone"})
 
     def picture(self) -> bytes:
-        """Return the walls of the arena as a PNG."""
+        """Return the walls of the arena as a PNG; made when a browser asks for it, so that no world waits for it."""
+        arena = self._arena
+        if arena is not None and self._picture[0] is not arena:
+            self._picture = arena, arena_picture(arena)
         return self._picture[1]
 
     # ---- receiving ----
