@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import re
 import sys
 import typing
@@ -53,6 +52,10 @@ html_theme = "furo"
 html_title = f"KiKS {release}"
 
 
+# Types in signatures are without the rules of Pydantic, which texts say.
+_hints = typing.get_type_hints
+typing.get_type_hints = lambda *args, include_extras=False, **options: _hints(*args, **options)
+
 PUBLIC = {
     f"{each.__module__}.{each.__name__}": f"kiks.{each.__name__}"
     for each in (getattr(kiks, name) for name in kiks.__all__)
@@ -69,10 +72,13 @@ def lead_to_public_names(app, env, node, contnode):
         return domain.resolve_xref(env, node["refdoc"], app.builder, "class", name, node, contnode)
 
 
-def without_rules(app, obj, bound_method):
-    """Leave the rules of Pydantic out of the types in signatures: texts say them."""
-    with contextlib.suppress(TypeError, NameError, AttributeError):
-        obj.__annotations__ = typing.get_type_hints(obj)
+ARRAY = re.compile(r"~?[\w.]*\bndarray\[~?\w+\[~?[\w.]+, \.\.\.\], ~?[\w.]*\bdtype\[(~?[\w.]+)\]\]")
+
+
+def shorten_arrays(app, what, name, *_):
+    """Write arrays as the code does."""
+    kinds = app.env.current_document.autodoc_annotations.get(name, {})
+    kinds.update({key: ARRAY.sub(r"NDArray[\1]", kind) for key, kind in kinds.items()})
 
 
 def prepare(app, what, name, obj, options, lines):
@@ -94,5 +100,5 @@ def setup(app):
     """Connect the functions above; `prepare` comes before napoleon."""
     app.connect("builder-inited", write_pages)
     app.connect("missing-reference", lead_to_public_names)
-    app.connect("autodoc-before-process-signature", without_rules)
+    app.connect("autodoc-process-signature", shorten_arrays, priority=600)
     app.connect("autodoc-process-docstring", prepare, priority=400)

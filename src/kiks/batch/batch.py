@@ -182,6 +182,13 @@ class Batch:
                 or [world, parameter].
             seconds: Simulated time after which no loop begins [s].
             measures: The measures.
+
+        Example:
+            >>> import kiks
+            >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 3, seed=1)
+            >>> rollouts = batch.run(kiks.controllers.linear(), [0.5] * 18, seconds=2, measures=[kiks.measures.path_mm])
+            >>> rollouts.values.shape
+            (3, 1, 1)
         """
         until_ns = ns_from_s(check_number("seconds", seconds, 0, SECONDS_MAX))
         driving = RobotControllers(controller, parameters, self.world_count, self.robot_count)
@@ -229,6 +236,12 @@ class Batch:
 
         Returns:
             The last readings of all robots of all worlds, float64 [world, robot, sensor]; a copy.
+
+        Example:
+            >>> import kiks
+            >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 3, seed=1)
+            >>> batch.reset().shape
+            (3, 1, 8)
         """
         chosen = np.arange(self.world_count)
         if worlds is not None:
@@ -262,6 +275,14 @@ class Batch:
 
         Returns:
             The readings of the robots, float64 [world, robot, sensor]; a copy.
+
+        Example:
+            >>> import kiks
+            >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 3, seed=1)
+            >>> import numpy as np
+            >>> sensed = batch.reset()
+            >>> batch.step(np.full((3, 1, 2), 5.0)).shape
+            (3, 1, 8)
         """
         given = array_of(wheels)
         if given is None or given.shape != self._worlds.wheels.shape:
@@ -295,14 +316,30 @@ class Batch:
     @property
     @_alone
     def times_s(self) -> NDArray[np.float64]:
-        """Start time of the present loop of each world [s], float64 [world]."""
+        """Start time of the present loop of each world [s], float64 [world].
+
+        Example:
+            >>> import kiks
+            >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 3, seed=1)
+            >>> sensed = batch.reset()
+            >>> batch.times_s.shape
+            (3,)
+        """
         times_s: NDArray[np.float64] = self._worlds.begins_ns / NS_PER_S
         return times_s
 
     @property
     @_alone
     def poses(self) -> NDArray[np.float64]:
-        """Poses of robots at the end of the last tick, float64 [world, robot, 3]: x_mm, y_mm, heading_rad."""
+        """Poses of robots at the end of the last tick, float64 [world, robot, 3]: x_mm, y_mm, heading_rad.
+
+        Example:
+            >>> import kiks
+            >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 3, seed=1)
+            >>> sensed = batch.reset()
+            >>> batch.poses.shape
+            (3, 1, 3)
+        """
         robots = self.state.robots
         return np.stack([robots["x_mm"], robots["y_mm"], robots["heading_rad"]], axis=-1)
 
@@ -314,7 +351,15 @@ class Batch:
 
     @_alone
     def state_hash(self, world: int) -> str:
-        """Return the hash of a world's state, 16 hexadecimal digits, as a simulation in the same state has it."""
+        """Return the hash of a world's state, 16 hexadecimal digits, as a simulation in the same state has it.
+
+        Example:
+            >>> import kiks
+            >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 3, seed=1)
+            >>> sensed = batch.reset()
+            >>> len(batch.state_hash(0))
+            16
+        """
         world = check_count("world", world, 0, self.world_count - 1)
         robots: Any = self.state.robots[world : world + 1].copy()
         # A simulation numbers only the kinds of its own robots.

@@ -79,7 +79,14 @@ class Khepera:
         return f"<{type(self).__name__} on {self.port!r}>"
 
     def close(self) -> None:
-        """Close the port. The robot keeps its last speed: nothing on board stops it. Other methods then raise."""
+        """Close the port. The robot keeps its last speed: nothing on board stops it. Other methods then raise.
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> robot = kiks.Khepera(sim.port(1))
+            >>> robot.close()
+        """
         self.port.close()
         if not isinstance(self.port, VirtualPort):
             self.port = CLOSED
@@ -96,11 +103,30 @@ class Khepera:
 
     @property
     def time_s(self) -> float:
-        """Time of the robot's world [s]: simulated time, or the computer's clock for a real robot."""
+        """Time of the robot's world [s]: simulated time, or the computer's clock for a real robot.
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> robot = kiks.Khepera(sim.port(1))
+            >>> robot.pause(2.5)
+            >>> robot.time_s
+            2.5
+        """
         return self.port.time_s if isinstance(self.port, VirtualPort) else time.monotonic()
 
     def pause(self, seconds: float) -> None:
-        """Let time pass [s]: simulated time for a simulated robot, real time for a real one."""
+        """Let time pass [s]: simulated time for a simulated robot, real time for a real one.
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> robot = kiks.Khepera(sim.port(1))
+            >>> robot.set_speed(5, 5)
+            >>> robot.pause(2.5)
+            >>> round(sim.time_s, 1)
+            2.5
+        """
         if isinstance(self.port, VirtualPort):
             self.port.sleep(seconds)
         else:
@@ -109,28 +135,78 @@ class Khepera:
     # ---- motion ----
 
     def set_speed(self, left: float, right: float) -> None:
-        """Set the wheel speeds (D) [pulses/10 ms]: rounded, and cut to ±127 as controllers' are; 1 is 8 mm/s."""
+        """Set the wheel speeds (D) [pulses/10 ms]: rounded, and cut to ±127 as controllers' are; 1 is 8 mm/s.
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> robot = kiks.Khepera(sim.port(1))
+            >>> robot.set_speed(5, -5)
+            >>> robot.pause(0.5)
+            >>> robot.speed()
+            (5, -5)
+        """
         # Infinity and what is no number do not differ from themselves by 0.
         if left.__class__ not in PLAIN or right.__class__ not in PLAIN or not left - left == right - right == 0:
             left, right = check_number("left", left), check_number("right", right)
         self._command(b"D,%d,%d\n" % (round(min(max(-127, left), 127)), round(min(max(-127, right), 127))))
 
     def stop(self) -> None:
-        """Set both speeds to 0."""
+        """Set both speeds to 0.
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> robot = kiks.Khepera(sim.port(1))
+            >>> robot.set_speed(5, 5)
+            >>> robot.stop()
+            >>> robot.pause(0.5)
+            >>> robot.speed()
+            (0, 0)
+        """
         self._command(b"D,0,0\n")
 
     def speed(self) -> tuple[int, int]:
-        """Return the measured speeds, left and right [pulses/10 ms] (E)."""
+        """Return the measured speeds, left and right [pulses/10 ms] (E).
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> robot = kiks.Khepera(sim.port(1))
+            >>> robot.set_speed(5, 5)
+            >>> robot.pause(0.5)
+            >>> robot.speed()
+            (5, 5)
+        """
         left, right = self._query(b"E\n", 2)
         return left, right
 
     def encoders(self) -> tuple[int, int]:
-        """Return the position counters, left and right [pulses] (H). A pulse is 0.08 mm."""
+        """Return the position counters, left and right [pulses] (H). A pulse is 0.08 mm.
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> robot = kiks.Khepera(sim.port(1))
+            >>> robot.set_speed(5, 5)
+            >>> robot.pause(1)
+            >>> robot.encoders()  # 12.5 pulses are a millimetre
+            (482, 482)
+        """
         left, right = self._query(b"H\n", 2)
         return left, right
 
     def set_encoders(self, left: int = 0, right: int = 0) -> None:
-        """Set the position counters [pulses] (G). Numbers are rounded."""
+        """Set the position counters [pulses] (G). Numbers are rounded.
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> robot = kiks.Khepera(sim.port(1))
+            >>> robot.set_encoders(100, -100)
+            >>> robot.encoders()
+            (100, -100)
+        """
         self._command(b"G,%d,%d\n" % _whole(-(2**31), 2**31 - 1, left=left, right=right))
 
     def move_to(self, left: int, right: int, *, wait: bool = False, poll_s: float = 0.02) -> None:
@@ -144,6 +220,14 @@ class Khepera:
 
         Raises:
             LinkError: If the reply is unexpected, or the wheels do not arrive within `ARRIVAL_MAX_S`.
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> robot = kiks.Khepera(sim.port(1))
+            >>> robot.move_to(500, 500, wait=True)
+            >>> robot.encoders()
+            (503, 503)
         """
         check_kind("wait", wait, bool)
         check_number("poll_s", poll_s, 0, SECONDS_MAX)
@@ -157,68 +241,173 @@ class Khepera:
             self.pause(poll_s)
 
     def set_profile(self, speed: int = 20, acceleration: int = 64) -> None:
-        """Set the trapezoid of both wheels (J): speed [pulses/10 ms], acceleration [pulses/256 per (10 ms)^2]."""
+        """Set the trapezoid of both wheels (J): speed [pulses/10 ms], acceleration [pulses/256 per (10 ms)^2].
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> robot = kiks.Khepera(sim.port(1))
+            >>> robot.set_profile(speed=10)
+            >>> robot.move_to(500, 500, wait=True)
+        """
         profile = _whole(1, 127, speed=speed) + _whole(1, 255, acceleration=acceleration)
         self._command(b"J,%d,%d,%d,%d\n" % (profile * 2))
 
     def set_pwm(self, left: int, right: int) -> None:
-        """Set the PWM of the motors, -255 to 255, without a controller (P)."""
+        """Set the PWM of the motors, -255 to 255, without a controller (P).
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> robot = kiks.Khepera(sim.port(1))
+            >>> robot.set_pwm(50, 50)
+            >>> robot.pause(1)
+            >>> sim.travelled_mm(1) > 0
+            True
+        """
         self._command(b"P,%d,%d\n" % _whole(-255, 255, left=left, right=right))
 
     def set_speed_gains(self, kp: int = 3800, ki: int = 800, kd: int = 100) -> None:
-        """Set the gains of the speed controllers (A)."""
+        """Set the gains of the speed controllers (A).
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> robot = kiks.Khepera(sim.port(1))
+            >>> robot.set_speed_gains(kp=3000)
+        """
         self._command(b"A,%d,%d,%d\n" % _whole(0, 32767, kp=kp, ki=ki, kd=kd))
 
     def set_position_gains(self, kp: int = 3000, ki: int = 20, kd: int = 4000) -> None:
-        """Set the gains of the position controllers (F)."""
+        """Set the gains of the position controllers (F).
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> robot = kiks.Khepera(sim.port(1))
+            >>> robot.set_position_gains(kp=2000)
+        """
         self._command(b"F,%d,%d,%d\n" % _whole(0, 32767, kp=kp, ki=ki, kd=kd))
 
     def status(self) -> tuple[Status, Status]:
-        """Return the reports of the two controllers, left and right (K)."""
+        """Return the reports of the two controllers, left and right (K).
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> robot = kiks.Khepera(sim.port(1))
+            >>> robot.status()[0]
+            Status(on_target=False, mode=0, error=0)
+        """
         t1, m1, e1, t2, m2, e2 = self._query(b"K\n", 6)
         return Status(bool(t1), m1, e1), Status(bool(t2), m2, e2)
 
     # ---- senses ----
 
     def proximity(self) -> list[int]:
-        """Return the eight proximity readings, clockwise from the left; 1023 is near, 0 nothing (N)."""
+        """Return the eight proximity readings, clockwise from the left; 1023 is near, 0 nothing (N).
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> robot = kiks.Khepera(sim.port(1))
+            >>> sim.place(1, 250, 460, 1.5708)  # 10 mm before a wall
+            >>> robot.proximity()
+            [4, 1022, 985, 1023, 1023, 0, 0, 7]
+        """
         return self._query(b"N\n", 8)
 
     def ambient(self) -> list[int]:
-        """Return the eight light readings, clockwise from the left; about 450 is dark, 50 bright (O)."""
+        """Return the eight light readings, clockwise from the left; about 450 is dark, 50 bright (O).
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> robot = kiks.Khepera(sim.port(1))
+            >>> lamp = sim.add_lamp(250, 300)
+            >>> robot.ambient()
+            [446, 421, 70, 71, 414, 458, 440, 449]
+        """
         return self._query(b"O\n", 8)
 
     def analog(self, channel: int) -> int:
-        """Return an analogue input [4 mV], channel 0 to 6 (I)."""
+        """Return an analogue input [4 mV], channel 0 to 6 (I).
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> robot = kiks.Khepera(sim.port(1))
+            >>> robot.analog(3)
+            0
+        """
         channel = check_count("channel", channel, 0, 6, "Channels 3 to 5 are inputs of the General I/O turret.")
         return self._query(b"I,%d\n" % channel, 1)[0]
 
     # ---- other commands ----
 
     def led(self, led: int, action: int) -> None:
-        """Switch an LED (L): 0 lateral, 1 frontal; 0 off, 1 on, 2 toggle."""
+        """Switch an LED (L): 0 lateral, 1 frontal; 0 off, 1 on, 2 toggle.
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> robot = kiks.Khepera(sim.port(1))
+            >>> robot.led(0, 1)
+        """
         led = check_count("led", led, 0, 1, "0 is the lateral one, 1 the frontal one.")
         action = check_count("action", action, 0, 2, "0 is off, 1 on, 2 toggle.")
         self._command(b"L,%d,%d\n" % (led, action))
 
     def version(self) -> tuple[str, str]:
-        """Return the versions of BIOS and protocol (B)."""
+        """Return the versions of BIOS and protocol (B).
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> robot = kiks.Khepera(sim.port(1))
+            >>> robot.version()
+            ('5.02', '5.01')
+        """
         words = self.send("B").split(",")
         if len(words) != 3 or words[0] != "b":
             raise LinkError(f"the reply to 'B' must be b,x.xx,y.yy, but it was {','.join(words)!r}. Is it a Khepera?")
         return words[1], words[2]
 
     def read_bus(self, address: int) -> int:
-        """Return a byte of the extension bus (R)."""
+        """Return a byte of the extension bus (R).
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> robot = kiks.Khepera(sim.port(1))
+            >>> robot.read_bus(32)
+            0
+        """
         return self._query(b"R,%d\n" % _address(address), 1)[0]
 
     def write_bus(self, data: int, address: int) -> None:
-        """Write a byte to the extension bus (W)."""
+        """Write a byte to the extension bus (W).
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> robot = kiks.Khepera(sim.port(1))
+            >>> robot.write_bus(170, 32)
+        """
         data = check_count("data", data, 0, 255, "It is a byte.")
         self._command(b"W,%d,%d\n" % (data, _address(address)))
 
     def turret(self, number: int, order: str) -> list[int]:
-        """Pass an order such as 'N' or 'D,1' to a turret (T); return the values of its reply."""
+        """Pass an order such as 'N' or 'D,1' to a turret (T); return the values of its reply.
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> robot = kiks.Khepera(sim.port(1))
+            >>> gripper = sim.fit(1, "gripper")
+            >>> robot.turret(1, "B")
+            [1, 0]
+        """
         if not isinstance(order, str) or not re.fullmatch(r"[A-Za-z](,[ 0-9+-]+)*", order):
             raise ParameterError(f"order must be a letter and numbers such as 'N' or 'D,1', but it was {shown(order)}.")
         request = f"T,{check_count('number', number, 0, 99)},{order}"
@@ -238,14 +427,31 @@ class Khepera:
             ) from None
 
     def image(self) -> list[int]:
-        """Return the 64 greys 0..255 of the K213 camera's last picture, the leftmost first (T,2,N)."""
+        """Return the 64 greys 0..255 of the K213 camera's last picture, the leftmost first (T,2,N).
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> robot = kiks.Khepera(sim.port(1))
+            >>> camera = sim.fit(1, "k213")
+            >>> len(robot.image())
+            64
+        """
         pixels = self.turret(2, "N")
         if len(pixels) != 64:
             raise LinkError(f"the reply to 'T,2,N' must be 64 greys, but it was {len(pixels)}. Is turret 2 a K213?")
         return pixels
 
     def send(self, text: str) -> str:
-        """Send any line and return the first line of the reply, both without line ends."""
+        """Send any line and return the first line of the reply, both without line ends.
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> robot = kiks.Khepera(sim.port(1))
+            >>> robot.send("D,5,5")
+            'd'
+        """
         if not isinstance(text, str) or "\n" in text or "\r" in text or not text.isascii():
             raise ParameterError(
                 f"text must be one line of ASCII, but it was {shown(text)}. The line end is added here."

@@ -129,6 +129,14 @@ class Arena:
             brightness: Integers 0..255 [row, column] with row 0 on top, 0 = floor; or booleans, True = wall of 255.
             mm_per_pixel: Edge of a pixel [mm]. A pixel above 1 mm becomes k x k cells, k = ceil(mm_per_pixel).
             name: Its name.
+
+        Example:
+            >>> import numpy as np
+            >>> import kiks
+            >>> walls = np.zeros((300, 400), np.uint8)
+            >>> walls[:, :10] = 255  # a white wall on the left
+            >>> kiks.Arena.from_array(walls).width_mm
+            400.0
         """
         if not isinstance(brightness, np.ndarray) or brightness.ndim != 2 or brightness.dtype.kind not in "bui":
             raise ParameterError(
@@ -179,7 +187,14 @@ class Arena:
 
     @classmethod
     def default(cls) -> Arena:
-        """Return the classic arena: 500 x 650 mm, white walls, round corners (kiks-behaviour.md, section 1.1)."""
+        """Return the classic arena: 500 x 650 mm, white walls, round corners (kiks-behaviour.md, section 1.1).
+
+        Example:
+            >>> import kiks
+            >>> arena = kiks.Arena.default()
+            >>> arena.width_mm, arena.height_mm
+            (500.0, 650.0)
+        """
         box = cls.box(500, 650, rounded_mm=100)
         return cls(box.brightness, box.mm_per_cell, "default", starts=(Pose(250.0, 325.0, math.pi / 2),))
 
@@ -225,17 +240,35 @@ class Arena:
 
     @property
     def width_mm(self) -> float:
-        """Width of the raster [mm]."""
+        """Width of the raster [mm].
+
+        Example:
+            >>> import kiks
+            >>> kiks.Arena.load("office").width_mm
+            1100.0
+        """
         return float(self.brightness.shape[1] * self.mm_per_cell)
 
     @property
     def height_mm(self) -> float:
-        """Height of the raster [mm]."""
+        """Height of the raster [mm].
+
+        Example:
+            >>> import kiks
+            >>> kiks.Arena.load("office").height_mm
+            850.0
+        """
         return float(self.brightness.shape[0] * self.mm_per_cell)
 
     @property
     def bodies(self) -> tuple[Ball | Cylinder, ...]:
-        """The balls, then the cylinders."""
+        """The balls, then the cylinders.
+
+        Example:
+            >>> import kiks
+            >>> kiks.Arena.load("pillars").bodies[0].radius_mm
+            32.0
+        """
         together: list[Ball | Cylinder] = [*self.balls]
         return (*together, *self.cylinders)
 
@@ -281,6 +314,11 @@ class Arena:
         Interpolates `clearance` between cell centres and takes off half a cell. That is exact before a straight wall
         along the raster; before a corner it is up to 0.21 cells too much, half way between two walls up to half a
         cell too little. In walls and outside it is negative.
+
+        Example:
+            >>> import kiks
+            >>> kiks.Arena.box(500, 500).clearance_at_mm(250, 250)
+            239.5
         """
         x_mm, y_mm = check_number("x_mm", x_mm), check_number("y_mm", y_mm)
         column, column_share = between(x_mm / self.mm_per_cell + PAD - 0.5, self.clearance.shape[1])
@@ -290,7 +328,13 @@ class Arena:
         return float(upright[0] + column_share * (upright[1] - upright[0]) - 0.5 * self.mm_per_cell)
 
     def free_for(self, x_mm: float, y_mm: float, radius_mm: float) -> bool:
-        """Return whether a disc of `radius_mm` [mm] at a place [mm] touches no wall."""
+        """Return whether a disc of `radius_mm` [mm] at a place [mm] touches no wall.
+
+        Example:
+            >>> import kiks
+            >>> kiks.Arena.box(500, 500).free_for(20, 250, radius_mm=27.5)
+            False
+        """
         if check_number("radius_mm", radius_mm, 0, advice="A Khepera has 27.5.") == 0:
             raise ParameterError("radius_mm must be positive, but it was 0. A Khepera has 27.5.")
         return self.clearance_at_mm(x_mm, y_mm) >= radius_mm
@@ -300,6 +344,11 @@ class Arena:
 
         That is the first of `starts`. Without any it is the cell with most room, among equals the one nearest to
         the middle, heading up: the same one every time.
+
+        Example:
+            >>> import kiks
+            >>> kiks.Arena.box(500, 500).find_start(radius_mm=27.5)
+            Pose(x_mm=249.5, y_mm=249.5, heading_rad=1.5707963267948966)
         """
         pose = self.starts[0] if self.starts else self._widest_place()
         if not self.free_for(pose.x_mm, pose.y_mm, radius_mm):

@@ -300,6 +300,11 @@ class RobotSpec:
             name_or_path: Name of a robot of ours, or the path of a TOML file with the same keys.
             response: What makes counts of the rays of its proximity sensors, one of `RESPONSES`; what the file says
                 if left out.
+
+        Example:
+            >>> import kiks
+            >>> kiks.RobotSpec.load("khepera_ii").name
+            'Khepera II'
         """
         path, known = path_of(name_or_path, "robot, if not a name such as 'khepera',"), robot_names()
         source = str(path)
@@ -341,12 +346,24 @@ class RobotSpec:
 
     @property
     def is_noisy(self) -> bool:
-        """Whether chance has a say in what its sensors and its camera read."""
+        """Whether chance has a say in what its sensors and its camera read.
+
+        Example:
+            >>> import kiks
+            >>> kiks.RobotSpec.load("khepera").is_noisy
+            True
+        """
         chance = self.proximity
         return any((chance.noise_small, chance.noise_large, self.ambient.noise_counts, *chance.jitter_counts))
 
     def without_noise(self) -> RobotSpec:
-        """Return a copy whose sensors and camera read the same again as long as nothing moves."""
+        """Return a copy whose sensors and camera read the same again as long as nothing moves.
+
+        Example:
+            >>> import kiks
+            >>> kiks.RobotSpec.load("khepera").without_noise().is_noisy
+            False
+        """
         return self.with_changes(
             proximity__noise_small=0.0,
             proximity__noise_large=0.0,

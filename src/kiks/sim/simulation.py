@@ -173,12 +173,26 @@ class Simulation:
 
     @property
     def arena(self) -> Arena:
-        """The walls, and what stood in them at the beginning."""
+        """The walls, and what stood in them at the beginning.
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> sim.arena.width_mm
+            500.0
+        """
         return self.world.arena
 
     @property
     def seed(self) -> int:
-        """Seed of all random numbers."""
+        """Seed of all random numbers.
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> sim.seed
+            1
+        """
         return self.world.seed
 
     @property
@@ -188,12 +202,26 @@ class Simulation:
 
     @property
     def spec(self) -> RobotSpec:
-        """The kind of robot 1."""
+        """The kind of robot 1.
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> sim.spec.name
+            'Khepera'
+        """
         return self.world.specs[self.index_of(1)]
 
     @property
     def robot_count(self) -> int:
-        """Number of robots."""
+        """Number of robots.
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> sim.robot_count
+            1
+        """
         return self.world.robot_count
 
     @property
@@ -201,6 +229,13 @@ class Simulation:
         """The lamps: x_mm, y_mm, power_w, and 1 for on or 0 for off: float64 [lamp, 4].
 
         Write to it to move or switch them. A lamp with a NaN position is ignored.
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> lamp = sim.add_lamp(250, 300)
+            >>> sim.lamps
+            array([[250., 300.,   1.,   1.]])
         """
         return self.world.expose_lamps()
 
@@ -218,11 +253,28 @@ class Simulation:
 
     @property
     def time_s(self) -> float:
-        """Simulated time since the start [s]."""
+        """Simulated time since the start [s].
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> sim.run(1.5)
+            >>> sim.time_s
+            1.5
+        """
         return s_from_ns(self.world.now_ns)
 
     def run(self, seconds: float) -> None:
-        """Let simulated time pass [s, at most 1e9]: robots drive on, and commands on the line act when they are due."""
+        """Let simulated time pass [s, at most 1e9]: robots drive on, and commands on the line act when they are due.
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> kiks.Khepera(sim.port(1)).set_speed(5, 5)
+            >>> sim.run(2)
+            >>> round(sim.travelled_mm(1))
+            79
+        """
         passing_ns = ns_from_s(check_number("seconds", seconds, 0, SECONDS_MAX, "Time never runs backwards."))
         with self.lock:
             self.loop.advance_to(self.now_ns + passing_ns)
@@ -249,13 +301,28 @@ class Simulation:
         return self.world.index_of(robot)
 
     def pose(self, robot: int) -> tuple[float, float, float]:
-        """Return where a robot is at this instant: x_mm, y_mm, heading_rad (not wrapped)."""
+        """Return where a robot is at this instant: x_mm, y_mm, heading_rad (not wrapped).
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> sim.place(1, 100, 200, 0.25)
+            >>> sim.pose(1)
+            (100.0, 200.0, 0.25)
+        """
         index = self.index_of(robot)
         with self._up_to_date() as world:
             return world.pose(index)
 
     def poses(self) -> NDArray[np.float64]:
-        """Return where all robots are at this instant, float64 [robot, 3]: x_mm, y_mm, heading_rad."""
+        """Return where all robots are at this instant, float64 [robot, 3]: x_mm, y_mm, heading_rad.
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), robots=3, seed=1)
+            >>> sim.poses().shape
+            (3, 3)
+        """
         with self._up_to_date() as world:
             return world.places()[0]
 
@@ -268,6 +335,13 @@ class Simulation:
             y_mm: From the arena's lower left corner upwards [mm].
             heading_rad: Counter-clockwise from the x axis [rad]; wrapped to one turn beyond a million. A multiple of
                 0.5 from 10 on is an error: it is a heading in degrees.
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> sim.place(1, 100, 200, 0.25)
+            >>> sim.pose(1)
+            (100.0, 200.0, 0.25)
         """
         index = self.index_of(robot)
         with self._changing() as world:
@@ -319,7 +393,15 @@ class Simulation:
             return self._turrets.fit(index, turret)
 
     def turrets(self, robot: int) -> tuple[Turret, ...]:
-        """Return the turrets that a robot carries, in the order in which they were fitted."""
+        """Return the turrets that a robot carries, in the order in which they were fitted.
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> turret = sim.fit(1, "k213")
+            >>> len(sim.turrets(1))
+            1
+        """
         return tuple(self.wires[self.index_of(robot)].firmware.fitted)
 
     def port(self, robot: int) -> SimPort:
@@ -330,11 +412,28 @@ class Simulation:
         return self._ports[index]
 
     def url(self, robot: int) -> str:
-        """Return the name under which pyserial opens a robot's port: 'kiks://sim1/1'."""
+        """Return the name under which pyserial opens a robot's port: 'kiks://sim1/1'.
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(seed=1)
+            >>> import serial
+            >>> port = serial.serial_for_url(sim.url(1), timeout=1)
+            >>> port.close()
+        """
         return f"kiks://{self.name}/{self.index_of(robot) + 1}"
 
     def travelled_mm(self, robot: int) -> float:
-        """Return the length of a robot's path so far [mm]."""
+        """Return the length of a robot's path so far [mm].
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> kiks.Khepera(sim.port(1)).set_speed(5, -5)
+            >>> sim.run(2)
+            >>> round(sim.travelled_mm(1))  # it turned on the spot
+            1
+        """
         forwards_mm, backwards_mm, _ = self.distances_mm()[self.index_of(robot)]
         return float(forwards_mm + backwards_mm)
 
@@ -348,7 +447,17 @@ class Simulation:
             return world.distances_mm()
 
     def contacts(self, robot: int) -> int:
-        """Return how often a robot has touched something so far: a wall, a robot, a ball or a cylinder."""
+        """Return how often a robot has touched something so far: a wall, a robot, a ball or a cylinder.
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> sim.place(1, 250, 400, 1.5708)
+            >>> kiks.Khepera(sim.port(1)).set_speed(10, 10)
+            >>> sim.run(2)
+            >>> sim.contacts(1)
+            1
+        """
         index = self.index_of(robot)
         with self._up_to_date() as world:
             return int(world.state.robots["contact_count"][0, index])
@@ -356,7 +465,15 @@ class Simulation:
     # ---- walls, balls, cylinders and lamps ----
 
     def set_arena(self, arena: Arena) -> None:
-        """Replace the walls alone by those of an arena."""
+        """Replace the walls alone by those of an arena.
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> sim.set_arena(kiks.Arena.box(800, 600))
+            >>> sim.arena.width_mm
+            800.0
+        """
         _check_arena(arena)
         # These take a while: they are computed before other threads have to wait.
         free_space = FreeSpace(arena, self.world.specs, self.world.state)
@@ -385,7 +502,14 @@ class Simulation:
             return self.things.add_body(Ball, x_mm, y_mm, changes)
 
     def add_cylinder(self, x_mm: float, y_mm: float, **changes: Any) -> int:
-        """Add a cylinder at rest; return its number. See `add_ball`."""
+        """Add a cylinder at rest; return its number. See `add_ball`.
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> cylinder = sim.add_cylinder(100, 100, radius_mm=20)
+            >>> sim.remove_body(cylinder)
+        """
         with self._changing():
             return self.things.add_body(Cylinder, x_mm, y_mm, changes)
 
@@ -394,6 +518,13 @@ class Simulation:
 
         Of their fields `number`, `what` (3 a ball, 4 a cylinder), `x_mm`, `y_mm`, `velocity_x` and `velocity_y` [mm/s],
         `radius_mm` and `brightness` are of use.
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> ball = sim.add_ball(100, 100)
+            >>> sim.bodies()["x_mm"]
+            array([100.])
         """
         with self._up_to_date() as world:
             return world.bodies()
@@ -409,27 +540,73 @@ class Simulation:
             y_mm: Where its centre goes [mm].
             speed_mm_s: How fast it rolls from there [mm/s].
             heading_rad: In which direction it rolls, counter-clockwise from the x axis [rad].
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> ball = sim.add_ball(100, 100)
+            >>> sim.move_body(ball, 200, 100, speed_mm_s=100)
+            >>> sim.run(1)
+            >>> sim.bodies()["x_mm"].round()
+            array([290.])
         """
         with self._changing():
             self.things.move_body(body, x_mm, y_mm, speed_mm_s, heading_rad)
 
     def remove_body(self, body: int) -> None:
-        """Remove a ball or cylinder."""
+        """Remove a ball or cylinder.
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> ball = sim.add_ball(100, 100)
+            >>> sim.remove_body(ball)
+            >>> len(sim.bodies())
+            0
+        """
         with self._changing():
             self.things.remove_body(body)
 
     def add_lamp(self, x_mm: float, y_mm: float, power_w: float = 1.0, *, is_on: bool = True) -> int:
-        """Add a lamp; return its row in `lamps`, counted from 1."""
+        """Add a lamp; return its row in `lamps`, counted from 1.
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> lamp = sim.add_lamp(250, 300, power_w=2)
+            >>> len(sim.lamps)
+            1
+        """
         with self._up_to_date():
             return self.things.add_lamp(x_mm, y_mm, power_w, is_on)
 
     def remove_lamp(self, lamp: int) -> None:
-        """Remove a lamp; those below it move up a row."""
+        """Remove a lamp; those below it move up a row.
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> lamp = sim.add_lamp(250, 300)
+            >>> sim.remove_lamp(lamp)
+            >>> len(sim.lamps)
+            0
+        """
         with self._up_to_date():
             self.things.remove_lamp(lamp)
 
     def checkpoint(self) -> Checkpoint:
-        """Return where everything stands, for `reset`."""
+        """Return where everything stands, for `reset`.
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> start = sim.checkpoint()
+            >>> before = sim.pose(1)
+            >>> sim.place(1, 100, 100, 0)
+            >>> sim.reset(start)
+            >>> sim.pose(1) == before
+            True
+        """
         with self._up_to_date():
             return self.things.checkpoint()
 
@@ -437,6 +614,15 @@ class Simulation:
         """Move everything back to a checkpoint: bodies and lamps added since then go, removed ones come back.
 
         Time, programs, wheels and counters go on.
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> start = sim.checkpoint()
+            >>> ball = sim.add_ball(100, 100)
+            >>> sim.reset(start)
+            >>> len(sim.bodies())
+            0
         """
         with self._changing():
             self.things.reset(checkpoint)
@@ -449,6 +635,13 @@ class Simulation:
         Args:
             robot: Its number.
             noise: True for the counts that command `N` would report now, with noise and rounding.
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> sim.place(1, 250, 460, 1.5708)  # 10 mm before a wall
+            >>> [round(count) for count in sim.proximity(1)]
+            [3, 1023, 1023, 1023, 1023, 3, 3, 3]
         """
         index = self.index_of(robot)
         with self._up_to_date():
@@ -459,13 +652,29 @@ class Simulation:
 
         Nothing checks whether the robot fits there: a fit asks thousands of times. Poses are float64 [pose, 3]: x_mm,
         y_mm, heading_rad.
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> import numpy as np
+            >>> poses = np.array([[250, 460, 1.5708], [250, 250, 1.5708]])
+            >>> sim.proximity_at(1, poses).shape
+            (2, 8)
         """
         index = self.index_of(robot)
         with self._up_to_date() as world:
             return proximity_at(world, index, poses)
 
     def ambient(self, robot: int, *, noise: bool = False) -> list[float]:
-        """Return the same for the light sensors, or the counts of command `O`."""
+        """Return the same for the light sensors, or the counts of command `O`.
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> lamp = sim.add_lamp(250, 300)
+            >>> [round(count) for count in sim.ambient(1)]
+            [450, 419, 73, 74, 410, 450, 450, 450]
+        """
         index = self.index_of(robot)
         with self._up_to_date():
             return [float(count) for count in self._sensors.ambient(index, noise)]
@@ -475,6 +684,12 @@ class Simulation:
 
         The leftmost ray is first; lengths are counted from the sensor, and infinite where nothing is within its reach.
         They are exact, even where the robot's response uses coarser ones.
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> sim.rays(1).shape
+            (8, 7)
         """
         index = self.index_of(robot)
         with self._up_to_date() as world:
@@ -502,7 +717,15 @@ class Simulation:
             return explain_ambient(world, robot, sensor)
 
     def image(self, robot: int) -> list[float]:
-        """Return what a K213 would see at this instant and pose, 64 greys from the left, without noise or rounding."""
+        """Return what a K213 would see at this instant and pose, 64 greys from the left, without noise or rounding.
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> turret = sim.fit(1, "k213")
+            >>> len(sim.image(1))
+            64
+        """
         index = self.index_of(robot)
         with self._up_to_date():
             return self._turrets.cameras.expect(index)
@@ -544,6 +767,15 @@ class Simulation:
             every_s: Time between two points [s]: whole hundredths, at least one.
             points_max: Most points that are kept, from 2. When there are more, every second one is dropped, and from
                 then on half as many come; None for all.
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> sim.record_paths(every_s=0.1)
+            >>> kiks.Khepera(sim.port(1)).set_speed(5, 5)
+            >>> sim.run(1)
+            >>> sim.paths().shape
+            (1, 11, 4)
         """
         ticks = 100 * check_number("every_s", every_s, 0, 1e7, "Take 0.1.")
         if ticks < 1 - 1e-9 or abs(ticks - round(ticks)) > 1e-6:
@@ -557,7 +789,16 @@ class Simulation:
             world.watch(self._paths)
 
     def paths(self) -> NDArray[np.float64]:
-        """Return the paths since `record_paths`, float64 [robot, point, 4]: time_s, x_mm, y_mm, heading_rad."""
+        """Return the paths since `record_paths`, float64 [robot, point, 4]: time_s, x_mm, y_mm, heading_rad.
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> sim.record_paths(every_s=0.5)
+            >>> sim.run(1)
+            >>> sim.paths().shape
+            (1, 3, 4)
+        """
         with self.lock:
             return self._recorded().array()
 
@@ -573,7 +814,14 @@ class Simulation:
         return self._paths
 
     def state_hash(self) -> str:
-        """Return 16 hexadecimal digits that any two equal runs agree on."""
+        """Return 16 hexadecimal digits that any two equal runs agree on.
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> sim.state_hash() == kiks.Simulation(kiks.Arena.box(500, 500), seed=1).state_hash()
+            True
+        """
         with self._up_to_date() as world:
             return world.state.hash()
 
