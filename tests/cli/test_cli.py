@@ -265,6 +265,7 @@ NO_RESULTS = {
     ("export", "files"),
     ("serve", "link"),
     ("session", "listen"),
+    ("examples", "out"),
 }
 """Paths that are read, and those that are written when a command begins."""
 

@@ -128,7 +128,9 @@ def run(
         leave_out(context, f"with --thinking {thinking}", "save_thinking")
     if is_alone:
         leave_out(context, "with one program", "when_silent", "patience")
-    parse_thinking(thinking)
+    is_replay = thinking.startswith("replay:") and len(commands) > 1
+    for number in range(1, len(commands) + 1) if is_replay else [0]:
+        parse_thinking(f"{thinking}.{number}" if is_replay else thinking)
     for number in mapping.values():
         index_of_robot(number, len(project.robots))
     # A program may change the working folder.
