@@ -25,7 +25,6 @@ extensions = [
     "sphinx.ext.autosummary",
     "sphinx.ext.napoleon",
     "sphinx_copybutton",
-    "sphinx_design",
 ]
 # What is for developers only, and the programs that make pages.
 exclude_patterns = ["next.md", "pages"]
@@ -34,7 +33,6 @@ exclude_patterns = ["next.md", "pages"]
 nitpicky = True
 nitpick_ignore_regex = [("py:.*", r"(?!kiks\.).*|kiks\.(?!controllers|measures|tasks)[a-z_]+\..*")]
 
-myst_enable_extensions = ["colon_fence"]
 myst_heading_anchors = 3
 
 # What users write as `kiks.measures` lies elsewhere, where autodoc does not look.
@@ -88,6 +86,12 @@ def prepare(app, what, name, obj, options, lines):
     lines[:] = [re.sub(r"`?docs/(\w+/\w+)\.md`?", r":doc:`/\1`", line) for line in lines]
 
 
+def level_captions(app, page, template, context, doctree):
+    """Give the captions of the list of pages their level, which readers of screens need."""
+    tree = context.get("furo_navigation_tree", "")
+    context["furo_navigation_tree"] = tree.replace('role="heading"', 'role="heading" aria-level="2"')
+
+
 def write_pages(app):
     """Write the pages that are made from what commands and files say of themselves, if they have changed."""
     for name, made in {"commands": commands.page(), "files": files.page()}.items():
@@ -97,8 +101,9 @@ def write_pages(app):
 
 
 def setup(app):
-    """Connect the functions above; `prepare` comes before napoleon."""
+    """Connect the functions above; `prepare` comes before napoleon, and `level_captions` after the theme."""
     app.connect("builder-inited", write_pages)
+    app.connect("html-page-context", level_captions, priority=900)
     app.connect("missing-reference", lead_to_public_names)
     app.connect("autodoc-process-signature", shorten_arrays, priority=600)
     app.connect("autodoc-process-docstring", prepare, priority=400)
