@@ -45,9 +45,9 @@ ROBOT_US, CHARACTER_US = 60, 3
 """What a simulated second of a robot, and a character for it with its share of the reply, cost to make again, about
 [us]."""
 
-CHUNK_S = 0.1
+CHUNK_S = 0.2
 """Least real time between two chunks [s]. A crash costs what came after the last chunk: at most a second of a world in
-real time, and a tenth of a second's work of one at full speed."""
+real time, and a fifth of a second's work of one at full speed. A jump makes up to as much again."""
 
 PROGRAMS = "programs/"
 """Folder of the programs' texts in the file."""
