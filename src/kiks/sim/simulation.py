@@ -747,6 +747,15 @@ class Simulation:
 
         Returns:
             A `kiks.recording.recorder.RunRecorder`, with `mark(note)` for bookmarks.
+
+        Example:
+            >>> import tempfile, kiks
+            >>> file = tempfile.mkdtemp() + "/run.mcap"
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> with sim.record(file) as recorder:
+            ...     sim.run(1)
+            ...     recorder.mark("here it turns")
+            ...     sim.run(1)
         """
         recorder: Recorder = record_simulation(self, file)
         return recorder
