@@ -245,6 +245,14 @@ class Recording:
             path: The file, whose ending says what it becomes.
             kind: Which kind, where the ending leaves a choice.
             options: Those of the kind.
+
+        Example:
+            >>> import tempfile, kiks
+            >>> file = tempfile.mkdtemp() + "/run.mcap"
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> with sim.record(file):
+            ...     sim.run(1)
+            >>> kiks.Recording(file).export(file + ".csv", table="poses")
         """
         upwards.export_recording(self, path, kind=kind, **options)
 
