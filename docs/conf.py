@@ -48,6 +48,7 @@ default_role = "code"
 
 html_theme = "furo"
 html_title = f"KiKS {release}"
+html_favicon = "images/icon.svg"
 
 
 # Types in signatures are without the rules of Pydantic, which texts say.

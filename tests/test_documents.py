@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import re
+import shlex
 from pathlib import Path
+from typing import Any
 
 import pytest
+import typer.main
 from tests import forked
 from tests.at_length import cases
 
@@ -89,6 +92,20 @@ def test_links_to_sections_lead_somewhere(page: Path) -> None:
             assert section in names, f"{page.name} points to {target}#{section}"
 
 
+def check_options(words: list[str]) -> None:
+    """Fail unless a command has the options it is called with; what stands after a program is the program's."""
+    command: Any = typer.main.get_command(app)
+    while hasattr(command, "commands") and words and words[0] in command.commands:
+        command = command.commands[words.pop(0)]
+    known = {option for each in command.params for option in (*each.opts, *each.secondary_opts)} | {"--help", "-h"}
+    is_open = command.name not in ("run", "demo")
+    for word in words:
+        if not is_open and word.endswith(".py"):
+            return
+        if word.startswith("-") and not word.startswith("---"):
+            assert word.partition("=")[0] in known, f"kiks {command.name} {word}"
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
 def test_commands_and_targets_exist(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
@@ -96,6 +113,8 @@ def test_commands_and_targets_exist(page: Path) -> None:
     assert set(re.findall(r"\bmake ([a-z-]+)\b", "".join(blocks(page, "sh")))) <= targets
     for command in re.findall(r"^kiks ([a-z]+)", "".join(blocks(page, "sh")), flags=re.MULTILINE):
         assert command in COMMANDS, f"{page.name}: kiks {command}"
+    for line in re.findall(r"^kiks .*", "".join(blocks(page, "sh")), flags=re.MULTILINE):
+        check_options(shlex.split(line, comments=True)[1:])
     # Paths that a page names in code must exist.
     for path in re.findall(r"\b(?:examples|docs|benchmarks|tests|src)/[\w./-]+\.\w+", text):
         assert (ROOT / path).exists(), f"{page.name} names {path}"

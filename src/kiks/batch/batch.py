@@ -303,6 +303,12 @@ class Batch:
         """The lamps: x_mm, y_mm, power_w, and 1 for on or 0 for off, float64 [world, lamp, 4].
 
         Write to the array to move or switch lamps; a lamp with a place of NaN lights nothing.
+
+        Example:
+            >>> import kiks
+            >>> batch = kiks.Batch(kiks.Arena.load("maze"), 3, seed=1)
+            >>> batch.lamps.shape
+            (3, 1, 4)
         """
         return self._lamps
 

@@ -83,13 +83,25 @@ class Controller(Compiled):
 
     @property
     def sizes(self) -> dict[str, int | None]:
-        """How many numbers each array has that it is called with; None if any number will do."""
+        """How many numbers each array has that it is called with; None if any number will do.
+
+        Example:
+            >>> import kiks
+            >>> kiks.controllers.linear().sizes
+            {'sensors': 8, 'memory': 0, 'parameters': 18, 'wheels': 2}
+        """
         counts = self.sensor_count, self.memory_count, self.parameter_count, 2
         return dict(zip(ARGUMENTS, counts, strict=True))
 
     @property
     def sensor_count(self) -> int:
-        """Number of its readings."""
+        """Number of its readings.
+
+        Example:
+            >>> import kiks
+            >>> kiks.controllers.linear(senses=("proximity", "ambient")).sensor_count
+            16
+        """
         return reading_count(self.senses)
 
     def __call__(
@@ -108,7 +120,13 @@ class Controller(Compiled):
             raise self.refused(TypeError(RETURNS))
 
     def check_parameters(self, parameters: ArrayLike) -> NDArray[np.float64]:
-        """Return parameters as float64 [..., parameter]."""
+        """Return parameters as float64 [..., parameter].
+
+        Example:
+            >>> import kiks
+            >>> kiks.controllers.linear().check_parameters([0] * 18).shape
+            (18,)
+        """
         given = check_numbers("parameters", parameters)
         given = given.reshape(1) if given.ndim == 0 else given
         if self.parameter_count not in (None, given.shape[-1]):

@@ -102,7 +102,13 @@ class Measure(Compiled):
 
     @property
     def sizes(self) -> dict[str, int | None]:
-        """How many numbers its notes are."""
+        """How many numbers its notes are.
+
+        Example:
+            >>> import kiks
+            >>> kiks.measures.straightness.sizes
+            {'notes': 2}
+        """
         return {"notes": self.note_count}
 
     def value(self, notes: NDArray[np.float64]) -> NDArray[np.float64]:

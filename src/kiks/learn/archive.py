@@ -119,11 +119,30 @@ class Archive:
 
     @property
     def elites(self) -> tuple[Elite, ...]:
-        """The elites, in the order of their cells."""
+        """The elites, in the order of their cells.
+
+        Example:
+            >>> import kiks
+            >>> evolution = kiks.Evolution(kiks.tasks.avoid(seconds=1, worlds=3), "map-elites", seed=1, population=8)
+            >>> _ = evolution.run(generations=2)
+            >>> archive = evolution.archive
+            >>> len(archive.elites) > 1
+            True
+        """
         return tuple(self._elites[cell] for cell in sorted(self._elites))
 
     def best_first(self) -> list[Elite]:
-        """Return the elites by their fitness, the best first; ties by cell."""
+        """Return the elites by their fitness, the best first; ties by cell.
+
+        Example:
+            >>> import kiks
+            >>> evolution = kiks.Evolution(kiks.tasks.avoid(seconds=1, worlds=3), "map-elites", seed=1, population=8)
+            >>> _ = evolution.run(generations=2)
+            >>> archive = evolution.archive
+            >>> first, second, *_ = archive.best_first()
+            >>> first.fitness >= second.fitness
+            True
+        """
         return sorted(self.elites, key=lambda elite: -elite.fitness)
 
     def elite_at(self, *place: float) -> Elite:
@@ -131,6 +150,15 @@ class Archive:
 
         Args:
             place: The place along each axis.
+
+        Example:
+            >>> import kiks
+            >>> evolution = kiks.Evolution(kiks.tasks.avoid(seconds=1, worlds=3), "map-elites", seed=1, population=8)
+            >>> _ = evolution.run(generations=2)
+            >>> archive = evolution.archive
+            >>> elite = archive.elite_at(100, 0.5)  # path_mm, straightness
+            >>> len(elite.parameters)
+            18
         """
         if len(place) != len(self.axes):
             names = ", ".join(axis.measure for axis in self.axes)
@@ -144,7 +172,16 @@ class Archive:
         return elites[int((away**2).sum(axis=1).argmin())]
 
     def champion_of(self, elite: Elite) -> Champion:
-        """Return an elite as a champion."""
+        """Return an elite as a champion.
+
+        Example:
+            >>> import kiks
+            >>> evolution = kiks.Evolution(kiks.tasks.avoid(seconds=1, worlds=3), "map-elites", seed=1, population=8)
+            >>> _ = evolution.run(generations=2)
+            >>> archive = evolution.archive
+            >>> archive.champion_of(archive.best_first()[0]).task
+            'avoid'
+        """
         measures = {name: value for name, value in elite.values.items() if name != "fitness"}
         return replace(
             self.champion,
@@ -155,23 +192,59 @@ class Archive:
         )
 
     def champion_at(self, *place: float) -> Champion:
-        """Return the elite of a place, as `elite_at` finds it, as a champion."""
+        """Return the elite of a place, as `elite_at` finds it, as a champion.
+
+        Example:
+            >>> import kiks
+            >>> evolution = kiks.Evolution(kiks.tasks.avoid(seconds=1, worlds=3), "map-elites", seed=1, population=8)
+            >>> _ = evolution.run(generations=2)
+            >>> archive = evolution.archive
+            >>> archive.champion_at(100, 0.5).task
+            'avoid'
+        """
         return self.champion_of(self.elite_at(*place))
 
     # ---- the whole ----
 
     @property
     def coverage(self) -> float:
-        """Share of the cells that are filled."""
+        """Share of the cells that are filled.
+
+        Example:
+            >>> import kiks
+            >>> evolution = kiks.Evolution(kiks.tasks.avoid(seconds=1, worlds=3), "map-elites", seed=1, population=8)
+            >>> _ = evolution.run(generations=2)
+            >>> archive = evolution.archive
+            >>> 0 < archive.coverage < 1
+            True
+        """
         return len(self._elites) / self.cell_count
 
     @property
     def qd_score(self) -> float:
-        """Sum of the fitness of all elites; a fitness below zero makes an elite count against it."""
+        """Sum of the fitness of all elites; a fitness below zero makes an elite count against it.
+
+        Example:
+            >>> import kiks
+            >>> evolution = kiks.Evolution(kiks.tasks.avoid(seconds=1, worlds=3), "map-elites", seed=1, population=8)
+            >>> _ = evolution.run(generations=2)
+            >>> archive = evolution.archive
+            >>> archive.qd_score > 0
+            True
+        """
         return float(sum(elite.fitness for elite in self.elites))
 
     def heat_map(self) -> Floats:
-        """Return the fitness in each cell, NaN in empty ones, float64 [cell of axis 0, ...]."""
+        """Return the fitness in each cell, NaN in empty ones, float64 [cell of axis 0, ...].
+
+        Example:
+            >>> import kiks
+            >>> evolution = kiks.Evolution(kiks.tasks.avoid(seconds=1, worlds=3), "map-elites", seed=1, population=8)
+            >>> _ = evolution.run(generations=2)
+            >>> archive = evolution.archive
+            >>> archive.heat_map().shape
+            (20, 20)
+        """
         heat: Floats = np.full(self.shape, np.nan)
         for elite in self.elites:
             heat[elite.cell] = elite.fitness

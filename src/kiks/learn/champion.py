@@ -129,6 +129,13 @@ class Champion:
 
         Raises:
             LinkError: If a port cannot be opened, or a robot does not answer as it should.
+
+        Example:
+            >>> import kiks
+            >>> champion = kiks.Champion(kiks.controllers.linear(), [0.5, 0.5] + [0.0] * 16)
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> champion.drive(sim.port(1), seconds=2)
+            20
         """
         period_s = self.timing.period_s
         return drive(port, self.controller, self.parameters, seconds=seconds, period_s=period_s, baud=self.baud)
@@ -139,7 +146,14 @@ class Champion:
         return self.timing.baud or 57600
 
     def project(self, arena: Arena | None = None) -> Project:
-        """Return its own world, or that of an arena or the default box, with its timing and turrets for its senses."""
+        """Return its own world, or that of an arena or the default box, with its timing and turrets for its senses.
+
+        Example:
+            >>> import kiks
+            >>> champion = kiks.Champion(kiks.controllers.linear(), [0.5, 0.5] + [0.0] * 16)
+            >>> champion.project().arena.width_mm
+            500.0
+        """
         own = self.world if arena is None else None
         project = own or Project(Arena.default() if arena is None else arena)
         seen = ("k213",) if "camera" in self.controller.senses else ()
@@ -160,6 +174,13 @@ class Champion:
             arena: The arena; its own world if left out, or the default box if it has none.
             robots: Number of robots; that of its own world, else 1, if left out.
             seed: Seed of all random numbers; that of its own world, else 0, if left out.
+
+        Example:
+            >>> import kiks
+            >>> champion = kiks.Champion(kiks.controllers.linear(), [0.5, 0.5] + [0.0] * 16)
+            >>> sim, ports = champion.simulation(kiks.Arena.box(500, 500))
+            >>> len(ports)
+            1
         """
         project = self.project(arena)
         there = project.robots
@@ -175,6 +196,15 @@ class Champion:
         """Write a file that `load` reads, and beside it the files that it names.
 
         These are its world, its robot if that does not come with KiKS, and the Python file that defines its controller.
+
+        Example:
+            >>> import kiks
+            >>> champion = kiks.Champion(kiks.controllers.linear(), [0.5, 0.5] + [0.0] * 16)
+            >>> import tempfile
+            >>> file = tempfile.mkdtemp() + "/champion.toml"
+            >>> champion.save(file)
+            >>> kiks.Champion.load(file).parameters == champion.parameters
+            True
         """
         target = path_of(path)
         recipe = recipe_for(self.controller, target.parent)
@@ -220,7 +250,17 @@ class Champion:
 
     @classmethod
     def load(cls, path: str | Path) -> Champion:
-        """Read a champion's file. A controller from a Python file or module is imported, which runs its code."""
+        """Read a champion's file. A controller from a Python file or module is imported, which runs its code.
+
+        Example:
+            >>> import kiks
+            >>> champion = kiks.Champion(kiks.controllers.linear(), [0.5, 0.5] + [0.0] * 16)
+            >>> import tempfile
+            >>> file = tempfile.mkdtemp() + "/champion.toml"
+            >>> champion.save(file)
+            >>> kiks.Champion.load(file).controller.name
+            'linear'
+        """
         path = path_of(path)
         what = f"Champion's file {str(path)!r}"
         read = check(_ChampionFile, parse_toml(read_file(path, what, bytes_max=CHAMPION_FILE_BYTES_MAX), what), what)

@@ -162,6 +162,12 @@ class Evolution:
 
         After the population of one side come the trials of the last generation's rival, if there is one. Of two sides
         it returns pairs: for each candidate of the first side one with each opponent, then the same for the second.
+
+        Example:
+            >>> import kiks
+            >>> evolution = kiks.Evolution(kiks.tasks.avoid(seconds=1), "ga", seed=1, population=8)
+            >>> evolution.ask().shape
+            (8, 18)
         """
         own = self._populations()
         rows = []
@@ -212,6 +218,12 @@ class Evolution:
 
         All candidates of a population drive in the same worlds, or with the same opponent in the same worlds, so that
         their fitness can be compared.
+
+        Example:
+            >>> import kiks
+            >>> evolution = kiks.Evolution(kiks.tasks.avoid(seconds=1), "ga", seed=1, population=8)
+            >>> evolution.seeds.shape
+            (8,)
         """
         purpose, begin = seeds.WORLDS + self._first_purpose, len(self.generations) * self.opponents
         drawn = [seed_for(self.seed, purpose, begin + number) for number in range(self.opponents)]
@@ -224,6 +236,13 @@ class Evolution:
         Args:
             values: Fitness, then the measures, float64 [candidate, value], as `Task.evaluate` returns them; or, of one
                 side, fitness alone, float64 [candidate]. More is better.
+
+        Example:
+            >>> import kiks
+            >>> evolution = kiks.Evolution(kiks.tasks.avoid(seconds=1), "ga", seed=1, population=8)
+            >>> evolution.tell(evolution.task.evaluate(evolution.ask(), evolution.seeds))
+            >>> evolution.champion.generation
+            1
         """
         if not self._own:
             raise ParameterError("ask() must come before each tell(), but it did not.")
@@ -329,6 +348,13 @@ class Evolution:
 
         Raises:
             WorkError: If the task cannot be evaluated.
+
+        Example:
+            >>> import kiks
+            >>> evolution = kiks.Evolution(kiks.tasks.avoid(seconds=1), "ga", seed=1, population=8)
+            >>> champion = evolution.run(generations=2)
+            >>> champion.task
+            'avoid'
         """
         if generations is None and seconds is None:
             raise ParameterError("generations or seconds must be given, but neither was: the run would never end.")
@@ -439,7 +465,15 @@ class Evolution:
 
     @property
     def driven_s(self) -> float:
-        """Total time for which the robots of the last generation drove [s]."""
+        """Total time for which the robots of the last generation drove [s].
+
+        Example:
+            >>> import kiks
+            >>> evolution = kiks.Evolution(kiks.tasks.avoid(seconds=1), "ga", seed=1, population=8)
+            >>> _ = evolution.run(generations=2)
+            >>> evolution.driven_s > 0
+            True
+        """
         return self.generations[-1].evaluations * self.task.driven_s
 
     @property
@@ -459,7 +493,15 @@ class Evolution:
 
     @property
     def champion(self) -> Champion:
-        """The champion of the first side, see `champions`."""
+        """The champion of the first side, see `champions`.
+
+        Example:
+            >>> import kiks
+            >>> evolution = kiks.Evolution(kiks.tasks.avoid(seconds=1), "ga", seed=1, population=8)
+            >>> _ = evolution.run(generations=2)
+            >>> len(evolution.champion.parameters)
+            18
+        """
         return self.champions[0]
 
     def champion_of(self, side: int | str = 0, generation: int | None = None) -> Champion:

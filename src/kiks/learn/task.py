@@ -250,7 +250,14 @@ class Task(Experiment):
 
     @property
     def value_names(self) -> tuple[str, ...]:
-        """Names of the values of a candidate: fitness, then the measures; of two sides, one after the other."""
+        """Names of the values of a candidate: fitness, then the measures; of two sides, one after the other.
+
+        Example:
+            >>> import kiks
+            >>> task = kiks.tasks.avoid()
+            >>> task.value_names
+            ('fitness', 'avoidance', 'roaming', 'contacts', 'path_mm', 'straightness')
+        """
         names = ("fitness", *self.measure_names)
         return names if self.against is None else tuple(f"{side.name}_{name}" for side in self.sides for name in names)
 
@@ -261,7 +268,14 @@ class Task(Experiment):
 
     @property
     def speed_limit(self) -> float:
-        """Wheel speed of an output of 1 [pulses/10 ms]: that of its controller."""
+        """Wheel speed of an output of 1 [pulses/10 ms]: that of its controller.
+
+        Example:
+            >>> import kiks
+            >>> task = kiks.tasks.avoid()
+            >>> task.speed_limit
+            5.0
+        """
         limit: float = (self.controller.recipe or {}).get("speed_limit", SPEED_LIMIT)
         return limit
 
@@ -272,12 +286,26 @@ class Task(Experiment):
 
     @property
     def parameter_count(self) -> int:
-        """Number of parameters of a candidate."""
+        """Number of parameters of a candidate.
+
+        Example:
+            >>> import kiks
+            >>> task = kiks.tasks.avoid()
+            >>> task.parameter_count
+            18
+        """
         return sum(side.parameter_count for side in self.sides)
 
     @property
     def driven_s(self) -> float:
-        """Total time for which the robots of a candidate drive [s]."""
+        """Total time for which the robots of a candidate drive [s].
+
+        Example:
+            >>> import kiks
+            >>> task = kiks.tasks.avoid()
+            >>> task.driven_s
+            240.0
+        """
         return float(self.worlds * len(self.controllers) * self.seconds)
 
     def parameters_of(self, candidates: Floats) -> list[Floats]:
@@ -361,6 +389,14 @@ class Task(Experiment):
 
         Returns:
             The values that `value_names` lists, the measures averaged over worlds, float64 [candidate, value].
+
+        Example:
+            >>> import kiks
+            >>> task = kiks.tasks.avoid()
+            >>> import numpy as np
+            >>> values = task.with_changes(seconds=1, worlds=3).evaluate(np.zeros((2, 18)), np.zeros(2, np.int64), 1)
+            >>> values.shape
+            (2, 6)
         """
         candidates, seeds = check_candidates(candidates, seeds)
         if candidates.shape[1] != self.parameter_count:

@@ -105,12 +105,32 @@ class Recording:
         return f"{what}, seed {self.start.head.seed}, {self.duration_s:.1f} s"
 
     def project_at(self, time_s: float) -> Project:
-        """Return the world at a time as a project, with robots, bodies and lamps where they are then."""
+        """Return the world at a time as a project, with robots, bodies and lamps where they are then.
+
+        Example:
+            >>> import tempfile, kiks
+            >>> file = tempfile.mkdtemp() + "/run.mcap"
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> with sim.record(file):
+            ...     sim.run(2.5)
+            >>> kiks.Recording(file).project_at(1.5).seed
+            1
+        """
         return described(self.world_at(time_s))
 
     @property
     def robots(self) -> range:
-        """Numbers of the robots that it has in the end."""
+        """Numbers of the robots that it has in the end.
+
+        Example:
+            >>> import tempfile, kiks
+            >>> file = tempfile.mkdtemp() + "/run.mcap"
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> with sim.record(file):
+            ...     sim.run(2.5)
+            >>> list(kiks.Recording(file).robots)
+            [1]
+        """
         return range(1, len(self.log.state_before(self.log.end_ns).specs) + 1)
 
     def check_robot(self, robot: object, advice: str = "", name: str = "robot") -> int:
@@ -121,13 +141,34 @@ class Recording:
 
     @property
     def duration_s(self) -> float:
-        """How long it is [s of simulated time]."""
+        """How long it is [s of simulated time].
+
+        Example:
+            >>> import tempfile, kiks
+            >>> file = tempfile.mkdtemp() + "/run.mcap"
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> with sim.record(file):
+            ...     sim.run(2.5)
+            >>> kiks.Recording(file).duration_s
+            2.5
+        """
         return s_from_ns(self.log.end_ns - self.log.begin_ns)
 
     # ---- tables ----
 
     def tables(self, *names: str) -> list[NDArray[np.void]]:
-        """Return several tables, [row] each, by names of `table`, in the time of one: the run is repeated for them."""
+        """Return several tables, [row] each, by names of `table`, in the time of one: the run is repeated for them.
+
+        Example:
+            >>> import tempfile, kiks
+            >>> file = tempfile.mkdtemp() + "/run.mcap"
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> with sim.record(file):
+            ...     sim.run(2.5)
+            >>> poses, events = kiks.Recording(file).tables("poses", "events")
+            >>> len(events)
+            0
+        """
         for name in names:
             if name not in tables.TABLES:
                 raise ParameterError(
@@ -146,8 +187,13 @@ class Recording:
             robot: Of this robot alone; of all if left out.
 
         Example:
-            >>> Recording("run.mcap").table("poses")["x_mm"].mean()  # doctest: +SKIP
-            312.4
+            >>> import tempfile, kiks
+            >>> file = tempfile.mkdtemp() + "/run.mcap"
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> with sim.record(file):
+            ...     sim.run(2.5)
+            >>> kiks.Recording(file).table("poses").dtype.names
+            ('time_s', 'robot', 'x_mm', 'y_mm', 'heading_rad')
         """
         if robot is not None:
             self.check_robot(robot, "Leave it out for all.")
@@ -163,6 +209,16 @@ class Recording:
 
         Args:
             time_s: The time [s], from the beginning to the end of the recording.
+
+        Example:
+            >>> import tempfile, kiks
+            >>> file = tempfile.mkdtemp() + "/run.mcap"
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> with sim.record(file):
+            ...     sim.run(2.5)
+            >>> world = kiks.Recording(file).world_at(1.5)
+            >>> world.time_s
+            1.5
         """
         return self.replay(time_s).let_go()
 
@@ -189,6 +245,14 @@ class Recording:
             path: The file, whose ending says what it becomes.
             kind: Which kind, where the ending leaves a choice.
             options: Those of the kind.
+
+        Example:
+            >>> import tempfile, kiks
+            >>> file = tempfile.mkdtemp() + "/run.mcap"
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> with sim.record(file):
+            ...     sim.run(1)
+            >>> kiks.Recording(file).export(file + ".csv", table="poses")
         """
         upwards.export_recording(self, path, kind=kind, **options)
 

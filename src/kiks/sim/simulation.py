@@ -197,7 +197,14 @@ class Simulation:
 
     @property
     def specs(self) -> list[RobotSpec]:
-        """The kind of each robot."""
+        """The kind of each robot.
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), robots=2, seed=1)
+            >>> [spec.name for spec in sim.specs]
+            ['Khepera', 'Khepera']
+        """
         return self.world.specs
 
     @property
@@ -248,7 +255,15 @@ class Simulation:
 
     @property
     def now_ns(self) -> int:
-        """The simulated time [ns]."""
+        """The simulated time [ns].
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), robots=2, seed=1)
+            >>> sim.run(0.5)
+            >>> sim.now_ns
+            500000000
+        """
         return self.world.now_ns
 
     @property
@@ -442,6 +457,12 @@ class Simulation:
 
         The columns are the way driven forwards, the way driven backwards, and the straight distance from where the
         robot started or was put last.
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), robots=2, seed=1)
+            >>> sim.distances_mm().shape
+            (2, 3)
         """
         with self._up_to_date() as world:
             return world.distances_mm()
@@ -712,7 +733,14 @@ class Simulation:
             return explain_proximity(world, robot, sensor)
 
     def explain_light(self, robot: int, sensor: int) -> LightExplanation:
-        """Return the same for command `O` and a light sensor."""
+        """Return the same for command `O` and a light sensor.
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), robots=2, seed=1)
+            >>> lamp = sim.add_lamp(250, 300)
+            >>> explanation = sim.explain_light(1, 2)
+        """
         with self._up_to_date() as world:
             return explain_ambient(world, robot, sensor)
 
@@ -747,6 +775,15 @@ class Simulation:
 
         Returns:
             A `kiks.recording.recorder.RunRecorder`, with `mark(note)` for bookmarks.
+
+        Example:
+            >>> import tempfile, kiks
+            >>> file = tempfile.mkdtemp() + "/run.mcap"
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> with sim.record(file) as recorder:
+            ...     sim.run(1)
+            ...     recorder.mark("here it turns")
+            ...     sim.run(1)
         """
         recorder: Recorder = record_simulation(self, file)
         return recorder
