@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from importlib.machinery import SourceFileLoader, SourcelessFileLoader
+from io import IOBase
 from pathlib import Path
 from pkgutil import get_importer
 from types import ModuleType
@@ -54,10 +55,16 @@ def _clear(names: dict[str, Any]) -> None:
 
     As garbage in a cycle with its functions, an open file would lose what it has not written yet.
     """
-    with catch_warnings(action="ignore", category=ResourceWarning):
-        for name in sorted(names, key=lambda name: not (name.startswith("_") and not name.startswith("__"))):
-            if name != "__builtins__":
-                names[name] = None
+    hook = sys.unraisablehook
+    # Python 3.13 tells of files that cannot be flushed as their port is closed; earlier ones do not.
+    sys.unraisablehook = lambda dropped: None if isinstance(dropped.object, IOBase) else hook(dropped)
+    try:
+        with catch_warnings(action="ignore", category=ResourceWarning):
+            for name in sorted(names, key=lambda name: not (name.startswith("_") and not name.startswith("__"))):
+                if name != "__builtins__":
+                    names[name] = None
+    finally:
+        sys.unraisablehook = hook
 
 
 def _run_file(path: str, main: ModuleType) -> None:
