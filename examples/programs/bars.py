@@ -1,4 +1,4 @@
-"""Show the eight proximity sensors as bars while somebody, or the robot itself, moves."""
+"""Show the eight proximity sensors as bars while the robot turns."""
 
 import time
 

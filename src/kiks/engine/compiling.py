@@ -4,7 +4,7 @@ Need: `fastmath` would let the compiler reorder sums, and then the bits depend o
 Method: entries and linked kernels get machine code, which contains all the other kernels that they call. Those are kept
 as LLVM's code, and optimized where they end up: passes and machine code of their own would take half of a first start.
 A linked kernel is called at an address that stands in a cell, so neither it nor its callers are compiled again when the
-other changes, and it is compiled once, whoever calls it. Its callers only know the cell's name.
+other changes, and it is compiled once for all its callers. They only know the cell's name.
 """
 
 from __future__ import annotations

@@ -160,7 +160,7 @@ def find_near(scene: Any, world: Any, x: Any, y: Any, reach_mm: Any, itself: Any
         for place in range(begins[world, row, first_column], begins[world, row, last_column + 1]):
             dx, dy, far = spots[world, place, 0] - x, spots[world, place, 1] - y, reach_mm + spots[world, place, 2]
             if count < found.shape[0]:
-                # Nobody can foretell which discs are near, so no branch depends on it.
+                # Which discs are near is unpredictable, so no branch depends on it.
                 found[count] = entries[world, place]
                 count += (dx * dx + dy * dy < far * far) & (entries[world, place] != itself)
     put_in_order(found, count)

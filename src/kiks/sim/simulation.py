@@ -74,8 +74,8 @@ class Simulation:
         program: What the computing of the program on its ports costs.
         name: The name in its ports' URLs.
 
-    A copy, by `copy.deepcopy` or `pickle`, goes on as the simulation would. Nobody records or watches it, and it has no
-    supervisor.
+    A copy, by `copy.deepcopy` or `pickle`, goes on as the simulation would. It is neither recorded nor shown, and
+    has no supervisor.
 
     Example:
         >>> sim = Simulation(Arena.box(500, 500), seed=1)
