@@ -17,7 +17,9 @@ from tests.at_length import cases
 from tests.guard import GUARD_S
 
 import kiks
-from kiks.batch.rollouts import FIRST, Rollouts
+from kiks.batch.number_table import FIRST
+from kiks.batch.rollouts import Rollouts
+from kiks.learn.exam import ExamResult
 
 pytestmark = pytest.mark.slow
 
@@ -78,16 +80,17 @@ def test_a_notebook_that_wants_no_page_has_the_address(run: Run) -> None:
         ("kiks.Simulation(robots=2)", "image/png", "<Simulation: 2 robots in 'default' at 0.000 s, seed 0>"),
         ("kiks.Arena.box(400, 300)", "image/png", "<Arena 'box': 400 x 300 mm>"),
         ("rollouts", "text/html", "<Rollouts: 2 worlds of 1 robot, path_mm>"),
+        ("sim.explain(1, 2)", "text/html", "<Explanation: sensor 2 (left 10) of robot 1 reads 0>"),
     ],
 )
 def test_a_notebook_shows_a_picture_or_a_table(run: Run, cell: str, kind: str, text: str) -> None:
     run(
-        "import numpy; from kiks.batch.rollouts import Rollouts\n"
+        "import numpy; from kiks.batch.rollouts import Rollouts; sim = kiks.Simulation()\n"
         "rollouts = Rollouts(numpy.ones((2, 1, 1)), numpy.ones(2, numpy.int64), ('path_mm',))"
     )
     (seen,) = run(cell)
     assert seen["text/plain"] == text
-    assert seen[kind].startswith("<table>") or b64decode(seen[kind]).startswith(b"\x89PNG")
+    assert seen[kind].startswith(("<table>", "<p>Sensor 2")) or b64decode(seen[kind]).startswith(b"\x89PNG")
 
 
 @pytest.mark.parametrize(
@@ -100,9 +103,15 @@ def test_a_terminal_has_the_address_once(words: list[str]) -> None:
     assert line.startswith("The desk: http://127.0.0.1:")
 
 
+def picture_of(thing: Any) -> tuple[bytes, dict[str, int]]:
+    """Return the picture that a notebook gets, and at which size it shows it."""
+    data, sizes = thing._repr_mimebundle_()
+    return b64decode(data["image/png"]), sizes["image/png"]
+
+
 def size_of(thing: Any) -> tuple[tuple[int, int], dict[str, int]]:
     """Return of a picture for notebooks how many pixels it has, and at which size it is shown."""
-    png, shown = thing._repr_png_()
+    png, shown = picture_of(thing)
     return Image.open(io.BytesIO(png)).size, shown
 
 
@@ -114,7 +123,7 @@ def test_pictures_are_sharp() -> None:
 def test_the_picture_of_an_arena_is_that_of_a_simulation_that_begins_there() -> None:
     arena = kiks.Arena.load("examples/arenas/pillars.toml")
     assert len(arena.bodies) == 2
-    assert arena._repr_png_() == kiks.Simulation(arena)._repr_png_()
+    assert picture_of(arena) == picture_of(kiks.Simulation(arena))
 
 
 def test_looking_at_a_picture_changes_nothing() -> None:
@@ -122,10 +131,34 @@ def test_looking_at_a_picture_changes_nothing() -> None:
     for sim in (looked_at, alone):
         sim.port(1).write(b"D,5,5\n")
         sim.run(0.123)
-    looked_at._repr_png_()
+    picture_of(looked_at)
     for sim in (looked_at, alone):
         sim.run(0.5)
     assert looked_at.state_hash() == alone.state_hash()
+
+
+def test_what_has_several_arenas_shows_them_side_by_side() -> None:
+    arenas = [kiks.Arena.box(300, 200), kiks.Arena.box(200, 300)]
+    assert size_of(kiks.Batch(arenas, 4)) == ((480 + 24 + 320, 480), {"width": 412, "height": 240})
+
+
+def test_an_evolution_shows_what_it_has_found() -> None:
+    evolution: Any = kiks.Evolution(kiks.tasks.avoid(seconds=1, worlds=3), "map-elites", seed=1, population=8)
+    archive: Any = evolution.archive
+    assert evolution._repr_mimebundle_() == archive._repr_mimebundle_() == ({}, {})
+    evolution.run(generations=2)
+    for thing in (evolution, archive):
+        (width, height), _ = size_of(thing)
+        assert width > height > 300
+    champion: Any = evolution.champion
+    assert "<tr><td>task</td><td>avoid</td></tr>" in champion._repr_mimebundle_()[0]["text/html"]
+    assert size_of(evolution.task)[1]["height"] == 240
+
+
+def test_the_result_of_an_exam_is_a_table_of_its_starts() -> None:
+    result: Any = ExamResult(np.array([True, False]), np.array([[31.0], [2.5]]), ("path_mm",), "drives")
+    assert repr(result) == "<Exam: not solved, 1 of 2 starts (drives)>"
+    assert "<th>start</th><th>solved</th><th>path_mm</th>" in result._repr_mimebundle_()[0]["text/html"]
 
 
 def test_what_is_short_says_what_it_is() -> None:
@@ -158,7 +191,7 @@ def test_a_long_table_shows_the_first_and_sums_up_all() -> None:
     assert lines[FIRST + 1] == "... 990 more"
     assert lines[-4].split() == ["mean", "499.50", "999.00", "142.86"]
     assert lines[-1].split() == ["max", "999", "1998", "285.57"]
-    html = shown._repr_html_()
+    html = shown._repr_mimebundle_()[0]["text/html"]  # type: ignore[attr-defined]
     assert html.count("<tr>") == len(lines)
     assert "&lt;path&gt;" in html
     assert "<path>" not in html

@@ -7,8 +7,11 @@ heavy libraries are loaded only where they are used.
 from __future__ import annotations
 
 import importlib
+from collections.abc import Callable
 from types import TracebackType
-from typing import Any, Protocol, Self
+from typing import Any, Protocol, Self, TypeVar
+
+Kind = TypeVar("Kind")
 
 
 class Hook:
@@ -30,6 +33,30 @@ class Hook:
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
         """Call the function."""
         return getattr(importlib.import_module(self._module), self._name)(*args, **kwargs)
+
+
+def shown_in_notebooks(module: str, name: str) -> Callable[[type[Kind]], type[Kind]]:
+    """Return a decorator of a class whose objects notebooks show as a picture or a table.
+
+    Args:
+        module: The module of a function that draws an object.
+        name: Its name. It returns what Jupyter calls a MIME bundle: data by their types, and sizes.
+
+    Example:
+        >>> @shown_in_notebooks("kiks.export.notebook", "arena")
+        ... class Room:
+        ...     pass
+        >>> hasattr(Room(), "_repr_mimebundle_")
+        True
+    """
+    draw = Hook(module, name)
+
+    def decorate(kind: type[Kind]) -> type[Kind]:
+        # Jupyter names types that it wants; it takes what it gets.
+        kind._repr_mimebundle_ = lambda self, include=None, exclude=None: draw(self)  # type: ignore[attr-defined]
+        return kind
+
+    return decorate
 
 
 class Recorder(Protocol):
@@ -62,9 +89,6 @@ load_arena_file = Hook("kiks.model.project", "load_arena_file")
 
 copy_simulation = Hook("kiks.sim.saved_state", "reduced")
 """Returns how `copy` and `pickle` make a simulation in the same state."""
-
-draw_for_notebook = Hook("kiks.export.notebook", "for_notebook")
-"""Draws an arena, a simulation, or the figures of a recording for a notebook."""
 
 show_in_browser = Hook("kiks.desk.server.show", "show")
 """Opens a simulation on a desk."""

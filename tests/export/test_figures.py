@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from base64 import b64decode
 from pathlib import Path
 
 import numpy as np
@@ -71,10 +72,9 @@ def test_a_run_is_plotted_while_it_is_recorded(tmp_path: Path) -> None:
 
 
 def test_a_notebook_shows_the_figures(recording: Recording) -> None:
-    shown = recording._repr_png_()
-    assert shown is not None
-    with Image.open(io.BytesIO(shown[0])) as picture:
-        assert picture.width > shown[1]["width"] > 400
+    data, sizes = recording._repr_mimebundle_()  # type: ignore[attr-defined]
+    with Image.open(io.BytesIO(b64decode(data["image/png"]))) as picture:
+        assert picture.width > sizes["image/png"]["width"] > 400
 
 
 def test_panels_are_the_rows_of_the_figure(recording: Recording) -> None:

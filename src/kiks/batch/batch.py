@@ -34,6 +34,7 @@ from kiks.model.array_checks import array_of, check_numbers
 from kiks.model.checks import SECONDS_MAX, check_count, check_kind, check_number
 from kiks.model.robot import RobotSpec
 from kiks.units import NS_PER_S, ns_from_s
+from kiks.upwards import shown_in_notebooks
 
 BLOCKS_PER_THREAD = 4
 """Blocks of worlds per thread: with several, no thread waits long for the slowest one."""
@@ -62,6 +63,7 @@ def _alone(method: Method) -> Method:
     return call  # type: ignore[return-value]
 
 
+@shown_in_notebooks("kiks.export.notebook", "arenas")
 class Batch:
     """Many worlds with the same number of robots, each with its own seed, start poses and kinds of robots.
 

@@ -121,12 +121,6 @@ class Picture:
         sheet = self._sheet(_LONGEST_SIDE, pen := _SvgPen())
         replace_file(path, _svg(sheet.image, pen.elements), "a picture")
 
-    def for_notebook(self) -> tuple[bytes, dict[str, int]]:
-        """Return it as a PNG, and at which size a notebook shows it: half, so it is sharp on any screen."""
-        image, pixels = self.image(), BytesIO()
-        image.save(pixels, "PNG")
-        return pixels.getvalue(), {"width": image.width // 2, "height": image.height // 2}
-
     def _sheet(self, longest_side: int, pen: _SvgPen | None = None) -> Sheet:
         """Return a sheet with all of it."""
         arena, count = self.arena, len(self.poses)

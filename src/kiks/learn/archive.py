@@ -21,6 +21,7 @@ from kiks.learn.evolution_log import Folder
 from kiks.learn.task import Axis
 from kiks.model.atomic_files import path_of
 from kiks.model.checks import check_number
+from kiks.upwards import shown_in_notebooks
 
 Floats = NDArray[np.float64]
 
@@ -53,6 +54,7 @@ class Elite:
         return self.values["fitness"]
 
 
+@shown_in_notebooks("kiks.learn.notebook", "archive")
 class Archive:
     """An archive: the best candidate of each cell.
 

@@ -28,6 +28,7 @@ from kiks.model.project import Project, ProjectRobot, Seed
 from kiks.model.robot import RobotSpec, robot_names, robot_toml, specs_of
 from kiks.sim.from_project import simulation_of
 from kiks.sim.simulation import Simulation
+from kiks.upwards import shown_in_notebooks
 from kiks.version import __version__
 
 FORMAT = 1
@@ -70,6 +71,7 @@ class _ChampionFile:
     code: Text = ""
 
 
+@shown_in_notebooks("kiks.learn.notebook", "champion")
 @record
 class Champion:
     """A controller with its parameters.

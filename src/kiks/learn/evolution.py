@@ -39,6 +39,7 @@ from kiks.learn.seeds import seed_for
 from kiks.learn.task import Task
 from kiks.model.array_checks import check_numbers
 from kiks.model.checks import check_count, check_kind, check_number
+from kiks.upwards import shown_in_notebooks
 from kiks.version import __version__
 
 LOG_EVERY_S = 10.0
@@ -54,6 +55,7 @@ TOURNAMENT_MAX = 100
 """Most champions of a side in the tournament of a run; of a longer evolution, champions at equal intervals."""
 
 
+@shown_in_notebooks("kiks.learn.notebook", "evolution")
 class Evolution:
     """An evolution.
 

@@ -17,6 +17,7 @@ from pydantic import Field
 
 from kiks.batch.batch import Batch
 from kiks.batch.initial_state import Arenas, Starts
+from kiks.batch.number_table import NumberTable
 from kiks.control.measure import Measure
 from kiks.errors import ParameterError, counted, shown
 from kiks.learn.champion import Champion
@@ -30,6 +31,7 @@ from kiks.model.family import family
 from kiks.model.project import Project, ProjectRobot
 from kiks.model.robot import RobotSpec, specs_of
 from kiks.sim.from_project import rounded_pose
+from kiks.upwards import shown_in_notebooks
 
 Solved = Callable[[Mapping[str, Floats]], NDArray[np.bool_]]
 
@@ -46,7 +48,8 @@ STARTS_MAX, MEASURES_MAX = 10_000, 100
 """Most starts and measures of an exam."""
 
 
-@dataclass(frozen=True)
+@shown_in_notebooks("kiks.export.notebook", "table")
+@dataclass(frozen=True, repr=False)
 class ExamResult:
     """How a champion did in an exam.
 
@@ -67,10 +70,18 @@ class ExamResult:
         """Whether enough starts were solved."""
         return bool(self.solved.sum() >= PASS_SHARE * len(self.solved))
 
+    def __repr__(self) -> str:
+        return f"<{self}>"
+
     def __str__(self) -> str:
         verdict = "solved" if self.is_passed else "not solved"
         goal = f" ({self.goal})" if self.goal else ""
         return f"Exam: {verdict}, {int(self.solved.sum())} of {len(self.solved)} starts{goal}"
+
+    def table(self) -> NumberTable:
+        """Return a table of all starts: whether each was solved, 1 or 0, and its measures."""
+        values = np.column_stack([self.solved, self.values])
+        return NumberTable({"start": len(self.solved)}, ("solved", *self.measures), values)
 
 
 @record

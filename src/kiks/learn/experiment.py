@@ -13,6 +13,7 @@ from kiks.control.measure import Measure
 from kiks.errors import ParameterError, shown
 from kiks.learn.evaluation import Floats
 from kiks.model.arena import Arena
+from kiks.upwards import shown_in_notebooks
 
 Fitness = Callable[[Mapping[str, Floats]], Floats]
 
@@ -20,6 +21,7 @@ CLEAR_MM = 8.0
 """Smallest gap between a random start and anything else [mm]."""
 
 
+@shown_in_notebooks("kiks.export.notebook", "arenas")
 class Experiment:
     """The common base of tasks and exams: robots drive in worlds, which arenas share evenly, and are measured."""
 

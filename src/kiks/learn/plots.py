@@ -32,6 +32,11 @@ def save_plot(evolution: Evolution, path: str | Path, baselines: Baselines | Non
         path: File of the picture.
         baselines: Its baselines, drawn as lines.
     """
+    save_figure(figure_of_evolution(evolution, baselines), path)
+
+
+def figure_of_evolution(evolution: Evolution, baselines: Baselines | None = None) -> Any:
+    """Return the figure of `save_plot`, a `matplotlib.figure.Figure`."""
     from matplotlib.figure import Figure
 
     sides, archives = evolution.task.sides, evolution.archives
@@ -42,7 +47,16 @@ def save_plot(evolution: Evolution, path: str | Path, baselines: Baselines | Non
         _draw_fitness(next(axes), evolution, side, baselines)
     for archive, champion in zip(archives, evolution.champions, strict=False):
         _draw_archive(figure, next(axes), archive, champion)
-    save_figure(figure, path)
+    return figure
+
+
+def figure_of_archive(archive: Archive) -> Any:
+    """Return a figure of an archive, a `matplotlib.figure.Figure`."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(6.4, 4.4), layout="constrained")
+    _draw_archive(figure, figure.subplots(), archive, archive.champion)
+    return figure
 
 
 def _draw_fitness(axes: Any, evolution: Evolution, side: int, baselines: Baselines | None) -> None:

@@ -43,6 +43,7 @@ MOSTLY_WALL = 0.6
 """Share of walls beyond which a picture has probably its colours the other way round."""
 
 
+@upwards.shown_in_notebooks("kiks.export.notebook", "arena")
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Arena:
     """A checked arena that never changes; `dataclasses.replace` makes a changed copy.
@@ -107,11 +108,6 @@ class Arena:
         counts = [(len(getattr(self, name)), label) for name, label, _ in _KINDS]
         held = "".join(f", {counted(count, label)}" for count, label in counts if count)
         return f"<Arena {shown(self.name)}: {self.width_mm:g} x {self.height_mm:g} mm{held}>"
-
-    def _repr_png_(self) -> tuple[bytes, dict[str, int]]:
-        """Return a picture, which notebooks show."""
-        picture: tuple[bytes, dict[str, int]] = upwards.draw_for_notebook(self)
-        return picture
 
     def __reduce__(self) -> tuple[Any, ...]:
         # Through the constructor: a plain pickle would bring the raster back writable and carry the caches along.

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+@upwards.shown_in_notebooks("kiks.export.notebook", "recording")
 class Recording:
     """A recorded run.
 
@@ -61,11 +62,6 @@ class Recording:
 
     def __repr__(self) -> str:
         return f"<{self._reader.what}: {counted(len(self.robots), 'robot')}, {self.duration_s:.3f} s>"
-
-    def _repr_png_(self) -> tuple[bytes, dict[str, int]] | None:
-        """Return its figures, which notebooks show; nothing without Matplotlib."""
-        picture: tuple[bytes, dict[str, int]] | None = upwards.draw_for_notebook(self)
-        return picture
 
     def __enter__(self) -> Recording:
         """Return itself."""

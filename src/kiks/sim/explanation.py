@@ -14,6 +14,7 @@ from kiks.engine.sensing.observe import NOTHING
 from kiks.model.checks import check_count
 from kiks.model.robot import SENSOR_COUNT
 from kiks.sim.world import World
+from kiks.upwards import shown_in_notebooks
 
 SENSOR_NAMES = ("left 90", "left 45", "left 10", "right 10", "right 45", "right 90", "back right", "back left")
 """What sensors are called, by their index in the answers to N and O (khepera-protocol.md 7.4)."""
@@ -49,6 +50,7 @@ class SeenRay:
     contribution_counts: float
 
 
+@shown_in_notebooks("kiks.export.notebook", "sentences")
 @dataclass(frozen=True)
 class Explanation:
     """Why command N returns a count for a sensor at this instant.
@@ -152,6 +154,7 @@ class SeenLamp:
     contribution_counts: float
 
 
+@shown_in_notebooks("kiks.export.notebook", "sentences")
 @dataclass(frozen=True)
 class LightExplanation:
     """Why command O returns a count for a sensor at this instant.

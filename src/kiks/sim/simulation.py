@@ -37,16 +37,17 @@ from kiks.upwards import (
     Recorder,
     View,
     copy_simulation,
-    draw_for_notebook,
     plot_simulation,
     record_simulation,
     show_in_browser,
+    shown_in_notebooks,
 )
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+@shown_in_notebooks("kiks.export.notebook", "simulation")
 class Simulation:
     r"""Robots in an arena, each at the end of a serial line.
 
@@ -148,11 +149,6 @@ class Simulation:
     def __reduce__(self) -> tuple[Any, ...]:
         parts: tuple[Any, ...] = copy_simulation(self)
         return parts
-
-    def _repr_png_(self) -> tuple[bytes, dict[str, int]]:
-        """Return a picture of it as it stands, which notebooks show."""
-        picture: tuple[bytes, dict[str, int]] = draw_for_notebook(self)
-        return picture
 
     @contextmanager
     def _up_to_date(self) -> Iterator[World]:
