@@ -83,7 +83,7 @@ wheel: setup
 	$(BIN)/python tools/compile_kernels.py build/kernels
 	KIKS_KERNELS=build/kernels $(BIN)/python -m pip wheel --quiet --no-deps --no-build-isolation --wheel-dir dist .
 
-# A package for Octave in `dist`: pkg install dist/kiks-*.tar.gz, then pkg load kiks.
+# A package for Octave in `dist`: pkg install dist/kiks-octave-*.tar.gz, then pkg load kiks.
 octave-package: setup
 	$(BIN)/python tools/octave_package.py dist
 

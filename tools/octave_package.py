@@ -1,7 +1,8 @@
-"""Build the Octave package: python tools/octave_package.py FOLDER makes FOLDER/kiks-VERSION.tar.gz for `pkg install`.
+"""Build the Octave package: python tools/octave_package.py FOLDER.
 
-Everything in it comes from elsewhere: the functions from matlab/, and the page from docs/howto/matlab.md, whose table
-gives the categories that `pkg describe -verbose kiks` lists. Licence and version are those of KiKS.
+The result, FOLDER/kiks-octave-VERSION.tar.gz, is for `pkg install`. Everything in it comes from elsewhere: the
+functions from matlab/, and the page from docs/howto/matlab.md, whose table gives the categories that
+`pkg describe -verbose kiks` lists. Licence and version are those of KiKS.
 """
 
 from __future__ import annotations
@@ -47,7 +48,7 @@ rmpath(fullfile(fileparts(mfilename('fullpath')), 'demos'));
 
 
 def version() -> str:
-    """Return the version in whole numbers, as `pkg` wants it: 3.0.0 for 3.0.0.dev0."""
+    """Return the version in whole numbers, as `pkg` wants it: 3.1.0 for 3.1.0.dev0."""
     found = re.match(r"\d+\.\d+\.\d+", __version__)
     assert found is not None
     return found[0]
@@ -84,7 +85,7 @@ def contents() -> dict[str, bytes]:
 
 def build(folder: Path) -> Path:
     """Write the package into a folder and return its file."""
-    name = f"kiks-{version()}"
+    name = f"kiks-octave-{version()}"
     folder.mkdir(parents=True, exist_ok=True)
     file = folder / f"{name}.tar.gz"
     with tarfile.open(file, "w:gz") as archive:

@@ -2,7 +2,7 @@
 
 import sys
 
-__version__ = "3.0.0.dev0"
+__version__ = "3.0.0"
 
 PYTHONS = (3, 11), (3, 15)
 """The oldest and the newest Python that Numba and KiKS know, as in `pyproject.toml`."""

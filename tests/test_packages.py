@@ -1,0 +1,83 @@
+"""What is published: an archive with all sources, a wheel with all its parts, and the same version everywhere."""
+
+from __future__ import annotations
+
+import email.message
+import email.parser
+import re
+import subprocess
+import sys
+import tarfile
+import zipfile
+from pathlib import Path
+
+import pytest
+import yaml
+
+import kiks
+
+pytestmark = pytest.mark.slow
+
+ROOT = Path(__file__).parents[1]
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with an archive of the sources and a wheel."""
+    folder = tmp_path_factory.mktemp("dist")
+    subprocess.run([sys.executable, "-m", "hatchling", "build", "-d", str(folder)], cwd=ROOT, check=True)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def metadata(built: Path) -> email.message.Message:
+    """Return what a package index reads."""
+    (wheel,) = built.glob("*.whl")
+    with zipfile.ZipFile(wheel) as archive:
+        (name,) = (name for name in archive.namelist() if name.endswith("/METADATA"))
+        return email.parser.Parser().parsestr(archive.read(name).decode())
+
+
+def tracked() -> set[str]:
+    """Return the files of the repository, with those that are new, but not those that git ignores."""
+    command = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
+    listed = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout.split("\0")
+    return {name for name in listed if (ROOT / name).is_file()}
+
+
+@pytest.mark.skipif(not (ROOT / ".git").exists(), reason="git knows the files of a clone only")
+def test_the_archive_of_the_sources_holds_all_of_them(built: Path) -> None:
+    (file,) = built.glob("*.tar.gz")
+    with tarfile.open(file) as archive:
+        inside = {name.partition("/")[2] for name in archive.getnames()}
+    assert inside == {"PKG-INFO"} | tracked()
+
+
+def test_a_wheel_holds_the_toolbox_and_the_examples(built: Path) -> None:
+    (wheel,) = built.glob("*-py3-none-any.whl")
+    with zipfile.ZipFile(wheel) as archive:
+        inside = set(archive.namelist())
+    for here, there in {"src/kiks": "kiks", "matlab": "kiks/matlab", "examples": "kiks/examples"}.items():
+        files = {path.relative_to(ROOT / here) for path in (ROOT / here).rglob("*") if path.is_file()}
+        wanted = {f"{there}/{path.as_posix()}" for path in files if path.suffix != ".pyc"}
+        assert wanted <= inside, sorted(wanted - inside)[:5]
+
+
+def test_the_readme_of_a_package_needs_no_files_beside_it(metadata: email.message.Message) -> None:
+    text = metadata.get_payload()
+    assert isinstance(text, str)
+    targets = re.findall(r"\]\(([^)]+)\)", text)
+    source = dict(line.split(", ") for line in metadata.get_all("Project-URL", []))["Source"]
+    assert len(targets) > 20
+    for target in targets:
+        base, _, path = target.partition(f"/v{kiks.__version__}/")
+        assert base in (f"{source}/blob", f"{source}/raw")
+        assert (ROOT / path.partition("#")[0]).exists()
+
+
+def test_all_places_have_the_same_version(metadata: email.message.Message) -> None:
+    assert metadata["Version"] == kiks.__version__
+    assert yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))["version"] == kiks.__version__
+    newest = re.search(r"^## (\S+)", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), re.MULTILINE)
+    assert newest
+    assert newest[1] == kiks.__version__
