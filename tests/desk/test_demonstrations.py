@@ -35,7 +35,7 @@ def test_a_demonstration_begins_with_its_program_and_supervisor_also_again_and_a
         await desk.replace(await desk.present_project())
         assert desk.sim.bodies()["x_mm"].tolist() == pytest.approx(places, abs=1e-3)
         assert desk.has_beginners
-        saved = await desk.project_to_save()
+        saved = await desk.project_to_save("mine")
         assert (saved.supervisor, saved.robots[0].program, len(saved.arena.cylinders)) == (None, None, 12)
 
     asyncio.run(do())

@@ -11,6 +11,7 @@ from tests.desk.visitor import NewPage, Visitor, make_project
 
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.show import Shown
+from kiks.model.project import Project
 from kiks.sim.from_project import simulation_of
 
 pytestmark = pytest.mark.slow
@@ -60,6 +61,40 @@ def test_program_is_written_saved_run_and_stopped(visitor: Visitor) -> None:
     visitor.tab("wire")
     visitor.send("H")
     expect(visitor.at("console-log")).to_contain_text("← h,")
+
+
+def test_a_program_that_ran_is_saved_with_the_project_and_shown_when_that_is_opened(visitor: Visitor) -> None:
+    visitor.tab("programs")
+    expect(visitor.at("name")).to_have_value("first_steps.py")  # an example
+    expect(visitor.at("attached")).to_contain_text("no program yet")
+    begin_program(visitor, "exercise1", FOR_EVER)
+    visitor.at("arguments").fill("--fast 'a b'")
+    visitor.at("run-program").click()
+    expect(visitor.at("attached")).to_contain_text("The project starts exercise1.py on robot 1.")
+    visitor.tab("arena")
+    visitor.at("save-name").fill("lesson")
+    visitor.at("save").click()
+    visitor.told("Saved as lesson.kiks")
+    saved = Project.load(visitor.desk.folder / "lesson.kiks")
+    assert (saved.arena.name, saved.robots[0].program, saved.robots[0].arguments) == (
+        "lesson",
+        "exercise1.py",
+        ("--fast", "a b"),
+    )
+
+    visitor.tab("programs")
+    visitor.at("leave-out").click()
+    expect(visitor.at("attached")).to_contain_text("no program yet")
+    visitor.at("new-program").click()
+    visitor.tab("arena")
+    visitor.choose("open-name", "lesson.kiks")
+    visitor.at("open").click()
+    visitor.told("Opened lesson")
+    visitor.tab("programs")
+    expect(visitor.at("editor")).to_contain_text("begun")
+    expect(visitor.at("name")).to_have_value("exercise1.py")
+    expect(visitor.at("arguments")).to_have_value("--fast 'a b'")
+    expect(visitor.at("programs")).to_contain_text("exercise1.py on robot 1: running")
 
 
 def test_mistake_is_shown_by_its_line_before_anything_runs(visitor: Visitor) -> None:

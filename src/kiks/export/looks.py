@@ -17,7 +17,7 @@ from kiks.model.robot import Body
 Colour = tuple[int, ...]
 """Red, green, blue, and perhaps opacity, 0 to 255."""
 
-BALL_COLOUR, CYLINDER_COLOUR = (245, 130, 40), (176, 122, 70)
+BALL_COLOUR, CYLINDER_COLOUR, LAMPLIGHT = (245, 130, 40), (176, 122, 70), (255, 205, 40)
 
 STRIPES_MM, RIM_MM = 3.0, 2.2
 """Width of the stripes around a robot, and of the ring in its colour [mm]."""

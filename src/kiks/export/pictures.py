@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from kiks.engine.state import BALL, BODY, CYLINDER
 from kiks.export.looks import Colour, body_colour, robot_colour
-from kiks.export.sheet import FINER, Place, Sheet, path_colour, path_mm, wall_picture
+from kiks.export.sheet import FINER, Place, Sheet, ground_picture, path_colour, path_mm
 from kiks.model.arena import Arena, Ball
 from kiks.model.atomic_files import ending_of, replace_file
 from kiks.model.robot import Body, RobotSpec
@@ -60,6 +60,7 @@ class Picture:
         poses: Of the robots: x_mm, y_mm, heading_rad, float64 [robot, 3].
         robots: The robots' shapes.
         trails: The paths that are drawn, with faint rings where they begin; None for none.
+        spec: The robot for whose sensors the light of lamps is drawn; a Khepera if None.
 
     Example:
         >>> Picture.of_simulation(Simulation(Arena.box(300, 200))).image().size
@@ -72,11 +73,14 @@ class Picture:
     poses: NDArray[np.float64]
     robots: Sequence[Body]
     trails: Trails | None = None
+    spec: RobotSpec | None = None
 
     @classmethod
     def of_simulation(cls, sim: Simulation) -> Picture:
         """Return the picture of a simulation as it stands."""
-        return cls(sim.arena, sim.world.lamps, sim.bodies(), sim.poses(), [spec.body for spec in sim.specs])
+        robots = [spec.body for spec in sim.specs]
+        spec = next(iter(sim.specs), None)
+        return cls(sim.arena, sim.world.lamps, sim.bodies(), sim.poses(), robots, spec=spec)
 
     @classmethod
     def of_arena(cls, arena: Arena) -> Picture:
@@ -103,7 +107,9 @@ class Picture:
             for number, x_mm, y_mm in moment.bodies[["number", "x_mm", "y_mm"]].tolist():
                 places.setdefault(number, []).append((x_mm, y_mm))
         robots = [spec.body for spec in moment.saved.specs]
-        return cls(moment.saved.arena, moment.saved.lamps, moment.bodies, moment.poses, robots, Trails(paths, places))
+        saved, trails = moment.saved, Trails(paths, places)
+        spec = next(iter(saved.specs), None)
+        return cls(saved.arena, saved.lamps, moment.bodies, moment.poses, robots, trails, spec)
 
     def image(self, *, longest_side: int = _LONGEST_SIDE) -> Image:
         """Return it in pixels, of which a side has at most so many."""
@@ -126,9 +132,9 @@ class Picture:
         arena, count = self.arena, len(self.poses)
         scale = FINER * min(longest_side / max(arena.width_mm, arena.height_mm), 2.0)
         size = (max(round(arena.width_mm * scale), FINER), max(round(arena.height_mm * scale), FINER))
-        sheet = Sheet(wall_picture(arena, size), scale, 0.0, arena.height_mm, pen)
-        for x_mm, y_mm, power_w, is_on in self.lamps.tolist():
-            sheet.lamp((x_mm, y_mm), power_w, is_on=bool(is_on))
+        sheet = Sheet(ground_picture(arena, self.lamps, self.spec, size), scale, 0.0, arena.height_mm, pen)
+        for x_mm, y_mm, _, is_on in self.lamps.tolist():
+            sheet.lamp((x_mm, y_mm), is_on=bool(is_on))
         if self.trails is not None:
             for index, (robot, path) in enumerate(zip(self.robots, self.trails.robots, strict=False)):
                 colours = (path_colour(index, count, k / max(len(path) - 1, 1)) for k in range(len(path)))

@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.engine.state import BALL
-from kiks.export.looks import Colour, body_colour, robot_colour, robot_shapes
+from kiks.export.light import light_map
+from kiks.export.looks import LAMPLIGHT, Colour, body_colour, robot_colour, robot_shapes
 from kiks.model.arena import Arena
-from kiks.model.robot import Body
+from kiks.model.robot import Body, RobotSpec
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -26,7 +27,10 @@ FINER = 2
 """A sheet is drawn that much larger and shrunk, which smooths the lines."""
 
 LAMP_MM = 18.0
-"""How far a lamp reaches without its light [mm]."""
+"""How far the drawing of a lamp reaches [mm]."""
+
+LIGHT_SHARE = 0.85
+"""Opacity of the strongest light on the floor."""
 
 NAME_SHARE = 0.42
 """Radius of the disc with a robot's number, as a share of the robot's."""
@@ -34,7 +38,6 @@ NAME_SHARE = 0.42
 FLOOR, INK, WHITE = (246, 243, 236), (30, 34, 40), (255, 255, 255)
 
 _PATH_BEGIN, _PATH_END = (66, 135, 245), (220, 60, 60)
-_LIGHT = (255, 205, 40)
 _LAMP_OFF = (165, 160, 150)
 
 
@@ -57,23 +60,32 @@ def path_mm(robot_count: int) -> float:
     return 1.2 if robot_count == 1 else 1.6
 
 
-def lamp_reach_mm(power_w: float) -> float:
-    """Return how far the light of a lamp is drawn [mm]: a sensor that looks at it would read half of darkness there."""
-    return 90.0 * math.sqrt(power_w)
-
-
 def wall_grey(brightness: Any) -> Any:
     """Return the grey of walls of a brightness: darker than they are, or a white wall would look like floor."""
     return 40 + brightness * 150 // 255
 
 
-def wall_picture(arena: Arena, size: tuple[int, int]) -> Image:
-    """Return a picture of the floor and the walls of an arena, of a size in pixels."""
+def ground_picture(arena: Arena, lamps: NDArray[np.float64], spec: RobotSpec | None, size: tuple[int, int]) -> Image:
+    """Return a picture of the floor with the light of lamps, and the walls of an arena.
+
+    Args:
+        arena: The arena.
+        lamps: x_mm, y_mm, power_w, and 1 for on or 0 for off, float64 [lamp, 4].
+        spec: The robot for whose sensors the light is drawn; a Khepera if None.
+        size: Its size in pixels.
+    """
     from PIL import Image
 
     cells = np.flipud(arena.brightness)
     shade = wall_grey(cells.astype(np.uint16)).astype(np.uint8)
-    colours = np.where((cells == 0)[..., None], np.array(FLOOR, np.uint8), shade[..., None])
+    floor: Any = np.array(FLOOR, np.uint8)
+    if (light := light_map(arena, lamps, spec or RobotSpec.load("khepera"))) is not None:
+        opacity = Image.fromarray((255 * LIGHT_SHARE * light).astype(np.uint8)).resize(
+            (cells.shape[1], cells.shape[0]), Image.Resampling.BILINEAR
+        )
+        floor = Image.new("RGB", opacity.size, FLOOR)
+        floor.paste(LAMPLIGHT, mask=opacity)
+    colours = np.where((cells == 0)[..., None], np.asarray(floor), shade[..., None])
     return Image.fromarray(colours.astype(np.uint8), "RGB").resize(size, Image.Resampling.LANCZOS)
 
 
@@ -143,14 +155,9 @@ class Sheet:
             self.pen.line(points[first : last + 1], fill=colour, width=self.pixels(width_mm))
             first = last
 
-    def lamp(self, place: Place, power_w: float, *, is_on: bool) -> None:
-        """Draw a lamp and its light."""
-        if is_on:
-            reach_mm = lamp_reach_mm(power_w)
-            rings = 24
-            for k in range(rings):
-                self.disc(place, reach_mm * (1 - k / rings), (*_LIGHT, 7))
-        colour = _LIGHT if is_on else _LAMP_OFF
+    def lamp(self, place: Place, *, is_on: bool) -> None:
+        """Draw a lamp; its light is on the ground."""
+        colour = LAMPLIGHT if is_on else _LAMP_OFF
         for k in range(8):
             turn = k * math.pi / 4
             ends = [(place[0] + r * math.cos(turn), place[1] + r * math.sin(turn)) for r in (11.0, LAMP_MM)]

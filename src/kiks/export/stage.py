@@ -22,11 +22,10 @@ from kiks.export.sheet import (
     LAMP_MM,
     Place,
     Sheet,
-    lamp_reach_mm,
+    ground_picture,
     mixed,
     path_colour,
     path_mm,
-    wall_picture,
 )
 from kiks.model.arena import Arena
 from kiks.recording.moments import LEAP_MM, Moment
@@ -108,7 +107,7 @@ class Ground:
             self._leave_trails(moment, share)
 
     def _draw_still(self, moment: Moment, scale: float) -> None:
-        """Draw walls and lamps; trails stay where they are."""
+        """Draw walls, light and lamps; trails stay where they are."""
         arena = moment.saved.arena
         size = max(round(arena.width_mm * scale), 1), max(round(arena.height_mm * scale), 1)
         if size[0] * size[1] > BASE_PIXELS_MAX:
@@ -116,17 +115,17 @@ class Ground:
                 f"the whole arena must have at most {BASE_PIXELS_MAX} pixels, but it would have {size[0]} x {size[1]}. "
                 "Zoom less, or make the film smaller."
             )
-        clean = Canvas(np.array(wall_picture(arena, size)), scale, 0.0, arena.height_mm)
-        for x_mm, y_mm, power_w, is_on in moment.saved.lamps.tolist():
-            place, reach_mm = (x_mm, y_mm), max(lamp_reach_mm(power_w) if is_on else 0.0, LAMP_MM)
-            with clean.patch([place], reach_mm) as sheet:
-                sheet.lamp(place, power_w, is_on=bool(is_on))
+        lamps, spec = moment.saved.lamps, next(iter(moment.saved.specs), None)
+        clean = Canvas(np.array(ground_picture(arena, lamps, spec, size)), scale, 0.0, arena.height_mm)
+        for x_mm, y_mm, _, is_on in lamps.tolist():
+            with clean.patch([(x_mm, y_mm)], LAMP_MM) as sheet:
+                sheet.lamp((x_mm, y_mm), is_on=bool(is_on))
         pixels = clean.pixels.copy()
         if self.arena is not None and self._clean.shape == pixels.shape:
             is_trail = (self.canvas.pixels != self._clean).any(axis=-1)
             pixels[is_trail] = self.canvas.pixels[is_trail]
         self.canvas, self._clean = Canvas(pixels, scale, 0.0, arena.height_mm), clean.pixels
-        self.arena, self._lamps = arena, moment.saved.lamps.tobytes()
+        self.arena, self._lamps = arena, lamps.tobytes()
 
     def _leave_trails(self, moment: Moment, share: float) -> None:
         """Let trails grow to where robots, balls and cylinders are."""

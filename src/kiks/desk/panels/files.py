@@ -104,8 +104,8 @@ class FilesPanel:
         ui.notify(f"Opened {project.arena.name}.")
 
     async def _encoded(self, name: str) -> bytes:
-        project = await self._desk.project_to_save()
-        return await asyncio.to_thread(encode, project, self._folder.full_name(name))
+        full = self._folder.full_name(name)
+        return await asyncio.to_thread(encode, await self._desk.project_to_save(PurePosixPath(full).stem), full)
 
     @told
     async def _save(self) -> None:

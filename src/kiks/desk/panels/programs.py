@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import shlex
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -56,6 +58,7 @@ class ProgramsPanel(Panel):
         super().__init__(desk, REFRESH_S)
         self._folder = scripts.ProgramFolder(desk.folder)
         self._drawn: object = None
+        self._world: object = None
         self._shown: Handle | None = None
         self._script: Path | None = None
         self._text: str | None = NEW  # as it was read or saved last; None with a draft
@@ -67,6 +70,7 @@ class ProgramsPanel(Panel):
             else:
                 named(ui.label(MAY_NOT if desk.owns_world else NOT_OWN).classes("text-body2"), "may-not")
             self._list = named(ui.column().classes("w-full gap-1"), "programs")
+            self._attached = named(ui.column().classes("w-full gap-0"), "attached")
             with ui.expansion("Output", value=True).classes("w-full").props("dense"):
                 label = "What the program has printed"
                 self._log = LogBox("12rem", "output", label, rows_max=SHOWN_LINES, new_max=NEWEST_LINES)
@@ -80,14 +84,21 @@ class ProgramsPanel(Panel):
         handles = list(desk.programs.handles)
         if self._shown not in handles:
             self._show(handles[-1] if handles else None)
-        drawn = [(handle, handle.state, handle is self._shown) for handle in handles]
+        attached = {robot: command for robot in range(1, desk.sim.robot_count + 1) if (command := desk.attached(robot))}
+        drawn = [(handle, handle.state, handle is self._shown) for handle in handles], attached, desk.names()
         if drawn != self._drawn:
             self._drawn = drawn
             self._list.clear()
             with self._list:
                 self._draw_list(handles)
+            self._attached.clear()
+            with self._attached:
+                self._draw_attached(attached)
         if desk.may_run_programs:
             offer_robots(self._robot, desk)
+            if self._world is not desk.present:
+                self._choose_attached(attached, is_first=self._world is None)
+                self._world = desk.present
         if self._shown is not None and self._shown.output is not None:
             self._log.add(self._shown.output, lambda line: (line.text, "program-error" if line.is_error else ""))
 
@@ -118,6 +129,33 @@ class ProgramsPanel(Panel):
             again = self.acting(lambda: self._start(handle.command, handle.robot))
             tip = "Start this program again, with the same arguments"
             icon_button("replay", f"Start again: {program}", "start-again", again, tip=tip)
+
+    def _draw_attached(self, attached: dict[int, Command]) -> None:
+        """Say which programs belong to the project, each with the button that takes it out."""
+        if not attached and self._desk.may_run_programs:
+            ui.label("The project has no program yet. Run one of yours, and it is saved with the project.")
+        for robot, command in attached.items():
+            with ui.row().classes("w-full items-center no-wrap gap-1"):
+                name = self._desk.names()[robot - 1]
+                ui.label(f"The project starts {command.name} on robot {name}.").classes("col")
+                if self._desk.may_run_programs:
+                    leave = self.acting(partial(self._leave, robot))
+                    tip = "Save the project without this program; if it runs, it goes on"
+                    icon_button("link_off", f"Leave out: {command.name}", "leave-out", leave, tip=tip)
+
+    async def _leave(self, robot: int) -> None:
+        self._desk.attach(None, robot)
+
+    def _choose_attached(self, attached: dict[int, Command], *, is_first: bool) -> None:
+        """Show the program of the project that has been opened; an example at first, if it has none."""
+        self._offer()
+        for robot, command in attached.items():
+            if (program := command.program.resolve()) in self._choice.options:
+                self._choice.value, self._robot.value = program, robot
+                self._arguments.value = shlex.join(command.arguments)
+                return
+        if is_first:
+            self._choice.value = EXAMPLES / "first_steps.py"
 
     def _choose(self, handle: Handle) -> None:
         self._show(handle)
@@ -163,7 +201,6 @@ class ProgramsPanel(Panel):
             save = named(ui.button("Save", on_click=self._save), "save-program").props("flat no-caps")
             save.tooltip("Save the program in the desk's folder")
         self._offer()
-        self._choice.value = EXAMPLES / "first_steps.py"
         ui.timer(0, self._dress_editor, once=True)
         ui.on("desk-dark", lambda event: self._set_theme(bool(event.args)))
 
@@ -263,5 +300,6 @@ class ProgramsPanel(Panel):
                 while handle.is_running:
                     await asyncio.sleep(POLL_S)
         self._show(await desk.change(lambda _: programs.start(command, robot)))
+        desk.attach(command, robot)
         if desk.is_paused:
             ui.notify("Time is paused. Press space to run it; then the program continues.")

@@ -18,8 +18,9 @@ from kiks.desk.server.player import Player
 from kiks.desk.server.scripts import EXAMPLES
 from kiks.errors import KiksError, LinkError, ParameterError
 from kiks.model.arena import Arena
+from kiks.model.atomic_files import program_in
 from kiks.model.checks import CLOCK_END_NS
-from kiks.model.project import Project
+from kiks.model.project import Project, ProjectRobot
 from kiks.ports.program_process import Command, Permission, commands_of, supervisor_of
 from kiks.ports.programs import Programs
 from kiks.sim.from_project import described, project_of, simulation_of
@@ -338,13 +339,38 @@ class Desk:
         world, project = world or self.shown, self.project
         return replace(await world.do(lambda sim: project_of(sim, project)), speed=self.present.gate.speed)
 
-    async def project_to_save(self) -> Project:
-        """Return the present project for a file in the desk's folder, without programs that lie elsewhere."""
+    async def project_to_save(self, name: str) -> Project:
+        """Return the present project for a file in the desk's folder, without programs that lie elsewhere.
+
+        Args:
+            name: Name of the file without its ending, which becomes that of the arena.
+        """
         project = await self.present_project()
-        if self._home == self.folder:
-            return project
-        robots = tuple(replace(each, program=None, arguments=()) for each in project.robots)
-        return replace(project, robots=robots, supervisor=None)
+        if self._home != self.folder:
+            robots = tuple(replace(each, program=None, arguments=()) for each in project.robots)
+            project = replace(project, robots=robots, supervisor=None)
+        robots = tuple(
+            _with_program(each, self.attached(number), self.folder) for number, each in enumerate(project.robots, 1)
+        )
+        return replace(project, arena=replace(project.arena, name=name), robots=robots)
+
+    # ---- programs of the project ----
+
+    def attached(self, robot: int) -> Command | None:
+        """Return the program that starts with the world, and is saved with it, on a robot."""
+        return self._commands[robot - 1] if robot <= len(self._commands) else None
+
+    def attach(self, command: Command | None, robot: int) -> None:
+        """Let a program of the desk's folder start with this world from now on, and be saved with it; None for none."""
+        if command is not None and _name_in(self.folder, command) is None:
+            return
+        self._commands += [None] * (robot - len(self._commands))
+        self._commands[robot - 1] = command
+        robots = list(self.project.robots)
+        if robot <= len(robots):
+            without = replace(robots[robot - 1], program=None, arguments=())
+            robots[robot - 1] = _with_program(without, command, self._home)
+            self.project = replace(self.project, robots=tuple(robots))
 
     # ---- time ----
 
@@ -483,3 +509,23 @@ class NewsHandler(logging.Handler):
 
 def _command_of(supervisor: Path | None) -> Command | None:
     return None if supervisor is None else Command(supervisor)
+
+
+def _name_in(folder: Path, command: Command) -> str | None:
+    """Return the name of a program's file in a folder or below it, as a project names it; None if it lies elsewhere."""
+    program, home = command.program.resolve(), folder.resolve()
+    if command.module or not program.is_relative_to(home):
+        return None
+    try:
+        program_in(home, name := program.relative_to(home).as_posix())
+        return name
+    except ParameterError:
+        return None
+
+
+def _with_program(robot: ProjectRobot, command: Command | None, folder: Path) -> ProjectRobot:
+    """Return a robot of a project in a folder with its program, if that lies there; else as it is."""
+    name = None if command is None else _name_in(folder, command)
+    if command is None or name is None:
+        return robot
+    return replace(robot, program=name, arguments=tuple(command.arguments))

@@ -21,12 +21,12 @@ export class Floor {
     this._light_key = "";
   }
 
-  /** Take the places of lamps; return whether the light has changed. */
-  setLamps(lamps, isDark) {
+  /** Take the lamps, and how strong their light is; return whether the light has changed. */
+  setLamps(lamps, scale, isDark) {
     const key = isDark + lamps.map((lamp) => `${lamp.x_mm},${lamp.y_mm},${lamp.power_w},${lamp.isOn}`).join(";");
-    if (!this.raster || key === this._light_key) return false;
+    if (!this.raster || !scale || key === this._light_key) return false;
     this._light_key = key;
-    this._light = lightMap(this.raster, lamps, LAMPLIGHT, isDark ? 0.62 : 0.85);
+    this._light = lightMap(this.raster, lamps, scale, LAMPLIGHT, isDark ? 0.62 : 0.85);
     return true;
   }
 

@@ -1,34 +1,38 @@
 /* The light of all lamps on the floor, with the shadows of walls: a small picture that is stretched over the arena.
 
    Method: for each lamp, rays in all directions find the range of its light; a cell is lit if it is nearer than that.
-   It is a soft and coarse picture for people; the engine computes what sensors measure. */
+   How strong the light is there, the scene says in a table (`export/light.py`, which draws the same for pictures). */
 
 const LONGEST_SIDE = 240;
 const DIRECTIONS = 720;
-/** Lamps hang above the floor, so that the light below them stays finite [mm]. */
-const HEIGHT_MM = 60;
-/** The light that shows at two thirds of its full strength [W/mm^2]. */
-const BRIGHT = 1 / (220 * 220);
+const NEAREST_MM = 1;
 
 /** Return a canvas of the raster's proportions, or null when no lamp is on. Row 0 is on top. */
-export function lightMap(raster, lamps, rgb, strongest) {
+export function lightMap(raster, lamps, scale, rgb, strongest) {
   const lit = lamps.filter((lamp) => lamp.isOn && lamp.power_w > 0);
   if (!lit.length) return null;
   const cell_mm = Math.max(raster.width_mm, raster.height_mm) / LONGEST_SIDE;
   const columns = Math.max(1, Math.round(raster.width_mm / cell_mm));
   const rows = Math.max(1, Math.round(raster.height_mm / cell_mm));
-  const light = new Float32Array(columns * rows);
+  const light = new Float32Array(columns * rows).fill(scale.background_flux);
   for (const lamp of lit) shine(lamp, raster, light, columns, rows, cell_mm);
-  const soft = blurred(light, columns, rows), canvas = document.createElement("canvas");
+  const soft = blurred(light.map((flux) => strengthOf(flux, scale)), columns, rows), canvas = document.createElement("canvas");
   canvas.width = columns;
   canvas.height = rows;
   const context = canvas.getContext("2d"), picture = context.createImageData(columns, rows);
   for (let k = 0; k < light.length; k++) {
     picture.data.set(rgb, 4 * k);
-    picture.data[4 * k + 3] = 255 * strongest * (1 - Math.exp(-Math.sqrt(soft[k] / BRIGHT)));
+    picture.data[4 * k + 3] = 255 * strongest * soft[k];
   }
   context.putImageData(picture, 0, 0);
   return canvas;
+}
+
+/** Return how strong the light is where sensors get a flux [W/mm^2], between two entries of the table. */
+function strengthOf(flux, { step_mm, strengths }) {
+  const place = 1 / Math.sqrt(flux) / step_mm, before = Math.floor(place);
+  if (!(before + 1 < strengths.length)) return 0;
+  return strengths[before] + (place - before) * (strengths[before + 1] - strengths[before]);
 }
 
 /** Return the mean of each cell and its neighbours, for shadows with soft edges. */
@@ -56,7 +60,7 @@ function shine(lamp, raster, light, columns, rows, cell_mm) {
       const share = turn - before;
       const isSeen = (direction) => reach[direction % DIRECTIONS] >= square;
       const seen = (isSeen(before) ? 1 - share : 0) + (isSeen(before + 1) ? share : 0);
-      light[row * columns + column] += (seen * lamp.power_w) / (square + HEIGHT_MM * HEIGHT_MM);
+      light[row * columns + column] += (seen * lamp.power_w) / Math.max(square, NEAREST_MM * NEAREST_MM);
     }
   }
 }

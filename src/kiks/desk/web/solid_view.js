@@ -186,7 +186,7 @@ export class SolidView {
   _paintFloor(frame) {
     if (!this._floor.raster) return;
     const lamps = this.show.light ? Array.from({ length: frame.lamp_count }, (_, index) => frame.lamp(index)) : [];
-    const isLit = this._floor.setLamps(lamps, this._isDark);
+    const isLit = this._floor.setLamps(lamps, this.feed.scene.light, this._isDark);
     const isFromTop = Boolean(this.feed.scene.has_old_coordinates);
     const key = `${this.show.grid} ${this.show.light} ${this._isDark} ${isFromTop}`;
     if (!isLit && key === this._floor_key) return;
