@@ -33,6 +33,7 @@ STREAM_REFEREE = 101
 def supervise(sim: Simulation) -> Iterator[float]:
     """Watch the match, print the goals, and at the end the score."""
     score, drop_count = {"left": 0, "right": 0}, 0
+    show(sim, score)
     rest, rest_s = drop(sim), 0.0
     try:
         while True:
@@ -43,6 +44,7 @@ def supervise(sim: Simulation) -> Iterator[float]:
             if goal:
                 side = "left" if goal == 1 else "right"
                 score[side] += 1
+                show(sim, score)
                 print(f"{sim.time_s:6.1f} s   {score['left']}:{score['right']}   {side}")
                 rest, rest_s = drop(sim), sim.time_s
             elif math.dist(place, rest) > STILL_MM:
@@ -52,6 +54,12 @@ def supervise(sim: Simulation) -> Iterator[float]:
                 rest, rest_s = drop(sim), sim.time_s
     finally:
         print(f"left {score['left']}, right {score['right']}, {drop_count} dropped balls")
+
+
+def show(sim: Simulation, score: dict[str, int]) -> None:
+    """Show the score on the desk: robot 1 plays on the left."""
+    for robot, goals in enumerate(score.values(), 1):
+        sim.set_score(robot, goals)
 
 
 def drop(sim: Simulation) -> tuple[float, float]:

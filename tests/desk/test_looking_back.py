@@ -18,13 +18,14 @@ from kiks.desk.server.desk import Desk
 from kiks.desk.server.marks import Mark, next_mark
 from kiks.desk.server.show import Driver
 from kiks.errors import LinkError, ParameterError
+from kiks.export.film import save_film
 from kiks.model.project import Project
 from kiks.ports.program_process import Command
 from kiks.recording.mcap_file import McapReader, Room
 from kiks.recording.replay import check_recording
 from kiks.recording.ring import Ring
 from kiks.sim.from_project import simulation_of
-from kiks.units import NS_PER_S
+from kiks.units import NS_PER_S, s_from_ns
 
 ROUND = """
 import sys, serial
@@ -428,6 +429,55 @@ def test_from_a_time_of_a_recording_a_person_goes_on(tmp_path: Path) -> None:
         run(desk.go_on_from_here())
         assert state_of(desk) == list(hashes.items())[10]
         assert desk.looking.span == (0, list(hashes)[10])
+
+
+@pytest.mark.parametrize(("at_s", "begin_s"), [(0.0, 0.0), (0.5, 0.0), (2.0, 0.0), (3.7, 0.0), (3.7, 3.7)])
+def test_a_branch_is_filmed_from_where_it_can_be(
+    at_s: float, begin_s: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("kiks.recording.recorder.CHUNK_S", 0.0)  # a chunk begins before its first entry
+    if begin_s:
+        monkeypatch.setattr("kiks.recording.ring.COPY_BYTES_MAX", 1)
+    with desk_of(make_sim(), owns_world=True) as desk:
+        desk.sim.run(4.2)
+        run(desk.looking.look_at(round(at_s * NS_PER_S)))
+        run(desk.go_on_from_here())
+        desk.sim.loop.gate = None
+        drive(desk.sim, 2.0)
+        recording = run(desk.looking.recording())
+        assert recording.log.begin_ns == begin_s * NS_PER_S
+        picture_count = save_film(recording, tmp_path / "branch.webp", size=(160, 120), fps=5)
+        assert picture_count == int((s_from_ns(desk.sim.now_ns) - begin_s) * 5) + 1
+
+
+def test_bookmarks_are_set_in_the_present_and_in_the_past_and_kept(tmp_path: Path) -> None:
+    sim = make_sim()
+    with sim.record(tmp_path / "run.mcap"), desk_of(sim, owns_world=True) as desk:
+        sim.run(2.5)
+        run(desk.looking.bookmark(sim.now_ns, "late"))
+        sim.run(0.1)
+        run(desk.looking.look_at(NS_PER_S))
+        run(desk.looking.bookmark(NS_PER_S, "early"))
+        run(desk.looking.bookmark(NS_PER_S, "early, too"))
+        bookmarks = [(1.0, "early"), (1.0, "early, too"), (2.5, "late")]
+        assert [(mark.time_s, mark.text) for mark in desk.looking.marks if mark.kind == "bookmark"] == bookmarks
+        run(desk.looking.look_at(2 * NS_PER_S))
+        run(desk.go_on_from_here())
+        run(desk.looking.tend())
+        assert [mark.text for mark in desk.looking.marks if mark.kind == "bookmark"] == ["early", "early, too"]
+    events = Recording(tmp_path / "run.mcap").table("events")
+    assert sorted(events[events["kind"] == "bookmark"]["text"].tolist()) == ["early", "early, too", "late"]
+
+
+def test_bookmarks_of_a_finished_recording_go_on_with_a_branch(tmp_path: Path) -> None:
+    hashes = recorded(tmp_path / "run.mcap")
+    with replaying(tmp_path / "run.mcap", list(hashes)[30]) as desk:
+        time_ns = desk.sim.now_ns
+        run(desk.looking.bookmark(time_ns, "here"))
+        assert any(mark.text == "here" for mark in desk.looking.marks)
+        run(desk.go_on_from_here())
+        run(desk.looking.tend())
+        assert [mark.time_s for mark in desk.looking.marks if mark.text == "here"] == [s_from_ns(time_ns)]
 
 
 def test_another_world_has_another_past(tmp_path: Path) -> None:

@@ -31,6 +31,8 @@ def played(tmp_path: Path) -> Iterator[Shown]:
         recorder.mark("look here")
         drive(sim, 0.5)
         recorder.say(1, "I have seen it")
+        sim.set_score(1, 2)
+        sim.set_score(2, 1)
         drive(sim, 0.5)
         sim.place(1, 100, 200, 3.1)
         Khepera(sim.port(1)).set_speed(15, 15)
@@ -75,6 +77,7 @@ def test_a_recording_is_played_stepped_and_jumped_through(replay: Visitor) -> No
     drag_to(visitor, 0.5)
     at_time(visitor, 2.0, 0.05)
     visitor.picture("replay")
+    expect(visitor.at("board-match")).to_have_text("2 : 1")
     page, begin_s = visitor.page, visitor.sim.time_s
     for press, by_s in (("on-short", 0.1), ("on-long", 1.0), ("back-long", -1.0), ("back-short", -0.1)):
         visitor.at(press).click()
@@ -90,26 +93,40 @@ def test_a_recording_is_played_stepped_and_jumped_through(replay: Visitor) -> No
         at_time(visitor, time_s)
     expect(visitor.at("time-slider")).to_have_attribute("aria-valuetext", "0:04.00 of 0:04.00")
     marks = visitor.desk.looking.marks
-    assert {mark.kind for mark in marks} == {"contact", "bookmark", "output", "change"}
+    assert {mark.kind for mark in marks} == {"contact", "bookmark", "output", "change", "score"}
     expect(page.locator(".kiks-bar-mark")).to_have_count(len(marks))
-    for mark in reversed(marks):
+    times = sorted({mark.time_s for mark in marks})
+    for time_s in reversed(times):
         visitor.at("event-before").click()
-        at_time(visitor, mark.time_s)
+        at_time(visitor, time_s)
+    expect(visitor.at("board")).to_be_hidden()  # there was no score yet
     visitor.at("event-before").click()
     visitor.told("Nothing happened before this.")
     page.keyboard.press("o")
-    at_time(visitor, marks[1].time_s)
+    at_time(visitor, times[1])
     expect(visitor.at("bar-event")).to_contain_text(marks[1].text)
     box = page.locator(".kiks-bar-bookmark").bounding_box()
     assert box is not None
     page.mouse.move(box["x"] + box["width"] / 2, box["y"] + 10)
     expect(visitor.at("bar-tip")).to_contain_text("look here")
+    page.keyboard.press("b")
+    visitor.at("bookmark-note").fill("and here")
+    page.keyboard.press("Enter")
+    expect(visitor.at("bar-event")).to_contain_text("and here")
+    expect(page.locator(".kiks-bar-bookmark")).to_have_count(2)
     visitor.choose("speed", "10 x")
     visitor.at("play").click()
     visitor.until(lambda: visitor.sim.time_s == 4.0 and visitor.desk.is_paused)
     expect(visitor.at("bar-now")).to_have_text("0:04.00")
     visitor.page.mouse.move(5, 300)
     visitor.drag_refused()
+    visitor.at("hall").click()
+    expect(visitor.at("board-clock")).to_contain_text("0:04.0")
+    expect(visitor.at("board")).to_contain_text("robot 1")
+    expect(visitor.at("run")).to_be_hidden()
+    visitor.picture("hall")
+    page.keyboard.press("Escape")
+    expect(visitor.at("run")).to_be_visible()
 
 
 @at_length

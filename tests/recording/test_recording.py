@@ -380,6 +380,30 @@ def test_another_run_is_told_with_its_first_second(tmp_path: Path) -> None:
     assert check_recording(Recording(tmp_path / "run.mcap").log).equal_count == 5
 
 
+def test_a_score_is_recorded_with_its_times(tmp_path: Path) -> None:
+    file, sim = tmp_path / "run.mcap", Simulation(Arena.box(400, 400), robots=2, seed=1)
+    with sim.record(file):
+        sim.set_score("laps", 0)
+        sim.run(1.3)
+        sim.set_score(2, 1)
+        sim.run(2.0)
+        sim.set_score("laps", 1)
+        sim.run(0.4)
+    recording = Recording(file)
+    events = recording.table("events")
+    assert events[["time_s", "robot", "kind", "text"]].tolist() == [
+        (0.0, 0, "score", "laps: 0"),
+        (1.3, 2, "score", "1"),
+        (3.3, 0, "score", "laps: 1"),
+    ]
+    assert [dict(recording.world_at(time_s).score) for time_s in (1.0, 1.5, 3.6)] == [
+        {"laps": 0},
+        {"laps": 0, 2: 1},
+        {"laps": 1, 2: 1},
+    ]
+    assert check_recording(recording.log).differs_ns is None
+
+
 def test_a_closed_recording_takes_no_bookmark(tmp_path: Path) -> None:
     recorder = Simulation(seed=1).record(tmp_path / "run.mcap")
     with pytest.raises(ParameterError, match="note must be a text, but it was 5"):

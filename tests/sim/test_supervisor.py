@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from dataclasses import replace
 
@@ -325,3 +326,23 @@ def test_a_world_without_a_robot_gets_one():
     sim.run(1.0)
     assert sim.pose(1)[0] > 300
     assert sim.paths().shape[0] == 1
+
+
+def test_a_score_is_set_read_copied_and_checked(sim: Simulation) -> None:
+    sim.set_score(2, np.int64(3))
+    sim.set_score("best lap", "12.4 s")
+    sim.set_score("laps", 2.5)
+    assert dict(sim.score) == {2: 3, "best lap": "12.4 s", "laps": 2.5}
+    assert copy.deepcopy(sim).score == sim.score
+    for what, value, rule in (
+        (3, 1, "number of an existing robot"),
+        ("", 1, "what of a score must be a line of 1 to 40 characters"),
+        ("laps", "a\nb", "value of a score must be a line"),
+        (1, math.nan, "value must be from -1e9 to 1e9"),
+    ):
+        with pytest.raises(ParameterError, match=rule):
+            sim.set_score(what, value)
+    for number in range(13):
+        sim.set_score(f"more {number}", number)
+    with pytest.raises(ParameterError, match="at most 16 entries, but 'one' would be one more"):
+        sim.set_score("one", 1)

@@ -29,6 +29,7 @@ def supervise(sim):
     at_start = tidy_count(sim)
     try:
         while True:
+            sim.set_score("cylinders at the walls", f"{tidy_count(sim)} of {CYLINDERS}")
             yield 1.0
     finally:
         print(f"{tidy_count(sim)} of {CYLINDERS} cylinders at the walls, {at_start} at the start")

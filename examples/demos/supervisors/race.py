@@ -14,9 +14,14 @@ def supervise(sim):
             line, before, angle = start + 2 * math.pi * (len(laps_s) + 1), now, angle + turned
             if angle >= line:
                 laps_s.append(sim.time_s - 0.02 * (angle - line) / turned)
+                sim.set_score("laps", len(laps_s))
+                sim.set_score("best lap", f"{best_of(laps_s):.2f} s")
     finally:
-        best = min((end - begin for begin, end in zip([0.0, *laps_s], laps_s, strict=False)), default=None)
-        print(f"{len(laps_s)} laps" + (f", the best in {best:.2f} s" if best else ""))
+        print(f"{len(laps_s)} laps" + (f", the best in {best_of(laps_s):.2f} s" if laps_s else ""))
+
+
+def best_of(laps_s):
+    return min(end - begin for begin, end in zip([0.0, *laps_s], laps_s, strict=False))
 
 
 def angle_of(sim):

@@ -7,14 +7,15 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
 from kiks.errors import ParameterError
 from kiks.model.checks import CLOCK_END_NS, ROBOTS_MAX
+from kiks.model.data_file import check, parse_json
 from kiks.sim.run_log import Kind
-from kiks.sim.saved_state import LAYOUT
+from kiks.sim.saved_state import LAYOUT, ScoreEntry
 
 
 class Entry(NamedTuple):
@@ -72,6 +73,13 @@ def block_of(values: Sequence[Any]) -> bytes:
     parts = kind, np.diff(time_ns, prepend=0), robot, number - time_ns, other - time_ns, length
     packed = (part.astype(f"<{code}").tobytes() for code, part in zip(_COLUMNS, parts, strict=True))
     return b"".join((_COUNT.pack(len(data)), *packed, *data))
+
+
+def score_of(entry: Entry) -> tuple[int | str, float | str]:
+    """Return what and value of an entry of the kind `SCORE`."""
+    kind, what = cast(Any, ScoreEntry), "the score of a recording"
+    found: tuple[int | str, float | str] = check(kind, parse_json(entry.data, what), what)
+    return found
 
 
 def characters_in(block: bytes) -> int:

@@ -1,4 +1,4 @@
-"""What happened in a run, for people: contacts, lines of output, bookmarks, changes by hand."""
+"""What happened in a run, for people: contacts, scores, lines of output, bookmarks, changes by hand."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from kiks.recording.entries import Entry
+from kiks.recording.entries import Entry, score_of
 from kiks.recording.log import RecordedLog
 from kiks.recording.rerun import Piece, run_again
 from kiks.sim.run_log import Kind
@@ -20,9 +20,9 @@ class Event(NamedTuple):
     Attributes:
         time_s: When [s].
         robot: Number of the robot; 0 for none.
-        kind: 'contact', 'output' (a line that a program printed), 'bookmark', or 'change' (by a hand or a program, in
-            any other way than over a line).
-        text: Of an output or a bookmark.
+        kind: 'contact', 'score' (`Simulation.set_score`), 'output' (a line that a program printed), 'bookmark', or
+            'change' (by a hand or a program, in any other way than over a line).
+        text: Of an output or a bookmark; the new value of a score.
     """
 
     time_s: float
@@ -32,7 +32,7 @@ class Event(NamedTuple):
 
 
 def notes_of(entries: Sequence[Entry], *, has_begun: bool) -> Iterator[Event]:
-    """Yield what was noted: lines of output, bookmarks, changes by hand.
+    """Yield what was noted: scores, lines of output, bookmarks, changes by hand.
 
     Args:
         entries: Entries of a log.
@@ -43,7 +43,11 @@ def notes_of(entries: Sequence[Entry], *, has_begun: bool) -> Iterator[Event]:
         if entry.kind == Kind.TEXT:
             yield Event(time_s, entry.robot + 1, "output", entry.data.decode("utf-8", "replace"))
         elif entry.kind == Kind.MARK:
-            yield Event(time_s, 0, "bookmark", entry.data.decode("utf-8", "replace"))
+            yield Event(s_from_ns(entry.number), 0, "bookmark", entry.data.decode("utf-8", "replace"))
+        elif entry.kind == Kind.SCORE:
+            what, value = score_of(entry)
+            robot = what if isinstance(what, int) else 0
+            yield Event(time_s, robot, "score", str(value) if robot else f"{what}: {value}")
         elif entry.kind == Kind.STATE and has_begun:
             yield Event(time_s, 0, "change", "")
         has_begun = has_begun or entry.kind in (Kind.STATE, Kind.CHECK)

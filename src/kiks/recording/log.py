@@ -10,7 +10,7 @@ from typing import NamedTuple, Protocol
 from kiks.errors import ParameterError
 from kiks.recording.entries import RECORDED_LAYOUT, Entry, block_of, entries_of
 from kiks.recording.mcap_file import FoundChunk
-from kiks.sim.run_log import ACT, CHECK, LAST_INPUT, MARK, STATE, TEXT
+from kiks.sim.run_log import ACT, CHECK, LAST_INPUT, MARK, SCORE, STATE, TEXT
 from kiks.sim.saved_state import SavedState, WorldFiles
 from kiks.units import s_from_ns
 from kiks.version import __version__
@@ -115,15 +115,23 @@ class RecordedLog:
         return self._blocks[block]
 
     def notes_of(self, block: int) -> list[Entry]:
-        """Return the entries of a block that people care for: lines of output, bookmarks and changes by hand."""
-        return self._read(block, (STATE, TEXT, MARK))
+        """Return the entries of a block that people care for: output, bookmarks, scores and changes by hand."""
+        return self._read(block, (STATE, SCORE, TEXT, MARK))
 
     def _read(self, block: int, kinds: Sequence[int] | None = None) -> list[Entry]:
         return entries_of(self.reader.read(block), self.reader.what, kinds)
 
     def until(self, block: int, time_ns: int) -> bytes:
-        """Return the log of a block, as bytes, up to a time [ns]."""
-        return block_of([value for entry in self.entries_of(block) if entry.time_ns <= time_ns for value in entry])
+        """Return the log of a block, as bytes, up to a time [ns], with bookmarks before it that were set later.
+
+        It is empty if the block has no entry up to then: a chunk may begin before its first entry.
+        """
+        entries = [entry for entry in self.entries_of(block) if entry.time_ns <= time_ns]
+        for later in range(block, self.blocks.stop):
+            for note in self.notes_of(later):
+                if note.kind == MARK and note.number <= time_ns < note.time_ns:
+                    entries.append(note._replace(time_ns=time_ns))
+        return block_of([value for entry in entries for value in entry]) if entries else b""
 
     def row_before(self, time_ns: int) -> Row:
         """Return the place of the last checkpoint at or before a time [ns], or of the first state."""

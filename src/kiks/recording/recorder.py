@@ -188,9 +188,10 @@ class RunWriter:
         """Note a line that the program of a robot's index has printed; from any thread, which waits for nothing."""
         self._lines.append((self._world.now_ns, robot, line[:LINE_CHARACTERS_MAX]))
 
-    def mark(self, note: str) -> None:
-        """Set a bookmark at this time; the caller holds the lock."""
-        self.note((MARK, self._world.now_ns, 0, 0, 0, note.encode()))
+    def mark(self, note: str, time_ns: int | None = None) -> None:
+        """Set a bookmark at a time [ns], this one if left out; the caller holds the lock."""
+        now_ns = self._world.now_ns
+        self.note((MARK, now_ns, 0, now_ns if time_ns is None else time_ns, 0, note.encode()))
 
     # ---- chunks ----
 

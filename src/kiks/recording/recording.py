@@ -178,8 +178,8 @@ class Recording:
 
         Args:
             name: 'poses': where robots were, tick by tick. 'wheels': counters, speeds and contacts, every 40 ms.
-                'readings': what programs read of the sensors. 'wire': characters both ways. 'events': contacts, lines
-                of output, bookmarks, changes by hand.
+                'readings': what programs read of the sensors. 'wire': characters both ways. 'events': contacts,
+                scores, lines of output, bookmarks, changes by hand.
             robot: Of this robot alone; of all if left out.
 
         Example:

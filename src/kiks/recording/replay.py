@@ -10,7 +10,7 @@ from collections.abc import Callable
 from threading import RLock
 
 from kiks.model.checks import CLOCK_END_NS
-from kiks.recording.entries import Entry
+from kiks.recording.entries import Entry, score_of
 from kiks.recording.log import HASH_LENGTH, RecordedLog, Row, has_state
 from kiks.recording.recorder import CHECK_NS
 from kiks.sim.port import BAUD_MAX, BAUD_MIN
@@ -145,6 +145,8 @@ class Replay:
             case Kind.STATE:
                 sim.sync()
                 self._restore(self._log.state_of(entry))
+            case Kind.SCORE:
+                sim.set_score(*score_of(entry))
 
     def _compare(self, checkpoint: Entry) -> None:
         self.check_count += 1

@@ -106,9 +106,10 @@ class Ring:
             if chunk.begin_ns <= until_ns and count_bytes <= COPY_BYTES_MAX:
                 blocks.append(block)
                 count_bytes += chunk.length
-        for block in reversed(blocks):
-            part = log.reader.read(block) if block != blocks[0] else log.until(block, until_ns)
-            self.write(log.reader.chunk(block).begin_ns, part)
+        for block in reversed(blocks[1:]):
+            self.write(log.reader.chunk(block).begin_ns, log.reader.read(block))
+        if blocks and (end := log.until(blocks[0], until_ns)):
+            self.write(log.reader.chunk(blocks[0]).begin_ns, end)
 
     # ---- as a source ----
 

@@ -25,18 +25,19 @@ class Kind(IntEnum):
     HANG_UP = 4
     SET_BAUD = 5  # number: [bit/s]
     DROP = 6  # number, other: `until_ns` and `now_ns` of `Wire.drop_after`
+    SCORE = 7  # data: what and value of `Simulation.set_score`, as a list in JSON
     ACT = 16  # the robot has done what was due; data: the reply; number, other: when it starts, a character [ns].
     # Only those of robots whose turrets a replay may not have are written, and one without data for each between two
     # inputs of one instant.
     THINK = 17  # number, other: from when to when the program thought [ns]
     TEXT = 18  # data: a line that the robot's program printed, in UTF-8
-    MARK = 19  # data: a person's note, in UTF-8
+    MARK = 19  # data: a person's note, in UTF-8; number: the time that it is about [ns]
 
 
-LAST_INPUT = Kind.DROP
+LAST_INPUT = Kind.SCORE
 """Kinds up to this one are inputs."""
 
-STATE, CHECK, SEND, TYPE, HANG_UP, SET_BAUD, DROP, ACT, THINK, TEXT, MARK = (int(kind) for kind in Kind)
+STATE, CHECK, SEND, TYPE, HANG_UP, SET_BAUD, DROP, SCORE, ACT, THINK, TEXT, MARK = (int(kind) for kind in Kind)
 """The same as plain numbers: members of an enumeration cost a tenth of a microsecond more."""
 
 NotedEntry = tuple[int, int, int, int, int, bytes]

@@ -30,13 +30,17 @@ from kiks.model.project import Project
 from kiks.model.robot import RobotSpec, robot_toml
 from kiks.model.turrets import TURRETS
 from kiks.sim.free_space import FreeSpace
-from kiks.sim.simulation import Simulation
+from kiks.sim.simulation import SCORE_ENTRIES_MAX, Simulation
 from kiks.sim.turret_host import TurretOfUser, described, name_of
 from kiks.sim.wire import Count, SavedWire
 from kiks.sim.world import World
 from kiks.units import TICK_NS
 
 Part = TypeVar("Part", Arena, RobotSpec)
+
+
+ScoreEntry = tuple[Whole | Text, Whole | float | Text]
+"""What and value of `Simulation.set_score`."""
 
 
 class AbsentTurret(Turret):
@@ -137,6 +141,7 @@ class Head:
         bodies: Number of bodies.
         lamps: Number of lamps.
         body_count: Bodies created so far, i.e. the last number.
+        score: See `Simulation.score`.
     """
 
     now_ns: Annotated[Whole, Field(ge=0, le=CLOCK_END_NS)]
@@ -147,6 +152,7 @@ class Head:
     bodies: Annotated[Whole, Field(ge=0, le=100_000)]
     lamps: Annotated[Whole, Field(ge=0, le=100_000)]
     body_count: Count
+    score: Annotated[tuple[ScoreEntry, ...], Field(max_length=SCORE_ENTRIES_MAX)] = ()
 
 
 @dataclass(frozen=True)
@@ -257,6 +263,7 @@ class SavedState:
             sim.things.body_count = self.head.body_count
             for wire, robot in zip(sim.wires, self.head.robots, strict=True):
                 wire.restore(robot.wire)
+            world.score = dict(self.head.score)
             world.note_change()
 
     def _extend(self, sim: Simulation) -> None:
@@ -297,6 +304,7 @@ def state_bytes(sim: Simulation, files: WorldFiles) -> bytes:
             "bodies": state.bodies.shape[1],
             "lamps": len(lamps),
             "body_count": sim.things.body_count,
+            "score": list(world.score.items()),
         }
         parts = json.dumps(head).encode(), b"\n", state.robots.tobytes(), state.bodies.tobytes(), lamps.tobytes()
         return b"".join(parts)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import json
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
 from itertools import count
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 from weakref import WeakValueDictionary
 
@@ -27,6 +29,7 @@ from kiks.sim.free_space import FreeSpace
 from kiks.sim.local_line import LocalLine
 from kiks.sim.paths import Paths
 from kiks.sim.port import CLOSED, VirtualPort
+from kiks.sim.run_log import SCORE
 from kiks.sim.sensors import Sensors
 from kiks.sim.snapshot import Snapshot, look, proximity_at, trace_rays
 from kiks.sim.things import Checkpoint, Things
@@ -644,6 +647,52 @@ class Simulation:
         with self._changing():
             self.things.reset(checkpoint)
 
+    # ---- the score ----
+
+    @property
+    def score(self) -> Mapping[int | str, float | str]:
+        """The score: numbers or texts by a robot's number or by a name; `set_score` writes it.
+
+        Example:
+            >>> import kiks
+            >>> kiks.Simulation(kiks.Arena.box(500, 500)).score
+            mappingproxy({})
+        """
+        with self.lock:
+            return MappingProxyType(dict(self.world.score))
+
+    def set_score(self, what: int | str, value: float | str) -> None:
+        """Set an entry of the score, which the desk shows while the run goes on; recordings keep it.
+
+        Args:
+            what: The number of the robot whose score it is, or a name, such as 'laps'.
+            value: A number or a text.
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500))
+            >>> sim.set_score(1, 3)
+            >>> sim.set_score("best lap", "12.4 s")
+            >>> dict(sim.score)
+            {1: 3, 'best lap': '12.4 s'}
+        """
+        with self.lock:
+            score = self.world.score
+            what = _score_text("what", what) if isinstance(what, str) else self.index_of(what) + 1
+            if isinstance(value, str):
+                value = _score_text("value", value)
+            else:
+                number = check_number("value", value, -SCORE_MAX, SCORE_MAX)
+                value = int(number) if number.is_integer() else number
+            if what not in score and len(score) == SCORE_ENTRIES_MAX:
+                raise ParameterError(
+                    f"a score must have at most {SCORE_ENTRIES_MAX} entries, but {shown(what)} would be one more."
+                )
+            if score.get(what) != value:
+                score[what] = value
+                if self.loop.recorder is not None:
+                    self.loop.recorder.note((SCORE, self.now_ns, 0, 0, 0, json.dumps([what, value]).encode()))
+
     # ---- what sensors read ----
 
     def proximity(self, robot: int, *, noise: bool = False) -> list[float]:
@@ -909,6 +958,17 @@ SIMULATIONS: WeakValueDictionary[str, Simulation] = WeakValueDictionary()
 """The simulations of this process that are alive, by name, the oldest first."""
 
 _NUMBERS = count(1)
+
+SCORE_ENTRIES_MAX, SCORE_TEXT_MAX, SCORE_MAX = 16, 40, 1e9
+"""Most entries of a score, characters of a name or text in it, and its largest number."""
+
+
+def _score_text(name: str, text: str) -> str:
+    if 0 < len(text) <= SCORE_TEXT_MAX and text.isprintable():
+        return text
+    raise ParameterError(
+        f"{name} of a score must be a line of 1 to {SCORE_TEXT_MAX} characters, but it was {shown(text)}."
+    )
 
 
 def _check_arena(arena: object) -> None:

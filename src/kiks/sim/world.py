@@ -64,6 +64,7 @@ class World:
         change_count: How often something other than time and the robots' lines has changed the world.
         on_change: Called at each of these changes.
         lamps_exposed: Whether a caller holds the writable array of lamps.
+        score: See `Simulation.score`.
     """
 
     def __init__(
@@ -84,6 +85,7 @@ class World:
         self.change_count = 0
         self.on_change: Callable[[], None] = lambda: None
         self.lamps_exposed = False
+        self.score: dict[int | str, float | str] = {}
         self._lamps = np.array(arena.lamps, np.float64).reshape(-1, 4)
         self.free_space = FreeSpace(arena, self.specs, self.state)
         self._pack_specs()

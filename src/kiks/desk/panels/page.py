@@ -7,6 +7,7 @@ from collections.abc import Callable
 from nicegui import ui
 
 from kiks.desk.panels.arena_view import ArenaView, Points
+from kiks.desk.panels.board import ScoreBoard
 from kiks.desk.panels.editor import EditorPanel
 from kiks.desk.panels.monitor import MonitorPanel
 from kiks.desk.panels.octave import OctavePanel
@@ -66,6 +67,7 @@ class Page:
             tools = ui.row().classes("items-center no-wrap gap-1")
         with ui.splitter(value=64, limits=(30, 100)).classes("desk-body") as halves:
             with halves.before, ui.column().classes("desk-stage"):
+                board = ScoreBoard(feed, "board.css")
                 with ui.element("div").classes("desk-arena"):
                     self._view = ArenaView(feed, on_pick=self._pick, on_draw=self._draw, on_remove=self._remove)
                     self._hint = ui.label(HINT if desk.past is None else PAST_HINT).classes("desk-hint")
@@ -73,7 +75,7 @@ class Page:
             with halves.after, ui.column().classes("w-full gap-0 no-wrap"):
                 self._build_tabs(feed)
         with tools:
-            ViewPanel(desk, self._view)
+            ViewPanel(desk, self._view, board)
         ui.timer(NEWS_S, self._tell_news)
 
     def _build_tabs(self, feed: str) -> None:

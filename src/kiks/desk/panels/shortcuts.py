@@ -35,6 +35,7 @@ SHORTCUTS = {
     "on-short": Shortcut("l", "0.1 s on"),
     "on-long": Shortcut("L", "1 s on"),
     "event-after": Shortcut("o", "Event after"),
+    "bookmark": Shortcut("b", "Set a bookmark"),
     "undo": Shortcut("Ctrl-z", "Undo the last step"),
     "redo": Shortcut("Ctrl-y", "Redo the step"),
 }

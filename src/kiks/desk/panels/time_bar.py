@@ -7,9 +7,21 @@ from collections.abc import Awaitable, Callable
 from nicegui import ui
 
 from kiks.desk.panels.shortcuts import SHORTCUTS, listen
-from kiks.desk.panels.widgets import WEB, FeedElement, Panel, agrees, icon_button, named, relabel, with_props
+from kiks.desk.panels.widgets import (
+    WEB,
+    FeedElement,
+    Panel,
+    agrees,
+    answer,
+    finish,
+    icon_button,
+    named,
+    relabel,
+    with_props,
+)
 from kiks.desk.server.desk import Desk
-from kiks.units import clock_text
+from kiks.desk.server.marks import TEXT_MAX
+from kiks.units import clock_text, s_from_ns
 
 SHORT_S, LONG_S = 0.1, 1.0
 """Steps of the buttons [s]."""
@@ -56,6 +68,7 @@ class TimeBar(Panel):
                     self._add("keyboard_double_arrow_right", "on-long", lambda: looking.move_by(LONG_S)),
                     self._add("last_page", "event-after", lambda: self._jump(is_before=False)),
                 ]
+                self._add("bookmark_add", "bookmark", self._set_bookmark)
                 self._state = named(ui.label().classes("desk-bar-state q-ml-sm"), "bar-state")
                 self._event = ui.label().classes("desk-bar-event col ellipsis text-caption")
                 named(self._event, "bar-event").props("aria-live=polite")
@@ -105,6 +118,17 @@ class TimeBar(Panel):
         mark = await self._desk.looking.jump(is_before=is_before)
         if mark is None:
             ui.notify(f"Nothing happened {'before' if is_before else 'after'} this.")
+
+    async def _set_bookmark(self) -> None:
+        """Ask for a note, and set a bookmark at the time at which the person has asked for it."""
+        time_ns = self._desk.sim.now_ns
+        with ui.dialog() as dialog, ui.card().classes("gap-3").style("width: 420px"):
+            ui.label(f"Bookmark at {clock_text(s_from_ns(time_ns))}").classes("text-h6")
+            note = named(ui.input("Note").props(f"autofocus maxlength={TEXT_MAX}").classes("w-full"), "bookmark-note")
+            note.on("keydown.enter", lambda: dialog.submit(note.value))
+            finish(dialog, "Set it", lambda: note.value)
+        if (text := await answer(dialog)) is not None:
+            await self._desk.looking.bookmark(time_ns, text.strip()[:TEXT_MAX] or "bookmark")
 
     async def _go_on(self) -> None:
         """Say what going on from here does, and do it if the person agrees."""

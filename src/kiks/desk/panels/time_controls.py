@@ -59,7 +59,7 @@ class TimePanel(Panel):
         self._speed.tooltip("Simulated time per real time; it never changes what robots do")
         ClockView(feed, "clock_view.css")
         self._add(
-            "bookmark_add",
+            "flag",
             "mark",
             "Checkpoint: remember where everything stands",
             lambda: desk.change(desk.mark),

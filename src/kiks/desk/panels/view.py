@@ -5,6 +5,7 @@ from __future__ import annotations
 from nicegui import ui
 
 from kiks.desk.panels.arena_view import LAYERS, ArenaView
+from kiks.desk.panels.board import ScoreBoard
 from kiks.desk.panels.shortcuts import SHORTCUTS
 from kiks.desk.panels.widgets import BAR, icon_button, named
 from kiks.desk.server.desk import Desk
@@ -35,9 +36,10 @@ class ViewPanel:
     Args:
         desk: The desk.
         view: The view of the arena.
+        board: The board above it.
     """
 
-    def __init__(self, desk: Desk, view: ArenaView) -> None:
+    def __init__(self, desk: Desk, view: ArenaView, board: ScoreBoard) -> None:
         self._desk = desk
         self._view = view
         toggle = ui.toggle(VIEWS, value="top", on_change=lambda event: view.change(view=event.value))
@@ -56,6 +58,8 @@ class ViewPanel:
             pass
         self._robots.on("before-show", self._list_robots)
         _button("fit_screen", "Show all of the arena (key: 0)", "fit").on_click(lambda: view.run_method("fit"))
+        tip = "Hall view, for a projector: arena, score and clock, large (Escape ends it)"
+        icon_button("tv", "Hall view", "hall", lambda: board.run_method("enter"), tip=tip, look=BAR)
         with ui.dialog() as self._help, ui.card():
             ui.markdown(HELP)
             ui.button("Close", on_click=self._help.close).props("flat no-caps")

@@ -209,6 +209,15 @@ class Desk:
         given += [""] * (self.sim.robot_count - len(given))
         return [name or str(number) for number, name in enumerate(given[: self.sim.robot_count], 1)]
 
+    def sides(self) -> list[str]:
+        """Return what a score calls the robots: their names, else those of their programs, else their numbers."""
+        programs = {each.robot: each.command.name.removesuffix(".py") for each in self.programs.handles}
+        found = [
+            programs.get(number, f"robot {number}") if name == str(number) else name
+            for number, name in enumerate(self.names(), 1)
+        ]
+        return [f"{name} {number}" if found.count(name) > 1 else name for number, name in enumerate(found, 1)]
+
     def tell(self) -> None:
         """Make all browsers load the scene again: a thing has appeared, disappeared or changed its looks."""
         self.scene += 1

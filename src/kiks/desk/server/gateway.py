@@ -20,6 +20,7 @@ from kiks.desk.server.live_editing import Editing
 from kiks.desk.server.marks import Mark, thinned
 from kiks.errors import KiksError, ParameterError
 from kiks.export.frames import arena_picture, describe_scene, describe_shapes, pack_frame, scene_key
+from kiks.export.looks import robot_hue
 from kiks.model.arena import Arena
 from kiks.model.checks import SECONDS_MAX
 from kiks.sim.simulation import Simulation
@@ -53,7 +54,7 @@ class Viewer:
     Attributes:
         name: Owner of the browser's hand.
         in_flight: Number of unacknowledged frames.
-        sent: The last scene, shapes and time bar that were sent, by their kinds.
+        sent: The last scene, shapes, time bar and board that were sent, by their kinds.
         newest: The next frame to send.
         pulls: The newest message of each kind that moves what the browser holds, to be done before the next frame.
         texts: Messages to send before that frame.
@@ -121,7 +122,7 @@ class Gateway:
         self._secret = secrets.token_urlsafe()
         self._seen: tuple[Any, ...] = ()
         self._seeking: set[asyncio.Task[None]] = set()
-        # The scene, its shapes and the time bar, by their kinds.
+        # The scene, its shapes, the time bar and the board, by their kinds.
         self._news: dict[str, dict[str, Any]] = {}
         self._scene_number = 0
         self._arena: Arena | None = None
@@ -174,6 +175,7 @@ class Gateway:
             self._news["shapes"] = shapes
         desk.shown.meter.note(sim.now_ns, is_paused=desk.is_paused)
         self._describe_bar()
+        self._describe_board(sim)
         return pack_frame(
             sim,
             scene=self._scene_number,
@@ -198,6 +200,19 @@ class Gateway:
         if (source := (looking.marks, state)) != self._bar_source:
             self._bar_source = source
             self._news["bar"] = {**state, "marks": [(*mark[:2], mark.text) for mark in thinned(looking.marks, span)]}
+
+    def _describe_board(self, sim: Simulation) -> None:
+        """Describe the score, by robots first; it is that of the time which is shown."""
+        sides = self.desk.sides() if sim.score else []
+        score = [
+            {
+                "name": sides[what - 1] if isinstance(what, int) else what,
+                "value": value,
+                "hue": robot_hue(what - 1) if isinstance(what, int) else None,
+            }
+            for what, value in sorted(sim.score.items(), key=lambda entry: (isinstance(entry[0], str), str(entry[0])))
+        ]
+        self._news["board"] = {"kind": "board", "score": score, "end_s": self.desk.project.seconds}
 
     def _show(self, frame: bytes) -> None:
         for viewer in self._viewers:

@@ -18,7 +18,7 @@ from kiks.recording.recorder import RunWriter
 from kiks.recording.recording import Recording
 from kiks.recording.ring import Ring
 from kiks.sim.simulation import Simulation
-from kiks.units import ns_from_s
+from kiks.units import ns_from_s, s_from_ns
 
 CLOSE_S = 1.0
 """Longest wait for the end of the recording when the desk is closed [s]."""
@@ -51,6 +51,8 @@ class LookingBack:
         self._reader: MarkReader | None = None
         self._keeps = False
         self._was_running = False
+        # Bookmarks of a recording that is finished: time [ns] and note.
+        self._bookmarks: list[tuple[int, str]] = []
         self._wanted_ns: int | None = None
         self._turn = asyncio.Lock()
 
@@ -80,6 +82,9 @@ class LookingBack:
             self._writer = RunWriter.of(sim)
             self._writer.add(ring)
             self._use(ring)
+            for time_ns, note in self._bookmarks if is_branch else ():
+                if time_ns <= sim.now_ns:
+                    self._writer.mark(note, time_ns)
         except (KiksError, OSError) as error:
             self._say(f"People cannot look back at this run: {error}")
 
@@ -91,6 +96,15 @@ class LookingBack:
         if self._writer is not None and isinstance(self._source, Ring):
             self._writer.remove(self._source)
         self._source = self._log = self._writer = self._reader = None
+
+    async def bookmark(self, time_ns: int, note: str) -> None:
+        """Set a bookmark at a time [ns]; what records the world keeps it."""
+        if (writer := self._writer) is None:
+            self._bookmarks.append((time_ns, note))
+        else:
+            await self._present().do(lambda _: writer.mark(note, time_ns))
+            await self._present().do(self._flush)
+        await self.tend()
 
     def show_recording(self, file: Path, time_ns: int) -> None:
         """Show a recording from a time on [ns]; the present world stands still until a person goes on from there."""
@@ -140,7 +154,9 @@ class LookingBack:
         """Read what has happened; contacts only for people who look back, as the run is made again for them."""
         if (reader := self._reader) is not None:
             with suppress(KiksError):  # a replay tells people of it
-                self.marks = await asyncio.to_thread(lambda: reader.read(has_contacts=has_contacts))
+                found = await asyncio.to_thread(lambda: reader.read(has_contacts=has_contacts))
+                own = (Mark(s_from_ns(time_ns), "bookmark", (note,)) for time_ns, note in self._bookmarks)
+                self.marks = sorted([*found, *own])
 
     def _flush(self, _sim: Simulation) -> None:
         if self._writer is not None:

@@ -23,7 +23,7 @@ TEXT_MAX = 160
 LINES_MAX = 5
 """Most lines of a mark."""
 
-KINDS = ("bookmark", "output", "change", "contact")
+KINDS = ("bookmark", "score", "output", "change", "contact")
 """Kinds of events, by priority: a merged mark has the first kind's colour."""
 
 
@@ -86,8 +86,8 @@ class MarkReader:
         mark = Mark(event.time_s, event.kind, (described(event),))
         key = event.kind, event.robot
         latest_s, number = self._latest.get(key, (-1.0, -1))
-        if number in self._marks and event.time_s - latest_s <= MERGED_S:
-            if event.kind == "output":
+        if event.kind != "bookmark" and number in self._marks and event.time_s - latest_s <= MERGED_S:
+            if event.kind in ("output", "score"):
                 self._marks[number] = self._marks[number].joined(mark)
         else:
             number = self._count = self._count + 1
@@ -107,7 +107,9 @@ def described(event: Event) -> str:
         return f"robot {event.robot} touches something"
     if event.kind == "output":
         return f"robot {event.robot}: {text}"
-    return text if event.kind == "bookmark" else "changed by hand"
+    if event.kind == "score" and event.robot:
+        return f"score of robot {event.robot}: {text}"
+    return "changed by hand" if event.kind == "change" else text
 
 
 def thinned(marks: Sequence[Mark], span: Span | None) -> list[Mark]:

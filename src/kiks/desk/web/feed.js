@@ -7,9 +7,10 @@
    feed.scene       the newest scene message (arena, robots, bodies) or null
    feed.frame       the newest frame (see frame.js) or null; it always belongs to feed.scene
    feed.bar         the newest description of the time bar (see time_bar.js) or null
+   feed.board       the newest score (see board.js) or null
    feed.connection  "connecting", "open", "lost" (it reconnects by itself) or "gone" (the desk is closed, or lost for
                     a minute: nothing reconnects)
-   feed.on(what, callback) subscribes to "scene", "shapes", "bar", "frame", "connection" or "error" (a message of the
+   feed.on(what, callback) subscribes to "scene", "shapes", "bar", "board", "frame", "connection" or "error" (a message of the
                     server) and returns a function that unsubscribes.
    feed.send(object) sends a message and returns whether there was a connection.
 
@@ -22,7 +23,7 @@
 
 import { Frame } from "./frame.js";
 
-const HAPPENINGS = ["scene", "shapes", "bar", "frame", "connection", "error"];
+const HAPPENINGS = ["scene", "shapes", "bar", "board", "frame", "connection", "error"];
 /** Number of frames for one acknowledgement, which costs the server a tenth of a frame. */
 const ACKNOWLEDGED_TOGETHER = 2;
 const FIRST_PAUSE_MS = 250;
@@ -37,7 +38,7 @@ export class Feed {
     this.path = path;
     this.scene = null;
     this.frame = null;
-    this.bar = null;
+    this.bar = this.board = null;
     this.connection = "connecting";
     this.frames_received = 0;
     this.bytes_received = 0;
@@ -94,9 +95,9 @@ export class Feed {
     } else if (message.kind === "shapes" && this.scene) {
       this.scene.robots.forEach((robot, index) => (robot.shapes = message.robots[index] ?? robot.shapes));
       this._tell("shapes", this.scene);
-    } else if (message.kind === "bar") {
-      this.bar = message;
-      this._tell("bar", message);
+    } else if (message.kind === "bar" || message.kind === "board") {
+      this[message.kind] = message;
+      this._tell(message.kind, message);
     } else if (message.kind === "error") {
       this._tell("error", message.text);
     } else if (message.kind === "gone") {

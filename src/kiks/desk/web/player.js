@@ -6,7 +6,7 @@ const LEAP_S = 1;
 /** Longest time between two pictures that counts [ms]: a hidden page gets none, and the run waits for it. */
 const LONGEST_MS = 250;
 const THUMB_PX = 16;
-const MARK_PX = { contact: 6, output: 6, change: 12, bookmark: 12 };
+const MARK_PX = { contact: 6, output: 6, change: 12, bookmark: 12, score: 12 };
 
 export class Player {
   /** `parts` is {play, slider, marks, clock, speed}, elements; `marks` is [[time_s, kind], ...]. */

@@ -1,0 +1,82 @@
+/* The board above the arena: the score of the run. In the hall view, for a projector, the page shows the board large,
+   with the clock, and the arena; all controls are hidden.
+
+   The messages "board" of the server carry the score, and frames carry the time. */
+
+import { clockText, pageFeed, robotColour } from "kiks-desk";
+
+const HALL = "desk-hall";
+
+export default {
+  template: `
+    <div class="kiks-board" v-show="isHall || entries.length" data-testid="board" role="region" aria-label="Score">
+      <div v-if="isHall" class="kiks-board-clock" data-testid="board-clock" role="timer">{{ clock }}<small
+        v-if="end_s"> of {{ clockText(end_s).slice(0, -3) }}</small></div>
+      <div v-if="isMatch" class="kiks-board-match">
+        <span class="kiks-board-side"><i :style="ink(entries[0])"></i><b>{{ entries[0].name }}</b></span>
+        <span class="kiks-board-value" data-testid="board-match">{{ entries[0].value }} : {{ entries[1].value }}</span>
+        <span class="kiks-board-side"><b>{{ entries[1].name }}</b><i :style="ink(entries[1])"></i></span>
+      </div>
+      <dl v-else class="kiks-board-list">
+        <div v-for="entry in entries" :key="entry.name">
+          <dt><i v-if="entry.hue !== null" :style="ink(entry)"></i>{{ entry.name }}</dt><dd>{{ entry.value }}</dd>
+        </div>
+      </dl>
+      <button v-if="isHall" class="kiks-board-leave" data-testid="leave-hall" aria-label="Leave the hall view"
+              title="Leave the hall view (Escape)" @click="leave">&#x2715;</button>
+    </div>`,
+  props: { feed: { type: String, default: "/desk/feed" } },
+  data: () => ({ entries: [], end_s: null, isHall: false, clock: "", isDark: false }),
+  computed: {
+    /** Two robots, and nothing else: a match. */
+    isMatch() { return this.entries.length === 2 && this.entries.every(({ hue }) => hue !== null); },
+  },
+  mounted() {
+    const feed = pageFeed(this.feed);
+    this.stops = [
+      feed.on("board", (board) => this.take(board)),
+      feed.on("frame", ({ time_s }) => {
+        if (this.isHall) this.clock = clockText(time_s).slice(0, -1);
+      }),
+    ];
+    if (feed.board) this.take(feed.board);
+    this.press = (event) => event.key === "Escape" && this.isHall && this.leave();
+    this.change = () => document.fullscreenElement || this.show(false);
+    document.addEventListener("keydown", this.press);
+    document.addEventListener("fullscreenchange", this.change);
+  },
+  unmounted() {
+    for (const stop of this.stops) stop();
+    document.removeEventListener("keydown", this.press);
+    document.removeEventListener("fullscreenchange", this.change);
+    this.show(false);
+  },
+  methods: {
+    clockText,
+
+    take({ score, end_s }) {
+      this.entries = score;
+      this.end_s = end_s;
+      this.isDark = document.body.classList.contains("body--dark");
+    },
+
+    ink({ hue }) { return { background: robotColour(hue, this.isDark) }; },
+
+    show(isHall) {
+      this.isHall = isHall;
+      document.body.classList.toggle(HALL, isHall);
+    },
+
+    /** Begin the hall view, on the whole screen where the browser allows it. */
+    enter() {
+      this.clock = clockText(pageFeed(this.feed).frame?.time_s ?? 0).slice(0, -1);
+      this.show(true);
+      document.documentElement.requestFullscreen?.().catch(() => {});
+    },
+
+    leave() {
+      this.show(false);
+      if (document.fullscreenElement) document.exitFullscreen();
+    },
+  },
+};
