@@ -43,11 +43,24 @@ def test_a_picture_of_a_recording_is_that_of_its_world(world: Simulation, record
     with Image.open(tmp_path / "run.png") as image:
         seen = np.asarray(image).astype(int)
     wanted = np.asarray(Picture.of_simulation(world).image()).astype(int)
+    seen, caption = np.split(seen, [len(wanted)])
+    assert (caption < 128).any()
     assert 0 < (np.abs(seen - wanted).max(axis=-1) > 8).mean() < 0.05  # without the trails
     recording.export(tmp_path / "early.png", time_s=1.0)
-    recording.export(tmp_path / "run.svg")
     assert (tmp_path / "early.png").read_bytes() != (tmp_path / "run.png").read_bytes()
-    assert "<polyline" in (tmp_path / "run.svg").read_text()
+
+
+def test_lines_stay_sharp_and_a_caption_says_what_is_seen(recording: Recording, tmp_path: Path) -> None:
+    for name in ("run.svg", "run.pdf", "again.svg"):
+        recording.export(tmp_path / name)
+    text = (tmp_path / "run.svg").read_text()
+    # Matplotlib draws the letters, and has them in a comment.
+    for words in ("box,", "seed", "3,", "50 mm", "robot 1, from its start", "robot 2, from its start", "lamp", "ball"):
+        assert f"<!-- {words} -->" in text, words
+    assert "cylinder" not in text
+    assert "<image" not in text
+    assert text == (tmp_path / "again.svg").read_text()
+    assert b"/Subtype /Image" not in (tmp_path / "run.pdf").read_bytes()
 
 
 def test_tables_are_the_same_in_each_kind_of_file(recording: Recording, tmp_path: Path) -> None:

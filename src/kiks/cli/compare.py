@@ -10,6 +10,9 @@ import typer
 
 from kiks.cli.outputs import output
 from kiks.errors import ParameterError
+from kiks.export.kinds import KINDS
+
+FIGURES = KINDS["figures"].endings
 
 if TYPE_CHECKING:
     from kiks.learn.results import Result
@@ -18,9 +21,9 @@ if TYPE_CHECKING:
 def compare(
     first: Annotated[Path, typer.Argument(help="A folder of kiks evolve, best with --seeds.")],
     second: Annotated[Path, typer.Argument(help="Another folder, with evolutions of the same task.")],
-    picture: Annotated[Path, typer.Option(help="File of the picture, .png.", callback=output(".png"))] = Path(
-        "kiks-compare.png"
-    ),
+    picture: Annotated[
+        Path, typer.Option(help=f"File of the picture, {' or '.join(FIGURES)}.", callback=output(*FIGURES))
+    ] = Path("kiks-compare.png"),
 ) -> None:
     """Compare the evolutions in two folders: medians, exams, and the Mann-Whitney test with its effect size.
 

@@ -5,17 +5,20 @@ A recording has a column, so that several stand side by side.
 
 from __future__ import annotations
 
-import io
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 import numpy as np
 
+from kiks.engine.state import BALL
 from kiks.errors import ParameterError
 from kiks.export.kinds import KINDS
-from kiks.export.looks import css, robot_colour
-from kiks.model.arena import Arena
+from kiks.export.looks import LAMPLIGHT, body_colour, css, robot_colour
+from kiks.export.pictures import Picture, Trails
+from kiks.export.vector_pen import file_of
 from kiks.model.atomic_files import ending_of, replace_file
 from kiks.recording.analysis import odometry, time_shares
 from kiks.recording.recorder import RunRecorder, RunWriter
@@ -26,7 +29,13 @@ from kiks.units import s_from_ns
 
 NO_ROBOT = "There was no robot in this run"
 
-COLUMN_INCHES, DOTS_PER_INCH = 5.6, 160
+COLUMN_INCHES = 4.6
+
+TITLE_CHARACTERS = 52
+"""Most characters of a line of a title."""
+
+PATH_COLUMNS, LEGEND_LINE_POINTS = 3, 13.0
+"""Columns of the legend of paths, above which the title stands, and the height of its lines."""
 
 HEAT_MM = 20.0
 """Side of a cell of the heat map [mm]."""
@@ -34,8 +43,8 @@ HEAT_MM = 20.0
 POINTS_MAX = 4000
 """Most points of a line over time."""
 
-ROWS = (1.25, 1.0, 0.8, 0.8, 0.28)
-"""Relative heights of the rows."""
+ROWS = {"readings": 2.1, "speeds": 2.1, "time": 0.75}
+"""Heights of the rows over time [inches]; those of an arena have its shape."""
 
 PANELS = {"paths": 0.0, "places": 0.0, "readings": 2.6, "speeds": 2.6, "time": 1.3}
 """The rows, and how high each is where it stands alone [inches]; 0 for as high as the arena makes it."""
@@ -43,6 +52,8 @@ PANELS = {"paths": 0.0, "places": 0.0, "readings": 2.6, "speeds": 2.6, "time": 1
 
 def save_figures(recordings: Sequence[Recording], path: str | Path, *, robot: int = 1) -> None:
     """Draw recordings side by side: paths, where robots were, readings, speeds, and where the time went.
+
+    Of several recordings the title names the file, and the scales are the same.
 
     Args:
         recordings: The recordings.
@@ -54,8 +65,9 @@ def save_figures(recordings: Sequence[Recording], path: str | Path, *, robot: in
 
 
 def save_figure(figure: Any, path: str | Path) -> None:
-    """Write a figure, whose texts become plain, as a PNG."""
-    replace_file(path, file_of(_with_plain_texts(figure), "png", 110), "the picture")
+    """Write a figure, whose texts become plain: .png, .svg or .pdf."""
+    kind = ending_of(path, "the picture", KINDS["figures"].endings)[1:]
+    replace_file(path, file_of(_with_plain_texts(figure), kind, 110), "the picture")
 
 
 def _with_plain_texts(figure: Any) -> Any:
@@ -72,29 +84,13 @@ def panels_of(recording: Recording, *, robot: int = 1) -> dict[str, bytes]:
     from matplotlib.figure import Figure
 
     pictures = {}
-    arena = recording.start.arena
-    arena_inches = min(max(0.75 * COLUMN_INCHES * arena.height_mm / arena.width_mm + 0.6, 2.0), COLUMN_INCHES)
+    arena_inches = _arena_inches([recording]) + 0.9
     for name, draw in _drawings(recording, robot).items():
         size = (2 * COLUMN_INCHES, PANELS[name]) if PANELS[name] else (COLUMN_INCHES, arena_inches)
         figure = Figure(figsize=size, layout="constrained")
         draw(figure.subplots())
-        for axes in figure.axes:
-            legend = axes.get_legend()
-            if legend is not None:
-                legend.set_in_layout(True)  # no other axes need the same width
         pictures[name] = file_of(_with_plain_texts(figure), "svg")
     return pictures
-
-
-def file_of(figure: Any, kind: str, dots_per_inch: int = DOTS_PER_INCH) -> bytes:
-    """Return the file of a figure. Without dates and random names, the same recording gives the same file."""
-    from matplotlib import rc_context
-
-    dated = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind)
-    buffer = io.BytesIO()
-    with rc_context({"svg.hashsalt": "kiks"}):
-        figure.savefig(buffer, format=kind, dpi=dots_per_inch, metadata=dated)
-    return buffer.getvalue()
 
 
 def figure_of(recordings: Sequence[Recording], *, robot: int = 1) -> Any:
@@ -104,14 +100,34 @@ def figure_of(recordings: Sequence[Recording], *, robot: int = 1) -> Any:
 
     drawings = [_drawings(recording, robot) for recording in recordings]
     # Padding makes room for the legends between the rows.
-    layout = ConstrainedLayoutEngine(h_pad=0.12)
-    figure = Figure(figsize=(COLUMN_INCHES * len(recordings), 2.6 * sum(ROWS)), layout=layout)
-    axes = figure.subplots(len(ROWS), len(recordings), squeeze=False, height_ratios=ROWS)
+    layout = ConstrainedLayoutEngine(h_pad=0.1)
+    arena_inches = _arena_inches(recordings)
+    heights = [ROWS.get(name, arena_inches) for name in PANELS]
+    size = COLUMN_INCHES * len(recordings), sum(heights) + 0.8 * len(heights)
+    figure = Figure(figsize=size, layout=layout)
+    axes = figure.subplots(len(heights), len(recordings), squeeze=False, height_ratios=heights)
     for column, recording, draw in zip(axes.T, recordings, drawings, strict=True):
-        column[0].set_title(recording.title, fontsize="medium")
+        name = f"{recording.log.reader.path.name}: " if len(recordings) > 1 else ""
+        title = fill(f"{name}{recording.title}", TITLE_CHARACTERS)
         for axes_of_row, name in zip(column, PANELS, strict=True):
             draw.get(name, _draw_nothing)(axes_of_row)
+        legend = column[0].get_legend()
+        lines = 0 if legend is None else -(-len(legend.get_texts()) // PATH_COLUMNS)
+        column[0].set_title(title, fontsize="medium", pad=6 + LEGEND_LINE_POINTS * lines)
+    for name, row in zip(PANELS, axes, strict=True):
+        if name in ROWS:
+            drawn = [each for each in row if each.axison]
+            for limits in ("xlim", "ylim"):
+                ends = [getattr(each, f"get_{limits}")() for each in drawn]
+                for each in drawn:
+                    each.set(**{limits: (min(low for low, _ in ends), max(high for _, high in ends))})
     return _with_plain_texts(figure)
+
+
+def _arena_inches(recordings: Sequence[Recording]) -> float:
+    """Return how high the axes of arenas are [inches]: the highest fills its column, if it is not too high."""
+    shapes = [each.start.arena.height_mm / each.start.arena.width_mm for each in recordings]
+    return min(max(0.8 * COLUMN_INCHES * max(shapes, default=1.0), 1.2), COLUMN_INCHES)
 
 
 def figure_of_run(sim: Simulation, *, robot: int = 1) -> Any:
@@ -130,12 +146,15 @@ def figure_of_run(sim: Simulation, *, robot: int = 1) -> Any:
 def _drawings(recording: Recording, robot: int) -> dict[str, Callable[[Any], None]]:
     """Return functions that draw the rows on axes, by the names of `PANELS`: of a run without a robot, paths alone."""
     poses, wheels, readings = recording.tables("poses", "wheels", "readings")
-    paths = {"paths": lambda axes: _draw_paths(axes, recording, poses, wheels)}
+    picture = Picture.of_recording(recording, recording.log.end_ns)
+    bodies_alone = Trails((), picture.trails.bodies if picture.trails else {})
+    picture = replace(picture, trails=bodies_alone)
+    paths = {"paths": lambda axes: _draw_paths(axes, recording, picture, poses, wheels)}
     if not recording.robots:
         return paths
     recording.check_robot(robot)
     return paths | {
-        "places": lambda axes: _draw_heat(axes, recording.start.arena, poses),
+        "places": lambda axes: _draw_heat(axes, replace(picture, poses=picture.poses[:0]), poses),
         "readings": lambda axes: _draw_readings(axes, readings[readings["robot"] == robot]),
         "speeds": lambda axes: _draw_speeds(axes, wheels[wheels["robot"] == robot]),
         "time": lambda axes: _draw_time(axes, recording, robot),
@@ -152,18 +171,15 @@ def _write_in(axes: Any, text: str) -> None:
     axes.text(0.5, 0.5, text, transform=axes.transAxes, ha="center", va="center", color="gray")
 
 
-def _draw_arena(axes: Any, arena: Arena) -> None:
-    extent = (0.0, arena.width_mm, 0.0, arena.height_mm)
-    axes.imshow(np.where(arena.brightness > 0, 0.35, 1.0), cmap="gray", vmin=0, vmax=1, origin="lower", extent=extent)
-    axes.set_aspect("equal")
-    axes.set_xlabel("x [mm]")
-    axes.set_ylabel("y [mm]")
+def _draw_arena(axes: Any, picture: Picture) -> None:
+    picture.draw_on(axes, 0.7 * COLUMN_INCHES)
+    axes.set(xlabel="x [mm]", ylabel="y [mm]")
 
 
-def _draw_paths(axes: Any, recording: Recording, poses: Table, wheels: Table) -> None:
+def _draw_paths(axes: Any, recording: Recording, picture: Picture, poses: Table, wheels: Table) -> None:
     """Draw where robots drove, where their wheels say that they drove, and where they began to touch something."""
     saved = recording.start
-    _draw_arena(axes, saved.arena)
+    _draw_arena(axes, picture)
     for number in recording.robots:
         path, counts = poses[poses["robot"] == number], wheels[wheels["robot"] == number]
         colour = css(robot_colour(number - 1))
@@ -185,24 +201,29 @@ def _draw_paths(axes: Any, recording: Recording, poses: Table, wheels: Table) ->
             markersize=5,
             label="contacts" if number == recording.robots[-1] and len(touched) else None,
         )
-    axes.set_xlim(0, saved.arena.width_mm)
-    axes.set_ylim(0, saved.arena.height_mm)
+    things = {"lamp": ("*", css(LAMPLIGHT))} if len(picture.lamps) else {}
+    things |= {"ball" if body["what"] == BALL else "cylinder": ("o", css(body_colour(body))) for body in picture.bodies}
+    for what, (marker, fill_colour) in things.items():
+        axes.plot([], [], marker, color=fill_colour, markeredgecolor="black", label=what)
     if 1 <= len(recording.robots) <= 6:
-        legend = axes.legend(fontsize="x-small", loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
-        legend.set_in_layout(False)
+        _legend_above(axes, PATH_COLUMNS)
 
 
-def _draw_heat(axes: Any, arena: Arena, poses: Table) -> None:
+def _draw_heat(axes: Any, picture: Picture, poses: Table) -> None:
     """Draw for how long robots were in which part of the arena."""
-    cells = [np.arange(0.0, size_mm + HEAT_MM, HEAT_MM) for size_mm in (arena.width_mm, arena.height_mm)]
+    sides_mm = picture.arena.width_mm, picture.arena.height_mm
+    cells = [np.arange(0.0, side_mm + HEAT_MM, HEAT_MM) for side_mm in sides_mm]
     seconds, x_edges, y_edges = np.histogram2d(poses["x_mm"], poses["y_mm"], bins=cells)
-    _draw_arena(axes, arena)
+    _draw_arena(axes, picture)
     shown = np.ma.masked_equal(seconds.T * 0.01, 0.0)
     # As vectors, its cells would be most of a large picture.
     mesh = axes.pcolormesh(x_edges, y_edges, shown, cmap="viridis", alpha=0.9, rasterized=True)
-    axes.figure.colorbar(mesh, ax=axes, label="seconds")
-    axes.set_xlim(0, arena.width_mm)
-    axes.set_ylim(0, arena.height_mm)
+    # The bar lies above, so that these axes are as large as those of the paths.
+    bar = axes.inset_axes((0.5, 1.04, 0.5, 0.05))
+    axes.figure.colorbar(mesh, cax=bar, orientation="horizontal", ticklocation="top")
+    bar.tick_params(labelsize="small")
+    bar.text(-0.03, 0.5, "seconds", transform=bar.transAxes, ha="right", va="center", fontsize="small")
+    axes.set(xlim=(0, sides_mm[0]), ylim=(0, sides_mm[1]))
 
 
 def _draw_readings(axes: Any, table: Table) -> None:
@@ -210,7 +231,7 @@ def _draw_readings(axes: Any, table: Table) -> None:
     table = _thinned(table[table["command"] == "N"])
     for sensor in range(8):
         axes.plot(table["time_s"], table["counts"][:, sensor], linewidth=0.7, label=str(sensor))
-    axes.set_ylabel("proximity, sensors 0 to 7")
+    axes.set_ylabel("proximity")
     axes.set_xlabel("time [s]")
     axes.grid(alpha=0.3)
     if len(table):
@@ -224,12 +245,12 @@ def _draw_speeds(axes: Any, table: Table) -> None:
     table = _thinned(table)
     for side, colour in (("left", "C0"), ("right", "C3")):
         axes.plot(table["time_s"], table[f"{side}_speed"], color=colour, linewidth=0.7, label=side)
-        asked = f"{side}, asked for"
-        axes.plot(table["time_s"], table[f"{side}_setpoint"], color=colour, linewidth=0.7, linestyle=":", label=asked)
-    axes.set_ylabel("pulses/10 ms")
+        axes.plot(table["time_s"], table[f"{side}_setpoint"], color=colour, linewidth=0.7, linestyle=":")
+    axes.plot([], [], color="gray", linewidth=0.9, linestyle=":", label="asked for")
+    axes.set_ylabel("speed [pulses/10 ms]")
     axes.set_xlabel("time [s]")
     axes.grid(alpha=0.3)
-    _legend_above(axes, 4)
+    _legend_above(axes, 3)
 
 
 def _draw_time(axes: Any, recording: Recording, robot: int) -> None:
@@ -244,14 +265,13 @@ def _draw_time(axes: Any, recording: Recording, robot: int) -> None:
         begin_s += share_s
     axes.set_yticks([])
     axes.set_xlabel(f"where the time of robot {robot} went [s]")
-    _legend_above(axes, 4)
+    _legend_above(axes, 2)
 
 
 def _legend_above(axes: Any, columns: int) -> None:
     """Put a legend over the axes, where it hides no line and takes no width from them."""
     place = {"loc": "lower right", "bbox_to_anchor": (1.0, 0.97), "frameon": False}
-    legend = axes.legend(fontsize="xx-small", ncols=columns, columnspacing=1.0, handlelength=1.4, **place)
-    legend.set_in_layout(False)
+    axes.legend(fontsize="small", ncols=columns, columnspacing=1.0, handlelength=1.2, labelspacing=0.2, **place)
 
 
 def _thinned(table: Table) -> Table:

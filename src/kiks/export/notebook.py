@@ -9,8 +9,9 @@ from html import escape
 from typing import TYPE_CHECKING, Any
 
 from kiks.batch.number_table import NumberTable
-from kiks.export.figures import COLUMN_INCHES, figure_of, file_of
+from kiks.export.figures import COLUMN_INCHES, figure_of
 from kiks.export.pictures import Picture
+from kiks.export.vector_pen import file_of
 from kiks.model.arena import Arena
 from kiks.recording.recording import Recording
 from kiks.sim.explanation import Explanation, LightExplanation
@@ -32,12 +33,12 @@ def simulation(sim: Simulation) -> Bundle:
     """Return a picture of a simulation as it stands."""
     with sim.lock:
         picture = Picture.of_simulation(sim)
-    return image(picture.image())
+    return image(picture.captioned())
 
 
 def arena(given: Arena) -> Bundle:
     """Return a picture of an arena."""
-    return image(Picture.of_arena(given).image())
+    return image(Picture.of_arena(given).captioned())
 
 
 def arenas(of: Any) -> Bundle:

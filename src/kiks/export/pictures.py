@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from base64 import b64encode
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
@@ -13,28 +12,34 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.engine.state import BALL, BODY, CYLINDER
+from kiks.export.caption import LETTERS_A_LINE, Caption, Sign, scale_bar
+from kiks.export.kinds import KINDS
 from kiks.export.looks import Colour, body_colour, robot_colour
-from kiks.export.sheet import FINER, Place, Sheet, ground_picture, path_colour, path_mm
+from kiks.export.sheet import FINER, LAMP_MM, WHITE, Place, Sheet, ground_picture, path_colour, path_mm, pen_on
+from kiks.export.vector_pen import UNIT_POINTS, VectorPen, file_of
 from kiks.model.arena import Arena, Ball
 from kiks.model.atomic_files import ending_of, replace_file
 from kiks.model.robot import Body, RobotSpec
 from kiks.recording.moments import moments
 from kiks.recording.recording import Recording
 from kiks.sim.simulation import Simulation
-from kiks.units import NS_PER_S
+from kiks.units import NS_PER_S, s_from_ns
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
     from PIL.Image import Image
 
-PICTURES = {".png": "PNG", ".svg": "SVG", ".pdf": "PDF", ".jpg": "JPEG"}
-"""The types of pictures by their endings."""
+PICTURES = KINDS["picture"].endings
+"""The endings of pictures."""
 
 POINT_NS, POINTS_MAX = NS_PER_S // 10, 20_000
 """Time between two points of a path [ns], and the most points of a path: of a longer run they lie farther apart."""
 
 _LONGEST_SIDE = 1200
-_PAGE_INCHES = 7.0
+_PAGE_SHARE = 0.6
 _BODY_PATH_MM = 2.4
+_PATH_SHARE = 0.002  # of the arena: a thinner path is not seen in a column of a paper
+_PATHS_MAX = 6
 
 
 class Trails(NamedTuple):
@@ -61,6 +66,7 @@ class Picture:
         robots: The robots' shapes.
         trails: The paths that are drawn, with faint rings where they begin; None for none.
         spec: The robot for whose sensors the light of lamps is drawn; a Khepera if None.
+        title: What the caption begins with: who drove, with which seed.
 
     Example:
         >>> Picture.of_simulation(Simulation(Arena.box(300, 200))).image().size
@@ -74,13 +80,15 @@ class Picture:
     robots: Sequence[Body]
     trails: Trails | None = None
     spec: RobotSpec | None = None
+    title: str = ""
 
     @classmethod
     def of_simulation(cls, sim: Simulation) -> Picture:
         """Return the picture of a simulation as it stands."""
+        title = ", ".join(filter(None, (sim.arena.name, f"seed {sim.seed}", f"{sim.time_s:.1f} s")))
         robots = [spec.body for spec in sim.specs]
         spec = next(iter(sim.specs), None)
-        return cls(sim.arena, sim.world.lamps, sim.bodies(), sim.poses(), robots, spec=spec)
+        return cls(sim.arena, sim.world.lamps, sim.bodies(), sim.poses(), robots, spec=spec, title=title)
 
     @classmethod
     def of_arena(cls, arena: Arena) -> Picture:
@@ -91,7 +99,8 @@ class Picture:
             record["brightness"], record["what"] = body.brightness, BALL if isinstance(body, Ball) else CYLINDER
         lamps, starts = (np.array(rows, np.float64) for rows in (arena.lamps, arena.starts))
         robots = [RobotSpec.load("khepera").body] * len(starts)
-        return cls(arena, lamps.reshape(-1, 4), bodies, starts.reshape(-1, 3), robots)
+        title = ", ".join(filter(None, (arena.name, f"{arena.width_mm:g} x {arena.height_mm:g} mm")))
+        return cls(arena, lamps.reshape(-1, 4), bodies, starts.reshape(-1, 3), robots, title=title)
 
     @classmethod
     def of_recording(cls, recording: Recording, time_ns: int) -> Picture:
@@ -108,37 +117,89 @@ class Picture:
                 places.setdefault(number, []).append((x_mm, y_mm))
         robots = [spec.body for spec in moment.saved.specs]
         saved, trails = moment.saved, Trails(paths, places)
+        title = f"{recording.what}, {s_from_ns(time_ns - begin_ns):.1f} s"
         spec = next(iter(saved.specs), None)
-        return cls(saved.arena, saved.lamps, moment.bodies, moment.poses, robots, trails, spec)
+        return cls(saved.arena, saved.lamps, moment.bodies, moment.poses, robots, trails, spec, title)
 
     def image(self, *, longest_side: int = _LONGEST_SIDE) -> Image:
-        """Return it in pixels, of which a side has at most so many."""
+        """Return the arena alone in pixels, of which a side has at most so many."""
+        return _shrunk(self._image(longest_side))
+
+    def captioned(self) -> Image:
+        """Return it in pixels, with its caption."""
         from PIL import Image
 
-        sheet = self._sheet(longest_side)
-        width, height = sheet.image.size
-        return sheet.image.resize((width // FINER, height // FINER), Image.Resampling.LANCZOS)
+        arena = self._image(_LONGEST_SIDE)
+        width = _page_width(arena.size)
+        caption = Caption(self.title, self._signs(arena.width, width), width, pen_on(arena).textlength)
+        words = Image.new("RGB", (width, caption.height), WHITE)
+        caption.draw(Sheet(pen_on(words), 1.0, 0.0, 0.0))
+        page = Image.new("RGB", (width, arena.height + caption.height), WHITE)
+        page.paste(arena, (0, 0))
+        page.paste(words, (0, arena.height))
+        return _shrunk(page)
 
     def save(self, path: str | Path) -> None:
-        """Write it to a file: with lines that stay sharp if it ends in .svg, else in pixels."""
-        if _type_of(path) != "SVG":
-            save_image(self.image(), path)
-            return
-        sheet = self._sheet(_LONGEST_SIDE, pen := _SvgPen())
-        replace_file(path, _svg(sheet.image, pen.elements), "a picture")
+        """Write it to a file, with its caption: with lines that stay sharp if it ends in .svg or .pdf."""
+        kind = ending_of(path, "a picture", PICTURES)
+        if kind in (".svg", ".pdf"):
+            replace_file(path, file_of(self._figure(), kind[1:]), "a picture")
+        else:
+            save_image(self.captioned(), path)
 
-    def _sheet(self, longest_side: int, pen: _SvgPen | None = None) -> Sheet:
-        """Return a sheet with all of it."""
-        arena, count = self.arena, len(self.poses)
-        scale = FINER * min(longest_side / max(arena.width_mm, arena.height_mm), 2.0)
-        size = (max(round(arena.width_mm * scale), FINER), max(round(arena.height_mm * scale), FINER))
-        sheet = Sheet(ground_picture(arena, self.lamps, self.spec, size), scale, 0.0, arena.height_mm, pen)
+    def draw_on(self, axes: Any, inches: float) -> None:
+        """Draw the arena on axes of Matplotlib, in millimetres.
+
+        Args:
+            axes: The axes.
+            inches: About how wide it is on paper, from which the width of lines follows.
+        """
+        arena = self.arena
+        scale = inches * 72 / UNIT_POINTS / arena.width_mm
+        axes.set(xlim=(0, arena.width_mm), ylim=(0, arena.height_mm), aspect="equal")
+        pen = VectorPen(axes, scale, arena.height_mm)
+        pen.ground(arena, self.lamps, self.spec)
+        self._draw(Sheet(pen, scale, 0.0, arena.height_mm))
+
+    def _image(self, longest_side: int) -> Image:
+        """Return the arena, FINER times as large."""
+        arena, (width, height) = self.arena, self._size(longest_side)
+        image = ground_picture(arena, self.lamps, self.spec, (width, height))
+        self._draw(Sheet(pen_on(image), width / arena.width_mm, 0.0, arena.height_mm))
+        return image
+
+    def _figure(self) -> Figure:
+        """Return it as a figure of Matplotlib, with its caption."""
+        from matplotlib.figure import Figure
+
+        width, height = self._size(_LONGEST_SIDE)
+        across = _page_width((width, height))
+        caption = Caption(self.title, self._signs(width, across), across, VectorPen.textlength)
+        whole, inch = height + caption.height, 72 / UNIT_POINTS
+        figure = Figure(figsize=(across / inch, whole / inch))
+        self.draw_on(figure.add_axes((0, caption.height / whole, width / across, height / whole)), width / inch)
+        words = figure.add_axes((0, 0, 1, caption.height / whole), xlim=(0, across), ylim=(-caption.height, 0))
+        caption.draw(Sheet(VectorPen(words, 1.0, 0.0), 1.0, 0.0, 0.0))
+        for axes in figure.axes:
+            axes.set(xticks=[], yticks=[])
+            axes.spines[:].set_visible(False)
+        return figure
+
+    def _size(self, longest_side: int) -> tuple[int, int]:
+        """Return width and height of the arena [pixels of a sheet]."""
+        sides_mm = self.arena.width_mm, self.arena.height_mm
+        scale = FINER * min(longest_side / max(sides_mm), 2.0)
+        width, height = (max(round(side_mm * scale), FINER) for side_mm in sides_mm)
+        return width, height
+
+    def _draw(self, sheet: Sheet) -> None:
+        """Draw all of it on a sheet that has the walls."""
+        count, seen_mm = len(self.poses), _PATH_SHARE * max(self.arena.width_mm, self.arena.height_mm)
         for x_mm, y_mm, _, is_on in self.lamps.tolist():
             sheet.lamp((x_mm, y_mm), is_on=bool(is_on))
         if self.trails is not None:
             for index, (robot, path) in enumerate(zip(self.robots, self.trails.robots, strict=False)):
-                colours = (path_colour(index, count, k / max(len(path) - 1, 1)) for k in range(len(path)))
-                sheet.path(path, colours, path_mm(count))
+                sheet.path(path, _path_colours(index, count, len(path)), max(path_mm(count), seen_mm))
                 sheet.ring(path[0][:2], robot.radius_mm, (*robot_colour(index), 90))
             for body in self.bodies:
                 places = self.trails.bodies[int(body["number"])]
@@ -148,7 +209,61 @@ class Picture:
             sheet.body(body)
         for index, (pose, robot) in enumerate(zip(self.poses.tolist(), self.robots, strict=False)):
             sheet.robot(pose, robot, index)
-        return sheet
+
+    def _signs(self, width: int, page_width: int) -> list[Sign]:
+        """Return what its caption explains, by the width of the arena and of the page [pixels]."""
+        signs = [scale_bar(self.arena.width_mm, width / page_width * LETTERS_A_LINE)]
+        count = len(self.poses) if self.trails is not None and self.trails.robots else 0
+        signs += [_path_sign(index, count) for index in range(count if count <= _PATHS_MAX else 1)]
+        signs += [_lamp_sign(is_on=is_on) for is_on in (True, False) if (self.lamps[:, 3] == is_on).any()]
+        firsts = (self.bodies[self.bodies["what"] == what][:1] for what in (BALL, CYLINDER))
+        signs += [_body_sign(body) for first in firsts for body in first]
+        return signs
+
+
+def _shrunk(image: Image) -> Image:
+    from PIL import Image
+
+    return image.resize((image.width // FINER, image.height // FINER), Image.Resampling.LANCZOS)
+
+
+def _page_width(size: tuple[int, int]) -> int:
+    """Return the width of the page of an arena [pixels]: a narrow one leaves some of it free, for words."""
+    return max(size[0], round(_PAGE_SHARE * size[1]))
+
+
+def _path_colours(index: int, robot_count: int, points: int) -> Iterator[Colour]:
+    return (path_colour(index, robot_count, k / max(points - 1, 1)) for k in range(points))
+
+
+def _path_sign(index: int, robot_count: int) -> Sign:
+    """Return the sign of a robot's path, with the ring where it began; one for all if there are many."""
+    radius_mm, end_mm = 13.0, 90.0
+
+    def draw(sheet: Sheet) -> None:
+        line = [(x_mm, 0.0) for x_mm in np.linspace(radius_mm, end_mm, 26).tolist()]
+        sheet.path(line, _path_colours(index, robot_count, len(line)), 2.4)
+        sheet.ring(line[0], radius_mm, (*robot_colour(index), 90))
+
+    text = f"robot {index + 1}, from its start"
+    return Sign(draw, end_mm, text if robot_count <= _PATHS_MAX else "each robot, from its start")
+
+
+def _lamp_sign(*, is_on: bool) -> Sign:
+    def draw(sheet: Sheet) -> None:
+        sheet.lamp((LAMP_MM, 0.0), is_on=is_on)
+
+    return Sign(draw, 2 * LAMP_MM, "lamp" if is_on else "lamp that is off")
+
+
+def _body_sign(body: Any) -> Sign:
+    body, radius_mm = body.copy(), float(body["radius_mm"])
+    body["x_mm"], body["y_mm"] = radius_mm, 0.0
+
+    def draw(sheet: Sheet) -> None:
+        sheet.body(body)
+
+    return Sign(draw, 2 * radius_mm, "ball" if body["what"] == BALL else "cylinder", 2.2 * radius_mm)
 
 
 def save_picture(recording: Recording, path: str | Path, *, time_s: float | None = None) -> None:
@@ -159,80 +274,13 @@ def save_picture(recording: Recording, path: str | Path, *, time_s: float | None
         path: The picture's file; .svg has lines that stay sharp.
         time_s: When [s]; the end of the recording if left out.
     """
-    _type_of(path)
+    ending_of(path, "a picture", PICTURES)
     time_ns = recording.log.end_ns if time_s is None else recording.time_ns(time_s)
     Picture.of_recording(recording, time_ns).save(path)
 
 
 def save_image(image: Image, path: str | Path) -> None:
-    """Write an image in pixels; the type follows from the ending."""
-    pixels, kind = BytesIO(), _type_of(path)
-    # PDF: so many pixels an inch that it fits a page across, and pixels as they are.
-    image.save(pixels, kind, **({"resolution": image.width / _PAGE_INCHES, "quality": 95} if kind == "PDF" else {}))
-    replace_file(path, pixels.getvalue(), "a picture")
-
-
-def _type_of(path: str | Path) -> str:
-    return PICTURES[ending_of(path, "a picture", PICTURES)]
-
-
-class _SvgPen:
-    """Draws what Pillow's `ImageDraw` would draw, as elements of SVG; of its methods those that a sheet uses."""
-
-    def __init__(self) -> None:
-        self.elements: list[str] = []
-
-    def ellipse(
-        self, box: tuple[float, ...], fill: Colour | None = None, outline: Colour | None = None, width: float = 1
-    ) -> None:
-        left, top, right, bottom = box
-        edge = 0.0 if outline is None else width / 2  # Pillow's outline lies within the box
-        place = (
-            f'cx="{(left + right) / 2:.1f}" cy="{(top + bottom) / 2:.1f}" r="{max((right - left) / 2 - edge, 0):.1f}"'
-        )
-        self._add("circle", place, fill, outline, width)
-
-    def polygon(self, points: Sequence[Place], fill: Colour | None = None) -> None:
-        self._add("polygon", _svg_points(points), fill, None, 0)
-
-    def line(self, points: Sequence[Place], fill: Colour | None = None, width: float = 1, joint: str = "") -> None:
-        self._add("polyline", _svg_points(points) + ' stroke-linejoin="round"', None, fill, width)
-
-    def text(self, at: Place, text: str, fill: Colour | None = None, font: Any = None, **_others: Any) -> None:
-        place = f'x="{at[0]:.1f}" y="{at[1]:.1f}" font-size="{font.size:.1f}" font-family="sans-serif"'
-        place += ' font-weight="bold" text-anchor="middle" dominant-baseline="central"'
-        self._add("text", place, fill, None, 0, text)
-
-    def _add(
-        self, kind: str, shape: str, fill: Colour | None, stroke: Colour | None, width: float, text: str = ""
-    ) -> None:
-        words = [kind, shape, *_svg_colour("fill", fill)]
-        if stroke is not None:
-            words += [*_svg_colour("stroke", stroke), f'stroke-width="{width:.1f}"']
-        self.elements.append(f"<{' '.join(words)}>{text}</{kind}>")
-
-
-def _svg_points(points: Sequence[Place]) -> str:
-    return f'points="{" ".join(f"{x:.1f},{y:.1f}" for x, y in points)}"'
-
-
-def _svg_colour(name: str, colour: Colour | None) -> Iterable[str]:
-    yield f'{name}="none"' if colour is None else f'{name}="#{bytes(colour[:3]).hex()}"'
-    if colour is not None and len(colour) > 3:
-        yield f'{name}-opacity="{colour[3] / 255:.2f}"'
-
-
-def _svg(image: Image, elements: Sequence[str]) -> str:
-    """Return a file with the picture of a sheet, and elements above it; it is shown smaller than they are."""
+    """Write an image in pixels; the type follows from the ending, .png or .jpg."""
     pixels = BytesIO()
-    image.save(pixels, "PNG")
-    size = f'width="{image.width}" height="{image.height}"'
-    data = b64encode(pixels.getvalue()).decode()
-    shown = f'width="{image.width // FINER}" height="{image.height // FINER}"'
-    lines = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {image.width} {image.height}" {shown}>',
-        f'<image {size} href="data:image/png;base64,{data}"/>',
-        *elements,
-        "</svg>",
-    ]
-    return "\n".join(lines) + "\n"
+    image.save(pixels, "PNG" if ending_of(path, "a picture", PICTURES) == ".png" else "JPEG")
+    replace_file(path, pixels.getvalue(), "a picture")

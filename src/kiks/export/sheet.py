@@ -106,22 +106,25 @@ def font(size: float) -> FreeTypeFont | ImageFont:
     return ImageFont.load_default(size)
 
 
+def pen_on(image: Image) -> Any:
+    """Return what draws on an image."""
+    from PIL import ImageDraw
+
+    return ImageDraw.Draw(image, "RGBA")
+
+
 class Sheet:
     """A picture in the making, in millimetres; later strokes lie over earlier ones.
 
     Args:
-        image: What is drawn on.
+        pen: What strokes are drawn with: `pen_on` an image, or a `VectorPen`.
         scale: Pixels of it a millimetre.
         left_mm: Place of its left side [mm].
         top_mm: Place of its upper side [mm].
-        pen: What strokes are drawn with, instead of pixels of `image`.
     """
 
-    def __init__(self, image: Image, scale: float, left_mm: float, top_mm: float, pen: Any = None) -> None:
-        from PIL import ImageDraw
-
-        self.image, self.scale, self.left_mm, self.top_mm = image, scale, left_mm, top_mm
-        self.pen: Any = ImageDraw.Draw(image, "RGBA") if pen is None else pen
+    def __init__(self, pen: Any, scale: float, left_mm: float, top_mm: float) -> None:
+        self.pen, self.scale, self.left_mm, self.top_mm = pen, scale, left_mm, top_mm
 
     def point(self, place: Sequence[float]) -> Place:
         """Return the pixel of a place [mm]."""

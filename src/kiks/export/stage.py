@@ -26,6 +26,7 @@ from kiks.export.sheet import (
     mixed,
     path_colour,
     path_mm,
+    pen_on,
 )
 from kiks.model.arena import Arena
 from kiks.recording.moments import LEAP_MM, Moment
@@ -70,7 +71,7 @@ class Canvas:
         bottom = min(max(math.ceil(max(rows) + margin), top + 1), height)
         part = self.pixels[top:bottom, left:right]
         image = Image.fromarray(part).resize((FINER * (right - left), FINER * (bottom - top)), Image.Resampling.NEAREST)
-        yield Sheet(image, FINER * self.scale, self.left_mm + left / self.scale, self.top_mm - top / self.scale)
+        yield Sheet(pen_on(image), FINER * self.scale, self.left_mm + left / self.scale, self.top_mm - top / self.scale)
         part[...] = np.asarray(image.reduce(FINER))
 
 

@@ -95,10 +95,26 @@ class Recording:
         return self.log.state_before(self.log.begin_ns)
 
     @property
+    def what(self) -> str:
+        """What ran: its programs, the arena, and the seed.
+
+        Example:
+            >>> import tempfile, kiks
+            >>> file = tempfile.mkdtemp() + "/run.mcap"
+            >>> sim = kiks.Simulation(kiks.Arena.load("office"), seed=1)
+            >>> with sim.record(file):
+            ...     sim.run(2.5)
+            >>> kiks.Recording(file).what
+            'office, seed 1'
+        """
+        programs = ", ".join(dict.fromkeys(name.partition("-")[2] or name for name in self.programs))
+        ran = " in ".join(filter(None, (programs, self.start.arena.name)))
+        return ", ".join(filter(None, (ran, f"seed {self.start.head.seed}")))
+
+    @property
     def title(self) -> str:
-        """A line that says what ran."""
-        what = ", ".join(self.programs) or self.about.get("arena", "")
-        return f"{what}, seed {self.start.head.seed}, {self.duration_s:.1f} s"
+        """What ran, and for how long."""
+        return f"{self.what}, {self.duration_s:.1f} s"
 
     def project_at(self, time_s: float) -> Project:
         """Return the world at a time as a project, with robots, bodies and lamps where they are then.
