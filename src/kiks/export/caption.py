@@ -11,6 +11,9 @@ from kiks.export.sheet import INK, WHITE, Sheet, font
 LETTERS_A_LINE = 38
 """Width of a picture in heights of its letters, which have 6.3 points in a column of a paper, 85 mm wide."""
 
+LETTER_PIXELS_MIN = 40
+"""Least height of letters [pixels of the sheet]: on a screen, which shows a quarter of them, that is still read."""
+
 LETTER_MM = 30.0
 """Height of a letter in the millimetres of signs."""
 
@@ -53,7 +56,7 @@ class Caption:
     """
 
     def __init__(self, title: str, signs: Sequence[Sign], width: float, text_length: Callable[..., float]) -> None:
-        self._size = width / LETTERS_A_LINE
+        self._size = letter_pixels(width)
         self._placed: list[tuple[float, int, str, Sign | None]] = []
         gap, right = _GAP * self._size, width - _MARGIN * self._size
         row, x = 0, 0.0
@@ -83,16 +86,20 @@ class Caption:
             pen.text((x, y), text, fill=INK, font=font(size), anchor="lm")
 
 
-def scale_bar(width_mm: float, letters: float) -> Sign:
+def letter_pixels(width: float) -> float:
+    """Return the height of the letters under a picture of a width in pixels."""
+    return max(width / LETTERS_A_LINE, LETTER_PIXELS_MIN)
+
+
+def scale_bar(width_mm: float, letter_mm: float) -> Sign:
     """Return the sign of a round length, a fifth of a picture or less.
 
     Args:
         width_mm: Width of the picture [mm].
-        letters: Its width in heights of letters.
+        letter_mm: Height of a letter on its scale [mm].
     """
     step_mm = 10 ** math.floor(math.log10(width_mm / 5))
     length_mm = max(part * step_mm for part in (1, 2, 5) if part * step_mm <= width_mm / 5)
-    letter_mm = width_mm / letters
 
     def draw(sheet: Sheet) -> None:
         half = 0.3 * letter_mm

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.engine.state import BALL, BODY, CYLINDER
-from kiks.export.caption import LETTERS_A_LINE, Caption, Sign, scale_bar
+from kiks.export.caption import Caption, Sign, letter_pixels, scale_bar
 from kiks.export.kinds import KINDS
 from kiks.export.looks import Colour, body_colour, robot_colour
 from kiks.export.sheet import FINER, LAMP_MM, WHITE, Place, Sheet, ground_picture, path_colour, path_mm, pen_on
@@ -212,7 +212,8 @@ class Picture:
 
     def _signs(self, width: int, page_width: int) -> list[Sign]:
         """Return what its caption explains, by the width of the arena and of the page [pixels]."""
-        signs = [scale_bar(self.arena.width_mm, width / page_width * LETTERS_A_LINE)]
+        pixel_mm = self.arena.width_mm / width
+        signs = [scale_bar(page_width * pixel_mm, letter_pixels(page_width) * pixel_mm)]
         count = len(self.poses) if self.trails is not None and self.trails.robots else 0
         signs += [_path_sign(index, count) for index in range(count if count <= _PATHS_MAX else 1)]
         signs += [_lamp_sign(is_on=is_on) for is_on in (True, False) if (self.lamps[:, 3] == is_on).any()]
