@@ -63,25 +63,23 @@ class VectorPen:
         self._transform = Affine2D().scale(1 / scale, -1 / scale).translate(0, top_mm) + axes.transData
 
     def ground(self, arena: Arena, lamps: NDArray[np.float64], spec: RobotSpec | None) -> None:
-        """Draw what `ground_picture` draws, as outlines: of equal light, and of walls, each grey over the darker ones."""
+        """Draw what `ground_picture` draws, as outlines; each grey lies over the darker ones."""
         self._axes.set_facecolor(_colour(FLOOR))
         light = light_map(arena, lamps, spec or RobotSpec.load("khepera"))
         if light is not None:
-            steps = np.linspace(0.0, 1.0, _LIGHT_STEPS + 1)
-            colours = [mixed(FLOOR, LAMPLIGHT, LIGHT_SHARE * share) for share in steps[1:]]
-            cell_mm = arena.width_mm / light.shape[1]
-            steps[0] = 0.2 * steps[1]
-            self._fill(np.flipud(light), cell_mm, 0.5, steps, colours)
+            for share in np.linspace(0.0, 1.0, _LIGHT_STEPS)[1:].tolist():
+                colour = mixed(FLOOR, LAMPLIGHT, LIGHT_SHARE * share)
+                self._fill(np.flipud(light), share, arena.width_mm / light.shape[1], 0.5, colour)
         cells, cell_mm = coarse_walls(arena, _WALL_CELLS_MAX)
         cells = np.pad(cells, 1)  # a wall at the edge has an outline there, too
         for brightness in np.unique(cells[cells > 0]).tolist():
-            grey = (wall_grey(brightness),) * 3
-            self._fill((cells >= brightness).astype(np.float64), cell_mm, -0.5, [0.5, 2.0], [grey])
+            self._fill(cells >= brightness, 0.5, cell_mm, -0.5, (wall_grey(brightness),) * 3)
 
-    def _fill(self, cells: Any, cell_mm: float, first: float, levels: Any, colours: Sequence[Colour]) -> None:
-        """Fill the areas between levels, with the middle of the first cell so many cells from the lower left corner."""
+    def _fill(self, cells: Any, level: float, cell_mm: float, first: float, colour: Colour) -> None:
+        """Fill the area above a level; the middle of the first cell is so many cells from the lower left corner."""
         x_mm, y_mm = ((np.arange(count) + first) * cell_mm for count in cells.shape[::-1])
-        self._axes.contourf(x_mm, y_mm, cells, levels=levels, colors=[*map(_colour, colours)], zorder=1)
+        levels = [level, 2.0]
+        self._axes.contourf(x_mm, y_mm, cells.astype(np.float64), levels=levels, colors=[_colour(colour)], zorder=1)
 
     def ellipse(
         self, box: tuple[float, ...], fill: Colour | None = None, outline: Colour | None = None, width: float = 1
