@@ -192,7 +192,7 @@ def test_a_robot_starts_in_the_middle_of_the_widest_place():
     assert arena.find_start(ROBOT_MM) == Pose(200.5, 150.5, math.pi / 2)
     raster = arena.brightness.copy()
     raster[:, 130] = 255
-    pose = replace(arena, brightness=raster).find_start(ROBOT_MM)
+    pose = replace(arena, ground=raster).find_start(ROBOT_MM)
     assert pose.x_mm == pytest.approx(261, abs=10)
     assert pose.y_mm == 150.5
 

@@ -7,7 +7,8 @@ x points right, y up, and (0, 0) is the lower left corner of the raster. Picture
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -29,8 +30,9 @@ from kiks.model.raster import (
     cells_per_pixel,
 )
 from kiks.model.wall_tables import WallTables, tables_of
+from kiks.model.walls import Wall, painted
 
-__all__ = ["MAX_CELLS", "PAD", "SIZE_MIN_MM", "Arena", "Ball", "Cylinder", "Lamp", "Pose"]
+__all__ = ["MAX_CELLS", "PAD", "SIZE_MIN_MM", "Arena", "Ball", "Cylinder", "Lamp", "Pose", "Wall"]
 
 _KINDS = (
     ("starts", "start", Pose),
@@ -49,14 +51,18 @@ class Arena:
     """A checked arena that never changes; `dataclasses.replace` makes a changed copy.
 
     Args:
-        brightness: uint8 [row, column], row 0 at the bottom: 0 is floor, 1..255 a wall from black to white. Kept
-            read-only; copied unless it already is.
+        ground: Its picture: uint8 [row, column], row 0 at the bottom: 0 is floor, 1..255 a wall from black to white.
+            Kept read-only; copied unless it already is.
         mm_per_cell: Edge of a cell [mm], at most 1.
         name: Its name.
         starts: Starts of robots, each on floor.
         lamps: Lamps, each inside the raster.
         balls: Balls, each centre on floor.
         cylinders: Cylinders, each centre on floor.
+        walls: Walls over the picture: lines, boxes and discs, the later ones over the earlier ones.
+
+    Attributes:
+        brightness: The picture with these walls, as sensors see it: uint8 [row, column], row 0 at the bottom.
 
     Example:
         >>> arena = Arena.box(400, 300)
@@ -66,21 +72,23 @@ class Arena:
         False
     """
 
-    brightness: npt.NDArray[np.uint8]
+    ground: npt.NDArray[np.uint8]
     mm_per_cell: float
     name: str
     starts: tuple[Pose, ...] = ()
     lamps: tuple[Lamp, ...] = ()
     balls: tuple[Ball, ...] = ()
     cylinders: tuple[Cylinder, ...] = ()
+    walls: tuple[Wall, ...] = ()
+    brightness: npt.NDArray[np.uint8] = field(init=False)
     _tables: WallTables = field(init=False)
 
     def __post_init__(self) -> None:
         check_kind("name", self.name, str)
-        given = self.brightness
+        given = self.ground
         if not isinstance(given, np.ndarray) or given.dtype != np.uint8 or given.ndim != 2:
             raise ParameterError(
-                f"brightness must be a uint8 array [row, column], but it was {_described(given)}. "
+                f"ground must be a uint8 array [row, column], but it was {_described(given)}. "
                 "Arena.from_array accepts other integers."
             )
         cells_per_pixel(given.shape[0], given.shape[1], self.mm_per_cell)
@@ -89,30 +97,34 @@ class Arena:
                 f"mm_per_cell must be at most 1, but it was {shown(self.mm_per_cell)}. "
                 "Arena.from_array cuts coarser pixels into cells."
             )
-        if given.all():
+        if given.flags.writeable or given.base is not None or not given.flags.c_contiguous:
+            given = given.copy(order="C")
+            given.setflags(write=False)
+        walls = _checked_walls(self.walls)
+        raster = painted(given, self.mm_per_cell, walls)
+        if raster.all():
             raise ArenaError(
                 f"Arena {shown(self.name)} must have floor, but every cell is wall. Black (0) is floor and all else "
                 "wall: invert the picture if it was drawn the other way round."
             )
-        if given.flags.writeable or given.base is not None or not given.flags.c_contiguous:
-            given = given.copy(order="C")
-            given.setflags(write=False)
-        object.__setattr__(self, "brightness", given)
+        object.__setattr__(self, "ground", given)
+        object.__setattr__(self, "walls", walls)
+        object.__setattr__(self, "brightness", raster)
         object.__setattr__(self, "mm_per_cell", float(self.mm_per_cell))
-        object.__setattr__(self, "_tables", tables_of(given, self.mm_per_cell))
+        object.__setattr__(self, "_tables", tables_of(raster, self.mm_per_cell))
         for name, label, kind in _KINDS:
-            entries = checked_places(label, kind, getattr(self, name), given, self.mm_per_cell)
+            entries = checked_places(label, kind, getattr(self, name), raster, self.mm_per_cell)
             object.__setattr__(self, name, entries)
 
     def __repr__(self) -> str:
         counts = [(len(getattr(self, name)), label) for name, label, _ in _KINDS]
+        counts.append((len(self.walls), "wall"))
         held = "".join(f", {counted(count, label)}" for count, label in counts if count)
         return f"<Arena {shown(self.name)}: {self.width_mm:g} x {self.height_mm:g} mm{held}>"
 
     def __reduce__(self) -> tuple[Any, ...]:
         # Through the constructor: a plain pickle would bring the raster back writable and carry the caches along.
-        parts = (self.brightness, self.mm_per_cell, self.name, self.starts, self.lamps, self.balls, self.cylinders)
-        return Arena, parts
+        return Arena, tuple(getattr(self, each.name) for each in fields(self) if each.init)
 
     def __deepcopy__(self, memo: dict[int, Any]) -> Arena:
         return self  # as it never changes
@@ -377,6 +389,14 @@ class Arena:
         best = int(offset.argmin())
         x_mm, y_mm = ((int(index[best]) + 0.5) * self.mm_per_cell for index in (columns, rows))
         return Pose(x_mm, y_mm, math.pi / 2)
+
+
+def _checked_walls(walls: Any) -> tuple[Wall, ...]:
+    found = tuple(walls) if isinstance(walls, Iterable) else (walls,)
+    for each in found:
+        if not isinstance(each, Wall):
+            raise ParameterError(f"walls must be a list of Wall, but it has {shown(each)}. Give Wall(line_mm=...).")
+    return found
 
 
 def _described(value: object) -> str:

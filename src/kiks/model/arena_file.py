@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -20,6 +20,7 @@ from kiks.model.box import PartMm, SideMm
 from kiks.model.data_file import Coordinate, Number, Point, Rule, Switch, Text, check, parse_toml, read_file, record
 from kiks.model.picture import encode_picture, read_picture
 from kiks.model.raster import MM_PER_PIXEL_MAX, MM_PER_PIXEL_MIN
+from kiks.model.walls import WALLS_MAX, Wall
 
 MIDDLE = 128
 """Grey from which on an inverted picture is floor."""
@@ -76,6 +77,7 @@ class CylinderEntry:
 Starts = Annotated[tuple[StartEntry, ...], Field(max_length=THINGS_MAX, description="Head each with [[start]].")]
 Lamps = Annotated[tuple[LampEntry, ...], Field(max_length=THINGS_MAX, description="Head each with [[lamp]].")]
 Balls = Annotated[tuple[BallEntry, ...], Field(max_length=THINGS_MAX, description="Head each with [[ball]].")]
+WallShapes = Annotated[tuple[Wall, ...], Field(max_length=WALLS_MAX, description="Head each with [[wall]].")]
 Cylinders = Annotated[
     tuple[CylinderEntry, ...], Field(max_length=THINGS_MAX, description="Head each with [[cylinder]].")
 ]
@@ -118,6 +120,7 @@ class ArenaFile(Walls):
     lamp: Lamps = ()
     ball: Balls = ()
     cylinder: Cylinders = ()
+    wall: WallShapes = ()
 
     def __post_init__(self) -> None:
         if self.picture is not None:
@@ -167,7 +170,7 @@ def _picture_arena(file: ArenaFile, folder: Path | None) -> Arena:
 
 
 def places_of(file: Any) -> dict[str, Any]:
-    """Return the starts, lamps, balls and cylinders of a file, for `dataclasses.replace`."""
+    """Return the starts, lamps, balls, cylinders and walls with shapes of a file, for `dataclasses.replace`."""
 
     def at(kind: Callable[..., Any], entries: Iterable[Any], *names: str) -> tuple[Any, ...]:
         return tuple(kind(*each.at_mm, *(getattr(each, name) for name in names)) for each in entries)
@@ -179,6 +182,7 @@ def places_of(file: Any) -> dict[str, Any]:
         "lamps": at(Lamp, file.lamp, "power_w", "is_on"),
         "balls": at(Ball, file.ball, *body),
         "cylinders": at(Cylinder, file.cylinder, *body),
+        "walls": file.wall,
     }
 
 
@@ -190,7 +194,7 @@ def save_arena(arena: Arena, path: str | Path) -> None:
     picture = path.with_suffix(".png")
     keys = {"picture": picture.name, "mm_per_pixel": arena.mm_per_cell, "name": arena.name}
     lines = [*(f"{name} = {toml(value)}" for name, value in keys.items()), *place_lines(arena)]
-    replace_files({picture: encode_picture(arena.brightness), path: "\n".join(lines) + "\n"}, "an arena")
+    replace_files({picture: encode_picture(arena.ground), path: "\n".join(lines) + "\n"}, "an arena")
 
 
 def place_lines(arena: Arena) -> list[str]:
@@ -206,6 +210,9 @@ def place_lines(arena: Arena) -> list[str]:
     for label, places in (("lamp", arena.lamps), ("ball", arena.balls), ("cylinder", arena.cylinders)):
         for place in places:
             entry(label, place, **dict(zip(place._fields[2:], place[2:], strict=True)))
+    for wall in arena.walls:
+        values = ((each.name, getattr(wall, each.name)) for each in fields(wall))
+        lines += ["", "[[wall]]", *(f"{name} = {toml(value)}" for name, value in values if value is not None)]
     return lines
 
 

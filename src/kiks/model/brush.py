@@ -1,48 +1,35 @@
-"""Painting walls: functions from an arena to an arena. Brightness 0 is floor, so painting with it erases.
+"""Drawing walls by hand: functions from an arena to an arena. Brightness 0 is floor, so drawing with it erases.
 
-Need: what is drawn mirrored comes out mirrored, to the cell, and a stroke over 8 m must not take the memory of 8 x 8 m.
-Method: a cell is covered if its centre is, borders included. Everything is counted in whole 64ths of a cell, so that no
-rounding decides about a centre on the border; and a stroke is cut into pieces of a few rows, of which only the columns
-near the stroke are examined.
+Rectangles, straight lines and dots become walls with a shape (`kiks.model.walls`). A freehand stroke becomes a part of
+the picture below them.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from itertools import pairwise
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from kiks.model.arena import Arena
+from kiks.model.cells import PER_CELL, Area, Point, paint, stroke_cells
 from kiks.model.checks import check_count, check_number
 from kiks.model.materials import brightness_of
-
-WIDTH_MAX_MM = 1000.0
-"""Widest brush [mm]."""
+from kiks.model.walls import WIDTH_MAX_MM, Wall, painted
 
 POINTS_MAX = 10_000
 """Most points of one stroke."""
 
 _FAR_MM = 1e5
 
-_PER_CELL = 64
-"""Units in a cell."""
-
-_STRIP_ROWS, _STRIP_COLUMNS = 64, 8192
-
-Point = tuple[float, float]
-
 
 def rectangle(
     arena: Arena, x0_mm: float, y0_mm: float, x1_mm: float, y1_mm: float, brightness: int | str = 255
 ) -> Arena:
-    """Return an arena with a rectangle between two corners [mm] filled, the same one if that changes nothing."""
-    corner, opposite = _cells(arena, [(x0_mm, y0_mm), (x1_mm, y1_mm)])
-    return _painted(arena, _rectangle_cells(arena.brightness.shape, corner, opposite), brightness)
+    """Return an arena with a box between two corners [mm], the same one if that changes nothing."""
+    corners = _checked([(x0_mm, y0_mm), (x1_mm, y1_mm)])
+    return draw(arena, Wall(box_mm=corners, brightness=_grey(brightness)))
 
 
 def line(arena: Arena, points_mm: Sequence[Point], *, width_mm: float, brightness: int | str = 255) -> Arena:
@@ -52,124 +39,68 @@ def line(arena: Arena, points_mm: Sequence[Point], *, width_mm: float, brightnes
         >>> int(line(Arena.box(400, 300), [(100, 50), (100, 250)], width_mm=10, brightness="wood").brightness[150, 100])
         190
     """
-    check_number("width_mm", width_mm, 1 / _PER_CELL, WIDTH_MAX_MM)
+    width_mm = check_number("width_mm", width_mm, 1 / PER_CELL, WIDTH_MAX_MM)
     check_count("the number of points", len(points_mm), 1, POINTS_MAX, "Draw in shorter strokes.")
-    points = _cells(arena, points_mm)
-    return _painted(arena, _stroke_cells(arena.brightness.shape, points, width_mm / arena.mm_per_cell), brightness)
+    points, grey = _checked(points_mm), _grey(brightness)
+    if len(set(points)) == 1:
+        return draw(arena, Wall(disc_mm=points[0], radius_mm=width_mm / 2, brightness=grey))
+    if len(points) == 2:
+        return draw(arena, Wall(line_mm=points, width_mm=width_mm, brightness=grey))
+    in_cells = [(x_mm / arena.mm_per_cell, y_mm / arena.mm_per_cell) for x_mm, y_mm in points]
+    return _paint_ground(arena, [*stroke_cells(arena.ground.shape, in_cells, width_mm / arena.mm_per_cell)], grey)
 
 
-def _cells(arena: Arena, points_mm: Sequence[Point]) -> list[Point]:
-    limits = (-_FAR_MM, _FAR_MM)
+def disc(arena: Arena, centre_mm: Point, radius_mm: float, brightness: int | str = 255) -> Arena:
+    """Return an arena with a disc around a point [mm], the same one if that changes nothing."""
+    (centre,) = _checked([centre_mm])
+    return draw(arena, Wall(disc_mm=centre, radius_mm=radius_mm, brightness=_grey(brightness)))
+
+
+def draw(arena: Arena, wall: Wall) -> Arena:
+    """Return an arena with one more wall, without those that it hides; the same arena if nothing looks different."""
+    raster = arena.brightness.copy()
+    paint(raster, areas := wall.cells(raster.shape, arena.mm_per_cell), wall.brightness)
+    if np.array_equal(raster, arena.brightness):
+        return arena
+    mask = _mask(raster.shape, areas)
+    seen = tuple(each for each in arena.walls if not all(part.all() for part in _parts(mask, each, arena.mm_per_cell)))
+    without = replace(arena, walls=seen)
+    return without if np.array_equal(without.brightness, raster) else replace(arena, walls=(*seen, wall))
+
+
+def _paint_ground(arena: Arena, areas: Sequence[Area], grey: int) -> Arena:
+    """Return an arena with cells of the picture in a grey: the walls that lie below them become a part of it, too."""
+    mask = _mask(arena.ground.shape, areas)
+    touched = [
+        number
+        for number, each in enumerate(arena.walls, start=1)
+        if any(part.any() for part in _parts(mask, each, arena.mm_per_cell))
+    ]
+    below = max(touched, default=0)
+    ground = painted(arena.ground, arena.mm_per_cell, arena.walls[:below]).copy()
+    paint(ground, areas, grey)
+    after = replace(arena, ground=ground, walls=arena.walls[below:])
+    return arena if np.array_equal(after.brightness, arena.brightness) else after
+
+
+def _mask(shape: tuple[int, int], areas: Sequence[Area]) -> npt.NDArray[np.uint8]:
+    mask = np.zeros(shape, np.uint8)
+    paint(mask, areas, 1)
+    return mask
+
+
+def _parts(mask: npt.NDArray[np.uint8], wall: Wall, mm_per_cell: float) -> list[npt.NDArray[np.uint8]]:
+    """Return what of a mask the parts of a wall cover."""
     return [
-        (
-            check_number("x_mm", x_mm, *limits) / arena.mm_per_cell,
-            check_number("y_mm", y_mm, *limits) / arena.mm_per_cell,
-        )
-        for x_mm, y_mm in points_mm
+        mask[rows, columns][... if covered is None else covered]
+        for rows, columns, covered in wall.cells(mask.shape, mm_per_cell)
     ]
 
 
-def _painted(arena: Arena, areas: Iterable[_Area], brightness: int | str) -> Arena:
-    grey = check_count("brightness", brightness_of(brightness), 0, 255, "0 is floor.")
-    raster = arena.brightness.copy()
-    for rows, columns, mask in areas:
-        raster[rows, columns][... if mask is None else mask] = grey
-    if np.array_equal(raster, arena.brightness):
-        return arena
-    raster.setflags(write=False)
-    return replace(arena, brightness=raster)
+def _checked(points_mm: Sequence[Point]) -> tuple[Point, ...]:
+    limits = (-_FAR_MM, _FAR_MM)
+    return tuple((check_number("x_mm", x_mm, *limits), check_number("y_mm", y_mm, *limits)) for x_mm, y_mm in points_mm)
 
 
-class _Area(NamedTuple):
-    """Cells of a raster: a box of rows and columns, and which of them, all if `mask` is None."""
-
-    rows: slice
-    columns: slice
-    mask: npt.NDArray[np.bool_] | None = None
-
-
-def _rectangle_cells(shape: tuple[int, int], corner: Point, opposite: Point) -> list[_Area]:
-    """Return the cells of a raster whose centres lie in a rectangle.
-
-    Args:
-        shape: Rows and columns of the raster.
-        corner: x and y of a corner [cells], (0, 0) the lower left corner of the raster.
-        opposite: x and y of the opposite corner [cells].
-    """
-    columns, rows = (
-        _centres(_units(min(a, b)), _units(max(a, b)), count)
-        for a, b, count in zip(corner, opposite, shape[::-1], strict=True)
-    )
-    return [_Area(rows, columns)] if rows.start < rows.stop and columns.start < columns.stop else []
-
-
-def _stroke_cells(shape: tuple[int, int], points: Sequence[Point], width: float) -> Iterator[_Area]:
-    """Yield the cells of a raster whose centres are at most half a width from a line through points.
-
-    Args:
-        shape: Rows and columns of the raster.
-        points: x and y of at least one point [cells], (0, 0) the lower left corner of the raster.
-        width: Width of the brush [cells].
-    """
-    whole = [(_units(x), _units(y)) for x, y in points]
-    radius = _units(width) / 2
-    for begin, end in pairwise(whole) if len(whole) > 1 else [(whole[0], whole[0])]:
-        yield from _segment_cells(shape, begin, end, radius)
-
-
-def _segment_cells(
-    shape: tuple[int, int], begin: tuple[int, int], end: tuple[int, int], radius: float
-) -> Iterator[_Area]:
-    low, high = sorted((begin[1], end[1]))
-    rows = _centres(math.ceil(low - radius), math.floor(high + radius), shape[0])
-    for first in range(rows.start, rows.stop, _STRIP_ROWS):
-        strip = slice(first, min(first + _STRIP_ROWS, rows.stop))
-        left, right = _reach(begin, end, strip.start * _PER_CELL - radius, strip.stop * _PER_CELL + radius)
-        reached = _centres(math.floor(left - radius), math.ceil(right + radius), shape[1])
-        y = (np.arange(strip.start, strip.stop)[:, None] * 2 + 1) * (_PER_CELL // 2)
-        for start in range(reached.start, reached.stop, _STRIP_COLUMNS):
-            columns = slice(start, min(start + _STRIP_COLUMNS, reached.stop))
-            x = (np.arange(columns.start, columns.stop) * 2 + 1) * (_PER_CELL // 2)
-            mask = _near(x, y, begin, end, radius)
-            if mask.any():
-                yield _Area(strip, columns, mask)
-
-
-def _near(
-    x: npt.NDArray[np.int64], y: npt.NDArray[np.int64], begin: tuple[int, int], end: tuple[int, int], radius: float
-) -> npt.NDArray[np.bool_]:
-    """Return which places are at most a radius from a line between two points."""
-    way_x, way_y = end[0] - begin[0], end[1] - begin[1]
-    from_begin_x, from_begin_y = x - begin[0], y - begin[1]
-    square = int(4 * radius * radius) // 4
-    near: npt.NDArray[np.bool_] = from_begin_x**2 + from_begin_y**2 <= square
-    near |= (x - end[0]) ** 2 + (y - end[1]) ** 2 <= square
-    length_2 = way_x * way_x + way_y * way_y
-    if length_2:
-        along = from_begin_x * way_x + from_begin_y * way_y
-        aside = np.abs(from_begin_x * way_y - from_begin_y * way_x)
-        # aside <= radius length, in whole numbers.
-        most = math.isqrt(int(4 * radius * radius) * length_2 // 4)
-        near |= (along >= 0) & (along <= length_2) & (aside <= most)
-    return near
-
-
-def _reach(begin: tuple[int, int], end: tuple[int, int], low: float, high: float) -> tuple[float, float]:
-    """Return the least and the largest x of that part of a line which lies between two heights."""
-    if begin[1] == end[1]:
-        return min(begin[0], end[0]), max(begin[0], end[0])
-    shares = (min(max((y - begin[1]) / (end[1] - begin[1]), 0.0), 1.0) for y in (low, high))
-    one, other = (begin[0] + share * (end[0] - begin[0]) for share in shares)
-    return min(one, other) - 1.0, max(one, other) + 1.0
-
-
-def _units(cells: float) -> int:
-    return round(cells * _PER_CELL)
-
-
-def _centres(low: int, high: int, count: int) -> slice:
-    """Return those of `count` cells whose centres lie between two places [units], both included."""
-    half = _PER_CELL // 2
-    first = max(-((half - low) // _PER_CELL), 0)
-    last = min((high - half) // _PER_CELL, count - 1)
-    return slice(first, max(last + 1, first))
+def _grey(brightness: int | str) -> int:
+    return check_count("brightness", brightness_of(brightness), 0, 255, "0 is floor.")

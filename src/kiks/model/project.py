@@ -23,6 +23,7 @@ from kiks.model.arena_file import (
     Pitch,
     Starts,
     Walls,
+    WallShapes,
     load_arena,
     place_lines,
     places_of,
@@ -234,7 +235,7 @@ class Project:
             lines += [f"{name} = {toml(value)}" for name, value in values if value not in (None, "", (), {})]
         lines += place_lines(self.arena)
         lines += ["", "[walls]"]
-        raster, mm_per_cell = self.arena.brightness, self.arena.mm_per_cell
+        raster, mm_per_cell = self.arena.ground, self.arena.mm_per_cell
         if mm_per_cell == 1.0 and (box := Box.of_raster(raster)) is not None:
             lines.append(f"size_mm = [{box.width_mm}, {box.height_mm}]")
             lines += [f"{name} = {getattr(box, name)}" for name in ("wall_mm", "rounded_mm", "brightness")]
@@ -289,6 +290,7 @@ class ProjectFile:
     lamp: Lamps = ()
     ball: Balls = ()
     cylinder: Cylinders = ()
+    wall: WallShapes = ()
     walls: ProjectWalls = ProjectWalls()
 
 

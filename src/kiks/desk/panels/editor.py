@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Awaitable, Callable
+from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
 
+import numpy as np
 from nicegui import ui
 
 from kiks.desk.panels.arena_view import ArenaView, Points
@@ -41,8 +43,9 @@ TOOLS = {
     "hand": _ToolButton(
         "Hand", "pan_tool", "Drag robots, balls, cylinders and lamps; turn robots by their rim", "hand"
     ),
-    "rectangle": _ToolButton("Rectangle", "rectangle", "Draw a block of wall from corner to corner", "rectangle"),
+    "rectangle": _ToolButton("Rectangle", "rectangle", "Draw a box of wall from corner to corner", "rectangle"),
     "line": _ToolButton("Line", "horizontal_rule", "Draw a straight wall as wide as the brush", "line"),
+    "disc": _ToolButton("Disc", "circle", "Draw a round wall from its middle to its rim", "disc"),
     "freehand": _ToolButton("Freehand", "gesture", "Draw a freehand wall as wide as the brush", "freehand"),
     "erase": _ToolButton("Erase", "cleaning_services", "Erase walls with the brush", "freehand"),
     "erase-box": _ToolButton("Erase a box", "crop_free", "Erase all walls in a rectangle", "rectangle"),
@@ -173,6 +176,9 @@ class EditorPanel(Panel):
         width_mm = float(self._brush.value)
         if kind == "rectangle":
             return editing.draw(lambda arena: brush.rectangle(arena, *points[0], *points[-1], grey))
+        if kind == "disc":
+            radius_mm = math.dist(points[0], points[-1]) or width_mm / 2
+            return editing.draw(lambda arena: brush.disc(arena, points[0], radius_mm, grey))
         if kind in ("line", "freehand"):
             return editing.draw(lambda arena: brush.line(arena, points, width_mm=width_mm, brightness=grey))
         (x_mm, y_mm) = points[0]
@@ -194,4 +200,4 @@ class EditorPanel(Panel):
 
 
 def _without_walls(arena: Arena) -> Arena:
-    return brush.rectangle(arena, 0, 0, arena.width_mm, arena.height_mm, 0)
+    return replace(arena, ground=np.zeros_like(arena.ground), walls=())

@@ -1,9 +1,11 @@
-/* Drawing on the arena: rectangle, line, freehand and point, snapped to a grid and kept within the arena. What is
+/* Drawing on the arena: rectangle, line, disc, freehand and point, snapped to a grid and kept within the arena. What is
    drawn is only shown here, as a preview; the editor does it. */
 
 import { shownPlace } from "./coordinates.js";
 
 const LEAST_STEP_MM = 0.5;
+/** What the distance from press to pointer is. */
+const SIZES = { line: "length", disc: "radius" };
 
 export class Drawing {
   constructor(feed) {
@@ -40,7 +42,7 @@ export class Drawing {
   end() {
     if (!this.isDrawing) return null;
     const { kind } = this.tool;
-    const points = kind === "line" || kind === "rectangle" ? [this.points[0], this.points.at(-1)] : this.points;
+    const points = kind === "freehand" ? this.points : [this.points[0], this.points.at(-1)];
     this.cancel();
     this.points = [points.at(-1)];
     return { kind, points };
@@ -60,7 +62,8 @@ export class Drawing {
     text.push(`x ${tell(shown_x)}, y ${tell(shown_y)} mm`);
     if (this.isDrawing && kind !== "freehand" && kind !== "point") {
       const wide = Math.abs(x - this.points[0][0]), high = Math.abs(y - this.points[0][1]);
-      text.push(kind === "line" ? `length ${tell(Math.hypot(wide, high))} mm` : `${tell(wide)} × ${tell(high)} mm`);
+      const way = tell(Math.hypot(wide, high));
+      text.push(kind === "rectangle" ? `${tell(wide)} × ${tell(high)} mm` : `${SIZES[kind]} ${way} mm`);
     }
     return { kind, points: this.points, brush_mm, isDrawing: this.isDrawing, text };
   }

@@ -69,6 +69,13 @@ function paintPreview(context, viewport, { kind, points, brush_mm, isDrawing, te
     context.lineWidth = 1.5;
     context.strokeStyle = colours.accent;
     context.strokeRect(...box);
+  } else if (kind === "disc" && isDrawing) {
+    const [centre_x, centre_y] = places[0];
+    context.arc(centre_x, centre_y, Math.hypot(x - centre_x, y - centre_y), 0, 2 * Math.PI);
+    context.fill();
+    context.lineWidth = 1.5;
+    context.strokeStyle = colours.accent;
+    context.stroke();
   } else if (places.length > 1) {
     places.forEach(([to_x, to_y], k) => (k ? context.lineTo(to_x, to_y) : context.moveTo(to_x, to_y)));
     context.stroke();
@@ -78,7 +85,7 @@ function paintPreview(context, viewport, { kind, points, brush_mm, isDrawing, te
   context.lineWidth = 1.5;
   context.strokeStyle = colours.accent;
   context.stroke();
-  if (kind === "rectangle" || kind === "line") {
+  if (kind === "rectangle" || kind === "line" || kind === "disc") {
     context.beginPath();
     context.moveTo(x - 9, y);
     context.lineTo(x + 9, y);

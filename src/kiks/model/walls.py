@@ -1,0 +1,122 @@
+"""Walls that are drawn as shapes: lines, boxes and discs in mm, over the picture or the box of an arena."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Annotated
+
+import numpy as np
+import numpy.typing as npt
+from pydantic import BeforeValidator, Field
+
+from kiks.errors import ArenaError, ParameterError
+from kiks.model.cells import Area, paint, rectangle_cells, stroke_cells
+from kiks.model.checks import check_count
+from kiks.model.data_file import Number, Point, Rule, Whole, record
+from kiks.model.materials import brightness_of
+
+WALLS_MAX = 1000
+"""Most walls of an arena that are shapes."""
+
+WIDTH_MAX_MM = 1000.0
+"""Widest line [mm]."""
+
+_POINTS_MAX = 100
+_TWO_POINTS = "Give box_mm = [[x, y], [x, y]], two opposite corners."
+_Line = Annotated[
+    tuple[Point, ...],
+    Field(min_length=2, max_length=_POINTS_MAX, description="Give line_mm = [[x, y], [x, y]], or more points."),
+    Rule(f"a list of 2 to {_POINTS_MAX} points, each of two numbers in mm"),
+]
+_Box = Annotated[
+    tuple[Point, ...],
+    Field(min_length=2, max_length=2, description=_TWO_POINTS),
+    Rule("a list of two points, each of two numbers in mm"),
+]
+_Paint = Annotated[
+    Whole,
+    BeforeValidator(brightness_of, json_schema_input_type=int | str),
+    Field(ge=0, le=255, description="1 is black, 255 white, 0 floor; or the name of a material, such as 'wood'."),
+]
+
+
+@record
+class Wall:
+    """A wall with a shape, of which it has one; later walls cover earlier ones.
+
+    Args:
+        line_mm: Points that a line goes through [mm].
+        box_mm: Two opposite corners of a box [mm].
+        disc_mm: The centre of a disc [mm].
+        width_mm: How thick a line is [mm]; its ends are round.
+        radius_mm: Radius of a disc [mm].
+        brightness: 1 black to 255 white, or a material; 0 makes floor of what is there, such as a door.
+
+    Example:
+        >>> from kiks import Arena
+        >>> from dataclasses import replace
+        >>> arena = replace(Arena.box(400, 300), walls=(Wall(line_mm=((200, 10), (200, 200)), brightness="wood"),))
+        >>> int(arena.brightness[100, 200])
+        190
+    """
+
+    line_mm: _Line | None = None
+    box_mm: _Box | None = None
+    disc_mm: Annotated[Point, Field(description="Give disc_mm = [x, y], its centre.")] | None = None
+    width_mm: Annotated[Number, Field(gt=0, le=WIDTH_MAX_MM, description="Leave it out for 10 mm.")] | None = None
+    radius_mm: Annotated[Number, Field(gt=0, le=1e4)] | None = None
+    brightness: _Paint = 255
+
+    def __post_init__(self) -> None:
+        shapes = [name for name in ("line_mm", "box_mm", "disc_mm") if getattr(self, name) is not None]
+        if len(shapes) != 1:
+            raise ParameterError(
+                f"a wall must have one of line_mm, box_mm and disc_mm, but it has {' and '.join(shapes) or 'none'}. "
+                "Give each shape a [[wall]] of its own."
+            )
+        for name, shape in (("width_mm", "line_mm"), ("radius_mm", "disc_mm")):
+            if getattr(self, name) is not None and shapes != [shape]:
+                raise ParameterError(f"{name} must come with {shape}, but it came with {shapes[0]}. Remove it.")
+        if self.disc_mm is not None and self.radius_mm is None:
+            raise ParameterError("radius_mm must come with disc_mm, but it is missing. Give radius_mm = 20.")
+
+    def cells(self, shape: tuple[int, int], mm_per_cell: float) -> list[Area]:
+        """Return the cells of a raster that the wall covers; `shape` has its rows and columns."""
+
+        def in_cells(points_mm: Iterable[Sequence[float]]) -> list[tuple[float, float]]:
+            return [(x_mm / mm_per_cell, y_mm / mm_per_cell) for x_mm, y_mm in points_mm]
+
+        if self.box_mm is not None:
+            corner, opposite = in_cells(self.box_mm)
+            return rectangle_cells(shape, corner, opposite)
+        points_mm, width_mm = self.line_mm, 10.0 if self.width_mm is None else self.width_mm
+        if self.disc_mm is not None and self.radius_mm is not None:
+            points_mm, width_mm = (self.disc_mm,), 2 * self.radius_mm
+        return [*stroke_cells(shape, in_cells(points_mm or ()), width_mm / mm_per_cell)]
+
+
+def painted(ground: npt.NDArray[np.uint8], mm_per_cell: float, walls: Sequence[Wall]) -> npt.NDArray[np.uint8]:
+    """Return a raster with walls over the ground, the ground itself if there are none.
+
+    Args:
+        ground: uint8 [row, column], row 0 at the bottom.
+        mm_per_cell: Edge of a cell [mm].
+        walls: The walls.
+
+    Raises:
+        ArenaError: If a wall covers nothing.
+    """
+    if not walls:
+        return ground
+    check_count("the number of walls", len(walls), 0, WALLS_MAX, "Draw a picture instead.")
+    raster = ground.copy()
+    for number, wall in enumerate(walls, start=1):
+        if not (areas := wall.cells(raster.shape, mm_per_cell)):
+            raise ArenaError(
+                f"wall {number} must cover a part of the arena, but it covers no cell of it. The arena is "
+                f"{raster.shape[1] * mm_per_cell:g} x {raster.shape[0] * mm_per_cell:g} mm, with cells of "
+                f"{mm_per_cell:g} mm."
+            )
+        paint(raster, areas, wall.brightness)
+    raster.setflags(write=False)
+    return raster
