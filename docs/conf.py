@@ -87,10 +87,14 @@ def prepare(app, what, name, obj, options, lines):
     lines[:] = [re.sub(r"`?docs/(\w+/\w+)\.md`?", r":doc:`/\1`", line) for line in lines]
 
 
-def level_captions(app, page, template, context, doctree):
-    """Give the captions of the list of pages their level, which readers of screens need."""
+SCROLLED = re.compile(r'<pre(?=[ >])|<div(?= class="table-wrapper)')
+
+
+def help_readers_and_keys(app, page, template, context, doctree):
+    """Give captions of the list of pages their level for readers of screens; let keys reach what can be scrolled."""
     tree = context.get("furo_navigation_tree", "")
     context["furo_navigation_tree"] = tree.replace('role="heading"', 'role="heading" aria-level="2"')
+    context["body"] = SCROLLED.sub(r'\g<0> tabindex="0"', context.get("body", ""))
 
 
 def write_pages(app):
@@ -102,9 +106,9 @@ def write_pages(app):
 
 
 def setup(app):
-    """Connect the functions above; `prepare` comes before napoleon, and `level_captions` after the theme."""
+    """Connect the functions above; `prepare` comes before napoleon, and `help_readers_and_keys` after the theme."""
     app.connect("builder-inited", write_pages)
-    app.connect("html-page-context", level_captions, priority=900)
+    app.connect("html-page-context", help_readers_and_keys, priority=900)
     app.connect("missing-reference", lead_to_public_names)
     app.connect("autodoc-process-signature", shorten_arrays, priority=600)
     app.connect("autodoc-process-docstring", prepare, priority=400)

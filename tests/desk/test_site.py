@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 from tests.at_length import at_length
-from tests.desk.visitor import NewPage
+from tests.desk.visitor import NewPage, check_access
 
 pytestmark = [pytest.mark.slow, at_length]
 
@@ -49,6 +49,15 @@ def test_pages_fit_and_show_their_pictures(site: str, new_page: NewPage, width: 
         page.goto(f"{site}/{name}.html")
         assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), name
         assert page.evaluate("[...document.images].every(image => image.complete && image.naturalWidth > 0)"), name
+
+
+def test_axe_finds_nothing_serious(site: str, new_page: NewPage) -> None:
+    page = new_page()
+    for name in ("index", "howto/demos", "howto/evolution", "explanation/security", "coming_from"):
+        page.goto(f"{site}/{name}.html")
+        for colours in ("light", "dark"):
+            page.emulate_media(color_scheme=colours)
+            check_access(page, f"{name}, {colours}")
 
 
 def test_search_finds_a_name(site: str, new_page: NewPage) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import pytest
+from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Locator, Page, expect
 from tests.at_length import AT_LENGTH
 
@@ -30,6 +31,14 @@ PICTURES_MAX = 3600
 
 NEXT_PICTURE = "() => new Promise((done) => requestAnimationFrame(() => done(true)))"
 FIRST_PICTURE = "() => window.kiksDesk?.stats().frames_drawn > 3 && kiksDesk.pose(0)"
+
+STILL = """() => {
+    const moving = document.getAnimations().filter(
+        (one) => one.playState === "running" && one.animationName !== "desk-fade");
+    for (const one of moving) one.finish();
+    return moving.length === 0;
+}"""
+"""Ends what moves or fades, and says whether all stood still already; the hint waits for half a minute."""
 
 INSIDE = {"robot": "proximity-0", "wire": "console", "arena": "save", "programs": "editor", "settings": "apply"}
 """Something in each tab."""
@@ -80,6 +89,18 @@ def leave_picture(page: Page, name: str, **options: Any) -> None:
     if AT_LENGTH:
         SCREENSHOTS.mkdir(exist_ok=True)
         page.screenshot(path=SCREENSHOTS / f"{name}.png", animations="disabled", **options)
+
+
+def check_access(page: Page, where: str) -> None:
+    """Let axe-core look for what keeps people out: contrast, names, roles. Nothing it finds may be serious."""
+    page.wait_for_function(STILL)
+    found = [
+        f"{where}: {rule['help']}: {node['html']}"
+        for rule in Axe().run(page).response["violations"]
+        if rule["impact"] in ("serious", "critical")
+        for node in rule["nodes"]
+    ]
+    assert not found, "\n".join(found)
 
 
 class Visitor:

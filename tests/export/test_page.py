@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 from tests.at_length import at_length
+from tests.desk.visitor import check_access
 
 from kiks import Arena, Khepera, ParameterError, Recording, Simulation
 from kiks.export import page_contents as contents
@@ -359,6 +360,15 @@ def test_the_player_plays_jumps_and_ends(plain_page: Path, visit: Callable[..., 
     assert page.locator(".times").inner_text().replace(" ", "").split("/")[0] == clock.inner_text()
     page.keyboard.press("Space")
     page.wait_for_function("() => kiksPage.player.isPlaying && kiksPage.player.time_s < 290")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("colours", ["light", "dark"])
+def test_axe_finds_nothing_serious(rich_page: Path, visit: Callable[..., Page], colours: str) -> None:
+    page = visit(rich_page, color_scheme=colours)
+    check_access(page, colours)
+    page.set_viewport_size({"width": 390, "height": 844})
+    check_access(page, f"{colours}, on a phone")
 
 
 @at_length

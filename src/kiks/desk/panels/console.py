@@ -7,7 +7,7 @@ from collections.abc import Callable
 from nicegui import ui
 
 from kiks.desk.panels.command_line import CommandLine
-from kiks.desk.panels.widgets import LogBox, named
+from kiks.desk.panels.widgets import LogBox, heading, named
 from kiks.desk.server.desk import Desk
 from kiks.firmware.commands import COMMANDS
 from kiks.firmware.commands import Command as RobotCommand
@@ -32,8 +32,9 @@ class ConsolePanel:
         self._desk = desk
         self._of_robot = robot
         self._waiting: list[Typed] = []
-        ui.label("Commands to the robot").classes("text-subtitle2")
-        self._rows = LogBox("7rem", "console-log", "What you typed, and the replies", rows_max=ROWS, new_max=ROWS)
+        heading("Commands to the robot", "text-subtitle2")
+        label = "What you typed, and the replies"
+        self._rows = LogBox("7rem", "console-log", label, rows_max=ROWS, new_max=ROWS, live="polite")
         self._line = CommandLine(
             self._send,
             label="Command",

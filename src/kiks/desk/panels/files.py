@@ -29,8 +29,11 @@ class FilesPanel:
     """
 
     def __init__(self, desk: Desk, editing: Editing) -> None:
-        # Uploads start at once, so the list of waiting files is always empty.
-        ui.add_css(".kiks-upload .q-uploader__list { display: none }")
+        # Uploads start at once, so the list of waiting files is always empty. The button that chooses one has a name.
+        ui.add_css(
+            ".kiks-upload :is(.q-uploader__list, .q-uploader__input) { display: none }"
+            ".kiks-upload .q-uploader__header { background: none; color: inherit }"
+        )
         self._desk = desk
         self._editing = editing
         self._folder = Folder(desk.folder)
@@ -62,7 +65,6 @@ class FilesPanel:
     def _build_upload(self) -> None:
         with ui.row().classes("w-full items-center no-wrap gap-1"):
             self._upload = ui.upload(
-                label="Upload a project, .kad or picture",
                 auto_upload=True,
                 max_file_size=UPLOAD_BYTES_MAX,
                 on_upload=self._take,
@@ -71,7 +73,12 @@ class FilesPanel:
                     type="negative",
                 ),
             )
-            self._upload.props("flat bordered").classes("col kiks-upload")
+            self._upload.props("flat").classes("col kiks-upload")
+            with self._upload.add_slot("header"):
+                tip = "Upload a project, an arena, a .kad or a picture; or drop the file here"
+                pick = f"() => getElement({self._upload.id}).$refs.qRef.pickFiles()"
+                text_button("Upload a file", "upload", "upload-file", tip).on("click", js_handler=pick)
+                ui.element("q-uploader-add-trigger")
             with_props(named(self._upload, "upload"), accept=",".join(OPENED))
             self._mm_per_pixel = number("mm per pixel", "mm-per-pixel", 1.0, min=0.1, max=100, step=0.1).classes("w-28")
             self._mm_per_pixel.tooltip("Size of a pixel of an uploaded picture")

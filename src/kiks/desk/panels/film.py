@@ -8,7 +8,7 @@ from pathlib import Path
 
 from nicegui import ui
 
-from kiks.desk.panels.widgets import number, select, told
+from kiks.desk.panels.widgets import dialog, number, select, told
 from kiks.desk.server.desk import Desk
 from kiks.errors import ParameterError, library
 from kiks.export.film import FPS, save_film
@@ -33,8 +33,7 @@ class FilmDialog:
         self._desk = desk
         self._done = 0.0
         self._is_given_up = False
-        with ui.dialog() as self._dialog, ui.card().classes("gap-2"):
-            ui.label("Make a film of the run").classes("text-h6")
+        with dialog("Make a film of the run") as self._dialog:
             with ui.row().classes("no-wrap items-end"):
                 self._start = number("From [s]", "film-start", min=0.0).classes("w-28")
                 self._end = number("To [s]", "film-end", min=0.0).classes("w-28")

@@ -10,7 +10,7 @@ from nicegui import ui
 from nicegui.events import GenericEventArguments
 
 from kiks.desk.panels.explanation_drawing import draw_rays
-from kiks.desk.panels.widgets import WEB, FeedElement, Panel, icon_button, named, offer_robots, select, told
+from kiks.desk.panels.widgets import WEB, FeedElement, Panel, heading, icon_button, named, offer_robots, select, told
 from kiks.desk.server.desk import Desk
 from kiks.sim.explanation import Explanation, LightExplanation
 from kiks.sim.simulation import Simulation
@@ -61,7 +61,7 @@ class MonitorPanel(Panel):
         """Build the explanation of a reading, hidden until a person asks for one."""
         with ui.column().classes("kiks-answer w-full gap-2").props('data-testid="explanation"') as self._answer:
             with ui.row().classes("w-full items-center justify-between no-wrap"):
-                self._title = ui.label().classes("text-h6").props('role="heading" aria-level="2" aria-live="polite"')
+                self._title = heading("", "text-h6").props("aria-live=polite")
                 icon_button("close", "Close the explanation", "close-explanation", self._forget)
             self._drawing = named(ui.html(sanitize=False).classes("w-full"), "explanation-drawing")
             self._words = named(ui.label().style("white-space: pre-line"), "explanation-text")

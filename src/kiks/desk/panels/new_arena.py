@@ -8,15 +8,14 @@ from typing import cast
 
 from nicegui import ui
 
-from kiks.desk.panels.widgets import answer, finish, number, select
+from kiks.desk.panels.widgets import answer, dialog, finish, number, select
 from kiks.model.arena import Arena
 from kiks.model.materials import REFLECTANCES
 
 
 async def ask_for_box() -> Arena | None:
     """Ask for the dimensions of an empty box and return it; None if the person cancels."""
-    with ui.dialog() as dialog, ui.card().classes("w-96"):
-        ui.label("New arena").classes("text-h6")
+    with dialog("New arena") as asked:
         ui.label("Robots stay; balls, cylinders and lamps are removed. Time starts at 0.").classes("text-body2")
         width_mm = _whole("Width in mm, walls included", "box-width", 1000, 100, 8000)
         height_mm = _whole("Height in mm, walls included", "box-height", 800, 100, 8000)
@@ -30,14 +29,13 @@ async def ask_for_box() -> Arena | None:
                 width_mm(), height_mm(), wall_mm=wall_mm(), rounded_mm=rounded_mm(), brightness=str(material.value)
             )
 
-        finish(dialog, "Create", make)
-    return cast("Arena | None", await answer(dialog))
+        finish(asked, "Create", make)
+    return cast("Arena | None", await answer(asked))
 
 
 async def ask_for_maze() -> Arena | None:
     """Ask for the dimensions of a maze and return it; None if the person cancels."""
-    with ui.dialog() as dialog, ui.card().classes("w-96"):
-        ui.label("Random maze").classes("text-h6")
+    with dialog("Random maze") as asked:
         ui.label("Robot 1 starts at the entrance, a lamp marks the exit. Time starts at 0.").classes("text-body2")
         columns = _whole("Columns", "maze-columns", 5, 1, 100)
         rows = _whole("Rows", "maze-rows", 5, 1, 100)
@@ -48,8 +46,8 @@ async def ask_for_maze() -> Arena | None:
         def make() -> Arena:
             return Arena.maze(columns=columns(), rows=rows(), path_mm=path_mm(), wall_mm=wall_mm(), seed=seed())
 
-        finish(dialog, "Create", make)
-    return cast("Arena | None", await answer(dialog))
+        finish(asked, "Create", make)
+    return cast("Arena | None", await answer(asked))
 
 
 def _whole(label: str, name: str, value: int, low: int, high: int) -> Callable[[], int]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from nicegui import ui
 
 from kiks.desk.panels.command_line import CommandLine
-from kiks.desk.panels.widgets import LogBox, Panel, select
+from kiks.desk.panels.widgets import LogBox, Panel, heading, select
 from kiks.desk.server.desk import Desk
 
 ROWS_MAX = 10_000
@@ -33,7 +33,7 @@ class OctavePanel(Panel):
         self._last_line = ""
         ui.add_css(".kiks-log * { white-space: pre-wrap; overflow-wrap: anywhere }")
         with ui.column().classes("w-full q-pa-sm gap-2"):
-            ui.label("Log").classes("text-subtitle2")
+            heading("Log", "text-subtitle2")
             self._rows = LogBox("55vh", "log", "Log of the session", rows_max=ROWS_MAX, new_max=ROWS_MAX).element
             self._rows.classes("kiks-log")
             programs = desk.outside.interpreters()

@@ -16,7 +16,7 @@ from kiks.desk.panels.settings import SettingsPanel
 from kiks.desk.panels.time_bar import TimeBar
 from kiks.desk.panels.time_controls import TimePanel
 from kiks.desk.panels.view import ViewPanel
-from kiks.desk.panels.widgets import WEB, Panel, named, told
+from kiks.desk.panels.widgets import WEB, Panel, heading, named, told
 from kiks.desk.panels.wire import WirePanel
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.live_editing import Editing
@@ -61,7 +61,7 @@ class Page:
         ui.add_head_html(MEMORY)
         ui.add_css(WEB / "page.css")
         with ui.header(elevated=True).classes("items-center q-py-none q-px-md no-wrap gap-2").style("height: 58px"):
-            ui.label("KiKS").classes("text-h6 gt-sm")
+            heading("KiKS", "text-h6 gt-sm", level=1)
             TimePanel(desk, feed)
             ui.space()
             tools = ui.row().classes("items-center no-wrap gap-1")

@@ -6,7 +6,7 @@ import asyncio
 import shlex
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from nicegui import ui
 
@@ -42,6 +42,10 @@ NOT_OWN = (
 """Shown in place of the editor where the world is not the desk's own."""
 
 CSS = ".program-error { color: #b00020 } .body--dark .program-error { color: #ff9a90 }"
+
+LIGHT: Final = "githubLight"
+DARK: Final = "githubDark"
+"""Themes of the editor whose words all have a contrast of 4.5 to 1 or more."""
 
 ICONS = {"running": "play_circle", "stopping": "hourglass_top", "stopped": "stop_circle", "silenced": "volume_off"}
 """Icons of programs by state; all other states are ends."""
@@ -191,7 +195,7 @@ class ProgramsPanel(Panel):
         # Here, the page's shortcut keys (space, .) are text.
         with ui.element("div").classes("w-full").on("keydown", js_handler="(event) => event.stopPropagation()"):
             keys: dict[str, Any] = {"Ctrl-Enter": act, "Cmd-Enter": act}
-            self._editor = ui.codemirror(NEW, language="Python", theme="basicLight", keymap=keys)
+            self._editor = ui.codemirror(NEW, language="Python", theme=LIGHT, keymap=keys)
             named(self._editor, "editor").on_value_change(self._note_draft)
             self._editor.classes("w-full").style("height: 38vh; border: 1px solid currentcolor")
         self._mistake = named(ui.label().classes("program-error text-body2").props("role=alert"), "mistake")
@@ -212,14 +216,15 @@ class ProgramsPanel(Panel):
             tell();
             const name = () => {
                 const text = document.querySelector("[data-testid=editor] .cm-content");
-                if (text) text.setAttribute("aria-label", "Program. Escape, then Tab leaves it.");
-                else requestAnimationFrame(name);
+                if (!text) return requestAnimationFrame(name);
+                text.setAttribute("aria-label", "Program. Escape, then Tab leaves it.");
+                text.tabIndex = 0;
             };
             name();
         """)
 
     def _set_theme(self, is_dark: bool) -> None:
-        self._editor.theme = "vscodeDark" if is_dark else "basicLight"
+        self._editor.theme = DARK if is_dark else LIGHT
 
     def _offer(self) -> None:
         """Update the list of programs."""

@@ -7,7 +7,7 @@ from typing import Any
 
 from nicegui import ui
 
-from kiks.desk.panels.widgets import Panel, named, number, select, with_props
+from kiks.desk.panels.widgets import Panel, heading, named, number, select, with_props
 from kiks.desk.server.desk import Desk
 from kiks.errors import ParameterError
 from kiks.model.project import ProjectRobot
@@ -56,7 +56,7 @@ class SettingsPanel(Panel):
             old.props("data-testid=old-coordinates").on_value_change(lambda: desk.show_old_coordinates(bool(old.value)))
             old.tooltip("x is a column and y a row of the arena's matrix, so y points down; sensors are 1 to 8")
             self._build_settings()
-            ui.label("Robots").classes("text-subtitle1")
+            heading("Robots")
             self._table = ui.column().classes("w-full gap-1")
             ui.button("Another robot", icon="add", on_click=self._add_row).props(
                 "flat dense no-caps data-testid=add-robot"

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
 from nicegui import ui
 
 from kiks.desk.panels.arena_view import LAYERS, ArenaView
 from kiks.desk.panels.board import ScoreBoard
 from kiks.desk.panels.shortcuts import SHORTCUTS
-from kiks.desk.panels.widgets import BAR, icon_button, named
+from kiks.desk.panels.widgets import BAR, dialog, icon_button, named, with_props
 from kiks.desk.server.desk import Desk
 
 VIEWS = {"top": "2-D", "both": "both", "solid": "3-D"}
@@ -46,7 +50,8 @@ class ViewPanel:
         toggle.props("dense unelevated no-caps toggle-color=accent text-color=white color=transparent")
         toggle.props('data-testid=views aria-label="2-D or 3-D"')
         toggle.tooltip("View from above, or in 3-D: there drag to orbit, turn the wheel to zoom")
-        with _button("layers", "Layers", "layers"), ui.menu(), ui.column().classes("q-pa-sm gap-0"):
+        layers = _button("layers", "Layers", "layers")
+        with layers, with_props(ui.menu(), role="group", aria_label="Layers"), ui.column().classes("q-pa-sm gap-0"):
             for name, (text, is_shown) in LAYERS.items():
                 box = ui.checkbox(
                     text, value=is_shown, on_change=lambda event, name=name: view.show_layer(name, event.value)
@@ -60,22 +65,26 @@ class ViewPanel:
         _button("fit_screen", "Show all of the arena (key: 0)", "fit").on_click(lambda: view.run_method("fit"))
         tip = "Hall view, for a projector: arena, score and clock, large (Escape ends it)"
         icon_button("tv", "Hall view", "hall", lambda: board.run_method("enter"), tip=tip, look=BAR)
-        with ui.dialog() as self._help, ui.card():
+        with dialog("Help") as self._help:
             ui.markdown(HELP)
             ui.button("Close", on_click=self._help.close).props("flat no-caps")
         dark = ui.dark_mode(value=None)
         with _button("contrast", "Light or dark", "dark"), ui.menu():
             for text, value in (("Same as the system", None), ("Light", False), ("Dark", True)):
-                ui.menu_item(text, on_click=lambda value=value: dark.set_value(value))
+                _item(text, partial(dark.set_value, value))
         _button("help_outline", "Help", "help").on_click(self._help.open)
 
     def _list_robots(self) -> None:
         self._robots.clear()
         with self._robots:
-            ui.menu_item("No robot", on_click=lambda: self._view.change(follow=-1))
+            _item("No robot", partial(self._view.change, follow=-1))
             for index, name in enumerate(self._desk.names()):
-                ui.menu_item(f"Robot {name}", on_click=lambda index=index: self._view.change(follow=index))
+                _item(f"Robot {name}", partial(self._view.change, follow=index))
 
 
 def _button(icon: str, label: str, name: str) -> ui.button:
     return icon_button(icon, label, name, look=BAR)
+
+
+def _item(text: str, act: Callable[[], Any]) -> None:
+    with_props(ui.menu_item(text, on_click=act), role="menuitem")

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
@@ -74,11 +75,18 @@ class Panel:
 
 async def agrees(question: str, explanation: str = "", *, yes: str = "Yes", no: str = "No") -> bool:
     """Ask a person, and return whether the answer is yes."""
-    with ui.dialog() as dialog, ui.card().classes("gap-3").style("max-width: 620px"):
-        ui.label(question).classes("text-h6" if explanation else "").props('role="heading" aria-level="2"')
+    with dialog(question) as asked:
         named(ui.label(explanation).classes("text-body2"), "dialog-text")
-        finish(dialog, yes, lambda: True, no)
-    return await answer(dialog) is not None
+        finish(asked, yes, lambda: True, no)
+    return await answer(asked) is not None
+
+
+@contextmanager
+def dialog(title: str) -> Iterator[ui.dialog]:
+    """Build a dialog with a title; what the block builds stands below it."""
+    with with_props(ui.dialog(), aria_label=title) as built, ui.card().classes("gap-3"):
+        heading(title, "text-h6")
+        yield built
 
 
 def finish(dialog: ui.dialog, yes: str, result: Callable[[], object], no: str = "Cancel") -> None:
@@ -116,6 +124,11 @@ def with_props(element: Some, **texts: str) -> Some:
 def named(element: Some, name: str) -> Some:
     """Give an element its name for tests."""
     return with_props(element, data_testid=name)
+
+
+def heading(text: str, look: str = "text-subtitle1", *, level: int = 2) -> ui.label:
+    """Build a heading, which screen readers list."""
+    return with_props(ui.label(text).classes(look), role="heading", aria_level=str(level))
 
 
 class FeedElement(Element):
@@ -157,7 +170,7 @@ def relabel(button: ui.button, icon: str, label: str) -> None:
         with_props(button, icon=icon, aria_label=label)
 
 
-def text_button(text: str, icon: str, name: str, tip: str, act: Callable[..., Any]) -> ui.button:
+def text_button(text: str, icon: str, name: str, tip: str, act: Callable[..., Any] | None = None) -> ui.button:
     """Build a button with an icon, a text (possibly empty) and a tooltip."""
     button = ui.button(text, icon=icon, on_click=act).props('dense no-caps outline padding="4px 10px"')
     return named(with_props(button, aria_label=text or tip), name).tooltip(tip)
@@ -192,11 +205,12 @@ class LogBox:
         label: Its accessible name.
         rows_max: Most rows in the box.
         new_max: Most rows that are added at once.
+        live: Whether screen readers read new rows aloud: 'off' or 'polite'.
     """
 
-    def __init__(self, height: str, name: str, label: str, *, rows_max: int, new_max: int) -> None:
+    def __init__(self, height: str, name: str, label: str, *, rows_max: int, new_max: int, live: str = "off") -> None:
         self.element = ui.log(max_lines=rows_max).classes("w-full text-caption").style(f"height: {height}")
-        named(with_props(self.element, aria_label=label), name)
+        named(with_props(self.element, role="log", aria_label=label, aria_live=live, tabindex="0"), name)
         self._new_max = new_max
         self._next = 0
 

@@ -5,7 +5,17 @@ from __future__ import annotations
 from nicegui import ui
 
 from kiks.desk.panels.console import ConsolePanel
-from kiks.desk.panels.widgets import LogBox, Panel, icon_button, named, offer_robots, relabel, select, with_props
+from kiks.desk.panels.widgets import (
+    LogBox,
+    Panel,
+    heading,
+    icon_button,
+    named,
+    offer_robots,
+    relabel,
+    select,
+    with_props,
+)
 from kiks.desk.server.desk import Desk
 from kiks.sim.wire import Wire
 from kiks.sim.wire_log import Piece, TimeShares, WireLog
@@ -75,7 +85,7 @@ class WirePanel(Panel):
 
     def _build_bar(self) -> None:
         with ui.row().classes("w-full items-center no-wrap"):
-            ui.label("Where the milliseconds went in").classes("text-subtitle2")
+            heading("Where the milliseconds went in", "text-subtitle2")
             self._window = select("", "wire-window", WINDOWS, 1, "How far back the bar looks, in simulated time")
             self._window.props('borderless aria-label="Window of time"')
         self._parts: dict[str, tuple[ui.element, ui.label, ui.label]] = {}

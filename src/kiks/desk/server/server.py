@@ -125,7 +125,9 @@ class DeskServer:
         plain = log_plainly()
         app = FastAPI(openapi_url=None)
         self._add_routes(app)
-        ui.run_with(app, title="KiKS", dark=None, show_welcome_message=False, reconnect_timeout=10.0)
+        # Quasar's bar has no name, and shows a request on the colour of the bar above the arena.
+        nicegui_app.config.quasar_config["loadingBar"] = {"skipHijack": True}
+        ui.run_with(app, title="KiKS", dark=None, language="en-US", show_welcome_message=False, reconnect_timeout=10.0)
 
         def begin() -> None:
             self._loop = asyncio.get_running_loop()
