@@ -14,6 +14,7 @@ import kiks
 sys.path.insert(0, str(Path(__file__).with_name("pages")))
 import commands
 import files
+import gallery
 
 project = "KiKS"
 copyright = "KiKS contributors"
@@ -25,9 +26,10 @@ extensions = [
     "sphinx.ext.autosummary",
     "sphinx.ext.napoleon",
     "sphinx_copybutton",
+    "sphinx_gallery.gen_gallery",
 ]
 # What is for developers only, and the programs that make pages.
-exclude_patterns = ["next.md", "pages"]
+exclude_patterns = ["next.md", "pages", "gallery/**/GALLERY_HEADER.rst"]
 
 # A reference to something of KiKS must lead somewhere. Those to other libraries would need the network.
 nitpicky = True
@@ -46,9 +48,26 @@ napoleon_use_rtype = False
 napoleon_use_ivar = True
 default_role = "code"
 
+gallery.prepare()
+sphinx_gallery_conf = {
+    "examples_dirs": "../build/gallery",
+    "gallery_dirs": gallery.PAGES,
+    "filename_pattern": "",
+    "abort_on_example_error": True,
+    "image_scrapers": ("gallery.keep_pictures",),
+    "capture_repr": (),
+    "subsection_order": [f"../build/gallery/{name}" for name in ("scripts", "demonstrations")],
+    "within_subsection_order": "FileNameSortKey",
+    "download_all_examples": False,
+    "show_signature": False,
+    "min_reported_time": 1e9,
+    "write_computation_times": False,
+}
+
 html_theme = "furo"
 html_title = f"KiKS {release}"
 html_favicon = "images/icon.svg"
+html_static_path, html_css_files = ["style"], ["gallery.css"]
 
 
 # Types in signatures are without the rules of Pydantic, which texts say.

@@ -1,0 +1,85 @@
+"""What sphinx-gallery runs: the scripts of `examples/gallery`, and an entry for each demonstration."""
+
+from __future__ import annotations
+
+import ast
+import os
+import shutil
+import sys
+from pathlib import Path
+from typing import Any
+
+from sphinx_gallery.scrapers import figure_rst
+
+from kiks.model.project import Project
+from kiks.model.shipped import demonstrations
+
+ROOT = Path(__file__).parents[2]
+SOURCE, PAGES = ROOT / "build" / "gallery", "gallery"
+"""Where scripts run, and leave recordings and pictures, and the folder of the pages."""
+
+HEADS = {
+    "": (
+        "Gallery",
+        "Short scripts and demonstrations. Each has run while this site was built, and made its pictures. "
+        "``kiks examples OUT`` copies them into a folder of yours, to be changed.",
+    ),
+    "scripts": ("Scripts", "``python FILE.py`` runs one: it prints a result and leaves its pictures."),
+    "demonstrations": (
+        "Demonstrations",
+        "Programs for pyserial, which know nothing of the simulation. ``kiks demo NAME`` runs one, "
+        "``kiks demo NAME --desk`` shows it in the browser.",
+    ),
+}
+
+DEMONSTRATION = '''"""
+{title}
+{line}
+
+{text}
+
+.. literalinclude:: /../{path}
+   :start-at: import
+   :caption: {path}
+"""
+
+# %%
+# ``kiks demo {name} --desk`` shows it in the browser. Without ``--desk`` it leaves a picture:
+
+import subprocess
+
+run = subprocess.run(["kiks", "demo", "{name}"], capture_output=True, text=True, check=True)
+print(run.stdout + run.stderr)
+'''
+
+
+def prepare() -> None:
+    """Lay the scripts out as sphinx-gallery reads them, and let them find the command `kiks`."""
+    os.environ["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    shutil.rmtree(SOURCE, ignore_errors=True)
+    for folder, (title, text) in HEADS.items():
+        (SOURCE / folder).mkdir(parents=True, exist_ok=True)
+        line = ("-" if folder else "=") * len(title)
+        (SOURCE / folder / "GALLERY_HEADER.rst").write_text(f"{title}\n{line}\n\n{text}\n")
+    for path in (ROOT / "examples" / "gallery").glob("*.py"):
+        shutil.copy(path, SOURCE / "scripts")
+    for name, project in demonstrations().items():
+        (SOURCE / "demonstrations" / f"{name}.py").write_text(entry(name, project))
+
+
+def entry(name: str, path: Path) -> str:
+    """Return the script of a demonstration, which shows its program and runs it."""
+    program = next(robot.program for robot in Project.load(path).robots if robot.program)
+    text = ast.get_docstring(ast.parse((path.parent / program).read_text(encoding="utf-8"))) or ""
+    title, place = name.replace("_", " ").capitalize(), (path.parent / program).relative_to(ROOT)
+    return DEMONSTRATION.format(title=title, line="=" * len(title), text=text, name=name, path=place)
+
+
+def keep_pictures(block: Any, variables: dict[str, Any], settings: dict[str, Any]) -> str:
+    """Return the pictures that a script has written, as its page shows them."""
+    kept = []
+    for path in sorted(SOURCE.rglob("*")):
+        if path.suffix in (".png", ".webp"):
+            place = Path(next(variables["image_path_iterator"])).with_suffix(path.suffix)
+            kept.append(str(shutil.move(path, place)))
+    return figure_rst(kept, settings["src_dir"], Path(variables["src_file"]).stem.replace("_", " "))
