@@ -13,6 +13,10 @@ INTRODUCTION = """# Commands
 
 Each command explains itself with `--help`, from which this page is made. A command that fails says why in one line and
 ends with status 1, or with 2 if it does not understand its arguments. `kiks --version` prints the version.
+
+For scripts, a command with results has `--json`: it prints them alone on the standard output, and all else, such as
+what a program prints, on the error output. `kiks run --json` tells the time, the seed, the state, and of each robot how
+far it drove and how often it touched something.
 """
 
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import subprocess
 import sys
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
-from typing import get_args, get_type_hints
+from typing import Any, get_args, get_type_hints
 
 import pytest
 from tests import forked
@@ -104,6 +106,25 @@ def test_arenas_are_listed_and_known_by_name() -> None:
             "'offise'. Did you mean 'office'?"
         ],
     )
+
+
+@pytest.mark.parametrize(
+    ("words", "known"),
+    [
+        (("arena", "list"), lambda found: found[2]["name"] == "office" and found[2]["lamps"] == 2),
+        (("arena", "info", ARENA), lambda found: found["starts"][0]["khepera_fits"] is True),
+        (("demo",), lambda found: found[0]["about"].startswith("Avoid")),
+        (("evolve", "--list"), lambda found: "avoid" in {each["name"] for each in found}),
+        (("doctor",), lambda found: found["libraries"]["numpy"] and found["speed"] > 10),
+        (("run", WANDER), lambda found: found["robots"][0]["contacts"] == 0 and len(found["state"]) == 16),
+        (("run", WANDER, WANDER), lambda found: len(found["robots"]) == 2 and found["not_repeatable"] is None),
+    ],
+)
+def test_scripts_get_json_alone(words: tuple[str, ...], known: Callable[[Any], bool]) -> None:
+    at = 2 if words[0] == "arena" else 1
+    result = forked.run(*words[:at], "--json", *words[at:])
+    assert result.returncode == 0, result.stderr
+    assert known(json.loads(result.stdout))
 
 
 def test_the_doctor_says_what_is_there_and_how_fast_it_is() -> None:
@@ -206,6 +227,16 @@ def test_turrets_and_kinds_of_robots_from_the_command_line(tmp_path: Path) -> No
     ], result.stderr
 
 
+def test_an_option_behind_a_program_is_the_program_s_and_that_is_said(tmp_path: Path) -> None:
+    (tmp_path / "words.py").write_text("import sys\nprint(sys.argv[1:])\n")
+    result = forked.run("run", "words.py", "--export", "x.html", cwd=tmp_path)
+    assert result.stdout == "['--export', 'x.html']\n"
+    assert "kiks: --export goes to words.py, as all words behind a program." in result.stderr
+    assert "goes to" not in forked.run("run", "--", "words.py", "--export", "x.html", cwd=tmp_path).stderr
+    assert "goes to" not in forked.run("run", "words.py", "--gain", "3", cwd=tmp_path).stderr
+    assert not (tmp_path / "x.html").exists()
+
+
 def test_a_programs_exit_code_and_errors_are_its_own(tmp_path: Path) -> None:
     assert forked.run("run", WANDER, "7").returncode == 7
     program = tmp_path / "wrong.py"
@@ -244,6 +275,10 @@ def test_live_thinking_is_recorded_and_replayed(tmp_path: Path) -> None:
         (("run", "--turret", "gripper=x", WANDER), "--turret must be a turret, or one with = and a robot's number"),
         (("demo", "avoid", "--arena", "nowhere.png"), "nowhere.png"),
         (("demo", "folow"), "Did you mean 'follow'"),
+        (("run", "--robots", "0", WANDER), "--robots must be a whole number from 1 to 1000, but it was '0'."),
+        (("serve", "--speed", "fast"), "--speed must be a number, but it was 'fast'."),
+        (("schema", "robto"), "KIND must be one of robot, arena, project, task, but it was 'robto'."),
+        (("run", WANDER, "exercise.kiks"), "a project must come first, but 'exercise.kiks' stands among the programs"),
         (("run", "champion.toml", "student.py"), "a champion must drive all robots alone, but 'student.py' follows it"),
     ],
 )

@@ -96,7 +96,3 @@ def test_our_files_are_accepted() -> None:
 )
 def test_values_out_of_range_are_refused(kind: str, change: dict[str, Any]) -> None:
     assert not accepts(kind, GOOD[kind] | change)
-
-
-def test_an_unknown_kind_is_refused() -> None:
-    assert CliRunner().invoke(app, ["schema", "robto"]).exit_code == 2

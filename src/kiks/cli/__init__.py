@@ -32,9 +32,19 @@ from kiks.errors import KiksError
 from kiks.ports.file_descriptors import raise_limit
 from kiks.version import __version__
 
+DEMO_HELP = """Run a demonstration, or list them.
+
+A demonstration is a program in a world of its own, and leaves a picture, kiks-NAME.png. With --desk you can watch it.
+
+Example: kiks demo avoid --desk
+
+Example: kiks demo follow --arena office --seconds 300"""
+
 app = typer.Typer(
     help="KiKS Is a Khepera Simulator: programs for a real Khepera robot run on a simulated one, unchanged.",
     context_settings={"help_option_names": ["-h", "--help"]},
+    subcommand_metavar="COMMAND ...",
+    options_metavar="",
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
 )
@@ -58,7 +68,8 @@ for _command in (
     doctor,
 ):
     app.command(cls=RunCommand if _command is run else Command)(with_options(_command))
-app.command("demo", cls=DemoCommand)(with_options(run))
+    if _command is run:
+        app.command("demo", cls=DemoCommand, help=DEMO_HELP)(with_options(run))
 app.add_typer(arena, name="arena")
 
 
@@ -74,7 +85,7 @@ WELCOME = f"""KiKS {__version__}: programs for a Khepera robot drive a simulated
   kiks run my_program.py      run a program of yours that talks to a Khepera with pyserial
   kiks examples first         get programs and arenas to change, in the folder first
 
-kiks --help lists all commands, kiks COMMAND --help explains one."""
+kiks -h lists all commands, kiks COMMAND -h explains one."""
 
 
 @app.callback(invoke_without_command=True)

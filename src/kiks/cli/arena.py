@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from kiks.cli.outputs import Command, output
+from kiks.cli.outputs import Command, has_results, output, tell_results
 from kiks.errors import counted
 
 if TYPE_CHECKING:
@@ -22,7 +23,13 @@ Out = Annotated[
     ),
 ]
 
-arena = typer.Typer(help="List the arenas, create one, or describe one.", no_args_is_help=True, rich_markup_mode=None)
+arena = typer.Typer(
+    help="List, create and describe arenas.",
+    no_args_is_help=True,
+    subcommand_metavar="COMMAND ...",
+    options_metavar="",
+    rich_markup_mode=None,
+)
 
 
 @arena.command(cls=Command)
@@ -34,7 +41,9 @@ def maze(
     wall_mm: Annotated[int, typer.Option(help="Thickness of the walls between them [mm].")] = 10,
     seed: Annotated[int, typer.Option(help="Seed: the same seed, the same maze.", min=0)] = 0,
 ) -> None:
-    """Create a random maze: a robot starts at the entrance, upper left, and a lamp hangs at the exit, lower right.
+    """Create a random maze.
+
+    A robot starts at the entrance, upper left, and a lamp hangs at the exit, lower right.
 
     Example: kiks arena maze maze.toml --columns 6 --rows 5 --seed 3
     """
@@ -52,7 +61,9 @@ def new(
     rounded_mm: Annotated[int, typer.Option(help="Radius of the corners [mm].")] = 0,
     brightness: Annotated[str, typer.Option(help="Brightness of the wall, 1 to 255, or a material: wood.")] = "255",
 ) -> None:
-    """Create an empty box whose picture, one pixel per millimetre, is ready to draw in.
+    """Create an empty box to draw in.
+
+    Its picture has one pixel per millimetre.
 
     Example: kiks arena new room.toml --width-mm 800 --height-mm 600 --brightness wood
     """
@@ -64,57 +75,92 @@ def new(
 
 
 @arena.command("list", cls=Command)
-def list_() -> None:
-    """List the arenas that come with KiKS, which every command and `Arena.load` know by name."""
+@has_results
+def list_(context: typer.Context) -> None:
+    """List the arenas that come with KiKS.
+
+    Every command and `Arena.load` know them by name.
+
+    Example: kiks arena list
+    """
     from kiks.model.shipped import shipped_arena, shipped_arenas
 
+    found, lines = [], []
     for name in shipped_arenas():
         if "/" not in name:
             place = shipped_arena(name)
             things = {"start": place.starts, "lamp": place.lamps, "ball": place.balls, "cylinder": place.cylinders}
-            contents = ", ".join(counted(len(each), thing) for thing, each in things.items() if each)
-            typer.echo(f"{name:<10} {place.width_mm:g} x {place.height_mm:g} mm, {contents}")
+            counts = {thing: len(each) for thing, each in things.items()}
+            contents = ", ".join(counted(count, thing) for thing, count in counts.items() if count)
+            lines.append(f"{name:<10} {place.width_mm:g} x {place.height_mm:g} mm, {contents}")
+            size = {"name": name, "width_mm": place.width_mm, "height_mm": place.height_mm}
+            found.append(size | {f"{thing}s": count for thing, count in counts.items()})
+    tell_results(context, found, lines)
 
 
 @arena.command(cls=Command)
-def info(file: Annotated[Path, typer.Argument(metavar="ARENA", help="An arena's name, file or picture.")]) -> None:
-    """Print an arena's size and contents, and whether a Khepera fits at the starts.
+@has_results
+def info(
+    context: typer.Context,
+    file: Annotated[Path, typer.Argument(metavar="ARENA", help="An arena's name, file or picture.")],
+) -> None:
+    """Describe an arena, and whether a Khepera fits at its starts.
 
     Example: kiks arena info maze
     """
-    import math
-
     from kiks.model.arena import Arena
     from kiks.model.robot import RobotSpec
 
     place = Arena.load(file)
     robot_mm = RobotSpec.load("khepera").body.diameter_mm
-    # Clearance is measured between centres of cells, so half a cell of it is wall.
-    widest_mm = 2 * float(place.clearance.max()) - place.mm_per_cell
-    walls = f"{100 * (place.brightness > 0).mean():.0f} % of it wall"
-    typer.echo(f"{place.name}: {place.width_mm:g} x {place.height_mm:g} mm, cells of {place.mm_per_cell:g} mm, {walls}")
-    typer.echo(f"Widest place: room for {widest_mm:.1f} mm across")
-    for number, start in enumerate(place.starts, start=1):
-        room_mm = max(2 * place.clearance_at_mm(start.x_mm, start.y_mm), 0.0)
-        fits = "fits" if place.free_for(start.x_mm, start.y_mm, robot_mm / 2) else "does not fit"
-        typer.echo(
-            f"Start {number}: {_at(start.x_mm, start.y_mm)}, heading {math.degrees(start.heading_rad):g} degrees, "
-            f"room for {room_mm:.1f} mm across: a Khepera ({robot_mm:g} mm) {fits}"
+    starts = []
+    for start in place.starts:
+        room_mm = max(2 * float(place.clearance_at_mm(start.x_mm, start.y_mm)), 0.0)
+        fits = bool(place.free_for(start.x_mm, start.y_mm, robot_mm / 2))
+        starts.append({**start._asdict(), "room_mm": room_mm, "khepera_fits": fits})
+    found = {
+        "name": place.name,
+        "width_mm": place.width_mm,
+        "height_mm": place.height_mm,
+        "mm_per_cell": place.mm_per_cell,
+        "wall_share": float((place.brightness > 0).mean()),
+        # Clearance is measured between centres of cells, so half a cell of it is wall.
+        "widest_mm": 2 * float(place.clearance.max()) - place.mm_per_cell,
+        "starts": starts,
+        **{
+            f"{name}s": [each._asdict() for each in getattr(place, f"{name}s")] for name in ("lamp", "ball", "cylinder")
+        },
+    }
+    tell_results(context, found, _lines_of(place, robot_mm, found))
+
+
+def _lines_of(place: Arena, robot_mm: float, found: dict[str, Any]) -> Iterator[str]:
+    """Yield what `info` tells people."""
+    import math
+
+    walls = f"{100 * found['wall_share']:.0f} % of it wall"
+    yield f"{place.name}: {place.width_mm:g} x {place.height_mm:g} mm, cells of {place.mm_per_cell:g} mm, {walls}"
+    yield f"Widest place: room for {found['widest_mm']:.1f} mm across"
+    for number, start in enumerate(found["starts"], start=1):
+        yield (
+            f"Start {number}: {_at(start['x_mm'], start['y_mm'])}, heading "
+            f"{math.degrees(start['heading_rad']):g} degrees, room for {start['room_mm']:.1f} mm across: a Khepera "
+            f"({robot_mm:g} mm) {'fits' if start['khepera_fits'] else 'does not fit'}"
         )
     if not place.starts:
         where = "fits nowhere"
-        if widest_mm >= robot_mm:
+        if found["widest_mm"] >= robot_mm:
             x_mm, y_mm, _ = place.find_start(robot_mm / 2)
             where = f"starts at {_at(x_mm, y_mm)}"
-        typer.echo(f"Start: none; a Khepera ({robot_mm:g} mm) {where}")
+        yield f"Start: none; a Khepera ({robot_mm:g} mm) {where}"
     for number, lamp in enumerate(place.lamps, start=1):
         switch = "on" if lamp.is_on else "off"
-        typer.echo(f"Lamp {number}: {_at(lamp.x_mm, lamp.y_mm)}, {lamp.power_w:g} W, {switch}")
+        yield f"Lamp {number}: {_at(lamp.x_mm, lamp.y_mm)}, {lamp.power_w:g} W, {switch}"
     for number, body in enumerate(place.bodies, start=1):
         is_ball = number <= len(place.balls)
         label = f"Ball {number}" if is_ball else f"Cylinder {number - len(place.balls)}"
         size = f"radius {body.radius_mm:g} mm, brightness {body.brightness}"
-        typer.echo(f"{label}: {_at(body.x_mm, body.y_mm)}, {size}")
+        yield f"{label}: {_at(body.x_mm, body.y_mm)}, {size}"
 
 
 def _at(x_mm: float, y_mm: float) -> str:

@@ -32,9 +32,10 @@ def calibrate(
     run_up: Annotated[float, typer.Option(help="Mark [mm] from which it drives towards the wall.")] = 500.0,
     yes: Annotated[bool, typer.Option("--yes", help="Take every default: for simulated robots.")] = False,
 ) -> None:
-    """Measure a robot in front of a white wall and write a robot file for a simulated robot like it.
+    """Measure a robot, and write a file for a simulated one like it.
 
-    The command says where to put the robot, and waits. It moves a simulated robot (kiks://1) by itself.
+    It stands in front of a white wall. The command says where to put the robot, and waits. It moves a simulated robot
+    (kiks://1) by itself.
 
     Example: kiks calibrate --port /dev/ttyUSB0 --out mine.toml
     """

@@ -30,9 +30,10 @@ def champion(
         str | None, typer.Option(help="With --generation: the file of the task, if it is a Python file or was moved.")
     ] = None,
 ) -> None:
-    """Write another controller of an evolution as a champion's file: an elite of its archive, or any candidate.
+    """Write another controller of an evolution as a champion's file.
 
-    `kiks run OUT.toml` lets it drive. A candidate drives in a world of its evaluation, as it did there.
+    It may be an elite of its archive, or any candidate. `kiks run OUT.toml` lets it drive. A candidate drives in a
+    world of its evaluation, as it did there.
 
     Example: kiks champion runs/avoid third.toml --generation 12 --rank 3
     """

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from kiks.cli.outputs import output
+from kiks.cli.outputs import has_results, output, tell_results
 from kiks.errors import ParameterError
 from kiks.export.kinds import KINDS
 
@@ -18,19 +19,23 @@ if TYPE_CHECKING:
     from kiks.learn.results import Result
 
 
+@has_results
 def compare(
+    context: typer.Context,
     first: Annotated[Path, typer.Argument(help="A folder of kiks evolve, best with --seeds.")],
     second: Annotated[Path, typer.Argument(help="Another folder, with evolutions of the same task.")],
     picture: Annotated[
         Path, typer.Option(help=f"File of the picture, {' or '.join(FIGURES)}.", callback=output(*FIGURES))
     ] = Path("kiks-compare.png"),
 ) -> None:
-    """Compare the evolutions in two folders: medians, exams, and the Mann-Whitney test with its effect size.
+    """Compare the evolutions in two folders.
+
+    It prints medians, exams, and the Mann-Whitney test with its effect size.
 
     Example: kiks compare runs/linear runs/gru
     """
     from kiks.learn.plots import save_results_plot
-    from kiks.learn.results import comparable, difference, load_results
+    from kiks.learn.results import comparable, difference, load_results, summary_of
 
     if first.resolve() == second.resolve():
         raise ParameterError(f"SECOND must be another folder than FIRST, but both are {str(first)!r}.")
@@ -40,14 +45,18 @@ def compare(
     samples = {"Fitness": [[each.fitness for each in group] for group in (one, two)]}
     if all(each.exam is not None for each in (*one, *two)):
         samples["Exam"] = [[each.exam.share for each in group if each.exam is not None] for group in (one, two)]
+    differences = {}
     for name, sample in samples.items():
         found = difference(*sample)
+        differences[name.lower()] = asdict(found) | {"effect": found.effect}
         typer.echo(
             f"{name}: U = {found.u:g}, p = {found.p:.3g}, A = {found.a:.2f} ({found.effect}): the share of pairs in "
             f"which {first} is better"
         )
     save_results_plot(groups, picture)
     typer.echo(f"Picture: {picture}")
+    summaries = {folder: summary_of(group) for folder, group in groups.items()}
+    tell_results(context, {"folders": summaries, "differences": differences})
 
 
 def print_seeds(results: Sequence[Result]) -> None:

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import shutil
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+from typing import NamedTuple
 
 import typer
+
+from kiks.cli.outputs import has_results, tell_results
 
 LIBRARIES = ("numba", "llvmlite", "numpy", "scipy", "pyserial", "nicegui", "matplotlib", "greenlet")
 """Libraries on whose versions most depends."""
@@ -33,39 +37,73 @@ SECONDS = 200.0
 """Simulated time of the measurement [s]."""
 
 
-def doctor() -> None:
-    """Print what is installed, what is missing and what for, and how fast this computer is.
+class Part(NamedTuple):
+    """What may be installed.
+
+    Attributes:
+        name: Its name.
+        is_there: Whether it is.
+        use: What it is for.
+        cure: How to get it.
+    """
+
+    name: str
+    is_there: bool
+    use: str
+    cure: str
+
+
+@has_results
+def doctor(context: typer.Context) -> None:
+    """Print what is installed, what is missing, and how fast it is.
 
     Example: kiks doctor
     """
     import importlib.metadata
-    import importlib.util
     import platform
+
+    from kiks.version import __version__
+
+    versions = {name: importlib.metadata.version(name) for name in LIBRARIES}
+    parts, speed = [*_parts()], _speed()
+    share = 100 * speed / REFERENCE_SPEED
+    found = {
+        "kiks": __version__,
+        "folder": str(Path(__file__).parents[1]),
+        "python": platform.python_version(),
+        "environment": sys.prefix,
+        "system": platform.platform(),
+        "libraries": versions,
+        "parts": [part._asdict() for part in parts],
+        "speed": speed,
+        "reference_speed": REFERENCE_SPEED,
+    }
+    lines = [
+        f"KiKS {found['kiks']} in {found['folder']}",
+        f"Python {found['python']} in {sys.prefix}, {found['system']}",
+        ", ".join(f"{name} {version}" for name, version in versions.items()),
+        *(
+            f"{'found  ' if is_there else 'missing'}  {name}, {use}{'' if is_there else ': ' + cure}"
+            for name, is_there, use, cure in parts
+        ),
+        f"A program drives {speed:.0f} times as fast as the robot: {share:.0f} % of the reference ({REFERENCE}).",
+    ]
+    tell_results(context, found, lines)
+
+
+def _parts() -> Iterator[Part]:
+    import importlib.util
 
     from kiks.engine.code_cache import cache_folders, is_compiled
     from kiks.engine.compiling import LAST
-    from kiks.version import __version__
 
-    typer.echo(f"KiKS {__version__} in {Path(__file__).parents[1]}")
-    typer.echo(f"Python {platform.python_version()} in {sys.prefix}, {platform.platform()}")
-    typer.echo(", ".join(f"{name} {importlib.metadata.version(name)}" for name in LIBRARIES))
     for extra, (library, use) in EXTRAS.items():
-        found = importlib.util.find_spec(library) is not None
-        _say(found, f"extra {extra}", f"for {use}", f"pip install 'kiks[{extra}]'")
+        is_there = importlib.util.find_spec(library) is not None
+        yield Part(f"extra {extra}", is_there, f"for {use}", f"pip install 'kiks[{extra}]'")
     for name, (commands, use) in PROGRAMS.items():
-        _say(any(map(shutil.which, commands)), name, f"for {use}", "install it with your system's packages")
-    has_engine = is_compiled(LAST) and is_compiled("roll_out")
-    folder = next(cache_folders(), None)
-    _say(has_engine, "the compiled engine", f"in {folder}", "kiks warmup compiles it")
-    speed = _speed()
-    share = 100 * speed / REFERENCE_SPEED
-    typer.echo(
-        f"A program drives {speed:.0f} times as fast as the robot: {share:.0f} % of the reference ({REFERENCE})."
-    )
-
-
-def _say(is_there: bool, name: str, use: str, cure: str) -> None:
-    typer.echo(f"{'found  ' if is_there else 'missing'}  {name}, {use}{'' if is_there else ': ' + cure}")
+        yield Part(name, any(map(shutil.which, commands)), f"for {use}", "install it with your system's packages")
+    is_there = is_compiled(LAST) and is_compiled("roll_out")
+    yield Part("the compiled engine", is_there, f"in {next(cache_folders(), None)}", "kiks warmup compiles it")
 
 
 def _speed() -> float:

@@ -14,7 +14,7 @@ import typer
 from kiks.cli.engine_start import ready_batch, ready_engine
 from kiks.cli.evolution_progress import Progress
 from kiks.cli.options import Seed, written_folder
-from kiks.cli.outputs import leave_out
+from kiks.cli.outputs import has_results, leave_out, tell_results
 from kiks.cli.record import RecordFile, recorded
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import ParameterError, nearest, shown
@@ -31,6 +31,7 @@ PERIODS = 5
 """Number of periods of an evolution of two sides whose winners are listed."""
 
 
+@has_results
 def evolve(
     context: typer.Context,
     task: Annotated[str, typer.Argument(help="A task (--list shows them), or a Python file that holds one.")] = "avoid",
@@ -64,12 +65,13 @@ def evolve(
     record: RecordFile = None,
     list_: Annotated[bool, typer.Option("--list", help="List the tasks that come with KiKS.")] = False,
 ) -> None:
-    """Evolve a controller for a task, and write champion.toml, archive.parquet, log.parquet and fitness.png.
+    """Evolve a controller for a task.
 
-    After Ctrl-C or a kill, the same command continues the evolution. With --seeds 10, ten evolutions run one after the
-    other; a table, seeds.png and summary.json show their results. In pursuit, predator and prey evolve against each
-    other, in football two players: predator.toml and prey.toml, or left.toml and right.toml, are the champions, and
-    tournament.png shows which of them progressed. --record keeps the champion's drive from the first start of its exam.
+    It writes champion.toml, archive.parquet, log.parquet and fitness.png. After Ctrl-C or a kill, the same command
+    continues the evolution. With --seeds 10, ten evolutions run one after the other; a table, seeds.png and
+    summary.json show their results. In pursuit, predator and prey evolve against each other, in football two players:
+    predator.toml and prey.toml, or left.toml and right.toml, are the champions, and tournament.png shows which of them
+    progressed. --record keeps the champion's drive from the first start of its exam.
 
     Example: kiks evolve avoid --seed 1 --out runs/avoid
     """
@@ -77,8 +79,8 @@ def evolve(
 
     if list_:
         leave_out(context, "with --list", *(set(context.params) - {"list_"}))
-        for name in tasks.TASKS:
-            typer.echo(f"{name:10} {tasks.load(name).about}")
+        found = [{"name": name, "about": tasks.load(name).about} for name in tasks.TASKS]
+        tell_results(context, found, [f"{each['name']:10} {each['about']}" for each in found])
         return
     if seeds is not None:
         leave_out(context, "with --seeds", "record")
@@ -90,7 +92,7 @@ def evolve(
     folder = out or Path(f"kiks-evolve-{chosen.name}")
     until = chosen.generations if generations is None and seconds is None else generations
     from kiks.learn.evolution import Evolution
-    from kiks.learn.results import seed_folder
+    from kiks.learn.results import seed_folder, summary_of
 
     results: list[Result] = []
     executor: Executor | None = None
@@ -128,6 +130,8 @@ def evolve(
                 _stop(evolution, home)
     if seeds is not None and results:
         _tell_seeds(results, folder)
+    if results:
+        tell_results(context, summary_of(results))
 
 
 def _finish(evolution: Evolution, folder: Path) -> Result:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -14,31 +16,49 @@ from kiks.errors import ParameterError, shown
 class DemoCommand(RunCommand):
     """`kiks run` for demonstrations, which it lists when it is given none."""
 
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        words: dict[str | None, Any] = {param.name: param for param in self.params}
+        words["program"].metavar, words["program"].help = "NAME", "The demonstration; without one, they are listed."
+        words["arguments"].hidden = True
+
+    def collect_usage_pieces(self, ctx: Any) -> list[str]:
+        """Say that the name may be left out, and leave out the arguments of programs."""
+        return ["[OPTIONS]", "[NAME]"]
+
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Also understand --list, and no words at all."""
-        if args in ([], ["--list"]):
-            list_demonstrations()
+        if set(args) <= {"--list", "--json"}:
+            found = _demonstrations()
+            typer.echo(json.dumps(found, indent=2) if "--json" in args else "\n".join(_lines_of(found)))
             ctx.exit()
         return super().parse_args(ctx, args)
 
 
-def list_demonstrations() -> None:
-    """Print what each demonstration shows, in the first line of its program."""
+def _demonstrations() -> list[dict[str, str]]:
+    """Return what each demonstration shows, in the first line of its program."""
     import ast
 
     from kiks.model.project import Project
     from kiks.model.shipped import demonstrations
 
-    typer.echo("kiks demo NAME runs a demonstration, kiks demo NAME --desk shows it in the browser:\n")
+    found = []
     for name, path in demonstrations().items():
         program = next(robot.program for robot in Project.load(path).robots if robot.program)
         text = ast.get_docstring(ast.parse((path.parent / program).read_text(encoding="utf-8"))) or ""
-        typer.echo(f"  {name:<13} {text.splitlines()[0]}")
-    typer.echo("\nkiks examples OUT copies their programs into a folder, to be changed.")
+        found.append({"name": name, "about": text.splitlines()[0]})
+    return found
+
+
+def _lines_of(found: list[dict[str, str]]) -> Iterator[str]:
+    yield "kiks demo NAME runs a demonstration, kiks demo NAME --desk shows it in the browser:\n"
+    for each in found:
+        yield f"  {each['name']:<13} {each['about']}"
+    yield "\nkiks examples OUT copies their programs into a folder, to be changed."
 
 
 def examples(out: Annotated[Path, typer.Argument(help="A new folder.")]) -> None:
-    """Copy the example programs, arenas and projects into a folder of yours, to be changed.
+    """Copy the example programs, arenas and projects into a folder.
 
     Example: kiks examples first
     """

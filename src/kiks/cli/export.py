@@ -71,7 +71,7 @@ def export(
     ] = None,
     title: Annotated[str | None, typer.Option(help="Page: its title; the programs' names if left out.")] = None,
 ) -> None:
-    """Make a film, a picture, figures, a photo, a table or a page of a recording.
+    """Make a film, picture, figures, photo, table or page of a run.
 
     The ending of OUT says which. A picture shows the world from above with all paths. Figures show paths and odometry,
     where robots were, readings, speeds, and where the milliseconds went. A photo has light and shadows, and needs

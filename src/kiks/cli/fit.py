@@ -9,12 +9,14 @@ from typing import Annotated
 
 import typer
 
-from kiks.cli.outputs import output
+from kiks.cli.outputs import has_results, output, tell_results
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import ParameterError, shown
 
 
+@has_results
 def fit(
+    context: typer.Context,
     files: Annotated[
         list[str],
         typer.Argument(help="Files of samples; =RADIUS in mm after that of a round object: post.sam=12.5."),
@@ -23,9 +25,9 @@ def fit(
         Path | None, typer.Option(help="Write the fitted robot here: mine.toml.", callback=output(".toml"))
     ] = None,
 ) -> None:
-    """Fit the proximity sensors to samples of a real robot: on every other angle, and test them on the rest.
+    """Fit the proximity sensors to samples of a real robot.
 
-    The fit also estimates how far the rig was off.
+    They are fitted on every other angle, and tested on the rest. The fit also estimates how far the rig was off.
 
     Example: kiks fit wall.sam round.sam=27 --robot mine.toml
     """
@@ -46,15 +48,18 @@ def fit(
         found = fit_robot([table.at_angles(slice(0, None, 2)) for table in tables], RobotSpec.load("khepera"))
     test = [rig.moved(table.at_angles(slice(1, None, 2))) for rig, table in zip(found.rigs, tables, strict=True)]
     answers, readings = active_pairs(found.spec, test)
+    results: dict[str, float | None] = dict.fromkeys(("median_counts", "mean_counts", "maximum_counts"))
     if len(answers):
         error = np.abs(answers - readings)
+        median, mean, most = (float(each(error)) for each in (np.median, np.mean, np.max))
+        results = {"median_counts": median, "mean_counts": mean, "maximum_counts": most}
         typer.echo(
-            f"Absolute errors on the other angles: median {np.median(error):.1f}, mean {error.mean():.1f}, "
-            f"maximum {error.max():.1f} counts."
+            f"Absolute errors on the other angles: median {median:.1f}, mean {mean:.1f}, maximum {most:.1f} counts."
         )
     if robot is not None:
         save_robot(found.spec, robot, comment="Proximity sensors fitted to samples by `kiks fit`.")
         typer.echo(f"Robot: {robot}")
+    tell_results(context, results)
 
 
 def parse_file(entry: str) -> tuple[str, float]:

@@ -6,7 +6,9 @@ import typer
 
 
 def matlab() -> None:
-    """Print the line that adds the toolbox to the path of Octave and MATLAB: type it there, or put it into startup.m.
+    """Print the line that adds the toolbox to Octave or MATLAB.
+
+    Type it there, or put it into startup.m.
 
     Example: octave --eval "$(kiks matlab) kiks; follow"
     """

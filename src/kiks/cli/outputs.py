@@ -1,22 +1,27 @@
-"""What a command was told, checked before it begins: the files that it would write, and options without an effect.
+"""What a command was told, checked before it begins: values, files that it would write, and options without an effect.
 
-Need: no command destroys what it reads or what a person has made, and none ignores an option. Method: `output` marks
-the options and arguments that name a file to be written. `Command` compares it with all other words of the command.
+Need: no command destroys what it reads or what a person has made, and none ignores an option. A script gets the results
+of a command, and nothing else. Method: `output` marks the options and arguments that name a file to be written.
+`Command` compares it with all other words of the command. With --json, all that a command and its programs print goes
+to the error output, but for the results.
 """
 
 from __future__ import annotations
 
+import json
 import os
 import re
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import suppress
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager, nullcontext, suppress
+from enum import Enum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, get_args
 
 import typer
 from typer.core import TyperCommand
 
-from kiks.errors import ParameterError, shown
+from kiks.errors import ParameterError, figure, shown
 from kiks.model.atomic_files import check_writable, ending_of
 
 # fmt: off
@@ -52,23 +57,68 @@ def output(
     return unchanged
 
 
-_forcing = typer.Typer(add_completion=False)
+_JSON, _RESULTS = "kiks.json", "kiks.results"
 
 
-@_forcing.command()
-def _forced(force: Annotated[bool, typer.Option("--force", help="Replace files of any kind.")] = False) -> None:
+def has_results(function: Callable[..., None]) -> Callable[..., None]:
+    """Mark a command that calls `tell_results`, so that it takes --json."""
+    function.has_results = True  # type: ignore[attr-defined]
+    return function
+
+
+def tell_results(context: typer.Context, results: object, lines: Iterable[str] = ()) -> None:
+    """Print what a command has found: the lines, or with --json the results alone, when the command ends."""
+    if context.meta.get(_JSON):
+        context.meta[_RESULTS] = results
+        return
+    for line in lines:
+        typer.echo(line)
+
+
+@contextmanager
+def _alone(context: Any) -> Iterator[None]:
+    """Let what is printed meanwhile go to the error output, also by other processes, and print the results then."""
+    sys.stdout.flush()
+    kept = os.dup(1)
+    os.dup2(2, 1)
+    try:
+        yield
+    finally:
+        sys.stdout.flush()
+        os.dup2(kept, 1)
+        os.close(kept)
+        if _RESULTS in context.meta:
+            typer.echo(json.dumps(context.meta[_RESULTS], indent=2, ensure_ascii=False))
+
+
+_adding = typer.Typer(add_completion=False)
+
+
+@_adding.command()
+def _added(
+    json: Annotated[
+        bool, typer.Option("--json", help="Print the results as JSON; all else goes to the error output.")
+    ] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace files of any kind.")] = False,
+) -> None:
     pass
 
 
 class Command(TyperCommand):
-    """A command that begins when nothing speaks against what it was told; with outputs it takes --force, too."""
+    """A command that begins when nothing speaks against what it was told.
+
+    It takes --json if it has results for scripts, and --force if it writes files.
+    """
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
         marked = [(param, getattr(param.callback, "output", None)) for param in self.params]
         self._outputs = [(param, found) for param, found in marked if found]
+        for_scripts, forcing = typer.main.get_command(_adding).params[:2]
+        if getattr(self.callback, "has_results", False):
+            self.params.append(for_scripts)
         if not all(is_new for _, (*_, is_new) in self._outputs):
-            self.params.append(typer.main.get_command(_forcing).params[0])
+            self.params.append(forcing)
         for param in self.params:
             _say_plainly(param)
 
@@ -79,15 +129,28 @@ class Command(TyperCommand):
             if param.param_type_name == "argument":
                 word = _name(param) + "..." * (param.nargs != 1)
                 pieces.append(word if param.required else f"[{word}]")
-        return pieces
+        return pieces or ["[OPTIONS]"]
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run it; with --json, only the results reach the standard output."""
+        with _alone(ctx) if ctx.meta.get(_JSON) else nullcontext():
+            return super().invoke(ctx)
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Also check what is told twice, and the outputs."""
-        left = super().parse_args(ctx, list(args))
+        try:
+            left = super().parse_args(ctx, list(args))
+        except typer.BadParameter as error:
+            param: Any = error.param
+            if param is None or not (rule := _rule(param)):
+                raise
+            value = self.make_parser(ctx).parse_args(list(args))[0].get(param.name)
+            raise ParameterError(f"{_name(param)} must be {rule}, but it was {shown(value)}.") from None
         order = self.make_parser(ctx).parse_args(list(args))[2]
         for param in order:
             if order.count(param) > 1 and param.nargs == 1 and not getattr(param, "multiple", False):
                 raise ParameterError(f"{_name(param)} must be given once, but it was given {order.count(param)} times.")
+        ctx.meta[_JSON] = ctx.params.pop("json", False)
         self._check_outputs(ctx.params, is_forced=ctx.params.pop("force", False))
         return left
 
@@ -131,11 +194,32 @@ def _name(param: Any) -> str:
     return str(param.metavar or param.name.upper()).removesuffix("...")
 
 
+def _limits(param: Any) -> str | None:
+    """Return between which numbers a parameter must be; None if it may be any."""
+    if param.min is None or param.max is None:
+        bound = param.max if param.min is None else param.min
+        return None if bound is None else f"at {'most' if param.min is None else 'least'} {figure(bound)}"
+    return f"from {figure(param.min)} to {figure(param.max)}"
+
+
+def _rule(param: Any) -> str:
+    """Return what a parameter must be; nothing if a library knows better."""
+    kind = param.type_descriptor.annotation
+    if kind in (int, float):
+        return " ".join(filter(None, ("a whole number" if kind is int else "a number", _limits(param))))
+    choices = [each.value for each in kind] if isinstance(kind, type) and issubclass(kind, Enum) else get_args(kind)
+    return f"one of {', '.join(choices)}" if choices and all(isinstance(each, str) for each in choices) else ""
+
+
 def _say_plainly(param: Any) -> None:
     """Let the help name what a parameter takes as people do, in place of a type of Python."""
+    param._get_number_range_help_str = lambda: _limits(param)
     if param.param_type_name == "argument":
         param.metavar = _name(param) + "..." * (param.nargs != 1)
         param.display_type_rich = lambda ctx: ""
+        record = param.get_help_record
+        # Without brackets in the usage, it is required: that need not be said twice.
+        param.get_help_record = lambda ctx: (found := record(ctx)) and (found[0], found[1].removesuffix("  [required]"))
     elif not getattr(param, "is_flag", False):
         words = {"int": "N", "float": "NUMBER", "path": "FILE", "": "TEXT"}
         param.display_type_rich = lambda ctx: (

@@ -131,10 +131,18 @@ def _command_line() -> str:
     return shlex.join(["kiks", *sys.argv[1:]])
 
 
-def tell_run(sim: Simulation, doubt: str = "") -> None:
-    """Say what each robot has done, then how the run has ended: its time, seed and state, or why not repeatable."""
+def tell_run(sim: Simulation, doubt: str = "") -> dict[str, Any]:
+    """Say what each robot has done, then how the run has ended: its time, seed and state, or why not repeatable.
+
+    Returns:
+        The same, for `tell_results`.
+    """
+    robots = []
     for number in range(1, sim.robot_count + 1):
-        contacts = counted(sim.contacts(number), "contact")
-        say(f"robot {number}: {sim.travelled_mm(number) / 1000:.2f} m driven, {contacts}, {sim.time_s:.3f} s")
-    repeatable = f"not repeatable: {doubt}" if doubt else f"state {sim.state_hash()}"
-    say(f"{sim.time_s:.3f} s simulated, seed {sim.seed}, {repeatable}")
+        driven_mm, contacts = float(sim.travelled_mm(number)), sim.contacts(number)
+        robots.append({"robot": number, "driven_mm": driven_mm, "contacts": contacts})
+        say(f"robot {number}: {driven_mm / 1000:.2f} m driven, {counted(contacts, 'contact')}, {sim.time_s:.3f} s")
+    state = None if doubt else sim.state_hash()
+    say(f"{sim.time_s:.3f} s simulated, seed {sim.seed}, {f'not repeatable: {doubt}' if doubt else f'state {state}'}")
+    ended = {"time_s": sim.time_s, "seed": sim.seed, "state": state, "not_repeatable": doubt or None}
+    return ended | {"robots": robots}

@@ -10,7 +10,7 @@ import typer
 from kiks.cli.desk import NoWait, open_desk
 from kiks.cli.engine_start import ready_engine
 from kiks.cli.options import say
-from kiks.cli.outputs import leave_out
+from kiks.cli.outputs import has_results, leave_out, tell_results
 from kiks.errors import ParameterError, counted
 from kiks.units import s_from_ns
 from kiks.version import __version__
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from kiks.recording.recording import Recording
 
 
+@has_results
 def replay(
     context: typer.Context,
     file: Annotated[Path, typer.Argument(help="A recording (.mcap) of --record or sim.record.", metavar="FILE")],
@@ -29,10 +30,11 @@ def replay(
     speed: Annotated[float, typer.Option(help="Simulated seconds per real second.", min=0.001, max=1000)] = 1.0,
     no_wait: NoWait = False,
 ) -> None:
-    """Show a recorded run again on the desk, or check that it is the same again.
+    """Show a recorded run again on the desk, or check it.
 
-    The world on the desk is a living one: its sensors and lines can be watched as ever. The time bar below it goes to
-    any time and to each event; from any time a person can go on without the recording.
+    With --check the run is made again, and compared to the bit. The world on the desk is a living one: its sensors and
+    lines can be watched as ever. The time bar below it goes to any time and to each event; from any time a person can
+    go on without the recording.
 
     Example: kiks replay run.mcap --check
     """
@@ -45,7 +47,7 @@ def replay(
     if not recording.is_whole:
         say(f"the run that wrote {str(file)!r} was killed, or goes on: this is what it has written so far.")
     if check:
-        raise typer.Exit(_check(recording, file))
+        raise typer.Exit(_check(context, recording, file))
     from kiks.desk.server.desk import Desk
     from kiks.recording.replay import Replay
 
@@ -56,7 +58,7 @@ def replay(
     open_desk(desk, waits=not no_wait)
 
 
-def _check(recording: Recording, file: Path) -> int:
+def _check(context: typer.Context, recording: Recording, file: Path) -> int:
     """Check a recording, and say what was found; return the exit code."""
     from kiks.recording.replay import check_recording
 
@@ -67,14 +69,13 @@ def _check(recording: Recording, file: Path) -> int:
             "killed before the first one, or goes on."
         )
     version = recording.about.get("kiks", "of an unknown version")
-    if found.differs_ns is None:
-        typer.echo(
-            f"The same run again: {counted(found.equal_count, 'checkpoint')} equal, to the bit, in "
-            f"{recording.duration_s:.3f} s of simulated time."
-        )
-        return 0
-    where = f"{counted(found.equal_count, 'checkpoint')} equal, that of {s_from_ns(found.differs_ns):.3f} s differs."
-    typer.echo(f"Another run: {where}")
-    if version != __version__:
-        typer.echo(f"KiKS {version} has recorded it, and this is KiKS {__version__}.")
-    return 1
+    differs_s = None if found.differs_ns is None else s_from_ns(found.differs_ns)
+    equal = f"{counted(found.equal_count, 'checkpoint')} equal"
+    lines = [f"The same run again: {equal}, to the bit, in {recording.duration_s:.3f} s of simulated time."]
+    if differs_s is not None:
+        lines = [f"Another run: {equal}, that of {differs_s:.3f} s differs."]
+        if version != __version__:
+            lines.append(f"KiKS {version} has recorded it, and this is KiKS {__version__}.")
+    results = {"is_same": differs_s is None, "equal_checkpoints": found.equal_count, "differs_s": differs_s}
+    tell_results(context, {**results, "recorded_by": version}, lines)
+    return 0 if differs_s is None else 1

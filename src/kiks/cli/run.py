@@ -17,7 +17,7 @@ from kiks.cli.job import job_of, takes_options_behind
 from kiks.cli.limits import Limits, MaxWall, Seconds
 from kiks.cli.options import Silence, World, say, show_log
 from kiks.cli.outputs import Command as CheckedCommand
-from kiks.cli.outputs import leave_out, output
+from kiks.cli.outputs import has_results, leave_out, output, tell_results
 from kiks.cli.record import ExportFile, RecordFile, noting_output, recorded, tell_run
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import ParameterError, shown
@@ -40,8 +40,20 @@ class RunCommand(CheckedCommand):
         if words and takes_options_behind(words[0]):
             behind, others = self._split(ctx, words[1:])
             options, words = options + behind, [words[0], *others]
+        elif "--" not in options:
+            self._say_what_programs_get(words)
         options = [word for word in options if word != "--"]
         return super().parse_args(ctx, [*options, "--", *words] if words else options)
+
+    def _say_what_programs_get(self, words: list[str]) -> None:
+        """Say that an option of ours behind a program is its own, as with `python`: it may be meant for us."""
+        ours = {name for param in self.params for name in param.opts}
+        for word in words[1:]:
+            if word.partition("=")[0] in ours:
+                say(
+                    f"{word} goes to {words[0]}, as all words behind a program. Is it for KiKS? Then put it before the "
+                    "program. If not, -- before the program says so."
+                )
 
     def _split(self, ctx: Any, args: list[str]) -> tuple[list[str], list[str]]:
         """Return the options at the beginning, and the words after them."""
@@ -51,6 +63,7 @@ class RunCommand(CheckedCommand):
         return args[:begin], args[begin:]
 
 
+@has_results
 def run(
     context: typer.Context,
     world: World,
@@ -88,10 +101,11 @@ def run(
     desk: WithDesk = False,
     no_wait: NoWait = False,
 ) -> None:
-    """Run a program for a real robot on a simulated one, unchanged; its waits and sleeps take no real time.
+    """Run a program for a real robot on a simulated one, unchanged.
 
-    Its serial ports lead to simulated robots, and its clocks show simulated time. Several programs share a world, each
-    in a process of its own: the first drives robot 1, the second robot 2, and so on.
+    Its serial ports lead to simulated robots, and its clocks show simulated time, so its waits take no real time.
+    Several programs share a world, each in a process of its own: the first drives robot 1, the second robot 2, and so
+    on. Options for KiKS stand before the program; what follows it belongs to it.
 
     A project (.kiks) has its own world, robots and programs; programs after it replace its own, from robot 1 on. With a
     file or folder of `kiks evolve`, its champion drives all robots, in its own world or in --arena. Demonstrations are
@@ -99,8 +113,6 @@ def run(
     soccer, square, swarm, to_the_light.
 
     Example: kiks run --arena maze --map /dev/ttyUSB0=1 wander.py
-
-    Example: kiks demo follow --arena office --seconds 300
     """
     show_log()
     if not desk:
@@ -181,15 +193,15 @@ def run(
             doubt = "it was interrupted"
             raise
         finally:
-            _tell(sim, thinking, doubt)
+            tell_results(context, _tell(sim, thinking, doubt))
     if job.demonstration:
         say(f"picture: {export}")
     raise typer.Exit(code)
 
 
-def _tell(sim: Simulation, thinking: str, doubt: str) -> None:
-    """Print the end of the run, and whether it is repeatable."""
-    tell_run(sim, "thinking was live" if thinking.startswith("live") else doubt)
+def _tell(sim: Simulation, thinking: str, doubt: str) -> dict[str, Any]:
+    """Say how the run has ended, and whether it is repeatable, and return it."""
+    return tell_run(sim, "thinking was live" if thinking.startswith("live") else doubt)
 
 
 def _run_on_desk(

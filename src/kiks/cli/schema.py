@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 
 import typer
 
@@ -15,8 +15,12 @@ FileKind = Literal["robot", "arena", "project", "task"]
 """Files that users write."""
 
 
-def schema(kind: Annotated[FileKind, typer.Argument(help="The kind of file.")]) -> None:
-    """Print the JSON schema of a kind of file, with which an editor can complete and check it.
+def schema(
+    kind: Annotated[FileKind, typer.Argument(help=f"The kind of file: {', '.join(get_args(FileKind))}.")],
+) -> None:
+    """Print the JSON schema of a kind of file, for an editor.
+
+    With it, the editor completes and checks your files.
 
     Example: kiks schema robot > robot.schema.json
     """

@@ -63,9 +63,10 @@ def serve(
     quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but warnings.")] = False,
     desk: WithDesk = False,
 ) -> None:
-    """Put simulated robots on real serial and TCP ports, for programs in any language.
+    """Put simulated robots on real serial and TCP ports.
 
-    The program opens the printed port in place of that of a real robot. Ctrl-C ends the server.
+    Programs in any language can use them. The program opens the printed port in place of that of a real robot. Ctrl-C
+    ends the server.
 
     Example: kiks serve --arena maze --link /tmp/khepera
     """

@@ -32,7 +32,7 @@ def session(
         ),
     ] = None,
 ) -> None:
-    """Serve the toolbox for Octave and MATLAB, which starts this command by itself.
+    """Serve the toolbox for Octave and MATLAB, which starts it.
 
     It takes requests, one per line, on its standard input, and ends when the last client has gone.
     """

@@ -8,7 +8,7 @@ from kiks.cli.engine_start import compile_all
 
 
 def warmup() -> None:
-    """Compile the engine and the batch now, so the next start is fast.
+    """Compile the engine now, so that the next start is fast.
 
     Example: kiks warmup
     """

@@ -248,7 +248,12 @@ def comparable(first: Sequence[Result], second: Sequence[Result]) -> list[list[R
 
 
 def save_summary(results: Sequence[Result], folder: Path) -> None:
-    """Write the results of several evolutions without their curves, and what they have in common."""
+    """Write the summary of several evolutions."""
+    replace_file(folder / SUMMARY, json.dumps(summary_of(results), indent=1) + "\n", "the summary")
+
+
+def summary_of(results: Sequence[Result]) -> dict[str, Any]:
+    """Return the results of several evolutions without their curves, and what they have in common."""
     low, median, high = quartiles(results)
     summary: dict[str, Any] = {"median_fitness": median, "quartiles_fitness": [low, high]}
     if (passed := passed_count(results)) is not None:
@@ -258,7 +263,7 @@ def save_summary(results: Sequence[Result], folder: Path) -> None:
         | {"evaluations": each.evaluations[-1]}
         for each in results
     ]
-    replace_file(folder / SUMMARY, json.dumps(summary, indent=1) + "\n", "the summary")
+    return summary
 
 
 # ---- statistics ----
