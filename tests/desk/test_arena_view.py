@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import math
+import re
+from pathlib import Path
 
 import pytest
+from PIL import Image
 from playwright.sync_api import Browser, Page, expect
 from tests.at_length import at_length, cases
 from tests.desk.visitor import NewPage, Visitor
@@ -144,6 +147,21 @@ def test_without_webgl_the_top_view_works(new_page: NewPage, shown: Shown, brows
     expect(visitor.at("arena-solid")).to_contain_text("needs WebGL 2")
     visitor.drag((150, 200), (160, 200))
     assert not visitor.answer("kiksDesk.isSolid()")
+
+
+def test_a_snapshot_is_a_picture_of_what_is_seen(visitor: Visitor, tmp_path: Path) -> None:
+    visitor.pause()
+    visitor.at("views").get_by_text("both").click()
+    visitor.page.wait_for_function("() => kiksDesk.isSolid()")
+    with visitor.page.expect_download() as downloaded:
+        visitor.at("snapshot").click()
+    assert re.fullmatch(r"room \dm\d\d\.\d\ds\.png", downloaded.value.suggested_filename)
+    downloaded.value.save_as(tmp_path / "snapshot.png")
+    box = visitor.at("arena").bounding_box()
+    assert box is not None
+    with Image.open(tmp_path / "snapshot.png") as picture:
+        assert picture.size == pytest.approx((box["width"], box["height"]), abs=1)
+        assert len(picture.convert("RGB").getcolors(1_000_000) or ()) > 100  # not blank
 
 
 # ---- scenes and connections ----

@@ -38,7 +38,8 @@ class ArenaView(
     """The arena from above, in 3-D, or both; it fills its parent element.
 
     Its properties: `view` is 'top', 'solid' (3-D) or 'both', and `follow` the index from 0 of the robot that stays in
-    the middle, -1 for none. Its methods in the browser: `fit` shows all of the arena, `clear_trails` deletes trails.
+    the middle, -1 for none. Its methods in the browser: `fit` shows all of the arena, `clear_trails` deletes trails,
+    `snapshot` downloads a picture of what is seen.
 
     Args:
         feed: Address of the WebSocket that frames come from, seen from the page; all its components share one.

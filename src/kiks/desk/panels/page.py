@@ -39,6 +39,9 @@ try {
 """Replacement for the session storage in which NiceGUI keeps a tab's id: in a notebook that has another host name, such
 as localhost for 127.0.0.1, Chromium denies access to it, and no button would work."""
 
+NOTE_SPLIT = "(value) => document.body.style.setProperty('--desk-split', value)"
+"""Tells the style sheet how much of the width the arena has [%], for the tooltips beside it."""
+
 NEWS_S = 0.5
 """Period at which new messages are shown [s]."""
 
@@ -66,6 +69,7 @@ class Page:
             ui.space()
             tools = ui.row().classes("items-center no-wrap gap-1")
         with ui.splitter(value=64, limits=(30, 100)).classes("desk-body") as halves:
+            halves.on("update:model-value", js_handler=NOTE_SPLIT)
             with halves.before, ui.column().classes("desk-stage"):
                 board = ScoreBoard(feed, "board.css")
                 with ui.element("div").classes("desk-arena"):

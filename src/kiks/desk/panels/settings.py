@@ -33,7 +33,6 @@ MODELS = {
 BAUDS = [9600, 19200, 38400, 57600, 115200]
 
 MATLAB_KIKS_SETTINGS = """
-**The settings of the Matlab KiKS.**
 *Time mode* and *CPU*: thinking `live` with a factor, above. *Time acceleration*: the speed above the arena.
 *Movement limit* and *interpolation limit*: not needed, motion is exact at any speed. *Fast sensors*: sensor
 model `fast`. *Grid*, *redraw* (clear trails) and *visualization*: the layers button above the arena. *KiKSnet*:
@@ -52,47 +51,52 @@ class SettingsPanel(Panel):
         super().__init__(desk)
         self._rows: list[_RobotRow] = []
         with ui.column().classes("w-full q-pa-md gap-3"):
+            heading("Run")
+            self._build_run()
+            heading("Robots and sensors")
+            self._build_robots()
+            self._build_buttons()
+            ui.separator()
+            heading("Display")
             old = ui.switch("Coordinates of KiKS 2.2.0", value=desk.has_old_coordinates)
             old.props("data-testid=old-coordinates").on_value_change(lambda: desk.show_old_coordinates(bool(old.value)))
             old.tooltip("x is a column and y a row of the arena's matrix, so y points down; sensors are 1 to 8")
-            self._build_settings()
-            heading("Robots")
-            self._table = ui.column().classes("w-full gap-1")
-            ui.button("Another robot", icon="add", on_click=self._add_row).props(
-                "flat dense no-caps data-testid=add-robot"
-            )
-            with ui.row().classes("w-full"):
-                apply = ui.button("Apply", icon="check", on_click=self.acting(self._apply)).props(
-                    "no-caps data-testid=apply"
-                )
-                apply.tooltip("Restart at time 0 with these settings; everything stays in place")
-                over = ui.button("Start over", icon="replay", on_click=self.acting(self._start_over))
-                over.props("no-caps outline data-testid=start-over")
-                over.tooltip("Restart at time 0 with the same seed, programs and initial places")
-            if not desk.owns_world:
-                ui.label("Another program owns this world. Change the settings there.").classes("text-caption")
-                for element in (apply, over):
-                    element.disable()
-            ui.markdown(MATLAB_KIKS_SETTINGS).classes("text-body2")
+            with ui.expansion("The settings of the Matlab KiKS").classes("w-full").props("dense"):
+                ui.markdown(MATLAB_KIKS_SETTINGS).classes("text-body2")
         self._show()
 
-    def _build_settings(self) -> None:
-        def choice(label: str, name: str, options: Any, hint: str) -> ui.select:
-            return with_props(select(label, name, options).props("outlined").classes("w-full"), hint=hint)
+    def _build_buttons(self) -> None:
+        with ui.row().classes("w-full"):
+            apply = ui.button("Apply", icon="check", on_click=self.acting(self._apply)).props(
+                "no-caps data-testid=apply"
+            )
+            apply.tooltip("Restart at time 0 with these settings; everything stays in place")
+            over = ui.button("Start over", icon="replay", on_click=self.acting(self._start_over))
+            over.props("no-caps outline data-testid=start-over")
+            over.tooltip("Restart at time 0 with the same seed, programs and initial places")
+        if not self._desk.owns_world:
+            ui.label("Another program owns this world. Change the settings there.").classes("text-caption")
+            for element in (apply, over):
+                element.disable()
 
+    def _build_run(self) -> None:
         self._seed = number("Seed", "seed", min=0).props("outlined").classes("w-full")
         with_props(self._seed, hint="Whole number. The same seed gives the same run, to the bit.")
         hint = "How much simulated time the program's computing takes."
-        self._policy = choice("Thinking", "thinking", POLICIES, hint)
+        self._policy = _choice("Thinking", "thinking", POLICIES, hint)
         self._amount = number("", "thinking-amount", min=0).props("outlined").classes("w-full")
         self._amount.bind_visibility_from(self._policy, "value", lambda policy: policy in ("fixed", "live"))
         self._policy.on_value_change(self._name_amount)
         self._file = named(ui.input("Recorded times"), "thinking-file").classes("w-full")
         self._file.props('dense outlined hint="A file of this folder, made with kiks run."')
         self._file.bind_visibility_from(self._policy, "value", lambda policy: policy == "replay")
+
+    def _build_robots(self) -> None:
+        self._table = ui.column().classes("w-full gap-1")
+        ui.button("Another robot", icon="add", on_click=self._add_row).props("flat dense no-caps data-testid=add-robot")
         hint = "Speed of the serial line; programs may set another one."
-        self._baud = choice("Baud rate", "baud", BAUDS, hint)
-        self._model = choice("Sensor model", "model", MODELS, "How a proximity sensor responds to what it sees.")
+        self._baud = _choice("Baud rate", "baud", BAUDS, hint)
+        self._model = _choice("Sensor model", "model", MODELS, "How a proximity sensor responds to what it sees.")
         self._noise = named(ui.switch("Noise"), "noise")
         self._noise.tooltip("Real sensors are noisy; without noise it is easier to find mistakes in programs.")
 
@@ -162,6 +166,10 @@ class SettingsPanel(Panel):
         await self._desk.start_over()
         self._show()
         ui.notify("Started over.")
+
+
+def _choice(label: str, name: str, options: Any, hint: str) -> ui.select:
+    return with_props(select(label, name, options).props("outlined").classes("w-full"), hint=hint)
 
 
 class _RobotRow:

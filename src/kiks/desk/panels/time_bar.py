@@ -8,14 +8,17 @@ from nicegui import ui
 
 from kiks.desk.panels.shortcuts import SHORTCUTS, listen
 from kiks.desk.panels.widgets import (
+    ABOVE,
     WEB,
     FeedElement,
     Panel,
     agrees,
     answer,
+    dialog,
     finish,
     icon_button,
     named,
+    place_tip,
     relabel,
     with_props,
 )
@@ -74,11 +77,11 @@ class TimeBar(Panel):
                 named(self._event, "bar-event").props("aria-live=polite")
                 back = self.acting(looking.back_to_now)
                 self._now = _long_button("Back to now", "update", "back-to-now", back)
-                self._now.tooltip("Show the present world again; it goes on as if nothing had been")
+                place_tip(self._now, "Show the present world again; it goes on as if nothing had been", ABOVE)
                 go_on = self.acting(self._go_on)
                 self._branch = _long_button("Go on from here", "call_split", "go-on-from-here", go_on)
                 tip = "Let the world live on from this moment" if desk.owns_world else NOT_OWN
-                self._branch.props("unelevated color=accent").tooltip(tip).set_enabled(desk.owns_world)
+                place_tip(self._branch.props("unelevated color=accent"), tip, ABOVE).set_enabled(desk.owns_world)
         listen(self._acts)
         self.refresh()
 
@@ -90,7 +93,7 @@ class TimeBar(Panel):
         shortcut = SHORTCUTS[name]
         self._acts[name] = self.acting(acted)
         tip = f"{shortcut.label} (key: {shortcut.words})"
-        return icon_button(icon, shortcut.label, name, self._acts[name], tip=tip)
+        return icon_button(icon, shortcut.label, name, self._acts[name], tip=tip, place=ABOVE)
 
     def refresh(self) -> None:
         """Show which time is shown, and what happens then."""
@@ -122,12 +125,11 @@ class TimeBar(Panel):
     async def _set_bookmark(self) -> None:
         """Ask for a note, and set a bookmark at the time at which the person has asked for it."""
         time_ns = self._desk.sim.now_ns
-        with ui.dialog() as dialog, ui.card().classes("gap-3").style("width: 420px"):
-            ui.label(f"Bookmark at {clock_text(s_from_ns(time_ns))}").classes("text-h6")
+        with dialog(f"Bookmark at {clock_text(s_from_ns(time_ns))}") as asked:
             note = named(ui.input("Note").props(f"autofocus maxlength={TEXT_MAX}").classes("w-full"), "bookmark-note")
-            note.on("keydown.enter", lambda: dialog.submit(note.value))
-            finish(dialog, "Set it", lambda: note.value)
-        if (text := await answer(dialog)) is not None:
+            note.on("keydown.enter", lambda: asked.submit(note.value))
+            finish(asked, "Set it", lambda: note.value)
+        if (text := await answer(asked)) is not None:
             await self._desk.looking.bookmark(time_ns, text.strip()[:TEXT_MAX] or "bookmark")
 
     async def _go_on(self) -> None:

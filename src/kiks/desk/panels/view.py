@@ -11,7 +11,7 @@ from nicegui import ui
 from kiks.desk.panels.arena_view import LAYERS, ArenaView
 from kiks.desk.panels.board import ScoreBoard
 from kiks.desk.panels.shortcuts import SHORTCUTS
-from kiks.desk.panels.widgets import BAR, dialog, icon_button, named, with_props
+from kiks.desk.panels.widgets import BELOW, bar_button, dialog, named, place_tip, with_props
 from kiks.desk.server.desk import Desk
 
 VIEWS = {"top": "2-D", "both": "both", "solid": "3-D"}
@@ -49,8 +49,8 @@ class ViewPanel:
         toggle = ui.toggle(VIEWS, value="top", on_change=lambda event: view.change(view=event.value))
         toggle.props("dense unelevated no-caps toggle-color=accent text-color=white color=transparent")
         toggle.props('data-testid=views aria-label="2-D or 3-D"')
-        toggle.tooltip("View from above, or in 3-D: there drag to orbit, turn the wheel to zoom")
-        layers = _button("layers", "Layers", "layers")
+        place_tip(toggle, "View from above, or in 3-D: there drag to orbit, turn the wheel to zoom", BELOW)
+        layers = bar_button("layers", "Layers", "layers")
         with layers, with_props(ui.menu(), role="group", aria_label="Layers"), ui.column().classes("q-pa-sm gap-0"):
             for name, (text, is_shown) in LAYERS.items():
                 box = ui.checkbox(
@@ -59,20 +59,22 @@ class ViewPanel:
                 named(box, f"show-{name}").props("dense").classes("q-py-xs")
             clear = ui.button("Clear trails", icon="auto_fix_normal").props("flat dense no-caps")
             clear.on_click(lambda: view.run_method("clear_trails"))
-        with _button("my_location", "Follow a robot", "follow"), ui.menu() as self._robots:
+        with bar_button("my_location", "Follow a robot", "follow"), ui.menu() as self._robots:
             pass
         self._robots.on("before-show", self._list_robots)
-        _button("fit_screen", "Show all of the arena (key: 0)", "fit").on_click(lambda: view.run_method("fit"))
+        bar_button("fit_screen", "Show all of the arena (key: 0)", "fit").on_click(lambda: view.run_method("fit"))
+        tip = "Snapshot: save a picture of the arena as you see it (PNG)"
+        bar_button("photo_camera", "Snapshot", "snapshot", lambda: view.run_method("snapshot"), tip)
         tip = "Hall view, for a projector: arena, score and clock, large (Escape ends it)"
-        icon_button("tv", "Hall view", "hall", lambda: board.run_method("enter"), tip=tip, look=BAR)
+        bar_button("tv", "Hall view", "hall", lambda: board.run_method("enter"), tip)
         with dialog("Help") as self._help:
             ui.markdown(HELP)
             ui.button("Close", on_click=self._help.close).props("flat no-caps")
         dark = ui.dark_mode(value=None)
-        with _button("contrast", "Light or dark", "dark"), ui.menu():
+        with bar_button("contrast", "Light or dark", "dark"), ui.menu():
             for text, value in (("Same as the system", None), ("Light", False), ("Dark", True)):
                 _item(text, partial(dark.set_value, value))
-        _button("help_outline", "Help", "help").on_click(self._help.open)
+        bar_button("help_outline", "Help", "help").on_click(self._help.open)
 
     def _list_robots(self) -> None:
         self._robots.clear()
@@ -80,10 +82,6 @@ class ViewPanel:
             _item("No robot", partial(self._view.change, follow=-1))
             for index, name in enumerate(self._desk.names()):
                 _item(f"Robot {name}", partial(self._view.change, follow=index))
-
-
-def _button(icon: str, label: str, name: str) -> ui.button:
-    return icon_button(icon, label, name, look=BAR)
 
 
 def _item(text: str, act: Callable[[], Any]) -> None:

@@ -21,9 +21,6 @@ Item = TypeVar("Item")
 
 WEB = Path(__file__).parents[1] / "web"
 
-BAR = "flat round dense color=white"
-"""Look of an icon button in the bar above the arena."""
-
 
 # ---- actions ----
 
@@ -110,6 +107,23 @@ async def answer(dialog: ui.dialog) -> Any:
 
 # ---- elements ----
 
+ui.tooltip.default_props('anchor="center left" self="center right"')
+ui.tooltip.default_classes("desk-tip")
+
+BELOW, ABOVE = (
+    'anchor="bottom middle" self="top middle"',
+    'anchor="top middle" self="bottom middle" :offset="[0, 50]"',
+)
+"""Places of tooltips where they cover nothing that a person may want next: below the bar above the arena, and above the
+slider of the time bar. All others, those of panels, stand on the arena beside them (`web/page.css`)."""
+
+
+def place_tip(element: Some, text: str, place: str) -> Some:
+    """Give an element a tooltip at a place."""
+    with element:
+        ui.tooltip(text).classes(replace="desk-tip-above" if place == ABOVE else "desk-tip-below").props(place)
+    return element
+
 
 def with_props(element: Some, **texts: str) -> Some:
     """Set properties to texts as they are; their names have `-` for `_`.
@@ -158,16 +172,22 @@ def icon_button(
     *,
     tip: str = "",
     look: str = "flat round dense",
+    place: str = "",
 ) -> ui.button:
     """Build a button with an icon alone; `label` is its accessible name, and its tooltip unless there is a tip."""
-    button = ui.button(icon=icon, on_click=act).props(look)
-    return named(with_props(button, aria_label=label), name).tooltip(tip or label)
+    button = named(with_props(ui.button(icon=icon, on_click=act).props(look), aria_label=label), name)
+    return place_tip(button, tip or label, place) if place else button.tooltip(tip or label)
 
 
 def relabel(button: ui.button, icon: str, label: str) -> None:
     """Give an icon button another icon and name, unless it has them."""
     if button.props.get("aria-label") != label:
         with_props(button, icon=icon, aria_label=label)
+
+
+def bar_button(icon: str, label: str, name: str, act: Callable[..., Any] | None = None, tip: str = "") -> ui.button:
+    """Build an icon button of the bar above the arena."""
+    return icon_button(icon, label, name, act, tip=tip, look="flat round dense color=white", place=BELOW)
 
 
 def text_button(text: str, icon: str, name: str, tip: str, act: Callable[..., Any] | None = None) -> ui.button:

@@ -57,6 +57,7 @@ export default {
   methods: {
     press(event) { this.stage.press(event); },
     fit() { this.stage.fit(); },
+    snapshot() { this.stage.snapshot(); },
     clear_trails() { this.stage.clearTrails(); },
   },
 };

@@ -3,7 +3,7 @@
 import { placeOfShown, shownPlace } from "./coordinates.js";
 
 export const RULER_PX = 26;
-const STEPS_MM = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000];
+export const STEPS_MM = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000];
 const LABEL_EVERY_PX = 56;
 
 /** Draw both rulers on top of the picture; `context` takes CSS pixels. */

@@ -7,6 +7,7 @@ import { Hand } from "./hand.js";
 import { KEYS_HELP, pressKey } from "./keys.js";
 import { Pointer } from "./pointer.js";
 import { loadRaster } from "./raster.js";
+import { saveSnapshot } from "./snapshot.js";
 import { nameOf, placeOf } from "./things.js";
 import { Drawing } from "./tools.js";
 import { TopView } from "./top_view.js";
@@ -100,6 +101,12 @@ export class Stage {
   fit() {
     this.topView.fit();
     this.solidView?.fit();
+    this._isWanted = true;
+  }
+
+  /** Download a picture of what is shown. */
+  async snapshot() {
+    await saveSnapshot(this);
     this._isWanted = true;
   }
 
