@@ -6,33 +6,29 @@ import email.message
 import email.parser
 import re
 import subprocess
-import sys
 import tarfile
 import zipfile
 from pathlib import Path
 
 import pytest
 import yaml
+from tests.documents import Reader
+from tests.matlab.octave import needs_octave
+from tests.wheels import ROOT, build, install
 
 import kiks
 
 pytestmark = pytest.mark.slow
 
-ROOT = Path(__file__).parents[1]
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return build(tmp_path_factory.mktemp("wheel"))
 
 
 @pytest.fixture(scope="module")
-def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a folder with an archive of the sources and a wheel."""
-    folder = tmp_path_factory.mktemp("dist")
-    subprocess.run([sys.executable, "-m", "hatchling", "build", "-d", str(folder)], cwd=ROOT, check=True)
-    return folder
-
-
-@pytest.fixture(scope="module")
-def metadata(built: Path) -> email.message.Message:
+def metadata(wheel: Path) -> email.message.Message:
     """Return what a package index reads."""
-    (wheel,) = built.glob("*.whl")
     with zipfile.ZipFile(wheel) as archive:
         (name,) = (name for name in archive.namelist() if name.endswith("/METADATA"))
         return email.parser.Parser().parsestr(archive.read(name).decode())
@@ -46,21 +42,27 @@ def tracked() -> set[str]:
 
 
 @pytest.mark.skipif(not (ROOT / ".git").exists(), reason="git knows the files of a clone only")
-def test_the_archive_of_the_sources_holds_all_of_them(built: Path) -> None:
-    (file,) = built.glob("*.tar.gz")
-    with tarfile.open(file) as archive:
+def test_the_archive_of_the_sources_holds_all_of_them(tmp_path: Path) -> None:
+    with tarfile.open(build(tmp_path, "-t", "sdist")) as archive:
         inside = {name.partition("/")[2] for name in archive.getnames()}
     assert inside == {"PKG-INFO"} | tracked()
 
 
-def test_a_wheel_holds_the_toolbox_and_the_examples(built: Path) -> None:
-    (wheel,) = built.glob("*-py3-none-any.whl")
+def test_a_wheel_holds_the_toolbox_and_the_examples(wheel: Path) -> None:
     with zipfile.ZipFile(wheel) as archive:
         inside = set(archive.namelist())
     for here, there in {"src/kiks": "kiks", "matlab": "kiks/matlab", "examples": "kiks/examples"}.items():
         files = {path.relative_to(ROOT / here) for path in (ROOT / here).rglob("*") if path.is_file()}
         wanted = {f"{there}/{path.as_posix()}" for path in files if path.suffix != ".pyc"}
         assert wanted <= inside, sorted(wanted - inside)[:5]
+
+
+@needs_octave
+def test_the_readme_is_true_for_a_wheel_in_an_empty_folder(wheel: Path, tmp_path: Path) -> None:
+    reader = Reader(tmp_path, install(wheel, tmp_path / "venv"))
+    reader.do_sh("kiks demo; kiks examples examples")
+    reader.do_python("import kiks; assert 'venv' in kiks.__file__")
+    reader.read(ROOT / "README.md")
 
 
 def test_the_readme_of_a_package_needs_no_files_beside_it(metadata: email.message.Message) -> None:

@@ -7,17 +7,15 @@ import pickle
 import shutil
 import subprocess
 import sys
-import sysconfig
 from pathlib import Path
 
 import pytest
 from llvmlite import binding
 from tests.at_length import at_length
+from tests.wheels import ROOT, build, install
 
 from kiks.engine import code_cache
 from kiks.engine.processor import LEVELS, level_of
-
-ROOT = Path(__file__).parent.parent
 
 RUN = """
 from kiks.cli.engine_start import compile_everything
@@ -49,27 +47,14 @@ def kernels(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def built(target: Path, **changes: str) -> Path:
-    command = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-index", "--no-build-isolation"]
-    subprocess.run([*command, "--wheel-dir", str(target), str(ROOT)], env=os.environ | changes, check=True)
-    (wheel,) = target.glob("*.whl")
-    return wheel
-
-
 @pytest.fixture(scope="module")
 def python(kernels: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the Python of an environment in which the wheel with kernels is installed."""
     folder = tmp_path_factory.mktemp("wheel")
-    wheel = built(folder, KIKS_KERNELS=str(kernels))
+    wheel = build(folder / "dist", KIKS_KERNELS=str(kernels))
     version = f"cp{sys.version_info.major}{sys.version_info.minor}"
     assert f"-{version}-{version}-linux_" in wheel.name
-    subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(folder / "venv")], check=True)
-    python = folder / "venv" / "bin" / "python"
-    command = [sys.executable, "-m", "pip", "--python", str(python), "install", "--quiet", "--no-deps", "--no-index"]
-    subprocess.run([*command, str(wheel)], check=True, umask=0o022)
-    (packages,) = (folder / "venv").glob("lib/*/site-packages")
-    (packages / "others.pth").write_text(sysconfig.get_path("purelib"))
-    return python
+    return install(wheel, folder / "venv") / "python"
 
 
 def run(python: Path, program: str, tmp_path: Path, **changes: str) -> str:
@@ -110,7 +95,7 @@ def call_one(python: Path, tmp_path: Path, before: str = "", **changes: str) -> 
 
 
 def test_a_wheel_without_kernels_is_for_all_computers(tmp_path: Path) -> None:
-    assert built(tmp_path).name.endswith("-py3-none-any.whl")
+    assert build(tmp_path).name.endswith("-py3-none-any.whl")
 
 
 def test_the_same_functions_are_compiled_for_levels_that_this_computer_may_not_have(

@@ -1,7 +1,7 @@
 """A soccer player in thirty lines: it runs after the ball, wherever that goes. `kiks demo soccer` plays better.
 
 python examples/players/chaser.py /dev/ttyUSB0
-kiks demo soccer --right examples/players/chaser.py
+kiks demo soccer examples/players/chaser.py kiks://1
 """
 
 import sys

@@ -1,28 +1,16 @@
-"""docs/howto/matlab.md is correct: its program runs, its functions exist, its constants are preferences."""
+"""docs/howto/matlab.md is correct: its functions exist, and its constants are preferences."""
 
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
-import pytest
-from tests.matlab.octave import A_PROCESS, ROOT, TOOLBOX, needs_octave, run
+from tests.matlab.octave import ROOT, TOOLBOX
 
 PAGE = (ROOT / "docs" / "howto" / "matlab.md").read_text(encoding="utf-8")
 
 
 def public_functions() -> set[str]:
     return {path.stem for path in TOOLBOX.glob("*.m")}
-
-
-@needs_octave
-@pytest.mark.slow
-def test_the_first_program_runs_and_stays_clear_of_the_wall(tmp_path: Path) -> None:
-    program = re.findall(r"^```matlab\n(.*?)^```", PAGE, flags=re.MULTILINE | re.DOTALL)[0]
-    after = program.replace("kiks_kclose(ref);", "say('pose', kiks_siminfo_robotpos()); kiks_kclose(ref);")
-    x, y, _ = run(after, tmp_path, A_PROCESS).said["pose"].ravel()
-    assert 28 < x < 472
-    assert 28 < y < 472
 
 
 def test_every_function_is_listed_and_every_listed_one_exists() -> None:

@@ -19,7 +19,7 @@ KHEPERA = RobotSpec.load("khepera")
 def documented(number: int) -> RobotSpec:
     """Return the Khepera with the noise that docs/explanation/sensors.md gives as an example."""
     guide = (Path(__file__).parents[3] / "docs" / "explanation" / "sensors.md").read_text(encoding="utf-8")
-    values = tomllib.loads(re.findall(r"```toml\n(.*?)```", guide, re.DOTALL)[number])
+    values = tomllib.loads(re.findall(r"```toml\n(.*?)```", guide, re.DOTALL)[number])["proximity"]
     changes = {f"proximity__{key}": tuple(v) if isinstance(v, list) else v for key, v in values.items()}
     return KHEPERA.with_changes(**changes)
 
