@@ -97,13 +97,18 @@ def test_a_program_that_ran_is_saved_with_the_project_and_shown_when_that_is_ope
     expect(visitor.at("programs")).to_contain_text("exercise1.py on robot 1: running")
 
 
-def test_mistake_is_shown_by_its_line_before_anything_runs(visitor: Visitor) -> None:
+def test_mistake_is_marked_as_it_is_typed_and_before_anything_runs(visitor: Visitor) -> None:
     begin_program(visitor, "wrong.py", "x = 1\nif x = 2:\n    pass\n")
+    expect(visitor.at("mistake")).to_contain_text("Line 2: invalid syntax")
+    expect(visitor.page.locator(".program-wrong-line")).to_have_text("if x = 2:")
+    expect(visitor.page.locator(".program-wrong")).to_have_text("x = 2")
+    visitor.picture("mistake")
     visitor.at("run-program").click()
     expect(visitor.at("mistake")).to_contain_text("Line 2: invalid syntax")
     assert not (visitor.desk.folder / "wrong.py").exists()
     visitor.write("x = 1\n1 / 0\n")
     expect(visitor.at("mistake")).to_have_text("")
+    expect(visitor.page.locator(".program-wrong-line")).to_have_count(0)
     visitor.at("run-program").click()
     expect(visitor.at("output")).to_contain_text("ZeroDivisionError: division by zero")
     expect(visitor.at("output")).to_contain_text("line 2, in <module>")

@@ -76,12 +76,25 @@ def test_unreadable_programs_are_refused(tmp_path: Path) -> None:
     ],
 )
 def test_syntax_errors_have_their_line(text: str, line: int) -> None:
-    assert find_mistake(text).startswith(f"Line {line}: ")
+    mistake = find_mistake(text)
+    assert mistake is not None
+    assert mistake.line == line
+    assert str(mistake).startswith(f"Line {line}: ")
+
+
+def test_a_syntax_error_has_its_place_in_the_line() -> None:
+    text = "# größer 🤖\nif größe = 2:\n    pass\n"
+    mistake = find_mistake(text)
+    assert mistake is not None
+    assert text[mistake.begin : mistake.end] == "größe = 2"
 
 
 @given(st.text(max_size=200))
 def test_any_text_is_a_program_or_has_a_mistake(text: str) -> None:
-    find_mistake(text)
+    mistake = find_mistake(text)
+    if mistake is not None:
+        assert 0 <= mistake.begin <= mistake.end <= len(text)
+        assert 1 <= mistake.line <= text.count("\n") + 1
 
 
 def test_good_programs_have_no_mistake() -> None:

@@ -27,6 +27,9 @@ SHOWN_LINES = 500
 NEWEST_LINES = 100
 """Maximum number of lines of output that one refresh adds."""
 
+CHECKED_MAX = 100_000
+"""Most characters of a program that is checked while a person types: compiling more would take too long."""
+
 POLL_S = 0.02
 """Period at which the end of a program is polled [s]."""
 
@@ -41,7 +44,13 @@ NOT_OWN = (
 )
 """Shown in place of the editor where the world is not the desk's own."""
 
-CSS = ".program-error { color: #b00020 } .body--dark .program-error { color: #ff9a90 }"
+CSS = """
+.program-error { color: #b00020 } .body--dark .program-error { color: #ff9a90 }
+.program-wrong-line { background: #b0002018; box-shadow: inset 3px 0 #b00020 }
+.body--dark .program-wrong-line { background: #ff9a9024; box-shadow: inset 3px 0 #ff9a90 }
+.program-wrong { text-decoration: underline wavy #d3281d; text-underline-offset: 3px }
+.body--dark .program-wrong { text-decoration-color: #ff9a90 }
+"""
 
 LIGHT: Final = "githubLight"
 DARK: Final = "githubDark"
@@ -67,6 +76,7 @@ class ProgramsPanel(Panel):
         self._script: Path | None = None
         self._text: str | None = NEW  # as it was read or saved last; None with a draft
         self._drafts: dict[Path | None, str] = {}
+        self._seen = self._checked = NEW
         ui.add_css(CSS)
         with ui.column().classes("w-full q-pa-sm gap-2"):
             if desk.may_run_programs:
@@ -100,6 +110,7 @@ class ProgramsPanel(Panel):
                 self._draw_attached(attached)
         if desk.may_run_programs:
             offer_robots(self._robot, desk)
+            self._check_pause()
             if self._world is not desk.present:
                 self._choose_attached(attached, is_first=self._world is None)
                 self._world = desk.present
@@ -198,7 +209,7 @@ class ProgramsPanel(Panel):
             self._editor = ui.codemirror(NEW, language="Python", theme=LIGHT, keymap=keys)
             named(self._editor, "editor").on_value_change(self._note_draft)
             self._editor.classes("w-full").style("height: 38vh; border: 1px solid currentcolor")
-        self._mistake = named(ui.label().classes("program-error text-body2").props("role=alert"), "mistake")
+        self._mistake = named(ui.label().classes("program-error text-body2").props("role=status"), "mistake")
         with ui.row().classes("w-full items-end no-wrap gap-2"):
             self._name = named(ui.input("Saved as", value="mine.py"), "name").classes("col").props("dense")
             self._name.tooltip("The file in the desk's folder in which the program is saved before it runs")
@@ -250,13 +261,34 @@ class ProgramsPanel(Panel):
         self._script = script
         self._name.value = name
         self._editor.value = text
-        self._mistake.text = ""
+        self._check()
 
     def _note_draft(self) -> None:
         self._drafts[self._script] = self._editor.value or ""
         if self._drafts[self._script] == self._text:
             del self._drafts[self._script]
-        self._mistake.text = ""
+
+    def _check_pause(self) -> None:
+        """Look for a mistake when the person has stopped to type."""
+        text, before = self._editor.value or "", self._seen
+        self._seen = text
+        if text == before and text != self._checked and len(text) <= CHECKED_MAX:
+            self._check()
+
+    def _check(self) -> bool:
+        """Mark the first mistake of the program, and return whether there is one."""
+        self._checked = self._editor.value or ""
+        mistake = scripts.find_mistake(self._checked)
+        self._mistake.text = "" if mistake is None else str(mistake)
+        marks: list[dict[str, Any]] = []
+        if mistake is not None:
+            marks.append({"kind": "line", "line": mistake.line, "class": "program-wrong-line"})
+            if mistake.end > mistake.begin:
+                place = {"from": mistake.begin, "to": mistake.end}
+                marks.append({"kind": "mark", **place, "class": "program-wrong"})
+        self._editor.decorations = marks
+        self._editor.line_tooltips = {} if mistake is None else {mistake.line: mistake.message}
+        return mistake is not None
 
     async def _stored(self) -> Path | None:
         """Save the program under its name and return its file; None if another one would be replaced and is to stay."""
@@ -289,8 +321,7 @@ class ProgramsPanel(Panel):
 
     async def _run(self) -> None:
         """Check the program, save it and run it."""
-        self._mistake.text = scripts.find_mistake(self._editor.value or "")
-        if not self._mistake.text:
+        if not self._check():
             arguments = scripts.split_arguments(self._arguments.value or "")
             if (script := await self._stored()) is not None:
                 await self._start(Command(script, arguments), self._robot.value or 1)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 import warnings
 from pathlib import Path
+from typing import NamedTuple
 
 from kiks.desk.server.folder import Folder
 from kiks.errors import ParameterError, shown
@@ -62,8 +63,29 @@ def encode_script(text: str) -> bytes:
     return data
 
 
-def find_mistake(text: str) -> str:
-    r"""Return the first syntax error of a program with its line; nothing if it has none.
+class Mistake(NamedTuple):
+    """A syntax error of a program.
+
+    Attributes:
+        line: Number of its line, from 1.
+        message: What is wrong.
+        code: The line.
+        begin: Where it begins in the program, from 0.
+        end: Where it ends; the same place if only the line is known.
+    """
+
+    line: int
+    message: str
+    code: str = ""
+    begin: int = 0
+    end: int = 0
+
+    def __str__(self) -> str:
+        return f"Line {self.line}: {self.message}" + (f": {self.code}" if self.code else "")
+
+
+def find_mistake(text: str) -> Mistake | None:
+    r"""Return the first syntax error of a program, which is compiled and not executed; None if it has none.
 
     Example:
         >>> print(find_mistake("x = 1\nif x = 2:\n    pass\n"))
@@ -74,12 +96,17 @@ def find_mistake(text: str) -> str:
             warnings.simplefilter("ignore")
             compile(text, "program", "exec", dont_inherit=True)
     except SyntaxError as error:
-        number, lines = error.lineno or 1, text.splitlines()
-        line = lines[number - 1].strip() if number <= len(lines) else ""
-        return f"Line {number}: {error.msg}" + (f": {line}" if line else "")
+        lines = text.split("\n")
+        # At the end of the text, the error may be of the line after the last one.
+        number = min(error.lineno or 1, len(lines))
+        code, line_begin = lines[number - 1], sum(len(line) + 1 for line in lines[: number - 1])
+        begin = min(max((error.offset or 1) - 1, 0), len(code))
+        is_within = error.end_lineno == error.lineno and (error.end_offset or 0) > begin + 1
+        end = min((error.end_offset or 0) - 1, len(code)) if is_within else len(code)
+        return Mistake(number, error.msg, code.strip(), line_begin + begin, line_begin + max(end, begin))
     except (ValueError, RecursionError, MemoryError) as error:
-        return f"Line 1: {error}" if str(error) else "Line 1: too deeply nested"
-    return ""
+        return Mistake(1, str(error) or "too deeply nested")
+    return None
 
 
 def split_arguments(text: str) -> list[str]:
