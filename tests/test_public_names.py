@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import builtins
+import importlib
 import inspect
 import re
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
+from tests import forked
 
 import kiks.errors
 from kiks.learn.gymnasium_envs import KheperaEnv, KheperaVectorEnv
@@ -64,3 +67,37 @@ def test_arguments_have_units_and_errors_exist(name: str) -> None:
             assert re.search(rf"\[({unit})[\];,]|\[[^\]]*\b({unit})\b", meaning), f"{name}: {argument}: {meaning}"
     for error in re.findall(r"^    (\w+): ", sections.get("Raises", ""), flags=re.MULTILINE):
         assert hasattr(kiks.errors, error) or hasattr(builtins, error), f"{name}: {error}"
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_a_module_of_names_can_be_imported(name: str) -> None:
+    found = forked.run(
+        code=f"import kiks.{name}; from kiks.{name} import *; print(dir(kiks.{name})); kiks.{name}.wrong"
+    )
+    assert found.stdout == f"{dir(MODULES[name])}\n"
+    assert "has no attribute 'wrong'" in found.stderr
+    assert importlib.import_module(f"kiks.{name}") is MODULES[name]
+
+
+def test_a_misspelled_name_gets_a_hint() -> None:
+    for line, hint in (("kiks.Simulatoin", "Simulation"), ("kiks.measures.contact", "contacts")):
+        assert f"Did you mean: {hint!r}?" in forked.run(code=f"import kiks; {line}").stderr
+
+
+def test_each_object_says_in_one_line_what_it_is(tmp_path: Path) -> None:
+    sim = kiks.Simulation(kiks.Arena.load("office"), seed=1)
+    with sim.record(tmp_path / "run.mcap") as recorder:
+        sim.run(1)
+    recording, robot = kiks.Recording(tmp_path / "run.mcap"), kiks.Khepera(sim.port(1))
+    task = kiks.tasks.avoid()
+    evolution = kiks.Evolution(task, seed=1, population=4)
+    evolution.run(generations=1)
+    batch = kiks.Batch(sim.arena, worlds=3)
+    rollouts = batch.run(task.controller, [0.0] * 18, seconds=0.1, measures=[kiks.measures.contacts])
+    recorded = recording, recording.log, recording.start, recording.project, recording.replay(), recorder
+    evolved = evolution, evolution.generations[0], evolution.champion, evolution.archive, evolution.archive.elites[0]
+    simulated = sim, sim.arena, sim.spec, sim.port(1), robot, sim.fit(1, "k213"), sim.explain(1, 2), batch, rollouts
+    parts = task, task.controller, task.exam, task.sides[0], kiks.measures.contacts, rollouts.table()
+    for each in (*recorded, *evolved, *simulated, *parts):
+        assert len(repr(each)) < 160, type(each)
+        assert not re.search(r"\n| at 0x", repr(each)), type(each)

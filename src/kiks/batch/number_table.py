@@ -8,6 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from kiks.errors import counted
+
 FIRST = 10
 """Number of rows that a table shows before it summarizes the others."""
 
@@ -26,6 +28,7 @@ class NumberTable:
         values: float64 [row, column].
 
     Attributes:
+        row_count: The number of rows.
         head: The first row: names.
         rows: The first `FIRST` rows.
         sums: The rows with the statistics of all.
@@ -43,6 +46,7 @@ class NumberTable:
     """
 
     def __init__(self, indices: dict[str, int], columns: Sequence[str], values: NDArray[np.float64]) -> None:
+        self.row_count = len(values)
         texts = [_column(numbers) for numbers in values.T]
         count = min(FIRST, len(values))
         places = np.array(np.unravel_index(np.arange(count), tuple(indices.values()))).T.tolist()
@@ -51,6 +55,9 @@ class NumberTable:
         self.rows = [[*map(str, place), *(numbers[k] for numbers, _ in texts)] for k, place in enumerate(places)]
         self.sums = [[name, *none, *(summed[k] for _, summed in texts)] for k, (name, _) in enumerate(_SUMS)]
         self.left_out = f"{len(values) - FIRST} more" if len(values) > FIRST else ""
+
+    def __repr__(self) -> str:
+        return f"<NumberTable: {counted(self.row_count, 'row')} of {', '.join(self.head)}>"
 
     def __str__(self) -> str:
         rows = self.head, *self.rows, *self.sums

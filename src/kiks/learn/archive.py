@@ -48,6 +48,9 @@ class Elite:
     values: Mapping[str, float]
     parameters: tuple[float, ...]
 
+    def __repr__(self) -> str:
+        return f"<Elite of cell {self.cell}: fitness {self.fitness:.4g}, of generation {self.generation}>"
+
     @property
     def fitness(self) -> float:
         """Its fitness."""

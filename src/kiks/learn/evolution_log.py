@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from kiks.errors import ParameterError, shown
+from kiks.errors import ParameterError, counted, shown
 from kiks.export.tables import write_parquet
 from kiks.learn.finals import Contender, Finals, Tournament
 from kiks.learn.fingerprint import differing, tell_unseen
@@ -93,6 +93,9 @@ class Generation:
     evaluations: int
     champion_fitness: float
     seconds: float
+
+    def __repr__(self) -> str:
+        return f"<Generation of {counted(self.population, 'candidate')}: best fitness {self.fitness.max():.4g}>"
 
     @property
     def fitness(self) -> Floats:

@@ -118,6 +118,9 @@ class Side:
     __eq__ = object.__eq__
     __hash__ = object.__hash__
 
+    def __repr__(self) -> str:
+        return f"<Side {self.name!r}: {counted(self.robots, 'robot')} with {self.controller!r}>"
+
     def __post_init__(self) -> None:
         if not self.controller.parameter_count:
             raise ParameterError(

@@ -78,6 +78,9 @@ class RecordedLog:
                 f"KiKS {__version__} has. Read it with that version."
             )
 
+    def __repr__(self) -> str:
+        return f"<RecordedLog of {self.reader.what}, {s_from_ns(self.begin_ns):.3f} to {s_from_ns(self.end_ns):.3f} s>"
+
     @property
     def blocks(self) -> range:
         """The numbers of its blocks, from the first one on that has a state: no run can be made again before that."""

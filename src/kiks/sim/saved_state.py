@@ -19,7 +19,7 @@ from pydantic import Field
 from kiks.clock.program_clock import ProgramClock
 from kiks.engine.physics.gripper import ARM_MAX, JAWS_MAX
 from kiks.engine.state import BALL, BODY, CYLINDER, ROBOT
-from kiks.errors import ParameterError, shown
+from kiks.errors import ParameterError, counted, shown
 from kiks.firmware.k213 import PERIODS_NS
 from kiks.firmware.radio import ATTEMPTS, DATA_LIMIT
 from kiks.firmware.turret import Turret
@@ -34,7 +34,7 @@ from kiks.sim.simulation import SCORE_ENTRIES_MAX, Simulation
 from kiks.sim.turret_host import TurretOfUser, described, name_of
 from kiks.sim.wire import Count, SavedWire
 from kiks.sim.world import World
-from kiks.units import TICK_NS
+from kiks.units import TICK_NS, s_from_ns
 
 Part = TypeVar("Part", Arena, RobotSpec)
 
@@ -176,6 +176,10 @@ class SavedState:
     robots: NDArray[np.void]
     bodies: NDArray[np.void]
     lamps: NDArray[np.float64]
+
+    def __repr__(self) -> str:
+        robots = counted(len(self.specs), "robot")
+        return f"<SavedState of {robots} in {self.arena.name!r} at {s_from_ns(self.head.now_ns):.3f} s>"
 
     @classmethod
     def from_bytes(cls, data: bytes, files: WorldFiles, what: str) -> SavedState:
