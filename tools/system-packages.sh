@@ -1,7 +1,7 @@
 #!/bin/sh
 # What KiKS needs of the system: Python's venv module, and for the tests a C compiler (a robot is driven from C),
-# Chromium (the desk is used in a real browser), Octave (the toolbox) and a virtual screen (programs with windows):
-# system-packages.sh [tests].
+# Chromium and Firefox (the desk is used in real browsers), Octave (the toolbox) and a virtual screen (programs with
+# windows): system-packages.sh [tests].
 # As root on Debian this installs what is missing; otherwise it names it.
 set -eu
 
@@ -10,6 +10,7 @@ missing=""
 if [ "${1:-}" = tests ]; then
     command -v gcc >/dev/null 2>&1 || missing="$missing gcc libc6-dev"
     command -v chromium >/dev/null 2>&1 || missing="$missing chromium fonts-dejavu-core"
+    command -v firefox-esr >/dev/null 2>&1 || command -v firefox >/dev/null 2>&1 || missing="$missing firefox-esr"
     command -v Xvfb >/dev/null 2>&1 || missing="$missing xvfb"
     "$python" -c 'import tkinter' >/dev/null 2>&1 || missing="$missing python3-tk"
     command -v octave-cli >/dev/null 2>&1 || missing="$missing octave"
