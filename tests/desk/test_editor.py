@@ -17,7 +17,7 @@ from tests.desk.visitor import NewPage, Visitor, open_desk
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.show import Shown
 from kiks.model import brush
-from kiks.model.arena import Arena, Pose
+from kiks.model.arena import Arena, Pose, Wall
 from kiks.model.project import Project
 
 pytestmark = pytest.mark.slow
@@ -181,3 +181,60 @@ def test_files_are_uploaded(desk: Desk, visitor: Visitor) -> None:
     visitor.told("level 5")
     assert desk.sim.arena.width_mm == 450
     assert list(desk.folder.iterdir()) == []
+
+
+def test_properties_are_set_by_a_double_click(desk: Desk, visitor: Visitor) -> None:
+    def put(name: str, text: str) -> None:
+        visitor.at(f"property-{name}").fill(text)
+        visitor.at(f"property-{name}").press("Enter")
+
+    def double(x_mm: float, y_mm: float) -> None:
+        visitor.page.mouse.dblclick(*visitor.on_page(x_mm, y_mm))
+
+    expect(visitor.at("properties")).to_contain_text("Double-click a robot")
+    for tool, place in (("lamp", (300, 300)), ("ball", (450, 150))):
+        visitor.take(tool)
+        click(visitor, *place)
+        wait_for_step(visitor)
+    visitor.take("disc")
+    visitor.pull((200, 400), (230, 400))
+    visitor.page.mouse.up()
+    visitor.until(lambda: len(desk.sim.arena.walls) == 1)
+    visitor.take("hand")
+    double(300, 300)
+    expect(visitor.at("properties")).to_contain_text("Lamp")
+    put("power_w", "2.5")
+    visitor.until(lambda: desk.sim.lamps[0, 2] == 2.5)
+    put("power_w", "-1")
+    expect(visitor.at("refused")).to_contain_text("power_w must be greater than 0, but it was -1")
+    put("power_w", "4")
+    visitor.until(lambda: desk.sim.lamps[0, 2] == 4)
+    expect(visitor.at("refused")).to_have_text("")
+    visitor.at("property-is_on").click()
+    visitor.until(lambda: desk.sim.lamps[0, 3] == 0)
+    click(visitor, 450, 150)
+    expect(visitor.at("properties")).to_contain_text("Ball")
+    put("radius_mm", "20")
+    visitor.until(lambda: desk.sim.bodies()["radius_mm"].tolist() == [20])
+    click(visitor, 200, 400)
+    expect(visitor.at("property-disc_mm")).to_have_value("200, 400")
+    put("disc_mm", "220, 400")
+    visitor.until(lambda: desk.sim.arena.walls == (Wall(disc_mm=(220, 400), radius_mm=30),))
+    visitor.tab("robot")
+    double(120, 120)
+    expect(visitor.at("property-name")).to_be_focused()
+    put("name", "Ada")
+    visitor.until(lambda: desk.names() == ["Ada"])
+    put("heading_deg", "90")
+    visitor.until(lambda: desk.sim.pose(1)[2] == pytest.approx(np.pi / 2))
+    visitor.picture("properties")
+    visitor.page.keyboard.press("Escape")
+    visitor.at("close-properties").click()
+    visitor.at("undo").click()
+    visitor.until(lambda: desk.sim.pose(1)[2] == 0)
+    visitor.at("save-name").fill("mine")
+    visitor.at("save").click()
+    visitor.told("Saved as mine.kiks")
+    text = (desk.folder / "mine.kiks").read_text()
+    assert "\n[[wall]]\ndisc_mm = [220.0, 400.0]\nradius_mm = 30.0\nbrightness = 255\n" in text
+    assert "power_w = 4.0\nis_on = false\n" in text

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 from collections.abc import Awaitable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -15,8 +16,10 @@ from kiks.desk.server.desk import Desk
 from kiks.desk.server.live_editing import Editing, Robot
 from kiks.errors import KiksError, LinkError, ParameterError
 from kiks.model import brush
-from kiks.model.arena import Arena, Ball, Cylinder, Lamp, Pose
+from kiks.model.arena import Arena, Ball, Cylinder, Lamp, Pose, Wall
 from kiks.model.project import Project, ProjectRobot
+from kiks.recording.recording import Recording
+from kiks.recording.replay import check_recording
 from kiks.sim.from_project import simulation_of
 from kiks.sim.simulation import Simulation
 
@@ -286,3 +289,92 @@ async def test_robots_beyond_the_starts_of_another_arena_find_room(desk, editing
     assert all(arena.free_for(*start[:2], 27.4) for start in arena.starts)
     with pytest.raises(KiksError, match="room for robot 1"):
         await editing.begin(Arena.box(100, 100, wall_mm=30))
+
+
+async def test_properties_of_anything_change_in_the_running_world_and_the_recording_replays(desk, editing, tmp_path):
+    await line(editing)
+    sim = desk.sim
+    recorder = sim.record(tmp_path / "run.mcap")
+    sim.port(1).write(b"D,3,3\n")
+    sim.run(1.5)
+    robot, ball, lamp = [await editing.select(what, 0, 0, 0) for what in ("robot", "body", "lamp")]
+    cylinder, wall = await editing.select("body", 1, 0, 0), await editing.select("floor", -1, 200, 100)
+    assert wall == Wall(line_mm=((200, 10), (200, 200)), width_mm=6)
+    assert await editing.select("floor", -1, 250, 250) is None
+
+    await editing.change(robot, name="Grace")
+    await editing.change(ball, radius_mm=20, brightness="wood")
+    await editing.change(cylinder, x_mm=410, friction_mm_s2=300)
+    await editing.change(lamp, power_w=4, is_on=False)
+    wall = await editing.change(wall, line_mm=((200, 10), (200, 150)))
+    pose = sim.pose(1)
+    assert pose[0] > 120  # it has driven on
+    sim.run(1.5)
+    await editing.change(robot, x_mm=120, y_mm=300, heading_deg=90)
+    assert sim.pose(1) == pytest.approx((120, 300, math.pi / 2))
+    sim.run(1.5)
+    recorder.close()
+    assert sim is desk.sim
+    assert desk.names() == ["Grace"]
+    bodies = sim.bodies()[["x_mm", "radius_mm", "brightness", "friction_mm_s2"]].tolist()
+    assert bodies == [(300, 20, 190, 20), (410, 16, 190, 300)]
+    assert sim.lamps.tolist() == [[50, 350, 4, 0]]
+    assert sim.arena.walls == (wall,)
+    assert not sim.arena.brightness[180, 200]
+    assert check_recording(Recording(tmp_path / "run.mcap").log).differs_ns is None
+
+    saved = Project.from_bytes((await desk.project_to_save("mine")).to_bytes())
+    assert saved.robots[0].name == "Grace"
+    assert saved.arena.lamps == (Lamp(50, 350, 4, False),)
+    assert saved.arena.balls == (Ball(300, 300, 20, 20, 190),)
+    for _ in range(6):
+        await editing.undo()
+    assert sim.lamps.tolist() == [[50, 350, 1, 1]]
+    assert sim.bodies()[["x_mm", "radius_mm", "brightness"]].tolist() == [(300, 32, 255), (400, 16, 190)]
+    assert desk.names() == ["Ada"]
+    assert sim.pose(1)[:2] == pytest.approx(pose[:2], abs=60)
+    await editing.redo()
+    assert desk.names() == ["Grace"]
+
+
+@pytest.mark.parametrize(
+    ("what", "index", "values", "message"),
+    [
+        ("lamp", 0, {"power_w": 0}, r"lamp: power_w must be greater than 0, but it was 0\. A Khepera lamp has 1 W"),
+        ("lamp", 0, {"power_w": "much"}, r"lamp: power_w must be a number, but it was 'much'"),
+        ("lamp", 0, {"power_w": math.nan}, r"lamp: power_w must be .*, but it was nan"),
+        ("lamp", 0, {"x_mm": 900}, r"lamp 1 must lie inside the arena, but it is at \(900, 350\) mm"),
+        ("body", 0, {"radius_mm": 101}, r"ball: radius_mm must be .* 100, but it was 101"),
+        ("body", 0, {"radius_mm": 95}, r"the place of body 1 must be free"),
+        ("body", 1, {"brightness": "green"}, r"cylinder: brightness must be"),
+        ("body", 1, {"x_mm": 3}, r"cylinder 1 must stand on floor"),
+        ("body", 1, {"x_mm": 12}, r"the place of body 2 must be free"),
+        ("robot", 0, {"y_mm": 12}, r"the place of robot 1 must be free"),
+        ("robot", 0, {"heading_deg": "up"}, r"robot: heading_deg must be a number"),
+        ("floor", -1, {"width_mm": 0}, r"wall: width_mm must be greater than 0"),
+        ("floor", -1, {"line_mm": ((900, 1), (901, 1))}, r"wall 1 must cover a part of the arena"),
+        ("floor", -1, {"line_mm": ((100, 100), (110, 100))}, r"The walls must leave room|must stand on floor"),
+    ],
+)
+async def test_bad_properties_are_refused_in_one_line(desk, editing, what, index, values, message):
+    await line(editing)
+    selected = await editing.select(what, index, 200, 100)
+    before = desk.sim.state_hash(), desk.sim.arena, desk.sim.world.lamps.tobytes()
+    with pytest.raises(KiksError, match=message) as caught:
+        await editing.change(selected, **values)
+    assert "\n" not in str(caught.value)
+    assert (desk.sim.state_hash(), desk.sim.arena, desk.sim.world.lamps.tobytes()) == before
+
+
+async def test_what_has_gone_cannot_be_changed_and_walls_are_removed_by_a_click(desk, editing):
+    await line(editing)
+    lamp, wall = await editing.select("lamp", 0, 0, 0), await editing.select("floor", -1, 200, 100)
+    await editing.remove(50, 350)
+    assert await editing.properties(lamp) is None
+    with pytest.raises(ParameterError, match=r"it has gone\. Select something else"):
+        await editing.change(lamp, power_w=3)
+    await editing.remove(200, 100)
+    assert desk.sim.arena.walls == ()
+    await editing.undo()
+    await editing.remove_selected(wall)
+    assert desk.sim.arena.walls == ()

@@ -166,10 +166,13 @@ def _pack_cameras(sim: Simulation) -> NDArray[np.void]:
 
 
 def scene_key(sim: Simulation) -> tuple[Any, ...]:
-    """Return what changes when a scene message no longer holds: the world, walls, robots, turrets, lamps or bodies."""
+    """Return what changes when a scene message no longer holds: the world, walls, robots, turrets, lamps or bodies.
+
+    Of bodies their sizes and looks count, too.
+    """
     turret_count = sum(len(wire.firmware.fitted) for wire in sim.wires)
     counts = sim.robot_count, turret_count, len(sim.world.lamps)
-    return sim, sim.arena, *counts, *sim.world.state.bodies["number"][0].tolist()
+    return sim, sim.arena, *counts, *sim.world.state.bodies[["number", "radius_mm", "brightness"]][0].tolist()
 
 
 def describe_scene(sim: Simulation, scene: int, names: Sequence[str] | None = None) -> dict[str, Any]:

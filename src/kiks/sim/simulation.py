@@ -573,6 +573,20 @@ class Simulation:
         with self._changing():
             self.things.move_body(body, x_mm, y_mm, speed_mm_s, heading_rad)
 
+    def change_body(self, body: int, **changes: Any) -> None:
+        """Change a ball or cylinder: its `radius_mm`, `friction_mm_s2` [mm/s^2] or `brightness`.
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> ball = sim.add_ball(100, 100)
+            >>> sim.change_body(ball, radius_mm=40, brightness="wood")
+            >>> sim.bodies()["brightness"]
+            array([190], dtype=uint8)
+        """
+        with self._changing():
+            self.things.change_body(body, changes)
+
     def remove_body(self, body: int) -> None:
         """Remove a ball or cylinder.
 

@@ -59,14 +59,19 @@ class Things:
 
     def add_body(self, kind: type[Ball | Cylinder], x_mm: float, y_mm: float, changes: dict[str, Any]) -> int:
         """Add a ball or cylinder at rest; return its number."""
+        return self._add(self._made(kind, {"x_mm": x_mm, "y_mm": y_mm} | changes))
+
+    def _made(self, kind: type[Ball | Cylinder], values: dict[str, Any]) -> Ball | Cylinder:
+        """Return a checked ball or cylinder."""
         try:
-            body = kind(x_mm, y_mm, **changes)
+            body = kind(**values)
         except TypeError:
+            names = [name for name in values if name not in ("x_mm", "y_mm")]
             raise ParameterError(
-                f"changes of a body must be radius_mm, friction_mm_s2 or brightness, but they were {list(changes)}."
+                f"changes of a body must be radius_mm, friction_mm_s2 or brightness, but they were {names}."
             ) from None
         balls, cylinders = ((body,), ()) if isinstance(body, Ball) else ((), (body,))
-        return self._add(self._checked(balls=balls, cylinders=cylinders).bodies[0])
+        return self._checked(balls=balls, cylinders=cylinders).bodies[0]
 
     def _add(self, body: Ball | Cylinder, overlap_mm: float = OVERLAP_MM) -> int:
         what, name = (BALL, "ball") if isinstance(body, Ball) else (CYLINDER, "cylinder")
@@ -98,6 +103,22 @@ class Things:
         record["x_mm"], record["y_mm"], record["trail"][:] = x_mm, y_mm, (x_mm, y_mm)
         record["velocity_x"], record["velocity_y"] = speed_mm_s * cosine, speed_mm_s * sine
         enter_worlds(world.scene, ITSELF)
+
+    def change_body(self, body: int, changes: dict[str, Any]) -> None:
+        """Change the size, friction or brightness of a ball or cylinder where it is."""
+        index, world = self._index_of(body), self._world
+        record: Any = world.state.bodies[0, index]
+        kind: type[Ball | Cylinder] = Ball if record["what"] == BALL else Cylinder
+        known = ("radius_mm", "friction_mm_s2", "brightness")
+        now = {name: record[name].item() for name in ("x_mm", "y_mm", *known)}
+        changed = self._made(kind, now | changes)
+        disc = world.robot_count + index
+        world.free_space.check_free(
+            f"the place of body {body}", changed.x_mm, changed.y_mm, changed.radius_mm, but=disc
+        )
+        for name in known:
+            record[name] = getattr(changed, name)
+        world.rebuild_scene()
 
     def remove_body(self, body: int) -> None:
         """Remove a ball or cylinder."""

@@ -28,7 +28,10 @@ LAYERS = {
 _THREE = Path(nicegui.__file__).parent / "elements" / "scene" / "dist"
 
 
-Points = Sequence[tuple[float, float]]
+Place = tuple[float, float]
+"""x and y in the arena [mm]."""
+
+Points = Sequence[Place]
 """Places of a stroke in the arena [mm], snapped to the grid."""
 
 
@@ -44,7 +47,8 @@ class ArenaView(
     Args:
         feed: Address of the WebSocket that frames come from, seen from the page; all its components share one.
         on_pick: Called with each click that is not a drag: with 'robot', 'sensor' (of the selected robot), 'body',
-            'lamp' or 'floor', the index of the thing, and that of the sensor, both from 0; -1 for none.
+            'lamp' or 'floor', the index of the thing, and that of the sensor, both from 0; -1 for none; and the place.
+        on_edit: Called with each double click and with Enter, in the same way: a person wants to set properties.
         on_draw: Called with each stroke of a tool: its kind and points.
         on_remove: Called with the place of a thing that a person removes [mm].
     """
@@ -53,7 +57,8 @@ class ArenaView(
         self,
         feed: str,
         *,
-        on_pick: Callable[[str, int, int], Any],
+        on_pick: Callable[[str, int, int, Place], Any],
+        on_edit: Callable[[str, int, Place], Any],
         on_draw: Callable[[str, Points], Any],
         on_remove: Callable[[float, float], Any],
     ) -> None:
@@ -61,7 +66,8 @@ class ArenaView(
         self._layers = {name: is_shown for name, (_, is_shown) in LAYERS.items()}
         self.change(show=self._layers, view="top", follow=-1)
         self.set_tool("hand")
-        self.on("pick", lambda e: on_pick(str(e.args["what"]), int(e.args["index"]), int(e.args["sensor"])))
+        self.on("pick", lambda e: on_pick(*_thing(e.args), int(e.args["sensor"]), _place(e.args)))
+        self.on("edit", lambda e: on_edit(*_thing(e.args), _place(e.args)))
         self.on("draw", lambda e: on_draw(str(e.args["kind"]), [(float(x), float(y)) for x, y in e.args["points"]]))
         self.on("remove", lambda e: on_remove(float(e.args["x_mm"]), float(e.args["y_mm"])))
 
@@ -81,3 +87,11 @@ class ArenaView(
             label: Text beside the pointer.
         """
         self.change(tool={"kind": kind, "brush_mm": brush_mm, "snap_mm": snap_mm, "label": label})
+
+
+def _thing(args: dict[str, Any]) -> tuple[str, int]:
+    return str(args["what"]), int(args["index"])
+
+
+def _place(args: dict[str, Any]) -> Place:
+    return float(args["x_mm"]), float(args["y_mm"])

@@ -14,6 +14,7 @@ from nicegui import ui
 from kiks.desk.panels.arena_view import ArenaView, Points
 from kiks.desk.panels.files import FilesPanel
 from kiks.desk.panels.new_arena import ask_for_box, ask_for_maze
+from kiks.desk.panels.properties import PropertiesPanel
 from kiks.desk.panels.shortcuts import SHORTCUTS, listen
 from kiks.desk.panels.widgets import Panel, named, select, text_button, told, with_props
 from kiks.desk.server.desk import Desk
@@ -53,7 +54,9 @@ TOOLS = {
     "ball": _ToolButton("Ball", "sports_soccer", "Add a ball", "point"),
     "cylinder": _ToolButton("Cylinder", "album", "Add a cylinder", "point"),
     "lamp": _ToolButton("Lamp", "lightbulb", "Add a lamp of 1 W", "point"),
-    "remove": _ToolButton("Remove", "delete", "Remove the robot, ball, cylinder or lamp that you click", "point"),
+    "remove": _ToolButton(
+        "Remove", "delete", "Remove the robot, ball, cylinder, lamp or drawn wall that you click", "point"
+    ),
 }
 """The tools by name."""
 
@@ -73,6 +76,8 @@ class EditorPanel(Panel):
         self._tool = "hand"
         self._buttons: dict[str, ui.button] = {}
         with ui.column().classes("w-full q-pa-md gap-3"):
+            self.properties = PropertiesPanel(desk, editing, self.refresh)
+            ui.separator()
             self._build_tools()
             self._build_brush()
             self._build_steps()
@@ -132,6 +137,7 @@ class EditorPanel(Panel):
     def set_visible(self, is_visible: bool) -> None:
         """Select the hand tool when a person leaves the panel."""
         super().set_visible(is_visible)
+        self.properties.set_visible(is_visible)
         if not is_visible:
             self._choose("hand")
 

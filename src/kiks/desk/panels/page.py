@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from nicegui import ui
 
-from kiks.desk.panels.arena_view import ArenaView, Points
+from kiks.desk.panels.arena_view import ArenaView, Place, Points
 from kiks.desk.panels.board import ScoreBoard
 from kiks.desk.panels.editor import EditorPanel
 from kiks.desk.panels.monitor import MonitorPanel
@@ -73,7 +73,9 @@ class Page:
             with halves.before, ui.column().classes("desk-stage"):
                 board = ScoreBoard(feed, "board.css")
                 with ui.element("div").classes("desk-arena"):
-                    self._view = ArenaView(feed, on_pick=self._pick, on_draw=self._draw, on_remove=self._remove)
+                    self._view = ArenaView(
+                        feed, on_pick=self._pick, on_edit=self._edit, on_draw=self._draw, on_remove=self._remove
+                    )
                     self._hint = ui.label(HINT if desk.past is None else PAST_HINT).classes("desk-hint")
                 TimeBar(desk, feed)
             with halves.after, ui.column().classes("w-full gap-0 no-wrap"):
@@ -113,8 +115,15 @@ class Page:
         for each, panel in self._panels.items():
             panel.set_visible(each == name)
 
-    async def _pick(self, what: str, index: int, sensor: int) -> None:
-        """Show the robot or sensor that was clicked."""
+    async def _pick(self, what: str, index: int, sensor: int, place: Place) -> None:
+        """Show the robot or sensor that was clicked; where walls are drawn, the properties of anything else."""
+        is_past = self._desk.past is not None
+        if (
+            not is_past
+            and what not in ("robot", "sensor")
+            and isinstance(editor := self._panels.get(self._tabs.value), EditorPanel)
+        ):
+            await editor.properties.show(await self._editing.select(what, index, *place))
         if what in ("robot", "sensor"):
             self._tabs.value = "robot"
             monitor = self._panels["robot"]
@@ -122,6 +131,18 @@ class Page:
             monitor.show_robot(index + 1)
             if what == "sensor":
                 await monitor.explain(sensor)
+
+    @told
+    async def _edit(self, what: str, index: int, place: Place) -> None:
+        """Show the properties of a thing or a wall; a double click on the floor shows all of the arena."""
+        is_past = self._desk.past is not None
+        if is_past or (selected := await self._editing.select(what, index, *place)) is None:
+            self._view.run_method("fit")
+            return
+        self._tabs.value = "arena"
+        editor = self._panels["arena"]
+        assert isinstance(editor, EditorPanel)
+        await editor.properties.show(selected, has_focus=True)
 
     async def _draw(self, kind: str, points: Points) -> None:
         """Pass a stroke to the editor."""

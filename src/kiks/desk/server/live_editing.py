@@ -11,17 +11,22 @@ import math
 import pickle
 import zlib
 from collections.abc import Callable, Mapping
-from dataclasses import replace
+from dataclasses import fields, replace
 from itertools import count
 from typing import Any, NamedTuple
+
+import numpy as np
 
 from kiks.desk.server.desk import Desk
 from kiks.engine.state import BALL
 from kiks.errors import ParameterError
-from kiks.model.arena import Arena, Ball, Cylinder, Lamp, Pose
+from kiks.model.arena import Arena, Ball, Cylinder, Lamp, Pose, Wall
 from kiks.model.arena_objects import THINGS_MAX
+from kiks.model.cells import paint
+from kiks.model.data_file import Coordinate, Text, check
 from kiks.model.free_disc import free_place
 from kiks.model.project import Project, ProjectRobot
+from kiks.sim.from_project import rounded_pose
 from kiks.sim.simulation import Simulation
 
 LAMP_REACH_MM = 20.0
@@ -45,8 +50,20 @@ class Robot(NamedTuple):
     robot: ProjectRobot = ProjectRobot()
 
 
+class RobotProperties(NamedTuple):
+    """What people set of a robot: name, position [mm], heading [deg]."""
+
+    name: Text
+    x_mm: Coordinate
+    y_mm: Coordinate
+    heading_deg: Coordinate
+
+
 Thing = Robot | Ball | Cylinder | Lamp
 _KINDS = (Robot, Ball, Cylinder, Lamp)
+
+Selected = int | Wall
+"""What a person has selected: the number of a thing, or a wall with a shape."""
 
 
 class Content(NamedTuple):
@@ -65,13 +82,47 @@ class Content(NamedTuple):
         found = {number: thing for number, thing in self.things.items() if isinstance(thing, kind)}
         return dict(sorted(found.items())) if kind is Robot else found
 
+    def arena(self) -> Arena:
+        """Return the arena with all that stands or hangs in it."""
+        robots, balls, cylinders, lamps = (tuple(self.of(kind).values()) for kind in _KINDS)
+        starts = tuple(Pose(*each[:3]) for each in robots)
+        return replace(self.walls, starts=starts, balls=balls, cylinders=cylinders, lamps=lamps)
+
     def in_project(self, project: Project) -> Project:
         """Return a project with this content instead of its own."""
-        robots, balls, cylinders, lamps = (tuple(self.of(kind).values()) for kind in _KINDS)
-        arena = replace(
-            self.walls, starts=tuple(Pose(*each[:3]) for each in robots), balls=balls, cylinders=cylinders, lamps=lamps
-        )
-        return replace(project, arena=arena, robots=tuple(each.robot for each in robots))
+        return replace(project, arena=self.arena(), robots=tuple(each.robot for each in self.of(Robot).values()))
+
+    def properties(self, selected: Selected) -> Any:
+        """Return the record of what people set of a thing or a wall; None if it has gone."""
+        if isinstance(selected, Wall):
+            return selected if selected in self.walls.walls else None
+        thing = self.things.get(selected)
+        if not isinstance(thing, Robot):
+            return thing
+        heading_deg = round(math.degrees(thing.heading_rad) % 360, 3)
+        return RobotProperties(thing.robot.name, thing.x_mm, thing.y_mm, heading_deg)
+
+    def wall_at(self, x_mm: float, y_mm: float) -> Wall | None:
+        """Return the uppermost wall with a shape at a place."""
+        return next((each for each in reversed(self.walls.walls) if _covers(self.walls, each, x_mm, y_mm)), None)
+
+    def without(self, selected: Selected) -> Content:
+        """Return the content without a thing or a wall."""
+        if isinstance(selected, Wall):
+            walls = tuple(each for each in self.walls.walls if each != selected)
+            return self._replace(walls=replace(self.walls, walls=walls))
+        return self._replace(things={number: thing for number, thing in self.things.items() if number != selected})
+
+    def with_properties(self, selected: Selected, changed: Any) -> Content:
+        """Return the content with another record of what people set of a thing or a wall."""
+        if isinstance(selected, Wall):
+            walls = tuple(changed if each == selected else each for each in self.walls.walls)
+            return self._replace(walls=replace(self.walls, walls=walls))
+        if isinstance(changed, RobotProperties):
+            name, x_mm, y_mm, heading_deg = changed
+            robot = replace(self.of(Robot)[selected].robot, name=name)
+            changed = Robot(*rounded_pose(x_mm, y_mm, math.radians(heading_deg % 360)), robot)
+        return self._replace(things={**self.things, selected: changed})
 
 
 class _Step(NamedTuple):
@@ -127,14 +178,54 @@ class Editing:
 
         await self._edit(added)
 
+    async def select(self, what: str, index: int, x_mm: float, y_mm: float) -> Selected | None:
+        """Return what a person selects: a thing by its kind and index among what is drawn, or the wall at a place."""
+        async with self._lock:
+            now = await self._content()
+            bodies = _in_order(self._desk.sim)
+        numbers = {
+            "robot": [*now.of(Robot)],
+            "lamp": [*now.of(Lamp)],
+            "body": [number for _, number in sorted(zip(bodies, (*now.of(Ball), *now.of(Cylinder)), strict=True))],
+        }.get("robot" if what == "sensor" else what)
+        if numbers is not None:
+            return numbers[index] if 0 <= index < len(numbers) else None
+        return now.wall_at(x_mm, y_mm)
+
+    async def properties(self, selected: Selected) -> Any:
+        """Return the record of what people set of a thing or a wall; None if it has gone."""
+        async with self._lock:
+            return (await self._content()).properties(selected)
+
+    async def change(self, selected: Selected, **values: Any) -> Selected:
+        """Change what people set of a thing or a wall, by the names in its record; return what is selected then.
+
+        Raises:
+            ParameterError: If a value breaks the rule of its field, or the world has no room for that.
+        """
+        after = selected
+
+        def changed(now: Content) -> Content:
+            nonlocal after
+            if (before := now.properties(selected)) is None:
+                raise ParameterError("What is changed must be there, but it has gone. Select something else.")
+            kind, known = type(before), values_of(before)
+            made = check(kind, known | values, kind.__name__.removesuffix("Properties").lower())
+            after = made if isinstance(selected, Wall) else selected
+            then = now if made == before else now.with_properties(selected, made)
+            then.arena()  # which checks places
+            return then
+
+        await self._edit(changed)
+        return after
+
+    async def remove_selected(self, selected: Selected) -> None:
+        """Remove a thing or a wall."""
+        await self._edit(lambda now: now.without(selected))
+
     async def remove(self, x_mm: float, y_mm: float) -> None:
-        """Remove the thing at a place."""
-
-        def removed(now: Content) -> Content:
-            gone = self._thing_at(now, x_mm, y_mm)
-            return now._replace(things={number: thing for number, thing in now.things.items() if number != gone})
-
-        await self._edit(removed)
+        """Remove the thing or the wall at a place."""
+        await self._edit(lambda now: now.without(self._thing_at(now, x_mm, y_mm)))
 
     async def begin(self, arena: Arena) -> None:
         """Begin with another arena and the same robots, as a step that can be undone.
@@ -201,6 +292,8 @@ class Editing:
             if then.walls is not now.walls:
                 await asyncio.to_thread(lambda: then.walls.faces)
             await desk.do(lambda sim: _change(sim, now, then))
+            robots = tuple(each.robot for each in then.of(Robot).values())
+            desk.project = replace(desk.project, robots=robots)
             # Resets return to here: the places of the old checkpoint may be walls by now.
             await desk.do(desk.mark)
             desk.project = await desk.present_project()
@@ -220,8 +313,8 @@ class Editing:
         things |= {next(self._fresh): thing for thing in (*arena.bodies, *arena.lamps)}
         return Content(replace(arena, starts=(), balls=(), cylinders=(), lamps=()), things)
 
-    def _thing_at(self, now: Content, x_mm: float, y_mm: float) -> int:
-        """Return the number of the thing that a click hits."""
+    def _thing_at(self, now: Content, x_mm: float, y_mm: float) -> Selected:
+        """Return what a click hits: the number of a thing, or a wall."""
         reaches_mm = dict.fromkeys(now.of(Lamp), LAMP_REACH_MM)
         reaches_mm |= {number: body.radius_mm for kind in (Ball, Cylinder) for number, body in now.of(kind).items()}
         reaches_mm |= {
@@ -231,12 +324,14 @@ class Editing:
             number: math.hypot(thing.x_mm - x_mm, thing.y_mm - y_mm) - reaches_mm[number]
             for number, thing in now.things.items()
         }
-        if not gaps_mm or min(gaps_mm.values()) > 0:
+        if gaps_mm and min(gaps_mm.values()) <= 0:
+            return min(gaps_mm, key=gaps_mm.__getitem__)
+        if (wall := now.wall_at(x_mm, y_mm)) is None:
             raise ParameterError(
-                "A thing must be at the place of a click, but nothing is there. Click a robot, a ball, a cylinder or "
-                "a lamp."
+                "A thing must be at the place of a click, but nothing is there. Click a robot, a ball, a cylinder, "
+                "a lamp, or a wall that was drawn as a line, box or disc."
             )
-        return min(gaps_mm, key=gaps_mm.__getitem__)
+        return wall
 
 
 def _known_of(sim: Simulation) -> tuple[Any, ...]:
@@ -245,17 +340,57 @@ def _known_of(sim: Simulation) -> tuple[Any, ...]:
 
 def _with_change(now: Content, here: Content, there: Content) -> Content:
     """Return the content of now with what changes from here to there; what has moved since then stays where it is."""
-    things = {number: thing for number, thing in now.things.items() if number in there.things}
+    things = {
+        number: _changed(thing, here.things.get(number), there.things[number])
+        for number, thing in now.things.items()
+        if number in there.things
+    }
     things |= {number: thing for number, thing in there.things.items() if number not in here.things}
     return Content(there.walls, things)
 
 
+def _changed(now: Any, here: Thing | None, there: Thing) -> Any:
+    """Return a thing of now with what of it changes from here to there."""
+    if here is None:
+        return now
+    values = zip(now._fields, here, there, strict=True)
+    return now._replace(**{name: after for name, before, after in values if after != before})
+
+
+def values_of(record: Any) -> dict[str, Any]:
+    """Return the values of a record by their names, without those that are left out."""
+    names = getattr(record, "_fields", None) or [each.name for each in fields(record)]
+    return {name: value for name in names if (value := getattr(record, name)) is not None}
+
+
+def _covers(arena: Arena, wall: Wall, x_mm: float, y_mm: float) -> bool:
+    row, column = (int(way_mm / arena.mm_per_cell) for way_mm in (y_mm, x_mm))
+    if not (0 <= row < arena.ground.shape[0] and 0 <= column < arena.ground.shape[1]):
+        return False
+    cells = np.zeros_like(arena.ground)
+    paint(cells, wall.cells(arena.ground.shape, arena.mm_per_cell), 1)
+    return bool(cells[row, column])
+
+
+def _in_order(sim: Simulation) -> list[int]:
+    """Return the indices of bodies in the order of a project, which has all balls before all cylinders."""
+    are_balls = (sim.bodies()["what"] == BALL).tolist()
+    return sorted(range(len(are_balls)), key=lambda index: not are_balls[index])
+
+
 def _change(sim: Simulation, now: Content, then: Content) -> None:
     """Apply the difference between two contents to a world that has the robots of both."""
-    numbers, are_balls = sim.bodies()["number"].tolist(), (sim.bodies()["what"] == BALL).tolist()
-    # A project has all balls before all cylinders, in the world's order.
-    in_order = sorted(range(len(numbers)), key=lambda index: not are_balls[index])
-    bodies = dict(zip((*now.of(Ball), *now.of(Cylinder)), (numbers[index] for index in in_order), strict=True))
+    numbers = sim.bodies()["number"].tolist()
+    bodies = dict(zip((*now.of(Ball), *now.of(Cylinder)), (numbers[index] for index in _in_order(sim)), strict=True))
+    for robot, (number, before) in enumerate(now.of(Robot).items(), 1):
+        if before[:3] != (pose := then.things[number][:3]):
+            sim.place(robot, *pose)
+    for row, (number, lamp) in enumerate(now.of(Lamp).items()):
+        if (after := then.things.get(number, lamp)) != lamp:
+            sim.lamps[row] = after
+    for number, body in bodies.items():
+        if (after := then.things.get(number)) is not None and after != now.things[number]:
+            _change_body(sim, body, now.things[number]._asdict(), after._asdict())
     for row, number in reversed([*enumerate(now.of(Lamp), 1)]):
         if number not in then.things:
             sim.remove_lamp(row)
@@ -270,6 +405,16 @@ def _change(sim: Simulation, now: Content, then: Content) -> None:
         elif not isinstance(thing, Robot):
             add = sim.add_ball if isinstance(thing, Ball) else sim.add_cylinder
             add(**thing._asdict())
+
+
+def _change_body(sim: Simulation, body: int, before: dict[str, Any], after: dict[str, Any]) -> None:
+    """Give a ball or cylinder other values; what moves stays in motion if it stays at its place."""
+    changes = {name: value for name, value in after.items() if value != before[name]}
+    place = {name: changes.pop(name) for name in ("x_mm", "y_mm") if name in changes}
+    if place:
+        sim.move_body(body, after["x_mm"], after["y_mm"])
+    if changes:
+        sim.change_body(body, **changes)
 
 
 def _push(steps: list[bytes], step: _Step) -> None:

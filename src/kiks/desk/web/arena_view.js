@@ -21,7 +21,7 @@ export default {
     view: { type: String, default: "top" },
     follow: { type: Number, default: -1 },
   },
-  emits: ["pick", "draw", "remove"],
+  emits: ["pick", "edit", "draw", "remove"],
   computed: {
     label: () => `Arena from above. ${KEYS_HELP}`,
   },

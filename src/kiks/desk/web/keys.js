@@ -1,5 +1,5 @@
-/* The keyboard: Tab or n selects the next thing, arrows move it (or the view), q and e turn it, Delete removes it, + and
-   - zoom. */
+/* The keyboard: Tab or n selects the next thing, arrows move it (or the view), q and e turn it, Enter shows its
+   properties, Delete removes it, + and - zoom. */
 
 import { allThings, isSame } from "./things.js";
 
@@ -12,9 +12,8 @@ const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowD
 const TURNS = { q: 1, "<": 1, e: -1, ">": -1 };
 
 export const KEYS_HELP =
-  "Tab selects the next thing, arrow keys move it by 10 mm (with Shift 1 mm), q and e turn it, Delete removes it, Escape " +
-  "deselects; " +
-  "plus and minus zoom, 0 shows everything.";
+  "Tab selects the next thing, arrow keys move it by 10 mm (with Shift 1 mm), q and e turn it, Enter shows its " +
+  "properties, Delete removes it, Escape deselects; plus and minus zoom, 0 shows everything.";
 
 /** Handle a key; return whether it was a shortcut. `tell` is that of the pointer. */
 export function pressKey(event, feed, hand, drawing, viewport, tell) {
@@ -33,6 +32,10 @@ export function pressKey(event, feed, hand, drawing, viewport, tell) {
     viewport.panBy(-right * PAN_PX, up * PAN_PX);
     tell.view();
     return true;
+  }
+  if (key === "Enter") {
+    if (hand.selected) tell.edit(hand.selected);
+    return Boolean(hand.selected);
   }
   if (key === "Delete") {
     if (hand.selected && !hand.holding) tell.remove(hand.selected);

@@ -11,8 +11,8 @@ const CLICK_PX = { mouse: 4, pen: 6, touch: 9 };
 const MIDDLE = 1, RIGHT = 2;
 
 export class Pointer {
-  /** `tell` is {pick(pick), draw(stroke), view(), fit()}: a click, a stroke, a view moved by hand, a request to
-      show the whole arena. */
+  /** `tell` is {pick(pick), edit(thing, place), draw(stroke), view(), fit()}: a click, a double click, a stroke, a view
+      moved by hand, a request to show the whole arena. */
   constructor(surface, feed, hand, drawing, tell) {
     Object.assign(this, { surface, feed, hand, drawing, tell });
     this._fingers = new Map();
@@ -26,9 +26,8 @@ export class Pointer {
     listen("lostpointercapture", this._lose);
     listen("pointerleave", this._leave);
     listen("contextmenu", (event) => event.preventDefault());
-    if (!surface.viewport) return;
-    listen("wheel", this._wheel, { passive: false });
     listen("dblclick", this._double);
+    if (surface.viewport) listen("wheel", this._wheel, { passive: false });
   }
 
   _down(event) {
@@ -179,7 +178,8 @@ export class Pointer {
 
   _double(event) {
     const place = this.surface.toArena(event.clientX, event.clientY);
-    if (!this.drawing.isActive && this._at(place).what === "floor") this.tell.fit();
+    if (!place || this.drawing.isActive) return;
+    this.tell.edit(this._at(place), { x_mm: place[0], y_mm: place[1] });
   }
 }
 

@@ -37,6 +37,10 @@ export class Stage {
     this._beats = 0;
     this._tell = {
       pick: (pick) => tell("pick", pick),
+      edit: ({ what, index }, place) => {
+        const { x_mm, y_mm } = place ?? placeOf(this.feed.frame, what, index);
+        tell("edit", { what, index, x_mm, y_mm });
+      },
       draw: (stroke) => tell("draw", stroke),
       remove: ({ what, index }) => {
         const { x_mm, y_mm } = placeOf(this.feed.frame, what, index);

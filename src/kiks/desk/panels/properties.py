@@ -1,0 +1,197 @@
+"""The properties of the selected thing or wall: a form made from the rules by which files are checked."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable
+from functools import partial
+from typing import Any
+
+from nicegui import ui
+
+from kiks.desk.panels.widgets import Panel, icon_button, named, with_props
+from kiks.desk.server.desk import Desk
+from kiks.desk.server.live_editing import Editing, Selected, values_of
+from kiks.errors import KiksError
+from kiks.model.data_file import adapter
+
+UNITS = {"_mm_s2": "mm/s²", "_mm": "mm", "_deg": "°", "_w": "W"}
+"""Units by how names of values end."""
+
+TYPED = "(event) => emit(event.target.value)"
+"""Sends what stands in a field with the event, as the field's own message may come later."""
+
+HINT = "Double-click a robot, a ball, a cylinder, a lamp or a drawn wall to set its properties."
+
+
+class PropertiesPanel(Panel):
+    """The properties of what a person has selected.
+
+    Args:
+        desk: The desk.
+        editing: Changes its world.
+        changed: Called after each change.
+    """
+
+    def __init__(self, desk: Desk, editing: Editing, changed: Callable[[], object]) -> None:
+        super().__init__(desk)
+        self._editing, self._changed = editing, changed
+        self._selected: Selected | None = None
+        self._record: Any = None
+        self._fields: dict[str, ui.input | ui.switch] = {}
+        self._in_focus = self._bad = ""
+        with named(ui.column().classes("w-full gap-1"), "properties") as self._form:
+            pass
+        self._refused = named(ui.label().classes("text-body2 desk-refused").props("role=alert"), "refused")
+        self._build()
+
+    async def show(self, selected: Selected | None, *, has_focus: bool = False) -> None:
+        """Show the properties of a thing or a wall; None for nothing."""
+        self._selected = selected
+        self._record = None if selected is None else await self._editing.properties(selected)
+        self._build()
+        if has_focus and self._fields:
+            next(iter(self._fields.values())).run_method("focus")
+
+    async def refresh(self) -> None:
+        """Show the present values, but in a field that a person types into."""
+        if self._selected is None or self._desk.past is not None:
+            return
+        record = await self._editing.properties(self._selected)
+        if type(record) is not type(self._record):
+            await self.show(None)
+            return
+        values, before = values_of(record), values_of(self._record)
+        self._record = record
+        for name, field in self._fields.items():
+            if values[name] != before[name] and name != self._in_focus:
+                field.value = _text(values[name])
+
+    def _build(self) -> None:
+        """Build the form of the selected thing."""
+        self._form.clear()
+        self._fields.clear()
+        self._in_focus = self._refused.text = ""
+        with self._form:
+            if self._record is None:
+                ui.label(HINT).classes("text-caption")
+                return
+            with ui.row().classes("w-full items-center no-wrap"):
+                ui.label(name_of(self._record)).classes("text-subtitle1 col")
+                icon_button("delete", "Remove it", "remove-selected", self._remove)
+                icon_button("close", "Close the properties", "close-properties", partial(self.show, None))
+            rules = rules_of(type(self._record))
+            with ui.element("div").classes("desk-properties"):
+                for name, value in values_of(self._record).items():
+                    self._fields[name] = self._build_field(name, value, rules[name])
+            if self._desk.has_old_coordinates:
+                ui.label("Here x and y are those of files: from the lower left corner, y up.").classes("text-caption")
+
+    def _build_field(self, name: str, value: Any, rule: dict[str, Any]) -> ui.input | ui.switch:
+        word, unit = label_of(name)
+        field: ui.input | ui.switch
+        if isinstance(value, bool):
+            field = ui.switch(word, value=value, on_change=lambda event: self._take(name, event.value))
+        else:
+            field = ui.input(word, value=_text(value)).props("dense outlined hide-bottom-space")
+            field = with_props(field, suffix=unit)
+            if not isinstance(value, str):
+                field = with_props(field, inputmode="decimal" if isinstance(value, int | float) else "text")
+            field.on("focus", partial(self._focus, name))
+            field.on("blur", lambda event: self._leave(name, event.args), js_handler=TYPED)
+            field.on("keydown.enter", lambda event: self._take(name, event.args), js_handler=TYPED)
+        if isinstance(value, tuple):
+            field.classes("desk-wide")
+        if tip := rule.get("description", ""):
+            field.tooltip(tip)
+        return named(field, f"property-{name}")
+
+    def _focus(self, name: str) -> None:
+        self._in_focus = name
+
+    async def _leave(self, name: str, typed: str) -> None:
+        self._in_focus = ""
+        await self._take(name, typed)
+
+    async def _take(self, name: str, typed: Any) -> None:
+        """Apply what a field says; its message stays below the form until the value is good."""
+        if self._selected is None or name not in self._fields:
+            return
+        before = values_of(self._record)[name]
+        if typed == _text(before):
+            if name == self._bad:
+                self._refused.text = ""
+            return
+        self._bad = name
+        await self._act(lambda selected: self._editing.change(selected, **{name: _value(typed, before)}))
+
+    async def _remove(self) -> None:
+        await self._act(self._editing.remove_selected)
+
+    async def _act(self, act: Callable[[Selected], Awaitable[Selected | None]]) -> None:
+        assert self._selected is not None
+        try:
+            self._selected = await act(self._selected)
+            self._refused.text = ""
+        except KiksError as error:
+            self._refused.text = str(error)
+            return
+        self._in_focus = ""
+        await (self.show(None) if self._selected is None else self.refresh())
+        for name, value in values_of(self._record).items() if self._fields else ():
+            self._fields[name].value = _text(value)
+        self._changed()
+
+
+def name_of(record: Any) -> str:
+    """Return what people call a thing with such properties."""
+    kind = type(record).__name__.removesuffix("Properties")
+    return f"{kind} {record.name}" if getattr(record, "name", "") else kind
+
+
+def rules_of(kind: Any) -> dict[str, dict[str, Any]]:
+    """Return the rules of each field of a record, from its JSON schema."""
+    schema = adapter(kind).json_schema()
+    if "properties" in schema:
+        return dict(schema["properties"])
+    return dict(zip(kind._fields, schema["prefixItems"], strict=True))
+
+
+def label_of(name: str) -> tuple[str, str]:
+    """Return what people call a value, and its unit.
+
+    Example:
+        >>> label_of("friction_mm_s2")
+        ('Friction', 'mm/s²')
+    """
+    ending = next((each for each in UNITS if name.endswith(each)), "")
+    word = name.removesuffix(ending).removeprefix("is_").replace("_", " ")
+    return word if len(word) == 1 else word.capitalize(), UNITS.get(ending, "")
+
+
+def _text(value: Any) -> Any:
+    """Return a value as people type it; a switch stays what it is."""
+    if isinstance(value, bool | str):
+        return value
+    if isinstance(value, tuple):
+        return ("; " if isinstance(value[0], tuple) else ", ").join(map(_text, value))
+    return f"{round(value, 3):.12g}"
+
+
+def _value(typed: Any, before: Any) -> Any:
+    """Return what a person has typed in place of a value; what it is not stays a text, which the rules refuse.
+
+    Example:
+        >>> _value("10, 20; 30, 40.5", ((1.0, 2.0), (3.0, 4.0)))
+        ((10, 20), (30, 40.5))
+    """
+    if isinstance(before, bool | str) or typed is None:
+        return typed
+    if isinstance(before, tuple):
+        parts = str(typed).split(";" if isinstance(before[0], tuple) else ",")
+        return tuple(_value(part, before[0]) for part in parts)
+    for kind in (int, float):
+        try:
+            return kind(typed)
+        except ValueError:
+            continue
+    return str(typed).strip()
