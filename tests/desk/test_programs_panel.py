@@ -174,13 +174,22 @@ def test_line_is_watched_only_while_the_panel_is_visible(visitor: Visitor) -> No
         assert visitor.sim.wires[1].log is None
 
 
-def test_page_of_a_public_desk_starts_no_programs(new_page: NewPage, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("owns_world", "reason", "other"),
+    [(True, "the desk is open to other computers", ""), (False, "Another program owns this world", "No program runs")],
+)
+def test_a_page_that_may_not_start_programs_tells_why(
+    owns_world: bool, reason: str, other: str, new_page: NewPage, tmp_path: Path
+) -> None:
     project = make_project()
-    shown = Shown(Desk(simulation_of(project, tmp_path), project=project, folder=tmp_path, owns_world=True), port=0)
+    desk = Desk(simulation_of(project, tmp_path), project=project, folder=tmp_path, owns_world=owns_world)
+    shown = Shown(desk, port=0)
     shown.drive()
     visitor = Visitor(new_page(), shown)
     visitor.at("tab-programs").click()
-    expect(visitor.at("may-not")).to_contain_text("cannot start programs from this page")
+    expect(visitor.at("may-not")).to_contain_text(reason)
+    if other:
+        expect(visitor.at("programs")).not_to_contain_text(other)
     assert visitor.at("run-program").count() == 0
     visitor.page.close()
     shown.close()

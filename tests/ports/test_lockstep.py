@@ -148,7 +148,7 @@ def test_world_begins_without_a_missing_program_after_a_warning(caplog: pytest.L
         wall.pass_s(1.5)
         run.wait_rounds(3)
         assert warnings(caplog) == [
-            "the world begins when 3 programs are there, but that of robot 2 or 3 is missing. It waits 8 s more."
+            "the world begins when 3 programs are there. Missing: that of robot 2 or 3. It waits 8 s more."
         ]
         assert one.has_no_reply()
         wall.pass_s(9)
@@ -168,7 +168,7 @@ def test_policy_wait_has_no_time_limit_for_a_missing_program(caplog: pytest.LogC
         wall.pass_s(1.5)
         run.wait_rounds(3)
         assert warnings(caplog) == [
-            "the world begins when 2 programs are there, but that of robot 2 is missing. It waits until all are there."
+            "the world begins when 2 programs are there. Missing: that of robot 2. It waits until all are there."
         ]
         wall.pass_s(1000)
         run.wait_rounds(3)

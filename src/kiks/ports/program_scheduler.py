@@ -296,7 +296,7 @@ class ProgramScheduler:
             if not self._has_reported_missing:
                 self._has_reported_missing = True
                 self._log.warning(
-                    "the world begins when %d programs are there, but %s is missing. %s",
+                    "the world begins when %d programs are there. Missing: %s. %s",
                     self._expected,
                     self._missing(),
                     "It waits until all are there." if waits_on else f"It waits {left_s:.0f} s more.",

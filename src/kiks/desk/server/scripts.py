@@ -69,19 +69,17 @@ class Mistake(NamedTuple):
     Attributes:
         line: Number of its line, from 1.
         message: What is wrong.
-        code: The line.
         begin: Where it begins in the program, from 0.
         end: Where it ends; the same place if only the line is known.
     """
 
     line: int
     message: str
-    code: str = ""
     begin: int = 0
     end: int = 0
 
     def __str__(self) -> str:
-        return f"Line {self.line}: {self.message}" + (f": {self.code}" if self.code else "")
+        return f"Line {self.line}: {self.message}"
 
 
 def find_mistake(text: str) -> Mistake | None:
@@ -89,7 +87,7 @@ def find_mistake(text: str) -> Mistake | None:
 
     Example:
         >>> print(find_mistake("x = 1\nif x = 2:\n    pass\n"))
-        Line 2: invalid syntax. Maybe you meant '==' or ':=' instead of '='?: if x = 2:
+        Line 2: invalid syntax. Maybe you meant '==' or ':=' instead of '='?
     """
     try:
         with warnings.catch_warnings():
@@ -103,7 +101,7 @@ def find_mistake(text: str) -> Mistake | None:
         begin = min(max((error.offset or 1) - 1, 0), len(code))
         is_within = error.end_lineno == error.lineno and (error.end_offset or 0) > begin + 1
         end = min((error.end_offset or 0) - 1, len(code)) if is_within else len(code)
-        return Mistake(number, error.msg, code.strip(), line_begin + begin, line_begin + max(end, begin))
+        return Mistake(number, error.msg, line_begin + begin, line_begin + max(end, begin))
     except (ValueError, RecursionError, MemoryError) as error:
         return Mistake(1, str(error) or "too deeply nested")
     return None
