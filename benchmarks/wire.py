@@ -20,20 +20,9 @@ from behaviours import Follow
 
 import kiks
 from calibration import calibration_loops_per_s, median_of, report
+from kiks.cli.doctor import driven_s
 
 ARENA = Path(__file__).parent.parent / "examples" / "arenas" / "office.toml"
-
-
-def memory_run(loops: int) -> tuple[float, float]:
-    """Return simulated and real time [s] of some loops of the demo on the port in memory."""
-    sim = kiks.Simulation(kiks.Arena.load(ARENA), seed=1)
-    robot, follow = kiks.Khepera(sim.port(1)), Follow()
-    for _ in range(200):
-        follow.step(robot)
-    begin_s, start_s = sim.time_s, time.perf_counter()
-    for _ in range(loops):
-        follow.step(robot)
-    return sim.time_s - begin_s, time.perf_counter() - start_s
 
 
 @contextmanager
@@ -71,7 +60,7 @@ def main() -> None:
     options = arguments.parse_args()
 
     calibration = calibration_loops_per_s()
-    runs = [memory_run(options.loops) for _ in range(7)]
+    runs = [driven_s(Follow().step, options.loops) for _ in range(7)]
     memory_speedup = statistics.median(simulated / real for simulated, real in runs)
     exchanges_per_s = statistics.median(2 * options.loops / real for _, real in runs)
     loop_s = runs[0][0] / options.loops

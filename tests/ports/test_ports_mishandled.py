@@ -20,9 +20,9 @@ from kiks.clock.serial_timing import BACKLOG_LIMIT
 from kiks.errors import LinkError
 from kiks.firmware.commands import COMMANDS
 from kiks.ports.endpoint import Endpoint
-from kiks.ports.file_descriptors import _warn_of_shortage
 from kiks.ports.live import LEFT_BEHIND_NS
 from kiks.ports.pty import PtyEndpoint
+from kiks.ports.resources import _warn_of_shortage
 from kiks.ports.rfc2217 import Rfc2217Endpoint
 from kiks.ports.tcp import HTTP_REQUEST, TcpEndpoint
 from kiks.units import NS_PER_S

@@ -29,7 +29,7 @@ from kiks.cli.session import session
 from kiks.cli.warmup import warmup
 from kiks.ending import INTERRUPTED, leave_threads, tell
 from kiks.errors import KiksError
-from kiks.ports.file_descriptors import raise_limit
+from kiks.ports.resources import raise_limit
 from kiks.version import __version__
 
 DEMO_HELP = """Run a demonstration, or list them.

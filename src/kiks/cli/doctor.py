@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import shutil
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import typer
 
 from kiks.cli.outputs import has_results, tell_results
+
+if TYPE_CHECKING:
+    from kiks.client.khepera import Khepera
 
 LIBRARIES = ("numba", "llvmlite", "numpy", "scipy", "pyserial", "nicegui", "matplotlib", "greenlet")
 """Libraries on whose versions most depends."""
@@ -33,8 +36,8 @@ PROGRAMS = {
 REFERENCE_SPEED, REFERENCE = 2000, "2 cores of an AMD EPYC, benchmarks/results/2026-11-26-light.md"
 """How many times faster than the robot a program on a line in memory is on the computer of the documents."""
 
-SECONDS = 200.0
-"""Simulated time of the measurement [s]."""
+LOOPS = 4000
+"""Loops of the program that is measured."""
 
 
 class Part(NamedTuple):
@@ -65,7 +68,8 @@ def doctor(context: typer.Context) -> None:
     from kiks.version import __version__
 
     versions = {name: importlib.metadata.version(name) for name in LIBRARIES}
-    parts, speed = [*_parts()], _speed()
+    simulated_s, real_s = driven_s(_wander, LOOPS)
+    parts, speed = [*_parts()], simulated_s / real_s
     share = 100 * speed / REFERENCE_SPEED
     found = {
         "kiks": __version__,
@@ -106,8 +110,14 @@ def _parts() -> Iterator[Part]:
     yield Part("the compiled engine", is_there, f"in {next(cache_folders(), None)}", "kiks warmup compiles it")
 
 
-def _speed() -> float:
-    """Return how many times faster than the robot a program in memory is that reads sensors and sets speeds."""
+def driven_s(step: Callable[[Khepera], object], loops: int, first_loops: int = 200) -> tuple[float, float]:
+    """Return the simulated and the real time [s] that a program on a line in memory takes.
+
+    Args:
+        step: A loop of the program, which asks the robot and tells it what to do.
+        loops: How often it is called.
+        first_loops: How often it is called before that; compiles or loads the engine.
+    """
     from time import perf_counter
 
     from kiks.client.khepera import Khepera
@@ -116,13 +126,14 @@ def _speed() -> float:
 
     sim = Simulation(Arena.load("office"), seed=1)
     robot = Khepera(sim.port(1))
-
-    def drive(until_s: float) -> None:
-        while sim.time_s < until_s:
-            near = max(robot.proximity()[1:5])
-            robot.set_speed(*((4, -4) if near > 200 else (6, 6)))
-
-    drive(1.0)  # compiles, or loads
+    for _ in range(first_loops):
+        step(robot)
     begin_s, start_s = sim.time_s, perf_counter()
-    drive(begin_s + SECONDS)
-    return (sim.time_s - begin_s) / (perf_counter() - start_s)
+    for _ in range(loops):
+        step(robot)
+    return sim.time_s - begin_s, perf_counter() - start_s
+
+
+def _wander(robot: Khepera) -> None:
+    near = max(robot.proximity()[1:5])
+    robot.set_speed(*((4, -4) if near > 200 else (6, 6)))

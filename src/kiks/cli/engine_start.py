@@ -100,8 +100,8 @@ def _compile_together(pieces: Iterable[Callable[[], None]]) -> None:
     All fill the same cache. This process begins with the first piece, the others with the last: each piece needs the
     machine code of those before it rather than of those after it. A piece whose process fails is left out.
     """
-    from kiks.ports.file_descriptors import processor_count
     from kiks.ports.program_process import python_line
+    from kiks.ports.resources import processor_count
 
     left = deque(pieces)
 

@@ -120,7 +120,6 @@ def run(
     else:
         leave_out(context, "with --desk, where a person ends the run", "max_wall", "seconds")
     job = job_of(str(program), arguments or [], world)
-    from kiks.clock.thinking import parse_thinking
     from kiks.ports.program_process import Labels
     from kiks.ports.program_scheduler import check_policy
     from kiks.ports.programs import Programs
@@ -140,16 +139,14 @@ def run(
         leave_out(context, f"with --thinking {thinking}", "save_thinking")
     if is_alone:
         leave_out(context, "with one program", "when_silent", "patience")
-    is_replay = thinking.startswith("replay:") and len(commands) > 1
-    for number in range(1, len(commands) + 1) if is_replay else [0]:
-        parse_thinking(f"{thinking}.{number}" if is_replay else thinking)
     for number in mapping.values():
         index_of_robot(number, len(project.robots))
     # A program may change the working folder.
     thoughts = None if save_thinking is None else save_thinking.absolute()
-    each_thinks = thinking if len(commands) == 1 else "none"
     ready = partial(ready_engine, as_needed=is_alone and job.needs_little)
-    sim = simulation_of(project, job.folder, kinds=job.kinds, thinking=each_thinks, ready=ready)
+    sim = simulation_of(
+        project, job.folder, kinds=job.kinds, thinking=thinking, program_count=len(commands), ready=ready
+    )
     # What is loaded by now stays to the end of the process: no collection looks at it again, not even those at the end,
     # which would take a third of the time of a short run.
     gc.freeze()

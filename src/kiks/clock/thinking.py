@@ -87,6 +87,26 @@ def parse_thinking(text: str) -> Thinking:
     return ThinkingLive(value) if name == "live" else ThinkingFixed(round(value * 1e6))
 
 
+def own_file(file: str, number: int, program_count: int) -> str:
+    """Return the file with the thinking times of one of some programs.
+
+    Example:
+        >>> own_file("times", 1, program_count=1), own_file("times", 2, program_count=3)
+        ('times', 'times.2')
+    """
+    return f"{file}.{number}" if program_count > 1 else file
+
+
+def own_policy(thinking: str, number: int, program_count: int) -> str:
+    """Return the policy of one of some programs; each repeats the times of its own.
+
+    Example:
+        >>> own_policy("replay:times", 2, program_count=3), own_policy("live", 2, program_count=3)
+        ('replay:times.2', 'live')
+    """
+    return own_file(thinking, number, program_count) if thinking.startswith("replay:") else thinking
+
+
 def save_thinking(measured_ns: list[int], path: str | Path) -> None:
     """Write the times that a live run measured [ns], one a line, for 'replay:FILE'."""
     replace_file(path, "".join(f"{time_ns}\n" for time_ns in measured_ns), "thinking times")

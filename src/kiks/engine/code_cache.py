@@ -36,7 +36,7 @@ from numba.core.compiler import CompileResult
 
 from kiks.engine.processor import processor
 from kiks.errors import ParameterError
-from kiks.model.atomic_files import PLAINLY, replace_file
+from kiks.model.atomic_files import NO_LINK_NO_WAIT, replace_file
 
 KERNEL_FOLDERS = ("engine", "control", "batch")
 """Folders beside one another whose files hold kernels."""
@@ -297,7 +297,7 @@ def _payload(path: Path, key: object) -> Any:
     A damaged file is deleted, unless it came with KiKS.
     """
     folder, is_own = str(path.parent), path.parent.parent != SHIPPED
-    with _IfAllowed(), open(os.open(path, os.O_RDONLY | PLAINLY), "rb") as file:
+    with _IfAllowed(), open(os.open(path, os.O_RDONLY | NO_LINK_NO_WAIT), "rb") as file:
         if not (_is_safe(os.fstat(file.fileno())) and _is_believed(path.parent)):
             if is_own:
                 tell(

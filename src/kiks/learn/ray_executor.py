@@ -18,7 +18,7 @@ from contextlib import suppress
 from typing import Any
 
 from kiks.errors import ParameterError, library
-from kiks.ports.file_descriptors import processor_count
+from kiks.ports.resources import processor_count
 
 LOOPBACK = "127.0.0.1"
 

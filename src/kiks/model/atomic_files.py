@@ -16,7 +16,7 @@ fcntl: Any = None
 with suppress(ModuleNotFoundError):  # Windows has none: there files are written as on a drive without locks
     fcntl = importlib.import_module("fcntl")
 
-PLAINLY = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
+NO_LINK_NO_WAIT = getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
 """How a file is opened that may be anything: not where a link leads, and without a wait for the other end of a pipe."""
 
 NAME_BYTES_MAX, PATH_BYTES_MAX = 255, 4000
@@ -81,7 +81,7 @@ class FileBeside:
 
     def __init__(self, target: Path, mode: int = 0o666, *, is_only: bool = False) -> None:
         for path in target.parent.glob(_PREFIX + "[0-9a-f]" * 16):
-            with suppress(OSError), open(os.open(path, os.O_RDWR | PLAINLY), "rb") as file:
+            with suppress(OSError), open(os.open(path, os.O_RDWR | NO_LINK_NO_WAIT), "rb") as file:
                 if lock(file.fileno(), path):
                     path.unlink()
         self._target = target

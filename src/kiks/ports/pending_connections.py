@@ -9,7 +9,7 @@ import threading
 from collections.abc import Callable
 
 from kiks.clock.patience import Patience
-from kiks.ports.file_descriptors import accept
+from kiks.ports.resources import accept
 
 PENDING_MAX = 16
 """Most pending connections; when one more comes, the oldest is closed."""

@@ -12,15 +12,15 @@ from pathlib import Path
 from typing import NoReturn
 
 from kiks.clock.patience import Patience
-from kiks.clock.thinking import parse_thinking
+from kiks.clock.thinking import own_file, own_policy, parse_thinking
 from kiks.ending import INTERRUPTED, noting_endings
 from kiks.errors import KiksError, ParameterError
-from kiks.ports.file_descriptors import opening
 from kiks.ports.messages import RECEIVE_SIZE, Answer, Inbox, Request, Start, packed
 from kiks.ports.participant import ProgramParticipant
 from kiks.ports.port_names import PortNames
 from kiks.ports.program_process import Command, Labels, OutputLine, Permission, Process, chance_seed
 from kiks.ports.program_scheduler import PATIENCE_S, START_PATIENCE_S, VISIT_PATIENCE_S, ProgramScheduler
+from kiks.ports.resources import opening
 from kiks.sim.ring_buffer import RingBuffer
 from kiks.sim.simulation import Simulation
 
@@ -235,8 +235,8 @@ class Programs:
         self._over: tuple[int, str] | None = None
         self._signals, self._count, self._was_touched, self._is_closed = 0, 0, False, False
         self._first_programs = [(robot, command) for robot, command in enumerate(commands, 1) if command is not None]
-        self._are_numbered = len(self._first_programs) > 1
-        for number in range(1, len(self._first_programs) + 1):
+        self._begun_count = len(self._first_programs)
+        for number in range(1, self._begun_count + 1):
             parse_thinking(self._policy(number))
         self._scheduler = ProgramScheduler(
             sim,
@@ -452,11 +452,7 @@ class Programs:
             raise KiksError(f"a program must have a world, but that of {name} has ended. Try again.")
 
     def _policy(self, number: int) -> str:
-        return self._thinking + (self._suffix(number) if self._thinking.startswith("replay:") else "")
-
-    def _suffix(self, number: int) -> str:
-        """Return the suffix of a program's own files."""
-        return f".{number}" if self._are_numbered else ""
+        return own_policy(self._thinking, number, self._begun_count)
 
     def _add(self, command: Command, robot: int) -> Handle:
         """Start a program's process, if it may start, and add the program."""
@@ -468,7 +464,7 @@ class Programs:
             is_late=self._scheduler.has_begun,
             end_ns=self.sim.loop.end_ns,
             thinking=self._policy(number),
-            record=f"{self._record}{self._suffix(number)}" if self._record is not None else "",
+            record=own_file(str(self._record), number, self._begun_count) if self._record is not None else "",
             offered=self._names.offered(),
             seed=chance_seed(self.sim.seed, robot),
             module=command.module,

@@ -28,7 +28,7 @@ from typing import BinaryIO
 from kiks.errors import LinkError
 from kiks.model.atomic_files import locked_file
 from kiks.ports.endpoint import READ_SIZE, Channel, Endpoint
-from kiks.ports.file_descriptors import SHORTAGES, opening
+from kiks.ports.resources import SHORTAGES, opening
 
 TCGETS2 = 0x802C542A
 """Linux request for terminal settings with any speed, as a number (asm-generic/ioctls.h)."""

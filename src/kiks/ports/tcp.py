@@ -9,7 +9,7 @@ import socket
 
 from kiks.errors import LinkError, ParameterError, shown
 from kiks.ports.endpoint import READ_SIZE, Channel, Endpoint
-from kiks.ports.file_descriptors import accept, opening
+from kiks.ports.resources import accept, opening
 
 WAITING_MAX = 128
 """Most clients that wait at a port until the commands of the last client are done; others must try again."""

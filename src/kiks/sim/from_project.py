@@ -8,7 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from kiks.clock.thinking import parse_thinking
+from kiks.clock.program_clock import ProgramClock
+from kiks.clock.thinking import own_policy
 from kiks.engine.state import BALL
 from kiks.model.arena import Ball, Cylinder, Lamp, Pose
 from kiks.model.atomic_files import inside
@@ -18,6 +19,7 @@ from kiks.model.robot import RobotSpec, robot_names, specs_of
 from kiks.model.thinking_policy import split_thinking
 from kiks.sim.simulation import Simulation
 from kiks.sim.turret_host import name_of
+from kiks.sim.world import World
 
 
 def simulation_of(
@@ -26,6 +28,7 @@ def simulation_of(
     *,
     kinds: Sequence[str | RobotSpec] = (),
     thinking: str | None = None,
+    program_count: int = 1,
     ready: Callable[[], object] = lambda: None,
 ) -> Simulation:
     """Return the world of a project at its start, with turrets fitted and lines set; programs are not begun.
@@ -35,6 +38,8 @@ def simulation_of(
         folder: Where it lies: robot files and replays are looked up from there.
         kinds: Kinds of robots in place of the project's: one for all or one for each. Files among them lie anywhere.
         thinking: What programs' computing costs, in place of what the project says; a replay lies anywhere.
+        program_count: Number of programs. Of several, each has a clock of its own, and the simulation has none; here
+            they are only checked.
         ready: Called when all files are read, before the engine is needed.
 
     Example:
@@ -50,9 +55,10 @@ def simulation_of(
     else:
         specs = [spec_of(robot, project, home) for robot in project.robots]
     thinking = thinking_of(project, home) if thinking is None else thinking
-    parse_thinking(thinking)
+    clocks = [ProgramClock(own_policy(thinking, number, program_count)) for number in range(1, program_count + 1)]
     ready()
-    sim = Simulation(project.arena, seed=project.seed, thinking=thinking, robots=len(specs), robot=specs)
+    world = World(project.arena, specs, project.seed)
+    sim = Simulation.of_world(world, thinking, clocks[0]) if program_count == 1 else Simulation.of_world(world)
     for number, (robot, wire) in enumerate(zip(project.robots, sim.wires, strict=True), start=1):
         for turret in robot.turrets:
             sim.fit(number, turret)

@@ -22,8 +22,8 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator
 
-from kiks.ports.file_descriptors import processor_count
 from kiks.ports.messages import AwaitedAnswer
+from kiks.ports.resources import processor_count
 
 LINE_MAX = 1 << 26
 """Longest request [bytes]: enough for all arenas except very large ones of noise."""

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
 from kiks.errors import LinkError, shown
-from kiks.model.atomic_files import PLAINLY, lock, locked_file
+from kiks.model.atomic_files import NO_LINK_NO_WAIT, lock, locked_file
 from kiks.ports.pty import default_folder
 from kiks.version import __version__
 
@@ -140,7 +140,7 @@ def write_session_file(address: SessionAddress, path: Path) -> None:
 def _create(path: Path, address: SessionAddress) -> BinaryIO:
     """Write a new file, and lock it as long as it is open."""
     try:
-        file = locked_file(path, os.O_CREAT | os.O_EXCL | PLAINLY, 0o600)
+        file = locked_file(path, os.O_CREAT | os.O_EXCL | NO_LINK_NO_WAIT, 0o600)
         file.write(address.line().encode("ascii"))
         file.flush()
     except OSError as error:
@@ -162,7 +162,7 @@ def _addresses(folder: Path) -> Iterator[SessionAddress]:
         with suppress(OSError):
             times[path] = path.lstat().st_mtime_ns
     for path in sorted(times, key=times.__getitem__, reverse=True):
-        with suppress(OSError), open(os.open(path, os.O_RDWR | PLAINLY), "rb") as file:
+        with suppress(OSError), open(os.open(path, os.O_RDWR | NO_LINK_NO_WAIT), "rb") as file:
             try:
                 if lock(file.fileno(), path):
                     path.unlink()

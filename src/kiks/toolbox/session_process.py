@@ -16,8 +16,8 @@ import socket
 import threading
 
 from kiks.errors import LinkError
-from kiks.ports.file_descriptors import opening
 from kiks.ports.pending_connections import PendingConnections
+from kiks.ports.resources import opening
 from kiks.toolbox.framing import POLL_MS, Exchange, Heartbeat, write_all
 from kiks.toolbox.requests import answer
 from kiks.toolbox.session import Session

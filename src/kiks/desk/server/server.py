@@ -22,7 +22,7 @@ from kiks.desk.server.server_log import log_plainly
 from kiks.desk.server.token import Token
 from kiks.errors import LinkError, ParameterError
 from kiks.model.limits import MESSAGE_BYTES_MAX
-from kiks.ports.file_descriptors import SHORTAGES, opening, shortage
+from kiks.ports.resources import SHORTAGES, opening, shortage
 
 PORT = 8123
 """Default TCP port."""

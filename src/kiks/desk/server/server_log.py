@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 
-from kiks.ports.file_descriptors import SHORTAGES, shortage
+from kiks.ports.resources import SHORTAGES, shortage
 
 LIBRARIES = ("uvicorn", "uvicorn.error", "nicegui", "engineio.server", "socketio.server")
 """Loggers of the libraries."""
