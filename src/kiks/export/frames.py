@@ -20,7 +20,7 @@ from kiks.engine.parameters import AHEAD, RAY_COUNT
 from kiks.engine.sensing.observe import NOTHING
 from kiks.engine.state import BALL, MODE_POSITION, MODE_SPEED, PIXEL_COUNT
 from kiks.export.light import light_scale
-from kiks.export.looks import body_colour, robot_hue, robot_shapes
+from kiks.export.looks import body_colour, robot_colours, robot_shapes
 from kiks.firmware.gripper import Gripper
 from kiks.firmware.k213 import K213
 from kiks.firmware.turret import Shape
@@ -218,7 +218,7 @@ def _describe_robot(sim: Simulation, index: int, name: str) -> dict[str, Any]:
         "kind": spec.name,
         "radius_mm": spec.body.radius_mm,
         "wheel_base_mm": spec.body.wheel_base_mm,
-        "hue": robot_hue(index),
+        "colours": robot_colours(index),
         "parts": [_shape(shape) for shape in robot_shapes(spec.body)],
         "white_stripes_rad": np.round(spec.body.white_stripes_rad, 5).tolist(),
         "reach_mm": float(parameters["reach_mm"]),

@@ -33,14 +33,21 @@ _NOSE = ((24.0, 0.0), (16.5, 5.5), (18.5, 0.0), (16.5, -5.5))
 _PINS = ((-11.6, -21.2, 23.2, 1.2), (-11.6, 20.0, 23.2, 1.2))
 
 
-def robot_hue(index: int) -> float:
-    """Return the hue of a robot's colour [deg]."""
-    return (_FIRST_HUE_DEG + _HUE_STEP_DEG * index) % 360
+def robot_colour(index: int, *, is_dark: bool = False) -> Colour:
+    """Return the colour of a robot on light ground, where white text on it can be read, or on dark ground."""
+    hue_deg = (_FIRST_HUE_DEG + _HUE_STEP_DEG * index) % 360
+    lightness, saturation = (0.66, 0.80) if is_dark else (0.36, 0.72)
+    return tuple(round(255 * part) for part in colorsys.hls_to_rgb(hue_deg / 360, lightness, saturation))
 
 
-def robot_colour(index: int) -> Colour:
-    """Return the colour of a robot on light ground."""
-    return tuple(round(255 * part) for part in colorsys.hls_to_rgb(robot_hue(index) / 360, 0.40, 0.72))
+def robot_colours(index: int) -> dict[str, str]:
+    """Return the colour of a robot on light and on dark ground, for browsers.
+
+    Example:
+        >>> robot_colours(0)
+        {'light': '#1a579e', 'dark': '#63a4ee'}
+    """
+    return {name: css(robot_colour(index, is_dark=name == "dark")) for name in ("light", "dark")}
 
 
 def body_colour(body: Any) -> Colour:

@@ -581,8 +581,8 @@ class Simulation:
             >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
             >>> ball = sim.add_ball(100, 100)
             >>> sim.change_body(ball, radius_mm=40, brightness="wood")
-            >>> sim.bodies()["brightness"]
-            array([190], dtype=uint8)
+            >>> sim.bodies()["radius_mm"]
+            array([40.])
         """
         with self._changing():
             self.things.change_body(body, changes)

@@ -13,6 +13,7 @@ from nicegui.element import Element
 
 from kiks.desk.server.desk import Desk
 from kiks.errors import KiksError
+from kiks.export.looks import robot_colours
 from kiks.sim.ring_buffer import RingBuffer
 
 Given = ParamSpec("Given")
@@ -210,7 +211,17 @@ def number(label: str, name: str, value: float | None = None, **options: Any) ->
 
 
 def offer_robots(choice: ui.select, desk: Desk) -> None:
-    """Let a list offer the robots by their numbers, and keep the chosen one if it is among these."""
+    """Let a list offer the robots by their numbers, with the colour of the chosen one, which stays if it is there."""
+    if "prepend" not in choice.slots:
+        with choice.add_slot("prepend"):
+            dot = ui.element("span").classes("desk-robot-dot").props("aria-hidden=true")
+
+        def paint() -> None:
+            colours = robot_colours((choice.value or 1) - 1)
+            dot.style(f"--light: {colours['light']}; --dark: {colours['dark']}")
+
+        choice.on_value_change(paint)
+        paint()
     robots = {robot: f"robot {name}" for robot, name in enumerate(desk.names(), 1)}
     if choice.options != robots:
         choice.set_options(robots, value=min(choice.value or 1, len(robots)) or None)

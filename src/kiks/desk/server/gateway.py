@@ -20,7 +20,7 @@ from kiks.desk.server.live_editing import Editing
 from kiks.desk.server.marks import Mark, thinned
 from kiks.errors import KiksError, ParameterError
 from kiks.export.frames import arena_picture, describe_scene, describe_shapes, pack_frame, scene_key
-from kiks.export.looks import robot_hue
+from kiks.export.looks import robot_colours
 from kiks.model.arena import Arena
 from kiks.model.checks import SECONDS_MAX
 from kiks.sim.simulation import Simulation
@@ -208,7 +208,7 @@ class Gateway:
             {
                 "name": sides[what - 1] if isinstance(what, int) else what,
                 "value": value,
-                "hue": robot_hue(what - 1) if isinstance(what, int) else None,
+                "colours": robot_colours(what - 1) if isinstance(what, int) else None,
             }
             for what, value in sorted(sim.score.items(), key=lambda entry: (isinstance(entry[0], str), str(entry[0])))
         ]

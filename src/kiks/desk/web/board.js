@@ -19,7 +19,7 @@ export default {
       </div>
       <dl v-else class="kiks-board-list">
         <div v-for="entry in entries" :key="entry.name">
-          <dt><i v-if="entry.hue !== null" :style="ink(entry)"></i>{{ entry.name }}</dt><dd>{{ entry.value }}</dd>
+          <dt><i v-if="entry.colours !== null" :style="ink(entry)"></i>{{ entry.name }}</dt><dd>{{ entry.value }}</dd>
         </div>
       </dl>
       <button v-if="isHall" class="kiks-board-leave" data-testid="leave-hall" aria-label="Leave the hall view"
@@ -29,7 +29,7 @@ export default {
   data: () => ({ entries: [], end_s: null, isHall: false, clock: "", isDark: false }),
   computed: {
     /** Two robots, and nothing else: a match. */
-    isMatch() { return this.entries.length === 2 && this.entries.every(({ hue }) => hue !== null); },
+    isMatch() { return this.entries.length === 2 && this.entries.every(({ colours }) => colours !== null); },
   },
   mounted() {
     const feed = pageFeed(this.feed);
@@ -60,7 +60,7 @@ export default {
       this.isDark = document.body.classList.contains("body--dark");
     },
 
-    ink({ hue }) { return { background: robotColour(hue, this.isDark) }; },
+    ink(entry) { return { background: robotColour(entry, this.isDark) }; },
 
     show(isHall) {
       this.isHall = isHall;

@@ -43,9 +43,9 @@ export function rgba([red, green, blue], alpha = 1) {
   return `rgba(${red},${green},${blue},${alpha})`;
 }
 
-/** The colour of a robot's ring and trail, by its hue. */
-export function robotColour(hue, isDark, alpha = 1) {
-  return `hsla(${hue},${isDark ? 80 : 72}%,${isDark ? 66 : 40}%,${alpha})`;
+/** The colour of a robot, of the two that come with the scene: its ring, its trail, its name. */
+export function robotColour({ colours }, isDark, alpha = 1) {
+  return (isDark ? colours.dark : colours.light) + Math.round(255 * alpha).toString(16).padStart(2, "0");
 }
 
 /** A lamp's light [red, green, blue]. */

@@ -3,7 +3,7 @@
 
 import { THREE } from "nicegui-scene";
 import { arc, board, box, column, empty, merge, plate } from "./solid_parts.js";
-import { readingBucket, READING_COLOURS } from "./colours.js";
+import { readingBucket, READING_COLOURS, robotColour } from "./colours.js";
 import { armAngle, jawsOf, PIVOT_MM } from "./gripper.js";
 
 /** Heights above the floor [mm]. */
@@ -32,7 +32,7 @@ export class SolidRobots {
     this._caps = this._many(merge(board(9, 1.2, "#ffffff", 0, 14)), new THREE.MeshLambertMaterial(), count);
     this._sensors = this._many(box(5, 7, 8), new THREE.MeshLambertMaterial(), 8 * count);
     this._leds = this._many(new THREE.OctahedronGeometry(2.4), new THREE.MeshBasicMaterial(), 2 * count);
-    scene.robots.forEach(({ hue }, index) => this._caps.setColorAt(index, this._tint.setHSL(hue / 360, 0.72, 0.42)));
+    scene.robots.forEach(({ colours }, index) => this._caps.setColorAt(index, this._tint.set(colours.light)));
     this._tops = scene.robots.map((robot) => this._top(robot));
     this._grippers = scene.robots.map((robot) => (robot.has_gripper ? this._gripper(robot) : null));
     this.setShapes(scene);
@@ -185,12 +185,13 @@ function turretGeometry(robot) {
   return parts.length ? merge(parts) : new THREE.BufferGeometry();
 }
 
-function nameSprite({ name, hue }) {
+function nameSprite(robot) {
+  const { name } = robot;
   const canvas = document.createElement("canvas"), context = canvas.getContext("2d");
   context.font = "700 44px system-ui, sans-serif";
   canvas.width = Math.ceil(context.measureText(name).width) + 40;
   canvas.height = 60;
-  context.fillStyle = `hsla(${hue},72%,34%,.92)`;
+  context.fillStyle = robotColour(robot, false, 0.92);
   context.roundRect(2, 2, canvas.width - 4, 56, 26);
   context.fill();
   context.font = "700 44px system-ui, sans-serif";

@@ -12,8 +12,8 @@ const STRIP_PX = [64, 9];
 
 /** The parts of a robot that never change, as paths in its own frame; the last one is the nose. */
 export class RobotLook {
-  constructor({ radius_mm, hue, parts, sensors, shapes, has_gripper }) {
-    Object.assign(this, { radius_mm, hue, hasGripper: has_gripper });
+  constructor({ radius_mm, colours, parts, sensors, shapes, has_gripper }) {
+    Object.assign(this, { radius_mm, colours, hasGripper: has_gripper });
     this.body = disc(0, 0, radius_mm);
     this.parts = parts.map(partOf);
     this.nose = this.parts.pop();
@@ -59,7 +59,7 @@ function sensorPath({ x_mm, y_mm, angle_rad }, radius_mm) {
 
 /** Draw one robot; the context takes the robot's own millimetres. A part without a colour has the robot's. */
 export function paintRobot(context, look, robot, scale, isDark) {
-  const isSmall = look.radius_mm * scale < SMALL_PX, own = robotColour(look.hue, isDark);
+  const isSmall = look.radius_mm * scale < SMALL_PX, own = robotColour(look, isDark);
   const paint = ({ path, colour }) => {
     context.fillStyle = colour || own;
     context.fill(path);
@@ -115,7 +115,8 @@ function paintGripper(context, robot, radius_mm) {
 }
 
 /** Write a robot's name on it, or below it when it is long or the robot small; `context` takes CSS pixels. */
-export function paintName(context, { name, hue }, x, y, radius_px, colours) {
+export function paintName(context, robot, x, y, radius_px, colours) {
+  const { name } = robot;
   const isInside = name.length <= 2 && radius_px >= 11;
   context.textAlign = "center";
   context.textBaseline = "middle";
@@ -123,7 +124,7 @@ export function paintName(context, { name, hue }, x, y, radius_px, colours) {
     const size = Math.max(9, 0.6 * radius_px) / (name.length === 2 ? 1.15 : 1);
     context.beginPath();
     context.arc(x, y, 0.42 * radius_px, 0, 2 * Math.PI);
-    context.fillStyle = `hsl(${hue},72%,36%)`;
+    context.fillStyle = robotColour(robot, false);
     context.fill();
     context.font = `700 ${size}px system-ui, sans-serif`;
     context.fillStyle = "#ffffff";

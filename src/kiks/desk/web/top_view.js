@@ -107,7 +107,7 @@ export class TopView {
       this._drawn = [];
       this._still_key = key;
     }
-    const colourOf = (index) => robotColour(this.feed.scene.robots[index].hue, this._isDark, 0.55);
+    const colourOf = (index) => robotColour(this.feed.scene.robots[index], this._isDark, 0.55);
     if (show.trails) this._drawn = this.trails.paint(context, viewport, this._drawn, colourOf);
   }
 
