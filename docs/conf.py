@@ -90,6 +90,16 @@ def lead_to_public_names(app, env, node, contnode):
         return domain.resolve_xref(env, node["refdoc"], app.builder, "class", name, node, contnode)
 
 
+HERE = Path(__file__).parent
+PAGES = {
+    re.search("^# (.+)", path.read_text(encoding="utf-8"), re.MULTILINE)[1]: path.relative_to(HERE)
+    .with_suffix("")
+    .as_posix()
+    for path in HERE.glob("*/*.md")
+}
+"""For the title of each page, by which docstrings name it, its place."""
+
+
 ARRAY = re.compile(r"~?[\w.]*\bndarray\[~?\w+\[~?[\w.]+, \.\.\.\], ~?[\w.]*\bdtype\[(~?[\w.]+)\]\]")
 
 
@@ -103,7 +113,7 @@ def prepare(app, what, name, obj, options, lines):
     """Read the sections of properties and measures, whose first line napoleon takes for a type, and link pages."""
     if what in ("property", "attribute", "data"):
         lines[:] = ["..", "", *GoogleDocstring(lines, app.config, app, "function", name, obj, options).lines()]
-    lines[:] = [re.sub(r"`?docs/(\w+/\w+)\.md`?", r":doc:`/\1`", line) for line in lines]
+    lines[:] = [re.sub('page "(.+?)"', lambda found: f"page :doc:`/{PAGES[found[1]]}`", line) for line in lines]
 
 
 SCROLLED = re.compile(r'<pre(?=[ >])|<div(?= class="table-wrapper)')

@@ -150,6 +150,17 @@ def test_commands_and_targets_exist(page: Path) -> None:
         assert (ROOT / path).exists(), f"{page.name} names {path}"
 
 
+def test_what_is_installed_names_pages_by_titles_that_exist() -> None:
+    # There is no `docs` beside it. The site makes links of the titles in docstrings (docs/conf.py).
+    titles = {re.findall("^# (.+)", page.read_text(encoding="utf-8"), flags=re.MULTILINE)[0] for page in PAGES}
+    for folder in ("src", "matlab", "examples"):
+        for path in (ROOT / folder).rglob("*"):
+            if path.suffix in (".py", ".m", ".toml", ".kiks", ".md", ".js", ".html", ".c", ".java"):
+                text = path.read_text(encoding="utf-8")
+                assert "docs/" not in text, path
+                assert set(re.findall(r'\bpage "([A-Z][^"{]+)"', text)) <= titles, path
+
+
 def test_the_python_reference_has_every_public_name() -> None:
     text = "".join(page.read_text(encoding="utf-8") for page in (ROOT / "docs/reference").glob("*.md"))
     found = set(re.findall(r"^\.\. auto(?:class|function|data|module):: ([\w.]+)$", text, flags=re.MULTILINE))

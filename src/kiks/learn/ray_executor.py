@@ -2,7 +2,7 @@
 
 A Ray cluster runs any code for any client that reaches it. So a cluster that is started here listens on the loopback
 address alone, without Ray's dashboard; a cluster of several computers belongs on a private network
-(docs/howto/distributed.md).
+(the page "Evaluations on many cores and many computers").
 """
 
 from __future__ import annotations

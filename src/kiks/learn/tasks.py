@@ -1,4 +1,4 @@
-"""Tasks by name, and task files: a ready-made task with changes, in a few lines of TOML (docs/howto/evolution.md)."""
+"""Tasks by name, and task files: a ready-made task with changes, in a few lines of TOML (the page "Evolution")."""
 
 from __future__ import annotations
 

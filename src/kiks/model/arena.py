@@ -167,7 +167,7 @@ class Arena:
 
     @classmethod
     def from_image(cls, path: str | Path, mm_per_pixel: float = 1.0) -> Arena:
-        """Read a picture: black is floor, any other grey a wall of that brightness (see docs/howto/arenas.md).
+        """Read a picture: black is floor, any other grey a wall of that brightness (the page "Arenas").
 
         Args:
             path: A PNG, TIF, PGM or BMP file.

@@ -1,4 +1,4 @@
-"""The arena file: a picture or a box, and the objects in it, in a few lines of TOML (docs/howto/arenas.md)."""
+"""The arena file: a picture or a box, and the objects in it, in a few lines of TOML (the page "Arenas")."""
 
 from __future__ import annotations
 

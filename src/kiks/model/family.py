@@ -21,7 +21,7 @@ def family(
     """Return robots of a kind that differ at random, for worlds of a `kiks.Batch`.
 
     What is evolved on a family does not lean on one robot's faults. The defaults are estimates: sensors of one Khepera
-    differ by a fifth (`docs/howto/calibration.md`), wheels and motors by a few hundredths.
+    differ by a fifth (the page "Calibrating your own robot"), wheels and motors by a few hundredths.
 
     Args:
         spec: The kind.

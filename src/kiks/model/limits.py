@@ -1,4 +1,4 @@
-"""How much is read of what comes from outside: files, requests and messages (docs/explanation/security.md)."""
+"""How much is read of what comes from outside: files, requests and messages (the page "Security")."""
 
 DATA_FILE_BYTES_MAX = 4 << 20
 """A data file of a kind that has no limit of its own."""

@@ -1,4 +1,4 @@
-"""A project: everything that a world is built from, in one file that people can read (docs/howto/projects.md).
+"""A project: everything that a world is built from, in one file that people can read (the page "Projects").
 
 The file is an arena file with its raster within, the robots, and the settings of the simulation.
 """
@@ -139,7 +139,7 @@ class Project:
         thinking: Thinking time of programs: 'none', 'fixed:MS', 'live', 'live:FACTOR' (another computer's), or
             'replay:FILE' with a file in the project's folder.
         baud: Speed of the serial lines [bit/s]; that of the robots' files if None.
-        response: Response of the proximity sensors (docs/explanation/sensors.md); that of the robots' files if None.
+        response: Response of the proximity sensors (the page "Sensors"); that of the robots' files if None.
         noise: Whether sensors are noisy.
         speed: Simulated seconds per real second on the desk; None for no limit.
         seconds: Simulated time at which a run ends [s]; None for the end of its programs.
@@ -219,7 +219,10 @@ class Project:
 
     def to_bytes(self) -> bytes:
         """Return the file."""
-        lines = ["# A project of KiKS: docs/howto/projects.md says what each line means.", f"kiks = {_VERSION}"]
+        lines = [
+            '# A project of KiKS: the page "Projects" of the documentation says what each line means.',
+            f"kiks = {_VERSION}",
+        ]
         for name in _SETTINGS:
             value = getattr(self, name)
             if name == "speed" and value is None:

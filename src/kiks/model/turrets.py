@@ -9,7 +9,7 @@ TURRETS = {
     "io": "kiks.firmware.general_io.GeneralIO",
     "battle": "kiks.firmware.battle.Battle",
 }
-"""For the name of each in files and commands the class that is its firmware (docs/howto/turrets.md).
+"""For the name of each in files and commands the class that is its firmware (the page "Turrets").
 
 The class stands here as text, as `model` knows no firmware. `kiks.sim.turret_host` imports it.
 """

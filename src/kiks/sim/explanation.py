@@ -25,7 +25,7 @@ RESPONSES = {
     "fast": "the thesis's table, which takes lengths in steps of 10 mm",
     "curve": "counts against distance as they were measured on a real robot",
 }
-"""One-line description of each sensor model (docs/explanation/sensors.md)."""
+"""One-line description of each sensor model (the page "Sensors")."""
 
 
 @dataclass(frozen=True)

@@ -66,7 +66,7 @@ class Simulation:
         thinking: What the program's own computing costs: 'none', 'fixed:MS', 'live', 'live:FACTOR' or 'replay:FILE'.
         robot: Kind of all robots: a name that `RobotSpec.load` knows, a file, or a `RobotSpec`; or a list of such, one
             for each robot.
-        response: Proximity sensor model, such as 'thesis' (docs/explanation/sensors.md); that of the robot's file if
+        response: Proximity sensor model, such as 'thesis' (the page "Sensors"); that of the robot's file if
             left out.
 
     Attributes:
@@ -385,7 +385,7 @@ class Simulation:
             return index + 1
 
     def fit(self, robot: int, turret: str | Turret) -> Turret:
-        r"""Put a turret on a robot; it answers to `T,<its number>,...` from now on (docs/howto/turrets.md).
+        r"""Put a turret on a robot; it answers to `T,<its number>,...` from now on (the page "Turrets").
 
         Args:
             robot: Its number.
@@ -827,7 +827,7 @@ class Simulation:
     def record(self, file: str | Path) -> Recorder:
         """Record the run to a file from now on, until `close()` or the end of `with`; `kiks.Recording` reads it.
 
-        The run is the same, to the bit. docs/howto/recording.md says what can be done with the file.
+        The run is the same, to the bit. The page "Recordings" says what can be done with the file.
 
         Args:
             file: The file, which ends in .mcap; an earlier one is replaced.

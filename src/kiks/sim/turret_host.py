@@ -197,7 +197,7 @@ def named(turret: object) -> Turret:
             raise ParameterError(
                 f"turret must be one of {', '.join(map(repr, TURRETS))} or an object of your own, but it was "
                 f"{shown(turret)}."
-                f"{nearest(turret, TURRETS)} docs/howto/turrets.md says how to make one."
+                f'{nearest(turret, TURRETS)} The page "Turrets" of the documentation says how to make one.'
             )
         module, _, name = TURRETS[turret].rpartition(".")
         made: Turret = getattr(import_module(module), name)()
@@ -205,7 +205,7 @@ def named(turret: object) -> Turret:
     if not isinstance(turret, Turret):
         raise ParameterError(
             f"turret must be a name or a kiks.firmware.turret.Turret, but it was {shown(turret)}. Inherit from Turret: "
-            "docs/howto/turrets.md says how."
+            'the page "Turrets" of the documentation says how.'
         )
     if not isinstance(turret, GeneralIO):
         _check(turret)
