@@ -32,6 +32,20 @@ FOCUS = """() => {
 """Which element has the focus: a number of its own, a name, and whether one sees that it has it."""
 
 
+OUT_OF_REACH = """() => {
+    const roles = ["button", "tab", "slider", "checkbox", "switch", "radio"].map((role) => `[role=${role}]`);
+    const far = [];
+    for (const each of document.querySelectorAll(["button", "input", "a", ...roles])) {
+        if (!each.checkVisibility({ visibilityProperty: true })) continue;
+        const { left, right, width, height } = (each.closest(".q-field, .q-slider") ?? each).getBoundingClientRect();
+        if (width < 24 || height < 24 || left < 0 || right > innerWidth)
+            far.push(`${each.closest("[data-testid]")?.dataset.testid} ${width} x ${height} at ${left}`);
+    }
+    return far;
+}"""
+"""Controls that are smaller than a finger, or cut off at the edge of the screen."""
+
+
 def walk(visitor: Visitor) -> Iterator[str]:
     """Press Tab until the focus returns to the start; return all elements that had it."""
     seen: list[int] = []
@@ -89,22 +103,40 @@ def test_axe_finds_nothing_serious(visitor: Visitor) -> None:
             visitor.page.keyboard.press("Escape")
 
 
-@pytest.mark.parametrize(("width", "height"), cases([(390, 844), (768, 1024), (800, 600), (1024, 768)]))
-def test_small_windows_stay_usable(new_page: NewPage, shown: Shown, width: int, height: int) -> None:
-    visitor = Visitor(new_page(width, height), shown)
+def test_readers_of_screens_hear_what_happens(visitor: Visitor) -> None:
+    live = visitor.page.locator(".kiks-live")
+    visitor.page.keyboard.press("Space")
+    expect(live).to_contain_text("Paused at 0:")
+    visitor.page.keyboard.press("Space")
+    expect(live).to_have_text("Time goes on")
+    visitor.sim.place(1, 555, 200, 0.0)
+    visitor.tab("wire")
+    visitor.send("D,10,10")
+    expect(live).to_have_text("robot 1 touches something")
+
+
+def test_escape_closes_an_explanation(visitor: Visitor) -> None:
+    visitor.at("proximity-0").press("Enter")
+    expect(visitor.at("explanation")).to_be_visible()
+    visitor.page.keyboard.press("Escape")
+    expect(visitor.at("explanation")).to_be_hidden()
+
+
+@pytest.mark.parametrize(
+    ("width", "height"), cases([(390, 844), (768, 1024), (844, 390), (800, 600), (1024, 768)], normally=2)
+)
+def test_fingers_reach_everything_on_small_screens(new_page: NewPage, shown: Shown, width: int, height: int) -> None:
+    visitor = Visitor(new_page(width, height, has_touch=True, is_mobile=True), shown)
     for tab in TABS:
         visitor.tab(tab)
         visitor.picture(f"{tab}_{width}x{height}")
         assert visitor.answer("document.documentElement.scrollWidth") == width
-        above = ("run", "step", "speed", "clock", "reset", "views", "layers", "help")
-        for name in (*above, *(f"tab-{one}" for one in TABS)):
-            box = visitor.at(name).bounding_box()
-            assert box is not None, name
-            assert box["x"] >= 0, name
-            assert box["x"] + box["width"] <= width, name
-        assert visitor.answer("document.querySelector('.desk-panels').scrollWidth") <= width
-    visitor.drag((150, 200), (200, 200))
-    assert visitor.sim.pose(1)[0] == pytest.approx(200, abs=2)
+        assert visitor.answer(OUT_OF_REACH) == [], tab
+    fingers = visitor.page.context.new_cdp_session(visitor.page)
+    for kind, x_mm in (("touchStart", 150), ("touchMove", 180), ("touchMove", 200), ("touchEnd", None)):
+        places = [] if x_mm is None else [dict(zip("xy", visitor.on_page(x_mm, 200), strict=True))]
+        fingers.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": places})
+    visitor.until(lambda: visitor.sim.pose(1)[0] == pytest.approx(200, abs=2))
     visitor.pause()
 
 

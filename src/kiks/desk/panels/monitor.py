@@ -54,6 +54,7 @@ class MonitorPanel(Panel):
                 self._build_answer()
             self._view.change(robot=0, chosen=None)
             self._view.on("explain", self._ask).on("seen", lambda event: self.set_visible(bool(event.args)))
+            self._view.on("keydown.escape", self._forget)
             self._turrets = named(ui.label().style("white-space: pre-line"), "turret-words")
         offer_robots(self._choice, desk)
 

@@ -42,6 +42,12 @@ as localhost for 127.0.0.1, Chromium denies access to it, and no button would wo
 NOTE_SPLIT = "(value) => document.body.style.setProperty('--desk-split', value)"
 """Tells the style sheet how much of the width the arena has [%], for the tooltips beside it."""
 
+NOTE_HEADER = """
+    const note = ([{ target }]) => document.body.style.setProperty("--desk-top", `${target.offsetHeight}px`);
+    new ResizeObserver(note).observe(document.querySelector(".q-header"));
+"""
+"""Tells the style sheet how high the bar above the arena is, which wraps on phones."""
+
 NEWS_S = 0.5
 """Period at which new messages are shown [s]."""
 
@@ -64,7 +70,8 @@ class Page:
         ui.add_head_html(MEMORY)
         ui.add_css(WEB / "page.css")
         with ui.header(elevated=True).classes("items-center q-py-none q-px-md no-wrap gap-2").style("height: 58px"):
-            heading("KiKS", "text-h6 gt-sm", level=1)
+            heading("KiKS", "text-h6 desk-from-1200", level=1)
+            ui.run_javascript(NOTE_HEADER)
             TimePanel(desk, feed)
             ui.space()
             tools = ui.row().classes("items-center no-wrap gap-1")

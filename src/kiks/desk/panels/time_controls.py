@@ -64,7 +64,7 @@ class TimePanel(Panel):
         bar_button("skip_next", "Step", "step", acts["step"], step_tip)
         self._add("dangerous", "halt", "Halt: stop all programs and all robots", desk.halt,
                   "All programs and all robots are stopped.")  # fmt: skip
-        self._step_s = _select(STEPS, 0.01, "Size of a step", "step-size", "5rem")
+        self._step_s = _select(STEPS, 0.01, "Size of a step", "step-size", "5rem").classes("desk-spare")
         self._speed = _select(SPEEDS, self._shown_speed(), "Speed of time", "speed", "8.5rem")
         self._speed.on_value_change(self._set_speed)
         place_tip(self._speed, "Simulated time per real time; it never changes what robots do", BELOW)

@@ -66,7 +66,7 @@ class ViewPanel:
         tip = "Snapshot: save a picture of the arena as you see it (PNG)"
         bar_button("photo_camera", "Snapshot", "snapshot", lambda: view.run_method("snapshot"), tip)
         tip = "Hall view, for a projector: arena, score and clock, large (Escape ends it)"
-        bar_button("tv", "Hall view", "hall", lambda: board.run_method("enter"), tip)
+        bar_button("tv", "Hall view", "hall", lambda: board.run_method("enter"), tip).classes("desk-from-1000")
         with dialog("Help") as self._help:
             ui.markdown(HELP)
             ui.button("Close", on_click=self._help.close).props("flat no-caps")

@@ -6,7 +6,7 @@ export default {
   template: `
     <div class="kiks-clock">
       <div class="text-subtitle1 text-weight-medium" data-testid="clock" title="Simulated time">{{ clock }}</div>
-      <div class="text-caption gt-sm" data-testid="rate">{{ rate }}</div>
+      <div class="text-caption desk-from-1200" data-testid="rate">{{ rate }}</div>
     </div>`,
   props: { feed: { type: String, default: "/desk/feed" } },
   data: () => ({ clock: clockText(0), rate: "" }),

@@ -1,6 +1,7 @@
 /* The stage: both views of the arena in one element, with pointer and keyboard, drawn for each picture of the screen.
    It does not depend on Vue; arena_view.js is its component. */
 
+import { clockText } from "./clock.js";
 import { shownPlace } from "./coordinates.js";
 import { pageFeed } from "./feed.js";
 import { Hand } from "./hand.js";
@@ -173,7 +174,10 @@ export class Stage {
         this.solidView?.setShapes(scene);
         this._isWanted = true;
       }),
-      this.feed.on("frame", (frame) => this.topView.trails.add(frame)),
+      this.feed.on("frame", (frame) => {
+        this.topView.trails.add(frame);
+        this._tellChange(frame);
+      }),
       this.feed.on("bar", (bar) => this._takeBar(bar)),
       this.feed.on("connection", (connection) => {
         if (connection !== "open") this.hand.forget();
@@ -311,6 +315,17 @@ export class Stage {
   _notice(text) {
     this.notice.textContent = text;
     this.notice.hidden = !text;
+  }
+
+  /** Tell readers of screens that time stands or goes on, and which robot has touched something. */
+  _tellChange(frame) {
+    const { robot_count, isPaused, time_s } = frame, before = this._heard;
+    const contacts = Array.from({ length: robot_count }, (_, index) => frame.robot(index).contacts);
+    this._heard = { isPaused, contacts };
+    if (before === undefined) return;
+    const touched = contacts.findIndex((count, index) => count > before.contacts[index]);
+    if (isPaused !== before.isPaused) this.live.textContent = isPaused ? `Paused at ${clockText(time_s)}` : "Time goes on";
+    else if (touched >= 0) this.live.textContent = `${nameOf(this.feed.scene, { what: "robot", index: touched })} touches something`;
   }
 
   _announce(thing) {
