@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Self
 
 import typer
 
+from kiks.errors import counted
+
 if TYPE_CHECKING:
     from kiks.learn.evolution import Evolution
 
@@ -66,10 +68,10 @@ class Progress:
 
     def each_round(self, number: int, sizes: list[int]) -> None:
         """Show the finals; called before each round."""
-        said = f"finals: {sizes[number]} candidates"
+        said = f"finals: {counted(sizes[number], 'candidate')}"
         self._bars.update(self._bar, completed=number / len(sizes), description=said)
         if not self._console.is_terminal and not number:
-            typer.echo(f"Finals: {sizes[0]} candidates in {len(sizes)} rounds")
+            typer.echo(f"Finals: {counted(sizes[0], 'candidate')} in {counted(len(sizes), 'round')}")
 
 
 def _working_s() -> float:

@@ -16,6 +16,7 @@ import typer
 from kiks.cli.engine_start import ready_engine
 from kiks.cli.outputs import output
 from kiks.ending import end_as_with_ctrl_c
+from kiks.errors import counted
 from kiks.model.atomic_files import explained
 
 if TYPE_CHECKING:
@@ -114,7 +115,10 @@ def monitor(
             rate_hz = (len(times_s) - 1) / (times_s[-1] - times_s[0]) if count > 1 else 0.0
             show(sample, rate_hz)
             wait()
-    typer.echo(f"{count} samples, {rate_hz:.1f} per second at the end{'' if csv is None else f', in {csv}'}", err=True)
+    typer.echo(
+        f"{counted(count, 'sample')}, {rate_hz:.1f} per second at the end{'' if csv is None else f', in {csv}'}",
+        err=True,
+    )
 
 
 def samples(robot: Khepera, rate_hz: float, seconds: float | None) -> Iterator[Sample]:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kiks.errors import ParameterError, shown
+from kiks.errors import ParameterError, counted, shown
 from kiks.export.tables import write_parquet
 from kiks.learn.champion import Champion
 from kiks.learn.evolution_log import Folder
@@ -96,7 +96,7 @@ class Archive:
 
     def __repr__(self) -> str:
         axes = " x ".join(axis.measure for axis in self.axes)
-        return f"<{type(self).__name__}: {len(self._elites)} elites in {self.cell_count} cells of {axes}>"
+        return f"<{type(self).__name__}: {counted(len(self._elites), 'elite')} in {counted(self.cell_count, 'cell')} of {axes}>"
 
     def add(self, candidates: Floats, values: Floats, generation: int) -> None:
         """Take candidates: each stays that is better than the elite of its cell.

@@ -250,7 +250,7 @@ class SavedState:
         with sim.lock:
             if not self.can_restore(sim):
                 raise ParameterError(
-                    f"Cannot go back to a state of {len(self.specs)} robots: the simulation has {sim.robot_count}, or "
+                    f"Cannot go back to a state of {counted(len(self.specs), 'robot')}: the simulation has {sim.robot_count}, or "
                     "other turrets. Make another simulation of the state."
                 )
             self._extend(sim)

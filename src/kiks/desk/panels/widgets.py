@@ -12,7 +12,7 @@ from nicegui import ui
 from nicegui.element import Element
 
 from kiks.desk.server.desk import Desk
-from kiks.errors import KiksError
+from kiks.errors import KiksError, counted
 from kiks.export.looks import robot_colours
 from kiks.sim.ring_buffer import RingBuffer
 
@@ -259,7 +259,7 @@ class LogBox:
         first, items = buffer.since(self._next)
         left_out = first - self._next + max(len(items) - self._new_max, 0)
         if left_out:
-            self.push(f"... {left_out} lines are left out ...", "text-italic")
+            self.push(f"... {counted(left_out, 'line')} left out ...", "text-italic")
         for made in map(row, items[-self._new_max :]):
             if made is not None:
                 self.push(*made)
