@@ -96,7 +96,8 @@ class Archive:
 
     def __repr__(self) -> str:
         axes = " x ".join(axis.measure for axis in self.axes)
-        return f"<{type(self).__name__}: {counted(len(self._elites), 'elite')} in {counted(self.cell_count, 'cell')} of {axes}>"
+        elites = counted(len(self._elites), "elite")
+        return f"<{type(self).__name__}: {elites} in {counted(self.cell_count, 'cell')} of {axes}>"
 
     def add(self, candidates: Floats, values: Floats, generation: int) -> None:
         """Take candidates: each stays that is better than the elite of its cell.

@@ -250,8 +250,8 @@ class SavedState:
         with sim.lock:
             if not self.can_restore(sim):
                 raise ParameterError(
-                    f"Cannot go back to a state of {counted(len(self.specs), 'robot')}: the simulation has {sim.robot_count}, or "
-                    "other turrets. Make another simulation of the state."
+                    f"Cannot go back to a state of {counted(len(self.specs), 'robot')}: the simulation has "
+                    f"{sim.robot_count}, or other turrets. Make another simulation of the state."
                 )
             self._extend(sim)
             world = sim.world
