@@ -86,14 +86,19 @@ class EditorPanel(Panel):
         self.refresh()
 
     def _build_tools(self) -> None:
-        with ui.row().classes("w-full gap-1"):
-            for name, tool in TOOLS.items():
-                button = ui.button(icon=tool.icon, on_click=lambda name=name: self._choose(name))
-                button.props('dense padding="6px"')
-                with named(with_props(button, aria_label=tool.word), f"tool-{name}"):
-                    ui.tooltip(f"{tool.word}: {tool.hint}")
-                self._buttons[name] = button
+        with ui.column().classes("w-full gap-1"):
+            for is_thing in (False, True):  # a row for walls, and one for what stands between them
+                with ui.row().classes("w-full gap-1"):
+                    for name, tool in TOOLS.items():
+                        if (tool.pointer == "point") == is_thing:
+                            self._build_tool(name, tool)
         self._hint = ui.label().classes("text-caption").props("data-testid=tool-hint aria-live=polite")
+
+    def _build_tool(self, name: str, tool: _ToolButton) -> None:
+        button = ui.button(icon=tool.icon, on_click=lambda: self._choose(name)).props('dense padding="6px"')
+        with named(with_props(button, aria_label=tool.word), f"tool-{name}"):
+            ui.tooltip(f"{tool.word}: {tool.hint}")
+        self._buttons[name] = button
 
     def _build_brush(self) -> None:
         with ui.row().classes("w-full items-center no-wrap"):

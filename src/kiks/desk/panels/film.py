@@ -35,9 +35,9 @@ class FilmDialog:
         self._is_given_up = False
         with dialog("Make a film of the run") as self._dialog:
             with ui.row().classes("no-wrap items-end"):
-                self._start = number("From [s]", "film-start", min=0.0).classes("w-28")
-                self._end = number("To [s]", "film-end", min=0.0).classes("w-28")
-                self._speed = number("Times real time", "film-speed", 1.0, min=0.0).classes("w-28")
+                self._start = number("From [s]", "film-start", min=0.0).classes("col")
+                self._end = number("To [s]", "film-end", min=0.0).classes("col")
+                self._speed = number("Times real time", "film-speed", 1.0, min=0.0).classes("col")
             self._follow = select("What is seen", "film-follow", {0: "the whole arena"}, 0).classes("w-full")
             self._kind = ui.toggle(endings := list(KINDS["film"].endings), value=endings[0]).props(
                 "dense no-caps data-testid=film-kind"

@@ -126,7 +126,7 @@ class TimeBar(Panel):
         """Ask for a note, and set a bookmark at the time at which the person has asked for it."""
         time_ns = self._desk.sim.now_ns
         with dialog(f"Bookmark at {clock_text(s_from_ns(time_ns))}") as asked:
-            note = named(ui.input("Note").props("autofocus").classes("w-full"), "bookmark-note")
+            note = named(ui.input("Note").props("autofocus").style("width: min(24rem, 72vw)"), "bookmark-note")
             with_props(note, maxlength=str(TEXT_MAX))
             note.on("keydown.enter", lambda: asked.submit(note.value))
             finish(asked, "Set it", lambda: note.value)

@@ -201,7 +201,7 @@ def select(
     label: str, name: str, options: Any, value: Any = None, tip: str = "", act: Any = None, **more: Any
 ) -> ui.select:
     """Build a list to choose from; more options are those of `ui.select`."""
-    choice = ui.select(options, label=label, value=value, on_change=act, **more).props("dense options-dense")
+    choice = ui.select(options, label=label or None, value=value, on_change=act, **more).props("dense options-dense")
     return named(choice.tooltip(tip) if tip else choice, name)
 
 

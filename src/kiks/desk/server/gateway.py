@@ -203,16 +203,14 @@ class Gateway:
 
     def _describe_board(self, sim: Simulation) -> None:
         """Describe the score, by robots first; it is that of the time which is shown."""
-        sides = self.desk.sides() if sim.score else []
-        score = [
-            {
-                "name": sides[what - 1] if isinstance(what, int) else what,
-                "value": value,
-                "colours": robot_colours(what - 1) if isinstance(what, int) else None,
-            }
-            for what, value in sorted(sim.score.items(), key=lambda entry: (isinstance(entry[0], str), str(entry[0])))
+        score = sim.score
+        sides = dict(enumerate(self.desk.sides(), 1)) if score else {}
+        entries: list[dict[str, Any]] = [
+            {"name": sides.get(robot, f"robot {robot}"), "value": score[robot], "colours": robot_colours(robot - 1)}
+            for robot in sorted(what for what in score if isinstance(what, int))
         ]
-        self._news["board"] = {"kind": "board", "score": score, "end_s": self.desk.project.seconds}
+        entries += [{"name": what, "value": score[what], "colours": None} for what in score if isinstance(what, str)]
+        self._news["board"] = {"kind": "board", "score": entries, "end_s": self.desk.project.seconds}
 
     def _show(self, frame: bytes) -> None:
         for viewer in self._viewers:

@@ -3,7 +3,7 @@
 
    The messages "board" of the server carry the score, and frames carry the time. */
 
-import { clockText, pageFeed, robotColour } from "kiks-desk";
+import { clockText, pageFeed } from "kiks-desk";
 
 const HALL = "desk-hall";
 
@@ -26,7 +26,7 @@ export default {
               title="Leave the hall view (Escape)" @click="leave">&#x2715;</button>
     </div>`,
   props: { feed: { type: String, default: "/desk/feed" } },
-  data: () => ({ entries: [], end_s: null, isHall: false, clock: "", isDark: false }),
+  data: () => ({ entries: [], end_s: null, isHall: false, clock: "" }),
   computed: {
     /** Two robots, and nothing else: a match. */
     isMatch() { return this.entries.length === 2 && this.entries.every(({ colours }) => colours !== null); },
@@ -57,10 +57,9 @@ export default {
     take({ score, end_s }) {
       this.entries = score;
       this.end_s = end_s;
-      this.isDark = document.body.classList.contains("body--dark");
     },
 
-    ink(entry) { return { background: robotColour(entry, this.isDark) }; },
+    ink({ colours }) { return { "--light": colours.light, "--dark": colours.dark }; },
 
     show(isHall) {
       this.isHall = isHall;
