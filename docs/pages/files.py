@@ -68,6 +68,8 @@ def kind_of(rule: dict[str, Any]) -> str:
         least, most = rule.get("minItems"), rule.get("maxItems")
         what = kind_of(rule.get("items", {})) or "values"
         many = what.replace("number", "numbers", 1) if what.startswith(("number", "whole number")) else what
+        if rule.get("items", {}).get("type") == "array":
+            many = f"lists of {what.removeprefix('list of ')}"
         return f"{least} {many}" if least == most and least else f"list of {many}"
     return PLAIN.get(rule.get("type", ""), "") + limits(rule)
 

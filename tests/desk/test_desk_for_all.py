@@ -98,9 +98,11 @@ def test_axe_finds_nothing_serious(visitor: Visitor) -> None:
             visitor.picture(f"{tab}_{theme.lower()}")
         for opener in ("help", "layers", "follow"):
             visitor.at(opener).click()
+            expect(opened := visitor.page.locator(".q-menu, .q-dialog__inner")).to_be_visible()
             check_access(visitor.page, f"{opener}, {theme}")
             visitor.picture(f"{opener}_{theme.lower()}")
             visitor.page.keyboard.press("Escape")
+            expect(opened).to_have_count(0)
 
 
 def test_readers_of_screens_hear_what_happens(visitor: Visitor) -> None:

@@ -96,6 +96,10 @@ def test_a_program_that_ran_is_saved_with_the_project_and_shown_when_that_is_ope
     expect(visitor.at("arguments")).to_have_value("--fast 'a b'")
     expect(visitor.at("programs")).to_contain_text("exercise1.py on robot 1: running")
 
+    visitor.page.reload()
+    visitor.tab("programs")
+    expect(visitor.at("name")).to_have_value("exercise1.py")
+
 
 def test_mistake_is_marked_as_it_is_typed_and_before_anything_runs(visitor: Visitor) -> None:
     begin_program(visitor, "wrong.py", "x = 1\nif x = 2:\n    pass\n")

@@ -45,7 +45,6 @@ NOT_OWN = (
 """Shown in place of the editor where the world is not the desk's own."""
 
 CSS = """
-.program-error { color: #b00020 } .body--dark .program-error { color: #ff9a90 }
 .program-wrong-line { background: #b0002018; box-shadow: inset 3px 0 #b00020 }
 .body--dark .program-wrong-line { background: #ff9a9024; box-shadow: inset 3px 0 #ff9a90 }
 .program-wrong { text-decoration: underline wavy #d3281d; text-underline-offset: 3px }
@@ -115,7 +114,7 @@ class ProgramsPanel(Panel):
                 self._choose_attached(attached, is_first=self._world is None)
                 self._world = desk.present
         if self._shown is not None and self._shown.output is not None:
-            self._log.add(self._shown.output, lambda line: (line.text, "program-error" if line.is_error else ""))
+            self._log.add(self._shown.output, lambda line: (line.text, "desk-error" if line.is_error else ""))
 
     def _draw_list(self, handles: list[Handle]) -> None:
         if not handles and self._desk.owns_world:
@@ -209,7 +208,7 @@ class ProgramsPanel(Panel):
             self._editor = ui.codemirror(NEW, language="Python", theme=LIGHT, keymap=keys)
             named(self._editor, "editor").on_value_change(self._note_draft)
             self._editor.classes("w-full").style("height: 38vh; border: 1px solid currentcolor")
-        self._mistake = named(ui.label().classes("program-error text-body2").props("role=status"), "mistake")
+        self._mistake = named(ui.label().classes("desk-error text-body2").props("role=status"), "mistake")
         with ui.row().classes("w-full items-end no-wrap gap-2"):
             self._name = named(ui.input("Saved as", value="mine.py"), "name").classes("col").props("dense")
             self._name.tooltip("The file in the desk's folder in which the program is saved before it runs")

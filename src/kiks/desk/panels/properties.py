@@ -41,7 +41,7 @@ class PropertiesPanel(Panel):
         self._in_focus = self._bad = ""
         with named(ui.column().classes("w-full gap-1"), "properties") as self._form:
             pass
-        self._refused = named(ui.label().classes("text-body2 desk-refused").props("role=alert"), "refused")
+        self._refused = named(ui.label().classes("text-body2 desk-error").props("role=alert"), "refused")
         self._build()
 
     async def show(self, selected: Selected | None, *, has_focus: bool = False) -> None:

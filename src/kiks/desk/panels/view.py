@@ -28,8 +28,9 @@ HELP = f"""
 **With the keyboard**
 
 * On the page: {_KEYS}.
-* On the arena (press Tab to reach it): `n` selects the next thing, arrows move it by 10 mm (with Shift 1 mm),
-  `q` and `e` turn it by 5 degrees, Delete removes it, Escape deselects it; `+` `-` `0`: zoom in, zoom out, show all.
+* On the arena (press Tab to reach it): `n` selects the next thing, arrows move it by 10 mm (with Shift 1 mm), `q` and
+  `e` turn it by 5 degrees, Enter shows its properties, Delete removes it, Escape deselects it; `+` `-` `0`: zoom in,
+  zoom out, show all.
 * In the program editor: Ctrl-Enter runs; Tab indents, and leaves the editor after Escape.
 """
 
