@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from kiks.export.sheet import INK, WHITE, Sheet, font
+from kiks.export.sheet import INK, Sheet, font
 
 LETTERS_A_LINE = 38
 """Width of a picture in heights of its letters, which have 6.3 points in a column of a paper, 85 mm wide."""
@@ -18,7 +18,6 @@ LETTER_MM = 30.0
 """Height of a letter in the millimetres of signs."""
 
 _ROW, _MARGIN, _GAP = 1.7, 0.7, 1.2
-_SCALE_SHARE = 0.3
 
 
 class Sign(NamedTuple):
@@ -50,13 +49,23 @@ class Caption:
         signs: What follows.
         width: Width of the picture [pixels of the sheet].
         text_length: Returns how long a text is in a font [pixels].
+        letter: Height of its letters [pixels]; that of a picture's if left out.
 
     Attributes:
         height: Its height [pixels].
+        right: How far its words reach, with a margin [pixels].
     """
 
-    def __init__(self, title: str, signs: Sequence[Sign], width: float, text_length: Callable[..., float]) -> None:
-        self._size = letter_pixels(width)
+    def __init__(
+        self,
+        title: str,
+        signs: Sequence[Sign],
+        width: float,
+        text_length: Callable[..., float],
+        letter: float | None = None,
+    ) -> None:
+        self._size = letter_pixels(width) if letter is None else letter
+        self.right = 0.0
         self._placed: list[tuple[float, int, str, Sign | None]] = []
         gap, right = _GAP * self._size, width - _MARGIN * self._size
         row, x = 0, 0.0
@@ -69,14 +78,13 @@ class Caption:
                 row, x = row + 1, 0.0
             x = x or _MARGIN * self._size
             self._placed.append((x, row, text, sign))
+            self.right = max(self.right, x + length + _MARGIN * self._size)
             x += length + (0.3 * self._size if sign is None else gap)
         self.height = math.ceil(((row + 1) * _ROW + 0.6) * self._size) if self._placed else 0
-        self._width = width
 
     def draw(self, sheet: Sheet) -> None:
-        """Draw it on a sheet, whose unit is a pixel and whose upper side is at 0."""
+        """Draw it on a white sheet, whose unit is a pixel and whose upper side is at 0."""
         pen, size = sheet.pen, self._size
-        pen.polygon([(0, 0), (self._width, 0), (self._width, self.height), (0, self.height)], fill=WHITE)
         for x, row, text, sign in self._placed:
             y = ((row + 0.5) * _ROW + 0.3) * size
             if sign is not None:

@@ -106,7 +106,7 @@ def save_film(
 
     def pictures(times_ns: Sequence[int]) -> Iterator[Pixels]:
         picture = np.zeros((height, width, 3), np.uint8)
-        panel = None if is_plain else Panel((width, height), robot=robot - 1, speed=speed)
+        panel = None if is_plain else Panel((width, height), robot=robot - 1, speed=speed, title=recording.what)
         left = width - (0 if panel is None else panel.width)
         index = None if follow is None else follow - 1
         stage = VIEWS[view]((left, height), follow=index, zoom=zoom, has_trails=not is_plain)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from textwrap import wrap
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,7 @@ _LEFT, _RIGHT = 20.0, 230.0
 _BARS_TOP, _BARS_BOTTOM = 200.0, 340.0
 _WHEELS = (424.0, 454.0)
 _SPEED_LEAST = 10
+_TITLE_LINE, _TITLE_CHARACTERS = 20.0, 28
 
 
 class Panel:
@@ -37,12 +39,13 @@ class Panel:
         size: Width and height of the film.
         robot: Index of the robot whose readings are shown.
         speed: Simulated seconds per second of the film.
+        title: What ran, for the bottom.
 
     Attributes:
         width: Pixels of its width; 0 where there is no room for it.
     """
 
-    def __init__(self, size: tuple[int, int], *, robot: int, speed: float) -> None:
+    def __init__(self, size: tuple[int, int], *, robot: int, speed: float, title: str) -> None:
         from PIL import Image, ImageDraw
 
         self._robot = robot
@@ -54,6 +57,7 @@ class Panel:
         self._paper = Image.new("RGB", (width, size[1]), _PAPER)
         self._pen = ImageDraw.Draw(self._paper)
         self._draw_words(speed)
+        self._draw_title(title, size[1] / self._scale)
 
     def draw(self, moment: Moment, picture: Pixels) -> None:
         """Draw it for a moment, on the right side of the picture; the clock alone if there is no room."""
@@ -90,6 +94,13 @@ class Panel:
         self._text(_LEFT, 396, "speed [pulses/10 ms]", 15, _FAINT)
         for row, name in zip(_WHEELS, ("left", "right"), strict=True):
             self._text(_LEFT, row, name, 15)
+
+    def _draw_title(self, title: str, height: float) -> None:
+        """Draw what ran at the bottom, as far as there is room."""
+        room = int((height - HEIGHT - _TITLE_LINE) / _TITLE_LINE)
+        lines = wrap(title, _TITLE_CHARACTERS)[: max(room, 0)]
+        for number, line in enumerate(reversed(lines)):
+            self._text(_LEFT, height - (number + 1) * _TITLE_LINE, line, 15, _FAINT)
 
     def _draw_counts(self, counts: Sequence[int]) -> None:
         """Draw a bar for each proximity sensor."""

@@ -15,11 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.errors import ParameterError
+from kiks.export.caption import Caption, scale_bar
 from kiks.export.looks import body_colour
 from kiks.export.sheet import (
     FINER,
     FLOOR,
     LAMP_MM,
+    WHITE,
     Place,
     Sheet,
     ground_picture,
@@ -47,6 +49,11 @@ TRAIL_PIXELS, PIECE_PIXELS = 2.0, 4.0
 
 BODY_TRAIL_MM = 2.4
 """Width of the trail of a ball or cylinder [mm]."""
+
+
+BAR_LETTER_SHARE, BAR_LETTER_MIN, BAR_SIDE_MIN = 0.022, 11.0, 200
+"""Height of the letters beside the scale bar as a share of the picture's, the least [pixels], and the least side of a
+picture with one [pixels]."""
 
 
 class Canvas:
@@ -172,6 +179,8 @@ class Stage:
         self._size, self._follow, self._zoom = size, follow, zoom
         self._empty = np.full((size[1], size[0], 3), OUTSIDE, np.uint8)
         self._ground = Ground(has_trails=has_trails)
+        self._bar = self._empty[:0], 0.0
+        self._has_bar = has_trails and min(size) >= BAR_SIDE_MIN
 
     def draw(self, moment: Moment, share: float, picture: Pixels) -> None:
         """Draw a moment.
@@ -191,6 +200,22 @@ class Stage:
         for index, (pose, spec) in enumerate(zip(moment.poses.tolist(), moment.saved.specs, strict=False)):
             with view.patch([pose[:2]], spec.body.radius_mm) as sheet:
                 sheet.robot(pose, spec.body, index)
+        if self._has_bar:
+            if self._bar[1] != view.scale:
+                self._bar = self._scale_picture(view.scale), view.scale
+            rows, columns = self._bar[0].shape[:2]
+            picture[-rows:, -columns:] = self._bar[0]
+
+    def _scale_picture(self, scale: float) -> Pixels:
+        """Return what says how long a millimetre is, for the lower right corner."""
+        from PIL import Image
+
+        letter = max(BAR_LETTER_SHARE * self._size[1], BAR_LETTER_MIN) * FINER
+        sign = scale_bar(self._size[0] / scale, letter / (FINER * scale))
+        caption = Caption("", [sign], math.inf, pen_on(Image.new("RGB", (1, 1))).textlength, letter)
+        image = Image.new("RGB", (math.ceil(caption.right), caption.height), WHITE)
+        caption.draw(Sheet(pen_on(image), 1.0, 0.0, 0.0))
+        return np.asarray(image.reduce(FINER))
 
     def _view(self, moment: Moment, picture: Pixels) -> Canvas:
         """Return a canvas of the picture, with what the camera sees of the base."""
