@@ -45,10 +45,10 @@ def callables() -> Iterator[tuple[str, Any]]:
 CALLABLES = dict(callables())
 
 
-@pytest.mark.parametrize("name", sorted(NAMES.keys() - CONSTANTS))
+@pytest.mark.parametrize("name", sorted((NAMES | CALLABLES).keys() - CONSTANTS))
 def test_every_name_has_an_example(name: str) -> None:
     # `--doctest-modules` runs them.
-    assert ">>> " in (NAMES[name].__doc__ or ""), name
+    assert ">>> " in ((NAMES | CALLABLES)[name].__doc__ or ""), name
 
 
 @pytest.mark.parametrize("name", sorted(CALLABLES))

@@ -217,7 +217,14 @@ class Batch:
 
     @_alone
     def take_arenas(self, worlds: NDArray[np.int64], arenas: Sequence[int]) -> None:
-        """Give worlds other arenas of the batch, by their indices, with the lamps of these; `reset` begins there."""
+        """Give worlds other arenas of the batch, by their indices, with the lamps of these; `reset` begins there.
+
+        Example:
+            >>> import kiks
+            >>> batch = kiks.Batch([kiks.Arena.box(500, 500), kiks.Arena.box(900, 900)], worlds=2)
+            >>> batch.take_arenas([0], [1])
+            >>> readings = batch.reset()  # now both worlds are 900 x 900 mm
+        """
         self.arena_indices[worlds] = arenas
         self._lamps[worlds] = self._initial_state.lamps[arenas]
 
@@ -354,7 +361,18 @@ class Batch:
     @property
     @_alone
     def values(self) -> NDArray[np.float64]:
-        """Values of the measures after the steps so far, float64 [world, robot, measure]."""
+        """Values of the measures after the steps so far, float64 [world, robot, measure].
+
+        Example:
+            >>> import kiks
+            >>> arena = kiks.Arena.box(500, 500)
+            >>> batch = kiks.Batch(arena, worlds=2, starts=(250, 250, 0), measures=[kiks.measures.path_mm])
+            >>> readings = batch.reset()
+            >>> for _ in range(10):
+            ...     readings = batch.step([[[5, 5]], [[0, 0]]])
+            >>> batch.values[:, 0, 0] > 30
+            array([ True, False])
+        """
         return self._watching.values(self.notes)
 
     @_alone

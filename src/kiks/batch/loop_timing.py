@@ -60,7 +60,13 @@ class Timing:
             raise ParameterError(f"period_s must be at least 0.01 without a line, but it was {self.period_s:g}.")
 
     def line(self, spec: RobotSpec) -> Any:
-        """Return the timing of the line to a robot of a kind, for kernels."""
+        """Return the timing of the line to a robot of a kind, for kernels.
+
+        Example:
+            >>> import kiks
+            >>> kiks.Timing().line(kiks.RobotSpec.load("khepera")).character_ns
+            1145833
+        """
         has_line = self.baud is not None
         return Line(
             character_ns(self.baud) if self.baud is not None else 0,

@@ -465,10 +465,16 @@ class Khepera:
     # ---- replies, for a program that sends a command to several robots before it reads the first reply ----
 
     def read_confirmation(self, request: bytes) -> None:
-        """Read the reply to a command that the robot confirms with its letter alone.
+        r"""Read the reply to a command that the robot confirms with its letter alone.
 
         Raises:
             LinkError: If the reply is unexpected, or does not come.
+
+        Example:
+            >>> import kiks
+            >>> robot = kiks.Khepera(kiks.Simulation().port(1))
+            >>> _ = robot.port.write(b"D,5,5\n")
+            >>> robot.read_confirmation(b"D,5,5")
         """
         if request.__class__ is not bytes:
             check_kind("request", request, bytes)
@@ -477,10 +483,17 @@ class Khepera:
             raise self._unexpected(request, reply)
 
     def read_numbers(self, request: bytes, count: int) -> list[int]:
-        """Read a reply of `count` whole numbers, after the command's letter; after a turret's order, `t,2,t`.
+        r"""Read a reply of `count` whole numbers, after the command's letter; after a turret's order, `t,2,t`.
 
         Raises:
             LinkError: If the reply is unexpected, or does not come.
+
+        Example:
+            >>> import kiks
+            >>> robot = kiks.Khepera(kiks.Simulation().port(1))
+            >>> _ = robot.port.write(b"E\n")
+            >>> robot.read_numbers(b"E", 2)
+            [0, 0]
         """
         if request.__class__ is not bytes or count.__class__ is not int or count < 0:
             check_kind("request", request, bytes)

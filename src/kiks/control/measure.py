@@ -112,7 +112,14 @@ class Measure(Compiled):
         return {"notes": self.note_count}
 
     def value(self, notes: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the values of all worlds and robots for their notes, float64 [world, robot, note]."""
+        """Return the values of all worlds and robots, float64 [world, robot], for their notes [world, robot, note].
+
+        Example:
+            >>> import numpy as np
+            >>> import kiks
+            >>> kiks.measures.path_mm.value(np.zeros((3, 2, kiks.measures.path_mm.note_count))).shape
+            (3, 2)
+        """
         try:
             values: NDArray[np.float64] = np.asarray(self.result(notes.copy()))
         except Exception as error:

@@ -106,6 +106,15 @@ class Archive:
             candidates: Their parameters, float64 [candidate, parameter].
             values: Their values, float64 [candidate, value].
             generation: The generation that found them.
+
+        Example:
+            >>> import numpy as np
+            >>> import kiks
+            >>> champion = kiks.Champion(kiks.controllers.linear(), [0.0] * 18)
+            >>> archive = kiks.Archive([kiks.Axis("path_mm", 0, 100, 10)], ["fitness", "path_mm"], champion)
+            >>> archive.add(np.zeros((3, 18)), np.array([[0.1, 5.0], [0.2, 6.0], [0.1, 95.0]]), generation=1)
+            >>> archive.elites
+            (<Elite of cell (0,): fitness 0.2, of generation 1>, <Elite of cell (9,): fitness 0.1, of generation 1>)
         """
         places = values[:, [self.value_names.index(axis.measure) for axis in self.axes]]
         fitness = values[:, self.value_names.index("fitness")]
@@ -259,7 +268,20 @@ class Archive:
     # ---- files ----
 
     def save(self, folder: str | Path, side: str = "") -> None:
-        """Write `archive.parquet`, or that of a side of two, into a folder: a table with a row for each elite."""
+        """Write `archive.parquet`, or that of a side of two, into a folder: a table with a row for each elite.
+
+        Example:
+            >>> import tempfile
+            >>> from pathlib import Path
+            >>> import kiks
+            >>> task = kiks.tasks.avoid(seconds=1, worlds=3)
+            >>> evolution = kiks.Evolution(task, "map-elites", seed=1, population=8)
+            >>> _ = evolution.run(generations=2)
+            >>> folder = tempfile.mkdtemp()
+            >>> evolution.archive.save(folder)
+            >>> [path.name for path in Path(folder).iterdir()]
+            ['archive.parquet']
+        """
         elites = self.elites
         columns: dict[str, Any] = {"generation": np.array([elite.generation for elite in elites], np.int64)}
         for number, axis in enumerate(self.axes):
@@ -277,6 +299,18 @@ class Archive:
         Args:
             folder: The folder.
             side: Name of the side, if there are two.
+
+        Example:
+            >>> import tempfile
+            >>> import kiks
+            >>> task = kiks.tasks.avoid(seconds=1, worlds=3)
+            >>> evolution = kiks.Evolution(task, "map-elites", seed=1, population=8)
+            >>> _ = evolution.run(generations=2)
+            >>> folder = tempfile.mkdtemp()
+            >>> evolution = kiks.Evolution(task, "map-elites", seed=1, population=8, folder=folder)
+            >>> _ = evolution.run(generations=2)
+            >>> len(kiks.Archive.load(folder).elites) == len(evolution.archive.elites)
+            True
         """
         home = Folder(folder)
         identity, champion = home.identity(), Champion.load(home.champion_file(side))

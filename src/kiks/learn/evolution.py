@@ -154,7 +154,16 @@ class Evolution:
 
     @property
     def archive(self) -> Archive | None:
-        """The archive of the first side; None if the task has no axes."""
+        """The archive of the first side; None if the task has no axes.
+
+        Example:
+            >>> import kiks
+            >>> task = kiks.tasks.avoid(seconds=1, worlds=3)
+            >>> evolution = kiks.Evolution(task, "map-elites", seed=1, population=8)
+            >>> _ = evolution.run(generations=2)
+            >>> evolution.archive
+            <Archive: 8 elites in 400 cells of path_mm x straightness>
+        """
         return self.archives[0] if self.archives else None
 
     # ---- ask and tell ----
@@ -396,6 +405,15 @@ class Evolution:
 
         Raises:
             WorkError: If the task cannot be evaluated.
+
+        Example:
+            >>> import kiks
+            >>> task = kiks.tasks.avoid(seconds=1, worlds=3)
+            >>> evolution = kiks.Evolution(task, "ga", seed=1, population=8)
+            >>> for _ in range(2):
+            ...     evolution.tell(task.evaluate(evolution.ask(), evolution.seeds))
+            >>> evolution.hold_finals() == evolution.champion
+            True
         """
         if self.task.against:
             every = max(1, -(-len(self.generations) // TOURNAMENT_MAX))
@@ -430,6 +448,13 @@ class Evolution:
 
         Raises:
             WorkError: If the task cannot be evaluated.
+
+        Example:
+            >>> import kiks
+            >>> evolution = kiks.Evolution(kiks.tasks.pursuit(seconds=1), seed=1, population=4, opponents=2)
+            >>> _ = evolution.run(generations=2)
+            >>> evolution.master_tournament(trials=1).scores.shape
+            (2, 2, 2)
         """
         trials, every = check_count("trials", trials, 1, 10_000), check_count("every", every, 1)
         if not self.task.against:
@@ -443,7 +468,20 @@ class Evolution:
         return Tournament((first, second), chosen + 1, scores)
 
     def save_log(self) -> None:
-        """Write the champions, the archives and the log into the folder, if there is one."""
+        """Write the champions, the archives and the log into the folder, if there is one.
+
+        Example:
+            >>> import tempfile
+            >>> from pathlib import Path
+            >>> import kiks
+            >>> task = kiks.tasks.avoid(seconds=1, worlds=3)
+            >>> folder = Path(tempfile.mkdtemp())
+            >>> evolution = kiks.Evolution(task, "ga", seed=1, population=8, folder=folder)
+            >>> evolution.tell(task.evaluate(evolution.ask(), evolution.seeds))
+            >>> evolution.save_log()
+            >>> (folder / "log.parquet").exists()
+            True
+        """
         if self._folder is not None and self.generations:
             for side, champion in zip(self.task.sides, self.champions, strict=True):
                 champion.save(self._folder.champion_file(side.name))
@@ -457,7 +495,16 @@ class Evolution:
 
     @property
     def figures(self) -> dict[str, float]:
-        """Best, champion's and mean fitness of the last generation; of two sides, best and mean of each."""
+        """Best, champion's and mean fitness of the last generation; of two sides, best and mean of each.
+
+        Example:
+            >>> import kiks
+            >>> task = kiks.tasks.avoid(seconds=1, worlds=3)
+            >>> evolution = kiks.Evolution(task, "ga", seed=1, population=8)
+            >>> _ = evolution.run(generations=2)
+            >>> list(evolution.figures)
+            ['best', 'champion', 'mean']
+        """
         last = self.generations[-1]
         if not self.task.against:
             return {"best": last.fitness.max(), "champion": self.champion.fitness, "mean": last.fitness.mean()}
@@ -484,6 +531,14 @@ class Evolution:
 
         Of one side: the winner of the finals; before these, the best rival; before the first trial, the best candidate.
         Of two sides: the best of the tournament; before it, those of the last generation.
+
+        Example:
+            >>> import kiks
+            >>> task = kiks.tasks.avoid(seconds=1, worlds=3)
+            >>> evolution = kiks.Evolution(task, "ga", seed=1, population=8)
+            >>> _ = evolution.run(generations=2)
+            >>> evolution.champions == (evolution.champion,)
+            True
         """
         if self.task.against:
             best = (None, None) if self.tournament is None else self.tournament.best
@@ -514,6 +569,14 @@ class Evolution:
         Args:
             side: Number or name of the side.
             generation: Number of the generation, from 1; the last one if left out.
+
+        Example:
+            >>> import kiks
+            >>> task = kiks.tasks.avoid(seconds=1, worlds=3)
+            >>> evolution = kiks.Evolution(task, "ga", seed=1, population=8)
+            >>> _ = evolution.run(generations=2)
+            >>> evolution.champion_of(generation=1).generation
+            1
         """
         names = [each.name for each in self.task.sides]
         if not isinstance(side, int | str) or side not in (*range(len(names)), *names):

@@ -132,6 +132,14 @@ class Exam(Experiment):
             robots: Number of robots in each world, all driven by it. A start is that of all of them.
             kinds: Kinds of robots, such as those of `imperfect_robots`. All starts are taken with each, so the result
                 has as many times more starts. Left out, the champion's own.
+
+        Example:
+            >>> import kiks
+            >>> arena, measure = kiks.Arena.box(900, 900), kiks.measures.path_mm
+            >>> exam = kiks.Exam([arena], [measure], lambda values: values["path_mm"] > 30,
+            ...             goal="drove 30 mm", seconds=2, worlds=4)
+            >>> exam.examine(kiks.Champion(kiks.controllers.linear(), [0.0] * 18)).solved
+            array([False, False, False, False])
         """
         check_kind("champion", champion, Champion, "kiks.Champion.load() returns one.")
         named = specs_of(champion.robot if kinds is None else kinds, None, None)
@@ -162,6 +170,11 @@ class Exam(Experiment):
         Args:
             robot: Kind of the robots.
             robots: Number of robots.
+
+        Example:
+            >>> import kiks
+            >>> kiks.tasks.avoid().exam.world("khepera").arena.name
+            'unseen'
         """
         poses = self._poses(robot, robots) if self.starts == "random" else None
         return world_of(

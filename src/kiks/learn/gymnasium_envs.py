@@ -75,19 +75,44 @@ class KheperaEnv(gymnasium.Env[Floats32, Floats32]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Floats32, dict[str, Any]]:
-        """Begin an episode; the same seed gives the same episode."""
+        """Begin an episode; the same seed gives the same episode.
+
+        Example:
+            >>> from kiks.learn.gymnasium_envs import KheperaEnv
+            >>> seen, info = KheperaEnv("Avoid").reset(seed=1)
+            >>> seen.shape
+            (8,)
+        """
         super().reset(seed=checked_seed(seed))
         self.episodes.begin([0], [seed])
         return self.episodes.observations()[0, 0], self._info()
 
     def step(self, action: Floats32) -> tuple[Floats32, float, bool, bool, dict[str, Any]]:
-        """Set the wheels' speeds, wait for the next loop, and sense."""
+        """Set the wheels' speeds, wait for the next loop, and sense.
+
+        Example:
+            >>> import numpy as np
+            >>> from kiks.learn.gymnasium_envs import KheperaEnv
+            >>> env = KheperaEnv("Avoid")
+            >>> _ = env.reset(seed=1)
+            >>> seen, reward, terminated, truncated, info = env.step(np.array([0.5, 0.5], np.float32))
+            >>> seen.shape, terminated, truncated
+            ((8,), False, False)
+        """
         reward = self.episodes.step([action])[0, 0]
         is_over = bool(self.episodes.terminations()[0])
         return self.episodes.observations()[0, 0], float(reward), is_over, False, self._info()
 
     def render(self) -> Any:
-        """Return a picture from above, uint8 [row, column, 3]; None without a render mode."""
+        """Return a picture from above, uint8 [row, column, 3]; None without a render mode.
+
+        Example:
+            >>> from kiks.learn.gymnasium_envs import KheperaEnv
+            >>> env = KheperaEnv("Avoid", render_mode="rgb_array")
+            >>> _ = env.reset(seed=1)
+            >>> env.render().shape
+            (480, 480, 3)
+        """
         return None if self.render_mode is None else self.episodes.picture(0)
 
     def _info(self) -> dict[str, Any]:
@@ -160,6 +185,12 @@ class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[An
             seed: World k gets `seed` + k; or a list with a seed for each. Without one, each world continues its random
                 numbers.
             options: "reset_mask" selects worlds, bool [world].
+
+        Example:
+            >>> from kiks.learn.gymnasium_envs import KheperaVectorEnv
+            >>> seen, info = KheperaVectorEnv(4, "Avoid").reset(seed=1)
+            >>> seen.shape
+            (4, 8)
         """
         mask = options.get("reset_mask") if isinstance(options, dict) else None
         if mask is not None and not (
@@ -181,6 +212,15 @@ class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[An
         Returns:
             Observations, float32 [world, sensor]; rewards [world]; whether each world has reached its end [world], and
             whether it was truncated [world]; and what Gymnasium calls info.
+
+        Example:
+            >>> import numpy as np
+            >>> from kiks.learn.gymnasium_envs import KheperaVectorEnv
+            >>> envs = KheperaVectorEnv(4, "Avoid")
+            >>> _ = envs.reset(seed=1)
+            >>> seen, rewards, terminations, truncations, info = envs.step(np.zeros((4, 2), np.float32))
+            >>> rewards.shape, terminations.any()
+            ((4,), np.False_)
         """
         if self.autoreset_mode is AutoresetMode.DISABLED and self._done.any():
             raise ParameterError(
@@ -203,7 +243,15 @@ class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[An
         return self.episodes.observations()[:, 0], rewards, terminations, truncations, self._infos() | final
 
     def render(self) -> tuple[Any, ...] | None:
-        """Return a picture of each world, uint8 [row, column, 3]; None without a render mode."""
+        """Return a picture of each world, uint8 [row, column, 3]; None without a render mode.
+
+        Example:
+            >>> from kiks.learn.gymnasium_envs import KheperaVectorEnv
+            >>> envs = KheperaVectorEnv(2, "Avoid", render_mode="rgb_array")
+            >>> _ = envs.reset(seed=1)
+            >>> len(envs.render())
+            2
+        """
         return None if self.render_mode is None else tuple(map(self.episodes.picture, range(self.num_envs)))
 
     # ---- inside ----

@@ -65,17 +65,36 @@ class KheperaTeam(ParallelEnv[str, Floats32, Floats32]):  # type: ignore[misc, u
         self.action_spaces = {agent: actions for agent, (_, actions) in spaces.items()}
 
     def observation_space(self, agent: str) -> Any:
-        """Return the observation space of a robot."""
+        """Return the observation space of a robot.
+
+        Example:
+            >>> from kiks.learn.pettingzoo_env import KheperaTeam
+            >>> KheperaTeam("Gather", robots=3).observation_space("robot_1").shape
+            (8,)
+        """
         return self.observation_spaces[agent]
 
     def action_space(self, agent: str) -> Any:
-        """Return the action space of a robot."""
+        """Return the action space of a robot.
+
+        Example:
+            >>> from kiks.learn.pettingzoo_env import KheperaTeam
+            >>> KheperaTeam("Gather", robots=3).action_space("robot_1").shape
+            (2,)
+        """
         return self.action_spaces[agent]
 
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Floats32], dict[str, dict[str, Any]]]:
-        """Begin an episode; the same seed gives the same episode."""
+        """Begin an episode; the same seed gives the same episode.
+
+        Example:
+            >>> from kiks.learn.pettingzoo_env import KheperaTeam
+            >>> seen, infos = KheperaTeam("Gather", robots=3).reset(seed=1)
+            >>> sorted(seen)
+            ['robot_1', 'robot_2', 'robot_3']
+        """
         self.episodes.begin([0], [checked_seed(seed)])
         self.agents = list(self.possible_agents)
         return self._by_agent(self.episodes.observations()[0]), self._infos()
@@ -83,7 +102,16 @@ class KheperaTeam(ParallelEnv[str, Floats32, Floats32]):  # type: ignore[misc, u
     def step(
         self, actions: dict[str, Floats32]
     ) -> tuple[dict[str, Floats32], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]]:
-        """Let all robots act, then read their sensors."""
+        """Let all robots act, then read their sensors.
+
+        Example:
+            >>> from kiks.learn.pettingzoo_env import KheperaTeam
+            >>> team = KheperaTeam("Gather", robots=3)
+            >>> _ = team.reset(seed=1)
+            >>> seen, rewards, *_ = team.step({agent: team.action_space(agent).sample() for agent in team.agents})
+            >>> len(rewards)
+            3
+        """
         if not self.agents or not isinstance(actions, dict) or set(actions) != set(self.agents):
             raise ParameterError(
                 f"actions must be given for {', '.join(self.agents) or 'no robot: the episode is over, call reset()'}, "
@@ -104,7 +132,15 @@ class KheperaTeam(ParallelEnv[str, Floats32, Floats32]):  # type: ignore[misc, u
         return result
 
     def render(self) -> Any:
-        """Return a picture from above, uint8 [row, column, 3]; None without a render mode."""
+        """Return a picture from above, uint8 [row, column, 3]; None without a render mode.
+
+        Example:
+            >>> from kiks.learn.pettingzoo_env import KheperaTeam
+            >>> team = KheperaTeam("Gather", robots=3, render_mode="rgb_array")
+            >>> _ = team.reset(seed=1)
+            >>> team.render().ndim
+            3
+        """
         return None if self.render_mode is None else self.episodes.picture(0)
 
     def _by_agent(self, values: Any) -> dict[str, Any]:

@@ -130,7 +130,13 @@ class Side:
 
     @property
     def parameter_count(self) -> int:
-        """Number of parameters of its controller."""
+        """Number of parameters of its controller.
+
+        Example:
+            >>> import kiks
+            >>> kiks.Side("prey", kiks.controllers.linear()).parameter_count
+            18
+        """
         return self.controller.parameter_count or 0
 
     @cached_property
@@ -266,7 +272,14 @@ class Task(Experiment):
 
     @property
     def timings(self) -> tuple[Timing, ...]:
-        """The timings that worlds take in turn."""
+        """The timings that worlds take in turn.
+
+        Example:
+            >>> import kiks
+            >>> task = kiks.tasks.avoid(seconds=1, worlds=3)
+            >>> task.timings
+            (Timing(period_s=0.06, baud=9600, think_s=0.0),)
+        """
         return self.timing if isinstance(self.timing, tuple) else (self.timing,)
 
     @property
@@ -284,7 +297,14 @@ class Task(Experiment):
 
     @property
     def controllers(self) -> list[Controller]:
-        """The controller of each robot of a world."""
+        """The controller of each robot of a world.
+
+        Example:
+            >>> import kiks
+            >>> task = kiks.tasks.avoid(seconds=1, worlds=3)
+            >>> task.controllers
+            [<Controller 'linear': proximity; 18 parameters>]
+        """
         return [side.controller for side in self.sides for _ in range(side.robots)]
 
     @property
@@ -312,7 +332,15 @@ class Task(Experiment):
         return float(self.worlds * len(self.controllers) * self.seconds)
 
     def parameters_of(self, candidates: Floats) -> list[Floats]:
-        """Return the parameters of each robot of a world, float64 [..., parameter] of candidates [..., parameter]."""
+        """Return the parameters of each robot of a world, float64 [..., parameter] of candidates [..., parameter].
+
+        Example:
+            >>> import numpy as np
+            >>> import kiks
+            >>> task = kiks.tasks.avoid(seconds=1, worlds=3)
+            >>> [each.shape for each in task.parameters_of(np.zeros((5, 18)))]
+            [(5, 18)]
+        """
         parts = np.split(candidates, [self.sides[0].parameter_count], axis=-1)
         return [part for side, part in zip(self.sides, parts, strict=False) for _ in range(side.robots)]
 
@@ -320,6 +348,13 @@ class Task(Experiment):
         """Return the starts of candidates with such seeds, float64 [candidate and world, robot, 3].
 
         They are the same for the same seed; None for those of the arena.
+
+        Example:
+            >>> import numpy as np
+            >>> import kiks
+            >>> task = kiks.tasks.avoid(seconds=1, worlds=3)
+            >>> task.start_poses(np.array([1, 2])).shape
+            (6, 1, 3)
         """
         if self.starts == "arena":
             return None
@@ -331,7 +366,13 @@ class Task(Experiment):
         return np.concatenate([poses[seed] for seed in seeds.tolist()])
 
     def world(self) -> Project:
-        """Return the world in which its champions are shown: that of their exam, or of training if there is none."""
+        """Return the world in which its champions are shown: that of their exam, or of training if there is none.
+
+        Example:
+            >>> import kiks
+            >>> kiks.tasks.maze().world().arena.name
+            'kheperax'
+        """
         if self.exam is not None:
             return self.exam.world(self.sides[0].specs[0], self.robots)
         poses = self.start_poses(np.zeros(1, np.int64))
@@ -347,6 +388,13 @@ class Task(Experiment):
             parameters: Its parameters, float64 [parameter].
             seed: Its seed.
             world: Number of the world, from 0.
+
+        Example:
+            >>> import numpy as np
+            >>> import kiks
+            >>> task = kiks.tasks.avoid(seconds=1, worlds=3)
+            >>> task.individual(np.array([0.5, 0.5] + [0.0] * 16), seed=1, world=2)
+            <Champion of 'avoid': <Controller 'linear': proximity; 18 parameters>, fitness 0>
         """
         if self.against is not None:
             raise ParameterError(f"the task must have one side, but {self.name} has two. Show its champions instead.")
@@ -369,6 +417,12 @@ class Task(Experiment):
         """Return the fingerprint of each argument on which the values of candidates or the exam depend, by its name.
 
         They are the same in each process, in each folder and on each computer (`kiks.learn.fingerprint`).
+
+        Example:
+            >>> import kiks
+            >>> task = kiks.tasks.avoid(seconds=1, worlds=3)
+            >>> list(task.digest())[:3]
+            ['arenas', 'controller', 'measures']
         """
         counted = {each.name: getattr(self, each.name) for each in fields(self) if each.name not in _UNCOUNTED}
         first, *others = (

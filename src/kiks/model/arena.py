@@ -172,6 +172,16 @@ class Arena:
         Args:
             path: A PNG, TIF, PGM or BMP file.
             mm_per_pixel: Edge of a pixel [mm].
+
+        Example:
+            >>> import tempfile
+            >>> from pathlib import Path
+            >>> import kiks
+            >>> from PIL import Image
+            >>> file = Path(tempfile.mkdtemp(), "room.png")
+            >>> Image.fromarray(kiks.Arena.box(200, 100).brightness).save(file)
+            >>> kiks.Arena.from_image(file, mm_per_pixel=2)
+            <Arena 'room': 400 x 200 mm>
         """
         from kiks.model.picture import read_picture
 
@@ -282,7 +292,13 @@ class Arena:
 
     @property
     def surface(self) -> npt.NDArray[np.uint8]:
-        """Brightness with the border of the world around it: uint8 [row + 2 PAD, column + 2 PAD], border 255."""
+        """Brightness with the border of the world around it: uint8 [row + 2 PAD, column + 2 PAD], border 255.
+
+        Example:
+            >>> import kiks
+            >>> kiks.Arena.box(100, 120).surface.shape  # [row, column], 120 and 100 mm with PAD, 2 mm, at each side
+            (124, 104)
+        """
         return self._tables.surface
 
     @property
@@ -290,12 +306,23 @@ class Arena:
         """Distance from each cell's centre to that of the nearest wall cell [mm].
 
         float32 [row + 2 PAD, column + 2 PAD], exact (Euclidean), 0 in wall cells; the border of the world is wall.
+
+        Example:
+            >>> import kiks
+            >>> kiks.Arena.box(100, 100).clearance.max().round()
+            np.float32(40.0)
         """
         return self._tables.clearance
 
     @property
     def rooms(self) -> npt.NDArray[np.float32]:
-        """The least `clearance` in each block of 16 x 16 cells [mm]: far from walls, one look-up in a small table."""
+        """The least `clearance` in each block of 16 x 16 cells [mm]: far from walls, one look-up in a small table.
+
+        Example:
+            >>> import kiks
+            >>> kiks.Arena.box(100, 100).rooms.shape
+            (7, 7)
+        """
         return self._tables.rooms
 
     @property
@@ -303,6 +330,11 @@ class Arena:
         """Free distance from any point of a cell in any direction [1/16 cells], and the brightness of walls.
 
         int16 [row + 2 PAD, column + 2 PAD], rounded down; wall cells have their brightness, negative.
+
+        Example:
+            >>> import kiks
+            >>> int(kiks.Arena.box(100, 100).leaps.min())  # minus the brightness of the walls
+            -255
         """
         return self._tables.leaps
 
@@ -313,6 +345,12 @@ class Arena:
         int32 [row + 2 PAD, column + 2 PAD]: three numbers with signs in one (`kiks.model.raster.unpack_faces`), the
         first in the highest bits: x and y of a unit vector straight into the wall [1/1023], 11 bits each, and how far
         that way its surface is from the cell's centre [1/256 cells], 10 bits; 0 for all other cells.
+
+        Example:
+            >>> import kiks
+            >>> arena = kiks.Arena.box(100, 100)
+            >>> arena.faces.shape == arena.surface.shape
+            True
         """
         return self._tables.faces
 

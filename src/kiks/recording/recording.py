@@ -74,7 +74,19 @@ class Recording:
 
     @property
     def is_whole(self) -> bool:
-        """Whether the run that wrote it came to its end."""
+        """Whether the run that wrote it came to its end.
+
+        Example:
+            >>> import tempfile
+            >>> from pathlib import Path
+            >>> import kiks
+            >>> file = Path(tempfile.mkdtemp(), "run.mcap")
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> with sim.record(file):
+            ...     sim.run(1.5)
+            >>> kiks.Recording(file).is_whole
+            True
+        """
         return not isinstance(self._reader, McapReader) or self._reader.is_whole
 
     @cached_property
@@ -105,7 +117,7 @@ class Recording:
             >>> with sim.record(file):
             ...     sim.run(2.5)
             >>> kiks.Recording(file).what
-            'office, seed 1'
+            'Office, seed 1'
         """
         programs = ", ".join(dict.fromkeys(name.partition("-")[2] or name for name in self.programs))
         ran = " in ".join(filter(None, (programs, self.start.arena.name)))
@@ -113,7 +125,19 @@ class Recording:
 
     @property
     def title(self) -> str:
-        """What ran, and for how long."""
+        """What ran, and for how long.
+
+        Example:
+            >>> import tempfile
+            >>> from pathlib import Path
+            >>> import kiks
+            >>> file = Path(tempfile.mkdtemp(), "run.mcap")
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> with sim.record(file):
+            ...     sim.run(1.5)
+            >>> kiks.Recording(file).title
+            'box, seed 1, 1.5 s'
+        """
         return f"{self.what}, {self.duration_s:.1f} s"
 
     def project_at(self, time_s: float) -> Project:
@@ -146,7 +170,19 @@ class Recording:
         return range(1, len(self.log.state_before(self.log.end_ns).specs) + 1)
 
     def check_robot(self, robot: object, advice: str = "", name: str = "robot") -> int:
-        """Return the number of a robot."""
+        """Return the number of a robot.
+
+        Example:
+            >>> import tempfile
+            >>> from pathlib import Path
+            >>> import kiks
+            >>> file = Path(tempfile.mkdtemp(), "run.mcap")
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> with sim.record(file):
+            ...     sim.run(1.5)
+            >>> kiks.Recording(file).check_robot(1)
+            1
+        """
         if not self.robots:
             raise ParameterError(f"{self._reader.what} must have a robot for this, but its world has none.")
         return check_count(name, robot, 1, len(self.robots), advice)
@@ -235,7 +271,19 @@ class Recording:
         return self.replay(time_s).let_go()
 
     def replay(self, time_s: float | None = None) -> Replay:
-        """Return the run from a time on, as a simulation that the recorded inputs move."""
+        """Return the run from a time on, as a simulation that the recorded inputs move.
+
+        Example:
+            >>> import tempfile
+            >>> from pathlib import Path
+            >>> import kiks
+            >>> file = Path(tempfile.mkdtemp(), "run.mcap")
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> with sim.record(file):
+            ...     sim.run(1.5)
+            >>> kiks.Recording(file).replay(1.0).sim.time_s
+            1.0
+        """
         return Replay(self.log, self.log.begin_ns if time_s is None else self.time_ns(time_s))
 
     def plot(self, *, robot: int = 1) -> Figure:
@@ -246,6 +294,17 @@ class Recording:
 
         Returns:
             A Matplotlib figure, which notebooks show.
+
+        Example:
+            >>> import tempfile
+            >>> from pathlib import Path
+            >>> import kiks
+            >>> file = Path(tempfile.mkdtemp(), "run.mcap")
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> with sim.record(file):
+            ...     sim.run(1.5)
+            >>> len(kiks.Recording(file).plot(robot=1).axes) > 1
+            True
         """
         figure: Figure = upwards.plot_recordings([self], robot=robot)
         return figure
@@ -269,7 +328,19 @@ class Recording:
         upwards.export_recording(self, path, kind=kind, **options)
 
     def time_ns(self, time_s: float, name: str = "time_s") -> int:
-        """Return a time of the recording [ns]."""
+        """Return a time of the recording [ns].
+
+        Example:
+            >>> import tempfile
+            >>> from pathlib import Path
+            >>> import kiks
+            >>> file = Path(tempfile.mkdtemp(), "run.mcap")
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> with sim.record(file):
+            ...     sim.run(1.5)
+            >>> kiks.Recording(file).time_ns(1.0)
+            1000000000
+        """
         begin_s, end_s = s_from_ns(self.log.begin_ns), s_from_ns(self.log.end_ns)
         time_s = check_number(name, time_s, begin_s, end_s, "That is where the recording begins and ends.")
         return min(max(ns_from_s(time_s), self.log.begin_ns), self.log.end_ns)

@@ -111,7 +111,14 @@ class Simulation:
 
     @classmethod
     def of_world(cls, world: World, thinking: str = "none", program: ProgramClock | None = None) -> Simulation:
-        """Return the simulation of a world at its start; the computing on its ports costs what `program` says."""
+        """Return the simulation of a world at its start; the computing on its ports costs what `program` says.
+
+        Example:
+            >>> import kiks
+            >>> from kiks.sim.world import World
+            >>> kiks.Simulation.of_world(World(kiks.Arena.box(500, 500), [kiks.RobotSpec.load("khepera")], seed=1))
+            <Simulation: 1 robot in 'box' at 0.000 s, seed 1>
+        """
         sim = cls.__new__(cls)
         sim._begin(world, thinking, program)
         return sim
@@ -294,24 +301,55 @@ class Simulation:
             self.loop.advance_to(self.now_ns + passing_ns)
 
     def advance_to(self, time_ns: int) -> None:
-        """Let time pass up to a time [ns]; does nothing if that has passed already."""
+        """Let time pass up to a time [ns]; does nothing if that has passed already.
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> sim.advance_to(1_000_000_000)
+            >>> sim.time_s
+            1.0
+        """
         self.loop.advance_to(time_ns)
 
     def next_event_ns(self) -> int | None:
-        """Return when a robot acts next [ns]; None while all of them wait for characters."""
+        r"""Return when a robot acts next [ns]; None while all of them wait for characters.
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> sim.next_event_ns() is None
+            True
+            >>> _ = sim.port(1).write(b"N\n")
+            >>> sim.next_event_ns() / 1e6  # in milliseconds
+            3.291666
+        """
         return self.loop.next_event_ns()
 
     def sync(self) -> None:
         """Do the ticks that have begun, take the pictures that are due on the way, and deliver radio messages.
 
         The engine is behind the clock until the state is read.
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> sim.run(1.0)
+            >>> sim.sync()  # what a call that reads the state does by itself
         """
         self._turrets.sync()
 
     # ---- robots ----
 
     def index_of(self, robot: int) -> int:
-        """Return the index of a robot by its number."""
+        """Return the index of a robot by its number.
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> sim.index_of(1)
+            0
+        """
         return self.world.index_of(robot)
 
     def pose(self, robot: int) -> tuple[float, float, float]:
@@ -419,7 +457,16 @@ class Simulation:
         return tuple(self.wires[self.index_of(robot)].firmware.fitted)
 
     def port(self, robot: int) -> SimPort:
-        """Return the computer's end of a robot's line: one object, always the same until it is closed."""
+        r"""Return the computer's end of a robot's line: one object, always the same until it is closed.
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> port = sim.port(1)
+            >>> _ = port.write(b"E\n")
+            >>> port.readline()
+            b'e,0,0\r\n'
+        """
         index = self.index_of(robot)
         if index not in self._ports or self._ports[index].line is CLOSED:
             self._ports[index] = SimPort(self, robot)
@@ -818,7 +865,14 @@ class Simulation:
             return self._turrets.cameras.expect(index)
 
     def look(self) -> Snapshot:
-        """Return where everything is at this instant, and what all sensors see. This changes nothing."""
+        """Return where everything is at this instant, and what all sensors see. This changes nothing.
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> sim.look().poses.shape
+            (1, 3)
+        """
         with self._up_to_date() as world:
             return look(world)
 
@@ -852,6 +906,15 @@ class Simulation:
 
         Returns:
             A Matplotlib figure, which notebooks show.
+
+        Example:
+            >>> import tempfile
+            >>> from pathlib import Path
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> with sim.record(Path(tempfile.mkdtemp(), "run.mcap")):
+            ...     sim.run(1.5)
+            ...     figure = sim.plot()
         """
         figure: Figure = plot_simulation(self, robot=robot)
         return figure
@@ -899,7 +962,17 @@ class Simulation:
             return self._recorded().array()
 
     def body_paths(self) -> dict[int, list[tuple[float, float]]]:
-        """Return where balls and cylinders were since `record_paths`, by their numbers: x_mm, y_mm."""
+        """Return where balls and cylinders were since `record_paths`, by their numbers: x_mm, y_mm.
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> ball = sim.add_ball(100, 100)
+            >>> sim.record_paths()
+            >>> sim.run(0.5)
+            >>> list(sim.body_paths()) == [ball]
+            True
+        """
         with self.lock:
             return self._recorded().of_bodies()
 
@@ -939,6 +1012,15 @@ class Simulation:
 
         Raises:
             LinkError: If the page cannot be served there.
+
+        Example:
+            >>> import kiks
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> shown = sim.show(browser=False)  # doctest: +ELLIPSIS
+            The desk: http://127.0.0.1:...
+            >>> shown.url.startswith("http://127.0.0.1:")
+            True
+            >>> shown.close()
         """
         view: View = show_in_browser(self, speed=speed, is_alive=is_alive, port=port, browser=browser)
         return view
