@@ -94,6 +94,7 @@ def test_axe_finds_nothing_serious(visitor: Visitor) -> None:
             visitor.page.mouse.move(5, 400)
             if tab == "robot":
                 visitor.at("proximity-0").click()
+                expect(visitor.at("explanation")).to_be_visible()
             check_access(visitor.page, f"{tab}, {theme}")
             visitor.picture(f"{tab}_{theme.lower()}")
         for opener in ("help", "layers", "follow"):
