@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 import sys
 import typing
 from pathlib import Path
@@ -21,7 +22,7 @@ copyright = "KiKS contributors"
 version = release = kiks.__version__
 
 extensions = [
-    "myst_parser",
+    "myst_nb",
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
     "sphinx.ext.napoleon",
@@ -29,13 +30,20 @@ extensions = [
     "sphinx_gallery.gen_gallery",
 ]
 # What is for developers only, and the programs that make pages.
-exclude_patterns = ["next.md", "pages", "gallery/**/GALLERY_HEADER.rst"]
+exclude_patterns = ["next.md", "pages", "gallery/**/GALLERY_HEADER.rst", "gallery/**/*.ipynb"]
 
 # A reference to something of KiKS must lead somewhere. Those to other libraries would need the network.
 nitpicky = True
 nitpick_ignore_regex = [("py:.*", r"(?!kiks\.).*|kiks\.(?!controllers|measures|tasks)[a-z_]+\..*")]
 
 myst_heading_anchors = 3
+
+# Notebooks run at each build, so that their pages show what a reader will see; tests/test_notebooks.py runs them, too.
+nb_execution_mode = "force"
+nb_execution_in_temp = True
+nb_execution_raise_on_error = True
+nb_execution_timeout = 300
+nb_merge_streams = True
 
 # What users write as `kiks.measures` lies elsewhere, where autodoc does not look.
 for name in ("controllers", "measures", "tasks"):
@@ -127,7 +135,8 @@ def help_readers_and_keys(app, page, template, context, doctree):
 
 
 def write_pages(app):
-    """Write the pages that are made from what commands and files say of themselves, if they have changed."""
+    """Write the pages that are made from what commands and files say of themselves, if they have changed; notebooks."""
+    shutil.copytree(gallery.ROOT / "examples" / "notebooks", Path(app.srcdir) / "notebooks", dirs_exist_ok=True)
     for name, made in {"commands": commands.page(), "files": files.page()}.items():
         path = Path(app.srcdir) / "reference" / f"{name}.md"
         if not path.exists() or path.read_text(encoding="utf-8") != made:

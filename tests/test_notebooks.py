@@ -7,11 +7,14 @@ import subprocess
 import sys
 from base64 import b64decode
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
+import nbformat
 import numpy as np
 import pytest
 from jupyter_client.manager import start_new_kernel
+from nbclient import NotebookClient
 from PIL import Image, ImageChops
 from tests.at_length import cases
 from tests.guard import GUARD_S
@@ -22,6 +25,8 @@ from kiks.batch.rollouts import Rollouts
 from kiks.learn.exam import ExamResult
 
 pytestmark = pytest.mark.slow
+
+NOTEBOOKS = Path(__file__).parents[1] / "examples" / "notebooks"
 
 OF_DESK = "sim = kiks.Simulation(robots=2)\n"
 
@@ -101,6 +106,17 @@ def test_a_terminal_has_the_address_once(words: list[str]) -> None:
     said = subprocess.run([sys.executable, *words, script], capture_output=True, text=True, timeout=GUARD_S, check=True)
     (line,) = [line for line in said.stdout.splitlines() if "http" in line]
     assert line.startswith("The desk: http://127.0.0.1:")
+
+
+@pytest.mark.parametrize("name", sorted(path.stem for path in NOTEBOOKS.glob("*.ipynb")))
+def test_a_notebook_of_the_examples_runs_and_shows_pictures(name: str, tmp_path: Path) -> None:
+    notebook = nbformat.read(NOTEBOOKS / f"{name}.ipynb", 4)
+    cells = [cell for cell in notebook.cells if cell.cell_type == "code"]
+    assert not any(cell.outputs for cell in cells), "outputs are not committed: they are large, and the site makes them"
+    settings: dict[str, Any] = {"metadata": {"path": str(tmp_path)}}
+    NotebookClient(notebook, kernel_name="python3", timeout=int(GUARD_S), resources=settings).execute()
+    pictures = [output for cell in cells for output in cell.outputs if "image/png" in output.get("data", {})]
+    assert len(pictures) > 1
 
 
 def picture_of(thing: Any) -> tuple[bytes, dict[str, int]]:

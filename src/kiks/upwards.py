@@ -99,7 +99,7 @@ record_simulation = Hook("kiks.recording.recorder", "RunRecorder")
 plot_simulation = Hook("kiks.export.figures", "figure_of_run")
 """Draws figures of a simulation that is being recorded."""
 
-plot_recordings = Hook("kiks.export.figures", "figure_of")
+plot_recordings = Hook("kiks.export.figures", "plot")
 """Draws figures of recordings."""
 
 export_recording = Hook("kiks.export.kinds", "export")
