@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import builtins
+import dataclasses
 import importlib
 import inspect
 import re
@@ -51,21 +52,44 @@ def test_every_name_has_an_example(name: str) -> None:
     assert ">>> " in ((NAMES | CALLABLES)[name].__doc__ or ""), name
 
 
-@pytest.mark.parametrize("name", sorted(CALLABLES))
-def test_returned_arrays_have_shapes(name: str) -> None:
-    if "NDArray" in str(CALLABLES[name].__annotations__.get("return", "")):
-        assert re.search(r"\[[\w ,.+]+\]", CALLABLES[name].__doc__ or ""), name
+ARRAY = re.compile(r"NDArray|ArrayLike|Floats|Integers")
+"""What the annotation of an array contains."""
+
+SHAPE = re.compile(r"\[[\w ,.+]+\]")
+
+
+def sections_of(name: str) -> dict[str, str]:
+    """Return the parts of a docstring by their headings; what stands before the first has the heading ''."""
+    text = "\n:\n" + inspect.cleandoc((NAMES | CALLABLES)[name].__doc__ or "")
+    return dict(re.findall(r"^([A-Z]\w+|):\n((?:.*\n?)*?)(?=^[A-Z]\w+:\n|\Z)", text, flags=re.MULTILINE))
+
+
+def entries_of(section: str) -> dict[str, str]:
+    return dict(re.findall(r"^    \*{0,2}(\w+): (.*(?:\n {5,}.*)*)", section, flags=re.MULTILINE))
 
 
 @pytest.mark.parametrize("name", sorted(NAMES.keys() | CALLABLES.keys()))
-def test_arguments_have_units_and_errors_exist(name: str) -> None:
-    text = inspect.cleandoc((NAMES | CALLABLES)[name].__doc__ or "")
-    sections = dict(re.findall(r"^(Args|Raises):\n((?: .*\n?|\n)+)", text, flags=re.MULTILINE))
-    for argument, meaning in re.findall(r"^    (\w+): (.*(?:\n {5,}.*)*)", sections.get("Args", ""), re.MULTILINE):
+def test_arrays_have_shapes(name: str) -> None:
+    each, sections = (NAMES | CALLABLES)[name], sections_of(name)
+    explained = entries_of(sections.get("Args", "")) | entries_of(sections.get("Attributes", ""))
+    is_record = dataclasses.is_dataclass(each)
+    annotations = getattr(each.__init__ if inspect.isclass(each) and not is_record else each, "__annotations__", {})
+    for argument, annotation in annotations.items():
+        if ARRAY.search(str(annotation)):
+            # A short docstring explains what there is in its text.
+            meaning = sections.get("Returns") if argument == "return" else explained.get(argument)
+            assert SHAPE.search(meaning or sections[""]), f"{name}: {argument}"
+
+
+@pytest.mark.parametrize("name", sorted(NAMES.keys() | CALLABLES.keys()))
+def test_quantities_have_units_and_errors_exist(name: str) -> None:
+    sections = sections_of(name)
+    quantities = entries_of(sections.get("Args", "")) | entries_of(sections.get("Attributes", ""))
+    for argument, meaning in quantities.items():
         unit = UNITS.get(argument.rpartition("_")[2])
         if unit and "_" in argument:
             assert re.search(rf"\[({unit})[\];,]|\[[^\]]*\b({unit})\b", meaning), f"{name}: {argument}: {meaning}"
-    for error in re.findall(r"^    (\w+): ", sections.get("Raises", ""), flags=re.MULTILINE):
+    for error in entries_of(sections.get("Raises", "")):
         assert hasattr(kiks.errors, error) or hasattr(builtins, error), f"{name}: {error}"
 
 

@@ -217,12 +217,17 @@ class Batch:
 
     @_alone
     def take_arenas(self, worlds: NDArray[np.int64], arenas: Sequence[int]) -> None:
-        """Give worlds other arenas of the batch, by their indices, with the lamps of these; `reset` begins there.
+        """Give worlds other arenas of the batch, with the lamps of these; `reset` begins there.
+
+        Args:
+            worlds: Indices of the worlds, int64 [index].
+            arenas: For each of them the index of its arena.
 
         Example:
+            >>> import numpy as np
             >>> import kiks
             >>> batch = kiks.Batch([kiks.Arena.box(500, 500), kiks.Arena.box(900, 900)], worlds=2)
-            >>> batch.take_arenas([0], [1])
+            >>> batch.take_arenas(np.array([0]), [1])
             >>> readings = batch.reset()  # now both worlds are 900 x 900 mm
         """
         self.arena_indices[worlds] = arenas
@@ -239,7 +244,7 @@ class Batch:
         """Reset worlds to their initial state, and let their robots sense for the first time.
 
         Args:
-            worlds: Indices of the worlds, or a bool for each world; all if left out.
+            worlds: Indices of the worlds [index], or a bool for each, bool [world]; all if left out.
             seeds: New seeds of these worlds, int64 [chosen world].
             starts: New start poses of their robots, float64 [chosen world, robot, 3].
 

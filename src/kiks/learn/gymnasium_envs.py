@@ -77,6 +77,9 @@ class KheperaEnv(gymnasium.Env[Floats32, Floats32]):
     ) -> tuple[Floats32, dict[str, Any]]:
         """Begin an episode; the same seed gives the same episode.
 
+        Returns:
+            The observation, float32 [sensor], and what Gymnasium calls info.
+
         Example:
             >>> from kiks.learn.gymnasium_envs import KheperaEnv
             >>> seen, info = KheperaEnv("Avoid").reset(seed=1)
@@ -89,6 +92,13 @@ class KheperaEnv(gymnasium.Env[Floats32, Floats32]):
 
     def step(self, action: Floats32) -> tuple[Floats32, float, bool, bool, dict[str, Any]]:
         """Set the wheels' speeds, wait for the next loop, and sense.
+
+        Args:
+            action: Speeds of the wheels from -1 to 1, shares of the speed limit, float32 [2].
+
+        Returns:
+            Observation, float32 [sensor]; reward; whether the episode has reached its end; whether it was truncated; and
+            what Gymnasium calls info.
 
         Example:
             >>> import numpy as np
@@ -185,6 +195,9 @@ class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[An
             seed: World k gets `seed` + k; or a list with a seed for each. Without one, each world continues its random
                 numbers.
             options: "reset_mask" selects worlds, bool [world].
+
+        Returns:
+            Observations, float32 [world, sensor], and what Gymnasium calls info.
 
         Example:
             >>> from kiks.learn.gymnasium_envs import KheperaVectorEnv

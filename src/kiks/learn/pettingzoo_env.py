@@ -89,6 +89,9 @@ class KheperaTeam(ParallelEnv[str, Floats32, Floats32]):  # type: ignore[misc, u
     ) -> tuple[dict[str, Floats32], dict[str, dict[str, Any]]]:
         """Begin an episode; the same seed gives the same episode.
 
+        Returns:
+            For each robot its observation, float32 [sensor], and what PettingZoo calls info.
+
         Example:
             >>> from kiks.learn.pettingzoo_env import KheperaTeam
             >>> seen, infos = KheperaTeam("Gather", robots=3).reset(seed=1)
@@ -103,6 +106,13 @@ class KheperaTeam(ParallelEnv[str, Floats32, Floats32]):  # type: ignore[misc, u
         self, actions: dict[str, Floats32]
     ) -> tuple[dict[str, Floats32], dict[str, float], dict[str, bool], dict[str, bool], dict[str, dict[str, Any]]]:
         """Let all robots act, then read their sensors.
+
+        Args:
+            actions: For each robot the speeds of its wheels from -1 to 1, shares of the speed limit, float32 [2].
+
+        Returns:
+            For each robot: observation, float32 [sensor]; reward; whether the episode has reached its end; whether it was
+            truncated; and what PettingZoo calls info.
 
         Example:
             >>> from kiks.learn.pettingzoo_env import KheperaTeam
