@@ -97,8 +97,8 @@ class KheperaEnv(gymnasium.Env[Floats32, Floats32]):
             action: Speeds of the wheels from -1 to 1, shares of the speed limit, float32 [2].
 
         Returns:
-            Observation, float32 [sensor]; reward; whether the episode has reached its end; whether it was truncated; and
-            what Gymnasium calls info.
+            Observation, float32 [sensor]; reward; whether the episode has reached its end; whether it was truncated;
+            and what Gymnasium calls info.
 
         Example:
             >>> import numpy as np

@@ -111,8 +111,8 @@ class KheperaTeam(ParallelEnv[str, Floats32, Floats32]):  # type: ignore[misc, u
             actions: For each robot the speeds of its wheels from -1 to 1, shares of the speed limit, float32 [2].
 
         Returns:
-            For each robot: observation, float32 [sensor]; reward; whether the episode has reached its end; whether it was
-            truncated; and what PettingZoo calls info.
+            For each robot: observation, float32 [sensor]; reward; whether the episode has reached its end; whether it
+            was truncated; and what PettingZoo calls info.
 
         Example:
             >>> from kiks.learn.pettingzoo_env import KheperaTeam
