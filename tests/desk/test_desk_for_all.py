@@ -10,7 +10,7 @@ import pytest
 from nicegui import Client
 from playwright.sync_api import expect
 from tests.at_length import at_length, cases, share
-from tests.desk.visitor import NewPage, Visitor, check_access
+from tests.desk.visitor import NewPage, Visitor, check_access, check_reach
 
 from kiks.desk.panels.page import Page
 from kiks.desk.server.server import SERVER
@@ -30,20 +30,6 @@ FOCUS = """() => {
     return [each._number, name ?? each.ariaLabel ?? each.innerText, isSeen];
 }"""
 """Which element has the focus: a number of its own, a name, and whether one sees that it has it."""
-
-
-OUT_OF_REACH = """() => {
-    const roles = ["button", "tab", "slider", "checkbox", "switch", "radio"].map((role) => `[role=${role}]`);
-    const far = [];
-    for (const each of document.querySelectorAll(["button", "input", "a", ...roles])) {
-        if (!each.checkVisibility({ visibilityProperty: true })) continue;
-        const { left, right, width, height } = (each.closest(".q-field, .q-slider") ?? each).getBoundingClientRect();
-        if (width < 24 || height < 24 || left < 0 || right > innerWidth)
-            far.push(`${each.closest("[data-testid]")?.dataset.testid} ${width} x ${height} at ${left}`);
-    }
-    return far;
-}"""
-"""Controls that are smaller than a finger, or cut off at the edge of the screen."""
 
 
 def walk(visitor: Visitor) -> Iterator[str]:
@@ -134,7 +120,7 @@ def test_fingers_reach_everything_on_small_screens(new_page: NewPage, shown: Sho
         visitor.tab(tab)
         visitor.picture(f"{tab}_{width}x{height}")
         assert visitor.answer("document.documentElement.scrollWidth") == width
-        assert visitor.answer(OUT_OF_REACH) == [], tab
+        check_reach(visitor.page, tab)
     fingers = visitor.page.context.new_cdp_session(visitor.page)
     for kind, x_mm in (("touchStart", 150), ("touchMove", 180), ("touchMove", 200), ("touchEnd", None)):
         places = [] if x_mm is None else [dict(zip("xy", visitor.on_page(x_mm, 200), strict=True))]

@@ -40,6 +40,20 @@ STILL = """() => {
 }"""
 """Ends what moves or fades, and says whether all stood still already; the hint waits for half a minute."""
 
+OUT_OF_REACH = """() => {
+    const roles = ["button", "tab", "slider", "checkbox", "switch", "radio"].map((role) => `[role=${role}]`);
+    const far = [];
+    for (const each of document.querySelectorAll(["button", "input", "a", ...roles])) {
+        if (!each.checkVisibility({ visibilityProperty: true })) continue;
+        const target = each.closest("label, .q-field, .q-slider") ?? each;
+        const { left, right, width, height } = target.getBoundingClientRect();
+        if (width < 24 || height < 24 || left < 0 || right > innerWidth)
+            far.push(`${each.closest("[data-testid]")?.dataset.testid} ${width} x ${height} at ${left}`);
+    }
+    return far;
+}"""
+"""Controls that are smaller than a finger, or cut off at the edge of the screen."""
+
 INSIDE = {"robot": "proximity-0", "wire": "console", "arena": "save", "programs": "editor", "settings": "apply"}
 """Something in each tab."""
 
@@ -101,6 +115,11 @@ def check_access(page: Page, where: str) -> None:
         for node in rule["nodes"]
     ]
     assert not found, "\n".join(found)
+
+
+def check_reach(page: Page, where: str) -> None:
+    """Check that fingers hit all controls, and that none is cut off."""
+    assert not (far := page.evaluate(OUT_OF_REACH)), f"{where}: {far}"
 
 
 class Visitor:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pytest
 from tests.at_length import at_length
-from tests.desk.visitor import check_access
+from tests.desk.visitor import check_access, check_reach
 
 from kiks import Arena, Khepera, ParameterError, Recording, Simulation
 from kiks.export import page_contents as contents
@@ -363,12 +363,14 @@ def test_the_player_plays_jumps_and_ends(plain_page: Path, visit: Callable[..., 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("colours", ["light", "dark"])
-def test_axe_finds_nothing_serious(rich_page: Path, visit: Callable[..., Page], colours: str) -> None:
-    page = visit(rich_page, color_scheme=colours)
-    check_access(page, colours)
-    page.set_viewport_size({"width": 390, "height": 844})
-    check_access(page, f"{colours}, on a phone")
+def test_axe_finds_nothing_serious(rich_page: Path, visit: Callable[..., Page]) -> None:
+    page = visit(rich_page)
+    for colours in ("light", "dark"):
+        page.emulate_media(color_scheme=colours)
+        check_access(page, colours)
+    page = visit(rich_page, 390, 844, has_touch=True, is_mobile=True)
+    check_access(page, "phone")
+    check_reach(page, "phone")
 
 
 @at_length
