@@ -198,7 +198,7 @@ def test_on_a_full_disk_the_earlier_file_stays(ending: str, recording: Recording
 
 
 def mistakes() -> Iterator[tuple[str, dict[str, object], str]]:
-    yield "film.avi", {}, r"a film must end in .mp4 or .gif or .webp, but it was"
+    yield "film.avi", {}, r"a film must end in .mp4, .gif or .webp, but it was"
     yield "no/film.mp4", {}, "a film must go to a file that can be written"
     yield "film.mp4", {"size": (63, 64)}, "the width of size must be a whole number from 64 to 4096, but it was 63"
     yield "film.mp4", {"size": (64, 5000)}, "the height of size must be"

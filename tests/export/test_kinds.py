@@ -84,7 +84,7 @@ def test_each_ending_has_a_kind_whose_options_are_those_of_its_function() -> Non
 
 def test_mistakes_get_a_clear_error(recording: Recording, tmp_path: Path) -> None:
     for name, options, words in (
-        ("run.doc", {}, "the file must end in .mp4 or"),
+        ("run.doc", {}, "the file must end in .mp4, .gif"),
         ("run.png", {"fps": 5}, "fps must be left out of a picture, but it was 5"),
         ("run.mp4", {"robo": 5}, "Did you mean 'robot'?"),
         ("run.mp4", {"kind": "photo"}, "a photo must end in .png or .jpg"),

@@ -25,7 +25,7 @@ def compare(
     first: Annotated[Path, typer.Argument(help="A folder of kiks evolve, best with --seeds.")],
     second: Annotated[Path, typer.Argument(help="Another folder, with evolutions of the same task.")],
     picture: Annotated[
-        Path, typer.Option(help=f"File of the picture, {' or '.join(FIGURES)}.", callback=output(*FIGURES))
+        Path, typer.Option(help=f"File of the picture, {', '.join(FIGURES)}.", callback=output(*FIGURES))
     ] = Path("kiks-compare.png"),
 ) -> None:
     """Compare the evolutions in two folders.

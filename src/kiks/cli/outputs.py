@@ -183,7 +183,7 @@ def leave_out(context: typer.Context, when: str, *names: str) -> None:
     for param in context.command.params:
         source = context.get_parameter_source(param.name or "")
         if source and source.name == "COMMANDLINE" and param.name in names:
-            given = context.params.get(param.name or "")
+            given = context.params.get(param.name or "", True)
             value = shown(str(given) if isinstance(given, Path) else given)
             raise ParameterError(f"{_name(param)} must be left out {when}, but it was {value}.")
 

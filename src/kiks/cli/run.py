@@ -118,7 +118,7 @@ def run(
     if not desk:
         leave_out(context, "without --desk", "no_wait")
     else:
-        leave_out(context, "with --desk, where a person ends the run", "max_wall", "seconds")
+        leave_out(context, "with --desk, where a person ends the run", "max_wall", "seconds", "json")
     job = job_of(str(program), arguments or [], world)
     from kiks.ports.program_process import Labels
     from kiks.ports.program_scheduler import check_policy

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from kiks.export.sheet import INK, Sheet, font
+from kiks.export.sheet import INK, Sheet, text_font
 
 LETTERS_A_LINE = 38
 """Width of a picture in heights of its letters, which have 6.3 points in a column of a paper, 85 mm wide."""
@@ -71,7 +71,7 @@ class Caption:
         row, x = 0, 0.0
         words = [(text, None) for text in title.split(" ")] if title else []
         for text, sign in (*words, *((each.text, each) for each in signs)):
-            length = text_length(text, font=font(self._size))
+            length = text_length(text, font=text_font(self._size))
             length += 0 if sign is None else sign.letters * self._size
             is_first_sign = sign is not None and bool(signs) and sign is signs[0]
             if (is_first_sign and words) or (x and x + length > right):
@@ -91,7 +91,7 @@ class Caption:
                 scale = size / sign.letter_mm
                 sign.draw(Sheet(pen, scale, -x / scale, y / scale))
                 x += sign.letters * size
-            pen.text((x, y), text, fill=INK, font=font(size), anchor="lm")
+            pen.text((x, y), text, fill=INK, font=text_font(size), anchor="lm")
 
 
 def letter_pixels(width: float) -> float:

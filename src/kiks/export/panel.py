@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from kiks.export.looks import Colour, robot_colour
-from kiks.export.sheet import INK, font, mixed
+from kiks.export.sheet import INK, font, mixed, text_font
 from kiks.export.stage import Pixels
 from kiks.model.robot import SENSOR_COUNT
 from kiks.recording.moments import Moment
@@ -100,7 +100,8 @@ class Panel:
         room = int((height - HEIGHT - _TITLE_LINE) / _TITLE_LINE)
         lines = wrap(title, _TITLE_CHARACTERS)[: max(room, 0)]
         for number, line in enumerate(reversed(lines)):
-            self._text(_LEFT, height - (number + 1) * _TITLE_LINE, line, 15, _FAINT)
+            at = (round(_LEFT * self._scale), round((height - (number + 1) * _TITLE_LINE) * self._scale))
+            self._pen.text(at, line, fill=_FAINT, font=text_font(14 * self._scale), anchor="lm")
 
     def _draw_counts(self, counts: Sequence[int]) -> None:
         """Draw a bar for each proximity sensor."""

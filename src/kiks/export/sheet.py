@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
+from importlib.util import find_spec
 from itertools import groupby, islice
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -104,6 +106,16 @@ def font(size: float) -> FreeTypeFont | ImageFont:
     from PIL import ImageFont
 
     return ImageFont.load_default(size)
+
+
+@lru_cache(64)
+def text_font(size: float) -> FreeTypeFont:
+    """Return a font for names that people choose: that of Matplotlib, as Pillow's own has no accents."""
+    from PIL import ImageFont
+
+    spec = find_spec("matplotlib")  # without importing it
+    (folder,) = (spec and spec.submodule_search_locations) or ("",)
+    return ImageFont.truetype(Path(folder, "mpl-data", "fonts", "ttf", "DejaVuSans.ttf"), size)
 
 
 def pen_on(image: Image) -> Any:

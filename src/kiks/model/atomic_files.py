@@ -272,7 +272,9 @@ def ending_of(path: object, what: str, endings: Iterable[str]) -> str:
     """Return the ending of a file's name, in small letters, after a check that it is a known one."""
     ending = path_of(path, what).suffix.lower()
     if ending not in endings:
-        raise ParameterError(f"{what} must end in {' or '.join(endings)}, but it was {shown(str(path))}.")
+        *others, last = endings
+        known = f"{', '.join(others)} or {last}" if others else last
+        raise ParameterError(f"{what} must end in {known}, but it was {shown(str(path))}.")
     return ending
 
 
