@@ -3,7 +3,7 @@ A film
 ======
 
 Four robots and five balls. A recording becomes a film by the ending of its name: ``.webp`` plays in any page,
-``.mp4`` in any player. Films need PyAV: ``pip install '.[film]'`` in a checkout.
+``.mp4`` in any player. Films need PyAV: ``pip install 'kiks[film]'``.
 """
 
 import kiks

@@ -1,6 +1,6 @@
 """Learn to avoid obstacles by PPO in 96 worlds at once, then drive a robot on a serial line with the policy.
 
-pip install '.[learn]' stable-baselines3
+pip install 'kiks[learn]' stable-baselines3
 python examples/learning/ppo_avoid.py
 
 The policy learns in the arenas of the task `avoid` and takes its exam in others. Its network becomes a champion that

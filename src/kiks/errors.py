@@ -87,16 +87,16 @@ def nearest(given: str, known: Iterable[str]) -> str:
 
 
 def installing(extra: str) -> str:
-    """Return how the libraries of an extra are installed: KiKS itself is in no index yet.
+    """Return how the libraries of an extra are installed, beside the KiKS that is there already.
 
     Args:
         extra: The extra: 'film', 'learn', 'ray' or 'render'.
 
     Example:
         >>> installing("learn")
-        "Run `pip install '.[learn]'` in a checkout of KiKS"
+        "Run `pip install 'kiks[learn]'`"
     """
-    return f"Run `pip install '.[{extra}]'` in a checkout of KiKS"
+    return f"Run `pip install 'kiks[{extra}]'`"
 
 
 SHOWN_MAX = 80

@@ -122,12 +122,12 @@ def ray():
         # Ray listens on the loopback address alone only with this variable.
         patch.setenv("RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER", "0")
         patch.setenv("PYTHONPATH", str(ROOT))
-        yield pytest.importorskip("ray", reason="Ray is not installed: pip install '.[ray]'")
+        yield pytest.importorskip("ray", reason="Ray is not installed: pip install 'kiks[ray]'")
 
 
 def test_the_error_without_ray_says_how_to_install_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "ray", None)
-    with pytest.raises(ParameterError, match=r"pip install '\.\[ray\]'"):
+    with pytest.raises(ParameterError, match=r"pip install 'kiks\[ray\]'"):
         RayExecutor()
 
 

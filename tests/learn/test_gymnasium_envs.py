@@ -79,7 +79,7 @@ def test_import_kiks_does_not_import_gymnasium() -> None:
 def test_the_error_names_a_missing_package(missing: str, module: str) -> None:
     code = f"import sys; sys.modules['{missing}'] = None; import {module}"
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
-    assert "pip install '.[learn]'" in found.stderr
+    assert "pip install 'kiks[learn]'" in found.stderr
 
 
 @pytest.mark.parametrize("name", ["kiks/Avoid-v0", "kiks/Maze-v0", "kiks/Light-v0", "kiks/Football-v0"])
