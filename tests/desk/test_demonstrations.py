@@ -11,8 +11,10 @@ import pytest
 from tests.guard import GUARD_S, wait_until
 
 from kiks.desk.server.desk import Desk
-from kiks.model.project import Project
+from kiks.model.project import Project, ProjectRobot
 from kiks.model.shipped import demonstrations
+from kiks.ports.program_process import Command
+from kiks.sim.from_project import simulation_of
 from kiks.sim.simulation import Simulation
 
 CLEAN = demonstrations()["clean"]
@@ -69,3 +71,15 @@ def test_the_world_pauses_when_the_project_has_ended_and_may_go_on(how: dict[str
     assert desk.sim.time_s == 1.0
     desk.clear_away()
     desk.close()
+
+
+def test_a_score_calls_a_side_by_its_robot_or_else_by_its_program(tmp_path: Path) -> None:
+    robots = (ProjectRobot(name="Reds"), *(ProjectRobot() for _ in range(3)))
+    project = Project(robots=robots)
+    commands = [Command(tmp_path / f"{name}.py") for name in ("player", "player", "chaser")]
+    desk = Desk(simulation_of(project, tmp_path), project=project, folder=tmp_path, commands=commands, is_held=True)
+    assert desk.sides() == ["Reds", "player", "chaser", "robot 4"]
+    other = Desk(Simulation(robots=2), folder=tmp_path, commands=commands[:2], is_held=True)
+    assert other.sides() == ["player 1", "player 2"]
+    for each in (desk, other):
+        each.close()

@@ -75,8 +75,8 @@ def test_commands_typed_faster_than_the_page_is_answered_all_arrive(visitor: Vis
 COVERED = """() => {
     const box = (element) => element.getBoundingClientRect();
     const tip = box(document.querySelector(".q-tooltip"));
-    const others = document.querySelectorAll(".desk-panels :is(button, input, .q-field), .desk-bar button, .kiks-bar");
-    return [...others].filter((other) => other.checkVisibility()).filter((other) => {
+    const others = ".q-tab, .desk-panels :is(button, input, .q-field), .desk-bar button, .kiks-bar";
+    return [...document.querySelectorAll(others)].filter((other) => other.checkVisibility()).filter((other) => {
         const { left, right, top, bottom } = box(other);
         return left < tip.right && right > tip.left && top < tip.bottom && bottom > tip.top;
     }).length;
@@ -85,7 +85,7 @@ COVERED = """() => {
 
 def test_tooltips_cover_no_control(visitor: Visitor) -> None:
     visitor.tab("arena")
-    for name in ("tool-line", "snap", "save", "film", "event-before", "bookmark"):
+    for name in ("tool-line", "snap", "save", "film", "event-before", "bookmark", "step", "help"):
         visitor.at(name).hover()
         expect(visitor.page.locator(".q-tooltip")).to_have_count(1)
         expect(visitor.page.locator(".q-tooltip")).to_have_css("opacity", "1")

@@ -8,7 +8,6 @@ from nicegui import ui
 
 from kiks.desk.panels.shortcuts import SHORTCUTS, listen
 from kiks.desk.panels.widgets import (
-    ABOVE,
     WEB,
     FeedElement,
     Panel,
@@ -77,11 +76,11 @@ class TimeBar(Panel):
                 named(self._event, "bar-event").props("aria-live=polite")
                 back = self.acting(looking.back_to_now)
                 self._now = _long_button("Back to now", "update", "back-to-now", back)
-                place_tip(self._now, "Show the present world again; it goes on as if nothing had been", ABOVE)
+                place_tip(self._now, "Show the present world again; it goes on as if nothing had been", "above")
                 go_on = self.acting(self._go_on)
                 self._branch = _long_button("Go on from here", "call_split", "go-on-from-here", go_on)
                 tip = "Let the world live on from this moment" if desk.owns_world else NOT_OWN
-                place_tip(self._branch.props("unelevated color=accent"), tip, ABOVE).set_enabled(desk.owns_world)
+                place_tip(self._branch.props("unelevated color=accent"), tip, "above").set_enabled(desk.owns_world)
         listen(self._acts)
         self.refresh()
 
@@ -93,7 +92,7 @@ class TimeBar(Panel):
         shortcut = SHORTCUTS[name]
         self._acts[name] = self.acting(acted)
         tip = f"{shortcut.label} (key: {shortcut.words})"
-        return icon_button(icon, shortcut.label, name, self._acts[name], tip=tip, place=ABOVE)
+        return icon_button(icon, shortcut.label, name, self._acts[name], tip=tip, place="above")
 
     def refresh(self) -> None:
         """Show which time is shown, and what happens then."""

@@ -8,7 +8,6 @@ from nicegui import ui
 
 from kiks.desk.panels.shortcuts import SHORTCUTS, listen
 from kiks.desk.panels.widgets import (
-    BELOW,
     WEB,
     FeedElement,
     Panel,
@@ -59,15 +58,15 @@ class TimePanel(Panel):
             "step-back": self.acting(lambda: desk.looking.move_by(-self._step_s.value)),
         }
         self._run = named(ui.button(on_click=acts["run"]).props("round unelevated color=accent"), "run")
-        place_tip(self._run, f"Run or pause (key: {SHORTCUTS['run'].words})", BELOW)
+        place_tip(self._run, f"Run or pause (key: {SHORTCUTS['run'].words})", "below")
         step_tip = f"Run for one step, then pause (key: {SHORTCUTS['step'].key}; back: {SHORTCUTS['step-back'].key})"
-        bar_button("skip_next", "Step", "step", acts["step"], step_tip)
+        bar_button("skip_next", "Step", "step", acts["step"], tip=step_tip)
         self._add("dangerous", "halt", "Halt: stop all programs and all robots", desk.halt,
                   "All programs and all robots are stopped.")  # fmt: skip
         self._step_s = _select(STEPS, 0.01, "Size of a step", "step-size", "5rem").classes("desk-spare")
         self._speed = _select(SPEEDS, self._shown_speed(), "Speed of time", "speed", "8.5rem")
         self._speed.on_value_change(self._set_speed)
-        place_tip(self._speed, "Simulated time per real time; it never changes what robots do", BELOW)
+        place_tip(self._speed, "Simulated time per real time; it never changes what robots do", "below")
         ClockView(feed, "clock_view.css")
         self._add(
             "flag",
@@ -88,7 +87,7 @@ class TimePanel(Panel):
         self.refresh()
 
     def _add(self, icon: str, name: str, tip: str, act: Callable[[], Awaitable[object]], done: str) -> None:
-        bar_button(icon, tip.partition(":")[0], name, self.acting(act, done), tip)
+        bar_button(icon, tip.partition(":")[0], name, self.acting(act, done), tip=tip)
 
     def _shown_speed(self) -> float:
         speed = self._desk.gate.speed

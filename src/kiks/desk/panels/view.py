@@ -11,7 +11,7 @@ from nicegui import ui
 from kiks.desk.panels.arena_view import LAYERS, ArenaView
 from kiks.desk.panels.board import ScoreBoard
 from kiks.desk.panels.shortcuts import SHORTCUTS
-from kiks.desk.panels.widgets import BELOW, bar_button, dialog, named, place_tip, with_props
+from kiks.desk.panels.widgets import bar_button, dialog, named, place_tip, with_props
 from kiks.desk.server.desk import Desk
 
 VIEWS = {"top": "2-D", "both": "both", "solid": "3-D"}
@@ -50,8 +50,8 @@ class ViewPanel:
         toggle = ui.toggle(VIEWS, value="top", on_change=lambda event: view.change(view=event.value))
         toggle.props("dense unelevated no-caps toggle-color=accent text-color=white color=transparent")
         toggle.props('data-testid=views aria-label="2-D or 3-D"')
-        place_tip(toggle, "View from above, or in 3-D: there drag to orbit, turn the wheel to zoom", BELOW)
-        layers = bar_button("layers", "Layers", "layers")
+        place_tip(toggle, "View from above, or in 3-D: there drag to orbit, turn the wheel to zoom", "aside")
+        layers = _button("layers", "Layers", "layers")
         with layers, with_props(ui.menu(), role="group", aria_label="Layers"), ui.column().classes("q-pa-sm gap-0"):
             for name, (text, is_shown) in LAYERS.items():
                 box = ui.checkbox(
@@ -60,22 +60,22 @@ class ViewPanel:
                 named(box, f"show-{name}").props("dense").classes("q-py-xs")
             clear = ui.button("Clear trails", icon="auto_fix_normal").props("flat dense no-caps")
             clear.on_click(lambda: view.run_method("clear_trails"))
-        with bar_button("my_location", "Follow a robot", "follow"), ui.menu() as self._robots:
+        with _button("my_location", "Follow a robot", "follow"), ui.menu() as self._robots:
             pass
         self._robots.on("before-show", self._list_robots)
-        bar_button("fit_screen", "Show all of the arena (key: 0)", "fit").on_click(lambda: view.run_method("fit"))
+        _button("fit_screen", "Show all of the arena (key: 0)", "fit").on_click(lambda: view.run_method("fit"))
         tip = "Snapshot: save a picture of the arena as you see it (PNG)"
-        bar_button("photo_camera", "Snapshot", "snapshot", lambda: view.run_method("snapshot"), tip)
+        _button("photo_camera", "Snapshot", "snapshot", lambda: view.run_method("snapshot"), tip=tip)
         tip = "Hall view, for a projector: arena, score and clock, large (Escape ends it)"
-        bar_button("tv", "Hall view", "hall", lambda: board.run_method("enter"), tip).classes("desk-from-1000")
+        _button("tv", "Hall view", "hall", lambda: board.run_method("enter"), tip=tip).classes("desk-from-1000")
         with dialog("Help") as self._help:
             ui.markdown(HELP)
             ui.button("Close", on_click=self._help.close).props("flat no-caps")
         dark = ui.dark_mode(value=None)
-        with bar_button("contrast", "Light or dark", "dark"), ui.menu():
+        with _button("contrast", "Light or dark", "dark"), ui.menu():
             for text, value in (("Same as the system", None), ("Light", False), ("Dark", True)):
                 _item(text, partial(dark.set_value, value))
-        bar_button("help_outline", "Help", "help").on_click(self._help.open)
+        _button("help_outline", "Help", "help").on_click(self._help.open)
 
     def _list_robots(self) -> None:
         self._robots.clear()
@@ -87,3 +87,6 @@ class ViewPanel:
 
 def _item(text: str, act: Callable[[], Any]) -> None:
     with_props(ui.menu_item(text, on_click=act), role="menuitem")
+
+
+_button = partial(bar_button, place="aside")

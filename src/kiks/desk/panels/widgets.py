@@ -111,18 +111,20 @@ async def answer(dialog: ui.dialog) -> Any:
 ui.tooltip.default_props('anchor="center left" self="center right"')
 ui.tooltip.default_classes("desk-tip")
 
-BELOW, ABOVE = (
-    'anchor="bottom middle" self="top middle"',
-    'anchor="top middle" self="bottom middle" :offset="[0, 50]"',
-)
-"""Places of tooltips where they cover nothing that a person may want next: below the bar above the arena, and above the
-slider of the time bar. All others, those of panels, stand on the arena beside them (`web/page.css`)."""
+PLACES = {
+    "below": 'anchor="bottom middle" self="top middle"',
+    "aside": 'anchor="bottom middle" self="top middle"',
+    "above": 'anchor="top middle" self="bottom middle" :offset="[0, 50]"',
+}
+"""Places of tooltips where they cover nothing that a person may want next: below the bar above the arena; on the arena
+for the buttons of that bar that are above the tabs; above the slider of the time bar. All others, of panels, stand on
+the arena beside them (`web/page.css`)."""
 
 
 def place_tip(element: Some, text: str, place: str) -> Some:
     """Give an element a tooltip at a place."""
     with element:
-        ui.tooltip(text).classes(replace="desk-tip-above" if place == ABOVE else "desk-tip-below").props(place)
+        ui.tooltip(text).classes(replace=f"desk-tip-{place}").props(PLACES[place])
     return element
 
 
@@ -186,9 +188,11 @@ def relabel(button: ui.button, icon: str, label: str) -> None:
         with_props(button, icon=icon, aria_label=label)
 
 
-def bar_button(icon: str, label: str, name: str, act: Callable[..., Any] | None = None, tip: str = "") -> ui.button:
+def bar_button(
+    icon: str, label: str, name: str, act: Callable[..., Any] | None = None, *, tip: str = "", place: str = "below"
+) -> ui.button:
     """Build an icon button of the bar above the arena."""
-    return icon_button(icon, label, name, act, tip=tip, look="flat round dense color=white", place=BELOW)
+    return icon_button(icon, label, name, act, tip=tip, look="flat round dense color=white", place=place)
 
 
 def text_button(text: str, icon: str, name: str, tip: str, act: Callable[..., Any] | None = None) -> ui.button:

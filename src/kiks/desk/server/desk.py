@@ -211,11 +211,12 @@ class Desk:
 
     def sides(self) -> list[str]:
         """Return what a score calls the robots: their names, else those of their programs, else their numbers."""
-        programs = {each.robot: each.command.name.removesuffix(".py") for each in self.programs.handles}
-        found = [
-            programs.get(number, f"robot {number}") if name == str(number) else name
-            for number, name in enumerate(self.names(), 1)
-        ]
+        running = {each.robot: each.command for each in self.programs.handles}
+        found = []
+        for number, name in enumerate(self.names(), 1):
+            command = running.get(number, self.attached(number))
+            program = f"robot {number}" if command is None else command.name.removesuffix(".py")
+            found.append(program if name == str(number) else name)
         return [f"{name} {number}" if found.count(name) > 1 else name for number, name in enumerate(found, 1)]
 
     def tell(self) -> None:
