@@ -218,6 +218,7 @@ def test_properties_are_set_by_a_double_click(desk: Desk, visitor: Visitor) -> N
     visitor.until(lambda: desk.sim.bodies()["radius_mm"].tolist() == [20])
     click(visitor, 200, 400)
     expect(visitor.at("property-disc_mm")).to_have_value("200, 400")
+    visitor.picture("properties_of_a_wall")
     put("disc_mm", "220, 400")
     visitor.until(lambda: desk.sim.arena.walls == (Wall(disc_mm=(220, 400), radius_mm=30),))
     visitor.tab("robot")

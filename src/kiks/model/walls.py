@@ -80,6 +80,16 @@ class Wall:
         if self.disc_mm is not None and self.radius_mm is None:
             raise ParameterError("radius_mm must come with disc_mm, but it is missing. Give radius_mm = 20.")
 
+    @property
+    def thick_mm(self) -> float:
+        """How thick a line is [mm].
+
+        Example:
+            >>> Wall(line_mm=((100, 50), (100, 90))).thick_mm
+            10.0
+        """
+        return 10.0 if self.width_mm is None else self.width_mm
+
     def cells(self, shape: tuple[int, int], mm_per_cell: float) -> list[Area]:
         """Return the cells of a raster that the wall covers; `shape` has its rows and columns."""
 
@@ -89,7 +99,7 @@ class Wall:
         if self.box_mm is not None:
             corner, opposite = in_cells(self.box_mm)
             return rectangle_cells(shape, corner, opposite)
-        points_mm, width_mm = self.line_mm, 10.0 if self.width_mm is None else self.width_mm
+        points_mm, width_mm = self.line_mm, self.thick_mm
         if self.disc_mm is not None and self.radius_mm is not None:
             points_mm, width_mm = (self.disc_mm,), 2 * self.radius_mm
         return [*stroke_cells(shape, in_cells(points_mm or ()), width_mm / mm_per_cell)]

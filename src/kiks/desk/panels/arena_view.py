@@ -12,6 +12,7 @@ from typing import Any
 import nicegui
 
 from kiks.desk.panels.widgets import WEB, FeedElement
+from kiks.model.walls import Wall
 
 LAYERS = {
     "rays": ("Rays of the proximity sensors, coloured by their readings", True),
@@ -75,6 +76,18 @@ class ArenaView(
         """Show or hide a layer."""
         self._layers = {**self._layers, name: is_shown}
         self.change(show=self._layers)
+
+    def show_wall(self, wall: Wall | None) -> None:
+        """Mark a wall with a shape, which a person has selected; None for none."""
+        stroke: dict[str, Any] | None = None
+        if wall is not None and wall.box_mm is not None:
+            stroke = {"kind": "rectangle", "points": wall.box_mm, "brush_mm": 1}
+        elif wall is not None and wall.disc_mm is not None:
+            (x_mm, y_mm), radius_mm = wall.disc_mm, wall.radius_mm or 0
+            stroke = {"kind": "disc", "points": [(x_mm, y_mm), (x_mm + radius_mm, y_mm)], "brush_mm": 1}
+        elif wall is not None:
+            stroke = {"kind": "line", "points": wall.line_mm, "brush_mm": wall.thick_mm}
+        self.change(wall=stroke)
 
     def set_tool(self, kind: str, *, brush_mm: float = 10.0, snap_mm: float = 0.0, label: str = "") -> None:
         """Give the pointer a tool.

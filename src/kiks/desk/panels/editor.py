@@ -76,7 +76,7 @@ class EditorPanel(Panel):
         self._tool = "hand"
         self._buttons: dict[str, ui.button] = {}
         with ui.column().classes("w-full q-pa-md gap-3"):
-            self.properties = PropertiesPanel(desk, editing, self.refresh)
+            self.properties = PropertiesPanel(desk, editing, view, self.refresh)
             ui.separator()
             self._build_tools()
             self._build_brush()

@@ -8,11 +8,13 @@ from typing import Any
 
 from nicegui import ui
 
+from kiks.desk.panels.arena_view import ArenaView
 from kiks.desk.panels.widgets import Panel, icon_button, named, with_props
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.live_editing import Editing, Selected, values_of
 from kiks.errors import KiksError
 from kiks.model.data_file import adapter
+from kiks.model.walls import Wall
 
 UNITS = {"_mm_s2": "mm/s²", "_mm": "mm", "_deg": "°", "_w": "W"}
 """Units by how names of values end."""
@@ -29,16 +31,18 @@ class PropertiesPanel(Panel):
     Args:
         desk: The desk.
         editing: Changes its world.
+        view: Marks the selected wall.
         changed: Called after each change.
     """
 
-    def __init__(self, desk: Desk, editing: Editing, changed: Callable[[], object]) -> None:
+    def __init__(self, desk: Desk, editing: Editing, view: ArenaView, changed: Callable[[], object]) -> None:
         super().__init__(desk)
-        self._editing, self._changed = editing, changed
+        self._editing, self._view, self._changed = editing, view, changed
         self._selected: Selected | None = None
         self._record: Any = None
         self._fields: dict[str, ui.input | ui.switch] = {}
         self._in_focus = self._bad = ""
+        self._is_acting = False
         with named(ui.column().classes("w-full gap-1"), "properties") as self._form:
             pass
         self._refused = named(ui.label().classes("text-body2 desk-error").props("role=alert"), "refused")
@@ -49,6 +53,7 @@ class PropertiesPanel(Panel):
         self._selected = selected
         self._record = None if selected is None else await self._editing.properties(selected)
         self._build()
+        self._mark()
         if has_focus and self._fields:
             next(iter(self._fields.values())).run_method("focus")
 
@@ -56,7 +61,10 @@ class PropertiesPanel(Panel):
         """Show the present values, but in a field that a person types into."""
         if self._selected is None or self._desk.past is not None:
             return
-        record = await self._editing.properties(self._selected)
+        asked = self._selected
+        record = await self._editing.properties(asked)
+        if self._is_acting or asked != self._selected:
+            return  # the answer is about a wall as it was before
         if type(record) is not type(self._record):
             await self.show(None)
             return
@@ -65,6 +73,14 @@ class PropertiesPanel(Panel):
         for name, field in self._fields.items():
             if values[name] != before[name] and name != self._in_focus:
                 field.value = _text(values[name])
+
+    def set_visible(self, is_visible: bool) -> None:
+        """Mark the selected wall while the panel is visible."""
+        super().set_visible(is_visible)
+        self._mark(is_visible=is_visible)
+
+    def _mark(self, *, is_visible: bool = True) -> None:
+        self._view.show_wall(self._selected if is_visible and isinstance(self._selected, Wall) else None)
 
     def _build(self) -> None:
         """Build the form of the selected thing."""
@@ -129,14 +145,18 @@ class PropertiesPanel(Panel):
 
     async def _act(self, act: Callable[[Selected], Awaitable[Selected | None]]) -> None:
         assert self._selected is not None
+        self._is_acting = True
         try:
             self._selected = await act(self._selected)
             self._refused.text = ""
         except KiksError as error:
             self._refused.text = str(error)
             return
+        finally:
+            self._is_acting = False
         self._in_focus = ""
         await (self.show(None) if self._selected is None else self.refresh())
+        self._mark()
         for name, value in values_of(self._record).items() if self._fields else ():
             self._fields[name].value = _text(value)
         self._changed()

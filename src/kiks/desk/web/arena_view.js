@@ -18,6 +18,7 @@ export default {
     feed: { type: String, required: true },
     tool: { type: Object, default: () => ({ kind: "hand" }) },
     show: { type: Object, default: () => ({}) },
+    wall: { type: Object, default: null },
     view: { type: String, default: "top" },
     follow: { type: Number, default: -1 },
   },
@@ -28,6 +29,7 @@ export default {
   watch: {
     tool: { deep: true, handler(tool) { this.stage.setTool(tool); } },
     show: { deep: true, handler(show) { this.stage.setShow({ ...show }); } },
+    wall(wall) { this.stage.setWall(wall); },
     view(view) { this.stage.setView(view); },
     follow(follow) { this.stage.setFollow(follow); },
   },

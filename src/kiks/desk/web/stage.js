@@ -29,6 +29,7 @@ export class Stage {
     this.drawing = new Drawing(this.feed);
     this.topView = new TopView(this.top, this.feed);
     this.solidView = null;
+    this._wall = null;
     this.view = "top";
     this.show = {};
     this.follow = -1;
@@ -67,6 +68,12 @@ export class Stage {
   setTool(tool) {
     this.drawing.setTool(tool);
     this.top.style.cursor = this.drawing.isActive ? "crosshair" : "";
+  }
+
+  /** Mark a wall with a shape, which is {kind, points, brush_mm}; null for none. */
+  setWall(wall) {
+    this._wall = wall;
+    this._isWanted = true;
   }
 
   setShow(show) {
@@ -284,7 +291,7 @@ export class Stage {
   _marks() {
     const { selected, hovered, ghost } = this.hand;
     const isFocused = this.root.classList.contains("kiks-keys") && this.root.contains(document.activeElement);
-    return { selected, hovered, ghost, preview: this.drawing.preview, isFocused };
+    return { selected, hovered, ghost, preview: this.drawing.preview, wall: this._wall, isFocused };
   }
 
   /** Return whether anything has changed; a paused world costs nothing. */

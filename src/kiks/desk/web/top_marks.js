@@ -2,9 +2,10 @@
 
 import { countOf, handleOf, placeOf, radiusOf } from "./things.js";
 
-/** Draw the marks {selected, hovered, ghost, preview}; `context` takes CSS pixels. */
-export function paintMarks(context, viewport, feed, { selected, hovered, ghost, preview, isFocused }, colours) {
+/** Draw the marks {selected, hovered, ghost, preview, wall}; `context` takes CSS pixels. */
+export function paintMarks(context, viewport, feed, { selected, hovered, ghost, preview, wall, isFocused }, colours) {
   const isThere = (thing) => thing && thing.index < countOf(feed, thing.what);
+  if (wall) paintShape(context, viewport, wall, colours);
   if (isThere(hovered)) paintRing(context, viewport, feed, hovered, colours, false, false);
   if (isThere(selected)) paintRing(context, viewport, feed, selected, colours, true, isFocused);
   if (ghost) paintGhost(context, viewport, ghost, colours);
@@ -55,7 +56,8 @@ function paintGhost(context, viewport, { x_mm, y_mm, heading_rad, radius_mm }, c
   context.setLineDash([]);
 }
 
-function paintPreview(context, viewport, { kind, points, brush_mm, isDrawing, text }, colours) {
+/** Draw a stroke: a box from corner to corner, a disc from its middle to its rim, or a line as wide as the brush. */
+function paintShape(context, viewport, { kind, points, brush_mm }, colours) {
   const places = points.map(([x_mm, y_mm]) => viewport.toScreen(x_mm, y_mm));
   const width = Math.max(1, brush_mm * viewport.scale);
   const [x, y] = places.at(-1);
@@ -63,13 +65,13 @@ function paintPreview(context, viewport, { kind, points, brush_mm, isDrawing, te
   context.lineCap = context.lineJoin = "round";
   context.lineWidth = width;
   context.beginPath();
-  if (kind === "rectangle" && isDrawing) {
+  if (kind === "rectangle") {
     const [[left, top]] = places, box = [Math.min(left, x), Math.min(top, y), Math.abs(x - left), Math.abs(y - top)];
     context.fillRect(...box);
     context.lineWidth = 1.5;
     context.strokeStyle = colours.accent;
     context.strokeRect(...box);
-  } else if (kind === "disc" && isDrawing) {
+  } else if (kind === "disc") {
     const [centre_x, centre_y] = places[0];
     context.arc(centre_x, centre_y, Math.hypot(x - centre_x, y - centre_y), 0, 2 * Math.PI);
     context.fill();
@@ -80,8 +82,13 @@ function paintPreview(context, viewport, { kind, points, brush_mm, isDrawing, te
     places.forEach(([to_x, to_y], k) => (k ? context.lineTo(to_x, to_y) : context.moveTo(to_x, to_y)));
     context.stroke();
   }
+}
+
+function paintPreview(context, viewport, preview, colours) {
+  const { kind, points, brush_mm, isDrawing, text } = preview, [x, y] = viewport.toScreen(...points.at(-1));
+  if (isDrawing) paintShape(context, viewport, preview, colours);
   context.beginPath();
-  context.arc(x, y, Math.max(3, width / 2), 0, 2 * Math.PI);
+  context.arc(x, y, Math.max(3, (brush_mm * viewport.scale) / 2), 0, 2 * Math.PI);
   context.lineWidth = 1.5;
   context.strokeStyle = colours.accent;
   context.stroke();
