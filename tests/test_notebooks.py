@@ -98,6 +98,14 @@ def test_a_notebook_shows_a_picture_or_a_table(run: Run, cell: str, kind: str, t
     assert seen[kind].startswith(("<table>", "<p>Sensor 2")) or b64decode(seen[kind]).startswith(b"\x89PNG")
 
 
+def test_a_notebook_shows_the_figures_of_a_run(run: Run, tmp_path: Path) -> None:
+    file = str(tmp_path / "run.mcap")
+    run(f"sim = kiks.Simulation()\nwith sim.record({file!r}):\n    sim.run(0.5)")
+    (seen,) = run(f"kiks.Recording({file!r}).plot()")
+    assert seen["text/plain"].startswith("<Figure size")
+    assert b64decode(seen["image/png"]).startswith(b"\x89PNG")
+
+
 @pytest.mark.parametrize(
     "words", cases([["-c"], ["-m", "IPython", "--colors=NoColor", "-c"]]), ids=["Python", "IPython"]
 )

@@ -96,10 +96,10 @@ show_in_browser = Hook("kiks.desk.server.show", "show")
 record_simulation = Hook("kiks.recording.recorder", "RunRecorder")
 """Records a simulation to a file."""
 
-plot_simulation = Hook("kiks.export.figures", "figure_of_run")
+plot_simulation = Hook("kiks.export.notebook", "plot_run")
 """Draws figures of a simulation that is being recorded."""
 
-plot_recordings = Hook("kiks.export.figures", "plot")
+plot_recordings = Hook("kiks.export.notebook", "plot")
 """Draws figures of recordings."""
 
 export_recording = Hook("kiks.export.kinds", "export")

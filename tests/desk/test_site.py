@@ -27,6 +27,7 @@ PAGES = (
     "coming_from",
     "gallery/index",
     "gallery/scripts/film",
+    "notebooks/first_steps",
 )
 
 

@@ -140,14 +140,7 @@ def figure_of_run(sim: Simulation, *, robot: int = 1) -> Any:
             f"{sim} must be recorded while it is plotted, but it is not. Begin with: with sim.record('run.mcap'):"
         )
     recorders[-1].flush()
-    return plot([Recording(recorders[-1].path)], robot=robot)
-
-
-def plot(recordings: Sequence[Recording], *, robot: int = 1) -> Any:
-    """Return the figure of `save_figures` for a user, to whom a notebook shows it."""
-    import matplotlib.pyplot  # noqa: F401  (it makes notebooks show figures)
-
-    return figure_of(recordings, robot=robot)
+    return figure_of([Recording(recorders[-1].path)], robot=robot)
 
 
 def _drawings(recording: Recording, robot: int) -> dict[str, Callable[[Any], None]]:

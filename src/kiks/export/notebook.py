@@ -9,7 +9,7 @@ from html import escape
 from typing import TYPE_CHECKING, Any
 
 from kiks.batch.number_table import NumberTable
-from kiks.export.figures import COLUMN_INCHES, figure_of
+from kiks.export.figures import COLUMN_INCHES, figure_of, figure_of_run
 from kiks.export.pictures import Picture
 from kiks.export.vector_pen import file_of
 from kiks.model.arena import Arena
@@ -70,6 +70,22 @@ def table(of: Any) -> Bundle:
     of_numbers: NumberTable = of.table()
     left = [[f"... {of_numbers.left_out}"]] if of_numbers.left_out else []
     return html(html_table([*of_numbers.rows, *left], of_numbers.head, of_numbers.sums))
+
+
+def plot(recordings: Sequence[Recording], *, robot: int = 1) -> Any:
+    """Return figures of recordings; see `kiks.export.figures.figure_of`."""
+    return _shown(figure_of(recordings, robot=robot))
+
+
+def plot_run(sim: Simulation, *, robot: int = 1) -> Any:
+    """Return figures of a run that is being recorded."""
+    return _shown(figure_of_run(sim, robot=robot))
+
+
+def _shown(given: Any) -> Any:
+    """Return a figure that a notebook shows. Matplotlib alone shows none before one is drawn with pyplot."""
+    given._repr_mimebundle_ = lambda include=None, exclude=None: figure(given, given.get_figwidth())
+    return given
 
 
 # ---- the parts ----
