@@ -81,6 +81,10 @@ def test_axe_finds_nothing_serious(visitor: Visitor) -> None:
             if tab == "robot":
                 visitor.at("proximity-0").click()
                 expect(visitor.at("explanation")).to_be_visible()
+            elif tab == "arena":
+                visitor.at("arena-top").press("n")
+                visitor.at("arena-top").press("Enter")
+                expect(visitor.at("properties")).to_be_visible()
             check_access(visitor.page, f"{tab}, {theme}")
             visitor.picture(f"{tab}_{theme.lower()}")
         for opener in ("help", "layers", "follow"):
