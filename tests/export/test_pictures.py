@@ -10,6 +10,7 @@ import pytest
 
 import kiks
 from kiks.errors import ParameterError
+from kiks.export.caption import scale_bar
 from kiks.export.looks import robot_colour
 from kiks.export.pictures import Picture
 from kiks.model.arena import Pose
@@ -83,6 +84,13 @@ def test_trails_show_where_everything_was(tmp_path: Path) -> None:
     assert pixel(image, 90, 110) != FLOOR  # where it began, faintly
     assert min(pixel(image, 90, 110)) > 180
     assert pixel(image, 100, 220) == FLOOR  # the ball that went
+
+
+@pytest.mark.parametrize(("width_mm", "text"), [(99, "10 mm"), (300, "50 mm"), (1000, "200 mm"), (20_000, "2 m")])
+def test_a_scale_bar_has_a_round_length(width_mm: float, text: str) -> None:
+    sign = scale_bar(width_mm, width_mm / 40)
+    assert sign.text == text
+    assert width_mm / 15 < sign.width_mm <= width_mm / 5
 
 
 @pytest.mark.parametrize("name", ["no/such/folder/x.png", "x.nothing"])
