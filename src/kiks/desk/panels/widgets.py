@@ -123,8 +123,9 @@ the arena beside them (`web/page.css`)."""
 
 def place_tip(element: Some, text: str, place: str) -> Some:
     """Give an element a tooltip at a place."""
+    look = PLACES[place]
     with element:
-        ui.tooltip(text).classes(replace=f"desk-tip-{place}").props(PLACES[place])
+        ui.tooltip(text).classes(replace=f"desk-tip-{place}").props(look)
     return element
 
 
