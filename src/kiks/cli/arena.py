@@ -130,6 +130,7 @@ def info(
         **{
             f"{name}s": [each._asdict() for each in getattr(place, f"{name}s")] for name in ("lamp", "ball", "cylinder")
         },
+        "walls": [each.table() for each in place.walls],
     }
     tell_results(context, found, _lines_of(place, robot_mm, found))
 
@@ -137,6 +138,8 @@ def info(
 def _lines_of(place: Arena, robot_mm: float, found: dict[str, Any]) -> Iterator[str]:
     """Yield what `info` tells people."""
     import math
+
+    from kiks.model.arena_file import toml
 
     walls = f"{100 * found['wall_share']:.0f} % of it wall"
     yield f"{place.name}: {place.width_mm:g} x {place.height_mm:g} mm, cells of {place.mm_per_cell:g} mm, {walls}"
@@ -161,6 +164,8 @@ def _lines_of(place: Arena, robot_mm: float, found: dict[str, Any]) -> Iterator[
         label = f"Ball {number}" if is_ball else f"Cylinder {number - len(place.balls)}"
         size = f"radius {body.radius_mm:g} mm, brightness {body.brightness}"
         yield f"{label}: {_at(body.x_mm, body.y_mm)}, {size}"
+    for number, wall in enumerate(place.walls, start=1):
+        yield f"Wall {number}: {', '.join(f'{name} = {toml(value)}' for name, value in wall.table().items())}"
 
 
 def _at(x_mm: float, y_mm: float) -> str:

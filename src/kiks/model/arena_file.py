@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -211,8 +211,7 @@ def place_lines(arena: Arena) -> list[str]:
         for place in places:
             entry(label, place, **dict(zip(place._fields[2:], place[2:], strict=True)))
     for wall in arena.walls:
-        values = ((each.name, getattr(wall, each.name)) for each in fields(wall))
-        lines += ["", "[[wall]]", *(f"{name} = {toml(value)}" for name, value in values if value is not None)]
+        lines += ["", "[[wall]]", *(f"{name} = {toml(value)}" for name, value in wall.table().items())]
     return lines
 
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Annotated
+from dataclasses import fields
+from typing import Annotated, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -79,6 +80,16 @@ class Wall:
                 raise ParameterError(f"{name} must come with {shape}, but it came with {shapes[0]}. Remove it.")
         if self.disc_mm is not None and self.radius_mm is None:
             raise ParameterError("radius_mm must come with disc_mm, but it is missing. Give radius_mm = 20.")
+
+    def table(self) -> dict[str, Any]:
+        """Return its keys and values in a file.
+
+        Example:
+            >>> Wall(disc_mm=(100, 50), radius_mm=20).table()
+            {'disc_mm': (100.0, 50.0), 'radius_mm': 20.0, 'brightness': 255}
+        """
+        values = ((each.name, getattr(self, each.name)) for each in fields(self))
+        return {name: value for name, value in values if value is not None}
 
     @property
     def thick_mm(self) -> float:

@@ -11,7 +11,7 @@ import math
 import pickle
 import zlib
 from collections.abc import Callable, Mapping
-from dataclasses import fields, replace
+from dataclasses import replace
 from itertools import count
 from typing import Any, NamedTuple
 
@@ -359,8 +359,7 @@ def _changed(now: Any, here: Thing | None, there: Thing) -> Any:
 
 def values_of(record: Any) -> dict[str, Any]:
     """Return the values of a record by their names, without those that are left out."""
-    names = getattr(record, "_fields", None) or [each.name for each in fields(record)]
-    return {name: value for name in names if (value := getattr(record, name)) is not None}
+    return record.table() if isinstance(record, Wall) else record._asdict()
 
 
 def _covers(arena: Arena, wall: Wall, x_mm: float, y_mm: float) -> bool:
