@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import expect
 from tests.at_length import at_length
-from tests.desk.visitor import NewPage, Visitor, make_project
+from tests.desk.visitor import NewPage, Visitor, check_access, make_project
 
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.show import Shown
@@ -109,6 +109,7 @@ def test_mistake_is_marked_as_it_is_typed_and_before_anything_runs(visitor: Visi
     visitor.picture("mistake")
     visitor.at("run-program").click()
     expect(visitor.at("mistake")).to_contain_text("Line 2: invalid syntax")
+    check_access(visitor.page, "a mistake")
     assert not (visitor.desk.folder / "wrong.py").exists()
     visitor.write("x = 1\n1 / 0\n")
     expect(visitor.at("mistake")).to_have_text("")

@@ -9,7 +9,7 @@ import pytest
 from playwright.sync_api import expect
 from tests.at_length import at_length
 from tests.desk.test_looking_back import drive
-from tests.desk.visitor import NewPage, Visitor
+from tests.desk.visitor import NewPage, Visitor, check_access
 
 from kiks import Khepera, Recording, Simulation
 from kiks.desk.server.desk import Desk
@@ -125,6 +125,7 @@ def test_a_recording_is_played_stepped_and_jumped_through(replay: Visitor) -> No
     expect(visitor.at("board")).to_contain_text("robot 1")
     expect(visitor.at("run")).to_be_hidden()
     visitor.picture("hall")
+    check_access(page, "the hall view")
     page.keyboard.press("Escape")
     expect(visitor.at("run")).to_be_visible()
 

@@ -45,8 +45,8 @@ NOT_OWN = (
 """Shown in place of the editor where the world is not the desk's own."""
 
 CSS = """
-.program-wrong-line { background: #b0002018; box-shadow: inset 3px 0 #b00020 }
-.body--dark .program-wrong-line { background: #ff9a9024; box-shadow: inset 3px 0 #ff9a90 }
+.program-wrong-line { box-shadow: inset 3px 0 #b00020 }
+.body--dark .program-wrong-line { box-shadow: inset 3px 0 #ff9a90 }
 .program-wrong { text-decoration: underline wavy #d3281d; text-underline-offset: 3px }
 .body--dark .program-wrong { text-decoration-color: #ff9a90 }
 """
