@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from playwright.sync_api import Page, expect
 from tests.at_length import at_length, share
-from tests.desk.visitor import FIRST_PICTURE, NewPage, leave_picture
+from tests.desk.visitor import FIRST_PICTURE, NewPage, check_access, leave_picture
 from tests.forked import kiks_command
 from tests.matlab.octave import need_tcp, needs_octave
 from tests.matlab.terminal import Terminal
@@ -113,7 +113,10 @@ def test_what_is_typed_on_the_desk_is_evaluated_in_octave(tmp_path: Path, new_pa
         expect(page.get_by_test_id("log")).to_contain_text("parse error")
         evaluate(page, "error('no %d', 2)")
         expect(page.get_by_test_id("log")).to_contain_text("error: no 2")
-        leave_picture(page, "octave")
+        for colours in ("light", "dark"):
+            page.emulate_media(color_scheme=colours)
+            check_access(page, f"octave, {colours}")
+            leave_picture(page, f"octave_{colours}")
         terminal.press_ctrl_c()
         assert terminal.ask("numel(z)") == "2"
         assert terminal.ask("numel(kProximity(ref))") == "8"
