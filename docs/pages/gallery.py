@@ -76,9 +76,9 @@ def entry(name: str, path: Path) -> str:
 
 
 def keep_pictures(block: Any, variables: dict[str, Any], settings: dict[str, Any]) -> str:
-    """Return the pictures that a script has written, as its page shows them."""
+    """Return the pictures that a script has written, in that order, as its page shows them."""
     kept = []
-    for path in sorted(SOURCE.rglob("*")):
+    for path in sorted(SOURCE.rglob("*"), key=lambda path: path.stat().st_mtime_ns):
         if path.suffix in (".png", ".webp"):
             place = Path(next(variables["image_path_iterator"])).with_suffix(path.suffix)
             kept.append(str(shutil.move(path, place)))
