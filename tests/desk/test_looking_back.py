@@ -367,7 +367,9 @@ def test_events_are_found_on_the_way(tmp_path: Path) -> None:
         kinds = [mark.kind for mark in marks]
         assert kinds.count("bookmark") == kinds.count("output") == kinds.count("change") == 1
         assert "contact" in kinds
-        assert {"half", "robot 1: hello", "changed by hand", "robot 1 touches something"} <= {m.text for m in marks}
+        assert {"half", "robot 1: hello", "changed by hand or by a program", "robot 1 touches something"} <= {
+            m.text for m in marks
+        }
         found: list[Mark] = []
         while (mark := run(desk.looking.jump(is_before=False))) is not None:
             assert desk.sim.time_s == mark.time_s

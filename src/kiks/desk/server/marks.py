@@ -109,7 +109,7 @@ def described(event: Event) -> str:
         return f"robot {event.robot}: {text}"
     if event.kind == "score" and event.robot:
         return f"score of robot {event.robot}: {text}"
-    return "changed by hand" if event.kind == "change" else text
+    return "changed by hand or by a program" if event.kind == "change" else text
 
 
 def thinned(marks: Sequence[Mark], span: Span | None) -> list[Mark]:
