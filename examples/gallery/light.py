@@ -2,9 +2,9 @@
 Light and shadow
 ================
 
-How bright is it for a robot? Command ``O`` reads the light sensors: about 500 in the dark, less in light. The
+How bright is it for a robot? Command ``O`` reads the light sensors: about 450 in the dark, less in light. The
 map shows the brightest of the eight at each place of a room with a lamp and a wall that casts a shadow. Near
-the lamp they read less than 50.
+the lamp they read less than 100.
 """
 
 import matplotlib.pyplot as plt

@@ -2,8 +2,8 @@
 Odometry beside the truth
 =========================
 
-A robot computes where it is from the counters of its wheels. Its wheels are one per cent larger or smaller
-than it believes, as those of real robots are, and the error grows with the way. A simulation knows the truth.
+A robot computes where it is from the counters of its wheels. Its wheels are up to two per cent larger or
+smaller than it believes, as those of real robots are, and the error grows with the way. A simulation knows the truth.
 """
 
 import math

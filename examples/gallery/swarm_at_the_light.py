@@ -13,7 +13,7 @@ import kiks
 
 @kiks.controller(senses=("proximity", "ambient"))
 def to_the_light(sensors, memory, parameters, wheels):
-    near, light = sensors[:8], 1 - sensors[8:] / 500  # light: 0 in the dark, 1 in bright light
+    near, light = sensors[:8], 1 - sensors[8:] / 500  # light: 0.1 in the dark, 1 in bright light
     turn = 6 * (max(light[3:6]) - max(light[0:3])) + 0.01 * (near[1] + near[2] - near[3] - near[4])
     ahead = 6 - 5 * max(light) - 0.006 * max(near[1:5])
     wheels[0], wheels[1] = ahead + turn, ahead - turn

@@ -17,7 +17,7 @@ import kiks
 @kiks.controller(senses=("ambient",), parameters=3)
 def vehicle(sensors, memory, parameters, wheels):
     rest, same, other = parameters
-    left, right = 1 - min(sensors[0:3]) / 500, 1 - min(sensors[3:6]) / 500  # 0 in the dark, 1 in bright light
+    left, right = 1 - min(sensors[0:3]) / 500, 1 - min(sensors[3:6]) / 500  # 0.1 in the dark, 1 in bright light
     wheels[0] = rest + same * left + other * right
     wheels[1] = rest + same * right + other * left
 
