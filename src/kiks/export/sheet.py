@@ -31,7 +31,7 @@ FINER = 2
 LAMP_MM = 18.0
 """How far the drawing of a lamp reaches [mm]."""
 
-LIGHT_SHARE = 0.85
+LIGHT_SHARE = 0.6
 """Opacity of the strongest light on the floor."""
 
 NAME_SHARE = 0.42

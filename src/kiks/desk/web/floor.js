@@ -26,7 +26,7 @@ export class Floor {
     const key = isDark + lamps.map((lamp) => `${lamp.x_mm},${lamp.y_mm},${lamp.power_w},${lamp.isOn}`).join(";");
     if (!this.raster || !scale || key === this._light_key) return false;
     this._light_key = key;
-    this._light = lightMap(this.raster, lamps, scale, LAMPLIGHT, isDark ? 0.62 : 0.85);
+    this._light = lightMap(this.raster, lamps, scale, LAMPLIGHT, isDark ? 0.5 : 0.6);
     return true;
   }
 
