@@ -73,6 +73,17 @@ def test_the_world_pauses_when_the_project_has_ended_and_may_go_on(how: dict[str
     desk.close()
 
 
+def test_a_desk_that_closes_lets_its_supervisor_end(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "referee.py").write_text(
+        "def supervise(sim):\n    try:\n        yield 9.0\n    finally:\n        print('1:0')\n"
+    )
+    desk = desk_in(tmp_path)
+    asyncio.run(desk.replace(Project(supervisor="referee.py")))
+    desk.clear_away()
+    desk.close()
+    assert capsys.readouterr().out == "1:0\n"
+
+
 def test_a_score_calls_a_side_by_its_robot_or_else_by_its_program(tmp_path: Path) -> None:
     robots = (ProjectRobot(name="Reds"), *(ProjectRobot() for _ in range(3)))
     project = Project(robots=robots)

@@ -498,7 +498,11 @@ class Desk:
         self.present.gate.close()
         self.clear_away()
         self.programs.close()
-        self.present.sim.loop.gate = None
+        sim = self.present.sim
+        with sim.lock:
+            sim.loop.gate = None
+            if isinstance(sim.loop.supervisor, Supervision):
+                sim.loop.supervisor.close()
 
 
 class NewsHandler(logging.Handler):
