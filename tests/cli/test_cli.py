@@ -237,6 +237,14 @@ def test_an_option_behind_a_program_is_the_program_s_and_that_is_said(tmp_path: 
     assert not (tmp_path / "x.html").exists()
 
 
+def test_a_program_that_uses_no_robot_is_told_so(tmp_path: Path) -> None:
+    program = tmp_path / "own.py"
+    program.write_text("import kiks\nkiks.Khepera(kiks.Simulation(kiks.Arena.default()).port(1)).proximity()\n")
+    advice = "kiks: nothing was sent to a robot, and no time has passed."
+    assert advice in forked.run("run", str(program)).stderr
+    assert advice not in forked.run("run", WANDER).stderr
+
+
 def test_a_programs_exit_code_and_errors_are_its_own(tmp_path: Path) -> None:
     assert forked.run("run", WANDER, "7").returncode == 7
     program = tmp_path / "wrong.py"
@@ -279,6 +287,15 @@ def test_live_thinking_is_recorded_and_replayed(tmp_path: Path) -> None:
         (("serve", "--speed", "fast"), "--speed must be a number, but it was 'fast'."),
         (("schema", "robto"), "KIND must be one of robot, arena, project, task, but it was 'robto'."),
         (("run", WANDER, "exercise.kiks"), "a project must come first, but 'exercise.kiks' stands among the programs"),
+        (
+            ("export", "run.mcap"),
+            "RECORDING and OUT must be given, but only 'run.mcap' was. kiks export -h shows how.",
+        ),
+        (("replay",), "FILE must be given, but nothing was. kiks replay -h shows how."),
+        (
+            ("arena", "new", "room.toml"),
+            "--width-mm must be given, but nothing was. kiks arena new -h shows how.",
+        ),
         (("run", "champion.toml", "student.py"), "a champion must drive all robots alone, but 'student.py' follows it"),
     ],
 )

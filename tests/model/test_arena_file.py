@@ -361,15 +361,17 @@ def with_black_walls(tmp_path):
     return grey[::-1] != 254
 
 
-def test_a_picture_with_black_walls_is_turned_round(tmp_path):
+def test_a_picture_with_black_walls_is_turned_round(tmp_path, caplog):
     walls = with_black_walls(tmp_path)
     arena = Arena.load(write(tmp_path, 'picture = "room.png"\ninvert = true'))
     walls[:5] = False  # grey, which only a map of ROS knows to be unknown
     assert np.array_equal(arena.brightness == 255, walls)
+    assert not caplog.messages
     with pytest.raises(
         ArenaError, match=r"room for a robot 55 mm .* walls are black: an arena file with invert = true"
     ):
         Arena.load(tmp_path / "room.png").find_start(27.5)
+    assert "is wall: black (0) is floor, and all else wall." in caplog.text
     with pytest.raises(ArenaError, match="invert must come with a picture"):
         Arena.load(write(tmp_path, "size_mm = [500, 650]\ninvert = true"))
 

@@ -93,4 +93,5 @@ def export(
         if "on_progress" in known:
             given["on_progress"] = show
         write_export([Recording(file) for file in files], out, kind=kind, **given)
-    typer.echo(f"{kind.capitalize()}: {out}, {out.stat().st_size / 1e6:.1f} MB")
+    size_kb = out.stat().st_size / 1e3
+    typer.echo(f"{kind.capitalize()}: {out}, {f'{size_kb:.0f} kB' if size_kb < 1000 else f'{size_kb / 1e3:.1f} MB'}")

@@ -142,9 +142,14 @@ class Command(TyperCommand):
             left = super().parse_args(ctx, list(args))
         except typer.BadParameter as error:
             param: Any = error.param
-            if param is None or not (rule := _rule(param)):
+            if param is None:
                 raise
-            value = self.make_parser(ctx).parse_args(list(args))[0].get(param.name)
+            given = self.make_parser(ctx).parse_args(list(args))[0]
+            value = given.get(param.name)
+            if value in (None, ()):
+                raise ParameterError(self._missing(ctx, param, given)) from None
+            if not (rule := _rule(param)):
+                raise
             raise ParameterError(f"{_name(param)} must be {rule}, but it was {shown(value)}.") from None
         order = self.make_parser(ctx).parse_args(list(args))[2]
         for param in order:
@@ -153,6 +158,17 @@ class Command(TyperCommand):
         ctx.meta[_JSON] = ctx.params.pop("json", False)
         self._check_outputs(ctx.params, is_forced=ctx.params.pop("force", False))
         return left
+
+    def _missing(self, ctx: Any, param: Any, given: Mapping[str, Any]) -> str:
+        """Return what is to be said if a required option or argument was not given."""
+        names, words = _name(param), []
+        if param.param_type_name == "argument":
+            # With one word of two, the library misses the first, and a person has left out the last.
+            needed = [each for each in self.params if each.param_type_name == "argument" and each.required]
+            names = " and ".join(map(_name, needed))
+            words = [str(value) for each in needed if (value := given.get(str(each.name)))]
+        found = f"only {shown(words[0])} was" if words else "nothing was"
+        return f"{names} must be given, but {found}. {ctx.command_path} -h shows how."
 
     def _check_outputs(self, told: dict[str, Any], *, is_forced: bool) -> None:
         outputs = {param.name: param for param, _ in self._outputs}

@@ -191,6 +191,11 @@ def run(
             raise
         finally:
             tell_results(context, _tell(sim, thinking, doubt))
+    if code == 0 and sim.now_ns == 0:
+        say(
+            "nothing was sent to a robot, and no time has passed. A program reaches its robot through a serial port, "
+            'as in kiks.Khepera("/dev/ttyUSB0"). One that makes a world of its own runs with python, without kiks run.'
+        )
     if job.demonstration:
         say(f"picture: {export}")
     raise typer.Exit(code)

@@ -44,6 +44,9 @@ _KINDS = (
 MOSTLY_WALL = 0.6
 """Share of walls beyond which a picture has probably its colours the other way round."""
 
+TURN_ROUND = "In most other programs walls are black: an arena file with invert = true turns the picture round."
+"""What to do then."""
+
 
 @upwards.shown_in_notebooks("kiks.export.notebook", "arena")
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -416,7 +419,7 @@ class Arena:
     def _advice(self) -> str:
         """Return what is likely to be wrong with an arena in which a robot has no room."""
         if (self.brightness > 0).mean() > MOSTLY_WALL:
-            return "In most other programs walls are black: an arena file with invert = true turns the picture round."
+            return TURN_ROUND
         return "Draw wider passages or give a larger mm_per_pixel."
 
     def _widest_place(self) -> Pose:

@@ -5,6 +5,7 @@ The file is an arena file with its raster within, the robots, and the settings o
 
 from __future__ import annotations
 
+import logging
 from base64 import b64decode, b64encode
 from collections.abc import Callable
 from dataclasses import fields, replace
@@ -15,7 +16,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field, InstanceOf
 
 from kiks.errors import ArenaError, KiksError, ParameterError, counted, nearest, shown
-from kiks.model.arena import Arena
+from kiks.model.arena import MOSTLY_WALL, TURN_ROUND, Arena
 from kiks.model.arena_file import (
     Balls,
     Cylinders,
@@ -54,6 +55,8 @@ from kiks.model.ros_map import load_ros_map
 from kiks.model.shipped import shipped_arenas
 from kiks.model.thinking_policy import split_thinking
 from kiks.model.turrets import TURRETS
+
+_log = logging.getLogger("kiks.model")
 
 FASTEST = "fastest"
 """Value in a file for no speed limit."""
@@ -315,4 +318,15 @@ def load_arena_file(path: Path) -> Arena:
             hint = nearest(str(path), known)
             raise ArenaError(f"An arena must be a file or one of {names}, but there is no {shown(str(path))}.{hint}")
         path = known[path.as_posix()]
-    return _READERS.get(path.suffix.lower(), Arena.from_image)(path)
+    read = _READERS.get(path.suffix.lower())
+    return _picture_alone(path) if read is None else read(path)
+
+
+def _picture_alone(path: Path) -> Arena:
+    """Read a picture; say if it is mostly wall, for a robot would then stand in what was drawn as a wall."""
+    arena = Arena.from_image(path)
+    if (share := float((arena.brightness > 0).mean())) > MOSTLY_WALL:
+        _log.warning(
+            "%.0f %% of %r is wall: black (0) is floor, and all else wall. %s", 100 * share, str(path), TURN_ROUND
+        )
+    return arena
