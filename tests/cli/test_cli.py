@@ -15,6 +15,7 @@ from typing import Any, get_args, get_type_hints
 import pytest
 from tests import forked
 from tests.at_length import at_length, cases
+from typer.testing import CliRunner
 
 from kiks.cli import app
 from kiks.errors import ParameterError
@@ -81,6 +82,25 @@ def test_demonstrations_are_listed() -> None:
     assert listed == kiks("demo", "--list").stdout
     assert re.findall(r"^  (\w+) +\S", listed, flags=re.MULTILINE) == [*demonstrations()]
     assert all(len(line) > 25 for line in listed.splitlines() if line.startswith("  "))
+
+
+@pytest.mark.parametrize(
+    ("line", "expected"),
+    [
+        ("kiks ex", ["examples", "export"]),
+        ("kiks demo ", [*demonstrations()]),
+        ("kiks demo av", ["avoid"]),
+        ("kiks demo avoid --des", ["--desk"]),
+        ("kiks run av", []),  # a file of the user, which the shell finds
+        ("kiks run --arena ma", ["maze"]),
+        ("kiks arena info pi", ["pillars", "pitch"]),
+        ("kiks run --export README.md --arena of", ["office"]),
+    ],
+)
+def test_a_shell_completes_commands_options_and_names(line: str, expected: list[str]) -> None:
+    words = {"_KIKS_COMPLETE": "complete_bash", "COMP_WORDS": line, "COMP_CWORD": str(line.count(" "))}
+    said = CliRunner().invoke(app, prog_name="kiks", env=words)
+    assert said.output.split() == expected
 
 
 def test_examples_are_copied_into_a_new_folder(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from kiks.cli.options import arena_names
 from kiks.cli.outputs import Command, has_results, output, tell_results
 from kiks.errors import counted
 
@@ -102,7 +103,10 @@ def list_(context: typer.Context) -> None:
 @has_results
 def info(
     context: typer.Context,
-    file: Annotated[Path, typer.Argument(metavar="ARENA", help="An arena's name, file or picture.")],
+    file: Annotated[
+        Path,
+        typer.Argument(metavar="ARENA", help="An arena's name, file or picture.", autocompletion=arena_names),
+    ],
 ) -> None:
     """Describe an arena, and whether a Khepera fits at its starts.
 

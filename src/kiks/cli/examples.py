@@ -28,7 +28,7 @@ class DemoCommand(RunCommand):
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Also understand --list, and no words at all."""
-        if set(args) <= {"--list", "--json"}:
+        if not ctx.resilient_parsing and set(args) <= {"--list", "--json"}:
             found = _demonstrations()
             typer.echo(json.dumps(found, indent=2) if "--json" in args else "\n".join(_lines_of(found)))
             ctx.exit()

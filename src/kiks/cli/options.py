@@ -30,6 +30,13 @@ SeedOrOwn = Annotated[
 ]
 
 
+def arena_names(incomplete: str) -> list[str]:
+    """Return the arenas that come with KiKS, for a shell that completes a name."""
+    from kiks.model.shipped import shipped_arenas
+
+    return [name for name in shipped_arenas() if name.startswith(incomplete)]
+
+
 @dataclass(frozen=True)
 class World:
     """The options that choose a world: an arena or a project, and what differs from it."""
@@ -37,7 +44,9 @@ class World:
     arena: Annotated[
         str | None,
         typer.Option(
-            help="Arena by name (kiks arena list), .toml, .kad, picture, or a project's .kiks; the classic box if none."
+            help="Arena by name (kiks arena list), .toml, .kad, picture, or a project's .kiks; the classic box if "
+            "none.",
+            autocompletion=arena_names,
         ),
     ] = None
     robots: Annotated[

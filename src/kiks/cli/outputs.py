@@ -138,6 +138,8 @@ class Command(TyperCommand):
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Also check what is told twice, and the outputs."""
+        if ctx.resilient_parsing:  # A shell asks what may follow.
+            return super().parse_args(ctx, args)
         try:
             left = super().parse_args(ctx, list(args))
         except typer.BadParameter as error:

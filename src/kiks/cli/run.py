@@ -36,6 +36,8 @@ class RunCommand(CheckedCommand):
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Move options after such a file before it, and mark where the words of programs begin."""
+        if ctx.resilient_parsing:
+            return super().parse_args(ctx, args)
         options, words = self._split(ctx, args)
         if words and takes_options_behind(words[0]):
             behind, others = self._split(ctx, words[1:])
@@ -63,6 +65,13 @@ class RunCommand(CheckedCommand):
         return args[:begin], args[begin:]
 
 
+def _names(ctx: typer.Context, incomplete: str) -> list[str]:
+    """Return the demonstrations for a shell that completes `kiks demo`; programs are files, which it knows itself."""
+    from kiks.model.shipped import demonstrations
+
+    return [name for name in demonstrations() if name.startswith(incomplete)] if ctx.info_name == "demo" else []
+
+
 @has_results
 def run(
     context: typer.Context,
@@ -72,7 +81,8 @@ def run(
         Path,
         typer.Argument(
             help="A Python program that talks to a Khepera through pyserial: a file, a folder with a __main__.py, or "
-            "-m and the name of a module; or a project (.kiks), a demonstration, or a champion's file or folder."
+            "-m and the name of a module; or a project (.kiks), a demonstration, or a champion's file or folder.",
+            autocompletion=_names,
         ),
     ],
     arguments: Annotated[
