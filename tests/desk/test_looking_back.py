@@ -480,6 +480,12 @@ def test_bookmarks_of_a_finished_recording_go_on_with_a_branch(tmp_path: Path) -
         run(desk.go_on_from_here())
         run(desk.looking.tend())
         assert [mark.time_s for mark in desk.looking.marks if mark.text == "here"] == [s_from_ns(time_ns)]
+        run(desk.looking.recording())
+        run(desk.looking.tend())
+        assert sum(mark.text == "here" for mark in desk.looking.marks) == 1
+        run(desk.start_over())
+        run(desk.looking.tend())
+        assert not any(mark.text == "here" for mark in desk.looking.marks)
 
 
 def test_another_world_has_another_past(tmp_path: Path) -> None:

@@ -24,7 +24,7 @@ from kiks.firmware.general_io import GeneralIO
 from kiks.firmware.turret import Orders, Turret
 from kiks.model.arena import Lamp
 from kiks.model.checks import CLOCK_END_NS, ROBOTS_MAX
-from kiks.recording.entries import Entry, block_of, characters_in, entries_of
+from kiks.recording.entries import Entry, block_of, characters_in, entries_of, score_of
 from kiks.recording.events import EventReader
 from kiks.recording.log import RecordedLog
 from kiks.recording.mcap_file import room_of
@@ -402,6 +402,12 @@ def test_a_score_is_recorded_with_its_times(tmp_path: Path) -> None:
         {"laps": 1, 2: 1},
     ]
     assert check_recording(recording.log).differs_ns is None
+
+
+@pytest.mark.parametrize("data", ["[1, NaN]", '["laps", 1e400]', "[0, 1]", '["", 1]', f'["laps", "{"x" * 41}"]', "[1]"])
+def test_a_score_in_a_file_keeps_the_rules_of_one_that_is_set(data: str) -> None:
+    with pytest.raises(ParameterError, match=r"the score of a recording: \["):
+        score_of(Entry(Kind.SCORE, 0, 0, 0, 0, data.encode()))
 
 
 def test_a_closed_recording_takes_no_bookmark(tmp_path: Path) -> None:

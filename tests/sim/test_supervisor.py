@@ -95,7 +95,7 @@ def test_a_thing_comes_and_goes_and_keeps_its_number(sim):
         (lambda sim: sim.add_ball(-5, 300), "must lie inside the arena"),
         (lambda sim: sim.add_ball(math.nan, 300), "x_mm must be at most 1000000000, but it was nan"),
         (lambda sim: sim.add_ball("x", 300), "x_mm must be a number, but it was 'x'"),
-        (lambda sim: sim.add_ball(100, 100, colour=1), r"radius_mm, friction_mm_s2 or brightness, .* \['colour'\]"),
+        (lambda sim: sim.add_ball(100, 100, colour=1), r"radius_mm, friction_mm_s2, brightness, .* \['colour'\]"),
         (lambda sim: sim.add_ball(100, 100, radius_mm=5), "radius_mm must be at least 10"),
         (lambda sim: sim.add_ball(100, 100, brightness=0), "brightness must be at least 1"),
         (lambda sim: sim.add_ball(100, 100, brightness="gold"), "one of .*'white'"),
@@ -326,6 +326,15 @@ def test_a_world_without_a_robot_gets_one():
     sim.run(1.0)
     assert sim.pose(1)[0] > 300
     assert sim.paths().shape[0] == 1
+
+
+def test_a_body_changes_its_looks_and_not_its_place(sim: Simulation) -> None:
+    ball = sim.add_ball(100, 100)
+    sim.change_body(ball, radius_mm=40, brightness="wood")
+    for changes in ({"x_mm": 120}, {"radius_mm": math.nan}, {"radius_mm": 90}):
+        with pytest.raises(ParameterError, match=f"{next(iter(changes))}|the place of body 1 must be free"):
+            sim.change_body(ball, **changes)
+    assert sim.bodies()[["x_mm", "radius_mm", "brightness"]].tolist() == [(100.0, 40.0, 190)]
 
 
 def test_a_score_is_set_read_copied_and_checked(sim: Simulation) -> None:

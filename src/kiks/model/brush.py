@@ -6,14 +6,14 @@ the picture below them.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 
 from kiks.model.arena import Arena
-from kiks.model.cells import PER_CELL, Area, Point, paint, stroke_cells
+from kiks.model.cells import PER_CELL, Area, Point, covered, stroke_cells
 from kiks.model.checks import check_count, check_number
 from kiks.model.materials import brightness_of
 from kiks.model.walls import WIDTH_MAX_MM, Wall, painted
@@ -47,7 +47,7 @@ def line(arena: Arena, points_mm: Sequence[Point], *, width_mm: float, brightnes
     if len(points) == 2:
         return draw(arena, Wall(line_mm=points, width_mm=width_mm, brightness=grey))
     in_cells = [(x_mm / arena.mm_per_cell, y_mm / arena.mm_per_cell) for x_mm, y_mm in points]
-    return _paint_ground(arena, [*stroke_cells(arena.ground.shape, in_cells, width_mm / arena.mm_per_cell)], grey)
+    return _paint_ground(arena, stroke_cells(arena.ground.shape, in_cells, width_mm / arena.mm_per_cell), grey)
 
 
 def disc(arena: Arena, centre_mm: Point, radius_mm: float, brightness: int | str = 255) -> Arena:
@@ -58,43 +58,33 @@ def disc(arena: Arena, centre_mm: Point, radius_mm: float, brightness: int | str
 
 def draw(arena: Arena, wall: Wall) -> Arena:
     """Return an arena with one more wall, without those that it hides; the same arena if nothing looks different."""
-    raster = arena.brightness.copy()
-    paint(raster, areas := wall.cells(raster.shape, arena.mm_per_cell), wall.brightness)
+    mask = covered(arena.ground.shape, wall.cells(arena.ground.shape, arena.mm_per_cell))
+    raster = np.where(mask, np.uint8(wall.brightness), arena.brightness)
     if np.array_equal(raster, arena.brightness):
         return arena
-    mask = _mask(raster.shape, areas)
     seen = tuple(each for each in arena.walls if not all(part.all() for part in _parts(mask, each, arena.mm_per_cell)))
     without = replace(arena, walls=seen)
     return without if np.array_equal(without.brightness, raster) else replace(arena, walls=(*seen, wall))
 
 
-def _paint_ground(arena: Arena, areas: Sequence[Area], grey: int) -> Arena:
+def _paint_ground(arena: Arena, areas: Iterable[Area], grey: int) -> Arena:
     """Return an arena with cells of the picture in a grey: the walls that lie below them become a part of it, too."""
-    mask = _mask(arena.ground.shape, areas)
+    mask = covered(arena.ground.shape, areas)
     touched = [
         number
         for number, each in enumerate(arena.walls, start=1)
         if any(part.any() for part in _parts(mask, each, arena.mm_per_cell))
     ]
     below = max(touched, default=0)
-    ground = painted(arena.ground, arena.mm_per_cell, arena.walls[:below]).copy()
-    paint(ground, areas, grey)
+    ground = np.where(mask, np.uint8(grey), painted(arena.ground, arena.mm_per_cell, arena.walls[:below]))
     after = replace(arena, ground=ground, walls=arena.walls[below:])
     return arena if np.array_equal(after.brightness, arena.brightness) else after
 
 
-def _mask(shape: tuple[int, int], areas: Sequence[Area]) -> npt.NDArray[np.uint8]:
-    mask = np.zeros(shape, np.uint8)
-    paint(mask, areas, 1)
-    return mask
-
-
-def _parts(mask: npt.NDArray[np.uint8], wall: Wall, mm_per_cell: float) -> list[npt.NDArray[np.uint8]]:
-    """Return what of a mask the parts of a wall cover."""
-    return [
-        mask[rows, columns][... if covered is None else covered]
-        for rows, columns, covered in wall.cells(mask.shape, mm_per_cell)
-    ]
+def _parts(mask: npt.NDArray[np.bool_], wall: Wall, mm_per_cell: float) -> Iterator[npt.NDArray[np.bool_]]:
+    """Yield what of a mask the parts of a wall cover."""
+    for rows, columns, cells in wall.cells((mask.shape[0], mask.shape[1]), mm_per_cell):
+        yield mask[rows, columns][... if cells is None else cells]
 
 
 def _checked(points_mm: Sequence[Point]) -> tuple[Point, ...]:

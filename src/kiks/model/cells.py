@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -24,10 +24,20 @@ _STRIP_ROWS, _STRIP_COLUMNS = 64, 8192
 Point = tuple[float, float]
 
 
-def paint(raster: npt.NDArray[np.uint8], areas: Iterable[Area], brightness: int) -> None:
-    """Give cells of a raster a brightness; 0 is floor."""
+def paint(raster: npt.NDArray[Any], areas: Iterable[Area], value: int) -> bool:
+    """Give cells of a raster a value, and return whether there are any."""
+    is_any = False
     for rows, columns, mask in areas:
-        raster[rows, columns][... if mask is None else mask] = brightness
+        raster[rows, columns][... if mask is None else mask] = value
+        is_any = True
+    return is_any
+
+
+def covered(shape: tuple[int, int], areas: Iterable[Area]) -> npt.NDArray[np.bool_]:
+    """Return which cells of a raster are in one of the areas, bool [row, column]."""
+    found = np.zeros(shape, np.bool_)
+    paint(found, areas, True)
+    return found
 
 
 class Area(NamedTuple):

@@ -101,7 +101,7 @@ class Wall:
         """
         return 10.0 if self.width_mm is None else self.width_mm
 
-    def cells(self, shape: tuple[int, int], mm_per_cell: float) -> list[Area]:
+    def cells(self, shape: tuple[int, int], mm_per_cell: float) -> Iterable[Area]:
         """Return the cells of a raster that the wall covers; `shape` has its rows and columns."""
 
         def in_cells(points_mm: Iterable[Sequence[float]]) -> list[tuple[float, float]]:
@@ -113,7 +113,7 @@ class Wall:
         points_mm, width_mm = self.line_mm, self.thick_mm
         if self.disc_mm is not None and self.radius_mm is not None:
             points_mm, width_mm = (self.disc_mm,), 2 * self.radius_mm
-        return [*stroke_cells(shape, in_cells(points_mm or ()), width_mm / mm_per_cell)]
+        return stroke_cells(shape, in_cells(points_mm or ()), width_mm / mm_per_cell)
 
 
 def painted(ground: npt.NDArray[np.uint8], mm_per_cell: float, walls: Sequence[Wall]) -> npt.NDArray[np.uint8]:
@@ -132,12 +132,11 @@ def painted(ground: npt.NDArray[np.uint8], mm_per_cell: float, walls: Sequence[W
     check_count("the number of walls", len(walls), 0, WALLS_MAX, "Draw a picture instead.")
     raster = ground.copy()
     for number, wall in enumerate(walls, start=1):
-        if not (areas := wall.cells(raster.shape, mm_per_cell)):
+        if not paint(raster, wall.cells(raster.shape, mm_per_cell), wall.brightness):
             raise ArenaError(
                 f"wall {number} must cover a part of the arena, but it covers no cell of it. The arena is "
                 f"{raster.shape[1] * mm_per_cell:g} x {raster.shape[0] * mm_per_cell:g} mm, with cells of "
                 f"{mm_per_cell:g} mm."
             )
-        paint(raster, areas, wall.brightness)
     raster.setflags(write=False)
     return raster

@@ -25,12 +25,12 @@ from kiks.firmware.radio import ATTEMPTS, DATA_LIMIT
 from kiks.firmware.turret import Turret
 from kiks.model.arena import Arena
 from kiks.model.checks import CLOCK_END_NS, ROBOTS_MAX
-from kiks.model.data_file import OneOf, Text, Whole, check, parse_json, parse_toml, record
+from kiks.model.data_file import Number, OneOf, Text, Whole, check, parse_json, parse_toml, record
 from kiks.model.project import Project
 from kiks.model.robot import RobotSpec, robot_toml
 from kiks.model.turrets import TURRETS
 from kiks.sim.free_space import FreeSpace
-from kiks.sim.simulation import SCORE_ENTRIES_MAX, Simulation
+from kiks.sim.simulation import SCORE_ENTRIES_MAX, SCORE_MAX, SCORE_TEXT_MAX, Simulation
 from kiks.sim.turret_host import TurretOfUser, described, name_of
 from kiks.sim.wire import Count, SavedWire
 from kiks.sim.world import World
@@ -39,7 +39,12 @@ from kiks.units import TICK_NS, s_from_ns
 Part = TypeVar("Part", Arena, RobotSpec)
 
 
-ScoreEntry = tuple[Whole | Text, Whole | float | Text]
+_ScoreText = Annotated[Text, Field(min_length=1, max_length=SCORE_TEXT_MAX)]
+
+ScoreEntry = tuple[
+    Annotated[Whole, Field(ge=1, le=ROBOTS_MAX)] | _ScoreText,
+    Annotated[Whole | Number, Field(ge=-SCORE_MAX, le=SCORE_MAX)] | _ScoreText,
+]
 """What and value of `Simulation.set_score`."""
 
 

@@ -747,7 +747,8 @@ class Simulation:
                 value = int(number) if number.is_integer() else number
             if what not in score and len(score) == SCORE_ENTRIES_MAX:
                 raise ParameterError(
-                    f"a score must have at most {SCORE_ENTRIES_MAX} entries, but {shown(what)} would be one more."
+                    f"a score must have at most {SCORE_ENTRIES_MAX} entries, but {shown(what)} would be one more. "
+                    "Give an entry that is there another value."
                 )
             if score.get(what) != value:
                 score[what] = value
@@ -1063,7 +1064,7 @@ def _score_text(name: str, text: str) -> str:
     if 0 < len(text) <= SCORE_TEXT_MAX and text.isprintable():
         return text
     raise ParameterError(
-        f"{name} of a score must be a line of 1 to {SCORE_TEXT_MAX} characters, but it was {shown(text)}."
+        f"{name} of a score must be a line of 1 to {SCORE_TEXT_MAX} characters, but it was {shown(text)}. Shorten it."
     )
 
 

@@ -19,6 +19,9 @@ from kiks.model.free_disc import OVERLAP_MM
 from kiks.sim.free_space import PRESSED_MM
 from kiks.sim.world import ITSELF, World
 
+CHANGES = ("radius_mm", "friction_mm_s2", "brightness")
+"""What can be set of a ball or cylinder besides its place."""
+
 
 @dataclass(frozen=True)
 class Checkpoint:
@@ -59,17 +62,12 @@ class Things:
 
     def add_body(self, kind: type[Ball | Cylinder], x_mm: float, y_mm: float, changes: dict[str, Any]) -> int:
         """Add a ball or cylinder at rest; return its number."""
+        _check_changes(changes)
         return self._add(self._made(kind, {"x_mm": x_mm, "y_mm": y_mm} | changes))
 
     def _made(self, kind: type[Ball | Cylinder], values: dict[str, Any]) -> Ball | Cylinder:
         """Return a checked ball or cylinder."""
-        try:
-            body = kind(**values)
-        except TypeError:
-            names = [name for name in values if name not in ("x_mm", "y_mm")]
-            raise ParameterError(
-                f"changes of a body must be radius_mm, friction_mm_s2 or brightness, but they were {names}."
-            ) from None
+        body = kind(**values)
         balls, cylinders = ((body,), ()) if isinstance(body, Ball) else ((), (body,))
         return self._checked(balls=balls, cylinders=cylinders).bodies[0]
 
@@ -109,14 +107,14 @@ class Things:
         index, world = self._index_of(body), self._world
         record: Any = world.state.bodies[0, index]
         kind: type[Ball | Cylinder] = Ball if record["what"] == BALL else Cylinder
-        known = ("radius_mm", "friction_mm_s2", "brightness")
-        now = {name: record[name].item() for name in ("x_mm", "y_mm", *known)}
+        _check_changes(changes)
+        now = {name: record[name].item() for name in ("x_mm", "y_mm", *CHANGES)}
         changed = self._made(kind, now | changes)
         disc = world.robot_count + index
         world.free_space.check_free(
             f"the place of body {body}", changed.x_mm, changed.y_mm, changed.radius_mm, but=disc
         )
-        for name in known:
+        for name in CHANGES:
             record[name] = getattr(changed, name)
         world.rebuild_scene()
 
@@ -184,3 +182,10 @@ class Things:
         for index, pose in enumerate(checkpoint.poses.tolist()):
             world.put_robot(index, *pose)
         world.rebuild_scene()
+
+
+def _check_changes(changes: dict[str, Any]) -> None:
+    if unknown := [name for name in changes if name not in CHANGES]:
+        raise ParameterError(
+            f"changes of a body must be {', '.join(CHANGES)}, but they were {shown(unknown)}. `move_body` moves it."
+        )

@@ -122,15 +122,12 @@ class Page:
         for each, panel in self._panels.items():
             panel.set_visible(each == name)
 
+    @told
     async def _pick(self, what: str, index: int, sensor: int, place: Place) -> None:
         """Show the robot or sensor that was clicked; where walls are drawn, the properties of anything else."""
-        is_past = self._desk.past is not None
-        if (
-            not is_past
-            and what not in ("robot", "sensor")
-            and isinstance(editor := self._panels.get(self._tabs.value), EditorPanel)
-        ):
-            await editor.properties.show(await self._editing.select(what, index, *place))
+        panel = self._panels.get(self._tabs.value)
+        if self._desk.past is None and what not in ("robot", "sensor") and isinstance(panel, EditorPanel):
+            await panel.properties.show(await self._editing.select(what, index, *place))
         if what in ("robot", "sensor"):
             self._tabs.value = "robot"
             monitor = self._panels["robot"]
@@ -142,8 +139,7 @@ class Page:
     @told
     async def _edit(self, what: str, index: int, place: Place) -> None:
         """Show the properties of a thing or a wall; a double click on the floor shows all of the arena."""
-        is_past = self._desk.past is not None
-        if is_past or (selected := await self._editing.select(what, index, *place)) is None:
+        if self._desk.past is not None or (selected := await self._editing.select(what, index, *place)) is None:
             self._view.run_method("fit")
             return
         self._tabs.value = "arena"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
+from contextlib import suppress
 from functools import partial
 from typing import Any
 
@@ -204,14 +205,12 @@ def _value(typed: Any, before: Any) -> Any:
         >>> _value("10, 20; 30, 40.5", ((1.0, 2.0), (3.0, 4.0)))
         ((10, 20), (30, 40.5))
     """
-    if isinstance(before, bool | str) or typed is None:
+    if isinstance(before, bool | str):
         return typed
     if isinstance(before, tuple):
         parts = str(typed).split(";" if isinstance(before[0], tuple) else ",")
         return tuple(_value(part, before[0]) for part in parts)
     for kind in (int, float):
-        try:
-            return kind(typed)
-        except ValueError:
-            continue
+        with suppress(ValueError):
+            return kind(str(typed))
     return str(typed).strip()

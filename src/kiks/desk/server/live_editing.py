@@ -15,14 +15,12 @@ from dataclasses import replace
 from itertools import count
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from kiks.desk.server.desk import Desk
 from kiks.engine.state import BALL
 from kiks.errors import ParameterError
 from kiks.model.arena import Arena, Ball, Cylinder, Lamp, Pose, Wall
 from kiks.model.arena_objects import THINGS_MAX
-from kiks.model.cells import paint
+from kiks.model.cells import covered
 from kiks.model.data_file import Coordinate, Text, check
 from kiks.model.free_disc import free_place
 from kiks.model.project import Project, ProjectRobot
@@ -363,12 +361,11 @@ def values_of(record: Any) -> dict[str, Any]:
 
 
 def _covers(arena: Arena, wall: Wall, x_mm: float, y_mm: float) -> bool:
-    row, column = (int(way_mm / arena.mm_per_cell) for way_mm in (y_mm, x_mm))
-    if not (0 <= row < arena.ground.shape[0] and 0 <= column < arena.ground.shape[1]):
+    """Return whether a wall covers a place; a place outside, or one that is no number, it does not."""
+    if not (0 <= x_mm < arena.width_mm and 0 <= y_mm < arena.height_mm):
         return False
-    cells = np.zeros_like(arena.ground)
-    paint(cells, wall.cells(arena.ground.shape, arena.mm_per_cell), 1)
-    return bool(cells[row, column])
+    cells = covered(arena.ground.shape, wall.cells(arena.ground.shape, arena.mm_per_cell))
+    return bool(cells[int(y_mm / arena.mm_per_cell), int(x_mm / arena.mm_per_cell)])
 
 
 def _in_order(sim: Simulation) -> list[int]:

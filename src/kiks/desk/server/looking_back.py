@@ -51,7 +51,7 @@ class LookingBack:
         self._reader: MarkReader | None = None
         self._keeps = False
         self._was_running = False
-        # Bookmarks of a recording that is finished: time [ns] and note.
+        # Time [ns] and note of bookmarks that were set in a finished recording, which cannot keep them.
         self._bookmarks: list[tuple[int, str]] = []
         self._wanted_ns: int | None = None
         self._turn = asyncio.Lock()
@@ -71,7 +71,8 @@ class LookingBack:
             sim: The world.
             is_branch: Whether it goes on from a time of the past, which is kept up to there; else it is forgotten.
         """
-        before = self._source if is_branch else None
+        before, bookmarks = (self._source, self._bookmarks) if is_branch else (None, [])
+        self._bookmarks = []
         self._forget()
         if not self._keeps:
             return
@@ -82,9 +83,10 @@ class LookingBack:
             self._writer = RunWriter.of(sim)
             self._writer.add(ring)
             self._use(ring)
-            for time_ns, note in self._bookmarks if is_branch else ():
+            for time_ns, note in bookmarks:
                 if time_ns <= sim.now_ns:
                     self._writer.mark(note, time_ns)
+            self._flush(sim)
         except (KiksError, OSError) as error:
             self._say(f"People cannot look back at this run: {error}")
 
@@ -99,11 +101,15 @@ class LookingBack:
 
     async def bookmark(self, time_ns: int, note: str) -> None:
         """Set a bookmark at a time [ns]; what records the world keeps it."""
-        if (writer := self._writer) is None:
-            self._bookmarks.append((time_ns, note))
-        else:
-            await self._present().do(lambda _: writer.mark(note, time_ns))
-            await self._present().do(self._flush)
+
+        def mark(sim: Simulation) -> None:
+            if self._writer is None:
+                self._bookmarks.append((time_ns, note))
+            else:
+                self._writer.mark(note, time_ns)
+                self._flush(sim)
+
+        await self._present().do(mark)
         await self.tend()
 
     def show_recording(self, file: Path, time_ns: int) -> None:
