@@ -155,3 +155,11 @@ def test_a_freehand_stroke_becomes_a_part_of_the_picture_with_the_walls_below_it
     beside = brush.line(arena, [(20, 200), (30, 220), (40, 200)], width_mm=5)
     assert beside.walls == arena.walls
     assert np.count_nonzero(beside.ground != arena.ground) > 50
+
+
+def test_walls_that_would_take_minutes_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("kiks.model.walls.EXAMINED_MAX", 3 * BOX.ground.size)
+    wide = Wall(line_mm=((10, 10), (390, 290)), width_mm=1000, brightness=0)
+    replace(BOX, walls=(wide,) * 3)
+    with pytest.raises(ArenaError, match=r"at most \d+ cells together, but these have more"):
+        replace(BOX, walls=(wide,) * 4)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
+from kiks.cli.outputs import json_of
 from kiks.cli.run import RunCommand
 from kiks.errors import ParameterError, shown
 
@@ -30,7 +30,7 @@ class DemoCommand(RunCommand):
         """Also understand --list, and no words at all."""
         if not ctx.resilient_parsing and set(args) <= {"--list", "--json"}:
             found = _demonstrations()
-            typer.echo(json.dumps(found, indent=2) if "--json" in args else "\n".join(_lines_of(found)))
+            typer.echo(json_of(found) if "--json" in args else "\n".join(_lines_of(found)))
             ctx.exit()
         return super().parse_args(ctx, args)
 

@@ -75,6 +75,17 @@ def tell_results(context: typer.Context, results: object, lines: Iterable[str] =
         typer.echo(line)
 
 
+def json_of(results: object) -> str:
+    """Return results as JSON, which has no NaN and no infinity: they become null.
+
+    Example:
+        >>> json_of([1.5, float("nan")]).split()
+        ['[', '1.5,', 'null', ']']
+    """
+    plain = json.loads(json.dumps(results), parse_constant=lambda _: None)
+    return json.dumps(plain, indent=2, ensure_ascii=False)
+
+
 @contextmanager
 def _alone(context: Any) -> Iterator[None]:
     """Let what is printed meanwhile go to the error output, also by other processes, and print the results then."""
@@ -88,7 +99,7 @@ def _alone(context: Any) -> Iterator[None]:
         os.dup2(kept, 1)
         os.close(kept)
         if _RESULTS in context.meta:
-            typer.echo(json.dumps(context.meta[_RESULTS], indent=2, ensure_ascii=False))
+            typer.echo(json_of(context.meta[_RESULTS]))
 
 
 _adding = typer.Typer(add_completion=False)

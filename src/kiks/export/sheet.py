@@ -113,9 +113,10 @@ def text_font(size: float) -> FreeTypeFont:
     """Return a font for names that people choose: that of Matplotlib, as Pillow's own has no accents."""
     from PIL import ImageFont
 
-    spec = find_spec("matplotlib")  # without importing it
-    (folder,) = (spec and spec.submodule_search_locations) or ("",)
-    return ImageFont.truetype(Path(folder, "mpl-data", "fonts", "ttf", "DejaVuSans.ttf"), size)
+    library = find_spec("matplotlib")  # importing it would take longer than drawing
+    assert library is not None
+    assert library.origin is not None
+    return ImageFont.truetype(Path(library.origin).parent / "mpl-data" / "fonts" / "ttf" / "DejaVuSans.ttf", size)
 
 
 def pen_on(image: Image) -> Any:

@@ -16,21 +16,43 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from kiks.errors import ArenaError
+from kiks.model.raster import MAX_CELLS
+
 PER_CELL = 64
 """Units in a cell."""
+
+EXAMINED_MAX = 4 * MAX_CELLS
+"""Most cells that are examined to draw all walls of an arena: some seconds of work."""
 
 _STRIP_ROWS, _STRIP_COLUMNS = 64, 8192
 
 Point = tuple[float, float]
 
 
-def paint(raster: npt.NDArray[Any], areas: Iterable[Area], value: int) -> bool:
-    """Give cells of a raster a value, and return whether there are any."""
-    is_any = False
+def paint(raster: npt.NDArray[Any], areas: Iterable[Area], value: int, examined_max: int = EXAMINED_MAX) -> int:
+    """Give cells of a raster a value.
+
+    Args:
+        raster: The raster [row, column].
+        areas: The cells.
+        value: Their value.
+        examined_max: Most cells that are examined.
+
+    Returns:
+        Number of cells that were examined.
+    """
+    examined = 0
     for rows, columns, mask in areas:
-        raster[rows, columns][... if mask is None else mask] = value
-        is_any = True
-    return is_any
+        part = raster[rows, columns]
+        part[... if mask is None else mask] = value
+        examined += part.size
+        if examined > examined_max:
+            raise ArenaError(
+                f"lines, boxes and discs must have at most {EXAMINED_MAX} cells together, but these have more. Make "
+                "them smaller or fewer, or draw a picture."
+            )
+    return examined
 
 
 def covered(shape: tuple[int, int], areas: Iterable[Area]) -> npt.NDArray[np.bool_]:

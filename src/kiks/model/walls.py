@@ -11,7 +11,7 @@ import numpy.typing as npt
 from pydantic import BeforeValidator, Field
 
 from kiks.errors import ArenaError, ParameterError
-from kiks.model.cells import Area, paint, rectangle_cells, stroke_cells
+from kiks.model.cells import EXAMINED_MAX, Area, paint, rectangle_cells, stroke_cells
 from kiks.model.checks import check_count
 from kiks.model.data_file import Number, Point, Rule, Whole, record
 from kiks.model.materials import brightness_of
@@ -125,14 +125,16 @@ def painted(ground: npt.NDArray[np.uint8], mm_per_cell: float, walls: Sequence[W
         walls: The walls.
 
     Raises:
-        ArenaError: If a wall covers nothing.
+        ArenaError: If a wall covers nothing, or all together too much.
     """
     if not walls:
         return ground
     check_count("the number of walls", len(walls), 0, WALLS_MAX, "Draw a picture instead.")
-    raster = ground.copy()
+    raster, left = ground.copy(), EXAMINED_MAX
     for number, wall in enumerate(walls, start=1):
-        if not paint(raster, wall.cells(raster.shape, mm_per_cell), wall.brightness):
+        examined = paint(raster, wall.cells(raster.shape, mm_per_cell), wall.brightness, left)
+        left -= examined
+        if not examined:
             raise ArenaError(
                 f"wall {number} must cover a part of the arena, but it covers no cell of it. The arena is "
                 f"{raster.shape[1] * mm_per_cell:g} x {raster.shape[0] * mm_per_cell:g} mm, with cells of "

@@ -184,7 +184,7 @@ class Editing:
         numbers = {
             "robot": [*now.of(Robot)],
             "lamp": [*now.of(Lamp)],
-            "body": [number for _, number in sorted(zip(bodies, (*now.of(Ball), *now.of(Cylinder)), strict=True))],
+            "body": [number for _, number in sorted(zip(bodies, (*now.of(Ball), *now.of(Cylinder)), strict=False))],
         }.get("robot" if what == "sensor" else what)
         if numbers is not None:
             return numbers[index] if 0 <= index < len(numbers) else None

@@ -18,7 +18,7 @@ export default {
         <span class="kiks-board-side"><b>{{ entries[1].name }}</b><i :style="ink(entries[1])"></i></span>
       </div>
       <dl v-else class="kiks-board-list">
-        <div v-for="entry in entries" :key="entry.name">
+        <div v-for="(entry, index) in entries" :key="index">
           <dt><i v-if="entry.colours !== null" :style="ink(entry)"></i>{{ entry.name }}</dt><dd>{{ entry.value }}</dd>
         </div>
       </dl>
