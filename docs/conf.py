@@ -45,9 +45,6 @@ nb_execution_raise_on_error = True
 nb_execution_timeout = 300
 nb_merge_streams = True
 
-# What users write as `kiks.measures` lies elsewhere, where autodoc does not look.
-for name in ("controllers", "measures", "tasks"):
-    sys.modules[f"kiks.{name}"] = getattr(kiks, name)
 autodoc_member_order = "bysource"
 autodoc_typehints = "description"
 autodoc_typehints_description_target = "documented"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import os
 import shutil
 import sys
@@ -11,7 +10,7 @@ from typing import Any
 
 from sphinx_gallery.scrapers import figure_rst
 
-from kiks.model.project import Project
+from kiks.cli.examples import first_program
 from kiks.model.shipped import demonstrations
 
 ROOT = Path(__file__).parents[2]
@@ -69,10 +68,11 @@ def prepare() -> None:
 
 def entry(name: str, path: Path) -> str:
     """Return the script of a demonstration, which shows its program and runs it."""
-    program = next(robot.program for robot in Project.load(path).robots if robot.program)
-    text = ast.get_docstring(ast.parse((path.parent / program).read_text(encoding="utf-8"))) or ""
-    title, place = name.replace("_", " ").capitalize(), (path.parent / program).relative_to(ROOT)
-    return DEMONSTRATION.format(title=title, line="=" * len(title), text=text, name=name, path=place)
+    program, text = first_program(path)
+    title = name.replace("_", " ").capitalize()
+    return DEMONSTRATION.format(
+        title=title, line="=" * len(title), text=text, name=name, path=program.relative_to(ROOT)
+    )
 
 
 def keep_pictures(block: Any, variables: dict[str, Any], settings: dict[str, Any]) -> str:

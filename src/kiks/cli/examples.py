@@ -37,17 +37,19 @@ class DemoCommand(RunCommand):
 
 def _demonstrations() -> list[dict[str, str]]:
     """Return what each demonstration shows, in the first line of its program."""
+    from kiks.model.shipped import demonstrations
+
+    return [{"name": name, "about": first_program(path)[1].splitlines()[0]} for name, path in demonstrations().items()]
+
+
+def first_program(project: Path) -> tuple[Path, str]:
+    """Return the first program of a project, and its docstring."""
     import ast
 
     from kiks.model.project import Project
-    from kiks.model.shipped import demonstrations
 
-    found = []
-    for name, path in demonstrations().items():
-        program = next(robot.program for robot in Project.load(path).robots if robot.program)
-        text = ast.get_docstring(ast.parse((path.parent / program).read_text(encoding="utf-8"))) or ""
-        found.append({"name": name, "about": text.splitlines()[0]})
-    return found
+    program = project.parent / next(robot.program for robot in Project.load(project).robots if robot.program)
+    return program, ast.get_docstring(ast.parse(program.read_text(encoding="utf-8"))) or ""
 
 
 def _lines_of(found: list[dict[str, str]]) -> Iterator[str]:

@@ -43,7 +43,8 @@ def notes_of(entries: Sequence[Entry], *, has_begun: bool) -> Iterator[Event]:
         if entry.kind == Kind.TEXT:
             yield Event(time_s, entry.robot + 1, "output", entry.data.decode("utf-8", "replace"))
         elif entry.kind == Kind.MARK:
-            yield Event(s_from_ns(entry.number), 0, "bookmark", entry.data.decode("utf-8", "replace"))
+            about_ns = min(max(entry.number, 0), entry.time_ns)
+            yield Event(s_from_ns(about_ns), 0, "bookmark", entry.data.decode("utf-8", "replace"))
         elif entry.kind == Kind.SCORE:
             what, value = score_of(entry)
             robot = what if isinstance(what, int) else 0

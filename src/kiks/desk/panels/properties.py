@@ -44,8 +44,7 @@ class PropertiesPanel(Panel):
         self._fields: dict[str, ui.input | ui.switch] = {}
         self._in_focus = self._bad = ""
         self._is_acting = False
-        with named(ui.column().classes("w-full gap-1"), "properties") as self._form:
-            pass
+        self._form = named(ui.column().classes("w-full gap-1"), "properties")
         self._refused = named(ui.label().classes("text-body2 desk-error").props("role=alert"), "refused")
         self._build()
 
@@ -63,7 +62,10 @@ class PropertiesPanel(Panel):
         if self._selected is None or self._desk.past is not None:
             return
         asked = self._selected
-        record = await self._editing.properties(asked)
+        try:
+            record = await self._editing.properties(asked)
+        except KiksError:
+            return  # by now, the past is shown
         if self._is_acting or asked != self._selected:
             return  # the answer is about a wall as it was before
         if type(record) is not type(self._record):

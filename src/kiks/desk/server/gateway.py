@@ -203,7 +203,7 @@ class Gateway:
 
     def _describe_board(self, sim: Simulation) -> None:
         """Describe the score, by robots first; it is that of the time which is shown."""
-        score = sim.score
+        score = {what: round(value, 3) if isinstance(value, float) else value for what, value in sim.score.items()}
         sides = dict(enumerate(self.desk.sides(), 1)) if score else {}
         entries: list[dict[str, Any]] = [
             {"name": sides.get(robot, f"robot {robot}"), "value": score[robot], "colours": robot_colours(robot - 1)}
