@@ -26,7 +26,7 @@ from kiks.firmware.k213 import K213
 from kiks.firmware.turret import Shape
 from kiks.model.arena import Arena
 from kiks.model.picture import encode_picture
-from kiks.model.robot import SENSOR_COUNT, RobotSpec
+from kiks.model.robot import SENSOR_COUNT
 from kiks.sim.simulation import Simulation
 
 VERSION, KIND = 1, 1
@@ -190,7 +190,7 @@ def describe_scene(sim: Simulation, scene: int, names: Sequence[str] | None = No
             "height_mm": float(arena.height_mm),
             "mm_per_cell": float(arena.mm_per_cell),
         },
-        "light": light_scale(sim.specs[0] if sim.specs else RobotSpec.load("khepera"))._asdict(),
+        "light": light_scale(next(iter(sim.specs), None))._asdict(),
         "robots": [
             _describe_robot(sim, index, str(index + 1) if names is None else names[index])
             for index in range(sim.robot_count)

@@ -41,8 +41,8 @@ class LightScale(NamedTuple):
 
 
 @lru_cache(16)
-def light_scale(spec: RobotSpec) -> LightScale:
-    """Return how strong light is for the sensors of a kind of robot.
+def light_scale(spec: RobotSpec | None) -> LightScale:
+    """Return how strong light is for the sensors of a kind of robot; those of a Khepera if None.
 
     Example:
         >>> scale = light_scale(RobotSpec.load("khepera"))
@@ -52,7 +52,7 @@ def light_scale(spec: RobotSpec) -> LightScale:
     from kiks.engine.parameters import pack
     from kiks.engine.sensing.ambient import curve
 
-    parameters = pack(spec).view(np.recarray)[0]
+    parameters = pack(spec or RobotSpec.load("khepera")).view(np.recarray)[0]
     # Readings are whole numbers: without noise, the signal is at least one count.
     noise = max(float(parameters.dark_noise_counts), 1.0)
 
@@ -68,13 +68,13 @@ def light_scale(spec: RobotSpec) -> LightScale:
     return LightScale(float(parameters.lamp_step_mm), (*strengths, 0.0), float(parameters.background_flux))
 
 
-def light_map(arena: Arena, lamps: NDArray[np.float64], spec: RobotSpec) -> NDArray[np.float32] | None:
+def light_map(arena: Arena, lamps: NDArray[np.float64], spec: RobotSpec | None) -> NDArray[np.float32] | None:
     """Return how strong the light of lamps is on the floor; None if no lamp is on.
 
     Args:
         arena: The arena, whose walls cast shadows.
         lamps: x_mm, y_mm, power_w, and 1 for on or 0 for off, float64 [lamp, 4].
-        spec: The robot whose sensors see it.
+        spec: The robot whose sensors see it; a Khepera if None.
 
     Returns:
         0 to 1, float32 [row, column], row 0 on top; cells of some millimetres.

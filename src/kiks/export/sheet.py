@@ -81,7 +81,7 @@ def ground_picture(arena: Arena, lamps: NDArray[np.float64], spec: RobotSpec | N
     cells = np.flipud(arena.brightness)
     shade = wall_grey(cells.astype(np.uint16)).astype(np.uint8)
     floor: Any = np.array(FLOOR, np.uint8)
-    if (light := light_map(arena, lamps, spec or RobotSpec.load("khepera"))) is not None:
+    if (light := light_map(arena, lamps, spec)) is not None:
         opacity = Image.fromarray((255 * LIGHT_SHARE * light).astype(np.uint8)).resize(
             (cells.shape[1], cells.shape[0]), Image.Resampling.BILINEAR
         )

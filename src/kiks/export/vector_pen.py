@@ -65,8 +65,7 @@ class VectorPen:
     def ground(self, arena: Arena, lamps: NDArray[np.float64], spec: RobotSpec | None) -> None:
         """Draw what `ground_picture` draws, as outlines; each grey lies over the darker ones."""
         self._axes.set_facecolor(_colour(FLOOR))
-        light = light_map(arena, lamps, spec or RobotSpec.load("khepera"))
-        if light is not None:
+        if (light := light_map(arena, lamps, spec)) is not None:
             for share in np.linspace(0.0, 1.0, _LIGHT_STEPS)[1:].tolist():
                 colour = mixed(FLOOR, LAMPLIGHT, LIGHT_SHARE * share)
                 self._fill(np.flipud(light), share, arena.width_mm / light.shape[1], 0.5, colour)
