@@ -18,6 +18,7 @@ LETTER_MM = 30.0
 """Height of a letter in the millimetres of signs."""
 
 _ROW, _MARGIN, _GAP = 1.7, 0.7, 1.2
+"""Height of a line, margin, and gap between signs [heights of a letter]."""
 
 
 class Sign(NamedTuple):
@@ -73,7 +74,7 @@ class Caption:
         for text, sign in (*words, *((each.text, each) for each in signs)):
             length = text_length(text, font=text_font(self._size))
             length += 0 if sign is None else sign.letters * self._size
-            is_first_sign = sign is not None and bool(signs) and sign is signs[0]
+            is_first_sign = bool(signs) and sign is signs[0]
             if (is_first_sign and words) or (x and x + length > right):
                 row, x = row + 1, 0.0
             x = x or _MARGIN * self._size

@@ -25,6 +25,8 @@ UNIT_POINTS = 0.2
 """A pixel of a sheet on paper [points]: a picture fills the width of a page."""
 
 _WALL_CELLS_MAX, _LIGHT_STEPS = 2000, 24
+"""Most cells along a side of the walls that are outlined, and levels of light."""
+
 _PARTS = {"l": "left", "m": "center", "r": "right"}
 
 

@@ -30,6 +30,7 @@ export class Stage {
     this.topView = new TopView(this.top, this.feed);
     this.solidView = null;
     this._wall = null;
+    this._heard = null;
     this.view = "top";
     this.show = {};
     this.follow = -1;
@@ -329,7 +330,7 @@ export class Stage {
     const { robot_count, isPaused, time_s } = frame, before = this._heard;
     const contacts = Array.from({ length: robot_count }, (_, index) => frame.robot(index).contacts);
     this._heard = { isPaused, contacts };
-    if (before === undefined) return;
+    if (!before) return;
     const touched = contacts.findIndex((count, index) => count > before.contacts[index]);
     if (isPaused !== before.isPaused) this.live.textContent = isPaused ? `Paused at ${clockText(time_s)}` : "Time goes on";
     else if (touched >= 0) this.live.textContent = `${nameOf(this.feed.scene, { what: "robot", index: touched })} touches something`;
