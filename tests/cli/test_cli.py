@@ -311,6 +311,7 @@ def test_live_thinking_is_recorded_and_replayed(tmp_path: Path) -> None:
             ("export", "run.mcap"),
             "RECORDING and OUT must be given, but only 'run.mcap' was. kiks export -h shows how.",
         ),
+        (("desk", "--no-browser", ARENA), "office.toml' is none. An arena stands after --arena, and programs in other"),
         (("replay",), "FILE must be given, but nothing was. kiks replay -h shows how."),
         (
             ("arena", "new", "room.toml"),

@@ -249,6 +249,11 @@ def parse_words(words: list[str]) -> list[Command]:
                 f"a project must come first, but {shown(word)} stands among the programs. Put it before them."
             )
         if Command(Path(word)).file.is_file() and (word.endswith(".py") or not commands):
+            if not word.endswith(".py") and _is_other(Path(word)):
+                raise ParameterError(
+                    f"PROGRAM must be a Python file, but {shown(word)} is none. An arena stands after --arena, and "
+                    "programs in other languages reach robots by kiks serve."
+                )
             commands.append(Command(Path(word)))
         elif len(parts) > 1 and parts[0] == "-m":
             commands.append(module_command(parts[1], parts[2:]))
@@ -266,6 +271,11 @@ def parse_words(words: list[str]) -> list[Command]:
                 f"{nearest(word, demonstrations())}"
             )
     return commands
+
+
+def _is_other(file: Path) -> bool:
+    """Return whether a file's ending is that of an arena, of a picture or of another language."""
+    return file.suffix.lower() in (".toml", ".kad", ".yaml", ".png", ".ipynb", ".c", ".java", ".m")
 
 
 def _split(word: str) -> list[str]:
