@@ -130,7 +130,7 @@ BASE = "kiks = 1\n[walls]\nsize_mm = [300, 300]\n"
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("", "kiks must be 1"),
+        ("", "kiks must be 1, the version of this format, but it is not there"),
         ("kiks = 2\n", "newer"),
         ("kiks = 1\n", "size_mm"),
         ("sede = 1\n" + BASE, "Did you mean 'seed'"),

@@ -205,9 +205,10 @@ class Project:
         """Read what `to_bytes` returned, or a person wrote; the arena is called `name` if the file does not say."""
         check_size(data, what, bytes_max=bytes_max, error=ArenaError)
         table = parse_toml(data, what, error=ArenaError)
-        if table.get("kiks") != _VERSION:
+        if (found := table.get("kiks")) != _VERSION:
+            was = "it is not there" if found is None else f"it was {shown(found)}"
             raise ArenaError(
-                f"{what}: kiks must be {_VERSION}, the version of this format, but it was {shown(table.get('kiks'))}. "
+                f"{what}: kiks must be {_VERSION}, the version of this format, but {was}. "
                 f"Write kiks = {_VERSION}, or open a newer file with a newer KiKS."
             )
         file = check(ProjectFile, table, what, error=ArenaError)
