@@ -270,7 +270,7 @@ def _draw_time(axes: Any, recording: Recording, robot: int) -> None:
 
 def _legend_above(axes: Any, columns: int) -> None:
     """Put a legend over the axes, where it hides no line and takes no width from them."""
-    place = {"loc": "lower right", "bbox_to_anchor": (1.0, 0.97), "frameon": False}
+    place = {"loc": "lower right", "bbox_to_anchor": (1.0, 1.0), "borderaxespad": 0.0, "frameon": False}
     axes.legend(fontsize="small", ncols=columns, columnspacing=1.0, handlelength=1.2, labelspacing=0.2, **place)
 
 
