@@ -312,6 +312,7 @@ def test_live_thinking_is_recorded_and_replayed(tmp_path: Path) -> None:
             "RECORDING and OUT must be given, but only 'run.mcap' was. kiks export -h shows how.",
         ),
         (("desk", "--no-browser", ARENA), "office.toml' is none. An arena stands after --arena, and programs in other"),
+        (("run", str(ROOT / "examples")), "examples' has neither a __main__.py nor a champion. Name a file in it."),
         (("replay",), "FILE must be given, but nothing was. kiks replay -h shows how."),
         (
             ("arena", "new", "room.toml"),

@@ -121,8 +121,13 @@ def _champion_job(path: Path, world: World) -> Job:
     from kiks.learn.champion import Champion
 
     file = path / "champion.toml" if path.is_dir() else path
-    if path.is_dir() and not file.exists() and (found := _two_sided_job(path, world)) is not None:
-        return found
+    if path.is_dir() and not file.exists():
+        if (found := _two_sided_job(path, world)) is not None:
+            return found
+        raise ParameterError(
+            f"PROGRAM must be a program, a project or the folder of an evolution, but {shown(str(path))} has neither a "
+            "__main__.py nor a champion. Name a file in it."
+        )
     champion = Champion.load(file)
     arena = None if world.arena is None else load_arena(world.arena)
     if arena is None and champion.world is None:
