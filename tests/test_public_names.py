@@ -108,11 +108,12 @@ def test_a_misspelled_name_gets_a_hint() -> None:
         assert f"Did you mean: {hint!r}?" in forked.run(code=f"import kiks; {line}").stderr
 
 
-def test_each_object_says_in_one_line_what_it_is(tmp_path: Path) -> None:
+def test_each_object_says_in_one_line_what_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
     sim = kiks.Simulation(kiks.Arena.load("office"), seed=1)
-    with sim.record(tmp_path / "run.mcap") as recorder:
+    with sim.record("run.mcap") as recorder:
         sim.run(1)
-    recording, robot = kiks.Recording(tmp_path / "run.mcap"), kiks.Khepera(sim.port(1))
+    recording, robot = kiks.Recording("run.mcap"), kiks.Khepera(sim.port(1))
     task = kiks.tasks.avoid()
     evolution = kiks.Evolution(task, seed=1, population=4)
     evolution.run(generations=1)

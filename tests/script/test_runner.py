@@ -80,6 +80,13 @@ def test_threads_that_wait_for_ever_end_with_one_line(text: str, waiting: str, r
     assert ran.err.count("\n") == 1
 
 
+def test_a_child_process_from_before_the_program_holds_none_of_its_pipes(run: Run) -> None:
+    with subprocess.Popen(["cat"], stdin=subprocess.PIPE):
+        ran = run("import os\nout, into = os.pipe()\nos.read(out, 1)\n")
+    assert ran.code == 1
+    assert "wait for ever: MainThread for files" in ran.err
+
+
 def test_main_thread_waits_for_all_threads_except_daemons(run: Run) -> None:
     ran = run("""
         import atexit, threading, time

@@ -35,6 +35,9 @@ PIPE_CHARACTERS = 1 << 16
 SETTLED_MS = 100
 """Longest time that the operating system may need to carry characters through a terminal [ms of real time]."""
 
+TASKS = "/proc/self/task"
+"""Where Linux lists the threads of this process, each with its child processes (man 5 proc)."""
+
 _Poll = type(select.poll())
 _file_methods = dict(vars(_io.FileIO))
 _real_poll, _real_epoll = _Poll.poll, select.epoll.poll
@@ -105,6 +108,16 @@ class _PortFile:
         return data
 
 
+def _children() -> set[str]:
+    """Return the numbers of all child processes of this one, those that have ended and were not waited for included."""
+    found: set[str] = set()
+    for thread in os.listdir(TASKS):
+        # The thread may have ended.
+        with suppress(OSError), open(f"{TASKS}/{thread}/children", encoding="ascii") as children:
+            found.update(children.read().split())
+    return found
+
+
 class _Wait:
     """A wait for files; see `thread_scheduler.FileWait`."""
 
@@ -138,6 +151,8 @@ class Files:
         self._ports: dict[int, _PortFile] = {}
         # What the program has opened to talk to itself, by device and inode.
         self._inside: set[tuple[int, int]] = set()
+        # Processes that were there before the program, such as the one that multiprocessing keeps, know nothing of it.
+        self._elders = _children()
 
     # ---- ports ----
 
@@ -161,8 +176,7 @@ class Files:
 
     def are_inside(self, descriptors: Iterable[int]) -> bool:
         """Return whether only the program can do something at the other ends of descriptors."""
-        with suppress(ChildProcessError):
-            os.waitid(os.P_ALL, 0, os.WEXITED | os.WNOHANG | os.WNOWAIT)
+        if _children() - self._elders:
             return False  # a child may have got the other end
         for each in descriptors:
             if each not in self._ports:
