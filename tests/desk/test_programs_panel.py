@@ -70,7 +70,7 @@ def test_a_program_that_ran_is_saved_with_the_project_and_shown_when_that_is_ope
     begin_program(visitor, "exercise1", FOR_EVER)
     visitor.at("arguments").fill("--fast 'a b'")
     visitor.at("run-program").click()
-    expect(visitor.at("attached")).to_contain_text("The project starts exercise1.py on robot 1.")
+    expect(visitor.at("attached")).to_contain_text("exercise1.py starts with this world on robot 1.")
     visitor.tab("arena")
     visitor.at("save-name").fill("lesson")
     visitor.at("save").click()

@@ -163,3 +163,10 @@ def test_walls_that_would_take_minutes_are_refused(monkeypatch: pytest.MonkeyPat
     replace(BOX, walls=(wide,) * 3)
     with pytest.raises(ArenaError, match=r"at most \d+ cells together, but these have more"):
         replace(BOX, walls=(wide,) * 4)
+
+
+def test_an_arena_with_the_same_walls_has_the_same_raster_and_one_with_others_has_its_own() -> None:
+    arena = replace(Arena.box(200, 200), walls=(Wall(box_mm=((50, 50), (80, 80))),))
+    assert replace(arena, name="other").brightness is arena.brightness
+    moved = replace(arena, walls=(Wall(box_mm=((50, 60), (80, 90))),))
+    assert (arena.brightness[55, 60], moved.brightness[55, 60]) == (255, 0)

@@ -40,7 +40,7 @@ def desk(
     speed: Annotated[float | None, typer.Option(help="Simulated seconds per real second; 0 for no limit.")] = None,
     folder: Annotated[
         Path | None,
-        typer.Option(help="Folder of projects and programs; no file outside it is opened or saved."),
+        typer.Option(metavar="FOLDER", help="Where projects and programs lie; no file outside it is opened or saved."),
     ] = None,
     port: Annotated[
         int | None, typer.Option(help="TCP port of the page, 0 for a free one; 8123 if left out.", min=0, max=65535)

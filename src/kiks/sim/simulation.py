@@ -1070,4 +1070,4 @@ def _score_text(name: str, text: str) -> str:
 
 def _check_arena(arena: object) -> None:
     """Check that this is an arena."""
-    check_kind("arena", arena, Arena, "Read a file with kiks.Arena.load(path).")
+    check_kind("arena", arena, Arena, "Give kiks.Arena.load('office'), or load a file with it.")

@@ -151,7 +151,7 @@ class ProgramsPanel(Panel):
         for robot, command in attached.items():
             with ui.row().classes("w-full items-center no-wrap gap-1"):
                 name = self._desk.names()[robot - 1]
-                ui.label(f"The project starts {command.name} on robot {name}.").classes("col")
+                ui.label(f"{command.name} starts with this world on robot {name}.").classes("col")
                 if self._desk.may_run_programs:
                     leave = self.acting(partial(self._leave, robot))
                     tip = "Save the project without this program; if it runs, it goes on"

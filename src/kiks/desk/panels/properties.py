@@ -50,10 +50,12 @@ class PropertiesPanel(Panel):
 
     async def show(self, selected: Selected | None, *, has_focus: bool = False) -> None:
         """Show the properties of a thing or a wall; None for nothing."""
-        self._selected = selected
-        self._record = None if selected is None else await self._editing.properties(selected)
-        self._build()
-        self._mark()
+        # The clicks of a double click ask for the same form: what a person types into it already must stay.
+        if selected is None or selected != self._selected or not self._fields:
+            self._selected = selected
+            self._record = None if selected is None else await self._editing.properties(selected)
+            self._build()
+            self._mark()
         if has_focus and self._fields:
             next(iter(self._fields.values())).run_method("focus")
 
