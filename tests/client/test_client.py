@@ -275,7 +275,9 @@ def test_place_checks_its_arguments(sim: kiks.Simulation) -> None:
 
 
 def test_arena_must_be_an_arena() -> None:
-    with pytest.raises(kiks.ParameterError, match=r"arena must be a kiks.Arena, but it was 'maze.png'. Read a file"):
+    with pytest.raises(
+        kiks.ParameterError, match=r"arena must be a kiks.Arena, but it was 'maze.png'. Give kiks.Arena.load"
+    ):
         kiks.Simulation("maze.png")  # type: ignore[arg-type]
 
 
