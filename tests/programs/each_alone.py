@@ -7,6 +7,7 @@ a word for each run: its name, program and arguments, as a shell has them.
 import os
 import shlex
 import sys
+import tempfile
 from pathlib import Path
 
 from kiks.cli import main
@@ -22,6 +23,9 @@ def run(name, *words):
     """Run one in this process, which ends with it."""
     for descriptor, kind in ((1, "out"), (2, "err")):
         os.dup2(os.open(folder / f"{name}.{kind}", os.O_WRONLY | os.O_CREAT | os.O_TRUNC), descriptor)
+    # The names of temporary files follow from the seed: in one folder, programs would be in each other's way.
+    (own := folder / f"{name.partition('.')[0]}.tmp").mkdir(exist_ok=True)
+    os.environ["TMPDIR"], tempfile.tempdir = str(own), None
     sys.argv = ["kiks", "run", *options, *words]
     try:
         main()

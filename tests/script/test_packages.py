@@ -561,11 +561,12 @@ def said(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[tuple[str, 
     """What each program, and KiKS beside it, has said each time, and KiKS's last lines, with the state."""
     folder, runs = tmp_path_factory.mktemp("packages"), []
     times = {name: 2 if name in AGAIN else 1 for name in PROGRAMS if is_here(name)}
-    for name, count in times.items():
-        path = folder / name / "program.py"
-        path.parent.mkdir()
-        path.write_text(PROGRAMS[name][0].lstrip("\n"))
-        runs += [shlex.join([f"{name}.{number}", str(path)]) for number in range(count)]
+    for number in range(2):
+        for name in (name for name, count in times.items() if number < count):
+            path = folder / name / "program.py"
+            path.parent.mkdir(exist_ok=True)
+            path.write_text(PROGRAMS[name][0].lstrip("\n"))
+            runs.append(shlex.join([f"{name}.{number}", str(path)]))
     command = [sys.executable, str(FOLDER / "each_alone.py"), str(folder), str(AT_ONCE), "--", *runs]
     subprocess.run(command, timeout=280, check=True, stdin=subprocess.DEVNULL)
 
