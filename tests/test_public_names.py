@@ -76,7 +76,7 @@ def test_arrays_have_shapes(name: str) -> None:
     annotations = getattr(each.__init__ if inspect.isclass(each) and not is_record else each, "__annotations__", {})
     for argument, annotation in annotations.items():
         if ARRAY.search(str(annotation)):
-            # A short docstring explains what there is in its text.
+            # A docstring without sections describes arguments and result in its text.
             meaning = sections.get("Returns") if argument == "return" else explained.get(argument)
             assert SHAPE.search(meaning or sections[""]), f"{name}: {argument}"
 
