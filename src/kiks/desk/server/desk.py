@@ -86,6 +86,9 @@ class Desk:
         outside: The programs in the world that this desk has not started.
         news: Messages to people, the newest last.
         log: These and what programs of Octave and MATLAB tell, each line with the time of day, the newest last.
+        hand_in: Takes a file that a person hands in, its bytes and its name; None: it is saved in the desk's folder.
+            Raises a `ParameterError` with a message for that person if it is not taken.
+        may_hand_in: Whether a file would be taken now.
     """
 
     def __init__(
@@ -114,6 +117,8 @@ class Desk:
         self.news: RingBuffer[str] = RingBuffer(NEWS_LIMIT)
         self.log: RingBuffer[str] = RingBuffer(log_limit)
         self.outside = OutsidePrograms()
+        self.hand_in: Callable[[bytes, str], None] | None = None
+        self.may_hand_in = True
         self.is_seen = threading.Event()
         self.looking = LookingBack(lambda: self.present, self.say)
         self._has_begun = not is_held
