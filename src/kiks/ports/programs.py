@@ -15,12 +15,13 @@ from kiks.clock.patience import Patience
 from kiks.clock.thinking import own_file, own_policy, parse_thinking
 from kiks.ending import INTERRUPTED, noting_endings
 from kiks.errors import KiksError, ParameterError
-from kiks.ports.messages import RECEIVE_SIZE, Answer, Inbox, Request, Start, packed
+from kiks.ports.messages import Start
 from kiks.ports.participant import ProgramParticipant
 from kiks.ports.port_names import PortNames
 from kiks.ports.program_process import Command, Labels, OutputLine, Permission, Process, chance_seed
 from kiks.ports.program_scheduler import PATIENCE_S, START_PATIENCE_S, VISIT_PATIENCE_S, ProgramScheduler
 from kiks.ports.resources import opening
+from kiks.ports.socket_participant import SocketParticipant
 from kiks.sim.ring_buffer import RingBuffer
 from kiks.sim.simulation import Simulation
 
@@ -39,7 +40,7 @@ WORLD_SHARE = 0.3
 _log = logging.getLogger("kiks.run")
 
 
-class Handle(ProgramParticipant):
+class Handle(SocketParticipant):
     """A started program, in a process of its own.
 
     Args:
@@ -49,10 +50,9 @@ class Handle(ProgramParticipant):
         robot: Number of its own robot.
         scheduler: See `ProgramParticipant`.
         names: See `ProgramParticipant`.
-        selector: Tells when the connection is ready.
+        selector: See `SocketParticipant`.
 
     Attributes:
-        has_hung_up: Whether it has closed its end of the socket.
         has_ended: Set when the process has ended.
     """
 
@@ -68,18 +68,10 @@ class Handle(ProgramParticipant):
         names: PortNames,
         selector: selectors.BaseSelector,
     ) -> None:
-        super().__init__(f"program {number} ({command.name})", number, robot, scheduler, names)
-        self.command, self.number = command, number
-        self.has_hung_up = self.is_end_reported = False
+        super().__init__(f"program {number} ({command.name})", connection, robot, scheduler, names, selector)
+        self.command = command
+        self.is_end_reported = False
         self.has_ended = threading.Event()
-        self._socket = connection
-        self._socket.setblocking(False)
-        self._inbox = Inbox()
-        self._unsent = b""
-        self._selector = selector
-        selector.register(connection, selectors.EVENT_READ, self.exchange)
-
-    # ---- the process ----
 
     @property
     def is_running(self) -> bool:
@@ -114,64 +106,10 @@ class Handle(ProgramParticipant):
             return ""
         return f"with exit code {code}" if code >= 0 else f"by signal {-code}"
 
-    # ---- the connection ----
-
-    def close(self) -> None:
-        """Close the connection."""
-        self._socket.close()
-
-    def exchange(self, events: int) -> None:
-        """Send and take what the connection is ready for."""
-        if events & selectors.EVENT_WRITE:
-            self._send(self._unsent)
-        if events & selectors.EVENT_READ and self._receive() is False:
-            self.hang_up()
-
-    def hang_up(self) -> None:
-        """Take the last requests of the program, which sends no more."""
-        if self.has_hung_up:
-            return
-        while self._receive():
-            pass
-        self.has_hung_up = True
-        self._selector.unregister(self._socket)
-        self.leave()
-        if self.has_left:
-            self.close()
-
-    def reply(self, answer: Answer) -> None:
-        """Send an answer; bytes that the program does not take yet wait."""
-        self._send(self._unsent + packed(tuple(answer)))
-
     def drop(self) -> None:
         """Disconnect the program, and kill its process."""
         super().drop()
         self.process.kill()
-
-    def _send(self, data: bytes) -> None:
-        had_unsent = bool(self._unsent)
-        try:
-            self._unsent = data[self._socket.send(data) :]
-        except BlockingIOError:
-            self._unsent = data
-        except OSError:
-            self._unsent = b""
-        has_unsent = bool(self._unsent)
-        if has_unsent is not had_unsent and not self.has_hung_up:
-            events = selectors.EVENT_READ | (selectors.EVENT_WRITE if has_unsent else 0)
-            self._selector.modify(self._socket, events, self.exchange)
-
-    def _receive(self) -> bool | None:
-        """Take requests that have arrived; return None if there are none, and False if the program has hung up."""
-        try:
-            received = self._socket.recv(RECEIVE_SIZE)
-        except BlockingIOError:
-            return None
-        except OSError:
-            received = b""
-        for fields in self._inbox.take(received):
-            self.add_request(Request._make(fields))
-        return bool(received)
 
 
 class _OverError(Exception):

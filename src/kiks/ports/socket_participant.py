@@ -1,0 +1,97 @@
+"""A program at the other end of a socket, as the scheduler sees it."""
+
+from __future__ import annotations
+
+import selectors
+import socket
+
+from kiks.ports.messages import RECEIVE_SIZE, Answer, Inbox, Request, packed
+from kiks.ports.participant import ProgramParticipant
+from kiks.ports.port_names import PortNames
+from kiks.ports.program_scheduler import ProgramScheduler
+
+
+class SocketParticipant(ProgramParticipant):
+    """A program at the other end of a socket; `SocketConnection` is its own end.
+
+    Args:
+        name: Its name in messages.
+        connection: This end of the socket to it.
+        robot: Number of its own robot, and its place in the order of programs that act at the same instant.
+        scheduler: See `ProgramParticipant`.
+        names: See `ProgramParticipant`.
+        selector: Tells when the connection is ready.
+
+    Attributes:
+        has_hung_up: Whether it has closed its end of the socket.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        connection: socket.socket,
+        robot: int,
+        scheduler: ProgramScheduler,
+        names: PortNames,
+        selector: selectors.BaseSelector,
+    ) -> None:
+        super().__init__(name, robot, robot, scheduler, names)
+        self.has_hung_up = False
+        self._socket = connection
+        self._socket.setblocking(False)
+        self._inbox = Inbox()
+        self._unsent = b""
+        self._selector = selector
+        selector.register(connection, selectors.EVENT_READ, self.exchange)
+
+    def close(self) -> None:
+        """Close the connection."""
+        self._socket.close()
+
+    def exchange(self, events: int) -> None:
+        """Send and take what the connection is ready for."""
+        if events & selectors.EVENT_WRITE:
+            self._send(self._unsent)
+        if events & selectors.EVENT_READ and self._receive() is False:
+            self.hang_up()
+
+    def hang_up(self) -> None:
+        """Take the last requests of the program, which sends no more."""
+        if self.has_hung_up:
+            return
+        while self._receive():
+            pass
+        self.has_hung_up = True
+        self._selector.unregister(self._socket)
+        self.leave()
+        if self.has_left:
+            self.close()
+
+    def reply(self, answer: Answer) -> None:
+        """Send an answer; bytes that the program does not take yet wait."""
+        self._send(self._unsent + packed(tuple(answer)))
+
+    def _send(self, data: bytes) -> None:
+        had_unsent = bool(self._unsent)
+        try:
+            self._unsent = data[self._socket.send(data) :]
+        except BlockingIOError:
+            self._unsent = data
+        except OSError:
+            self._unsent = b""
+        has_unsent = bool(self._unsent)
+        if has_unsent is not had_unsent and not self.has_hung_up:
+            events = selectors.EVENT_READ | (selectors.EVENT_WRITE if has_unsent else 0)
+            self._selector.modify(self._socket, events, self.exchange)
+
+    def _receive(self) -> bool | None:
+        """Take requests that have arrived; return None if there are none, and False if the program has hung up."""
+        try:
+            received = self._socket.recv(RECEIVE_SIZE)
+        except BlockingIOError:
+            return None
+        except OSError:
+            received = b""
+        for fields in self._inbox.take(received):
+            self.add_request(Request._make(fields))
+        return bool(received)
