@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from kiks.ports.program_process import Command
     from kiks.ports.programs import Programs
     from kiks.sim.simulation import Simulation
+    from kiks.sim.supervision import Supervision
 
 
 class RunCommand(CheckedCommand):
@@ -175,10 +176,7 @@ def run(
     texts = [each.file for each in commands if each is not None]
     code, doubt = 1, ""
     with ExitStack() as at_the_end:
-        if job.supervisor is not None:
-            texts.append(job.supervisor)
-            if not desk:
-                at_the_end.callback(Supervision(sim, job.supervisor).close)
+        texts += [] if job.supervisor is None else [job.supervisor]
         at_the_end.enter_context(recorded(sim, record, export, texts))
         if desk:
             # If the command line has changed the kinds of robots, the desk derives the project from the simulation.
@@ -186,6 +184,8 @@ def run(
             options = {"project": told, "speed": project.speed, "folder": job.folder, "supervisor": job.supervisor}
             _run_on_desk(sim, commands, host, thinking, waits=not no_wait, **options)
             return
+        supervision = Supervision(sim, job.supervisor, project.goal)
+        at_the_end.callback(supervision.close)
         end_as_with_ctrl_c()
         try:
             if len(commands) == 1 and commands[0] is not None:
@@ -200,7 +200,7 @@ def run(
             doubt = "it was interrupted"
             raise
         finally:
-            tell_results(context, _tell(sim, thinking, doubt))
+            tell_results(context, _tell(sim, thinking, doubt) | _judged(supervision))
     if code == 0 and sim.now_ns == 0:
         say(
             "nothing was sent to a robot, and no time has passed. A program reaches its robot through a serial port, "
@@ -214,6 +214,14 @@ def run(
 def _tell(sim: Simulation, thinking: str, doubt: str) -> dict[str, Any]:
     """Say how the run has ended, and whether it is repeatable, and return it."""
     return tell_run(sim, "thinking was live" if thinking.startswith("live") else doubt)
+
+
+def _judged(supervision: Supervision) -> dict[str, Any]:
+    """Say how the run has done, if its project has a goal, and return it."""
+    if supervision.judge is None:
+        return {}
+    say(supervision.decide())
+    return {"goal": vars(supervision.judge.end())}
 
 
 def _run_on_desk(

@@ -24,8 +24,9 @@ from kiks.model.atomic_files import inside, path_of, replace_files
 from kiks.model.checks import ROBOTS_MAX, check_count
 from kiks.model.data_file import Number, Rule, Text, Whole, as_list, check, parse_toml, read_file, record
 from kiks.model.limits import CHAMPION_FILE_BYTES_MAX
-from kiks.model.project import Project, ProjectRobot, Seed
+from kiks.model.project import Project, ProjectRobot
 from kiks.model.robot import RobotSpec, robot_names, robot_toml, specs_of
+from kiks.model.settings import Seed
 from kiks.sim.from_project import simulation_of
 from kiks.sim.simulation import Simulation
 from kiks.upwards import shown_in_notebooks

@@ -26,7 +26,7 @@ from kiks.learn.task import Axis
 from kiks.model.array_checks import Numbers, read_arrays
 from kiks.model.atomic_files import make_folder, path_of, replace_file
 from kiks.model.data_file import Rule, Text, Whole, check, parse_json, read_file, record
-from kiks.model.project import Seed
+from kiks.model.settings import Seed
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]

@@ -235,7 +235,11 @@ def toml(value: Any) -> str:
         return f"{{ {', '.join(f'{toml_key(key)} = {toml(each)}' for key, each in value.items())} }}"
     if isinstance(value, bool):
         return "true" if value else "false"
-    return quoted(value) if isinstance(value, str) else repr(value)
+    if not isinstance(value, str):
+        return repr(value)
+    if "\n" not in value or "'''" in f"{value}'" or not all(each.isprintable() or each in "\n\t" for each in value):
+        return quoted(value)
+    return f"'''\n{value}'''"  # as people read and write it
 
 
 def toml_key(name: str) -> str:

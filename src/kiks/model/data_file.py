@@ -83,6 +83,27 @@ def record(kind: type[_Model]) -> type[_Model]:
     return made  # type: ignore[no-any-return]
 
 
+def table_of(made: Any) -> dict[str, Any]:
+    """Return what a file says of a record: all values that are not the default.
+
+    Example:
+        >>> @record
+        ... class Circle:
+        ...     radius_mm: float = 1.0
+        ...     name: str = ""
+        >>> table_of(Circle(radius_mm=2.0))
+        {'radius_mm': 2.0}
+    """
+    told = ((each, getattr(made, each.name)) for each in dataclasses.fields(made))
+    return {each.name: _plain(value) for each, value in told if value != each.default}
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, tuple):
+        return [_plain(each) for each in value]
+    return table_of(value) if dataclasses.is_dataclass(value) else value
+
+
 @dataclasses.dataclass(frozen=True)
 class OneOf:
     """The names that a text must be one of; not a `Literal`, so that code may hold the name as a `str`."""

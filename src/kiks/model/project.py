@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import fields, replace
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, InstanceOf
 
@@ -33,7 +33,7 @@ from kiks.model.arena_file import (
 from kiks.model.arena_objects import THINGS_MAX
 from kiks.model.atomic_files import check_relative, ending_of, path_of, replace_file
 from kiks.model.box import Box
-from kiks.model.checks import ROBOTS_MAX, SECONDS_MAX
+from kiks.model.checks import ROBOTS_MAX
 from kiks.model.data_file import (
     Number,
     OneOf,
@@ -46,14 +46,17 @@ from kiks.model.data_file import (
     parse_toml,
     read_file,
     record,
+    table_of,
 )
+from kiks.model.exercise import CASES_MAX, LONG_TEXT_MAX, Cases, Exercise
+from kiks.model.goal import Goal
 from kiks.model.kad import load_kad
 from kiks.model.limits import PROJECT_FILE_BYTES_MAX
 from kiks.model.picture import decode_picture, encode_picture
 from kiks.model.robot import Baud, Brightness, Response, robot_names
 from kiks.model.ros_map import load_ros_map
+from kiks.model.settings import Seconds, Seed, Speed, ThinkingPolicy
 from kiks.model.shipped import shipped_arenas
-from kiks.model.thinking_policy import split_thinking
 from kiks.model.turrets import TURRETS
 
 _log = logging.getLogger("kiks.model")
@@ -78,12 +81,6 @@ def _check_differ(turrets: tuple[str, ...]) -> tuple[str, ...]:
     if len(set(turrets)) < len(turrets):
         raise ParameterError(f"must differ, but they were {list(turrets)}. A robot has one of each.")
     return turrets
-
-
-def _check_thinking(thinking: str) -> str:
-    if isinstance(file := split_thinking(thinking)[1], str):
-        check_relative(file, "thinking's replay file")
-    return thinking
 
 
 Program = Annotated[Text, AfterValidator(partial(check_relative, what="program"))]
@@ -123,12 +120,7 @@ class ProjectRobot:
 
 
 Robots = Annotated[tuple[ProjectRobot, ...], Field(max_length=ROBOTS_MAX, description="Head each with [[robot]].")]
-Seed = Annotated[Whole, Field(ge=0, le=2**63 - 1)]
-ThinkingPolicy = Annotated[Text, AfterValidator(_check_thinking)]
-Speed = Annotated[Number, Field(ge=1e-3, le=1e3, description="1 is real time.")]
-
-
-Seconds = Annotated[Number, Field(gt=0, le=SECONDS_MAX)]
+CaseTables = Annotated[tuple[Cases, ...], Field(max_length=CASES_MAX, description="Head each with [[case]].")]
 
 
 @record
@@ -147,6 +139,9 @@ class Project:
         speed: Simulated seconds per real second on the desk; None for no limit.
         seconds: Simulated time at which a run ends [s]; None for the end of its programs.
         supervisor: A Python file in the project's folder that acts in the world from outside, such as a referee.
+        goal: When a run has solved it, and its points; None without a goal.
+        cases: Ways in which programs are tried.
+        exercise: What makes an exercise of it; None if it is none.
 
     Example:
         >>> project = Project(Arena.default(), robots=(ProjectRobot(turrets=("gripper",)),), seed=7)
@@ -164,6 +159,9 @@ class Project:
     speed: Speed | None = 1.0
     seconds: Seconds | None = None
     supervisor: Program | None = None
+    goal: Goal | None = None
+    cases: CaseTables = ()
+    exercise: Exercise | None = None
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__}: {counted(len(self.robots), 'robot')} in {self.arena!r}, seed {self.seed}>"
@@ -175,8 +173,13 @@ class Project:
 
     @classmethod
     def load(cls, path: str | Path) -> Project:
-        """Read a project, or an arena of any kind, which becomes a project with a robot for each of its starts."""
+        """Read a project, or an arena of any kind, which becomes a project with a robot for each of its starts.
+
+        A folder is an exercise: the project `exercise.kiks` in it, with the exercise's text and template beside it.
+        """
         path = path_of(path)
+        if path.is_dir():
+            return _load_exercise(path)
         if path.suffix.lower() != ".kiks":
             return cls.of_arena(Arena.load(path))
         what = f"Project file {str(path)!r}"
@@ -217,7 +220,7 @@ class Project:
             settings = {each: getattr(file, each) for each in _SETTINGS}
             if file.speed == FASTEST:
                 settings["speed"] = None
-            return cls(arena, file.robot, **settings)
+            return cls(arena, file.robot, goal=file.goal, cases=file.case, exercise=file.exercise, **settings)
         except KiksError as error:
             raise ArenaError(f"{what}: {error}") from None
 
@@ -240,6 +243,10 @@ class Project:
             lines += ["", "[[robot]]"]
             values = ((each.name, getattr(robot, each.name)) for each in fields(robot))
             lines += [f"{name} = {toml(value)}" for name, value in values if value not in (None, "", (), {})]
+        tables = [("[goal]", self.goal), ("[exercise]", self.exercise), *(("[[case]]", each) for each in self.cases)]
+        for head, table in tables:
+            if table is not None:
+                lines += ["", head, *(f"{name} = {toml(value)}" for name, value in table_of(table).items())]
         lines += place_lines(self.arena)
         lines += ["", "[walls]"]
         raster, mm_per_cell = self.arena.ground, self.arena.mm_per_cell
@@ -291,6 +298,9 @@ class ProjectFile:
     speed: Annotated[Speed | Literal["fastest"], Rule("a number from 0.001 to 1000, or 'fastest'")] = 1.0
     seconds: Seconds | None = None
     supervisor: Program | None = None
+    goal: Goal | None = None
+    exercise: Exercise | None = None
+    case: CaseTables = ()
     name: Text | None = None
     robot: Robots = (ProjectRobot(),)
     start: Starts = ()
@@ -308,6 +318,26 @@ _READERS: dict[str, Callable[[Path], Arena]] = {
     ".yaml": load_ros_map,
     ".yml": load_ros_map,
 }
+
+
+EXERCISE_FILES = {"text": "text.md", "template": "template.py"}
+"""Files in the folder of an exercise, by what they hold."""
+
+
+def project_file(path: Path) -> Path:
+    """Return the file of a project: in the folder of an exercise it has a name of its own."""
+    return path / "exercise.kiks" if path.is_dir() else path
+
+
+def _load_exercise(folder: Path) -> Project:
+    project = Project.load(project_file(folder))
+    beside: dict[str, Any] = {}
+    for name, file in EXERCISE_FILES.items():
+        if (folder / file).exists():
+            what = f"The exercise's {name} {str(folder / file)!r}"
+            data = read_file(folder / file, what, bytes_max=4 * LONG_TEXT_MAX, error=ArenaError)
+            beside[name] = data.decode("utf-8", errors="replace")
+    return replace(project, exercise=replace(project.exercise or Exercise(), **beside))
 
 
 def load_arena_file(path: Path) -> Arena:

@@ -11,8 +11,10 @@ from typing import Any
 from kiks.clock.program_clock import ProgramClock
 from kiks.clock.thinking import own_policy
 from kiks.engine.state import BALL
-from kiks.model.arena import Ball, Cylinder, Lamp, Pose
+from kiks.model.arena import Arena, Ball, Cylinder, Lamp, Pose
 from kiks.model.atomic_files import inside
+from kiks.model.exercise import Case
+from kiks.model.family import differences_of
 from kiks.model.free_disc import free_place
 from kiks.model.project import Project, ProjectRobot
 from kiks.model.robot import RobotSpec, robot_names, specs_of
@@ -65,6 +67,47 @@ def simulation_of(
         if project.baud is not None:
             wire.set_baud(project.baud)
     return sim
+
+
+FAMILY_SEED = 0
+"""Seed of the family whose robots have numbers in cases."""
+
+
+def in_case(project: Project, case: Case, folder: Path) -> Project:
+    """Return a project as a case changes it, with neither cases nor an exercise.
+
+    Args:
+        project: The project.
+        case: One of its cases, or another.
+        folder: Where the project lies: robot files and arenas are looked up from there.
+
+    Example:
+        >>> case = Case(seed=7, baud=38400, family=2)
+        >>> made = in_case(Project(), case, Path())
+        >>> made.seed, made.baud, sorted(made.robots[0].changes)
+        (7, 38400, ['body', 'motor', 'proximity'])
+    """
+    arena = project.arena if case.arena is None else _arena_of(case.arena, folder)
+    if case.start is not None:
+        arena = replace(arena, starts=(case.start, *arena.starts[1:]))
+    robots = project.robots
+    if case.family:
+        robots = tuple(_imperfect(robot, project, case.family, folder) for robot in robots)
+    told = {name: value for name in ("seed", "baud", "thinking") if (value := getattr(case, name)) is not None}
+    return replace(project, arena=arena, robots=robots, cases=(), exercise=None, **told)
+
+
+def _arena_of(name: str, folder: Path) -> Arena:
+    """Return an arena of a case: one that comes with KiKS, or a file in the project's folder."""
+    return Arena.load(inside(folder, name, "arena") if Path(name).suffix else name)
+
+
+def _imperfect(robot: ProjectRobot, project: Project, number: int, folder: Path) -> ProjectRobot:
+    """Return a robot of a project as the imperfect one with a number."""
+    differences = differences_of(spec_of(robot, project, folder), number, seed=FAMILY_SEED)[-1]
+    parts = robot.changes.keys() | differences.keys()
+    changes = {part: robot.changes.get(part, {}) | differences.get(part, {}) for part in sorted(parts)}
+    return replace(robot, changes=changes)
 
 
 def spec_of(robot: ProjectRobot, project: Project, folder: Path) -> RobotSpec:

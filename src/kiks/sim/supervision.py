@@ -1,4 +1,4 @@
-"""A supervisor: a Python file that acts in a world from outside while programs drive its robots, such as a referee."""
+"""Supervision: what acts in a world from outside while programs drive its robots, such as a referee or the judge."""
 
 from __future__ import annotations
 
@@ -10,61 +10,103 @@ from pathlib import Path
 
 from kiks.errors import KiksError, ParameterError
 from kiks.model.checks import SECONDS_MAX, check_number
+from kiks.model.goal import Goal
+from kiks.sim.judge import Judge
 from kiks.sim.read_completion import NEVER_NS
 from kiks.sim.simulation import Simulation
 from kiks.units import ns_from_s
 
+Acts = Generator[float, None, None]
+
+REFEREE, JUDGE = "the supervisor", "the judge"
+"""What messages call those who act."""
+
 
 class Supervision:
-    """Lets the supervisor of a file act in a world, as a `kiks.sim.event_loop.Supervisor`.
+    """Lets the supervisor of a file, and the judge of a goal, act in a world (`kiks.sim.event_loop.Supervisor`).
 
     The file has a generator `supervise(sim)`. Its first part runs at once. Then it yields the time until it acts again
     [s of simulated time]; when it returns then, the run ends. `close` runs its `finally`, which may print a result.
+    The judge acts after it at each instant.
+
+    Args:
+        sim: The world.
+        file: The supervisor's file; None without one.
+        goal: The goal; None without one.
 
     Attributes:
-        next_ns: When it acts next [ns].
-        end: Called with an exit code and a message when it has returned, or failed; raises to end the run.
+        judge: The judge of the goal; None without one.
+        next_ns: When one of them acts next [ns].
+        end: Called with an exit code and a message when one has returned, or failed; raises to end the run.
     """
 
-    def __init__(self, sim: Simulation, file: Path) -> None:
-        self._sim, self._name = sim, file.name
+    def __init__(self, sim: Simulation, file: Path | None = None, goal: Goal | None = None) -> None:
+        self._sim, self._file = sim, file
         self.end: Callable[[int, str], object] = lambda code, message: None
-        self.next_ns = sim.now_ns
-        if not file.is_file():
-            raise ParameterError(f"a supervisor must be a Python file, but there is none at {str(file)!r}.")
-        supervise = runpy.run_path(str(file)).get("supervise")
-        if not isgeneratorfunction(supervise):
-            raise ParameterError(
-                f"a supervisor must define a function supervise(sim) that yields the time until it acts again [s], but "
-                f"{file.name} defines none."
-            )
-        self._acts: Generator[float, None, None] = supervise(sim)
-        try:
-            self._prepare()
-        except StopIteration:
-            self.next_ns = NEVER_NS
-        sim.loop.supervisor = self
+        self.judge = None if goal is None else Judge(sim, goal)
+        self._acts: dict[str, Acts] = {}
+        if file is not None:
+            self._acts[REFEREE] = _supervise_of(file)(sim)
+        if self.judge is not None:
+            self._acts[JUDGE] = self.judge.supervise(sim)
+        self._due_ns: dict[str, int] = {}
+        for who in self._acts:
+            try:
+                self._prepare(who, sim.now_ns)
+            except StopIteration:
+                self._due_ns[who] = NEVER_NS
+        self.next_ns = min(self._due_ns.values(), default=NEVER_NS)
+        if self._acts:
+            sim.loop.supervisor = self
 
-    def _prepare(self) -> None:
-        wait_s = check_number("the time that a supervisor yields", next(self._acts), 0.001, SECONDS_MAX)
-        self.next_ns += ns_from_s(wait_s)
+    def _prepare(self, who: str, now_ns: int) -> None:
+        wait_s = check_number("the time that a supervisor yields", next(self._acts[who]), 0.001, SECONDS_MAX)
+        self._due_ns[who] = now_ns + ns_from_s(wait_s)
 
     def act(self) -> None:
-        """Let it act, and end the run when it has returned."""
-        try:
-            self._prepare()
-        except StopIteration:
-            self._finish(0, f"the supervisor has ended the run at {self._sim.time_s:.3f} s of simulated time.")
-        except Exception as error:
-            if not isinstance(error, KiksError):
-                traceback.print_exc()
-            self._finish(1, f"the supervisor {self._name} has failed: {error}")
+        """Let those act that are due, and end the run when one has returned."""
+        now_ns = self.next_ns
+        for who, due_ns in tuple(self._due_ns.items()):
+            if due_ns > now_ns:
+                continue
+            try:
+                self._prepare(who, now_ns)
+            except StopIteration:
+                self._finish(0, f"{who} has ended the run at {self._sim.time_s:.3f} s of simulated time.")
+            except Exception as error:
+                if not isinstance(error, KiksError):
+                    traceback.print_exc()
+                name = f" {self._file.name}" if self._file is not None and who == REFEREE else ""
+                self._finish(1, f"{who}{name} has failed: {error}")
+        self.next_ns = min(self._due_ns.values())
+
+    def decide(self) -> str:
+        """Let the judge decide, and return its judgement in a sentence; an empty text without a goal."""
+        if self.judge is None:
+            return ""
+        judgement = self.judge.end()
+        return f"Goal {judgement}, {judgement.points:g} point{'' if judgement.points == 1 else 's'}."
 
     def _finish(self, code: int, message: str) -> None:
+        self._due_ns = dict.fromkeys(self._due_ns, NEVER_NS)
         self.next_ns = NEVER_NS
         self.end(code, message)
 
     def close(self) -> None:
-        """End it, wherever it waits."""
+        """End all, wherever they wait; the judge decides."""
         self._sim.loop.supervisor = None
-        self._acts.close()
+        for acts in self._acts.values():
+            acts.close()
+        self.decide()
+
+
+def _supervise_of(file: Path) -> Callable[[Simulation], Acts]:
+    if not file.is_file():
+        raise ParameterError(f"a supervisor must be a Python file, but there is none at {str(file)!r}.")
+    supervise = runpy.run_path(str(file)).get("supervise")
+    if not isgeneratorfunction(supervise):
+        raise ParameterError(
+            f"a supervisor must define a function supervise(sim) that yields the time until it acts again [s], but "
+            f"{file.name} defines none."
+        )
+    return supervise

@@ -11,8 +11,9 @@ from pydantic import BeforeValidator, Field
 from kiks.model.arena import Arena
 from kiks.model.checks import ROBOTS_MAX
 from kiks.model.data_file import Number, OneOf, Rule, Switch, Text, Whole, check, record
-from kiks.model.project import Project, ProjectRobot, Seed, ThinkingPolicy
+from kiks.model.project import Project, ProjectRobot
 from kiks.model.robot import Brightness, Response, RobotSpec
+from kiks.model.settings import Seed, ThinkingPolicy
 from kiks.model.turrets import TURRETS
 from kiks.toolbox.old_constants import NUMBER as _NUMBER
 from kiks.toolbox.old_constants import SWITCH, OldConstants

@@ -318,15 +318,16 @@ class Desk:
         sim, seconds = world.sim, self.project.seconds
 
         def end(_code: int, message: str) -> None:
-            self.say(message)
+            self.say(f"{message} {supervision.decide()}".strip())
             world.gate.pause(sim.now_ns)
 
         def end_time() -> None:
             sim.loop.end_at(CLOCK_END_NS, end_time)  # a person may let it go on
             end(0, f"The project ends after {seconds:g} s of simulated time.")
 
-        if self._supervisor is not None:
-            Supervision(sim, self._supervisor.program).end = end
+        file = None if self._supervisor is None else self._supervisor.program
+        supervision = Supervision(sim, file, self.project.goal)
+        supervision.end = end
         if seconds is not None:
             sim.loop.end_at(ns_from_s(seconds), end_time)
 

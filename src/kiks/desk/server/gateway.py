@@ -210,7 +210,9 @@ class Gateway:
             for robot in sorted(what for what in score if isinstance(what, int))
         ]
         entries += [{"name": what, "value": score[what], "colours": None} for what in score if isinstance(what, str)]
-        self._news["board"] = {"kind": "board", "score": entries, "end_s": self.desk.project.seconds}
+        project = self.desk.project
+        goal = "" if project.goal is None else project.goal.text
+        self._news["board"] = {"kind": "board", "score": entries, "goal": goal, "end_s": project.seconds}
 
     def _show(self, frame: bytes) -> None:
         for viewer in self._viewers:

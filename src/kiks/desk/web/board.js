@@ -9,9 +9,11 @@ const HALL = "desk-hall";
 
 export default {
   template: `
-    <div class="kiks-board" v-show="isHall || entries.length" data-testid="board" role="region" aria-label="Score">
+    <div class="kiks-board" v-show="isHall || goal || entries.length" data-testid="board" role="region" aria-label="Score">
       <div v-if="isHall" class="kiks-board-clock" data-testid="board-clock" role="timer">{{ clock }}<small
         v-if="end_s"> of {{ clockText(end_s).slice(0, -3) }}</small></div>
+      <p v-if="goal" class="kiks-board-goal" data-testid="board-goal">{{ goal }}<span v-if="!isHall" role="timer">{{ clock
+        }}<template v-if="end_s"> of {{ clockText(end_s).slice(0, -3) }}</template></span></p>
       <div v-if="isMatch" class="kiks-board-match">
         <span class="kiks-board-side"><i :style="ink(entries[0])"></i><b>{{ entries[0].name }}</b></span>
         <span class="kiks-board-value" data-testid="board-match">{{ entries[0].value }} : {{ entries[1].value }}</span>
@@ -26,7 +28,7 @@ export default {
               title="Leave the hall view (Escape)" @click="leave">&#x2715;</button>
     </div>`,
   props: { feed: { type: String, default: "/desk/feed" } },
-  data: () => ({ entries: [], end_s: null, isHall: false, clock: "" }),
+  data: () => ({ entries: [], goal: "", end_s: null, isHall: false, clock: "" }),
   computed: {
     /** Two robots, and nothing else: a match. */
     isMatch() { return this.entries.length === 2 && this.entries.every(({ colours }) => colours !== null); },
@@ -36,7 +38,7 @@ export default {
     this.stops = [
       feed.on("board", (board) => this.take(board)),
       feed.on("frame", ({ time_s }) => {
-        if (this.isHall) this.clock = clockText(time_s).slice(0, -1);
+        if (this.isHall || this.goal) this.clock = clockText(time_s).slice(0, -1);
       }),
     ];
     if (feed.board) this.take(feed.board);
@@ -54,8 +56,9 @@ export default {
   methods: {
     clockText,
 
-    take({ score, end_s }) {
+    take({ score, goal, end_s }) {
       this.entries = score;
+      this.goal = goal ?? "";
       this.end_s = end_s;
     },
 

@@ -1,0 +1,56 @@
+"""The goal of a project: when a run has solved it, and how many points it gets (the page "Goals")."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import AfterValidator, Field
+
+from kiks.model.checks import ROBOTS_MAX
+from kiks.model.data_file import Text, Whole, record
+from kiks.model.formula import Formula
+
+
+def _check_formula(text: str) -> str:
+    Formula(text)
+    return text
+
+
+FormulaText = Annotated[Text, AfterValidator(_check_formula)]
+
+
+@record
+class Goal:
+    """What a run is for. A judge looks every 0.1 s of simulated time, and ends the run when it is solved or failed.
+
+    Formulas have numbers, + - * /, comparisons, `and`, `or`, `not`, `min`, `max`, `abs`, `round` and `a if b else c`.
+    Their names are `time_s`; `is_solved`; the measures of `kiks.measures`, such as `contacts` or `goal_mm(800, 500)`;
+    `wall_mm`, the gap to the nearest wall [mm]; `score("laps")`, what a supervisor has counted;
+    `held_s(condition)`, for how long it has held without a break, and `total_s(condition)`, for how long in all [s].
+
+    Args:
+        text: The goal in a line for people.
+        solved: Formula that says whether it is solved.
+        failed: Formula that says whether it cannot be solved any more.
+        points: Formula of the points; 1 if it is solved, else 0, if left out.
+        robot: The robot whose measures count; `contacts(robot=2)` is another's.
+
+    Example:
+        >>> Goal("Reach the lamp without a contact", solved="light_mm < 80", failed="contacts > 0").points
+        'is_solved'
+    """
+
+    text: Text = ""
+    solved: FormulaText = "False"
+    failed: FormulaText = "False"
+    points: FormulaText = "is_solved"
+    robot: Annotated[Whole, Field(ge=1, le=ROBOTS_MAX)] = 1
+
+    def formulas(self) -> dict[str, Formula]:
+        """Return the formulas by their names.
+
+        Example:
+            >>> sorted(Goal(solved="light_mm < 80").formulas())
+            ['failed', 'points', 'solved']
+        """
+        return {name: Formula(getattr(self, name)) for name in ("solved", "failed", "points")}

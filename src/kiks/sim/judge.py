@@ -1,0 +1,268 @@
+"""The judge of a run: looks at a project's goal while the run goes on, and says how it has ended."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Generator, Sequence
+from dataclasses import dataclass
+from typing import Any, cast
+
+import numpy as np
+
+from kiks.control import measures
+from kiks.control.measure import Measure, Moment
+from kiks.errors import KiksError, ParameterError, nearest, shown
+from kiks.model.arena import Arena
+from kiks.model.checks import check_number
+from kiks.model.formula import TIMERS, Formula, Term
+from kiks.model.goal import Goal
+from kiks.sim.simulation import SCORE_MAX, Simulation
+from kiks.units import ns_from_s
+
+LOOK_S = 0.1
+"""Simulated time between two looks of the judge [s]: that of a control loop of a program on a 9600 baud line."""
+
+SHOWN_S = 1.0
+"""Simulated time between two changes of the points that people see [s]."""
+
+POINTS, RESULT = "points", "result"
+"""Entries of the score that the judge writes."""
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """How a run has done.
+
+    Attributes:
+        is_solved: Whether the goal was reached.
+        is_failed: Whether the run had failed, so that it could not be reached any more.
+        points: The points.
+        time_s: Simulated time at which it was decided [s].
+    """
+
+    is_solved: bool
+    is_failed: bool
+    points: float
+    time_s: float
+
+    def __str__(self) -> str:
+        how = "solved" if self.is_solved else "failed" if self.is_failed else "not solved"
+        return f"{how} after {self.time_s:.1f} s"
+
+
+class Judge:
+    """Judges a run by a goal; `supervise` is its supervisor.
+
+    Args:
+        sim: The world.
+        goal: The goal.
+
+    Attributes:
+        judgement: How the run has done; None until it is decided.
+
+    Example:
+        >>> from kiks import Arena, Khepera, Simulation
+        >>> sim = Simulation(Arena.box(500, 500), seed=1)
+        >>> judge = Judge(sim, Goal(solved="path_mm > 100", points="20 - time_s"))
+        >>> Khepera(sim.port(1)).set_speed(10, 10)
+        >>> for wait_s in judge.supervise(sim):
+        ...     sim.run(wait_s)
+        >>> str(judge.judgement)
+        'solved after 1.5 s'
+    """
+
+    def __init__(self, sim: Simulation, goal: Goal) -> None:
+        self.judgement: Judgement | None = None
+        self._sim = sim
+        sim.index_of(goal.robot)
+        self._is_solved, self._looked_ns = False, -1
+        self._watched = self._watch(goal)
+        for name, watched in self._watch(goal).items():
+            # What is wrong with a formula is said before the run, of which this look is no part.
+            watched.look()
+            watched.number(name)
+
+    def _watch(self, goal: Goal) -> dict[str, _Watched]:
+        own: dict[str, Callable[[], float]] = {
+            "time_s": lambda: self._sim.time_s,
+            "is_solved": lambda: float(self._is_solved),
+        }
+        found = {}
+        for name, formula in goal.formulas().items():
+            try:
+                found[name] = _Watched(formula, self._sim, goal.robot, own)
+            except KiksError as error:
+                raise ParameterError(f"the goal's {name} {error}") from None
+        return found
+
+    def supervise(self, sim: Simulation) -> Generator[float, None, None]:
+        """Look at the goal until it is solved or has failed; see `kiks.sim.supervision.Supervision`."""
+        shown_ns = 0
+        while True:
+            yield LOOK_S
+            if self.judgement is not None:
+                continue  # a person lets the world go on
+            self._look()
+            if self._is_solved or self._watched["failed"].number("failed"):
+                self.end()
+                return
+            if sim.now_ns >= shown_ns:
+                shown_ns = sim.now_ns + ns_from_s(SHOWN_S)
+                sim.set_score(POINTS, self._watched["points"].number("points"))
+
+    def end(self) -> Judgement:
+        """Decide, if that is not done yet, write the result into the score, and return it."""
+        if self.judgement is None:
+            if self._sim.now_ns != self._looked_ns:
+                self._look()
+            is_failed = not self._is_solved and self._watched["failed"].number("failed") != 0
+            points = round(self._watched["points"].number("points"), 3)
+            points = int(points) if points.is_integer() else points
+            self.judgement = Judgement(self._is_solved, is_failed, points, self._sim.time_s)
+            self._sim.set_score(POINTS, points)
+            self._sim.set_score(RESULT, str(self.judgement))
+        return self.judgement
+
+    def _look(self) -> None:
+        self._looked_ns = self._sim.now_ns
+        for watched in self._watched.values():
+            watched.look()
+        self._is_solved = self._watched["solved"].number("solved") != 0
+
+
+class _Watched:
+    """A formula in a world: what each of its terms has seen.
+
+    Args:
+        formula: The formula.
+        sim: The world.
+        robot: The robot whose measures count.
+        own: The values of the judge's own names.
+    """
+
+    def __init__(self, formula: Formula, sim: Simulation, robot: int, own: dict[str, Callable[[], float]]) -> None:
+        self._formula, self._sim = formula, sim
+        self._terms = [_watcher(term, sim, robot, own) for term in formula.terms]
+
+    def look(self) -> None:
+        """Let all terms look at the world once."""
+        self._values = [watch() for watch in self._terms]
+
+    def number(self, name: str) -> float:
+        """Return the value at the last look.
+
+        Args:
+            name: What messages call the formula.
+        """
+        try:
+            return check_number(f"the goal's {name}", float(self._formula.value(self._values)), -SCORE_MAX, SCORE_MAX)
+        except (ArithmeticError, TypeError) as error:
+            raise ParameterError(
+                f"the goal's {name} must be a number, but {self._formula.text!r} has none at {self._sim.time_s:.1f} s: "
+                f"{error}."
+            ) from None
+
+
+def _watcher(term: Term, sim: Simulation, robot: int, own: dict[str, Callable[[], float]]) -> Callable[[], Any]:
+    """Return what looks at the world for a term and returns its value."""
+    if term.condition is not None:
+        return _timer(_Watched(term.condition, sim, robot, own), is_broken=term.name == "held_s")
+    named: dict[str, Any] = dict(term.named)
+    robot = sim.index_of(named.pop("robot", robot)) + 1
+    if term.name in own and not (term.arguments or named):
+        return own[term.name]
+    if term.name == "wall_mm" and not (term.arguments or named):
+        radius_mm = sim.specs[robot - 1].body.radius_mm
+        return lambda: sim.world.free_space.wall_gap_mm(*sim.pose(robot)[:2], radius_mm)
+    if term.name == "score" and len(term.arguments) == 1 and not named:
+        (what,) = term.arguments
+        return lambda: _counted(sim, int(what) if isinstance(what, float) else what)
+    return _measured(_measure(term, named, sim.arena), sim, robot)
+
+
+def _measure(term: Term, named: dict[str, Any], arena: Arena) -> Measure:
+    """Return the measure that a term names."""
+    known = [*measures.__all__, "time_s", "is_solved", "wall_mm", "score", *TIMERS]
+    if term.name not in measures.__all__:
+        raise ParameterError(
+            f"must name measures, but {shown(str(term))} is none.{nearest(term.name, known)} The page "
+            '"Controllers and measures" lists them.'
+        )
+    made = getattr(measures, term.name)
+    if isinstance(made, Measure):
+        if term.arguments or named:
+            raise ParameterError(f"must use {term.name} without arguments, but it was {shown(str(term))}.")
+        return made
+    given = (arena, *term.arguments) if "arena" in inspect.signature(made).parameters else term.arguments
+    try:
+        return cast(Measure, made(*given, **named))
+    except TypeError as error:
+        raise ParameterError(f"must use {term.name} as its reference says, but {shown(str(term))}: {error}.") from None
+
+
+def _measured(measure: Measure, sim: Simulation, robot: int) -> Callable[[], float]:
+    """Return what lets a measure look at a robot."""
+    notes = np.zeros(measure.note_count)
+
+    def watch() -> float:
+        measure.kernel(_moment(sim, robot, measure.senses), notes)
+        return float(measure.value(notes[None, None]).item())
+
+    return watch
+
+
+def _moment(sim: Simulation, robot: int, senses: Sequence[str]) -> Any:
+    """Return what a measure sees of a robot now. Its readings are free of noise: the judge sees what is the case."""
+    poses, world = sim.poses(), sim.world
+    record = world.state.robots[0, robot - 1]
+    forwards_mm, backwards_mm, _ = world.distances_mm()[robot - 1]
+    readings = [value for sense in senses for value in _SENSES[sense](sim, robot)]
+    return Moment(
+        sim.time_s,
+        LOOK_S,
+        np.array(readings, np.float64),
+        record["speed_setpoint"].astype(np.float64),
+        poses[robot - 1, 0],
+        poses[robot - 1, 1],
+        poses[robot - 1, 2],
+        float(record["start_x_mm"]),
+        float(record["start_y_mm"]),
+        float(forwards_mm + backwards_mm),
+        float(record["contact_count"]),
+        bool(record["is_touching"] > 0),
+        world.state.bodies[0],
+        world.lamps,
+        robot - 1,
+        poses,
+    )
+
+
+_SENSES: dict[str, Callable[[Simulation, int], list[float]]] = {
+    "proximity": lambda sim, robot: sim.proximity(robot),
+    "ambient": lambda sim, robot: sim.ambient(robot),
+    "camera": lambda sim, robot: sim.image(robot),
+}
+
+
+def _counted(sim: Simulation, what: int | str) -> float:
+    """Return an entry of the score; 0 before anything has counted it."""
+    value = sim.score.get(what, 0)
+    if isinstance(value, str):
+        raise ParameterError(f"the goal must use numbers of the score, but {shown(what)} is {shown(value)}.")
+    return value
+
+
+def _timer(condition: _Watched, *, is_broken: bool) -> Callable[[], float]:
+    """Return what counts for how long a condition holds [s], from anew when it was broken, or in all."""
+    count = 0
+
+    def watch() -> float:
+        nonlocal count
+        condition.look()
+        if condition.number("condition"):
+            count += 1
+        elif is_broken:
+            count = 0
+        return count * LOOK_S
+
+    return watch
