@@ -68,7 +68,7 @@ class Judge:
         >>> for wait_s in judge.supervise(sim):
         ...     sim.run(wait_s)
         >>> str(judge.judgement)
-        'solved after 1.5 s'
+        'solved after 1.3 s'
     """
 
     def __init__(self, sim: Simulation, goal: Goal) -> None:
