@@ -5,6 +5,9 @@ from __future__ import annotations
 import asyncio
 import html
 import re
+from collections.abc import Awaitable, Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
 from urllib.parse import quote, urlencode, urlsplit
 
@@ -43,6 +46,64 @@ STRANGER_S = 10.0
 TIMER = "kiks_timer"
 """Key of a connection's timer in the state of its requests."""
 
+KEY = "kiks_key"
+"""Key of the token of a request in its scope."""
+
+ADVICE = """<p>Open the complete address that KiKS printed when it started. It ends in <code>?token=</code> and a long
+word. Your browser remembers it until you close the browser. In Python the address is <code>shown.url</code>, where
+<code>shown = sim.show()</code>.</p>
+<p>The address changes each time KiKS starts.</p>"""
+"""What the page of a refusal advises; HTML."""
+
+GONE = 1008
+"""Code with which a WebSocket closes whose token has become invalid (RFC 6455, 7.4.1: it violates a policy)."""
+
+
+@dataclass
+class Door:
+    """Who comes in beside the owner of a server, and by which addresses.
+
+    Attributes:
+        keys: The tokens of others by their places.
+        entrance: Answers requests for `/` without a token; None: they are refused.
+        advice: What the page of a refusal advises; HTML.
+        name: Name of the computer in the address that people open, if a proxy stands before the server.
+        is_secure: Whether that proxy speaks TLS.
+        max_age_s: How long browsers keep cookies of others [s].
+    """
+
+    keys: dict[str, Token] = field(default_factory=dict)
+    entrance: ASGIApp | None = None
+    advice: str = ADVICE
+    name: str | None = None
+    is_secure: bool = False
+    max_age_s: int = 30 * 24 * 3600
+    _sockets: dict[str, set[Callable[[], Awaitable[None]]]] = field(default_factory=dict)
+
+    def add(self, key: Token) -> None:
+        """Let a token in."""
+        self.keys[key.place] = key
+
+    async def remove(self, key: Token) -> None:
+        """Refuse a token from now on, and close the WebSockets that it has opened; called in the server's thread."""
+        self.keys.pop(key.place, None)
+        for close in tuple(self._sockets.get(key.place, ())):
+            await close()
+
+    @contextmanager
+    def noting(self, scope: Scope, close: Callable[[], Awaitable[None]]) -> Iterator[None]:
+        """Note how a connection is closed, if it is a WebSocket, until it has ended."""
+        sockets = self._sockets.setdefault(scope[KEY].place, set()) if scope["type"] == "websocket" else set()
+        sockets.add(close)
+        try:
+            yield
+        finally:
+            sockets.discard(close)
+
+    def cookie(self, key: Token) -> str:
+        """Return the cookie with the token of somebody who has come in by the entrance."""
+        return f"{_cookie(key, 'SameSite=Strict', is_secure=self.is_secure)}; Max-Age={self.max_age_s}"
+
 
 class LimitedConnection(H11Protocol):
     """One connection, a stranger until `AccessControl` has accepted a request of it and cancelled its timer.
@@ -74,22 +135,24 @@ class LimitedConnection(H11Protocol):
 class AccessControl:
     """ASGI middleware that checks each request before it reaches the application.
 
-    * Each request needs the token in a cookie, and a path in the token's place; `?token=...` or `?ticket=...` in an
-      address sets the cookie and leads there.
+    * Each request needs a token in a cookie, and a path in its place that it opens; `?token=...` or `?ticket=...` in an
+      address sets the owner's cookie and leads there.
     * A request with an `Origin` header must come from the desk's own page.
     * A desk for this computer alone accepts only host names of this computer, against DNS rebinding.
     * A request declares its length, which is at most `REQUEST_BYTES_MAX`.
 
     Args:
         app: The application.
-        key: The token that browsers must know.
+        key: The token of the owner, which opens everything.
         is_local: Whether the desk is for this computer alone.
+        door: Who else comes in.
     """
 
-    def __init__(self, app: ASGIApp, key: Token, *, is_local: bool = True) -> None:
+    def __init__(self, app: ASGIApp, key: Token, *, is_local: bool = True, door: Door | None = None) -> None:
         self._app = app
         self._key = key
         self._is_local = is_local
+        self._door = Door() if door is None else door
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Pass a request to the application, or refuse it."""
@@ -100,30 +163,33 @@ class AccessControl:
         try:
             answer = self._checked(HTTPConnection(scope))
         except HTTPException as refusal:
-            page = REFUSED.replace("REASON", html.escape(refusal.detail))
+            page = REFUSED.replace("REASON", html.escape(refusal.detail)).replace("ADVICE", self._door.advice)
             headers = {"cache-control": "no-store", "connection": "close"}
             answer = HTMLResponse(page, refusal.status_code, headers) if scope["type"] == "http" else WebSocketClose()
-        await answer({**scope, "root_path": self._key.place}, receive, send)
+        await answer(scope, receive, send)
 
     def _checked(self, request: HTTPConnection) -> ASGIApp:
         """Return what answers a request: the application, or a way to it; else raise the refusal."""
         self._check(request)
-        if not self._knows_token(request):
-            query = dict(request.query_params)
-            token, ticket = query.pop("token", ""), query.pop("ticket", "")
-            key, scope = self._key, request.scope
-            is_page = scope["type"] == "http"
-            if not is_page or not (key.fits(token) or key.take(ticket, scope.get("client"), scope.get("server"))):
-                raise HTTPException(
-                    403, "The desk must be opened with its token, but the address has none or another one"
-                )
+        scope, is_page = request.scope, request.scope["type"] == "http"
+        if (key := self._known_key(request)) is not None:
+            if not key.opens(scope["path"].removeprefix(key.place)):
+                raise HTTPException(403, "A page must belong to your own desk, but this one does not")
+            if (timer := scope.get("state", {}).get(TIMER)) is not None:
+                timer.cancel()
+            scope.update({"root_path": key.place, KEY: key})
+            return self._pass_on
+        query = dict(request.query_params)
+        token, ticket = query.pop("token", ""), query.pop("ticket", "")
+        key = self._key
+        if is_page and (key.fits(token) or key.take(ticket, scope.get("client"), scope.get("server"))):
             path = scope["path"].removeprefix(key.place).lstrip("/")
             address = f"{key.place}/{quote(path)}" + (f"?{urlencode(query)}" if query else "")
-            headers = {"set-cookie": self._cookie(request.headers), "cache-control": "no-store"}
+            headers = {"set-cookie": self._own_cookie(request.headers), "cache-control": "no-store"}
             return RedirectResponse(address, 303, headers)
-        if (timer := request.scope.get("state", {}).get(TIMER)) is not None:
-            timer.cancel()
-        return self._pass_on
+        if is_page and self._door.entrance is not None and scope["path"] == "/":
+            return self._door.entrance
+        raise HTTPException(403, "The desk must be opened with its token, but the address has none or another one")
 
     def _check(self, request: HTTPConnection) -> None:
         """Refuse a request that is not from the desk's own page, or is too large."""
@@ -142,7 +208,7 @@ class AccessControl:
             raise HTTPException(
                 403, f"Requests must come from the desk's own page, but this one came from {shown(origin)}"
             )
-        if self._is_local and name not in LOOPBACK:
+        if self._is_local and name not in LOOPBACK and name != self._door.name:
             raise HTTPException(403, f"The desk's host must be a name of this computer, but it was {shown(host)}")
         is_open_ended = "transfer-encoding" in headers or not re.fullmatch("[0-9]{1,18}", length)
         if is_open_ended or int(length) > REQUEST_BYTES_MAX:
@@ -150,15 +216,18 @@ class AccessControl:
                 413, f"A request must declare a length of at most {REQUEST_BYTES_MAX >> 20} MiB, but this one has not"
             )
 
-    def _knows_token(self, request: HTTPConnection) -> bool:
-        if not request.scope["path"].startswith(f"{self._key.place}/"):
-            return False
+    def _known_key(self, request: HTTPConnection) -> Token | None:
+        """Return the token at whose place a request is, if one of its cookies holds it."""
+        place = "/" + request.scope["path"].split("/", 2)[1] if request.scope["path"].count("/") > 1 else ""
+        key = self._key if place == self._key.place else self._door.keys.get(place)
+        if key is None:
+            return None
         # Other servers of this computer may set cookies of the same name: a dictionary would hold one of them.
         pairs = (pair.strip().partition("=") for pair in request.headers.get("cookie", "").split(";"))
-        return any(each == COOKIE and self._key.fits(value) for each, _, value in pairs)
+        return key if any(each == COOKIE and key.fits(value) for each, _, value in pairs) else None
 
-    def _cookie(self, headers: Headers) -> str:
-        """Return the cookie with the token; pages of other sites never send it, and other servers never get it.
+    def _own_cookie(self, headers: Headers) -> str:
+        """Return the cookie with the owner's token; pages of other sites never send it, and other servers never get it.
 
         A notebook is another site: there the cookie is bound to the page of the notebook.
         """
@@ -166,8 +235,9 @@ class AccessControl:
             "iframe",
             "frame",
         )
-        rule = "SameSite=None; Secure; Partitioned" if is_within else "SameSite=Strict"
-        return f"{COOKIE}={self._key.token}; Path={self._key.place}; HttpOnly; {rule}"
+        if is_within:
+            return _cookie(self._key, "SameSite=None; Secure; Partitioned", is_secure=False)
+        return _cookie(self._key, "SameSite=Strict", is_secure=self._door.is_secure)
 
     async def _pass_on(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Call the application; a failure of it after the client has left is none."""
@@ -179,8 +249,23 @@ class AccessControl:
             has_left = has_left or message["type"].endswith(".disconnect")
             return message
 
-        try:
-            await self._app(scope, receive_noting, send)
-        except Exception:
+        async def send_noting(message: Message) -> None:
             if not has_left:
-                raise
+                await send(message)
+
+        async def close() -> None:
+            nonlocal has_left
+            if not has_left:
+                has_left = True
+                await send({"type": "websocket.close", "code": GONE})
+
+        with self._door.noting(scope, close):
+            try:
+                await self._app(scope, receive_noting, send_noting)
+            except Exception:
+                if not has_left:
+                    raise
+
+
+def _cookie(key: Token, rule: str, *, is_secure: bool) -> str:
+    return f"{COOKIE}={key.token}; Path={key.place}; HttpOnly; {rule}" + ("; Secure" if is_secure else "")

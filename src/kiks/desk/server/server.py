@@ -6,18 +6,22 @@ import asyncio
 import logging
 import socket
 import threading
+from collections.abc import Coroutine
 from contextlib import suppress
+from typing import Any, TypeVar
 
 import uvicorn
 from fastapi import FastAPI, Response, WebSocket
 from nicegui import app as nicegui_app
-from nicegui import ui
+from nicegui import core, ui
+from starlette.requests import Request
 from starlette.responses import RedirectResponse
 
 from kiks.desk.panels.page import Page
-from kiks.desk.server.access import HEADERS, LOOPBACK, AccessControl, LimitedConnection
+from kiks.desk.server.access import HEADERS, KEY, LOOPBACK, AccessControl, Door, LimitedConnection
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.gateway import Gateway
+from kiks.desk.server.page_guard import PageGuard, guard_messages
 from kiks.desk.server.server_log import log_plainly
 from kiks.desk.server.token import Token
 from kiks.errors import LinkError, ParameterError
@@ -38,6 +42,8 @@ EVERY_ADDRESS = ("0.0.0.0", "::")
 
 CLOSED = "KiKS: this desk is closed. Open it again where it was opened."
 
+Done = TypeVar("Done")
+
 
 class DeskServer:
     """Serves desks to browsers.
@@ -46,12 +52,14 @@ class DeskServer:
 
     Attributes:
         desks: The gateways of the open desks by number.
-        key: The token that browsers must know.
+        key: The token that browsers of the owner must know.
+        door: Who else comes in.
     """
 
     def __init__(self) -> None:
         self.desks: dict[int, Gateway] = {}
         self.key = Token()
+        self.door = Door()
         self._is_local = True
         self._count = 0
         self._socket: socket.socket | None = None
@@ -87,11 +95,17 @@ class DeskServer:
                     f"the desk must begin to serve within {START_S:g} s, but it did not. Look above for the reason."
                 )
 
-    def open(self, desk: Desk) -> Gateway:
-        """Make a desk available to browsers; `start` must have been called."""
+    def open(self, desk: Desk, number: int | None = None) -> Gateway:
+        """Make a desk available to browsers; `start` must have been called.
+
+        Args:
+            desk: The desk.
+            number: Its number in its address, which no other has had; the next one if left out.
+        """
         with self._lock:
-            self._count += 1
-            gateway = self.desks[self._count] = Gateway(desk, self._count)
+            number = self._count + 1 if number is None else number
+            self._count = max(self._count, number)
+            gateway = self.desks[number] = Gateway(desk, number)
             assert self._loop is not None
             asyncio.run_coroutine_threadsafe(gateway.run(), self._loop)
         return gateway
@@ -105,20 +119,29 @@ class DeskServer:
 
     def url(self, number: int | None = None) -> str:
         """Return the URL of a desk, or of the newest one, with the token."""
-        return f"{self._address(number)}?token={self.key.token}"
+        return f"{self._page(number)}?token={self.key.token}"
 
     def url_for_once(self, number: int) -> str:
         """Return a URL of a desk that works once, for a browser of this user: other users may see it."""
-        return f"{self._address(number)}?ticket={self.key.new_ticket()}"
+        return f"{self._page(number)}?ticket={self.key.new_ticket()}"
 
-    # ---- inside ----
-
-    def _address(self, number: int | None) -> str:
+    def address(self) -> str:
+        """Return the address under which other computers reach this server, with a slash at its end."""
         assert self._socket is not None
         host, port = self._socket.getsockname()[:2]
         host = _own_address(self._socket.family) if host in EVERY_ADDRESS else host
         host = f"[{host}]" if ":" in host else host
-        return f"http://{host}:{port}/" + ("" if number is None else f"desk/{number}")
+        return f"http://{host}:{port}/"
+
+    def run(self, work: Coroutine[Any, Any, Done]) -> Done:
+        """Run a coroutine in the server's thread, and return its result; from any other thread."""
+        assert self._loop is not None
+        return asyncio.run_coroutine_threadsafe(work, self._loop).result()
+
+    # ---- inside ----
+
+    def _page(self, number: int | None) -> str:
+        return self.address() + ("" if number is None else f"desk/{number}")
 
     def _serve(self, begun: threading.Event) -> None:
         """Run the web server in its own thread."""
@@ -128,6 +151,7 @@ class DeskServer:
         # Quasar's bar has no name, and shows a request on the colour of the bar above the arena.
         nicegui_app.config.quasar_config["loadingBar"] = {"skipHijack": True}
         ui.run_with(app, title="KiKS", dark=None, language="en-US", show_welcome_message=False, reconnect_timeout=10.0)
+        guard_messages(core.sio)
 
         def begin() -> None:
             self._loop = asyncio.get_running_loop()
@@ -136,7 +160,7 @@ class DeskServer:
 
         nicegui_app.on_startup(begin)
         config = uvicorn.Config(
-            AccessControl(app, self.key, is_local=self._is_local),
+            AccessControl(PageGuard(app), self.key, is_local=self._is_local, door=self.door),
             http=LimitedConnection,
             headers=HEADERS,
             # uvloop ends the process when there is no file descriptor for its loop.
@@ -164,8 +188,9 @@ class DeskServer:
 
     def _add_routes(self, app: FastAPI) -> None:
         @app.get("/")
-        def newest() -> Response:
-            number = max(self.desks, default=None)
+        def newest(request: Request) -> Response:
+            own = request.scope[KEY].desk
+            number = max(self.desks, default=None) if own is None else own
             if number is None:
                 return Response(CLOSED, media_type="text/plain")
             return RedirectResponse(f"desk/{number}")

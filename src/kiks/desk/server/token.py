@@ -23,6 +23,9 @@ TOKEN_BYTES = 24
 
 COOKIE = "kiks_token"
 
+LIBRARY_PATHS = ("/_nicegui/", "/_nicegui_ws/")
+"""Where NiceGUI's files and sockets are; `PageGuard` keeps the pages apart that are behind them."""
+
 ESTABLISHED = "01"
 """State of an open connection in the system's list (include/net/tcp_states.h)."""
 
@@ -33,20 +36,37 @@ Address = tuple[str, int]
 
 
 class Token:
-    """The token of a server, and its tickets.
+    """A token, what it opens, and its tickets.
 
     Args:
         token: The text of the token; a random one if left out.
+        place: Begin of the path of all pages that need it; a random one if left out.
+        desk: The only desk that it opens; None: it opens all that the server has.
 
     Attributes:
         token: The text of the token.
         place: Begin of the path of all pages that need it.
+        desk: The only desk that it opens; None for all.
     """
 
-    def __init__(self, token: str | None = None) -> None:
+    def __init__(self, token: str | None = None, place: str | None = None, *, desk: int | None = None) -> None:
         self.token = secrets.token_urlsafe(TOKEN_BYTES) if token is None else token
-        self.place = f"/{secrets.token_urlsafe(TOKEN_BYTES)}"
+        self.place = f"/{secrets.token_urlsafe(TOKEN_BYTES)}" if place is None else place
+        self.desk = desk
         self._tickets: set[str] = set()
+
+    def opens(self, path: str) -> bool:
+        """Return whether it opens a path below its place.
+
+        Example:
+            >>> key = Token(desk=2)
+            >>> [key.opens(path) for path in ("/desk/2/feed", "/desk/20/feed", "/desk/3", "/room")]
+            [True, False, False, False]
+        """
+        if self.desk is None:
+            return True
+        own = f"/desk/{self.desk}"
+        return path in ("/", own, "/favicon.ico") or path.startswith((f"{own}/", *LIBRARY_PATHS))
 
     def fits(self, given: str) -> bool:
         """Compare a text with the token in constant time."""
