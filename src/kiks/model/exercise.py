@@ -99,7 +99,7 @@ class Cases:
 
     Example:
         >>> [case.name for case in Cases("home", seed=(1, 2), baud=(9600,)).each()]
-        ['home, seed 1, 9600 baud', 'home, seed 2, 9600 baud']
+        ['home, seed 1', 'home, seed 2']
     """
 
     name: Text = ""
