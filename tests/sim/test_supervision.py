@@ -8,6 +8,7 @@ import pytest
 from tests import forked
 
 from kiks.errors import ParameterError
+from kiks.model.goal import Goal
 from kiks.sim.simulation import Simulation
 from kiks.sim.supervision import Supervision
 
@@ -84,3 +85,20 @@ def test_a_supervisor_that_fails_ends_the_run(tmp_path: Path) -> None:
     missing = forked.run("run", "game.kiks", cwd=tmp_path)
     assert missing.returncode == 2
     assert "a supervisor must be a Python file, but there is none at" in missing.stderr
+
+
+def test_a_solved_goal_is_worth_a_point() -> None:
+    sim = Simulation()
+    supervision = Supervision(sim, goal=Goal(solved="time_s >= 1"))
+    sim.run(3.0)
+    assert supervision.decide() == "Goal solved after 1.0 s, 1 point."
+
+
+@pytest.mark.parametrize(
+    ("failed", "said"), [("False", "solved after 1.0 s, 1 point"), ("time_s >= 1", "failed after")]
+)
+def test_what_must_hold_to_the_end_is_solved_there_unless_the_goal_has_failed(failed: str, said: str) -> None:
+    sim = Simulation()
+    supervision = Supervision(sim, goal=Goal(solved="is_over", failed=failed))
+    sim.run(1.0)
+    assert said in supervision.decide()

@@ -24,9 +24,10 @@ class Goal:
     """What a run is for. A judge looks every 0.1 s of simulated time, and ends the run when it is solved or failed.
 
     Formulas have numbers, + - * /, comparisons, `and`, `or`, `not`, `min`, `max`, `abs`, `round` and `a if b else c`.
-    Their names are `time_s`; `is_solved`; the measures of `kiks.measures`, such as `contacts` or `goal_mm(800, 500)`;
-    `wall_mm`, the gap to the nearest wall [mm]; `score("laps")`, what a supervisor has counted;
-    `held_s(condition)`, for how long it has held without a break, and `total_s(condition)`, for how long in all [s].
+    Their names are `time_s`; `is_solved`; `is_over`, when neither `solved` nor `failed` has ended the run; the measures
+    of `kiks.measures`, such as `contacts` or `goal_mm(800, 500)`; `wall_mm`, the gap to the nearest wall [mm];
+    `score("laps")`, what a supervisor has counted; `held_s(condition)`, for how long it has held without a break, and
+    `total_s(condition)`, for how long in all [s].
 
     Args:
         text: The goal in a line for people.

@@ -75,7 +75,7 @@ class Judge:
         self.judgement: Judgement | None = None
         self._sim = sim
         sim.index_of(goal.robot)
-        self._is_solved, self._looked_ns = False, -1
+        self._is_solved, self._is_over, self._looked_ns = False, False, -1
         self._watched = self._watch(goal)
         for name, watched in self._watch(goal).items():
             # What is wrong with a formula is said before the run, of which this look is no part.
@@ -86,6 +86,7 @@ class Judge:
         own: dict[str, Callable[[], float]] = {
             "time_s": lambda: self._sim.time_s,
             "is_solved": lambda: float(self._is_solved),
+            "is_over": lambda: float(self._is_over),
         }
         found = {}
         for name, formula in goal.formulas().items():
@@ -116,6 +117,8 @@ class Judge:
             if self._sim.now_ns != self._looked_ns:
                 self._look()
             is_failed = not self._is_solved and self._watched["failed"].number("failed") != 0
+            self._is_over = not (self._is_solved or is_failed)
+            self._solve()
             points = round(self._watched["points"].number("points"), 3)
             points = int(points) if points.is_integer() else points
             self.judgement = Judgement(self._is_solved, is_failed, points, self._sim.time_s)
@@ -127,7 +130,10 @@ class Judge:
         self._looked_ns = self._sim.now_ns
         for watched in self._watched.values():
             watched.look()
-        self._is_solved = self._watched["solved"].number("solved") != 0
+        self._solve()
+
+    def _solve(self) -> None:
+        self._is_solved = self._is_solved or self._watched["solved"].number("solved") != 0
 
 
 class _Watched:
@@ -143,19 +149,21 @@ class _Watched:
     def __init__(self, formula: Formula, sim: Simulation, robot: int, own: dict[str, Callable[[], float]]) -> None:
         self._formula, self._sim = formula, sim
         self._terms = [_watcher(term, sim, robot, own) for term in formula.terms]
+        self._own = [own.get(str(term)) for term in formula.terms]
 
     def look(self) -> None:
         """Let all terms look at the world once."""
         self._values = [watch() for watch in self._terms]
 
     def number(self, name: str) -> float:
-        """Return the value at the last look.
+        """Return the value at the last look, with the judge's own names as they are now.
 
         Args:
             name: What messages call the formula.
         """
+        values = [seen if tell is None else tell() for seen, tell in zip(self._values, self._own, strict=True)]
         try:
-            return check_number(f"the goal's {name}", float(self._formula.value(self._values)), -SCORE_MAX, SCORE_MAX)
+            return check_number(f"the goal's {name}", float(self._formula.value(values)), -SCORE_MAX, SCORE_MAX)
         except (ArithmeticError, TypeError) as error:
             raise ParameterError(
                 f"the goal's {name} must be a number, but {self._formula.text!r} has none at {self._sim.time_s:.1f} s: "
@@ -182,7 +190,7 @@ def _watcher(term: Term, sim: Simulation, robot: int, own: dict[str, Callable[[]
 
 def _measure(term: Term, named: dict[str, Any], arena: Arena) -> Measure:
     """Return the measure that a term names."""
-    known = [*measures.__all__, "time_s", "is_solved", "wall_mm", "score", *TIMERS]
+    known = [*measures.__all__, "time_s", "is_solved", "is_over", "wall_mm", "score", *TIMERS]
     if term.name not in measures.__all__:
         raise ParameterError(
             f"must name measures, but {shown(str(term))} is none.{nearest(term.name, known)} The page "
