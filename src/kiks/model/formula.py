@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import ast
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 from kiks.errors import ParameterError, shown
+from kiks.model.data_file import one_line
 
 FORMULA_MAX = 1000
 """Most characters of a formula."""
@@ -15,7 +17,13 @@ FORMULA_MAX = 1000
 TIMERS = ("held_s", "total_s")
 """Functions of a condition: how long it has held without a break, and how long in all [s]."""
 
-FUNCTIONS: dict[str, Callable[..., Any]] = {"min": min, "max": max, "abs": abs, "round": round}
+
+def _round(number: float, digits: float = 0) -> float:
+    """Return a number rounded as a float, which takes no time for any count of digits."""
+    return round(float(number), int(digits))
+
+
+FUNCTIONS: dict[str, Callable[..., Any]] = {"min": min, "max": max, "abs": abs, "round": _round}
 """Functions of numbers."""
 
 _NODES = (
@@ -71,13 +79,14 @@ class Formula:
         try:
             if len(text) > FORMULA_MAX:
                 raise ValueError(f"it has more than {FORMULA_MAX} characters")
-            tree = ast.parse(text.strip(), mode="eval")
             self.terms: list[Term] = []
-            self._code = compile(ast.fix_missing_locations(_Terms(self.terms).visit(tree)), "<formula>", "eval")
+            with warnings.catch_warnings(action="ignore"):
+                tree = _Terms(self.terms).visit(ast.parse(text.strip(), mode="eval"))
+                self._code = compile(ast.fix_missing_locations(tree), "<formula>", "eval")
         except ParameterError:
             raise
         except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
-            reason = error.msg if isinstance(error, SyntaxError) else str(error)
+            reason = error.msg if isinstance(error, SyntaxError) else one_line(error)
             raise ParameterError(f"must be a formula, but {shown(text)} is none: {reason}. {_EXAMPLE}") from None
 
     def __eq__(self, other: object) -> bool:
@@ -94,6 +103,8 @@ class Formula:
 
         Raises:
             ArithmeticError: If it divides by zero.
+            TypeError: If a function gets too few arguments, or too many.
+            ValueError: If it rounds what is no number.
         """
         return eval(self._code, {"__builtins__": {}}, FUNCTIONS | {"_value": values})
 
@@ -136,6 +147,8 @@ class _Terms(ast.NodeTransformer):
             return self._place(Term(name, condition=Formula(ast.unparse(node.args[0]))))
         arguments = tuple(map(_constant, node.args))
         named = tuple((each.arg or "**", _constant(each.value)) for each in node.keywords)
+        if len(dict(named)) < len(named):
+            raise ValueError(f"an argument of {name} comes twice")
         return self._place(Term(name, arguments, named))
 
     def _place(self, term: Term) -> ast.AST:

@@ -17,7 +17,7 @@ from kiks.model.checks import check_number
 from kiks.model.formula import TIMERS, Formula, Term
 from kiks.model.goal import Goal
 from kiks.sim.simulation import SCORE_MAX, Simulation
-from kiks.units import ns_from_s
+from kiks.units import ns_from_s, s_from_ns
 
 LOOK_S = 0.1
 """Simulated time between two looks of the judge [s]: that of a control loop of a program on a 9600 baud line."""
@@ -75,11 +75,13 @@ class Judge:
         self.judgement: Judgement | None = None
         self._sim = sim
         sim.index_of(goal.robot)
-        self._is_solved, self._is_over, self._looked_ns = False, False, -1
+        self._is_solved, self._is_over = False, False
+        self._looked_ns: int | None = None
+        self._began_ns = sim.now_ns
         self._watched = self._watch(goal)
         for name, watched in self._watch(goal).items():
             # What is wrong with a formula is said before the run, of which this look is no part.
-            watched.look()
+            watched.look(0)
             watched.number(name)
 
     def _watch(self, goal: Goal) -> dict[str, _Watched]:
@@ -127,13 +129,19 @@ class Judge:
         return self.judgement
 
     def _look(self) -> None:
-        self._looked_ns = self._sim.now_ns
+        now_ns = self._sim.now_ns
+        passed_ns = now_ns - (self._began_ns if self._looked_ns is None else self._looked_ns)
+        self._looked_ns = now_ns
         for watched in self._watched.values():
-            watched.look()
+            watched.look(passed_ns)
         self._solve()
 
     def _solve(self) -> None:
         self._is_solved = self._is_solved or self._watched["solved"].number("solved") != 0
+
+
+Watch = Callable[[int], Any]
+"""What looks at the world for a term of a formula and returns its value; it is told the time since it looked [ns]."""
 
 
 class _Watched:
@@ -151,9 +159,9 @@ class _Watched:
         self._terms = [_watcher(term, sim, robot, own) for term in formula.terms]
         self._own = [own.get(str(term)) for term in formula.terms]
 
-    def look(self) -> None:
+    def look(self, passed_ns: int) -> None:
         """Let all terms look at the world once."""
-        self._values = [watch() for watch in self._terms]
+        self._values = [watch(passed_ns) for watch in self._terms]
 
     def number(self, name: str) -> float:
         """Return the value at the last look, with the judge's own names as they are now.
@@ -164,33 +172,48 @@ class _Watched:
         values = [seen if tell is None else tell() for seen, tell in zip(self._values, self._own, strict=True)]
         try:
             return check_number(f"the goal's {name}", float(self._formula.value(values)), -SCORE_MAX, SCORE_MAX)
-        except (ArithmeticError, TypeError) as error:
+        except (ArithmeticError, TypeError, ValueError) as error:
+            if isinstance(error, KiksError):
+                raise
             raise ParameterError(
                 f"the goal's {name} must be a number, but {self._formula.text!r} has none at {self._sim.time_s:.1f} s: "
                 f"{error}."
             ) from None
 
 
-def _watcher(term: Term, sim: Simulation, robot: int, own: dict[str, Callable[[], float]]) -> Callable[[], Any]:
-    """Return what looks at the world for a term and returns its value."""
+def _watcher(term: Term, sim: Simulation, robot: int, own: dict[str, Callable[[], float]]) -> Watch:
+    """Return what looks at the world for a term."""
     if term.condition is not None:
         return _timer(_Watched(term.condition, sim, robot, own), is_broken=term.name == "held_s")
     named: dict[str, Any] = dict(term.named)
     robot = sim.index_of(named.pop("robot", robot)) + 1
     if term.name in own and not (term.arguments or named):
-        return own[term.name]
+        tell = own[term.name]
+        return lambda _: tell()
     if term.name == "wall_mm" and not (term.arguments or named):
         radius_mm = sim.specs[robot - 1].body.radius_mm
-        return lambda: sim.world.free_space.wall_gap_mm(*sim.pose(robot)[:2], radius_mm)
-    if term.name == "score" and len(term.arguments) == 1 and not named:
-        (what,) = term.arguments
-        return lambda: _counted(sim, int(what) if isinstance(what, float) else what)
+        return lambda _: sim.world.free_space.wall_gap_mm(*sim.pose(robot)[:2], radius_mm)
+    if term.name == "score" and len(term.arguments) == 1 and not (named or isinstance(term.arguments[0], float)):
+        what = term.arguments[0]
+        return lambda _: _counted(sim, what)
     return _measured(_measure(term, named, sim.arena), sim, robot)
+
+
+_USES = {
+    "time_s": "'time_s'",
+    "is_solved": "'is_solved'",
+    "is_over": "'is_over'",
+    "wall_mm": "'wall_mm' or 'wall_mm(robot=2)'",
+    "score": "'score(\"laps\")' or 'score(2)'",
+}
+"""How names are used that are neither measures nor timers."""
 
 
 def _measure(term: Term, named: dict[str, Any], arena: Arena) -> Measure:
     """Return the measure that a term names."""
-    known = [*measures.__all__, "time_s", "is_solved", "is_over", "wall_mm", "score", *TIMERS]
+    known = [*measures.__all__, *_USES, *TIMERS]
+    if (use := _USES.get(term.name)) is not None:
+        raise ParameterError(f"must use {term.name} as {use}, but it was {shown(str(term))}.")
     if term.name not in measures.__all__:
         raise ParameterError(
             f"must name measures, but {shown(str(term))} is none.{nearest(term.name, known)} The page "
@@ -208,18 +231,18 @@ def _measure(term: Term, named: dict[str, Any], arena: Arena) -> Measure:
         raise ParameterError(f"must use {term.name} as its reference says, but {shown(str(term))}: {error}.") from None
 
 
-def _measured(measure: Measure, sim: Simulation, robot: int) -> Callable[[], float]:
+def _measured(measure: Measure, sim: Simulation, robot: int) -> Watch:
     """Return what lets a measure look at a robot."""
     notes = np.zeros(measure.note_count)
 
-    def watch() -> float:
-        measure.kernel(_moment(sim, robot, measure.senses), notes)
+    def watch(passed_ns: int) -> float:
+        measure.kernel(_moment(sim, robot, measure.senses, s_from_ns(passed_ns)), notes)
         return float(measure.value(notes[None, None]).item())
 
     return watch
 
 
-def _moment(sim: Simulation, robot: int, senses: Sequence[str]) -> Any:
+def _moment(sim: Simulation, robot: int, senses: Sequence[str], period_s: float) -> Any:
     """Return what a measure sees of a robot now. Its readings are free of noise: the judge sees what is the case."""
     poses, world = sim.poses(), sim.world
     record = world.state.robots[0, robot - 1]
@@ -227,7 +250,7 @@ def _moment(sim: Simulation, robot: int, senses: Sequence[str]) -> Any:
     readings = [value for sense in senses for value in _SENSES[sense](sim, robot)]
     return Moment(
         sim.time_s,
-        LOOK_S,
+        period_s,
         np.array(readings, np.float64),
         record["speed_setpoint"].astype(np.float64),
         poses[robot - 1, 0],
@@ -260,17 +283,17 @@ def _counted(sim: Simulation, what: int | str) -> float:
     return value
 
 
-def _timer(condition: _Watched, *, is_broken: bool) -> Callable[[], float]:
+def _timer(condition: _Watched, *, is_broken: bool) -> Watch:
     """Return what counts for how long a condition holds [s], from anew when it was broken, or in all."""
-    count = 0
+    held_ns = 0
 
-    def watch() -> float:
-        nonlocal count
-        condition.look()
+    def watch(passed_ns: int) -> float:
+        nonlocal held_ns
+        condition.look(passed_ns)
         if condition.number("condition"):
-            count += 1
+            held_ns += passed_ns
         elif is_broken:
-            count = 0
-        return count * LOOK_S
+            held_ns = 0
+        return s_from_ns(held_ns)
 
     return watch

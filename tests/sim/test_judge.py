@@ -1,0 +1,341 @@
+"""The judge of a run: what each name of a formula is, when a run ends, and what is kept of its result."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+from tests import forked
+
+import kiks
+from kiks.errors import KiksError, ParameterError
+from kiks.model.arena import Arena, Cylinder, Lamp, Pose
+from kiks.model.goal import Goal
+from kiks.model.project import Project
+from kiks.sim.judge import LOOK_S, Judge, Judgement
+from kiks.sim.simulation import Simulation
+from kiks.sim.supervision import Supervision
+
+PLACE_MM, LAMP_MM = (250.0, 200.0), (100.0, 350.0)
+
+TURNS = {0: (6, 5), 25: (-3, 4), 40: (9, 9), 80: (2, -8), 100: (7, 8)}
+"""Speeds of robot 1 by the look after which they are sent."""
+
+LOOKS = 130
+
+
+def world() -> Simulation:
+    arena = replace(
+        Arena.box(500, 400),
+        cylinders=(Cylinder(150, 100), Cylinder(300, 300), Cylinder(350, 150)),
+        lamps=(Lamp(*LAMP_MM), Lamp(400, 50, 1.0, False)),
+        starts=(Pose(200, 150, 0.3), Pose(80, 330, 2.0)),
+    )
+    return Simulation(arena, robots=2, seed=4)
+
+
+class Look(NamedTuple):
+    """What a person sees of robot 1 at an instant."""
+
+    time_s: float
+    x_mm: float
+    y_mm: float
+    path_mm: float
+    contacts: int
+    is_touching: bool
+    wheels: tuple[int, int]
+    proximity: list[float]
+    bodies_mm: Any
+    other_mm: Any
+
+
+def looked(sim: Simulation, wheels: tuple[int, int]) -> Look:
+    bodies = sim.bodies()
+    return Look(
+        sim.time_s,
+        *sim.pose(1)[:2],
+        sim.travelled_mm(1),
+        sim.contacts(1),
+        bool(sim.world.state.robots[0, 0]["is_touching"] > 0),
+        wheels,
+        sim.proximity(1),
+        np.stack([bodies["x_mm"], bodies["y_mm"]], axis=1),
+        sim.poses()[1, :2],
+    )
+
+
+def away_mm(looks: list[Look], x_mm: float, y_mm: float) -> Any:
+    return np.hypot([each.x_mm - x_mm for each in looks], [each.y_mm - y_mm for each in looks])
+
+
+def last_run_s(holds: Any) -> float:
+    return LOOK_S * next((k for k, each in enumerate(reversed(list(holds))) if not each), len(holds))
+
+
+def near_others(looks: list[Look], radius_mm: float) -> Any:
+    bodies = looks[-1].bodies_mm
+    return (np.hypot(*(bodies[:, None] - bodies[None]).transpose(2, 0, 1)) <= radius_mm).sum(axis=1)
+
+
+EXPECTED: dict[str, Callable[[list[Look]], float]] = {
+    "time_s": lambda looks: looks[-1].time_s,
+    "path_mm": lambda looks: looks[-1].path_mm,
+    "net_mm": lambda looks: away_mm(looks, 200, 150)[-1],
+    "contacts": lambda looks: looks[-1].contacts,
+    "touching_share": lambda looks: np.mean([each.is_touching for each in looks]),
+    "final_x_mm": lambda looks: looks[-1].x_mm,
+    "final_y_mm": lambda looks: looks[-1].y_mm,
+    "speed_pulses": lambda looks: np.mean([each.wheels for each in looks]),
+    "turned_pulses": lambda looks: sum(100 * LOOK_S * (abs(a) + abs(b)) for a, b in (each.wheels for each in looks)),
+    "light_mm": lambda looks: away_mm(looks, *LAMP_MM)[-1],
+    "goal_mm(250, 200)": lambda looks: away_mm(looks, *PLACE_MM)[-1],
+    "closest_mm(250, 200)": lambda looks: away_mm(looks, *PLACE_MM).min(),
+    "reached_s(250, 200, radius_mm=60)": lambda looks: LOOK_S * (1 + np.argmax(away_mm(looks, *PLACE_MM) <= 60)),
+    "near_light_share(200)": lambda looks: np.mean(away_mm(looks, *LAMP_MM) <= 200),
+    "light_stay_s(300)": lambda looks: last_run_s(away_mm(looks, *LAMP_MM) <= 300),
+    "coverage": lambda looks: len({(each.x_mm // 100, each.y_mm // 100) for each in looks}) / 20,
+    "coverage(square_mm=50)": lambda looks: len({(each.x_mm // 50, each.y_mm // 50) for each in looks}) / 80,
+    "beside_wall_share('right', counts=30)": lambda looks: np.mean([each.proximity[5] >= 30 for each in looks]),
+    "gathered(300, 250, radius_mm=80)": lambda looks: (
+        np.hypot(*(looks[-1].bodies_mm - (300, 250)).T) <= 80
+    ).sum(),
+    "largest_group(170)": lambda looks: near_others(looks, 170).max(),
+    "neighbour_mm": lambda looks: np.hypot(
+        looks[-1].x_mm - looks[-1].other_mm[0], looks[-1].y_mm - looks[-1].other_mm[1]
+    ),
+    "contacts(robot=2)": lambda looks: 0,
+    "goal_mm(250, 200, robot=2)": lambda looks: np.hypot(*(looks[-1].other_mm - PLACE_MM)),
+    "held_s(light_mm < 300)": lambda looks: last_run_s(away_mm(looks, *LAMP_MM) < 300),
+    "total_s(goal_mm(250, 200) < 90)": lambda looks: LOOK_S * (away_mm(looks, *PLACE_MM) < 90).sum(),
+    "total_s(held_s(path_mm > 50) > 1)": lambda looks: (
+        LOOK_S * max(sum(each.path_mm > 50 for each in looks) - 10, 0)
+    ),
+    "wall_mm": lambda looks: (
+        min(looks[-1].x_mm, 500 - looks[-1].x_mm, looks[-1].y_mm, 400 - looks[-1].y_mm) - 10 - 27.5
+    ),
+    'score("laps") + score(2)': lambda looks: 10,
+    "is_solved + 1": lambda looks: 1,
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def run() -> tuple[Simulation, list[Look], dict[str, float]]:
+    """Return a run with what was seen of it, and what a judge has counted of each formula."""
+    sim = world()
+    sim.set_score("laps", 7)
+    sim.set_score(2, 3)
+    judges = {text: Judge(sim, Goal(points=text)) for text in EXPECTED}
+    watching = [judge.supervise(sim) for judge in judges.values()]
+    for each in watching:
+        next(each)
+    looks, wheels = [], (0, 0)
+    for number in range(LOOKS):
+        if number in TURNS:
+            wheels = TURNS[number]
+            sim.port(1).write("D,{},{}\n".format(*wheels).encode())
+        sim.run(LOOK_S)
+        looks.append(looked(sim, wheels))
+        for each in watching:
+            next(each)
+    assert looks[-1].contacts > 0
+    assert 0 < sum(each.is_touching for each in looks) < len(looks)
+    return sim, looks, {text: judge.end().points for text, judge in judges.items()}
+
+
+@pytest.mark.parametrize("text", EXPECTED)
+def test_each_name_of_a_formula_is_what_a_person_sees(text: str, run: Any) -> None:
+    _, looks, points = run
+    assert points[text] == pytest.approx(EXPECTED[text](looks), abs=0.051 if text == "wall_mm" else 6e-4)
+
+
+def test_every_measure_can_be_judged() -> None:
+    sim = world()
+    arguments = {"goal_mm": "(1, 2)", "closest_mm": "(1, 2)", "reached_s": "(1, 2)", "gathered": "(1, 2)"}
+    for name in kiks.measures.__all__:
+        judge = Judge(sim, Goal(points=name + arguments.get(name, "")))
+        assert np.isfinite(judge.end().points)
+
+
+def test_a_run_of_a_controller_is_judged_by_what_a_batch_measures() -> None:
+    arena = replace(Arena.box(500, 500), starts=(Pose(250, 250, 0.5),))
+    controller, parameters = kiks.controllers.linear(), [0.8, 0.8] + [0.0] * 16
+    names = ("contacts", "path_mm", "final_x_mm", "final_y_mm")
+    batch = kiks.Batch(arena, 1, seed=3)
+    measures = [getattr(kiks.measures, name) for name in names]
+    values = batch.run(controller, parameters, seconds=10, measures=measures).values[0, 0]
+    sim = Simulation(arena, seed=3)
+    kiks.drive(sim.port(1), controller, parameters, seconds=10)
+    # The batch has measured at its last step, at most a tenth of a second before the end; the robot stands at a wall.
+    found = [Judge(sim, Goal(points=name)).end().points for name in names]
+    np.testing.assert_allclose(found, values, atol=0.1)
+
+
+# ---- how a run ends ----
+
+
+def supervised(goal: Goal, tmp_path: Path, referee: str = "") -> tuple[Simulation, Supervision, list[str]]:
+    file = None
+    if referee:
+        file = tmp_path / "referee.py"
+        file.write_text(referee)
+    sim = Simulation(Arena.box(500, 500), seed=1)
+    supervision, said = Supervision(sim, file, goal), []
+    supervision.end = lambda code, message: said.append(f"{code}: {message}")
+    sim.port(1).write(b"D,10,10\n")
+    return sim, supervision, said
+
+
+def test_a_run_ends_at_the_first_look_at_which_it_is_solved(tmp_path: Path) -> None:
+    sim, supervision, said = supervised(Goal(solved="path_mm >= 60", points="50 - time_s"), tmp_path)
+    sim.run(0.7)
+    assert said == []
+    sim.run(2)
+    assert supervision.judge is not None
+    assert supervision.judge.judgement == Judgement(True, False, 49.2, 0.8)
+    assert said == ["0: the judge has ended the run at 0.800 s of simulated time."]
+    assert dict(sim.score) == {"points": 49.2, "result": "solved after 0.8 s"}
+    assert supervision.decide() == "Goal solved after 0.8 s, 49.2 points."
+
+
+def test_a_run_that_has_failed_ends_even_if_points_were_earned(tmp_path: Path) -> None:
+    sim, supervision, said = supervised(Goal(failed="contacts > 0", points="round(path_mm / 100)"), tmp_path)
+    sim.run(10)
+    assert len(said) == 1
+    assert supervision.decide() == "Goal failed after 2.8 s, 2 points."
+
+
+def test_a_run_that_ends_before_is_judged_as_it_is(tmp_path: Path) -> None:
+    sim, supervision, said = supervised(Goal(points="round(held_s(path_mm >= 0), 3)"), tmp_path)
+    sim.run(1.234)
+    supervision.close()
+    assert said == []
+    # The time since the last look counts as it is, and not as a whole tenth of a second.
+    assert supervision.decide() == "Goal not solved after 1.2 s, 1.234 points."
+    sim.run(5)
+    assert supervision.decide() == "Goal not solved after 1.2 s, 1.234 points."
+
+
+def test_people_see_the_points_as_they_come(tmp_path: Path) -> None:
+    sim, _, _ = supervised(Goal(points="10 * time_s"), tmp_path)
+    seen = []
+    for _ in range(4):
+        sim.run(0.5)
+        seen.append(sim.score["points"])
+    assert seen == [1, 1, 11, 11]
+
+
+def test_a_judge_in_python_counts_what_a_formula_uses(tmp_path: Path) -> None:
+    referee = "def supervise(sim):\n    while True:\n        yield 0.5\n        sim.set_score('laps', 2 * sim.time_s)\n"
+    sim, supervision, _ = supervised(Goal(solved='score("laps") >= 3', points='score("laps")'), tmp_path, referee)
+    sim.run(4)
+    assert supervision.decide() == "Goal solved after 1.5 s, 3 points."
+
+
+def test_a_formula_without_a_value_ends_the_run_in_one_line(tmp_path: Path) -> None:
+    sim, _, said = supervised(Goal(solved="1 / (time_s < 2) > 5"), tmp_path)
+    sim.run(4)
+    assert said == [
+        "1: the judge has failed: the goal's solved must be a number, but '1 / (time_s < 2) > 5' has none at 2.0 s: "
+        "division by zero."
+    ]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("contact > 0", "the goal's solved must name measures, but 'contact' is none. Did you mean 'contacts'?"),
+        ("measure > 0", "must name measures, but 'measure' is none"),
+        ("contacts(3) > 0", "must use contacts without arguments, but it was 'contacts(3)'"),
+        ("goal_mm(1) < 3", "must use goal_mm as its reference says, but 'goal_mm(1)': missing a required argument"),
+        ("goal_mm('a', 1) < 3", "the goal's solved x_mm must be a number, but it was 'a'"),
+        ("goal_mm(" + "9" * 900 + ", 1) < 3", "the goal's solved x_mm must be"),
+        ("wall_following('up') > 1", "side must be 'left' or 'right', but it was 'up'"),
+        ("contacts(robot=3) > 0", "robot must be the number of an existing robot, but it was 3"),
+        ("contacts(robot='a') > 0", "robot must be the number of an existing robot, but it was 'a'"),
+        ("score(1.5) > 1", "must use score as 'score(\"laps\")' or 'score(2)', but it was 'score(1.5)'"),
+        ("score", "must use score as"),
+        ("wall_mm(3) < 5", "must use wall_mm as 'wall_mm' or 'wall_mm(robot=2)'"),
+        ("held_s(time) > 3", "must name measures, but 'time' is none. Did you mean 'time_s'?"),
+        ("1 / contacts > 2", "must be a number, but '1 / contacts > 2' has none at 0.0 s: float division by zero"),
+        ("min() > 2", "must be a number, but 'min() > 2' has none at 0.0 s"),
+        ("light_mm - light_mm", "the goal's solved must be from -1e9 to 1e9, but it was nan"),
+        ("round(light_mm - light_mm, light_mm)", "the goal's solved must be a number"),
+    ],
+)
+def test_what_is_wrong_is_said_before_the_run_in_one_line(text: str, message: str) -> None:
+    sim = Simulation(Arena.box(500, 500), seed=1)
+    with pytest.raises(ParameterError) as caught:
+        Judge(sim, Goal(solved=text))
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert len(str(caught.value)) < 500
+
+
+def test_a_text_in_the_score_is_no_number() -> None:
+    sim = Simulation(Arena.box(500, 500), seed=1)
+    sim.set_score("laps", "many")
+    with pytest.raises(KiksError, match="the goal must use numbers of the score, but 'laps' is 'many'"):
+        Judge(sim, Goal(solved="score('laps') > 3"))
+
+
+# ---- what a run leaves ----
+
+GAME = """
+kiks = 1
+seconds = 8.0
+[goal]
+text = "Drive 200 mm"
+solved = "path_mm > 200"
+points = "10 if is_solved else round(path_mm / 20, 1)"
+[[start]]
+at_mm = [100, 250]
+heading_deg = 0
+[walls]
+size_mm = [500, 500]
+"""
+
+DRIVES = """
+import serial, sys, time
+port = serial.Serial("/dev/ttyUSB0", 9600)
+port.write(b"D,%s,%s\\n" % (sys.argv[1].encode(), sys.argv[1].encode()))
+time.sleep(float(sys.argv[2]))
+"""
+
+
+@pytest.mark.parametrize(
+    ("words", "goal"),
+    [
+        (("10", "60"), {"is_solved": True, "is_failed": False, "points": 10, "time_s": 2.6}),
+        (("1", "60"), {"is_solved": False, "is_failed": False, "points": 3.2, "time_s": 8.0}),
+        (("1", "2"), {"is_solved": False, "is_failed": False, "points": 0.8, "time_s": 2.0}),
+    ],
+    ids=["solved", "out of time", "ends before"],
+)
+def test_kiks_run_tells_and_records_the_same_judgement(words: tuple[str, str], goal: Any, tmp_path: Path) -> None:
+    (tmp_path / "game.kiks").write_text(GAME)
+    (tmp_path / "drives.py").write_text(DRIVES)
+    result = forked.run("run", "--json", "--record", "run.mcap", "game.kiks", "drives.py", *words, cwd=tmp_path)
+    assert result.returncode == 0, result.stderr
+    told = json.loads(result.stdout)["goal"]
+    assert told == pytest.approx(goal, abs=0.06)
+    line = f"Goal {'solved' if goal['is_solved'] else 'not solved'} after {told['time_s']:.1f} s"
+    assert line in result.stderr
+    game = Project.load(tmp_path / "game.kiks").goal
+    assert game is not None
+    with kiks.Recording(tmp_path / "run.mcap") as recording:
+        end = recording.world_at(recording.duration_s)
+        assert end.score["points"] == told["points"]
+        assert str(end.score["result"]).endswith(f"solved after {told['time_s']:.1f} s")
+        # Another judge sees the same when the run is made again.
+        replay = recording.replay(0)
+        judge = Judge(replay.sim, game)
+        for wait_s in judge.supervise(replay.sim):
+            if replay.sim.time_s + wait_s > recording.duration_s:
+                break
+            replay.go_to(round(1e9 * (replay.sim.time_s + wait_s)))
+        assert vars(judge.end()) == pytest.approx(told, abs=0.1)
