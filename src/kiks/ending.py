@@ -41,6 +41,9 @@ not return hears no Ctrl-C."""
 _LIMIT = signal.SIGRTMAX - 2 if _HAS_OWN_SIGNALS else signal.SIGTERM
 _HEARD = signal.SIGRTMAX - 3 if _HAS_OWN_SIGNALS else signal.SIGTERM
 _ENDINGS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
+_DIE_WITH_PARENT = 1
+"""PR_SET_PDEATHSIG of Linux (linux/prctl.h)."""
+
 _CODE = "code that did not return, such as a controller without an end: there is no summary"
 _STUCK = f"stopped in the middle of {_CODE}."
 
@@ -50,6 +53,14 @@ def end_at_once() -> None:
     _handle(lambda _number, _frame: leave(INTERRUPTED, "stopped."))
     if _HAS_OWN_SIGNALS:
         _Guard().start()
+
+
+def end_with_parent() -> None:
+    """Let Linux kill this process when the thread that has started it ends, such as when its process is killed."""
+    if sys.platform == "linux":
+        import ctypes
+
+        ctypes.CDLL(None).prctl(_DIE_WITH_PARENT, signal.SIGKILL)
 
 
 def leave_threads() -> None:

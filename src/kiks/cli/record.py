@@ -20,8 +20,8 @@ from kiks.export.kinds import ENDINGS
 if TYPE_CHECKING:
     from kiks.sim.simulation import Simulation
 
-PROGRAM_CHARACTERS_MAX = 1 << 20
-"""Most characters of a program's text in a recording."""
+UNFINISHED_CHARACTERS_MAX = 1 << 20
+"""Most characters of a line that a program has not finished yet."""
 
 
 def _picture_of_demonstration(given: Mapping[str, Any]) -> Path | None:
@@ -67,10 +67,9 @@ def recorded(
     if record is None and export is None:
         yield
         return
-    from kiks.recording.recorder import RunRecorder
+    from kiks.recording.recorder import RunRecorder, program_texts
     from kiks.recording.recording import Recording
 
-    texts = {f"{number}-{path.name}": _text_of(path) for number, path in enumerate(programs, 1)}
     with ExitStack() as at_the_end:
         if record is None:
             record = Path(at_the_end.enter_context(TemporaryDirectory(prefix="kiks-")), "run.mcap")
@@ -78,7 +77,9 @@ def recorded(
         if export is not None:
             path = export.absolute()
             at_the_end.callback(lambda: Recording(file).export(path))
-        at_the_end.enter_context(RunRecorder(sim, file, programs=texts, about={"command": _command_line()}))
+        at_the_end.enter_context(
+            RunRecorder(sim, file, programs=program_texts(programs), about={"command": _command_line()})
+        )
         yield
 
 
@@ -105,7 +106,7 @@ def _noting(stream: Any, note: Callable[[str], None]) -> Iterator[None]:
         *lines, unfinished[0] = (unfinished[0] + text).split("\n")
         for line in lines:
             note(line)
-        if len(unfinished[0]) > PROGRAM_CHARACTERS_MAX:
+        if len(unfinished[0]) > UNFINISHED_CHARACTERS_MAX:
             unfinished[0] = ""
         return count
 
@@ -116,15 +117,6 @@ def _noting(stream: Any, note: Callable[[str], None]) -> Iterator[None]:
         stream.write = write
         if unfinished[0]:
             note(unfinished[0])
-
-
-def _text_of(program: Path) -> str:
-    """Return the text of a program; nothing if it is no text, or cannot be read, which its start will tell."""
-    try:
-        text = program.read_text("utf-8", "replace")
-    except OSError:
-        return ""
-    return "" if "\0" in text else text[:PROGRAM_CHARACTERS_MAX]
 
 
 def _command_line() -> str:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import logging
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from time import monotonic
 from types import TracebackType
@@ -51,6 +51,9 @@ real time, and a fifth of a second's work of one at full speed. A jump makes up 
 
 PROGRAMS = "programs/"
 """Folder of the programs' texts in the file."""
+
+PROGRAM_CHARACTERS_MAX = 1 << 20
+"""Most characters of a program's text in the file."""
 
 LINES_MAX = 20_000
 """Most lines of output that wait for a chunk; of more, the oldest are dropped."""
@@ -238,6 +241,20 @@ class RunWriter:
 def description_of(sim: Simulation) -> dict[str, str]:
     """Return what a recording says of itself: the version, its records' fields, the policy of thinking, the arena."""
     return {"kiks": __version__, "layout": RECORDED_LAYOUT, "thinking": sim.thinking, "arena": sim.arena.name}
+
+
+def program_texts(programs: Iterable[Path]) -> dict[str, str]:
+    """Return the texts of programs, by their numbers and names; nothing of what is no text, or cannot be read."""
+    return {f"{number}-{path.name}": _text_of(path) for number, path in enumerate(programs, 1)}
+
+
+def _text_of(program: Path) -> str:
+    try:
+        with program.open(encoding="utf-8", errors="replace") as file:
+            text = file.read(PROGRAM_CHARACTERS_MAX)
+    except OSError:
+        return ""  # its start will tell
+    return "" if "\0" in text else text
 
 
 class RunRecorder:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import gc
 import json
 import os
@@ -13,13 +12,11 @@ from pathlib import Path
 
 from kiks.clock.program_clock import ProgramClock
 from kiks.clock.thinking import save_thinking
+from kiks.ending import end_with_parent
 from kiks.errors import KiksError
 from kiks.ports.messages import Kind, Start
 from kiks.ports.remote_link import RemoteLine, SocketConnection
 from kiks.script.runner import run_program
-
-DIE_WITH_PARENT = 1
-"""PR_SET_PDEATHSIG of Linux (linux/prctl.h)."""
 
 
 def main(descriptor: int, start: Start) -> int:
@@ -29,9 +26,8 @@ def main(descriptor: int, start: Start) -> int:
         descriptor: The socket at whose other end the world is.
         start: The program, and what it finds.
     """
-    if sys.platform == "linux":
-        # A program that never sends a request would not notice that the world has gone.
-        ctypes.CDLL(None).prctl(DIE_WITH_PARENT, signal.SIGKILL)
+    # A program that never sends a request would not notice that the world has gone.
+    end_with_parent()
     if os.getpgrp() == os.getpid():
         # KiKS may have been started with Ctrl-C ignored, but the desk interrupts programs with it.
         signal.signal(signal.SIGINT, signal.default_int_handler)

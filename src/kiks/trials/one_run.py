@@ -1,0 +1,127 @@
+"""One trial: a world is made, programs drive in it, the goal judges, and a recording is left."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from pathlib import Path
+from typing import NoReturn
+
+from kiks.errors import ParameterError
+from kiks.ports.program_process import supervisor_of
+from kiks.ports.programs import Handle, Programs
+from kiks.recording.recorder import RunRecorder, program_texts
+from kiks.sim.from_project import simulation_of, thinking_of
+from kiks.sim.simulation import Simulation
+from kiks.sim.supervision import Supervision
+from kiks.trials.trial import CRASHED, ENDED, ENDLESS, OUT_OF_TIME, RUNNING, Outcome, ProgramEnd, Trial
+from kiks.trials.watch import Watch
+from kiks.units import ns_from_s
+
+LINES = 10
+"""Most lines of what a program has printed last that an outcome keeps."""
+
+LINE_CHARACTERS = 300
+"""Most characters of such a line."""
+
+
+def run_trial(trial: Trial, folder: Path) -> Outcome:
+    """Run a trial in this process, each program in one of its own; must be called in the main thread.
+
+    Args:
+        trial: The trial.
+        folder: The output folder, where its recording goes.
+    """
+    project = trial.project
+    seconds = project.seconds
+    if seconds is None:
+        raise ParameterError(
+            "a project in which programs are tried must have a time limit, but it says no seconds. Write "
+            "seconds = 60.0."
+        )
+    commands = trial.programs
+    for command in filter(None, commands):
+        command.check_file()
+    thinking = thinking_of(project, trial.folder)
+    sim = simulation_of(
+        project, trial.folder, thinking=thinking, program_count=sum(each is not None for each in commands)
+    )
+    recording = folder / trial.recording
+    recording.parent.mkdir(parents=True, exist_ok=True)
+    supervisor = supervisor_of(project, trial.folder)
+    files = [command.file for command in commands if command is not None]
+    with ExitStack() as at_the_end:
+        run = _Run(sim)
+        if supervisor is not None:
+            supervision = Supervision(sim, supervisor)
+            at_the_end.callback(supervision.close)
+        texts = program_texts(files + ([] if supervisor is None else [supervisor]))
+        at_the_end.enter_context(RunRecorder(sim, recording, programs=texts, about={"command": trial.command}))
+        programs = run.programs = Programs(
+            sim, commands, thinking=thinking, when_silent="wait", keeps_output=True, say=lambda text: None
+        )
+        if supervisor is not None:
+            supervision.end = run.end_by_judge
+        sim.loop.end_at(ns_from_s(seconds), run.end_by_time)
+        with Watch(programs, seconds) as watch:
+            programs.run()
+        ends = tuple(_end_of(handle, run.how, watch.reasons) for handle in programs.handles)
+        state = sim.state_hash()
+    score = {str(what): value for what, value in sim.score.items()}
+    points = score.get("points", 0.0)
+    return Outcome(
+        trial.key,
+        trial.name,
+        is_solved=bool(score.get("solved", 0)),
+        points=points if isinstance(points, float | int) else 0.0,
+        time_s=sim.time_s,
+        score=score,
+        ends=ends,
+        state=state,
+        recording=trial.recording,
+        doubt=run.doubt or ("" if any(watch.reasons) else programs.doubt),
+    )
+
+
+class _Run:
+    """What has ended the run of a simulation."""
+
+    programs: Programs
+
+    def __init__(self, sim: Simulation) -> None:
+        self._sim = sim
+        self.how = RUNNING
+        self.doubt = ""
+
+    def end_by_time(self) -> NoReturn:
+        self.how = OUT_OF_TIME
+        self.programs.end(0, "")
+
+    def end_by_judge(self, code: int, message: str) -> NoReturn:
+        self.doubt = message if code else ""
+        self.programs.end(code, message)
+
+
+def _end_of(handle: Handle, how: str, reasons: dict[int, str]) -> ProgramEnd:
+    """Return how a program has ended.
+
+    Args:
+        handle: The program.
+        how: What has ended the run, for a program that still ran.
+        reasons: Why programs were killed, by robot.
+    """
+    output = handle.output
+    lines = [] if output is None else output.since(0)[1]
+    printed = tuple(_cut(line.text) for line in lines[-LINES:])
+    detail = ""
+    if (reason := reasons.get(handle.robot)) is not None:
+        how, detail = ENDLESS, reason
+    elif not handle.is_stopped:
+        how = CRASHED if handle.code else ENDED
+        if handle.code:
+            errors = [line.text for line in lines if line.is_error and line.text.strip()]
+            detail = _cut(errors[-1].removeprefix("kiks: ")) if errors else handle.how
+    return ProgramEnd(handle.robot, handle.command.name, how, detail, printed)
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= LINE_CHARACTERS else f"{text[:LINE_CHARACTERS]}…"

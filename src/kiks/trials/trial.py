@@ -1,0 +1,183 @@
+"""A trial and its outcome: one run of programs in one world, as records that files and other processes can hold."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from kiks.model.atomic_files import inside
+from kiks.model.project import Project
+from kiks.model.thinking_policy import split_thinking
+from kiks.ports.program_process import Command, supervisor_of
+from kiks.version import __version__
+
+ENDED = "ended"
+"""A program has ended by itself."""
+
+RUNNING = "running"
+"""It still ran when the goal ended the run."""
+
+OUT_OF_TIME = "out of time"
+"""It still ran at the time limit of the project."""
+
+CRASHED = "crashed"
+"""It has ended with an error."""
+
+ENDLESS = "endless"
+"""It computed, or waited in real time, and let no simulated time pass: it was killed."""
+
+STOPPED = "stopped"
+"""The sandbox has stopped it, or its worker has died."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A run that is to be judged: programs in a world.
+
+    Attributes:
+        name: Its name, such as 'ann/3'. It is unique, and a path below the output folder, where the recording goes.
+        project: The world, with the changes of the case applied.
+        folder: Where the project lies: robot files, replays and the supervisor are looked up from there.
+        programs: The program of each robot; None for a robot without one.
+        is_trusted: Whether the programs may do what this user may; otherwise each runs in a sandbox.
+        command: The command that runs it alone, for its recording; empty for none.
+
+    Example:
+        >>> from kiks.ports.program_process import Command
+        >>> Trial("ann/1", Project(seconds=10.0), Path(), (Command(Path("ann.py")),)).recording
+        'runs/ann/1.mcap'
+    """
+
+    name: str
+    project: Project
+    folder: Path
+    programs: tuple[Command | None, ...]
+    is_trusted: bool = False
+    command: str = ""
+
+    @property
+    def recording(self) -> str:
+        """The file of its recording, from the output folder."""
+        return f"runs/{self.name}.mcap"
+
+    @cached_property
+    def key(self) -> str:
+        """A digest of all that its outcome depends on: the bytes of its files and the version of KiKS."""
+        digest = hashlib.sha256(f"{__version__}\0{self.is_trusted}\0".encode())
+        for data in self._parts():
+            digest.update(b"%d\0" % len(data))
+            digest.update(data)
+        return digest.hexdigest()[:32]
+
+    def _parts(self) -> Iterator[bytes]:
+        project, folder = self.project, self.folder
+        yield project.to_bytes()
+        replay = split_thinking(project.thinking)[1]
+        files = [robot.kind for robot in project.robots if robot.kind.lower().endswith(".toml")]
+        files += [replay] if isinstance(replay, str) else []
+        paths = [inside(folder, file, "file") for file in files]
+        supervisor = supervisor_of(project, folder)
+        for path in [*paths, *([] if supervisor is None else [supervisor])]:
+            yield _bytes_of(path)
+        for command in self.programs:
+            yield b"" if command is None else json.dumps([command.module, *command.arguments]).encode()
+            yield from () if command is None else _program_parts(command.program)
+
+
+def _program_parts(program: Path) -> Iterator[bytes]:
+    """Yield the bytes of a program: of a folder, the names and bytes of all files in it."""
+    for path in sorted(program.rglob("*")) if program.is_dir() else ():
+        if path.is_file() and path.suffix != ".pyc":
+            yield path.relative_to(program).as_posix().encode("utf-8", "surrogateescape")
+            yield _bytes_of(path)
+    if not program.is_dir():
+        yield _bytes_of(program)
+
+
+def _bytes_of(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError:
+        return b""  # the run will tell
+
+
+@dataclass(frozen=True)
+class ProgramEnd:
+    """How a program of a trial has ended.
+
+    Attributes:
+        robot: Number of its robot.
+        name: The program's name.
+        how: One of `ENDED`, `RUNNING`, `OUT_OF_TIME`, `CRASHED`, `ENDLESS`, `STOPPED`.
+        detail: The last line of its error, or why it was stopped; empty if neither.
+        printed: The last lines that it has printed.
+    """
+
+    robot: int
+    name: str
+    how: str
+    detail: str = ""
+    printed: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What has come out of a trial; the same on every machine, unless there is a doubt.
+
+    Attributes:
+        key: `Trial.key`.
+        name: `Trial.name`.
+        is_solved: Whether the goal was reached.
+        points: Its points.
+        time_s: How long the run was [s of simulated time].
+        score: What the supervisor has counted, by robot or name.
+        ends: How each program has ended.
+        state: The hash of the last state.
+        recording: The file of its recording, from the output folder; empty if there is none.
+        doubt: Why it might not come out so again; empty if it would. Such a trial is made again at the next start.
+    """
+
+    key: str
+    name: str
+    is_solved: bool
+    points: float
+    time_s: float
+    score: dict[str, float | str]
+    ends: tuple[ProgramEnd, ...]
+    state: str
+    recording: str
+    doubt: str = ""
+
+    def end_of(self, robot: int = 1) -> ProgramEnd:
+        """Return how the program of a robot has ended.
+
+        Raises:
+            KeyError: If the robot has none.
+        """
+        for end in self.ends:
+            if end.robot == robot:
+                return end
+        raise KeyError(robot)
+
+    def to_line(self) -> str:
+        """Return it as one line of JSON."""
+        return json.dumps(asdict(self), ensure_ascii=True)
+
+    @classmethod
+    def from_line(cls, line: str | bytes) -> Outcome:
+        """Read what `to_line` returned.
+
+        Raises:
+            ValueError: If it is none.
+        """
+        fields: dict[str, Any] = json.loads(line)
+        try:
+            ends = tuple(ProgramEnd(**end | {"printed": tuple(end["printed"])}) for end in fields.pop("ends"))
+            return cls(**fields, ends=ends)
+        except (TypeError, KeyError, AttributeError) as error:
+            raise ValueError(f"no outcome: {error}") from None
