@@ -63,7 +63,7 @@ class Case:
         seed: The seed.
         start: Where robot 1 starts.
         arena: The arena, by its name or file.
-        baud: Speed of the serial lines [bit/s].
+        baud: Speed of the serial lines [bit/s], whatever programs set.
         thinking: The thinking policy.
         family: Number of the imperfect robot that all robots are; 0 for the exact one.
         is_hidden: Whether only the lecturer's file has it.
@@ -92,7 +92,7 @@ class Cases:
         seed: Seeds.
         start: Places where robot 1 starts.
         arena: Arenas in place of the project's: names of those that come with KiKS, or files in its folder.
-        baud: Speeds of the serial lines [bit/s].
+        baud: Speeds of the serial lines [bit/s], whatever programs set.
         thinking: Thinking policies.
         family: Numbers of imperfect robots, as `kiks.family` makes them; 0 is the exact one.
         is_hidden: Whether only the lecturer's file has these cases.

@@ -66,7 +66,7 @@ FASTEST = "fastest"
 
 _VERSION = 1
 _LINE = 116
-_SETTINGS = ("seed", "thinking", "baud", "response", "noise", "speed", "seconds", "supervisor")
+_SETTINGS = ("seed", "thinking", "baud", "keeps_baud", "response", "noise", "speed", "seconds", "supervisor")
 
 
 def _check_kind(kind: str) -> str:
@@ -134,6 +134,7 @@ class Project:
         thinking: Thinking time of programs: 'none', 'fixed:MS', 'live', 'live:FACTOR' (another computer's), or
             'replay:FILE' with a file in the project's folder.
         baud: Speed of the serial lines [bit/s]; that of the robots' files if None.
+        keeps_baud: Whether the lines keep that speed, whatever programs set.
         response: Response of the proximity sensors (the page "Sensors"); that of the robots' files if None.
         noise: Whether sensors are noisy.
         speed: Simulated seconds per real second on the desk; None for no limit.
@@ -154,6 +155,7 @@ class Project:
     seed: Seed = 0
     thinking: ThinkingPolicy = "none"
     baud: Baud | None = None
+    keeps_baud: Switch = False
     response: Response | None = None
     noise: Switch = True
     speed: Speed | None = 1.0
@@ -234,7 +236,7 @@ class Project:
             value = getattr(self, name)
             if name == "speed" and value is None:
                 value = FASTEST
-            if value is not None:
+            if value is not None and (value or name != "keeps_baud"):
                 lines.append(f"{name} = {toml(value)}")
         lines.append(f"name = {toml(self.arena.name)}")
         if not self.robots:
@@ -293,6 +295,7 @@ class ProjectFile:
     seed: Seed = 0
     thinking: ThinkingPolicy = "none"
     baud: Baud | None = None
+    keeps_baud: Switch = False
     response: Response | None = None
     noise: Switch = True
     speed: Annotated[Speed | Literal["fastest"], Rule("a number from 0.001 to 1000, or 'fastest'")] = 1.0

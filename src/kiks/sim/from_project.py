@@ -66,6 +66,7 @@ def simulation_of(
             sim.fit(number, turret)
         if project.baud is not None:
             wire.set_baud(project.baud)
+        wire.keeps_baud = project.keeps_baud
     return sim
 
 
@@ -94,6 +95,7 @@ def in_case(project: Project, case: Case, folder: Path) -> Project:
     if case.family:
         robots = tuple(_imperfect(robot, project, case.family, folder) for robot in robots)
     told = {name: value for name in ("seed", "baud", "thinking") if (value := getattr(case, name)) is not None}
+    told["keeps_baud"] = project.keeps_baud or case.baud is not None
     return replace(project, arena=arena, robots=robots, cases=(), exercise=None, **told)
 
 

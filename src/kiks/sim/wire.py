@@ -44,6 +44,7 @@ class SavedWire:
         pending: Commands on their way: when each acts [ns], its line, and whether the host does not get the reply.
         last_act_ns: When the last of them acts [ns].
         orphan_count: Number of replies to come that are dropped.
+        keeps_baud: Whether programs cannot change the speed.
     """
 
     line: tuple[Baud, Instant, Instant]
@@ -54,6 +55,7 @@ class SavedWire:
     pending: tuple[tuple[Instant, Characters, Switch], ...]
     last_act_ns: Instant
     orphan_count: Count
+    keeps_baud: Switch = False
 
 
 def ignore_reply(_reply: bytes, _arrival_ns: int) -> None:
@@ -74,6 +76,7 @@ class Wire:
         recorder: Records the whole run; None while nothing does.
         on_act: Called with what the robot does, an entry of the kind ACT; None if unused.
         pending: Commands on their way: when each acts [ns], its line, and what takes the reply in place of the host.
+        keeps_baud: Whether the line keeps its speed, whatever a program asks for.
         thinks_since_ns: Since when a real program has the port, whose every gap counts as thinking [ns]; else None.
         next_ns: When the robot does something next [ns], or None while it only waits for characters.
     """
@@ -91,12 +94,15 @@ class Wire:
         self.recorder: WireRecorder | None = None
         self.on_act: Callable[[NotedEntry], object] | None = None
         self._watcher_count = 0
+        self.keeps_baud = False
         self.thinks_since_ns: int | None = None
         self._last_act_ns = 0
         self._orphan_count = 0
 
     def set_baud(self, baud: int) -> None:
-        """Set both ends of the line to a baud rate [bit/s], as the robot's mode selector does."""
+        """Set both ends of the line to a baud rate [bit/s], as the robot's mode selector does, unless it is kept."""
+        if self.keeps_baud:
+            return
         self._note(SET_BAUD, baud)
         self.firmware.baud = self.firmware.selected_baud = baud
         self.line.set_baud(baud)
@@ -254,6 +260,7 @@ class Wire:
             "line": self.line.save(),
             "robot_baud": firmware.baud,
             "selected_baud": firmware.selected_baud,
+            "keeps_baud": self.keeps_baud,
             "demo_wakes_ns": firmware.demo_wakes_ns,
             "partial": firmware.receiver.partial.decode("latin-1"),
             "pending": [(act_ns, line.decode("latin-1"), hear is not None) for act_ns, line, hear in pending],
@@ -266,6 +273,7 @@ class Wire:
         firmware = self.firmware
         self.line.restore(*saved.line)
         firmware.baud, firmware.selected_baud = saved.robot_baud, saved.selected_baud
+        self.keeps_baud = saved.keeps_baud
         firmware.demo_wakes_ns = saved.demo_wakes_ns
         firmware.receiver.partial = saved.partial.encode("latin-1")
         self.pending = deque(
