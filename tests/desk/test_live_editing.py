@@ -17,6 +17,7 @@ from kiks.desk.server.live_editing import Editing, Robot
 from kiks.errors import KiksError, LinkError, ParameterError
 from kiks.model import brush
 from kiks.model.arena import Arena, Ball, Cylinder, Lamp, Pose, Wall
+from kiks.model.exercise import Exercise
 from kiks.model.project import Project, ProjectRobot
 from kiks.recording.recording import Recording
 from kiks.recording.replay import check_recording
@@ -378,3 +379,32 @@ async def test_what_has_gone_cannot_be_changed_and_walls_are_removed_by_a_click(
     await editing.undo()
     await editing.remove_selected(wall)
     assert desk.sim.arena.walls == ()
+
+
+@pytest.mark.parametrize("may_edit", [False, True])
+async def test_lock_holds_in_the_server(tmp_path: Path, may_edit: bool) -> None:
+    arena = replace(Arena.box(800, 400), starts=(Pose(100, 200, 0.0),), lamps=(Lamp(700, 200),))
+    project = Project(arena, exercise=Exercise("To the lamp"))
+    desk = Desk(simulation_of(project), project=project, folder=tmp_path, owns_world=True, may_edit=may_edit)
+    editing = Editing(desk)
+    lamp = await editing.select("lamp", 0, 0, 0)
+    assert lamp is not None
+    acts = {
+        "grab": lambda: desk.grab("a browser", "robot", 0),
+        "draw": lambda: editing.draw(lambda arena: brush.disc(arena, (400, 300), 20, 255)),
+        "place": lambda: editing.place(Lamp(400, 100)),
+        "change": lambda: editing.change(lamp, power_w=3.0),
+        "remove": lambda: editing.remove(700, 200),
+        "begin": lambda: editing.begin(Arena.box(500, 500)),
+        "settings": lambda: desk.alter(replace(project, noise=False)),
+    }
+    before = desk.sim.state_hash()
+    for name, act in acts.items():
+        if may_edit:
+            await act()
+            continue
+        with pytest.raises(KiksError, match="it is locked"):
+            await act()
+        assert (desk.sim.state_hash(), desk.project.noise) == (before, True), name
+    assert desk.project.noise is not may_edit
+    desk.close()

@@ -52,6 +52,9 @@ def desk(
         bool, typer.Option("--run-programs", help="Let browsers on other computers start programs, too.")
     ] = False,
     browser: Annotated[bool, typer.Option(help="Open a browser.")] = True,
+    edit: Annotated[
+        bool, typer.Option("--edit", help="Change an exercise that is locked for students, as its lecturer.")
+    ] = False,
     record: RecordFile = None,
     no_wait: NoWait = False,
 ) -> None:
@@ -92,6 +95,7 @@ def desk(
         commands=commands,
         supervisor=supervisor_of(project, home) if file is not None else None,
         is_held=not no_wait,
+        may_edit=edit,
     )
     # A new start makes another world: the recording ends with the first one.
     with recorded(sim, record=record, programs=[each.file for each in commands if each is not None]):

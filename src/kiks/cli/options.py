@@ -83,11 +83,11 @@ class World:
             programs: Number of programs for robots 1, 2, and so on, named apart from the project.
             fills_starts: Whether each start of an arena has a robot, or only the first.
         """
-        from kiks.model.project import Project
+        from kiks.model.project import Project, project_file
 
         read, home = self.arena if file is None else file, Path()
         if read is not None and is_project(read):
-            project, home = Project.load(read), Path(read).parent
+            project, home = Project.load(read), project_file(Path(read)).parent
         else:
             project = (Project.of_arena if fills_starts else Project)(load_arena(read))
         if file is not None and self.arena is not None:
@@ -175,8 +175,8 @@ def load_arena(file: str | None) -> Arena:
 
 
 def is_project(file: str | Path) -> bool:
-    """Return whether a file's name is that of a project."""
-    return str(file).lower().endswith(".kiks")
+    """Return whether a file's name is that of a project, or a folder is that of an exercise."""
+    return str(file).lower().endswith(".kiks") or (Path(file) / "exercise.kiks").is_file()
 
 
 def say(text: str) -> None:

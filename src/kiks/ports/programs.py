@@ -331,7 +331,8 @@ class Programs:
         if self._over is None:
             return own
         code, message = self._over
-        self._say(message)
+        if message:
+            self._say(message)
         return code or own
 
     def end(self, code: int, message: str) -> NoReturn:

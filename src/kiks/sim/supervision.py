@@ -37,7 +37,8 @@ class Supervision:
     Attributes:
         judge: The judge of the goal; None without one.
         next_ns: When one of them acts next [ns].
-        end: Called with an exit code and a message when one has returned, or failed; raises to end the run.
+        end: Called with an exit code and a message when one has returned, or failed; raises to end the run. The message
+            is empty if the judge has ended it: `decide` says how.
     """
 
     def __init__(self, sim: Simulation, file: Path | None = None, goal: Goal | None = None) -> None:
@@ -72,7 +73,8 @@ class Supervision:
             try:
                 self._prepare(who, now_ns)
             except StopIteration:
-                self._finish(0, f"{who} has ended the run at {self._sim.time_s:.3f} s of simulated time.")
+                message = f"{who} has ended the run at {self._sim.time_s:.3f} s of simulated time."
+                self._finish(0, "" if who == JUDGE else message)  # a judgement says it all
             except Exception as error:
                 if not isinstance(error, KiksError):
                     traceback.print_exc()

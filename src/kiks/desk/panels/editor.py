@@ -16,7 +16,7 @@ from kiks.desk.panels.files import FilesPanel
 from kiks.desk.panels.new_arena import ask_for_box, ask_for_maze
 from kiks.desk.panels.properties import PropertiesPanel
 from kiks.desk.panels.shortcuts import SHORTCUTS, listen
-from kiks.desk.panels.widgets import Panel, named, select, text_button, told, with_props
+from kiks.desk.panels.widgets import Panel, lock_note, named, select, text_button, told, with_props
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.live_editing import Editing, Robot
 from kiks.errors import ParameterError
@@ -76,6 +76,7 @@ class EditorPanel(Panel):
         self._tool = "hand"
         self._buttons: dict[str, ui.button] = {}
         with ui.column().classes("w-full q-pa-md gap-3"):
+            lock_note(desk)
             self.properties = PropertiesPanel(desk, editing, view, self.refresh)
             ui.separator()
             self._build_tools()

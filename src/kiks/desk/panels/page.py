@@ -9,6 +9,7 @@ from nicegui import ui
 from kiks.desk.panels.arena_view import ArenaView, Place, Points
 from kiks.desk.panels.board import ScoreBoard
 from kiks.desk.panels.editor import EditorPanel
+from kiks.desk.panels.exercise import ExercisePanel
 from kiks.desk.panels.monitor import MonitorPanel
 from kiks.desk.panels.octave import OctavePanel
 from kiks.desk.panels.programs import ProgramsPanel
@@ -95,6 +96,7 @@ class Page:
         """Build the tabs beside the arena; the panel of each is built when it is first opened."""
         desk = self._desk
         tabs: list[tuple[str, str, Callable[[], Panel]]] = [
+            ("exercise", "Exercise", lambda: ExercisePanel(desk)),
             ("robot", "Robot", lambda: MonitorPanel(desk, feed)),
             ("wire", "Wire", lambda: WirePanel(desk)),
             ("arena", "Arena", lambda: EditorPanel(desk, self._editing, self._view)),
@@ -107,12 +109,19 @@ class Page:
         self._panels: dict[str, Panel] = {}
         look = "dense no-caps align=justify active-color=accent"
         with ui.tabs().props(look).classes("w-full desk-tabs") as heads:
-            for name, word, _ in tabs:
-                named(ui.tab(name, word), f"tab-{name}")
+            heads_of = {name: named(ui.tab(name, word), f"tab-{name}") for name, word, _ in tabs}
+        self._exercise, self._exercise_tab = desk.project.exercise, heads_of["exercise"]
         with ui.tab_panels(heads, animated=False).classes("desk-panels w-full") as self._tabs:
             self._places = {name: ui.tab_panel(name) for name in self._builders}
         self._tabs.on_value_change(lambda event: self._open(event.value))
-        self._tabs.value = "robot"
+        self._show_exercise()
+
+    def _show_exercise(self) -> None:
+        """Show the tab of the exercise, if the project is one; else that of the robot."""
+        is_exercise = self._exercise is not None
+        self._exercise_tab.set_visibility(is_exercise)
+        if is_exercise or self._tabs.value in (None, "exercise"):
+            self._tabs.value = "exercise" if is_exercise else "robot"
 
     def _open(self, name: str) -> None:
         """Show a panel, and let the others rest."""
@@ -158,6 +167,10 @@ class Page:
         await self._editing.remove(x_mm, y_mm)
 
     def _tell_news(self) -> None:
+        """Show what has happened: messages, and another exercise, which may have been opened on another page."""
+        if (exercise := self._desk.project.exercise) != self._exercise:
+            self._exercise = exercise
+            self._show_exercise()
         first, news = self._desk.news.since(self._told)
         self._told = first + len(news)
         for text in news:

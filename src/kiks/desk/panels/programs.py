@@ -15,6 +15,7 @@ from kiks.desk.panels.widgets import LogBox, Panel, icon_button, named, offer_ro
 from kiks.desk.server import scripts
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.scripts import EXAMPLES, NEW
+from kiks.model.exercise import Exercise
 from kiks.ports.program_process import Command
 from kiks.ports.programs import Handle
 
@@ -73,6 +74,7 @@ class ProgramsPanel(Panel):
         self._world: object = None
         self._shown: Handle | None = None
         self._script: Path | None = None
+        self._exercise: Exercise | None = None
         self._text: str | None = NEW  # as it was read or saved last; None with a draft
         self._drafts: dict[Path | None, str] = {}
         self._seen = self._checked = NEW
@@ -161,8 +163,22 @@ class ProgramsPanel(Panel):
         self._desk.attach(None, robot)
 
     def _choose_attached(self, attached: dict[int, Command], *, is_first: bool) -> None:
-        """Show the program of the project that has been opened; an example at first, if it has none."""
+        """Show the program of the project that has been opened: in an exercise that of the student.
+
+        If it has none, a new exercise begins with its template, and all else with an example.
+        """
         self._offer()
+        project = self._desk.project
+        if (exercise := project.exercise) is not None:
+            own = self._desk.own_robot
+            if (command := attached.get(own)) is not None:
+                attached = {own: command}
+            elif exercise != self._exercise:
+                self._exercise = exercise
+                self._begin_exercise(exercise, own)
+                return
+            else:
+                return
         for robot, command in attached.items():
             if (program := command.program.resolve()) in self._choice.options:
                 self._choice.value, self._robot.value = program, robot
@@ -170,6 +186,15 @@ class ProgramsPanel(Panel):
                 return
         if is_first:
             self._choice.value = EXAMPLES / "first_steps.py"
+
+    def _begin_exercise(self, exercise: Exercise, robot: int) -> None:
+        """Show the student's program of an exercise, which may be there from an earlier day; else its template."""
+        name = scripts.name_of(exercise.title or self._desk.project.arena.name)
+        self._robot.value = robot
+        if (program := self._folder.path / name) in self._choice.options:
+            self._choice.value = program
+        else:
+            self._new(name, exercise.template or NEW)
 
     def _choose(self, handle: Handle) -> None:
         self._show(handle)
@@ -192,7 +217,7 @@ class ProgramsPanel(Panel):
         with ui.row().classes("w-full items-end no-wrap gap-2"):
             tip = "Your programs in the desk's folder, and examples that come with KiKS"
             self._choice = select("Program", "script", {}, None, tip, self._open).classes("col")
-            icon_button("note_add", "New program", "new-program", self._new, tip="Write a new program")
+            icon_button("note_add", "New program", "new-program", lambda: self._new(), tip="Write a new program")
         with ui.row().classes("w-full items-end no-wrap gap-2"):
             tip = "The robot that answers on every port that the program opens"
             self._robot = select("Runs on", "robot", {1: "robot 1"}, 1, tip)
@@ -252,9 +277,10 @@ class ProgramsPanel(Panel):
             self._folder.open(script.name)
         self._edit(script, script.name, draft or self._text or "")
 
-    def _new(self) -> None:
+    def _new(self, name: str = "mine.py", text: str = NEW) -> None:
         self._choice.value = None
-        self._edit(None, "mine.py", NEW)
+        self._text = text
+        self._edit(None, name, text)
 
     def _edit(self, script: Path | None, name: str, text: str) -> None:
         self._script = script
@@ -329,6 +355,14 @@ class ProgramsPanel(Panel):
         """Start a program on a robot after stopping the one that runs there."""
         desk, programs = self._desk, self._desk.programs
         desk.check_present()
+        if desk.project.exercise is not None and desk.owns_world:
+            desk.attach(command, robot)
+            if desk.attached(robot) == command:
+                # A run that is judged begins at time 0, with its programs.
+                await desk.start_over()
+                await desk.go_on()
+                self._show(next((each for each in desk.programs.handles if each.robot == robot), None))
+                return
         for handle in list(programs.handles):
             if handle.robot == robot and handle.is_running:
                 programs.stop(handle)

@@ -7,7 +7,7 @@ from typing import Any
 
 from nicegui import ui
 
-from kiks.desk.panels.widgets import Panel, heading, named, number, select, with_props
+from kiks.desk.panels.widgets import Panel, heading, lock_note, named, number, select, with_props
 from kiks.desk.server.desk import Desk
 from kiks.errors import ParameterError
 from kiks.model.project import ProjectRobot
@@ -51,6 +51,7 @@ class SettingsPanel(Panel):
         super().__init__(desk)
         self._rows: list[_RobotRow] = []
         with ui.column().classes("w-full q-pa-md gap-3"):
+            lock_note(desk)
             heading("Run")
             self._build_run()
             heading("Robots and sensors")
@@ -149,7 +150,7 @@ class SettingsPanel(Panel):
         if seed is None or seed != int(seed):
             raise ParameterError(f"seed must be a whole number, but it was {seed}.")
         present = await self._desk.present_project()
-        await self._desk.replace(
+        await self._desk.alter(
             replace(
                 present,
                 seed=int(seed),

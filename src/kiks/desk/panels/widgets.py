@@ -11,7 +11,7 @@ from typing import Any, ParamSpec, TypeVar
 from nicegui import ui
 from nicegui.element import Element
 
-from kiks.desk.server.desk import Desk
+from kiks.desk.server.desk import LOCKED, Desk
 from kiks.errors import KiksError, counted
 from kiks.export.looks import robot_colours
 from kiks.sim.ring_buffer import RingBuffer
@@ -166,6 +166,14 @@ class FeedElement(Element):
         """Change properties of the component."""
         self._props.update(properties)
         self.update()
+
+
+def lock_note(desk: Desk) -> ui.row:
+    """Build the line that says that an exercise is locked; it is there while this is so."""
+    with named(ui.row(), "locked").classes("items-center no-wrap text-body2") as note:
+        ui.icon("lock").props("aria-hidden=true")
+        ui.label(LOCKED)
+    return note.bind_visibility_from(desk, "is_locked")
 
 
 def icon_button(

@@ -35,6 +35,12 @@ NEWS_LIMIT = 200
 LOG_LIMIT = 1000
 """Number of lines of the log that are kept, unless a program asks for another."""
 
+LOCKED = (
+    "Walls, things and settings of this exercise must stay as they are, because it is locked. Its lecturer changes it "
+    "with kiks desk --edit."
+)
+"""What people read who try to change them."""
+
 Done = TypeVar("Done")
 
 NewPrograms = Callable[[Simulation, Sequence[Command | None], Gate], Programs]
@@ -75,6 +81,7 @@ class Desk:
         has_old_coordinates: Whether people see the coordinates of KiKS 2.2.0.
         project_of: Makes the project of an arena that people open.
         log_limit: Number of lines of the log that are kept.
+        may_edit: Whether people may change a locked exercise, as its lecturer does.
 
     Attributes:
         present: The world that goes on.
@@ -107,10 +114,12 @@ class Desk:
         has_old_coordinates: bool = False,
         project_of: Callable[[Arena], Project] = Project.of_arena,
         log_limit: int = LOG_LIMIT,
+        may_edit: bool = False,
     ) -> None:
         self.folder = (Path.cwd() if folder is None else folder).resolve()
         self.owns_world = owns_world
         self.may_run_programs = may_run_programs
+        self.may_edit = may_edit
         self.has_old_coordinates = has_old_coordinates
         self.project_of = project_of
         self.scene = 0
@@ -267,6 +276,22 @@ class Desk:
                 "first."
             )
 
+    @property
+    def own_robot(self) -> int:
+        """The robot that people's programs drive in an exercise."""
+        return 1 if self.project.goal is None else self.project.goal.robot
+
+    @property
+    def is_locked(self) -> bool:
+        """Whether walls, things and settings must stay as the exercise has them."""
+        exercise = self.project.exercise
+        return exercise is not None and exercise.is_locked and not self.may_edit
+
+    def check_unlocked(self) -> None:
+        """Check that people may change walls, things and settings."""
+        if self.is_locked:
+            raise ParameterError(LOCKED)
+
     # ---- another world ----
 
     async def replace(self, project: Project, folder: Path | None = None) -> None:
@@ -282,6 +307,16 @@ class Desk:
         home = folder or self._home
         await self._put(project, commands_of(project, home), _command_of(supervisor_of(project, home)))
         self._home = home
+
+    async def alter(self, project: Project) -> None:
+        """Replace the world by that of its own project with another arena, other robots or other settings.
+
+        Raises:
+            LinkError: If the world cannot be replaced.
+            ParameterError: If it is an exercise that is locked.
+        """
+        self.check_unlocked()
+        await self.replace(project)
 
     async def start_over(self) -> None:
         """Begin again with the same world, seed and programs.
@@ -325,6 +360,8 @@ class Desk:
             sim.loop.end_at(CLOCK_END_NS, end_time)  # a person may let it go on
             end(0, f"The project ends after {seconds:g} s of simulated time.")
 
+        if self.project.exercise is not None and self.attached(self.own_robot) is None:
+            world.pause()  # its clock runs for a program
         file = None if self._supervisor is None else self._supervisor.program
         supervision = Supervision(sim, file, self.project.goal)
         supervision.end = end
@@ -475,6 +512,7 @@ class Desk:
 
     async def grab(self, owner: str, what: str, index: int) -> None:
         """Let the hand of `owner` take a thing."""
+        self.check_unlocked()
         world = self.present
 
         def take(_sim: Simulation) -> None:

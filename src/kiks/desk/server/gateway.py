@@ -23,6 +23,7 @@ from kiks.export.frames import arena_picture, describe_scene, describe_shapes, p
 from kiks.export.looks import robot_colours
 from kiks.model.arena import Arena
 from kiks.model.checks import SECONDS_MAX
+from kiks.sim.judge import POINTS, RESULT
 from kiks.sim.simulation import Simulation
 from kiks.units import ns_from_s, s_from_ns
 
@@ -211,7 +212,12 @@ class Gateway:
         ]
         entries += [{"name": what, "value": score[what], "colours": None} for what in score if isinstance(what, str)]
         project = self.desk.project
-        goal = "" if project.goal is None else project.goal.text
+        goal = None
+        if project.goal is not None:
+            # What the judge has written stands beside the goal.
+            judged = {each["name"]: each["value"] for each in entries if each["name"] in (POINTS, RESULT)}
+            entries = [each for each in entries if each["name"] not in judged]
+            goal = {"text": project.goal.text or "Goal", "points": judged.get(POINTS), "result": judged.get(RESULT)}
         self._news["board"] = {"kind": "board", "score": entries, "goal": goal, "end_s": project.seconds}
 
     def _show(self, frame: bytes) -> None:

@@ -283,8 +283,9 @@ class Editing:
 
     async def _apply(self, now: Content, then: Content, is_another_arena: bool) -> None:
         desk = self._desk
+        desk.check_unlocked()
         if is_another_arena or now.of(Robot).keys() != then.of(Robot).keys():
-            await desk.replace(then.in_project(await desk.present_project()))
+            await desk.alter(then.in_project(await desk.present_project()))
         else:
             # The faces of walls take a while: they are computed before the world is locked.
             if then.walls is not now.walls:

@@ -9,6 +9,7 @@ from typing import NamedTuple
 from kiks.desk.server.player import Span
 from kiks.recording.events import Event, EventReader
 from kiks.recording.log import RecordedLog
+from kiks.sim.judge import POINTS
 from kiks.units import ns_from_s, s_from_ns
 
 MERGED_S = 0.3
@@ -77,7 +78,8 @@ class MarkReader:
         """
         with self._lock:
             for event in (*self._events.notes(), *(self._events.contacts() if has_contacts else ())):
-                self._add(event)
+                if not (event.kind == "score" and event.text.startswith(f"{POINTS}:")):
+                    self._add(event)  # the judge's points change each second
             begin_s = s_from_ns(self._log.begin_ns)
             self._marks = {number: mark for number, mark in self._marks.items() if mark.time_s >= begin_s}
             return sorted(self._marks.values())

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 import shlex
+import unicodedata
 import warnings
 from pathlib import Path
 from typing import NamedTuple
@@ -39,6 +41,17 @@ def offered(folder: Folder) -> dict[Path, str]:
     own = {folder.path / name: name for name in folder.names()}
     examples = sorted(EXAMPLES.glob("[!_]*.py"))
     return own | {path: f"example: {path.stem.replace('_', ' ')}" for path in examples}
+
+
+def name_of(title: str) -> str:
+    """Return the name of a program's file for a title: letters and digits that every file system takes.
+
+    Example:
+        >>> name_of("What does sensor 3 see?"), name_of("Übung 1")
+        ('what_does_sensor_3_see.py', 'ubung_1.py')
+    """
+    plain = unicodedata.normalize("NFKD", title.lower()).encode("ascii", "ignore").decode()
+    return f"{'_'.join(re.findall('[a-z0-9]+', plain))[:60] or 'mine'}.py"
 
 
 def read_script(path: Path) -> str:

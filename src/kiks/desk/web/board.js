@@ -12,8 +12,15 @@ export default {
     <div class="kiks-board" v-show="isHall || goal || entries.length" data-testid="board" role="region" aria-label="Score">
       <div v-if="isHall" class="kiks-board-clock" data-testid="board-clock" role="timer">{{ clock }}<small
         v-if="end_s"> of {{ clockText(end_s).slice(0, -3) }}</small></div>
-      <p v-if="goal" class="kiks-board-goal" data-testid="board-goal">{{ goal }}<span v-if="!isHall" role="timer">{{ clock
-        }}<template v-if="end_s"> of {{ clockText(end_s).slice(0, -3) }}</template></span></p>
+      <div v-if="goal" class="kiks-board-goal" data-testid="board-goal">
+        <span class="kiks-board-text">{{ goal.text }}</span>
+        <span v-if="!isHall" class="kiks-board-time" role="timer">{{ clock
+          }}<template v-if="end_s"> of {{ clockText(end_s).slice(0, -3) }}</template></span>
+        <span v-if="goal.points !== null" data-testid="board-points"><b>{{ goal.points }}</b> {{
+          goal.points === 1 ? "point" : "points" }}</span>
+        <strong v-if="goal.result" :class="['kiks-board-result', outcome]" role="status" data-testid="board-result">{{
+          goal.result }}</strong>
+      </div>
       <div v-if="isMatch" class="kiks-board-match">
         <span class="kiks-board-side"><i :style="ink(entries[0])"></i><b>{{ entries[0].name }}</b></span>
         <span class="kiks-board-value" data-testid="board-match">{{ entries[0].value }} : {{ entries[1].value }}</span>
@@ -28,8 +35,11 @@ export default {
               title="Leave the hall view (Escape)" @click="leave">&#x2715;</button>
     </div>`,
   props: { feed: { type: String, default: "/desk/feed" } },
-  data: () => ({ entries: [], goal: "", end_s: null, isHall: false, clock: "" }),
+  data: () => ({ entries: [], goal: null, end_s: null, isHall: false, clock: "" }),
   computed: {
+    /** How the goal was decided; the judge begins its result so. */
+    outcome() { return ["solved", "failed"].find((word) => this.goal.result.startsWith(word)) ?? "open"; },
+
     /** Two robots, and nothing else: a match. */
     isMatch() { return this.entries.length === 2 && this.entries.every(({ colours }) => colours !== null); },
   },
@@ -58,7 +68,7 @@ export default {
 
     take({ score, goal, end_s }) {
       this.entries = score;
-      this.goal = goal ?? "";
+      this.goal = goal;
       this.end_s = end_s;
     },
 

@@ -1,0 +1,93 @@
+"""An exercise on the desk: its text, its lock, and a run of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import expect
+from tests.desk.visitor import NewPage, Visitor, open_desk
+
+from kiks.desk.panels.exercise_text import parts_of
+from kiks.model.arena import Arena
+from kiks.model.arena_objects import Lamp, Pose
+from kiks.model.exercise import Exercise
+from kiks.model.goal import Goal
+from kiks.model.project import Project
+
+TEXT = """Drive to the lamp.
+
+<script>document.title = "attacked"</script> ![a plan](http://example.org/plan.png) [x](javascript:alert(1))
+
+## Hint: how to begin
+
+Set both wheels to 30.
+
+## What counts
+
+Time.
+"""
+
+DRIVE = """import time
+import serial
+
+with serial.Serial("/dev/ttyUSB0", 9600, timeout=1) as port:
+    port.write(b"D,30,30\\n")
+    port.readline()
+    time.sleep(5)
+"""
+
+
+def make_exercise() -> Project:
+    """Return an exercise in which a robot drives to a lamp, with two seeds and a hidden one."""
+    arena = Arena.box(800, 400)
+    return Project(
+        Arena(arena.brightness, arena.mm_per_cell, "room", starts=(Pose(100, 200, 0.0),), lamps=(Lamp(700, 200),)),
+        seconds=20.0,
+        goal=Goal("Reach the lamp", solved="light_mm < 120", failed="contacts > 0", points="10 * is_solved"),
+        exercise=Exercise("To the lamp", text=TEXT, template=DRIVE.replace("30,30", "0,0")),
+    )
+
+
+def test_text_loads_and_runs_nothing() -> None:
+    parts = parts_of(TEXT)
+    assert [part.hint for part in parts] == ["", "Hint: how to begin", ""]
+    html = "".join(part.html for part in parts)
+    assert not [each for each in ("<script", "<img", "href") if each in html]
+    assert "<em>a plan</em>" in html
+
+
+@pytest.mark.slow
+def test_exercise_is_read_solved_and_locked(tmp_path: Path, new_page: NewPage) -> None:
+    shown = open_desk(tmp_path, make_exercise())
+    try:
+        visitor = Visitor(new_page(), shown)
+        expect(visitor.at("exercise-text")).to_contain_text("Drive to the lamp")
+        hint = visitor.page.get_by_text("Set both wheels to 30.")
+        expect(hint).to_be_hidden()
+        visitor.at("hint").click()
+        expect(hint).to_be_visible()
+        assert visitor.page.title() == "KiKS"
+        assert visitor.desk.is_paused
+        assert visitor.sim.now_ns == 0
+
+        visitor.tab("programs")
+        expect(visitor.page.locator(".cm-content")).to_contain_text("D,0,0")
+        visitor.write(DRIVE)
+        visitor.at("run-program").click()
+        expect(visitor.at("board-result")).to_contain_text("solved after 2.")
+        expect(visitor.at("board-points")).to_have_text("10 points")
+        assert (tmp_path / "to_the_lamp.py").read_text() == DRIVE
+        assert visitor.desk.is_paused
+
+        lies = visitor.sim.pose(1)
+        visitor.pull(lies[:2], (300, 200))
+        expect(visitor.at("arena-notice")).to_contain_text("it is locked")
+        visitor.page.mouse.up()
+        visitor.tab("settings")
+        expect(visitor.at("locked").locator("visible=true")).to_have_count(1)
+        visitor.at("apply").click()
+        visitor.told("it is locked")
+        assert visitor.sim.pose(1) == lies
+    finally:
+        shown.close()
