@@ -17,6 +17,7 @@ from tests.guard import wait_until
 from kiks import Recording
 from kiks.errors import KiksError, ParameterError
 from kiks.model.arena import Arena, Pose
+from kiks.model.goal import Goal
 from kiks.model.project import Project
 from kiks.ports.program_process import Command, python_line
 from kiks.trials import watch
@@ -44,16 +45,14 @@ PROGRAMS = {
         """,
 }
 
-SUPERVISOR = """
+JUDGE = """
     def supervise(sim):
-        sim.set_score("points", 0)
         while True:
             yield 0.5
-            sim.set_score("points", sim.time_s)
-            if sim.pose(1)[0] > 180:
-                sim.set_score("solved", 1)
-                return
+            sim.set_score("halves", int(sim.time_s * 2))
     """
+
+GOAL = Goal(solved="path_mm > 80", points='score("halves")')
 
 
 def write(folder: Path, name: str, text: str) -> Command:
@@ -65,8 +64,8 @@ def write(folder: Path, name: str, text: str) -> Command:
 def trials_in(folder: Path) -> list[Trial]:
     """Return trials of each program in two cases."""
     arena = replace(Arena.box(400, 400), starts=(Pose(100.0, 200.0, 0.0),))
-    write(folder, "judge", SUPERVISOR)
-    project = Project(arena, seconds=3.0, supervisor="judge.py")
+    write(folder, "judge", JUDGE)
+    project = Project(arena, seconds=3.0, supervisor="judge.py", goal=GOAL)
     return [
         Trial(f"{name}/{seed}", replace(project, seed=seed), folder, (write(folder, name, text),), is_trusted=True)
         for name, text in PROGRAMS.items()
@@ -84,7 +83,7 @@ def test_a_trial_says_how_the_program_has_ended_and_what_it_scored(tmp_path: Pat
     assert crashes.end_of().printed[0] == "about to"
     assert goes_on.end_of().how == RUNNING
     assert goes_on.is_solved
-    assert goes_on.points == goes_on.time_s == 1.5
+    assert (goes_on.points, goes_on.time_s) == (2, 1.3)
     assert not any(each.doubt for each in (drives, crashes, goes_on))
 
 

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import NoReturn
 
-from kiks.errors import ParameterError
+from kiks.errors import KiksError, ParameterError
 from kiks.ports.program_process import supervisor_of
 from kiks.ports.programs import Handle, Programs
 from kiks.recording.recorder import RunRecorder, program_texts
 from kiks.sim.from_project import simulation_of, thinking_of
+from kiks.sim.judge import POINTS, Judgement
 from kiks.sim.simulation import Simulation
-from kiks.sim.supervision import Supervision
+from kiks.sim.supervision import JUDGE, Supervision
 from kiks.trials.trial import CRASHED, ENDED, ENDLESS, OUT_OF_TIME, RUNNING, Outcome, ProgramEnd, Trial
 from kiks.trials.watch import Watch
 from kiks.units import ns_from_s
@@ -51,28 +52,27 @@ def run_trial(trial: Trial, folder: Path) -> Outcome:
     files = [command.file for command in commands if command is not None]
     with ExitStack() as at_the_end:
         run = _Run(sim)
-        if supervisor is not None:
-            supervision = Supervision(sim, supervisor)
-            at_the_end.callback(supervision.close)
+        supervision = Supervision(sim, supervisor, project.goal)
+        at_the_end.callback(run.close, supervision)
         texts = program_texts(files + ([] if supervisor is None else [supervisor]))
         at_the_end.enter_context(RunRecorder(sim, recording, programs=texts, about={"command": trial.command}))
         programs = run.programs = Programs(
             sim, commands, thinking=thinking, when_silent="wait", keeps_output=True, say=lambda text: None
         )
-        if supervisor is not None:
-            supervision.end = run.end_by_judge
+        supervision.end = run.end_by_judge
         sim.loop.end_at(ns_from_s(seconds), run.end_by_time)
         with Watch(programs, seconds) as watch:
             programs.run()
         ends = tuple(_end_of(handle, run.how, watch.reasons) for handle in programs.handles)
         state = sim.state_hash()
+        judgement = run.judgement(supervision)
     score = {str(what): value for what, value in sim.score.items()}
-    points = score.get("points", 0.0)
     return Outcome(
         trial.key,
         trial.name,
-        is_solved=bool(score.get("solved", 0)),
-        points=points if isinstance(points, float | int) else 0.0,
+        is_solved=judgement.is_solved,
+        is_failed=judgement.is_failed,
+        points=judgement.points,
         time_s=sim.time_s,
         score=score,
         ends=ends,
@@ -95,6 +95,22 @@ class _Run:
     def end_by_time(self) -> NoReturn:
         self.how = OUT_OF_TIME
         self.programs.end(0, "")
+
+    def judgement(self, supervision: Supervision) -> Judgement:
+        """Return how the run has done; without a goal, the points are those that the supervisor has counted."""
+        try:
+            if supervision.judge is not None:
+                return supervision.judge.end()
+        except KiksError as error:
+            # What one program does must not end the grading of all.
+            self.doubt = self.doubt or f"{JUDGE} has failed: {error}"
+        points = self._sim.score.get(POINTS, 0) if supervision.judge is None else 0
+        return Judgement(False, False, points if isinstance(points, float | int) else 0, self._sim.time_s)
+
+    def close(self, supervision: Supervision) -> None:
+        """End the supervision; that the judge has failed is noted already."""
+        with suppress(KiksError):
+            supervision.close()
 
     def end_by_judge(self, code: int, message: str) -> NoReturn:
         self.doubt = message if code else ""

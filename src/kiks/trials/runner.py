@@ -239,4 +239,4 @@ def _lost(trial: Trial, why: str) -> Outcome:
     ends = tuple(
         ProgramEnd(robot, command.name, STOPPED, why) for robot, command in enumerate(trial.programs, 1) if command
     )
-    return Outcome(trial.key, trial.name, False, 0.0, 0.0, {}, ends, "", "", why)
+    return Outcome(trial.key, trial.name, False, False, 0, 0.0, {}, ends, "", "", why)

@@ -133,7 +133,8 @@ class Outcome:
         key: `Trial.key`.
         name: `Trial.name`.
         is_solved: Whether the goal was reached.
-        points: Its points.
+        is_failed: Whether it could not be reached any more.
+        points: Its points; without a goal those that the supervisor has counted under 'points'.
         time_s: How long the run was [s of simulated time].
         score: What the supervisor has counted, by robot or name.
         ends: How each program has ended.
@@ -145,6 +146,7 @@ class Outcome:
     key: str
     name: str
     is_solved: bool
+    is_failed: bool
     points: float
     time_s: float
     score: dict[str, float | str]
