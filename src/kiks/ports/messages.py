@@ -2,20 +2,46 @@
 
 A program sends requests, stamped with its own time. Some requests only tell and get no answer, so the program goes on
 at once. The others ask, and the answer carries the program's new time. Between processes, a message is four bytes for
-its length and what `marshal` makes of its fields; within a process it is handed over as it is.
+its length and the array of its fields as MessagePack; within a process it is handed over as it is.
+
+The sender of a message may be anybody's program. So nothing is taken on its word: `Inbox` refuses a length beyond its
+limit before the message comes, and takes plain data of bounded size alone; `checked_request` checks the kind, and the
+type and range of each field. Each raises a `ProtocolError`, and nothing else. Whether a program may do to a robot what
+it asks for depends on the world, and is checked there (`ports/participant.py`).
 """
 
 from __future__ import annotations
 
-import marshal
 import struct
+from collections.abc import Callable
 from typing import Any, NamedTuple
+
+import msgpack
+
+from kiks.clock.serial_timing import BACKLOG_LIMIT
+from kiks.errors import KiksError
+from kiks.model.checks import CLOCK_END_NS
+from kiks.sim.port import BAUD_MAX, BAUD_MIN
+from kiks.sim.read_completion import NEVER_NS
 
 RECEIVE_SIZE = 1 << 16
 """Most bytes read from the connection at once."""
 
 WINDOW = 64
 """Requests that a program may send without an answer: it limits how far a program runs ahead of the world."""
+
+REQUEST_BYTES_MAX = 1 << 16
+"""Longest request."""
+
+ANSWER_BYTES_MAX = 2 << 20
+"""Longest answer: the characters that a line keeps for its reader (`OUTPUT_LIMIT`), and more."""
+
+ITEMS_MAX = 1024
+"""Most items of an array in a message, such as the reads of `Kind.WAIT`."""
+
+
+class ProtocolError(KiksError):
+    """What has come is no message, as a sentence about the program: 'sent ...'."""
 
 
 class Kind:
@@ -138,29 +164,148 @@ class Start(NamedTuple):
 
 _LENGTH = struct.Struct("<I")
 
-_MARSHAL_VERSION = 2
-"""Later ones look for objects that occur twice, which takes half as long again."""
+_pack: Callable[[tuple[Any, ...]], bytes] = msgpack.Packer(unicode_errors="surrogatepass").pack
 
 
 def packed(message: tuple[Any, ...]) -> bytes:
     """Return the fields of a message as bytes."""
-    data = marshal.dumps(message, _MARSHAL_VERSION)
+    data = _pack(message)
     return _LENGTH.pack(len(data)) + data
 
 
 class Inbox:
-    """Makes messages of the bytes of a connection, which come in any pieces."""
+    """Makes messages of the bytes of a connection, which come in any pieces.
 
-    def __init__(self) -> None:
+    Args:
+        limit: Longest message [bytes].
+    """
+
+    def __init__(self, limit: int) -> None:
+        self._limit = limit
         self._rest = b""
 
     def take(self, data: bytes) -> list[Any]:
-        """Take bytes; return the messages that are complete with them, as tuples of their fields."""
+        """Take bytes; return the messages that are complete with them: of each, its fields, not checked yet.
+
+        Raises:
+            ProtocolError: If they are no messages, or one is too long.
+        """
         if self._rest:
             data = self._rest + data
         messages, start, size = [], 0, len(data)
-        while start + 4 <= size and (end := start + 4 + _LENGTH.unpack_from(data, start)[0]) <= size:
-            messages.append(marshal.loads(data[start + 4 : end]))
+        while start + 4 <= size:
+            length = _LENGTH.unpack_from(data, start)[0]
+            if length > self._limit:
+                raise ProtocolError(f"sent a message of {length} bytes to the world")
+            end = start + 4 + length
+            if end > size:
+                break
+            messages.append(_unpacked(data[start + 4 : end]))
             start = end
         self._rest = data[start:]
         return messages
+
+
+def _unpacked(data: bytes) -> Any:
+    try:
+        # Bytes and texts are no longer than the message. An array may say so, too, and takes eight times its length.
+        return msgpack.unpackb(
+            data,
+            use_list=False,
+            unicode_errors="surrogatepass",
+            max_array_len=ITEMS_MAX,
+            max_map_len=0,
+            max_ext_len=0,
+        )
+    except (ValueError, msgpack.UnpackException):
+        raise ProtocolError("sent something to the world that is no message") from None
+
+
+def checked_request(fields: Any) -> Request:
+    """Return the fields of a message as a request.
+
+    A time beyond the end of all time becomes that end.
+
+    Raises:
+        ProtocolError: If they are none.
+    """
+    if fields.__class__ is tuple and len(fields) == 6:
+        kind, robot, at_ns, ticket, thought_ns, arguments = fields
+        if (
+            kind.__class__ is robot.__class__ is at_ns.__class__ is ticket.__class__ is thought_ns.__class__ is int
+            and arguments.__class__ is tuple
+            and robot >= 0 <= at_ns
+            and ticket >= 0 <= thought_ns
+            and _ARGUMENTS.get(kind, _is_unknown)(arguments)
+        ):
+            if at_ns > CLOCK_END_NS or thought_ns > CLOCK_END_NS:
+                at_ns, thought_ns = min(at_ns, CLOCK_END_NS), min(thought_ns, CLOCK_END_NS)
+                return Request(kind, robot, at_ns, ticket, thought_ns, arguments)
+            return _as_request(Request, fields)
+    raise ProtocolError("sent something to the world that is no request")
+
+
+_as_request: Callable[[type[Request], tuple[Any, ...]], Request] = tuple.__new__
+"""`Request._make` without a check of the length, in half its time."""
+
+
+def _is_unknown(_arguments: tuple[Any, ...]) -> bool:
+    return False
+
+
+def _are(*checks: Callable[[Any], bool]) -> Callable[[tuple[Any, ...]], bool]:
+    """Return a function that checks arguments, one by one."""
+    count = len(checks)
+    if count == 1:
+        first = checks[0]
+        return lambda arguments: len(arguments) == 1 and first(arguments[0])
+    return lambda arguments: (
+        len(arguments) == count and all(check(each) for check, each in zip(checks, arguments, strict=True))
+    )
+
+
+def _is_size(size: Any) -> bool:
+    return size is None or (size.__class__ is int and size >= 0)
+
+
+def _is_terminator(terminator: Any) -> bool:
+    return terminator is None or (terminator.__class__ is bytes and terminator != b"")
+
+
+def _is_span(time_ns: Any) -> bool:
+    return time_ns.__class__ is int and -CLOCK_END_NS <= time_ns <= 2 * CLOCK_END_NS
+
+
+def _are_read(arguments: tuple[Any, ...]) -> bool:
+    # In one go: most requests are reads.
+    if len(arguments) != 4:
+        return False
+    size, terminator, timeout_ns, poll_ns = arguments
+    return (
+        (size is None or (size.__class__ is int and size >= 0))
+        and (terminator is None or (terminator.__class__ is bytes and terminator != b""))
+        and (timeout_ns is None or _is_span(timeout_ns))
+        and poll_ns.__class__ is int
+        and 0 <= poll_ns <= CLOCK_END_NS
+    )
+
+
+_is_one_read = _are(lambda robot: robot.__class__ is int, _is_size, _is_terminator)
+
+_ARGUMENTS: dict[int, Callable[[tuple[Any, ...]], bool]] = {
+    **dict.fromkeys((Kind.REACHED, Kind.MEET, Kind.COUNT, Kind.DROP, Kind.SENT, Kind.BAUD), lambda each: each == ()),
+    Kind.FIND: _are(lambda name: name.__class__ is str),
+    Kind.CLAIM: _are(lambda holder: holder.__class__ is str),
+    Kind.HANG_UP: _are(lambda is_claimed: is_claimed.__class__ is bool),
+    Kind.SEND: lambda each: len(each) == 1 and each[0].__class__ is bytes and len(each[0]) <= BACKLOG_LIMIT,
+    Kind.ROOM: _are(lambda count: count.__class__ is int and 0 <= count < 1 << 32),
+    Kind.READ: _are_read,
+    Kind.SET_BAUD: _are(lambda baud: baud.__class__ is int and BAUD_MIN <= baud <= BAUD_MAX),
+    Kind.WAIT: _are(
+        lambda reads: (
+            reads.__class__ is tuple and all(read.__class__ is tuple and _is_one_read(read) for read in reads)
+        ),
+        lambda until_ns: _is_span(until_ns) or (until_ns.__class__ is int and until_ns == NEVER_NS),
+    ),
+}
+"""Whether the arguments of a kind are right."""

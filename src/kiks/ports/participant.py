@@ -4,22 +4,32 @@ from __future__ import annotations
 
 import logging
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from kiks.clock.serial_timing import BACKLOG_LIMIT
 from kiks.errors import KiksError
-from kiks.ports.messages import ASKING, Answer, Kind, Request
+from kiks.model.checks import CLOCK_END_NS
+from kiks.ports.messages import ASKING, Answer, Kind, ProtocolError, Request
 from kiks.ports.port_names import PortNames
 from kiks.ports.program_scheduler import Participant, ProgramScheduler
 from kiks.sim.local_line import claim
+from kiks.sim.port import BAUD_MAX
 from kiks.sim.read_completion import NEVER_NS, Read, end_of_read, end_of_wait, is_complete, never_ends
-from kiks.units import NS_PER_S
+from kiks.sim.wire import Wire
+from kiks.units import NS_PER_S, character_ns
 
 STOPPING_NS = NS_PER_S // 2
 """Time that a robot's wheels have to come to rest when its program was stopped [ns]."""
 
+PENDING_MAX = 4 * BACKLOG_LIMIT
+"""Most commands on their way to a robot: `BACKLOG_LIMIT` characters are half as many."""
+
+BURST_MAX = 16 * BACKLOG_LIMIT
+"""Most characters that a program sends beyond those that its lines would carry at `BAUD_MAX`."""
+
+_SHORTEST_NS = character_ns(BAUD_MAX)
+
 LINE_REQUESTS: dict[int, Callable[..., object]] = {
-    Kind.SEND: lambda wire, at_ns, data: wire.send(data, at_ns),
     Kind.COUNT: lambda wire, at_ns: wire.line.arrived_count(at_ns),
     Kind.DROP: lambda wire, at_ns: wire.line.take(wire.line.arrived_count(at_ns)),
     Kind.SENT: lambda wire, at_ns: max(at_ns, wire.line.sending_until_ns),
@@ -29,6 +39,23 @@ LINE_REQUESTS: dict[int, Callable[..., object]] = {
 """What requests that concern the line alone do to a robot's wire at a time [ns], and their results."""
 
 _log = logging.getLogger("kiks.run")
+
+
+class _Lines(dict[int, Wire]):
+    """The lines of the robots that a program has claimed, by their numbers.
+
+    Args:
+        others: All lines, if it may use those that it has not claimed; else none.
+    """
+
+    def __init__(self, others: Sequence[Wire]) -> None:
+        super().__init__()
+        self._others = others
+
+    def __missing__(self, robot: int) -> Wire:
+        if not self._others:
+            raise ProtocolError(f"used the line of robot {robot} without having opened it")
+        return self._others[robot - 1]
 
 
 class ProgramParticipant(Participant):
@@ -46,9 +73,13 @@ class ProgramParticipant(Participant):
     Attributes:
         is_silenced: Whether it was disconnected because it was silent.
         is_stopped: Whether a person has stopped it; then its robots stop when it has left.
+        reason: Why KiKS has ended it, such as 'used more than 512 MB of memory'; then its robots stop, too. Else empty.
         is_closed: Whether the connection is closed.
         answer: The last answer to a program in a thread; None until it is there.
     """
+
+    is_trusted = True
+    """Whether it may use lines that it has not claimed, and knows itself how much they take."""
 
     answer: Answer | None = None
     is_closed = False
@@ -59,12 +90,14 @@ class ProgramParticipant(Participant):
         self.is_here = False
         self.is_silenced = False
         self.is_stopped = False
+        self.reason = ""
         self._world, self._wires = scheduler.loop.world, scheduler.loop.wires
         self._scheduler = scheduler
         self._names = names
         self._requests: deque[Request] = deque()
         self._pending_read: Request | None = None
-        self._robots: set[int] = set()
+        self._lines = _Lines(self._wires if self.is_trusted else ())
+        self._sent_count, self._sent_limit = 0, NEVER_NS if self.is_trusted else 0
         self._used: set[int] = set()
         self._ticket = 0
         self._has_been_warned = False
@@ -92,6 +125,21 @@ class ProgramParticipant(Participant):
         self.waits = False
         self._free_robots()
         self.has_left = True
+
+    def end_because(self, reason: str) -> None:
+        """End the program at once: it has broken a rule.
+
+        Args:
+            reason: What it has done, such as 'used more than 512 MB of memory'.
+        """
+        if not self.reason:
+            self.reason = reason
+            self.disconnect()
+            self.expel()
+
+    def expel(self) -> None:
+        """Close the connection to a program that has broken a rule."""
+        self.close()
 
     def add_request(self, request: Request) -> None:
         """Take a request of the program."""
@@ -147,6 +195,8 @@ class ProgramParticipant(Participant):
         self._ticket = request.ticket
         try:
             self._execute(request)
+        except ProtocolError as error:
+            self.end_because(str(error))
         except KiksError as error:
             self._answer(at_ns, error=str(error))
 
@@ -158,7 +208,7 @@ class ProgramParticipant(Participant):
         if request.kind == Kind.WAIT:
             self._check_wait_for_all(request)
             return
-        wire = self._wires[request.robot - 1]
+        wire = self._lines[request.robot]
         size, terminator, timeout_ns, poll_ns = request.arguments
         deadline_ns = NEVER_NS if timeout_ns is None else self.acts_from_ns + timeout_ns
         end = end_of_read(wire, size, terminator, deadline_ns, self.acts_from_ns + poll_ns)
@@ -199,17 +249,25 @@ class ProgramParticipant(Participant):
     def _note_thinking(self, request: Request) -> None:
         """Record the thinking time on the wires of its robots."""
         if request.thought_ns:
-            until_ns = min(self.acts_from_ns + request.thought_ns, request.at_ns)
-            for robot in self._robots:
-                self._wires[robot - 1].think(self.acts_from_ns, until_ns)
+            until_ns = max(min(self.acts_from_ns + request.thought_ns, request.at_ns), self.acts_from_ns)
+            for wire in self._lines.values():
+                wire.think(self.acts_from_ns, until_ns)
 
     def _execute(self, request: Request) -> None:
         """Execute a request, at the instant at which the program acts."""
         at_ns, kind = self.acts_from_ns, request.kind
         if kind in (Kind.READ, Kind.WAIT):
+            for read in request.arguments[0] if kind == Kind.WAIT else ():
+                _ = self._lines[read[0]]
             self._pending_read = request
             self.waits = True
             self.check_wait()
+        elif kind == Kind.SEND:
+            wire, data = self._lines[request.robot], request.arguments[0]
+            self._sent_count += len(data)
+            if self._sent_count > self._sent_limit:
+                self._check_room(wire)
+            wire.send(data, at_ns)
         elif kind == Kind.END:
             self._end()
         elif kind == Kind.MEET:
@@ -217,25 +275,42 @@ class ProgramParticipant(Participant):
         elif kind == Kind.FIND:
             self._answer(at_ns, self._names.robot(request.arguments[0], self.robot))
         elif kind == Kind.ROOM:
-            room_ns = self._wires[request.robot - 1].line.room_ns(request.arguments[0])
+            room_ns = self._lines[request.robot].line.room_ns(request.arguments[0])
             if room_ns > at_ns:
                 self._warn_of_backlog(request.robot)
             self._answer(at_ns, room_ns, robot=request.robot)
         elif kind == Kind.CLAIM:
-            claim(self._wires[request.robot - 1], request.robot, request.arguments[0])
-            self._robots.add(request.robot)
+            if not 1 <= request.robot <= len(self._wires):
+                raise ProtocolError(f"asked for robot {request.robot}, which there is not")
+            self._names.check(request.robot, self.robot)
+            wire = self._wires[request.robot - 1]
+            claim(wire, request.robot, request.arguments[0])
+            self._lines[request.robot] = wire
             self._used.add(request.robot)
             self._answer(at_ns, robot=request.robot)
         elif kind == Kind.HANG_UP:
-            wire = self._wires[request.robot - 1]
-            if request.arguments[0]:
-                wire.holder = None
-                self._robots.discard(request.robot)
-            wire.hang_up()
+            # A program whose claim has failed hangs up, too.
+            if request.robot in self._lines or self.is_trusted:
+                wire = self._lines[request.robot]
+                if request.arguments[0]:
+                    wire.holder = None
+                    self._lines.pop(request.robot, None)
+                wire.hang_up()
         elif kind != Kind.REACHED:
-            result = LINE_REQUESTS[kind](self._wires[request.robot - 1], at_ns, *request.arguments)
+            result = LINE_REQUESTS[kind](self._lines[request.robot], at_ns, *request.arguments)
             if kind in ASKING:
                 self._answer(at_ns, result, robot=request.robot)
+
+    def _check_room(self, wire: Wire) -> None:
+        """Check that a line has room by far for what the program sends: it should have asked.
+
+        Raises:
+            ProtocolError: If it has not.
+        """
+        count = self._sent_count
+        if count > BURST_MAX + self.acts_from_ns // _SHORTEST_NS * len(self._lines) or len(wire.pending) > PENDING_MAX:
+            raise ProtocolError("sent more characters than its line takes")
+        self._sent_limit = count + BACKLOG_LIMIT
 
     def _end(self) -> None:
         """Release the robots of the program, which has left, and close the connection."""
@@ -245,13 +320,13 @@ class ProgramParticipant(Participant):
         self.has_left = True
 
     def _free_robots(self) -> None:
-        """Release its robots; they drive on, unless a person has stopped the program."""
+        """Release its robots; they drive on, unless a person or KiKS has ended the program."""
         wires = self._wires
-        for robot in self._robots:
-            wires[robot - 1].holder = None
-            wires[robot - 1].hang_up()
-        self._robots.clear()
-        if self.is_stopped:
+        for wire in self._lines.values():
+            wire.holder = None
+            wire.hang_up()
+        self._lines.clear()
+        if self.is_stopped or self.reason:
             now_ns = self._world.now_ns
             for robot in {self.robot, *self._used} - {0}:
                 if wires[robot - 1].holder is None:
@@ -261,6 +336,8 @@ class ProgramParticipant(Participant):
 
     def _answer(self, now_ns: int, result: object = None, *, robot: int = 0, error: str = "") -> None:
         """Answer a request, so the program goes on."""
+        if now_ns > CLOCK_END_NS:
+            now_ns = CLOCK_END_NS
         ahead_count = 0
         if robot:
             line = self._wires[robot - 1].line

@@ -16,13 +16,15 @@ class PortNames:
         sim: The simulation.
         by_name: Robots by port name, for all programs.
         programs: Number of programs; the first owns robot 1, and so on.
+        are_apart: Whether no program may take the own robot of another one, as in a match.
     """
 
-    def __init__(self, sim: Simulation, by_name: dict[str, int], programs: int = 1) -> None:
+    def __init__(self, sim: Simulation, by_name: dict[str, int], programs: int = 1, *, are_apart: bool = False) -> None:
         for robot in by_name.values():
             sim.port(robot)
         self._sim = sim
         self._by_name = dict(by_name)
+        self._are_apart = are_apart
         self._own = set(range(1, programs + 1))
         self._found: dict[tuple[int, str], int] = {}
 
@@ -41,6 +43,22 @@ class PortNames:
         self.own(robot)
         self._own.discard(robot)
 
+    def check(self, robot: int, program: int) -> None:
+        """Check that a program may take a robot.
+
+        Args:
+            robot: Number of the robot.
+            program: The program, by the number of its own robot.
+
+        Raises:
+            LinkError: If it may not.
+        """
+        if self._are_apart and robot != program and robot in self._own:
+            raise LinkError(
+                f"a program must drive its own robot, which is robot {program} here, but it asked for robot {robot}, "
+                f"which belongs to another program. Open 'kiks://{program}'."
+            )
+
     def robot(self, name: str, program: int = 1) -> int:
         """Return the robot behind a name that a program opens.
 
@@ -49,8 +67,13 @@ class PortNames:
             program: The program, by the number of its own robot.
 
         Raises:
-            LinkError: If every robot has a name already, or the robot does not exist.
+            LinkError: If every robot has a name already, or the robot does not exist or belongs to another program.
         """
+        robot = self._robot(name, program)
+        self.check(robot, program)
+        return robot
+
+    def _robot(self, name: str, program: int) -> int:
         if name.startswith("kiks:"):
             return self._of_url(name)
         if name in self._by_name:
@@ -74,7 +97,7 @@ class PortNames:
                 f"a port's name must be without options where several programs share a world, but it was "
                 f"{shown(name)}. Give the options to kiks run."
             )
-        port = find_port(name)
+        port = find_port(name, self._sim)
         if port.sim is not self._sim:
             raise LinkError(
                 f"a port must belong to the world that the programs share, but it was {shown(name)}. Open 'kiks://1'."

@@ -101,6 +101,8 @@ class Handle(SocketParticipant):
     @property
     def how(self) -> str:
         """How it has ended; empty while it runs."""
+        if self.reason:
+            return f"because it {self.reason}"
         code = self.process.code
         if code is None:
             return ""
@@ -109,6 +111,11 @@ class Handle(SocketParticipant):
     def drop(self) -> None:
         """Disconnect the program, and kill its process."""
         super().drop()
+        self.process.kill()
+
+    def expel(self) -> None:
+        """Close the connection, and kill its process."""
+        super().expel()
         self.process.kill()
 
 
@@ -139,6 +146,7 @@ class Programs:
         new_patience: Makes patiences with another wall clock, such as one that stands still while the world does.
         visitors: Number of programs in threads of this process that begin together with these; see `admit`.
         labels: Prints the output with labels, if the handles do not keep it; None: the programs print it themselves.
+        are_apart: Whether no program may take the own robot of another one, as in a match.
 
     Attributes:
         handles: The programs; of ended ones, the last one of each robot.
@@ -160,6 +168,7 @@ class Programs:
         new_patience: Callable[[float], Patience] = Patience,
         visitors: int = 0,
         labels: Labels | None = None,
+        are_apart: bool = False,
     ) -> None:
         self.sim = sim
         self.permission = Permission(None)
@@ -187,7 +196,7 @@ class Programs:
             new_patience=new_patience,
             start_patience_s=VISIT_PATIENCE_S if visitors else START_PATIENCE_S,
         )
-        self._names = PortNames(sim, robots_by_name or {}, 0)
+        self._names = PortNames(sim, robots_by_name or {}, 0, are_apart=are_apart)
         for robot, _ in self._first_programs:
             self._names.own(robot)
         with opening("the programs of a world"):

@@ -19,12 +19,15 @@ from typing import Any
 from kiks.clock.own_lock import OwnLock
 from kiks.clock.serial_timing import BACKLOG_LIMIT
 from kiks.errors import LinkError
-from kiks.ports.messages import RECEIVE_SIZE, WINDOW, Answer, Inbox, Kind, Request, packed
+from kiks.ports.messages import ANSWER_BYTES_MAX, RECEIVE_SIZE, WINDOW, Answer, Inbox, Kind, Request, packed
 from kiks.sim.read_completion import NEVER_NS, Read
 from kiks.units import TICK_NS
 
 TELL_NS = TICK_NS
 """Simulated time after which a program reports its time to the scheduler [ns]."""
+
+_SIZE_MAX = 1 << 32
+"""More characters than any read completes with; messages hold no larger number for a larger size."""
 
 
 class Connection(ABC):
@@ -125,7 +128,7 @@ class SocketConnection(Connection):
         super().__init__(OwnLock(), is_late=is_late, end_ns=end_ns)
         # Of the socket as it is now: `script/socket_waits.py` gives sockets other methods while a program runs.
         self._send_all, self._receive = connection.sendall, connection.recv
-        self._inbox = Inbox()
+        self._inbox = Inbox(ANSWER_BYTES_MAX)
 
     def _transmit(self, request: Request) -> None:
         try:
@@ -183,7 +186,7 @@ class RemoteLine:
     def read(self, size: int | None, terminator: bytes | None, timeout_ns: int | None, poll_ns: int) -> bytes:
         """Wait for `size` characters or a terminator; see `Line.read`."""
         data: bytes
-        data, self._taken_ns = self._ask(Kind.READ, size, terminator, timeout_ns, poll_ns)
+        data, self._taken_ns = self._ask(Kind.READ, _plain(size), terminator, timeout_ns, poll_ns)
         return data
 
     @property
@@ -208,7 +211,8 @@ class RemoteLine:
 
     def wait_for(self, reads: Sequence[Read], until_ns: int) -> list[bool]:
         """Let time pass until one of several reads is complete; see `Line.wait_for`."""
-        flags: list[bool] = self._connection.ask(Kind.WAIT, 0, [tuple(read) for read in reads], until_ns).result
+        plain = [(read.robot, _plain(read.size), read.terminator) for read in reads]
+        flags: list[bool] = self._connection.ask(Kind.WAIT, 0, plain, until_ns).result
         return flags
 
     def drop_arrived(self) -> None:
@@ -238,6 +242,11 @@ class RemoteLine:
         answer = self._connection.ask(kind, self._robot, *arguments)
         self._ahead_count = answer.ahead_count
         return answer.result
+
+
+def _plain(size: int | None) -> int | None:
+    """Return the size of a read as a message holds it: `True` is a size, too."""
+    return None if size is None else min(int(size), _SIZE_MAX)
 
 
 def _end() -> None:

@@ -1,14 +1,35 @@
-"""A program at the other end of a socket, as the scheduler sees it."""
+"""A program at the other end of a socket, as the scheduler sees it.
+
+It may be anybody's, so nothing that it sends is taken on its word. Whatever comes, it raises no exception in the world,
+never makes it wait, and takes memory up to fixed limits. A program that breaks a rule is ended, its robots stop, and
+`reason` says which rule.
+"""
 
 from __future__ import annotations
 
 import selectors
 import socket
 
-from kiks.ports.messages import RECEIVE_SIZE, Answer, Inbox, Request, packed
+from kiks.ports.messages import (
+    ANSWER_BYTES_MAX,
+    RECEIVE_SIZE,
+    REQUEST_BYTES_MAX,
+    WINDOW,
+    Answer,
+    Inbox,
+    ProtocolError,
+    checked_request,
+    packed,
+)
 from kiks.ports.participant import ProgramParticipant
 from kiks.ports.port_names import PortNames
 from kiks.ports.program_scheduler import ProgramScheduler
+
+QUEUE_MAX = 8 * WINDOW
+"""Most requests of a program that wait. It sends `WINDOW` and one that asks; a few more if Ctrl-C interrupts it."""
+
+LAST_PIECES_MAX = 64
+"""Most pieces of `RECEIVE_SIZE` that are read when a program has gone: more than a socket holds."""
 
 
 class SocketParticipant(ProgramParticipant):
@@ -26,6 +47,8 @@ class SocketParticipant(ProgramParticipant):
         has_hung_up: Whether it has closed its end of the socket.
     """
 
+    is_trusted = False
+
     def __init__(
         self,
         name: str,
@@ -39,7 +62,7 @@ class SocketParticipant(ProgramParticipant):
         self.has_hung_up = False
         self._socket = connection
         self._socket.setblocking(False)
-        self._inbox = Inbox()
+        self._inbox = Inbox(REQUEST_BYTES_MAX)
         self._unsent = b""
         self._selector = selector
         selector.register(connection, selectors.EVENT_READ, self.exchange)
@@ -59,17 +82,40 @@ class SocketParticipant(ProgramParticipant):
         """Take the last requests of the program, which sends no more."""
         if self.has_hung_up:
             return
-        while self._receive():
-            pass
-        self.has_hung_up = True
-        self._selector.unregister(self._socket)
+        for _ in range(LAST_PIECES_MAX):
+            if not self._receive():
+                break
+        self._unregister()
         self.leave()
         if self.has_left:
             self.close()
 
+    def expel(self) -> None:
+        """Close the connection."""
+        self._unregister()
+        self.close()
+
+    def _unregister(self) -> None:
+        if not self.has_hung_up:
+            self.has_hung_up = True
+            self._selector.unregister(self._socket)
+
     def reply(self, answer: Answer) -> None:
         """Send an answer; bytes that the program does not take yet wait."""
-        self._send(self._unsent + packed(tuple(answer)))
+        if len(self._unsent) > ANSWER_BYTES_MAX:
+            self.end_because("asked the world again and again without reading its answers")
+        else:
+            self._send(self._unsent + packed(tuple(answer)))
+
+    def take(self, data: bytes) -> None:
+        """Take bytes that the program has sent, in any pieces."""
+        try:
+            for fields in self._inbox.take(data):
+                self.add_request(checked_request(fields))
+                if len(self._requests) > QUEUE_MAX:
+                    raise ProtocolError(f"sent more than {QUEUE_MAX} requests without waiting for an answer")
+        except ProtocolError as error:
+            self.end_because(str(error))
 
     def _send(self, data: bytes) -> None:
         had_unsent = bool(self._unsent)
@@ -92,6 +138,5 @@ class SocketParticipant(ProgramParticipant):
             return None
         except OSError:
             received = b""
-        for fields in self._inbox.take(received):
-            self.add_request(Request._make(fields))
+        self.take(received)
         return bool(received)

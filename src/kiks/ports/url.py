@@ -13,10 +13,13 @@ if TYPE_CHECKING:
 _SHOWN_NAMES = 5
 """Most simulations that a message names: the newest."""
 
+_DIGITS_MAX = 9
+"""Most digits of a robot's number."""
+
 _OPTIONS = ("arena", "robots", "robot", "seed", "thinking")
 
 
-def find_port(url: str) -> SimPort:
+def find_port(url: str, newest: Simulation | None = None) -> SimPort:
     """Return a new port for a name.
 
     A number alone is a robot of the newest simulation, or of a new one in the default arena if there is none. Options
@@ -24,6 +27,7 @@ def find_port(url: str) -> SimPort:
 
     Args:
         url: 'kiks://ROBOT', 'kiks://SIMULATION/ROBOT' or 'kiks://ROBOT?arena=FILE&robots=2&seed=3&thinking=none'.
+        newest: Takes the place of the newest simulation.
 
     Raises:
         LinkError: If the name is malformed, or the simulation or the robot does not exist.
@@ -31,10 +35,13 @@ def find_port(url: str) -> SimPort:
     # Imported here: a program in a process of its own finds its ports by another function, and needs no simulation.
     from kiks.sim.simulation import SIMULATIONS, SimPort, Simulation
 
-    parts = urlsplit(url)
+    try:
+        parts = urlsplit(url)
+    except ValueError:  # a bracket that is not closed
+        parts = urlsplit("")
     path = parts.path.strip("/")
     name, number = (parts.netloc, path) if path else ("", parts.netloc)
-    if parts.scheme != "kiks" or not (number.isascii() and number.isdigit()):
+    if parts.scheme != "kiks" or not (number.isascii() and number.isdigit() and len(number) <= _DIGITS_MAX):
         raise LinkError(
             f"a simulated port must be named like 'kiks://1', but it was {shown(url)}. The number is the robot's, "
             "from 1."
@@ -50,7 +57,7 @@ def find_port(url: str) -> SimPort:
                 f"a simulation's name must be one that is alive, such as {known}, but it was {shown(name)}. "
                 f"'kiks://1' without a name is robot 1 of the newest simulation."
             )
-        sim = alive[name] if name else next(reversed(alive.values()), None) or Simulation()
+        sim = alive[name] if name else newest or next(reversed(alive.values()), None) or Simulation()
     robot = int(number)
     if not 1 <= robot <= sim.robot_count:
         if not sim.robot_count:
