@@ -340,6 +340,9 @@ NO_RESULTS = {
     ("serve", "link"),
     ("session", "listen"),
     ("examples", "out"),
+    ("room", "exercise"),
+    ("room", "students"),
+    ("room", "folder"),
 }
 """Paths that are read, and those that are written when a command begins."""
 

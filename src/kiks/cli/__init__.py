@@ -22,6 +22,7 @@ from kiks.cli.monitor import monitor
 from kiks.cli.options import show_log, with_options
 from kiks.cli.outputs import Command
 from kiks.cli.replay import replay
+from kiks.cli.room import room
 from kiks.cli.run import RunCommand, run
 from kiks.cli.schema import schema
 from kiks.cli.serve import serve
@@ -58,6 +59,7 @@ for _command in (
     replay,
     export,
     serve,
+    room,
     matlab,
     session,
     monitor,

@@ -142,17 +142,17 @@ def open_desk(
             shown.browse()
         if waits and (desk.has_beginners or desk.past is not None):
             typer.echo("The run begins when a page shows it; with --no-wait it begins at once.")
-            _wait_for(desk.is_seen)
+            wait_for(desk.is_seen)
         desk.begin()
         Driver(desk, programs_ended).run()
-        _wait_for(threading.Event())
+        wait_for(threading.Event())
     except KeyboardInterrupt:
         typer.echo(f"Stopped after {desk.sim.time_s:.1f} s of simulated time.")
     finally:
         shown.close()
 
 
-def _wait_for(event: threading.Event) -> None:
+def wait_for(event: threading.Event) -> None:
     """Wait for an event or Ctrl-C: a signal that comes just before a wait acts after it, so no wait may be long."""
     while not event.wait(CTRL_C_S):
         pass

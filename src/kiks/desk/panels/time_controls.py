@@ -64,7 +64,9 @@ class TimePanel(Panel):
         self._add("dangerous", "halt", "Halt: stop all programs and all robots", desk.halt,
                   "All programs and all robots are stopped.")  # fmt: skip
         self._step_s = _select(STEPS, 0.01, "Size of a step", "step-size", "5rem").classes("desk-spare")
-        self._speed = _select(SPEEDS, self._shown_speed(), "Speed of time", "speed", "8.5rem")
+        most = desk.speed_max or float("inf")
+        self._speeds = {speed: word for speed, word in SPEEDS.items() if (speed or float("inf")) <= most}
+        self._speed = _select(self._speeds, self._shown_speed(), "Speed of time", "speed", "8.5rem")
         self._speed.on_value_change(self._set_speed)
         place_tip(self._speed, "Simulated time per real time; it never changes what robots do", "below")
         ClockView(feed, "clock_view.css")
@@ -91,7 +93,9 @@ class TimePanel(Panel):
 
     def _shown_speed(self) -> float:
         speed = self._desk.gate.speed
-        return 0.0 if speed is None else min((each for each in SPEEDS if each), key=lambda each: abs(each - speed))
+        return (
+            0.0 if speed is None else min((each for each in self._speeds if each), key=lambda each: abs(each - speed))
+        )
 
     def refresh(self) -> None:
         """Show whether time runs, and at which speed."""

@@ -24,6 +24,7 @@ from kiks.model.project import Project, ProjectRobot
 from kiks.ports.program_process import Command, Permission, commands_of, supervisor_of
 from kiks.ports.programs import Programs
 from kiks.sim.from_project import described, project_of, simulation_of
+from kiks.sim.judge import Judgement
 from kiks.sim.ring_buffer import RingBuffer
 from kiks.sim.simulation import Simulation
 from kiks.sim.supervision import Supervision
@@ -72,8 +73,12 @@ class Desk:
         project: The project it was built from; derived from the world if left out.
         speed: Simulated seconds per real second; None for full speed.
         folder: Where files are opened and saved.
+        home: Where the project lies with its programs, its supervisor and its kinds of robots; `folder` if left out.
+        speed_max: The highest speed that people may choose; None for no limit.
         owns_world: Whether the world may be replaced; False if a program outside holds it.
         may_run_programs: Whether a browser or a project may start programs other than `commands`.
+        is_for_others: Whether its people are others than the user of this computer: then no file of theirs becomes a
+            supervisor.
         commands: Programs that start with the world, the first for robot 1 and so on; they are always permitted.
         supervisor: File of the project's supervisor, which is permitted, too.
         new_programs: Factory of a world's program host; the default takes the project's settings.
@@ -105,8 +110,11 @@ class Desk:
         project: Project | None = None,
         speed: float | None = 1.0,
         folder: Path | None = None,
+        home: Path | None = None,
+        speed_max: float | None = None,
         owns_world: bool = False,
         may_run_programs: bool = False,
+        is_for_others: bool = False,
         commands: Sequence[Command | None] = (),
         supervisor: Path | None = None,
         new_programs: NewPrograms | None = None,
@@ -120,6 +128,7 @@ class Desk:
         self.owns_world = owns_world
         self.may_run_programs = may_run_programs
         self.may_edit = may_edit
+        self.is_for_others = is_for_others
         self.has_old_coordinates = has_old_coordinates
         self.project_of = project_of
         self.scene = 0
@@ -133,7 +142,8 @@ class Desk:
         self._has_begun = not is_held
         self._commands = list(commands)
         self._supervisor = _command_of(supervisor)
-        self._home = self.folder
+        self.speed_max = speed_max
+        self._home = self.folder if home is None else home.resolve()
         self._granted = [*commands, self._supervisor]
         self._new_programs = new_programs or self._usual_programs
         self._retired: list[Programs] = []
@@ -183,6 +193,13 @@ class Desk:
             self.looking.keep()
 
     @property
+    def judgement(self) -> Judgement | None:
+        """How the present run has ended; None while it is not decided, and without a goal."""
+        supervisor = self.present.sim.loop.supervisor
+        judge = supervisor.judge if isinstance(supervisor, Supervision) else None
+        return None if judge is None else judge.judgement
+
+    @property
     def has_beginners(self) -> bool:
         """Whether programs start with the world."""
         return any(command is not None for command in self._commands)
@@ -202,9 +219,8 @@ class Desk:
     def _permission(self) -> Permission:
         return Permission(self._granted, folders=(self.folder, EXAMPLES.parent), may_start_others=self.may_run_programs)
 
-    def _permitted(self, commands: Sequence[Command | None]) -> list[Command | None]:
+    def _permitted(self, commands: Sequence[Command | None], permission: Permission) -> list[Command | None]:
         """Return the programs with None for each that may not start; people get a message about those."""
-        permission = self._permission()
 
         def permitted(command: Command | None) -> Command | None:
             try:
@@ -305,7 +321,7 @@ class Desk:
             LinkError: If the world cannot be replaced.
         """
         home = folder or self._home
-        await self._put(project, commands_of(project, home), _command_of(supervisor_of(project, home)))
+        await self._put(project, commands_of(project, home), _command_of(supervisor_of(project, home)), home)
         self._home = home
 
     async def alter(self, project: Project) -> None:
@@ -324,19 +340,24 @@ class Desk:
         Raises:
             LinkError: If the world cannot be replaced.
         """
-        await self._put(self.project, self._commands, self._supervisor)
+        await self._put(self.project, self._commands, self._supervisor, self._home)
 
-    async def _put(self, project: Project, commands: Sequence[Command | None], supervisor: Command | None) -> None:
-        """Begin the world of a project."""
+    async def _put(
+        self, project: Project, commands: Sequence[Command | None], supervisor: Command | None, home: Path
+    ) -> None:
+        """Begin the world of a project, which lies in a folder."""
         self._check_owns()
-        sim = await asyncio.to_thread(simulation_of, project, self.folder)
+        sim = await asyncio.to_thread(simulation_of, project, home)
         old, before = self.present, (self.project, self._commands, self._supervisor)
         was_paused = old.gate.is_paused
         world = DeskWorld(sim, old.gate.speed)
         if was_paused and self.past is None:
             world.pause()
         self.project = project
-        *self._commands, self._supervisor = self._permitted([*commands, supervisor])
+        self._commands = self._permitted(commands, self._permission())
+        # A supervisor runs in this process, which a sandbox is to protect.
+        only = Permission(self._granted) if self.is_for_others else self._permission()
+        (self._supervisor,) = self._permitted([supervisor], only)
         # Its recording ends without a wait for the thread that moves it.
         await old.do(lambda _: old.pause())
         try:
@@ -459,6 +480,11 @@ class Desk:
 
     async def set_speed(self, speed: float | None) -> None:
         """Set the speed [simulated seconds per real second]; None for full speed."""
+        if self.speed_max is not None and (speed is None or speed > self.speed_max):
+            raise ParameterError(
+                f"The speed must be at most {self.speed_max:g} x here, as many share this computer, but it was "
+                f"{'full speed' if speed is None else f'{speed:g} x'}."
+            )
         world = self.shown
         await world.do(lambda sim: world.gate.set_speed(speed, sim.now_ns))
 
@@ -554,15 +580,20 @@ class NewsHandler(logging.Handler):
 
     Args:
         desk: The desk.
+
+    Attributes:
+        thread: Number of the only thread whose warnings it shows; None for all.
     """
 
     def __init__(self, desk: Desk) -> None:
         super().__init__(logging.WARNING)
         self._desk = desk
+        self.thread: int | None = None
 
     def emit(self, record: logging.LogRecord) -> None:
         """Show a log record."""
-        self._desk.say(self.format(record))
+        if self.thread in (None, record.thread):
+            self._desk.say(self.format(record))
 
 
 def _command_of(supervisor: Path | None) -> Command | None:

@@ -69,6 +69,7 @@ class Shown:
         desk: The desk.
         host: Address to listen at.
         port: TCP port, 0 for a free one; if left out, 8123, or a free one if that is taken.
+        number: Its number in its address; the next one if left out.
 
     Attributes:
         desk: The desk.
@@ -79,14 +80,16 @@ class Shown:
         LinkError: If it cannot listen there.
     """
 
-    def __init__(self, desk: Desk, *, host: str = "127.0.0.1", port: int | None = None) -> None:
+    def __init__(
+        self, desk: Desk, *, host: str = "127.0.0.1", port: int | None = None, number: int | None = None
+    ) -> None:
         self.desk = desk
         with desk.sim.lock:
             # Compile the code for frames before the first browser waits for it.
             pack_frame(desk.sim, scene=0)
         desk.keep_past()
         SERVER.start(host=host, port=port)
-        self.gateway = SERVER.open(desk)
+        self.gateway = SERVER.open(desk, number)
         self.url = SERVER.url(self.gateway.number)
         self._driver: Driver | None = None
         self._thread: threading.Thread | None = None
@@ -100,6 +103,8 @@ class Shown:
             self._driver = Driver(self.desk)
             self._thread = threading.Thread(target=self._driver.run, name="kiks driver", daemon=True)
             self._thread.start()
+            if self.desk.is_for_others:
+                self._news.thread = self._thread.ident
 
     def browse(self) -> None:
         """Open the desk in a browser if there is a screen."""

@@ -1,0 +1,84 @@
+"""`kiks room`: a class at its desks."""
+
+from __future__ import annotations
+
+import threading
+from pathlib import Path
+from typing import Annotated
+from urllib.parse import urlsplit
+
+import typer
+
+from kiks.cli.desk import wait_for
+from kiks.cli.engine_start import ready_engine
+from kiks.ending import end_as_with_ctrl_c
+from kiks.errors import ParameterError, shown
+
+
+def room(
+    exercise: Annotated[
+        Path, typer.Argument(help="A project, or the folder of an exercise: each desk begins with it.")
+    ],
+    students: Annotated[Path, typer.Option(metavar="FILE", help="The students' names, one on each line, at most 200.")],
+    host: Annotated[str, typer.Option(help="Address to listen at: 0.0.0.0 for all of this computer's.")] = "127.0.0.1",
+    port: Annotated[
+        int | None, typer.Option(help="TCP port, 0 for a free one; 8123 if left out.", min=0, max=65535)
+    ] = None,
+    code: Annotated[
+        str | None, typer.Option(help="Code that lets students in; that of the last time, or a random one if left out.")
+    ] = None,
+    folder: Annotated[
+        Path, typer.Option(metavar="FOLDER", help="Where students' files and what they hand in are kept.")
+    ] = Path("room"),
+    address: Annotated[
+        str,
+        typer.Option(metavar="URL", help="The address that people open, behind a proxy: https://kiks.school.example."),
+    ] = "",
+    trusted: Annotated[
+        bool, typer.Option("--trusted", help="Run students' programs with your rights where there is no sandbox.")
+    ] = False,
+) -> None:
+    """Open a room: one address for a class, and a desk for each student.
+
+    Students give the code and choose their names. The address that is printed for you shows all desks. Ctrl-C ends it;
+    what students have written is there again the next time.
+
+    Example: kiks room square.kiks --students names.txt --host 0.0.0.0
+    """
+    from kiks.desk.room.entrance import check_code
+    from kiks.desk.room.names import read_names
+    from kiks.model.project import Project
+
+    names, code = read_names(students), check_code(code) if code is not None else ""
+    _check_address(address)
+    project = Project.load(exercise)
+    if not trusted:
+        raise ParameterError(
+            "students' programs must run in a sandbox, but there is none. Add --trusted if you trust all students: "
+            "their programs can do what you can."
+        )
+    ready_engine()
+    from kiks.desk.room.page import open_room
+    from kiks.desk.room.room import Room
+
+    home = exercise if exercise.is_dir() else exercise.parent
+    opened = Room(project, home, names, folder, code=code, address=address)
+    with open_room(opened, host=host, port=port):
+        end_as_with_ctrl_c()
+        typer.echo(f"For the class: {opened.address}   The code: {opened.code}")
+        typer.echo(f"For you alone: {opened.lecturer_address}   Ctrl-C ends the room.")
+        wait_for(threading.Event())
+
+
+def _check_address(address: str) -> None:
+    try:
+        url = urlsplit(address)
+        is_right = url.scheme in ("http", "https") and url.hostname and url.path in ("", "/") and not url.query
+        url.port  # noqa: B018 # raises if it is none
+    except ValueError:
+        is_right = False
+    if address and not is_right:
+        raise ParameterError(
+            f"--address must be that of the proxy, without a path, but it was {shown(address)}. For example "
+            "https://kiks.school.example."
+        )

@@ -1,0 +1,1 @@
+"""A room: a desk for each student of a class, behind one address, and the lecturer's page."""

@@ -1,0 +1,187 @@
+"""The entrance of a room: a plain page at which students give the room's code and choose their names."""
+
+from __future__ import annotations
+
+import hmac
+import re
+import time
+from collections.abc import Awaitable, Callable, Iterable
+from pathlib import Path
+from typing import NamedTuple
+from urllib.parse import parse_qs
+
+from jinja2 import Environment
+from starlette.requests import Request
+from starlette.responses import HTMLResponse, Response
+from starlette.types import Receive, Scope, Send
+
+from kiks.desk.server.access import LOOPBACK, Door
+from kiks.desk.server.token import Token
+from kiks.errors import ParameterError, shown
+
+LETTERS = "ABCDEFGHJKLMNPQRSTUVWXYZ23456789"
+"""Of a code that KiKS makes: those that people confuse on a blackboard are missing."""
+
+CODE_LENGTH = 6
+
+FORM_BYTES_MAX = 4096
+"""Most bytes of a form: a code and a name."""
+
+ADDRESSES_MAX = 1000
+"""Most addresses whose guesses are counted apart."""
+
+_PAGE = Environment(autoescape=True).from_string(
+    (Path(__file__).parents[1] / "web" / "entrance.html").read_text(encoding="utf-8")
+)
+
+
+def check_code(code: str) -> str:
+    """Return a code that a person has chosen, as it is compared."""
+    if not re.fullmatch(r"[A-Za-z0-9 -]{6,40}", code) or len(plain := plain_code(code)) < CODE_LENGTH:
+        raise ParameterError(
+            f"--code must have at least {CODE_LENGTH} letters and digits, at most 40, but it was {shown(code)}. Leave "
+            "it out for one that nobody can guess."
+        )
+    return plain
+
+
+def plain_code(code: str) -> str:
+    """Return a code as it is compared: in capitals, without the blanks and dashes that people add.
+
+    Example:
+        >>> plain_code(" kx7-q2m")
+        'KX7Q2M'
+    """
+    return re.sub(r"[\s-]", "", code).upper()
+
+
+class Rate(NamedTuple):
+    """How many wrong codes are borne: some at once, and then so many a second."""
+
+    at_once: float
+    per_s: float
+
+
+OF_ONE, OF_ALL = Rate(20, 0.5), Rate(200, 5.0)
+"""Of one address, which a whole class may share; of all together. A code of KiKS is one of a thousand million."""
+
+
+class Guesses:
+    """Counts wrong codes, and says who must wait.
+
+    Args:
+        wall_s: A monotonic clock [s]; tests pass their own.
+
+    Example:
+        >>> now = [0.0]
+        >>> guesses = Guesses(wall_s=lambda: now[0])
+        >>> for _ in range(20):
+        ...     guesses.note_wrong("192.0.2.1")
+        >>> guesses.must_wait("192.0.2.1"), guesses.must_wait("192.0.2.2")
+        (True, False)
+        >>> now[0] = 4.0
+        >>> guesses.must_wait("192.0.2.1")
+        False
+    """
+
+    def __init__(self, *, wall_s: Callable[[], float] = time.monotonic) -> None:
+        self._wall_s = wall_s
+        # Since when [s], and how many are not forgotten yet; the newest last.
+        self._counts: dict[str, tuple[float, float]] = {}
+
+    def must_wait(self, address: str) -> bool:
+        """Return whether no code of an address is looked at now, be it right or wrong."""
+        return any(self._count(name, rate) > rate.at_once - 1 for name, rate in _rates(address))
+
+    def note_wrong(self, address: str) -> None:
+        """Count a wrong code."""
+        for name, rate in _rates(address):
+            count = self._count(name, rate) + 1
+            self._counts.pop(name, None)
+            self._counts[name] = self._wall_s(), count
+        while len(self._counts) > ADDRESSES_MAX:
+            del self._counts[next(iter(self._counts))]
+
+    def _count(self, name: str, rate: Rate) -> float:
+        since_s, count = self._counts.get(name, (0.0, 0.0))
+        return max(count - rate.per_s * (self._wall_s() - since_s), 0.0)
+
+
+def _rates(address: str) -> Iterable[tuple[str, Rate]]:
+    return (address, OF_ONE), ("", OF_ALL)
+
+
+class Entrance:
+    """ASGI application for `/`.
+
+    Args:
+        code: The code, as `plain_code` returns it.
+        title: What the page is called.
+        door: Makes cookies.
+        names: Returns the names, each with whether it is free.
+        take: Gives a name to a browser, and returns its token; raises a `ParameterError` if it is not free.
+    """
+
+    def __init__(
+        self,
+        code: str,
+        title: str,
+        door: Door,
+        names: Callable[[], dict[str, bool]],
+        take: Callable[[str], Awaitable[Token]],
+    ) -> None:
+        self.guesses = Guesses()
+        self._code, self._title, self._door = code, title, door
+        self._names, self._take = names, take
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer a request."""
+        request = Request(scope, receive)
+        await (await self._answer(request))(scope, receive, send)
+
+    async def _answer(self, request: Request) -> Response:
+        if request.method not in ("GET", "POST"):
+            return Response(status_code=405)
+        given = dict(request.query_params) if request.method == "GET" else await _form(request)
+        if given is None:
+            return Response(status_code=413)
+        code, name = given.get("code", ""), given.get("name", "")
+        if not code:
+            return self._page("code")
+        address = self._address(request)
+        if self.guesses.must_wait(address):
+            return self._page("code", fault="Too many wrong codes came from here. Try again in a minute.", status=429)
+        if not hmac.compare_digest(plain_code(code).encode(), self._code.encode()):
+            self.guesses.note_wrong(address)
+            return self._page("code", fault="The code is another one. Look at the blackboard again.", status=403)
+        if request.method == "GET" or not name:
+            return self._page("names")
+        try:
+            key = await self._take(name)
+        except ParameterError as error:
+            return self._page("names", fault=str(error), status=409)
+        return self._page("welcome", home=f"{key.place}/", name=name, cookie=self._door.cookie(key))
+
+    def _page(self, step: str, *, fault: str = "", status: int = 200, cookie: str = "", **more: str) -> Response:
+        headers = {"cache-control": "no-store"} | ({"set-cookie": cookie} if cookie else {})
+        names = self._names() if step == "names" else {}
+        text = _PAGE.render(step=step, title=self._title, code=self._code, names=names, fault=fault, **more)
+        return HTMLResponse(text, status, headers)
+
+    def _address(self, request: Request) -> str:
+        """Return whose guess it is: the connection's other end, or what a proxy of this computer says of its own."""
+        address = request.client.host if request.client is not None else ""
+        if self._door.name is not None and address in LOOPBACK:
+            return request.headers.get("x-forwarded-for", address).rpartition(",")[2].strip()[:50]
+        return address
+
+
+async def _form(request: Request) -> dict[str, str] | None:
+    """Return the fields of a form; None if it is too large."""
+    data = b""
+    async for piece in request.stream():
+        data += piece
+        if len(data) > FORM_BYTES_MAX:
+            return None
+    fields = parse_qs(data.decode("utf-8", errors="replace"), max_num_fields=10) if data.count(b"&") < 10 else {}
+    return {name: values[0] for name, values in fields.items()}

@@ -1,0 +1,251 @@
+"""A room: a desk for each student of a class, each with its own world and folder, behind one address."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import re
+import secrets
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path, PurePosixPath
+from urllib.parse import urlsplit
+
+from nicegui import background_tasks
+
+from kiks.desk.room.entrance import CODE_LENGTH, LETTERS, Entrance
+from kiks.desk.room.pictures import Pictures
+from kiks.desk.room.seats import Seat, read_seats, write_seats
+from kiks.desk.server.access import ADVICE
+from kiks.desk.server.desk import Desk
+from kiks.desk.server.server import SERVER
+from kiks.desk.server.show import Shown
+from kiks.desk.server.token import Token
+from kiks.errors import KiksError, ParameterError, shown
+from kiks.model.atomic_files import make_folder, replace_file
+from kiks.model.limits import UPLOAD_BYTES_MAX
+from kiks.model.project import Project
+from kiks.ports.program_process import commands_of, supervisor_of
+from kiks.sim.from_project import simulation_of
+
+SPEED_MAX = 5.0
+"""Highest speed of a desk in a room [simulated seconds per real second]."""
+
+DESKS, HANDED_IN = "desks", "handed-in"
+"""Folders of the room's folder: one below the first for each student; what students hand in."""
+
+LOOK_S = 1.0
+"""Period at which the room looks how the desks do [s]."""
+
+STUDENT_ADVICE = """<p><a href="/">Choose your name again</a>, or ask your teacher.</p>
+<p>For the teacher: open the complete address that KiKS printed when it started. It ends in <code>?token=</code> and a
+long word.</p>"""
+
+
+class Room:
+    """The desks of a class, and what the lecturer sees of them.
+
+    Students come in by the entrance; their browsers get tokens that open their own desks alone. The owner's token opens
+    the lecturer's page and all desks.
+
+    Args:
+        project: The exercise.
+        home: Where it lies.
+        names: The students' names.
+        folder: Where the room keeps the students' folders and what they hand in.
+        code: The code of the entrance; that of the last time if left out, or a random one.
+        address: The address that people open, if it is that of a proxy.
+
+    Attributes:
+        project: What each desk begins with: the exercise without its hidden cases.
+        title: The title of the exercise.
+        code: The code of the entrance.
+        seats: The students' places, by their names.
+        desks: The open desks, by the students' names.
+        may_hand_in: Whether handing in is open.
+    """
+
+    def __init__(
+        self, project: Project, home: Path, names: Sequence[str], folder: Path, *, code: str = "", address: str = ""
+    ) -> None:
+        self.project = replace(project, cases=tuple(each for each in project.cases if not each.is_hidden))
+        self.title = (project.exercise.title if project.exercise is not None else "") or project.arena.name
+        self.folder, self._home = folder.resolve(), home
+        is_new = not self.folder.exists()
+        for each in (DESKS, HANDED_IN):
+            make_folder(self.folder / each, "--folder")
+        if is_new:
+            self.folder.chmod(0o700)  # other users of this computer may be students
+        self.seats, kept_code = read_seats(self.folder, list(names))
+        self.code = code or kept_code or "".join(secrets.choice(LETTERS) for _ in range(CODE_LENGTH))
+        self.desks: dict[str, Shown] = {}
+        self.may_hand_in = True
+        self._pictures: dict[str, Pictures] = {}
+        self._public = address
+        self._turn = asyncio.Lock()
+        self._is_over = False
+
+    # ---- from the thread of the command ----
+
+    def open(self, *, host: str = "127.0.0.1", port: int | None = None) -> None:
+        """Let people in; the desks of those who have been there are open again.
+
+        Raises:
+            LinkError: If the room cannot listen there.
+        """
+        door = SERVER.door
+        door.advice = STUDENT_ADVICE
+        if self._public:
+            url = urlsplit(self._public)
+            door.name, door.is_secure = url.hostname, url.scheme == "https"
+        SERVER.start(host=host, port=port)
+        for seat in self.seats.values():
+            if seat.number:
+                self._open(seat)
+        self.save()
+        door.entrance = Entrance(self.code, self.title, door, self.free_names, self.take)
+        SERVER.run(self._begin())
+
+    async def _begin(self) -> None:
+        for seat in self.seats.values():
+            if seat.key is not None:
+                SERVER.door.add(seat.key)
+        background_tasks.create(self._watch(), name="kiks room")
+
+    def close(self) -> None:
+        """Close all desks, and let no student in."""
+        self._is_over = True
+        door = SERVER.door
+        door.entrance, door.advice, door.name, door.is_secure = None, ADVICE, None, False
+        for each in self.desks.values():
+            each.close()
+        SERVER.run(self._leave())
+
+    async def _leave(self) -> None:
+        for key in tuple(SERVER.door.keys.values()):
+            await SERVER.door.remove(key)
+
+    @property
+    def address(self) -> str:
+        """The address for students, without the code."""
+        return f"{self._public.rstrip('/')}/" if self._public else SERVER.address()
+
+    @property
+    def address_with_code(self) -> str:
+        """The address that leads past the question for the code."""
+        return f"{self.address}?code={self.code}"
+
+    @property
+    def lecturer_address(self) -> str:
+        """The address of the lecturer's page, with its token."""
+        return f"{self.address}room?token={SERVER.key.token}"
+
+    # ---- in the server's thread ----
+
+    def free_names(self) -> dict[str, bool]:
+        """Return all names, each with whether it is free."""
+        return {name: seat.key is None for name, seat in self.seats.items()}
+
+    async def take(self, name: str) -> Token:
+        """Give a name to a browser, and return its token; its desk opens.
+
+        Raises:
+            ParameterError: If the name is none of the class, or not free.
+        """
+        async with self._turn:
+            if (seat := self.seats.get(name)) is None:
+                raise ParameterError(f"The name must be one of the class, but it was {shown(name)}. Choose another.")
+            if seat.key is not None:
+                raise ParameterError(f"The name must be free, but {name} is taken. Ask your teacher to give it free.")
+            if not seat.number:
+                seat.number = max(each.number for each in self.seats.values()) + 1
+            if name not in self.desks:
+                await asyncio.to_thread(self._open, seat)
+            seat.key = Token(desk=seat.number)
+            SERVER.door.add(seat.key)
+            await asyncio.to_thread(self.save)
+            return seat.key
+
+    async def give_free(self, name: str) -> None:
+        """Let any browser take a name again; the one that had it is disconnected, and the desk stays as it is."""
+        async with self._turn:
+            seat = self.seats[name]
+            if seat.key is not None:
+                key, seat.key = seat.key, None
+                await SERVER.door.remove(key)
+                await asyncio.to_thread(self.save)
+
+    def let_hand_in(self, is_open: bool) -> None:
+        """Open or close handing in."""
+        self.may_hand_in = is_open
+        for each in self.desks.values():
+            each.desk.may_hand_in = is_open
+
+    async def picture(self, name: str) -> bytes:
+        """Return a small picture of a desk's world."""
+        return await self._pictures[name].draw()
+
+    # ---- inside ----
+
+    def save(self) -> None:
+        """Write down which browser has which name, and how the desks do."""
+        write_seats(self.folder, self.seats, self.code)
+
+    def _open(self, seat: Seat) -> None:
+        """Open the desk of a student."""
+        folder = self.folder / DESKS / seat.folder
+        make_folder(folder, "a student's folder")
+        desk = Desk(
+            simulation_of(self.project, self._home),
+            project=self.project,
+            speed=min(self.project.speed or SPEED_MAX, SPEED_MAX),
+            speed_max=SPEED_MAX,
+            folder=folder,
+            home=self._home,
+            owns_world=True,
+            may_run_programs=True,
+            is_for_others=True,
+            commands=commands_of(self.project, self._home),
+            supervisor=supervisor_of(self.project, self._home),
+        )
+        desk.hand_in, desk.may_hand_in = partial(self._take_in, seat), self.may_hand_in
+        opened = Shown(desk, number=seat.number)
+        desk.begin()
+        opened.drive()
+        self._pictures[seat.name] = Pictures(desk)
+        self.desks[seat.name] = opened
+
+    def _take_in(self, seat: Seat, data: bytes, name: str) -> None:
+        """Take what a student hands in; the latest counts."""
+        if not self.may_hand_in:
+            raise ParameterError("Handing in must be open, but your teacher has closed it. Ask your teacher.")
+        ending = PurePosixPath(name).suffix.lower()
+        if not re.fullmatch(r"\.[a-z0-9]{1,8}", ending) or len(data) > UPLOAD_BYTES_MAX:
+            raise ParameterError(
+                f"What is handed in must be a file of at most {UPLOAD_BYTES_MAX >> 20} MiB, but it was "
+                f"{shown(name)} of {len(data) / 2**20:.1f}. Hand in another one."
+            )
+        file = f"{seat.folder}{ending}"
+        replace_file(self.folder / HANDED_IN / file, data, "what is handed in")
+        if seat.handed_in not in ("", file):
+            (self.folder / HANDED_IN / seat.handed_in).unlink(missing_ok=True)
+        seat.handed_in = file
+        self.save()
+
+    async def _watch(self) -> None:
+        """Note how the desks do, until the room is closed."""
+        log = logging.getLogger("kiks.desk")
+        while not self._is_over:
+            await asyncio.sleep(LOOK_S)
+            has_news = False
+            for name, each in tuple(self.desks.items()):
+                judged = each.desk.judgement
+                # Of a goal of the student's own making a judgement says nothing.
+                if judged is not None and each.desk.project.goal == self.project.goal:
+                    has_news |= self.seats[name].note(judged.points, is_solved=judged.is_solved)
+            if has_news:
+                try:
+                    await asyncio.to_thread(self.save)
+                except KiksError as error:
+                    log.error("%s", error)

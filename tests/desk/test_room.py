@@ -1,0 +1,341 @@
+"""A room: students come in by code and name, and nothing of one reaches another."""
+
+from __future__ import annotations
+
+import asyncio
+import http.client
+import json
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlencode, urlsplit
+
+import pytest
+import socketio
+from nicegui import Client
+from tests.guard import GUARD_S
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import ClientConnection, connect
+
+from kiks.desk.room.entrance import Guesses, check_code
+from kiks.desk.room.names import folder_name, read_names
+from kiks.desk.room.page import open_room
+from kiks.desk.room.room import SPEED_MAX, Room
+from kiks.desk.server.server import SERVER
+from kiks.desk.server.token import COOKIE
+from kiks.errors import ParameterError
+from kiks.model.arena import Arena
+from kiks.model.exercise import Cases, Exercise
+from kiks.model.goal import Goal
+from kiks.model.project import Project, ProjectRobot
+
+NAMES = ["Ada", "Bob", "../etc", "<b>Eve</b>"]
+CODE = "KX7Q2M"
+
+
+@dataclass
+class Browser:
+    """A browser without a person: it keeps one cookie."""
+
+    cookie: str = ""
+    home: str = ""
+
+    def ask(self, path: str, method: str = "GET", body: str | None = None, **headers: str) -> tuple[int, str, str]:
+        """Return status, headers and page."""
+        asking = http.client.HTTPConnection(urlsplit(SERVER.address()).netloc, timeout=GUARD_S)
+        sent = {"Cookie": self.cookie, **{name.replace("_", "-"): value for name, value in headers.items()}}
+        asking.request(method, path, body, sent)
+        answer = asking.getresponse()
+        page = answer.read().decode(errors="replace")
+        asking.close()
+        return answer.status, str(answer.headers), page
+
+    def enter(self, name: str, code: str = CODE) -> int:
+        """Choose a name, and keep the cookie; return the status."""
+        status, headers, page = self.ask("/", "POST", urlencode({"code": code, "name": name}))
+        if (found := re.search(f"{COOKIE}=[^;]+", headers)) is not None:
+            self.cookie = found[0]
+            self.home = json.loads(re.search("const home = (.*);", page)[1])  # type: ignore[index]
+        return status
+
+    def page(self, path: str = "") -> tuple[int, str]:
+        status, _, page = self.ask(f"{self.home}{path}")
+        return status, page
+
+    def feed(self, path: str) -> ClientConnection:
+        netloc = urlsplit(SERVER.address()).netloc
+        return connect(f"ws://{netloc}{path}", additional_headers={"Cookie": self.cookie}, compression=None)
+
+    def client_id(self, path: str) -> str:
+        """Open a page of NiceGUI, and return the number that it has."""
+        known = set(Client.instances)
+        assert self.page(path)[0] == 200
+        (new,) = set(Client.instances) - known
+        return new
+
+
+def exercise() -> Project:
+    arena = Arena.box(400, 400)
+    shown, hidden = Cases("home", seed=(1, 2)), Cases("secret", seed=(3,), is_hidden=True)
+    goal = Goal("Drive 5 cm", solved="path_mm > 50", points="7 * is_solved")
+    return Project(
+        arena,
+        robots=(ProjectRobot(),),
+        goal=goal,
+        cases=(shown, hidden),
+        exercise=Exercise("Drive"),
+    )
+
+
+@pytest.fixture
+def room(tmp_path: Path) -> Iterator[Room]:
+    room = Room(exercise(), tmp_path, NAMES, tmp_path / "room", code=CODE)
+    with open_room(room, port=0):
+        yield room
+
+
+def assert_ends(feed: ClientConnection) -> None:
+    for _ in range(1000):
+        try:
+            feed.recv(timeout=GUARD_S)
+        except ConnectionClosed:
+            return
+    raise AssertionError("the connection is still there")
+
+
+def owner() -> Browser:
+    return Browser(f"{COOKIE}={SERVER.key.token}", f"{SERVER.key.place}/")
+
+
+def test_a_student_comes_in_by_code_and_name(room: Room) -> None:
+    browser = Browser()
+    assert browser.ask("/")[0] == 200
+    assert "Ada" not in browser.ask("/")[2]
+    assert browser.ask("/?code=AAAAAA")[0] == 403
+    status, _, page = browser.ask("/?code=kx7-q2m")
+    assert status == 200
+    assert "Ada" in page
+    assert "<b>" not in page
+    assert browser.enter("Ada", "AAAAAA") == 403
+    assert browser.enter("Nobody") == 409
+    assert not browser.cookie
+    assert browser.enter("Ada") == 200
+    status, headers, _ = browser.ask(browser.home)
+    assert status == 307
+    assert "desk/1" in headers
+    assert browser.page("desk/1")[0] == 200
+    with browser.feed(f"{browser.home}desk/1/feed") as feed:
+        assert json.loads(feed.recv(timeout=GUARD_S))["kind"] == "scene"
+
+
+def test_a_name_is_taken_until_it_is_given_free(room: Room) -> None:
+    first, second = Browser(), Browser()
+    assert first.enter("Ada") == 200
+    assert second.enter("Ada") == 409
+    assert not second.cookie
+    (room.desks["Ada"].desk.folder / "mine.py").write_text("print(1)")
+    with first.feed(f"{first.home}desk/1/feed") as feed:
+        feed.recv(timeout=GUARD_S)
+        SERVER.run(room.give_free("Ada"))
+        assert_ends(feed)
+    assert first.page("desk/1")[0] == 403
+    assert second.enter("Ada") == 200
+    assert second.page("desk/1")[0] == 200
+    assert first.page("desk/1")[0] == 403
+    assert (room.desks["Ada"].desk.folder / "mine.py").exists()
+
+
+def test_a_student_reaches_nothing_of_another(room: Room) -> None:
+    ada, bob = Browser(), Browser()
+    assert ada.enter("Ada") == bob.enter("Bob") == 200
+    for path in (
+        *("desk/2", "desk/2/feed", "desk/2/arena/1.png", "desk/02", "desk/1/../2", "desk/1/%2e%2e/2", "desk//2"),
+        *("room", "room/picture/1", "room/", "/room", "./room", "room?token=x", "desk/1/../../room", "openapi.json"),
+    ):
+        assert ada.page(path)[0] in (403, 404), path
+    # With the path of another one, and one's own cookie; and the other way round.
+    for mixed in (Browser(ada.cookie, bob.home), Browser(bob.cookie, ada.home), Browser("", ada.home)):
+        assert mixed.page("desk/1")[0] == mixed.page("desk/2")[0] == mixed.page("room")[0] == 403
+        for number in (1, 2):
+            with pytest.raises(InvalidStatus), mixed.feed(f"{mixed.home}desk/{number}/feed"):
+                pass
+    with pytest.raises(InvalidStatus), ada.feed(f"{ada.home}desk/2/feed"):
+        pass
+    assert Browser(ada.cookie, owner().home).page("room")[0] == 403
+    assert Browser(f"{COOKIE}={SERVER.key.token}", ada.home).page("desk/1")[0] == 403
+    assert ada.ask("/room?token=" + ada.cookie.partition("=")[2])[0] == 403
+    assert owner().page("desk/2")[0] == owner().page("room")[0] == 200
+    assert owner().ask(f"{owner().home}room/picture/1")[2].startswith("\ufffd\ufffd")
+
+
+def test_messages_reach_pages_of_the_same_token_alone(room: Room) -> None:
+    ada, bob = Browser(), Browser()
+    assert ada.enter("Ada") == bob.enter("Bob") == 200
+    own, other, lecturers = ada.client_id("desk/1"), bob.client_id("desk/2"), owner().client_id("room")
+    heard: list[Any] = []
+    for page in (other, lecturers):
+        client = Client.instances[page]
+        for name in ("handle_event", "handle_javascript_response", "handle_log_message"):
+            setattr(client, name, lambda message, name=name: heard.append(name))
+    Client.instances[own].handle_event = lambda message: heard.append("own")  # type: ignore[method-assign]
+
+    async def attack() -> list[Any]:
+        answers = []
+        async with socketio.AsyncSimpleClient() as socket:
+            url = f"{SERVER.address()}?client_id={own}&implicit_handshake=false"
+            path = f"{ada.home}_nicegui_ws/socket.io"
+            await socket.connect(url, headers={"Cookie": ada.cookie}, socketio_path=path, transports=["websocket"])
+            for page in (other, lecturers, own):
+                hand = {"client_id": page, "tab_id": "t", "document_id": "d", "next_message_id": 0}
+                hand["old_tab_id"] = None  # type: ignore[assignment]
+                answers.append(await socket.call("handshake", hand))
+                for event in ("event", "javascript_response", "log", "ack"):
+                    message = {"client_id": page, "id": 1, "level": "error", "message": "x", "next_message_id": 9}
+                    await socket.emit(event, message)
+            for page in ([], {}, None, {"client_id": []}, {"client_id": 7}):
+                await socket.emit("event", page)
+            answers.append(await socket.call("handshake", hand))
+        for page in (other, lecturers):
+            refused = socketio.AsyncSimpleClient()
+            query = f"client_id={page}&implicit_handshake=true&tab_id=t&document_id=d&next_message_id=0"
+            url = f"{SERVER.address()}?{query}"
+            with pytest.raises(socketio.exceptions.ConnectionError):
+                await refused.connect(url, headers={"Cookie": ada.cookie}, socketio_path=path)
+        return answers
+
+    assert asyncio.run(attack())[:3] == [False, False, True]
+    assert set(heard) <= {"own"}
+    assert Client.instances[other].tab_id is None
+    upload = f"{ada.home}_nicegui/client/{other}/upload/5"
+    assert ada.ask(upload, "POST", "x", content_length="1")[0] == 404
+
+
+def test_wrong_codes_are_few() -> None:
+    now = [0.0]
+    guesses = Guesses(wall_s=lambda: now[0])
+    borne = 0
+    for second in range(3600):
+        now[0] = float(second)
+        for _ in range(100):
+            if not guesses.must_wait(f"192.0.2.{second % 200}"):
+                borne += 1
+                guesses.note_wrong(f"192.0.2.{second % 200}")
+    assert borne <= 200 + 5 * 3600
+
+
+def test_a_guesser_has_to_wait(room: Room) -> None:
+    guesser = Browser()
+    answers = [guesser.ask("/?code=AAAAA" + letter)[0] for letter in "BCDEFGHIJKLMNOPQRSTUVWXYZ"]
+    assert answers[:10] == [403] * 10
+    assert answers[-1] == 429
+    assert guesser.enter("Ada") == 429
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("Ada\nBob\n ada \n", "each name once, but 'ada' stands on lines 1 and 3"),
+        ("\n\n \n", "1 to 200 names"),
+        ("\n".join(f"student {number}" for number in range(10_000)), "200 names, one on each line, but it has 10000"),
+        ("Ada\n" + "x" * 61, "60 printable characters, but line 2"),
+        ("Ada\nB\u202eob\n", "60 printable characters, but line 2"),
+        ("Ada\nB\x1b[31mob\n", "60 printable characters"),
+        ("x" * 2_000_000, "at most 1 MiB"),
+        ("A\xffda".encode("latin-1"), "text in UTF-8"),
+    ],
+)
+def test_a_wrong_file_of_names_gets_one_line(tmp_path: Path, text: str | bytes, words: str) -> None:
+    file = tmp_path / "names.txt"
+    file.write_bytes(text if isinstance(text, bytes) else text.encode())
+    with pytest.raises(ParameterError) as raised:
+        read_names(file)
+    assert words in str(raised.value)
+    assert "\n" not in str(raised.value)
+
+
+def test_names_become_folders_that_differ_and_lead_nowhere(tmp_path: Path) -> None:
+    file = tmp_path / "names.txt"
+    file.write_text("\ufeffAda\n\n  Jo\u0308rg   M \r\n../../etc\n/root\nCON\n.ssh\n-rf\n\u65e5\u672c\na/b\na_b\n~\n")
+    names = read_names(file)
+    assert names[:2] == ["Ada", "J\xf6rg M"]
+    folders = [folder_name(name) for name in names]
+    assert folders[0] == "Ada"
+    assert len({each.casefold() for each in folders}) == len(names)
+    for each in folders:
+        assert (tmp_path / each).resolve().parent == tmp_path
+        assert not each.startswith((".", "-", "~"))
+
+
+def test_what_is_handed_in_lies_in_one_folder(room: Room) -> None:
+    for name in ("Ada", "../etc"):
+        assert Browser().enter(name) == 200
+    desks = {name: each.desk for name, each in room.desks.items()}
+    for name, desk in desks.items():
+        assert desk.hand_in is not None
+        desk.hand_in(b"1", "mine.py")
+        desk.hand_in(name.encode(), "../../evil.zip")
+    folder = room.folder / "handed-in"
+    assert {each.name: each.read_bytes() for each in folder.iterdir()} == {
+        "Ada.zip": b"Ada",
+        f"{folder_name('../etc')}.zip": b"../etc",
+    }
+    room.let_hand_in(False)
+    assert not desks["Ada"].may_hand_in
+    with pytest.raises(ParameterError, match="your teacher has closed it"):
+        desks["Ada"].hand_in(b"2", "mine.py")  # type: ignore[misc]
+    room.let_hand_in(True)
+    for wrong in ("mine", "x.p/y", ".", "a.\u65e5"):
+        with pytest.raises(ParameterError, match="must be a file"):
+            desks["Ada"].hand_in(b"2", wrong)  # type: ignore[misc]
+
+
+def test_a_room_comes_up_again(tmp_path: Path) -> None:
+    ada = Browser()
+    for _ in range(2):
+        room = Room(exercise(), tmp_path, NAMES[::-1], tmp_path / "room")
+        with open_room(room, port=0):
+            if not ada.cookie:
+                assert ada.enter("Ada", room.code) == 200
+                room.desks["Ada"].desk.folder.joinpath("mine.py").write_text("print(1)")
+                room.seats["Ada"].note(7, is_solved=True)
+                room.save()
+                code = room.code
+            assert ada.page("desk/1")[0] == 200
+            assert list(room.desks) == ["Ada"]
+            assert room.desks["Ada"].desk.folder.joinpath("mine.py").read_text() == "print(1)"
+            assert Browser().enter("Ada", room.code) == 409
+        assert ada.page("desk/1")[0] == 403
+    assert room.code == code
+    assert room.seats["Ada"].is_solved
+    assert (tmp_path / "room" / "room.json").stat().st_mode & 0o77 == 0
+    (tmp_path / "room" / "room.json").write_text("{")
+    with pytest.raises(ParameterError, match="file of the room"):
+        Room(exercise(), tmp_path, NAMES, tmp_path / "room")
+
+
+def test_a_supervisor_of_a_student_never_runs(room: Room) -> None:
+    assert Browser().enter("Ada") == 200
+    desk = room.desks["Ada"].desk
+    mark = room.folder / "mark"
+    (desk.folder / "evil.py").write_text(f"open({str(mark)!r}, 'w')\ndef supervise(sim):\n    yield 1\n")
+    project = replace(exercise(), supervisor="evil.py")
+    SERVER.run(desk.replace(project, desk.folder))
+    assert not mark.exists()
+    assert any("was left out" in each for each in desk.news.since(0)[1])
+
+
+def test_a_desk_of_a_room_has_a_highest_speed(room: Room) -> None:
+    assert Browser().enter("Ada") == 200
+    for speed in (None, 2 * SPEED_MAX):
+        with pytest.raises(ParameterError, match="as many share this computer"):
+            SERVER.run(room.desks["Ada"].desk.set_speed(speed))
+    assert not any(case.is_hidden for table in room.project.cases for case in table.each())
+
+
+def test_a_code_of_a_persons_own() -> None:
+    assert check_code("ada-2026") == "ADA2026"
+    for code in ("", "12345", "a-b-c", "\u65e5\u672c\u65e5\u672c\u65e5\u672c", "x" * 41):
+        with pytest.raises(ParameterError, match="--code must have"):
+            check_code(code)
