@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import io
+import json
+import zipfile
 from pathlib import Path
 
 import pytest
 from playwright.sync_api import expect
-from tests.desk.visitor import NewPage, Visitor, open_desk
+from tests.desk.visitor import NewPage, Visitor, check_access, open_desk
 
 from kiks.desk.panels.exercise_text import parts_of
 from kiks.model.arena import Arena
 from kiks.model.arena_objects import Lamp, Pose
-from kiks.model.exercise import Exercise
+from kiks.model.exercise import Cases, Exercise
 from kiks.model.goal import Goal
 from kiks.model.project import Project
+from kiks.trials.hand_in import PAGE, SCORE, program_of
 
 TEXT = """Drive to the lamp.
 
@@ -44,6 +48,7 @@ def make_exercise() -> Project:
     return Project(
         Arena(arena.brightness, arena.mm_per_cell, "room", starts=(Pose(100, 200, 0.0),), lamps=(Lamp(700, 200),)),
         seconds=20.0,
+        cases=(Cases(seed=(1, 2)), Cases("hidden", is_hidden=True)),
         goal=Goal("Reach the lamp", solved="light_mm < 120", failed="contacts > 0", points="10 * is_solved"),
         exercise=Exercise("To the lamp", text=TEXT, template=DRIVE.replace("30,30", "0,0")),
     )
@@ -58,7 +63,7 @@ def test_text_loads_and_runs_nothing() -> None:
 
 
 @pytest.mark.slow
-def test_exercise_is_read_solved_and_locked(tmp_path: Path, new_page: NewPage) -> None:
+def test_exercise_is_read_solved_tried_and_handed_in(tmp_path: Path, new_page: NewPage) -> None:
     shown = open_desk(tmp_path, make_exercise())
     try:
         visitor = Visitor(new_page(), shown)
@@ -79,6 +84,32 @@ def test_exercise_is_read_solved_and_locked(tmp_path: Path, new_page: NewPage) -
         expect(visitor.at("board-points")).to_have_text("10 points")
         assert (tmp_path / "to_the_lamp.py").read_text() == DRIVE
         assert visitor.desk.is_paused
+
+        visitor.at("tab-exercise").click()
+        visitor.at("try-all").click()
+        expect(visitor.at("tries-state")).to_have_text("2 of 2 solved, 20 points.")
+        check_access(visitor.page, "exercise")
+        visitor.picture("exercise-tried")
+        visitor.at("show-try-1").click()
+        visitor.until(lambda: visitor.desk.past is not None and visitor.sim.seed == 2 and visitor.sim.time_s > 0.1)
+        visitor.at("back-to-now").click()
+        visitor.until(lambda: visitor.desk.past is None)
+        assert visitor.sim.seed == 0
+        with visitor.page.expect_download() as download:
+            visitor.at("hand-in").click()
+        file = download.value.path().read_bytes()
+        assert download.value.suggested_filename == "to_the_lamp.zip"
+        assert program_of(file) == DRIVE.encode()
+        with zipfile.ZipFile(io.BytesIO(file)) as archive:
+            assert json.loads(archive.read(SCORE))["points"] == 20
+            assert archive.read(PAGE).startswith(b"<!DOCTYPE html>")
+        given: list[tuple[str, bytes]] = []
+        visitor.desk.hand_in = lambda data, name: given.append((name, data))
+        visitor.at("hand-in").click()
+        visitor.told("Handed in: 2 of 2 solved")
+        assert given == [("to_the_lamp.zip", file)]
+        visitor.desk.may_hand_in = False
+        expect(visitor.at("hand-in")).to_be_disabled()
 
         lies = visitor.sim.pose(1)
         visitor.pull(lies[:2], (300, 200))

@@ -29,6 +29,9 @@ OUTCOMES = "outcomes.jsonl"
 ATTEMPTS = 2
 """How often a trial is begun whose worker dies."""
 
+ASK_S = 0.2
+"""Period at which a caller is asked whether the trials go on [s]."""
+
 _READ_SIZE = 1 << 16
 
 
@@ -38,6 +41,7 @@ def run_trials(
     *,
     workers: int | None = None,
     on_outcome: Callable[[Outcome, int], object] = lambda outcome, count: None,
+    goes_on: Callable[[], bool] = lambda: True,
 ) -> list[Outcome]:
     """Run trials; return their outcomes in the order of the trials, the same however many workers there are.
 
@@ -50,6 +54,8 @@ def run_trials(
         workers: How many processes; one for each core if left out.
         on_outcome: Called with each outcome as it comes, also with those that are there at the start, and with how many
             there are by then.
+        goes_on: Asked several times a second; when it says no, the trials under way end, and those that are done are
+            returned.
 
     Raises:
         KiksError: If a trial cannot begin, such as when its project has no time limit.
@@ -91,8 +97,8 @@ def run_trials(
         # A line that a kill has cut short ends here.
         with explained(file, "outcomes"), file.open("ab") as lines:
             lines.write(b"\n")
-        _Crew(missing, folder.absolute(), min(workers or processor_count(), len(missing)), take).run()
-    made = [outcomes[trial.name] for trial in trials]
+        _Crew(missing, folder.absolute(), min(workers or processor_count(), len(missing)), take).run(goes_on)
+    made = [outcomes[trial.name] for trial in trials if trial.name in outcomes]
     replace_file(file, "".join(f"{outcome.to_line()}\n" for outcome in made), "outcomes")
     return made
 
@@ -180,13 +186,13 @@ class _Crew:
         self._workers: set[_Worker] = set()
         self._selector = selectors.DefaultSelector()
 
-    def run(self) -> None:
-        """Run all trials."""
+    def run(self, goes_on: Callable[[], bool]) -> None:
+        """Run all trials, or as many as are done when they shall not go on."""
         try:
             for _ in range(self._count):
                 self._hire()
-            while any(worker.trial is not None for worker in self._workers):
-                for key, _ in self._selector.select():
+            while any(worker.trial is not None for worker in self._workers) and goes_on():
+                for key, _ in self._selector.select(ASK_S):
                     self._hear(key.data)
         finally:
             for worker in self._workers:

@@ -1,13 +1,17 @@
-"""The exercise panel: what is to be done, with hints that unfold."""
+"""The exercise panel: what is to be done, with hints that unfold, and how the program does in all cases."""
 
 from __future__ import annotations
+
+from collections.abc import Awaitable, Callable
 
 from nicegui import ui
 
 from kiks.desk.panels.exercise_text import parts_of
+from kiks.desk.panels.tries import TriesPanel
 from kiks.desk.panels.widgets import Panel, heading, named
 from kiks.desk.server.desk import Desk
 from kiks.model.exercise import Exercise
+from kiks.ports.program_process import Command
 
 CSS = """
 .exercise-text { font-size: 15px; line-height: 1.5; overflow-wrap: anywhere }
@@ -32,15 +36,23 @@ class ExercisePanel(Panel):
 
     Args:
         desk: The desk.
+        program: Saves the program in the editor and returns it; None if a person wants it otherwise.
     """
 
-    def __init__(self, desk: Desk) -> None:
+    def __init__(self, desk: Desk, program: Callable[[], Awaitable[Command | None]]) -> None:
         super().__init__(desk)
         self._shown: Exercise | None = None
         ui.add_css(CSS)
         with ui.column().classes("w-full q-pa-md gap-2"):
             self._text = named(ui.column().classes("w-full gap-0"), "exercise-text")
+            ui.separator()
+            self._tries = TriesPanel(desk, program)
         self.refresh()
+
+    def set_visible(self, is_visible: bool) -> None:
+        """Follow the panel's tab."""
+        super().set_visible(is_visible)
+        self._tries.set_visible(is_visible)
 
     def refresh(self) -> None:
         """Show the text of another exercise."""

@@ -21,6 +21,7 @@ from kiks.desk.panels.widgets import WEB, Panel, heading, named, told
 from kiks.desk.panels.wire import WirePanel
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.live_editing import Editing
+from kiks.ports.program_process import Command
 
 PRIMARY, ACCENT, POSITIVE = "#174a63", "#b85c00", "#1b7a34"
 """Background colours for white text, with contrasts of 9.4, 4.7 and 5.4 to 1. On dark pages, text in these colours is
@@ -96,7 +97,7 @@ class Page:
         """Build the tabs beside the arena; the panel of each is built when it is first opened."""
         desk = self._desk
         tabs: list[tuple[str, str, Callable[[], Panel]]] = [
-            ("exercise", "Exercise", lambda: ExercisePanel(desk)),
+            ("exercise", "Exercise", lambda: ExercisePanel(desk, self._program)),
             ("robot", "Robot", lambda: MonitorPanel(desk, feed)),
             ("wire", "Wire", lambda: WirePanel(desk)),
             ("arena", "Arena", lambda: EditorPanel(desk, self._editing, self._view)),
@@ -123,11 +124,22 @@ class Page:
         if is_exercise or self._tabs.value in (None, "exercise"):
             self._tabs.value = "exercise" if is_exercise else "robot"
 
-    def _open(self, name: str) -> None:
-        """Show a panel, and let the others rest."""
+    def _panel(self, name: str) -> Panel:
+        """Return a panel, which is built when it is first needed."""
         if name not in self._panels:
             with self._places[name]:
                 self._panels[name] = self._builders[name]()
+        return self._panels[name]
+
+    async def _program(self) -> Command | None:
+        """Save the program in the editor, and return it."""
+        programs = self._panel("programs")
+        assert isinstance(programs, ProgramsPanel)
+        return await programs.command()
+
+    def _open(self, name: str) -> None:
+        """Show a panel, and let the others rest."""
+        self._panel(name)
         for each, panel in self._panels.items():
             panel.set_visible(each == name)
 

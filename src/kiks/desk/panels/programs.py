@@ -15,6 +15,7 @@ from kiks.desk.panels.widgets import LogBox, Panel, icon_button, named, offer_ro
 from kiks.desk.server import scripts
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.scripts import EXAMPLES, NEW
+from kiks.errors import ParameterError
 from kiks.model.exercise import Exercise
 from kiks.ports.program_process import Command
 from kiks.ports.programs import Handle
@@ -344,17 +345,28 @@ class ProgramsPanel(Panel):
             where = "an unchanged example, with nothing to save" if is_example else f"saved in {self._desk.folder}"
             ui.notify(f"{script.name} is {where}.")
 
+    async def command(self) -> Command | None:
+        """Check the program in the editor, save it, and return how it is started; None if a person wants it otherwise.
+
+        Raises:
+            ParameterError: If it has a mistake.
+        """
+        if not self._desk.may_run_programs:
+            raise ParameterError(MAY_NOT)
+        if self._check():
+            raise ParameterError(f"The program has a mistake. {self._mistake.text}")
+        arguments = scripts.split_arguments(self._arguments.value or "")
+        script = await self._stored()
+        return None if script is None else Command(script, arguments)
+
     async def _run(self) -> None:
         """Check the program, save it and run it."""
-        if not self._check():
-            arguments = scripts.split_arguments(self._arguments.value or "")
-            if (script := await self._stored()) is not None:
-                await self._start(Command(script, arguments), self._robot.value or 1)
+        if not self._check() and (command := await self.command()) is not None:
+            await self._start(command, self._robot.value or 1)
 
     async def _start(self, command: Command, robot: int) -> None:
         """Start a program on a robot after stopping the one that runs there."""
         desk, programs = self._desk, self._desk.programs
-        desk.check_present()
         if desk.project.exercise is not None and desk.owns_world:
             desk.attach(command, robot)
             if desk.attached(robot) == command:
@@ -363,6 +375,7 @@ class ProgramsPanel(Panel):
                 await desk.go_on()
                 self._show(next((each for each in desk.programs.handles if each.robot == robot), None))
                 return
+        desk.check_present()
         for handle in list(programs.handles):
             if handle.robot == robot and handle.is_running:
                 programs.stop(handle)

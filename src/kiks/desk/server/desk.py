@@ -16,6 +16,7 @@ from kiks.desk.server.desk_world import DeskWorld
 from kiks.desk.server.looking_back import LookingBack
 from kiks.desk.server.player import Player
 from kiks.desk.server.scripts import EXAMPLES
+from kiks.desk.server.tries import Tries
 from kiks.errors import KiksError, LinkError, ParameterError
 from kiks.model.arena import Arena
 from kiks.model.atomic_files import program_in
@@ -98,8 +99,9 @@ class Desk:
         outside: The programs in the world that this desk has not started.
         news: Messages to people, the newest last.
         log: These and what programs of Octave and MATLAB tell, each line with the time of day, the newest last.
-        hand_in: Takes a file that a person hands in, its bytes and its name; None: it is saved in the desk's folder.
-            Raises a `ParameterError` with a message for that person if it is not taken.
+        tries: How a person's program has done in all cases of the exercise.
+        hand_in: Takes a file that a person hands in, its bytes and its name; None: the browser downloads it. Raises
+            a `ParameterError` with a message for that person if it is not taken.
         may_hand_in: Whether a file would be taken now.
     """
 
@@ -137,6 +139,7 @@ class Desk:
         self.outside = OutsidePrograms()
         self.hand_in: Callable[[bytes, str], None] | None = None
         self.may_hand_in = True
+        self.tries = Tries()
         self.is_seen = threading.Event()
         self.looking = LookingBack(lambda: self.present, self.say)
         self._has_begun = not is_held
@@ -307,6 +310,12 @@ class Desk:
         """Check that people may change walls, things and settings."""
         if self.is_locked:
             raise ParameterError(LOCKED)
+
+    def try_all(self, command: Command) -> None:
+        """Try a person's program in all cases of the project, while the world goes on; see `tries`."""
+        self._permission().check(command)
+        has_hidden = self.may_edit or not self.is_locked
+        self.tries.begin(self.project, self._home, command, robot=self.own_robot, has_hidden=has_hidden)
 
     # ---- another world ----
 
@@ -564,6 +573,7 @@ class Desk:
 
     def close(self) -> None:
         """End the programs, release the world, and forget its past."""
+        self.tries.close()
         self.looking.close()
         self.present.gate.close()
         self.clear_away()

@@ -54,6 +54,8 @@ class LookingBack:
         # Time [ns] and note of bookmarks that were set in a finished recording, which cannot keep them.
         self._bookmarks: list[tuple[int, str]] = []
         self._wanted_ns: int | None = None
+        # What is read of this world's own past while people look at another run.
+        self._own: tuple[Source | None, RecordedLog | None, MarkReader | None, list[Mark]] | None = None
         self._turn = asyncio.Lock()
 
     # ---- what is recorded; with the lock of the present world ----
@@ -72,6 +74,7 @@ class LookingBack:
             is_branch: Whether it goes on from a time of the past, which is kept up to there; else it is forgotten.
         """
         before, bookmarks = (self._source, self._bookmarks) if is_branch else (None, [])
+        self._turn_from_other_run()
         self._bookmarks = []
         self._forget()
         if not self._keeps:
@@ -121,8 +124,30 @@ class LookingBack:
         self.has_present = False
         self._show(time_ns)
 
+    async def show_run(self, file: Path) -> None:
+        """Play the recording of another run; the present stands still until people go back to it."""
+        async with self._turn:
+            if self.past is None:
+                await self._stop_present()
+            elif self.has_present:
+                self.stop()
+            reader = McapReader(file)
+            self._own = self._own or (self._source, self._log, self._reader, self.marks)
+            self._use(reader)
+            self.marks = []
+            await asyncio.to_thread(self._show, 0)
+            if (past := self.past) is not None:
+                await past.do(lambda _: past.gate.go_on())
+        await self.tend()
+
+    def _turn_from_other_run(self) -> None:
+        """Read this world's own past again."""
+        if self._own is not None:
+            (self._source, self._log, self._reader, self.marks), self._own = self._own, None
+
     def stop(self) -> None:
         """Show the present, which is another world now."""
+        self._turn_from_other_run()
         past, self.past = self.past, None
         self.has_present = True
         if past is not None:
@@ -188,19 +213,23 @@ class LookingBack:
         if self._source is None:
             raise LinkError("Cannot look back: this world is not recorded. Start it over.")
         if (past := self.past) is None:
-            present = self._present()
-
-            def stop(sim: Simulation) -> None:
-                self._was_running = not present.gate.is_paused
-                present.drop_all()
-                present.pause()
-                self._flush(sim)
-
-            await present.do(stop)
+            await self._stop_present()
             await asyncio.to_thread(self._show, time_ns)
         else:
             await asyncio.to_thread(past.seek, time_ns)
             past.meter = Speedometer()
+
+    async def _stop_present(self) -> None:
+        """Let the present stand still while people look back."""
+        present = self._present()
+
+        def stop(sim: Simulation) -> None:
+            self._was_running = not present.gate.is_paused
+            present.drop_all()
+            present.pause()
+            self._flush(sim)
+
+        await present.do(stop)
 
     def _show(self, time_ns: int) -> None:
         """Begin to show the past at a time [ns]."""

@@ -1,0 +1,172 @@
+"""The tries of a program in all cases of an exercise: the buttons, and a table of what has come out."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from functools import partial
+from pathlib import PurePosixPath
+
+from nicegui import ui
+
+from kiks.desk.panels.widgets import Panel, icon_button, named
+from kiks.desk.server.desk import Desk
+from kiks.errors import ParameterError, counted
+from kiks.ports.program_process import Command
+from kiks.trials.hand_in import score_of
+from kiks.trials.trial import CRASHED, ENDLESS, STOPPED, Outcome
+
+CLOSED = "Handing in is closed now. Ask your lecturer to open it."
+"""What people read who cannot hand in."""
+
+CSS = """
+.tries { width: 100%; border-collapse: collapse; font-size: 14px }
+.tries :is(th, td) { padding: 5px 8px 5px 0; text-align: left; vertical-align: top }
+.tries th { font-weight: 500 }
+.tries tr { border-bottom: 1px solid rgba(127, 140, 155, .4) }
+.tries .tries-number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap }
+.tries-detail { font-size: 12.5px; opacity: .85; overflow-wrap: anywhere; white-space: pre-wrap }
+.tries-solved { color: #1b7a34; font-weight: 500 }
+.body--dark .tries-solved { color: #7ddc95 }
+.tries-failed { color: #b00020; font-weight: 500 }
+.body--dark .tries-failed { color: #ff9a90 }
+"""
+
+
+class TriesPanel(Panel):
+    """The buttons 'Try all' and 'Hand in', and the table.
+
+    Args:
+        desk: The desk.
+        program: Saves the program in the editor and returns it; None if a person wants it otherwise.
+    """
+
+    def __init__(self, desk: Desk, program: Callable[[], Awaitable[Command | None]]) -> None:
+        super().__init__(desk)
+        self._program = program
+        self._drawn: object = None
+        self._is_packing = False
+        ui.add_css(CSS)
+        with ui.row().classes("w-full items-center gap-2"):
+            self._try = ui.button("Try all", icon="playlist_play", on_click=self.acting(self._begin))
+            named(self._try.props("unelevated no-caps color=primary"), "try-all")
+            self._try.tooltip("Run the program of the editor in all cases of this exercise")
+            self._stop = ui.button("Stop", icon="stop", on_click=self.acting(self._end))
+            named(self._stop.props("outline no-caps"), "stop-tries").tooltip("Stop these tries")
+            self._hand_in = ui.button("Hand in", icon="outbox", on_click=self.acting(self._give))
+            named(self._hand_in.props("outline no-caps"), "hand-in")
+            self._hand_in.tooltip("Try the program in all cases, and hand in program, run and score as one file")
+            self._said = named(ui.label().classes("text-body2").props("role=status"), "tries-state")
+        self._table = named(ui.column().classes("w-full"), "tries")
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Show what has come out."""
+        desk, tries = self._desk, self._desk.tries
+        is_running = tries.is_running
+        is_shown = tries.project is not None and tries.project.exercise == desk.project.exercise
+        self._try.set_enabled(not is_running)
+        self._stop.set_visibility(is_running)
+        self._hand_in.set_enabled(desk.may_hand_in and not (is_running or self._is_packing))
+        drawn = is_shown, is_running, len(tries.outcomes), tries.error, desk.may_hand_in, self._is_packing
+        if drawn == self._drawn:
+            return
+        self._drawn = drawn
+        self._said.text = "" if desk.may_hand_in else CLOSED
+        self._table.clear()
+        if is_shown:
+            self._said.text = self._state() or self._said.text
+            with self._table:
+                self._build_table()
+
+    def _state(self) -> str:
+        tries = self._desk.tries
+        if tries.error:
+            return tries.error
+        score = score_of(tries.tried)
+        if tries.is_running:
+            return f"{len(tries.outcomes)} of {counted(len(tries.cases), 'case')} tried."
+        if self._is_packing:
+            return "Writing what is handed in ..."
+        of = "" if tries.is_whole else f", {len(tries.cases) - len(tries.outcomes)} not tried"
+        return f"{score['solved']} of {score['cases']} solved, {_points(score['points'])}{of}."
+
+    def _build_table(self) -> None:
+        tries = self._desk.tries
+        with ui.element("table").classes("tries"), ui.element("tbody"):
+            with ui.element("tr"):
+                for word, look in (("Case", ""), ("Points", "tries-number"), ("Time", "tries-number"), ("Run", "")):
+                    with ui.element("th").classes(look):
+                        ui.label(word)
+            for number, case in enumerate(tries.cases):
+                if (outcome := tries.outcomes.get(number)) is not None:
+                    self._build_row(number, case.name + " (hidden)" * case.is_hidden, outcome)
+
+    def _build_row(self, number: int, name: str, outcome: Outcome) -> None:
+        with named(ui.element("tr"), f"try-{number}"):
+            with ui.element("td"):
+                ui.label(name)
+                how, look = ("solved", "solved") if outcome.is_solved else ("not solved", "open")
+                how, look = ("failed", "failed") if outcome.is_failed else (how, look)
+                ui.label(how).classes(f"tries-{look}")
+                if text := _detail(outcome, self._desk.own_robot):
+                    ui.label(text).classes("tries-detail")
+            for text in (f"{outcome.points:g}", f"{outcome.time_s:.1f} s"):
+                with ui.element("td").classes("tries-number"):
+                    ui.label(text)
+            with ui.element("td"):
+                show = self.acting(partial(self._show, number))
+                icon_button("play_circle", f"Show the run: {name}", f"show-try-{number}", show, tip="Show this run")
+
+    async def _begin(self) -> None:
+        if (command := await self._program()) is not None:
+            self._desk.try_all(command)
+
+    async def _end(self) -> None:
+        self._desk.tries.stop()
+        await asyncio.to_thread(self._desk.tries.wait)
+
+    async def _show(self, number: int) -> None:
+        await self._desk.looking.show_run(self._desk.tries.recording(number))
+
+    async def _give(self) -> None:
+        desk, tries = self._desk, self._desk.tries
+        if not desk.may_hand_in:
+            raise ParameterError(CLOSED)
+        if (command := await self._program()) is None:
+            return
+        if not tries.is_of(desk.project, command):
+            desk.try_all(command)
+            self.refresh()
+            await asyncio.to_thread(tries.wait)
+        self._is_packing = True
+        self.refresh()
+        try:
+            data = await asyncio.to_thread(tries.packed)
+        finally:
+            self._is_packing = False
+        name = f"{PurePosixPath(command.name).stem}.zip"
+        if desk.hand_in is None:
+            ui.download.content(data, name)
+            ui.notify(f"{name} is in your browser's downloads. Send it to your lecturer.", type="positive")
+        else:
+            await asyncio.to_thread(desk.hand_in, data, name)
+            ui.notify(f"Handed in: {self._state()}", type="positive")
+
+
+def _points(points: float) -> str:
+    return f"{points:g} point{'' if points == 1 else 's'}"
+
+
+def _detail(outcome: Outcome, robot: int) -> str:
+    """Return how the program of a robot has ended, and what it has printed last."""
+    try:
+        end = outcome.end_of(robot)
+    except KeyError:
+        return outcome.doubt
+    lines = list(end.printed[-1:])
+    if end.how in (CRASHED, ENDLESS, STOPPED):
+        lines = [f"{end.how}: {end.detail}" if end.detail else end.how]
+    else:
+        lines = [f"The program: {end.how}", *lines]
+    return "\n".join([*lines, *([outcome.doubt] if outcome.doubt else [])])

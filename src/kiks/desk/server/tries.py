@@ -1,0 +1,146 @@
+"""A person's program tried in all cases of an exercise, in processes of their own, while the desk goes on."""
+
+from __future__ import annotations
+
+import tempfile
+import threading
+from pathlib import Path
+
+from kiks.errors import KiksError, ParameterError
+from kiks.model.exercise import Case, cases_of
+from kiks.model.project import Project
+from kiks.ports.program_process import Command, commands_of
+from kiks.ports.resources import processor_count
+from kiks.sim.from_project import in_case
+from kiks.trials.hand_in import PAGE, Tried, packed
+from kiks.trials.runner import run_trials
+from kiks.trials.trial import Outcome, Trial
+
+
+class Tries:
+    """The tries of one program; new ones take their place.
+
+    Attributes:
+        is_trusted: Whether the program may do what this user may; else it runs in a sandbox.
+        workers: How many processes try; one for each core but one, which is the desk's, if None.
+        project: The exercise; None before the first try.
+        cases: The cases, in order.
+        outcomes: What has come out so far, by numbers of the cases, from 0.
+        error: Why they cannot begin; empty if they can.
+    """
+
+    def __init__(self) -> None:
+        self.is_trusted = True
+        self.workers: int | None = None
+        self.project: Project | None = None
+        self.cases: list[Case] = []
+        self.outcomes: dict[int, Outcome] = {}
+        self.error = ""
+        self._command: Command | None = None
+        self._program = b""
+        self._folder: tempfile.TemporaryDirectory[str] | None = None
+        self._thread: threading.Thread | None = None
+        self._is_wanted = False
+
+    @property
+    def is_running(self) -> bool:
+        """Whether some are under way."""
+        return self._thread is not None and self._thread.is_alive()
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether all cases have come out."""
+        return len(self.outcomes) == len(self.cases) > 0
+
+    @property
+    def tried(self) -> list[Tried]:
+        """The cases that have come out."""
+        return [Tried(self.cases[number].name, outcome) for number, outcome in sorted(self.outcomes.items())]
+
+    def is_of(self, project: Project, command: Command) -> bool:
+        """Return whether these are all tries of a program, as it is now, in an exercise."""
+        same = self.is_whole and (self.project, self._command) == (project, command)
+        return same and self._program == command.program.read_bytes()
+
+    def begin(self, project: Project, home: Path, command: Command, *, robot: int, has_hidden: bool) -> None:
+        """Begin to try a program.
+
+        Args:
+            project: The exercise.
+            home: The folder of the exercise.
+            command: The program.
+            robot: The robot that it drives.
+            has_hidden: Whether to try it in hidden cases, too.
+        """
+        if self.is_running:
+            raise ParameterError("These tries must end first. Wait, or stop them.")
+        self.project, self._command, self._program = project, command, command.program.read_bytes()
+        self.cases = [case for case in cases_of(project.cases) if has_hidden or not case.is_hidden]
+        self.outcomes, self.error, self._is_wanted = {}, "", True
+        if self._folder is None:
+            self._folder = tempfile.TemporaryDirectory(prefix="kiks-tries-", ignore_cleanup_errors=True)
+        programs = commands_of(project, home)
+        programs[robot - 1] = command
+        self._thread = threading.Thread(target=self._run, args=(project, home, tuple(programs)), daemon=True)
+        self._thread.start()
+
+    def _run(self, project: Project, home: Path, programs: tuple[Command | None, ...]) -> None:
+        try:
+            trials = [
+                Trial(str(number), in_case(project, case, home), home, programs, self.is_trusted)
+                for number, case in enumerate(self.cases)
+            ]
+            run_trials(
+                trials,
+                self._path(),
+                workers=self.workers or max(processor_count() - 1, 1),
+                on_outcome=self._take,
+                goes_on=lambda: self._is_wanted,
+            )
+        except (KiksError, OSError) as error:
+            self.error = str(error)
+
+    def _take(self, outcome: Outcome, _count: int) -> None:
+        self.outcomes[int(outcome.name)] = outcome
+
+    def _path(self) -> Path:
+        assert self._folder is not None
+        return Path(self._folder.name)
+
+    def stop(self) -> None:
+        """Let those under way end; what has come out stays."""
+        self._is_wanted = False
+
+    def wait(self) -> None:
+        """Wait until none is under way."""
+        if self._thread is not None:
+            self._thread.join()
+
+    def recording(self, number: int) -> Path:
+        """Return the recording of a case that has come out."""
+        if not (name := self.outcomes[number].recording):
+            raise ParameterError("A try must have a recording to be shown, but this one was lost. Try all again.")
+        return self._path() / name
+
+    def packed(self) -> bytes:
+        """Return the file that is handed in when all cases have come out; its run is the one with the fewest points."""
+        from kiks.export.page import save_page
+        from kiks.recording.recording import Recording
+
+        if self.error:
+            raise ParameterError(self.error)
+        if not self.is_whole:
+            raise ParameterError("All cases must have come out before a program is handed in. Hand it in again.")
+        assert self.project is not None
+        worst = min(self.outcomes, key=lambda number: (self.outcomes[number].points, number))
+        file, page = self.recording(worst), self._path() / PAGE
+        title = "" if self.project.exercise is None else self.project.exercise.title
+        save_page(Recording(file), page, title=f"{title}: {self.cases[worst].name}" if title else None)
+        return packed(self._program, self.tried, exercise=title, recording=file.read_bytes(), page=page.read_bytes())
+
+    def close(self) -> None:
+        """End all, and forget what has come out."""
+        self.stop()
+        self.wait()
+        if self._folder is not None:
+            self._folder.cleanup()
