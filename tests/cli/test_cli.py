@@ -353,6 +353,7 @@ RESULTS = {
     ("run", "record"): ("run", "--record", "PLACE", WANDER),
     ("serve", "record"): ("serve", "--record", "PLACE"),
     ("desk", "record"): ("desk", "--record", "PLACE"),
+    ("host", "record"): ("host", "--record", "PLACE"),
     ("export", "out"): ("export", "run.mcap", "PLACE"),
     ("evolve", "record"): ("evolve", "--record", "PLACE"),
     ("fit", "robot"): ("fit", "wall.sam", "--robot", "PLACE"),

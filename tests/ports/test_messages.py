@@ -213,5 +213,5 @@ def test_in_a_match_no_program_takes_the_robot_of_another_one() -> None:
         ]
         hostile.send(*asked)
         programs.round(0)
-        assert ["which belongs to another program" in answer.error for answer in hostile.answers] == [1, 1, 0]
+        assert ["a program must drive its own robot" in answer.error for answer in hostile.answers] == [1, 1, 0]
         assert (hostile.answers[-1].result, hostile.reason) == (1, "")

@@ -17,6 +17,7 @@ from kiks.cli.evolve import evolve
 from kiks.cli.examples import DemoCommand, examples
 from kiks.cli.export import export
 from kiks.cli.fit import fit
+from kiks.cli.host import host
 from kiks.cli.matlab import matlab
 from kiks.cli.monitor import monitor
 from kiks.cli.options import show_log, with_options
@@ -60,6 +61,7 @@ for _command in (
     export,
     serve,
     room,
+    host,
     matlab,
     session,
     monitor,

@@ -120,6 +120,7 @@ def open_desk(
     port: int | None = None,
     browser: bool = True,
     waits: bool = True,
+    opened: Callable[[], None] = lambda: None,
     programs_ended: Callable[[Simulation], None] = lambda sim: None,
 ) -> None:
     """Show a desk until Ctrl-C.
@@ -130,6 +131,7 @@ def open_desk(
         port: TCP port of the page.
         browser: Whether to open a browser.
         waits: Whether programs begin when the first page shows the world; otherwise at once.
+        opened: Called when the page can be opened.
         programs_ended: Called with the world, locked, when its programs have ended.
     """
     from kiks.desk.server.show import Driver, Shown
@@ -137,6 +139,7 @@ def open_desk(
     shown = Shown(desk, host=host, port=port)
     end_as_with_ctrl_c()
     typer.echo(f"The desk: {shown.url}   Ctrl-C ends it.")
+    opened()
     try:
         if browser:
             shown.browse()

@@ -14,6 +14,7 @@ import typer
 from kiks.cli.desk import NoWait, WithDesk, open_desk
 from kiks.cli.engine_start import ready_engine
 from kiks.cli.job import job_of, takes_options_behind
+from kiks.cli.join import run_joined
 from kiks.cli.limits import Limits, MaxWall, Seconds
 from kiks.cli.options import Silence, World, say, show_log
 from kiks.cli.outputs import Command as CheckedCommand
@@ -111,6 +112,10 @@ def run(
     export: ExportFile = None,
     desk: WithDesk = False,
     no_wait: NoWait = False,
+    join: Annotated[
+        str | None,
+        typer.Option(help="Drive a robot on another computer, by the address that kiks host prints there."),
+    ] = None,
 ) -> None:
     """Run a program for a real robot on a simulated one, unchanged.
 
@@ -126,6 +131,10 @@ def run(
     Example: kiks run --arena maze --map /dev/ttyUSB0=1 wander.py
     """
     show_log()
+    if join is not None:
+        others = {param.name or "" for param in context.command.params} - {"program", "arguments", "join"}
+        leave_out(context, "with --join, as the host has the world", *others)
+        raise typer.Exit(run_joined(join, [str(program), *(arguments or [])]))
     if not desk:
         leave_out(context, "without --desk", "no_wait")
     else:

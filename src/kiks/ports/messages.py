@@ -143,9 +143,9 @@ class Start(NamedTuple):
         is_late: Whether the world may have begun already; else the program begins with it.
         end_ns: Where the time of the world ends [ns].
         thinking: The thinking policy.
-        record: File for the measured thinking times; empty for none.
         offered: The port names that the program finds when it lists ports.
         seed: What all its random numbers follow from.
+        record: File for the measured thinking times; empty for none.
         module: Name of a module to run in place of the file, as `python -m` does; empty for none.
         program: Its file, or a folder or an archive with a `__main__.py`.
         arguments: What it finds in `sys.argv` after its name.
@@ -154,12 +154,12 @@ class Start(NamedTuple):
     is_late: bool
     end_ns: int
     thinking: str
-    record: str
     offered: list[str]
     seed: str
-    module: str
-    program: str
-    arguments: list[str]
+    record: str = ""
+    module: str = ""
+    program: str = ""
+    arguments: list[str] = []  # noqa: RUF012  (replaced, never changed)
 
 
 _LENGTH = struct.Struct("<I")

@@ -75,6 +75,7 @@ class ProgramParticipant(Participant):
         is_stopped: Whether a person has stopped it; then its robots stop when it has left.
         reason: Why KiKS has ended it, such as 'used more than 512 MB of memory'; then its robots stop, too. Else empty.
         is_closed: Whether the connection is closed.
+        holds_world: Whether the world waits for it while it thinks.
         answer: The last answer to a program in a thread; None until it is there.
     """
 
@@ -83,6 +84,7 @@ class ProgramParticipant(Participant):
 
     answer: Answer | None = None
     is_closed = False
+    holds_world = True
 
     def __init__(self, name: str, rank: int, robot: int, scheduler: ProgramScheduler, names: PortNames) -> None:
         super().__init__(name, rank)
@@ -147,7 +149,7 @@ class ProgramParticipant(Participant):
             return
         if not self.is_here:
             self.is_here = True
-            self.is_waited_for = not self.is_silenced
+            self.is_waited_for = self.holds_world and not self.is_silenced
             self.acts_from_ns = self._world.now_ns
         self.patience.renew()
         if request.kind == Kind.REACHED and not self._requests and not self.waits:

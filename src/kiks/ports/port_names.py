@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from kiks.errors import LinkError, shown
-from kiks.ports.url import find_port
+from kiks.ports.url import find_sim_port, is_elsewhere
 from kiks.sim.simulation import Simulation
 
 
@@ -26,6 +26,7 @@ class PortNames:
         self._by_name = dict(by_name)
         self._are_apart = are_apart
         self._own = set(range(1, programs + 1))
+        self._alone: set[int] = set()
         self._found: dict[tuple[int, str], int] = {}
 
     def offered(self) -> list[str]:
@@ -33,9 +34,15 @@ class PortNames:
         count = 1 + sum(robot not in self._own for robot in range(1, self._sim.robot_count + 1))
         return [*self._by_name, *(f"/dev/ttyUSB{number}" for number in range(count))][:count]
 
-    def own(self, robot: int) -> None:
-        """Give a robot to a new program as its own, and forget the names of the program that had it."""
+    def own(self, robot: int, *, is_alone: bool = False) -> None:
+        """Give a robot to a new program as its own, and forget the names of the program that had it.
+
+        Args:
+            robot: Number of the robot.
+            is_alone: Whether the program may take no other one.
+        """
         self._own.add(robot)
+        (self._alone.add if is_alone else self._alone.discard)(robot)
         self._found = {(program, name): found for (program, name), found in self._found.items() if program != robot}
 
     def disown(self, robot: int) -> None:
@@ -53,10 +60,10 @@ class PortNames:
         Raises:
             LinkError: If it may not.
         """
-        if self._are_apart and robot != program and robot in self._own:
+        if robot != program and (program in self._alone or (self._are_apart and robot in self._own)):
             raise LinkError(
-                f"a program must drive its own robot, which is robot {program} here, but it asked for robot {robot}, "
-                f"which belongs to another program. Open 'kiks://{program}'."
+                f"a program must drive its own robot, which is robot {program} here, but it asked for robot {robot}. "
+                f"Open 'kiks://{program}'."
             )
 
     def robot(self, name: str, program: int = 1) -> int:
@@ -92,12 +99,12 @@ class PortNames:
         return self._found[program, name]
 
     def _of_url(self, name: str) -> int:
-        if "?" in name:
+        if "?" in name and not is_elsewhere(name):
             raise LinkError(
                 f"a port's name must be without options where several programs share a world, but it was "
                 f"{shown(name)}. Give the options to kiks run."
             )
-        port = find_port(name, self._sim)
+        port = find_sim_port(name, self._sim)
         if port.sim is not self._sim:
             raise LinkError(
                 f"a port must belong to the world that the programs share, but it was {shown(name)}. Open 'kiks://1'."

@@ -164,8 +164,8 @@ class Process:
         *,
         keeps_output: bool,
         writer: OutputWriter | None = None,
-        on_end: Callable[[], None],
-        hear: Callable[[str], None],
+        on_end: Callable[[], None] = lambda: None,
+        hear: Callable[[str], None] = lambda line: None,
     ) -> None:
         self.output: RingBuffer[OutputLine] | None = RingBuffer(OUTPUT_LIMIT) if keeps_output else None
         self._writer = _OutputKeeper(self.output) if self.output is not None else writer

@@ -123,6 +123,7 @@ class ProgramScheduler:
         new_patience: Makes patiences with another wall clock.
         start_patience_s: How long the world waits for the programs with which it begins [s of real time]; without a
             limit if `when_silent` is 'wait'.
+        may_begin: Returns whether the world begins although programs are missing; then nothing else ends the wait.
 
     Attributes:
         loop: The event loop of the world.
@@ -143,6 +144,7 @@ class ProgramScheduler:
         patience_s: float = PATIENCE_S,
         new_patience: Callable[[float], Patience] = Patience,
         start_patience_s: float = START_PATIENCE_S,
+        may_begin: Callable[[], bool] | None = None,
     ) -> None:
         check_policy(when_silent, patience_s)
         self.participants: list[Participant] = []
@@ -158,6 +160,7 @@ class ProgramScheduler:
         self._log = log
         self._start_patience_s = start_patience_s
         self._start_timeout = new_patience(start_patience_s)
+        self._may_begin = may_begin
         self._has_reported_missing = False
         self._seen_ns = 0
 
@@ -187,9 +190,7 @@ class ProgramScheduler:
             Time for which nothing more will happen [s]; None if nothing happens until a request comes.
         """
         if not self.has_begun:
-            wait_s = self._wait_for_all()
-            if not self.has_begun:
-                return wait_s
+            return self._wait_for_all()
         for _ in range(STEPS):
             is_stuck, holders = self._step()
             if is_stuck:
@@ -279,14 +280,18 @@ class ProgramScheduler:
     def _wait_for_all(self) -> float | None:
         """Begin when all programs are there or the wait is over; return the time until the next check [s]."""
         self.participants = [participant for participant in self.participants if not participant.has_left]
+        present_count = sum(participant.is_here for participant in self.participants)
+        if self.participants and present_count >= self._expected:
+            self.has_begun = True
+            return 0.0
+        if self._may_begin is not None:
+            if self._may_begin():
+                self._begin_without("as a person wanted")
+            return None
         if not self.participants:
             self._start_timeout.renew()
             self._has_reported_missing = False
             return None
-        present_count = sum(participant.is_here for participant in self.participants)
-        if present_count >= self._expected:
-            self.has_begun = True
-            return 0.0
         left_s = self._start_timeout.left_s()
         warning_s = left_s - (self._start_patience_s - START_WARNING_S)
         if warning_s > 0:
@@ -302,18 +307,22 @@ class ProgramScheduler:
                     "It waits until all are there." if waits_on else f"It waits {left_s:.0f} s more.",
                 )
             return None if waits_on else left_s
+        self._begin_without(f"which did not come within {self._start_patience_s:g} s")
+        return 0.0
+
+    def _begin_without(self, why: str) -> None:
+        """Begin without the missing programs."""
         self._log.warning(
-            "the world has begun without %s, which did not come within %g s. A program that comes now acts from now "
-            "on, and the run is not repeatable.",
+            "the world has begun without %s, %s. A program that comes now acts from now on, and the run is not "
+            "repeatable.",
             self._missing(),
-            self._start_patience_s,
+            why,
         )
         self.is_repeatable = False
         for participant in self.participants:
-            participant.is_waited_for = participant.is_here
+            participant.is_waited_for = participant.is_waited_for and participant.is_here
         self._expected = 1
         self.has_begun = True
-        return 0.0
 
     def _check_patience(self, holders: list[Participant]) -> float | None:
         """Give up programs that have delayed others for too long; return the time until the next check [s]."""

@@ -7,16 +7,18 @@ import logging
 import selectors
 import socket
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 from typing import NoReturn
 
+from kiks.clock.gate import Gate
 from kiks.clock.patience import Patience
 from kiks.clock.thinking import own_file, own_policy, parse_thinking
 from kiks.ending import INTERRUPTED, noting_endings
 from kiks.errors import KiksError, ParameterError
 from kiks.ports.messages import Start
 from kiks.ports.participant import ProgramParticipant
+from kiks.ports.player import Player
 from kiks.ports.port_names import PortNames
 from kiks.ports.program_process import Command, Labels, OutputLine, Permission, Process, chance_seed
 from kiks.ports.program_scheduler import PATIENCE_S, START_PATIENCE_S, VISIT_PATIENCE_S, ProgramScheduler
@@ -147,6 +149,9 @@ class Programs:
         visitors: Number of programs in threads of this process that begin together with these; see `admit`.
         labels: Prints the output with labels, if the handles do not keep it; None: the programs print it themselves.
         are_apart: Whether no program may take the own robot of another one, as in a match.
+        players: Robots that programs elsewhere take (see `let_in`). With thinking 'live' the world waits for none of
+            them, and goes on in real time.
+        gate: Where the world waits for the players: it opens when all are there, or begins when a person opens it.
 
     Attributes:
         handles: The programs; of ended ones, the last one of each robot.
@@ -169,6 +174,8 @@ class Programs:
         visitors: int = 0,
         labels: Labels | None = None,
         are_apart: bool = False,
+        players: Collection[int] = (),
+        gate: Gate | None = None,
     ) -> None:
         self.sim = sim
         self.permission = Permission(None)
@@ -187,7 +194,7 @@ class Programs:
             parse_thinking(self._policy(number))
         self._scheduler = ProgramScheduler(
             sim,
-            expected=len(self._first_programs) + visitors,
+            expected=len(self._first_programs) + visitors + len(players),
             missing=self._missing,
             log=_log,
             is_once=True,
@@ -195,9 +202,14 @@ class Programs:
             patience_s=patience_s,
             new_patience=new_patience,
             start_patience_s=VISIT_PATIENCE_S if visitors else START_PATIENCE_S,
+            may_begin=None if gate is None else lambda: not gate.is_paused,
         )
+        self._players: dict[int, Player | None] = dict.fromkeys(players)
+        self._gate = gate
+        if gate is not None:
+            gate.pause(sim.now_ns)
         self._names = PortNames(sim, robots_by_name or {}, 0, are_apart=are_apart)
-        for robot, _ in self._first_programs:
+        for robot in (*(robot for robot, _ in self._first_programs), *players):
             self._names.own(robot)
         with opening("the programs of a world"):
             self._wake_receiver, self._wake_sender = socket.socketpair()
@@ -219,8 +231,13 @@ class Programs:
 
     @property
     def drive(self) -> bool:
-        """Whether programs move the world's time; then nothing else may."""
-        return self._scheduler.drive
+        """Whether programs move the world's time, or it waits for players; then nothing else may."""
+        return self._scheduler.drive or (self._gate is not None and not self._scheduler.has_begun)
+
+    @property
+    def are_there(self) -> bool:
+        """Whether any program takes part."""
+        return bool(self._scheduler.participants)
 
     @property
     def doubt(self) -> str:
@@ -278,6 +295,40 @@ class Programs:
             self._was_touched = True
         return participant
 
+    def let_in(self, connection: socket.socket, robot: int, name: str) -> tuple[Player, Start]:
+        """Add a program elsewhere, which takes the place of another one on the same robot.
+
+        Args:
+            connection: This end of a socket, which leads to it.
+            robot: Number of its robot, one of the players'.
+            name: Its name in messages.
+
+        Returns:
+            The program, and what it has to know.
+        """
+        with self.sim.lock:
+            self._check_open(name)
+            if (before := self._players[robot]) is not None:
+                before.dismiss(f"Another program has taken robot {robot} with the same token.")
+            has_begun = self._scheduler.has_begun
+            player = Player(name, connection, robot, self._scheduler, self._names, self._selector)
+            player.holds_world = not self._thinking.startswith("live")
+            player.is_waited_for = player.holds_world and not has_begun
+            self._names.own(robot, is_alone=True)
+            self._scheduler.join(player)
+            self._players[robot] = player
+            self._was_touched = self._was_touched or has_begun
+            start = self._start_of(robot, self._thinking)
+        self._wake()
+        return player, start
+
+    def lose(self, player: Player) -> None:
+        """Disconnect a program elsewhere whose connection was lost: its robot stops."""
+        with self.sim.lock:
+            self._was_touched = self._was_touched or not player.has_left
+            player.dismiss("")
+        self._wake()
+
     @property
     def is_shared(self) -> bool:
         """Whether more than one program takes part, or the world waits for programs to begin."""
@@ -289,9 +340,12 @@ class Programs:
         if self._is_moving:
             return None
         self._is_moving = True
+        had_begun = self._scheduler.has_begun
         try:
             return self._scheduler.advance()
         finally:
+            if self._gate is not None and not had_begun and self._scheduler.has_begun:
+                self._gate.go_on()
             self._is_moving = False
             self._moved.notify_all()
 
@@ -388,6 +442,9 @@ class Programs:
         with self.sim.lock:
             for participant in self._visitors:
                 participant.close()
+            for player in self._players.values():
+                if player is not None:
+                    player.dismiss("The world has ended.")
             self._moved.notify_all()
         self._selector.close()
         self._wake_receiver.close()
@@ -408,13 +465,8 @@ class Programs:
         number = self._count + 1
         here, there = socket.socketpair()
         handle = Handle(command, here, number, robot, self._scheduler, self._names, self._selector)
-        start = Start(
-            is_late=self._scheduler.has_begun,
-            end_ns=self.sim.loop.end_ns,
-            thinking=self._policy(number),
+        start = self._start_of(robot, self._policy(number))._replace(
             record=own_file(str(self._record), number, self._begun_count) if self._record is not None else "",
-            offered=self._names.offered(),
-            seed=chance_seed(self.sim.seed, robot),
             module=command.module,
             program=str(command.program),
             arguments=list(command.arguments),
@@ -440,6 +492,16 @@ class Programs:
         self._scheduler.join(handle)
         self.handles.append(handle)
         return handle
+
+    def _start_of(self, robot: int, thinking: str) -> Start:
+        """Return what the program of a robot has to know of the world."""
+        return Start(
+            is_late=self._scheduler.has_begun,
+            end_ns=self.sim.loop.end_ns,
+            thinking=thinking,
+            offered=self._names.offered(),
+            seed=chance_seed(self.sim.seed, robot),
+        )
 
     def _record_line(self, robot: int, line: str) -> None:
         recorder = self.sim.loop.recorder
@@ -483,7 +545,13 @@ class Programs:
                 _log.warning("%s, which the world does not wait for, still runs. Ctrl-C ends it.", names)
 
     def _missing(self) -> str:
-        return ", ".join(each.name for each in self.handles if not each.is_here) or "a program elsewhere"
+        missing = [each.name for each in self.handles if not each.is_here]
+        missing += [
+            f"a program for robot {robot}"
+            for robot, player in self._players.items()
+            if player is None or player.has_left or not player.is_here
+        ]
+        return ", ".join(missing) or "a program elsewhere"
 
     def _wake(self) -> None:
         """Wake `round`."""

@@ -9,12 +9,11 @@ round trip.
 from __future__ import annotations
 
 import os
-import socket
 import sys
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
-from typing import Any
+from typing import Any, Protocol
 
 from kiks.clock.own_lock import OwnLock
 from kiks.clock.serial_timing import BACKLOG_LIMIT
@@ -115,16 +114,26 @@ class Connection(ABC):
         self._transmit(request)
 
 
+class Stream(Protocol):
+    """What a connection needs of a socket."""
+
+    def sendall(self, data: bytes) -> None:
+        """Send bytes; raise an `OSError` if the connection is closed."""
+
+    def recv(self, size: int) -> bytes:
+        """Return the next bytes; none if the connection is closed."""
+
+
 class SocketConnection(Connection):
     """The connection to a world in another process.
 
     Args:
-        connection: The socket to it.
+        connection: The socket to it, or what stands for one.
         is_late: Whether the world may have begun already.
         end_ns: Where its time ends [ns].
     """
 
-    def __init__(self, connection: socket.socket, *, is_late: bool = False, end_ns: int = NEVER_NS) -> None:
+    def __init__(self, connection: Stream, *, is_late: bool = False, end_ns: int = NEVER_NS) -> None:
         super().__init__(OwnLock(), is_late=is_late, end_ns=end_ns)
         # Of the socket as it is now: `script/socket_waits.py` gives sockets other methods while a program runs.
         self._send_all, self._receive = connection.sendall, connection.recv
@@ -136,19 +145,28 @@ class SocketConnection(Connection):
         except OSError:
             # While it exits, Python clears objects in any order: a port may be closed after this socket.
             if not sys.is_finalizing():
-                _end()
+                self.end()
 
     def _wait(self, ticket: int) -> Answer:
         while True:
-            try:
-                received = self._receive(RECEIVE_SIZE)
-            except OSError:
-                received = b""
+            received = self.take()
             if not received:
-                _end()
+                self.end()
             for fields in self._inbox.take(received):
                 if fields[0] == ticket:
                     return Answer._make(fields)
+
+    def take(self) -> bytes:
+        """Return the next bytes of the world; none if the connection is closed."""
+        try:
+            return self._receive(RECEIVE_SIZE)
+        except OSError:
+            return b""
+
+    def end(self) -> None:
+        """Exit at once: without the world the program cannot do anything useful."""
+        sys.stdout.flush()
+        os._exit(1)
 
 
 class RemoteLine:
@@ -247,9 +265,3 @@ class RemoteLine:
 def _plain(size: int | None) -> int | None:
     """Return the size of a read as a message holds it: `True` is a size, too."""
     return None if size is None else min(int(size), _SIZE_MAX)
-
-
-def _end() -> None:
-    """Exit at once: without the world the program cannot do anything useful."""
-    sys.stdout.flush()
-    os._exit(1)

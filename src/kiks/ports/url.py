@@ -1,4 +1,7 @@
-"""Names of simulated ports: `kiks://1`, `kiks://sim2/1`, `kiks://1?arena=maze.toml&seed=3&thinking=fixed:2`."""
+"""Names of simulated ports: `kiks://1`, `kiks://sim2/1`, `kiks://1?arena=maze.toml&seed=3&thinking=fixed:2`.
+
+`kiks://HOST:PORT/1?token=TOKEN` is a robot on another computer.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +11,7 @@ from urllib.parse import parse_qsl, urlsplit
 from kiks.errors import LinkError, ParameterError, nearest, shown
 
 if TYPE_CHECKING:
+    from kiks.sim.port import VirtualPort
     from kiks.sim.simulation import SimPort, Simulation
 
 _SHOWN_NAMES = 5
@@ -19,8 +23,31 @@ _DIGITS_MAX = 9
 _OPTIONS = ("arena", "robots", "robot", "seed", "thinking")
 
 
-def find_port(url: str, newest: Simulation | None = None) -> SimPort:
-    """Return a new port for a name.
+def is_elsewhere(url: str) -> bool:
+    """Return whether a name is that of a robot on another computer: it has a TCP port.
+
+    Example:
+        >>> is_elsewhere("kiks://192.168.1.7:8123/1?token=x"), is_elsewhere("kiks://1"), is_elsewhere("kiks://sim2/1")
+        (True, False, False)
+    """
+    return url.startswith("kiks:") and ":" in url.removeprefix("kiks:").partition("?")[0]
+
+
+def find_port(url: str) -> VirtualPort:
+    """Return a new port for a name: see `find_sim_port`; `kiks://HOST:PORT/ROBOT?token=TOKEN` is on another computer.
+
+    Raises:
+        LinkError: If the name is malformed, or there is no such robot.
+    """
+    if is_elsewhere(url):
+        from kiks.ports.joining import HostedPort
+
+        return HostedPort(url)
+    return find_sim_port(url)
+
+
+def find_sim_port(url: str, newest: Simulation | None = None) -> SimPort:
+    """Return a new port for a name in this process.
 
     A number alone is a robot of the newest simulation, or of a new one in the default arena if there is none. Options
     after a question mark always create a new simulation.
@@ -32,6 +59,11 @@ def find_port(url: str, newest: Simulation | None = None) -> SimPort:
     Raises:
         LinkError: If the name is malformed, or the simulation or the robot does not exist.
     """
+    if is_elsewhere(url):
+        raise LinkError(
+            "a program in simulated time must have the robots of one world, but "
+            f"{shown(url.partition('?')[0])} is on another computer. Run it there: kiks run --join ADDRESS PROGRAM."
+        )
     # Imported here: a program in a process of its own finds its ports by another function, and needs no simulation.
     from kiks.sim.simulation import SIMULATIONS, SimPort, Simulation
 

@@ -57,7 +57,7 @@ def run_here(
     """
     from kiks.ports.port_names import PortNames
     from kiks.ports.program_process import chance_seed
-    from kiks.ports.url import find_port
+    from kiks.ports.url import find_sim_port
     from kiks.sim.local_line import LocalLine
 
     names = PortNames(sim, told)
@@ -65,7 +65,7 @@ def run_here(
     def find(name: str) -> int | VirtualPort:
         if not name.startswith("kiks:"):
             return names.robot(name)
-        port = find_port(name)
+        port = find_sim_port(name)
         return port.robot if port.sim is sim else port
 
     return run_program(

@@ -65,6 +65,7 @@ class Door:
 
     Attributes:
         keys: The tokens of others by their places.
+        bearers: The tokens of programs, which send them in the header `Authorization`, by the paths that they open.
         entrance: Answers requests for `/` without a token; None: they are refused.
         advice: What the page of a refusal advises; HTML.
         name: Name of the computer in the address that people open, if a proxy stands before the server.
@@ -73,6 +74,7 @@ class Door:
     """
 
     keys: dict[str, Token] = field(default_factory=dict)
+    bearers: dict[str, list[Token]] = field(default_factory=dict)
     entrance: ASGIApp | None = None
     advice: str = ADVICE
     name: str | None = None
@@ -136,7 +138,7 @@ class AccessControl:
     """ASGI middleware that checks each request before it reaches the application.
 
     * Each request needs a token in a cookie, and a path in its place that it opens; `?token=...` or `?ticket=...` in an
-      address sets the owner's cookie and leads there.
+      address sets the owner's cookie and leads there. Programs send a token in the header `Authorization`.
     * A request with an `Origin` header must come from the desk's own page.
     * A desk for this computer alone accepts only host names of this computer, against DNS rebinding.
     * A request declares its length, which is at most `REQUEST_BYTES_MAX`.
@@ -172,9 +174,10 @@ class AccessControl:
         """Return what answers a request: the application, or a way to it; else raise the refusal."""
         self._check(request)
         scope, is_page = request.scope, request.scope["type"] == "http"
-        if (key := self._known_key(request)) is not None:
-            if not key.opens(scope["path"].removeprefix(key.place)):
-                raise HTTPException(403, "A page must belong to your own desk, but this one does not")
+        if (key := self._known_key(request)) is not None and not key.opens(scope["path"].removeprefix(key.place)):
+            raise HTTPException(403, "A page must belong to your own desk, but this one does not")
+        key = key or self._bearer(request)
+        if key is not None:
             if (timer := scope.get("state", {}).get(TIMER)) is not None:
                 timer.cancel()
             scope.update({"root_path": key.place, KEY: key})
@@ -225,6 +228,12 @@ class AccessControl:
         # Other servers of this computer may set cookies of the same name: a dictionary would hold one of them.
         pairs = (pair.strip().partition("=") for pair in request.headers.get("cookie", "").split(";"))
         return key if any(each == COOKIE and key.fits(value) for each, _, value in pairs) else None
+
+    def _bearer(self, request: HTTPConnection) -> Token | None:
+        """Return the token that a program has sent, if it opens the path; all of them are compared."""
+        given = request.headers.get("authorization", "").removeprefix("Bearer ")
+        fitting = [key for key in self._door.bearers.get(request.scope["path"], ()) if key.fits(given)]
+        return fitting[0] if fitting else None
 
     def _own_cookie(self, headers: Headers) -> str:
         """Return the cookie with the owner's token; pages of other sites never send it, and other servers never get it.

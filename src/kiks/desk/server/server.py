@@ -22,10 +22,12 @@ from kiks.desk.server.access import HEADERS, KEY, LOOPBACK, AccessControl, Door,
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.gateway import Gateway
 from kiks.desk.server.page_guard import PageGuard, guard_messages
+from kiks.desk.server.players import Players
 from kiks.desk.server.server_log import log_plainly
 from kiks.desk.server.token import Token
 from kiks.errors import LinkError, ParameterError
 from kiks.model.limits import MESSAGE_BYTES_MAX
+from kiks.ports.joining import PATH
 from kiks.ports.resources import SHORTAGES, opening, shortage
 
 PORT = 8123
@@ -54,7 +56,10 @@ class DeskServer:
         desks: The gateways of the open desks by number.
         key: The token that browsers of the owner must know.
         door: Who else comes in.
+        players: Lets programs elsewhere take robots; None: none may.
     """
+
+    players: Players | None = None
 
     def __init__(self) -> None:
         self.desks: dict[int, Gateway] = {}
@@ -127,11 +132,20 @@ class DeskServer:
 
     def address(self) -> str:
         """Return the address under which other computers reach this server, with a slash at its end."""
+        return f"http://{self.place()}/"
+
+    def place(self) -> str:
+        """Return the host and the port of that address."""
         assert self._socket is not None
         host, port = self._socket.getsockname()[:2]
         host = _own_address(self._socket.family) if host in EVERY_ADDRESS else host
         host = f"[{host}]" if ":" in host else host
-        return f"http://{host}:{port}/"
+        return f"{host}:{port}"
+
+    def let_in(self, players: Players) -> None:
+        """Let programs elsewhere take the robots of a desk from now on."""
+        self.players = players
+        self.door.bearers[PATH] = list(players.robots)
 
     def run(self, work: Coroutine[Any, Any, Done]) -> Done:
         """Run a coroutine in the server's thread, and return its result; from any other thread."""
@@ -201,6 +215,11 @@ class DeskServer:
             if gateway is None:
                 return Response(status_code=404)
             return Response(gateway.picture(), media_type="image/png", headers={"cache-control": "no-store"})
+
+        @app.websocket(PATH)
+        async def robot(socket: WebSocket) -> None:
+            assert self.players is not None
+            await self.players.serve(socket, socket.scope[KEY])
 
         @app.websocket("/desk/{number}/feed")
         async def feed(socket: WebSocket, number: int) -> None:

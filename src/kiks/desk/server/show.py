@@ -42,11 +42,11 @@ class Driver:
         """Let time pass, as programs and the gate allow, until `stop`."""
         while not self._is_over.is_set():
             programs = self._desk.programs
-            had_programs = programs.drive
-            programs.round(ROUND_S if had_programs else 0)
+            had_programs = programs.are_there
+            programs.round(ROUND_S if programs.drive else 0)
             if not programs.drive:
                 with programs.sim.lock:
-                    if had_programs:
+                    if had_programs and not programs.are_there:
                         self._programs_ended(programs.sim)
                     programs.sim.advance_to(programs.sim.now_ns + SLICE_NS)
                     programs.sim.sync()

@@ -1,0 +1,321 @@
+"""A robot of a world on another computer: `kiks://HOST:PORT/1?token=TOKEN` (the command `kiks host`).
+
+A program elsewhere is one of the programs that share a world. Its messages are those of a process of `kiks run`, over a
+WebSocket of the desk's server.
+"""
+
+from __future__ import annotations
+
+import json
+import socket
+import threading
+import weakref
+from collections.abc import Callable
+from contextlib import ExitStack, suppress
+from typing import Annotated, Any, NamedTuple
+from urllib.parse import parse_qs, urlsplit
+
+from pydantic import Field
+
+from kiks.clock.program_clock import ProgramClock
+from kiks.errors import LinkError, shown
+from kiks.model.checks import ROBOTS_MAX
+from kiks.model.data_file import Switch, Text, Whole, check, record
+from kiks.model.limits import MESSAGE_BYTES_MAX
+from kiks.model.settings import ThinkingPolicy
+from kiks.ports.messages import RECEIVE_SIZE, Kind, Start
+from kiks.ports.remote_link import RemoteLine, SocketConnection
+from kiks.sim.port import VirtualPort
+from kiks.units import NS_PER_S
+from kiks.version import __version__
+
+PATH = "/robot"
+"""Path of the WebSocket on the desk's server."""
+
+OPEN_S = 10.0
+"""Longest wait for a host [s of real time]."""
+
+CHECK_S = 0.05
+"""Longest time between two checks of a program that waits for an answer [s of real time]."""
+
+SLICE_NS = NS_PER_S
+"""Simulated time that passes in one piece while a program pauses [ns]: an interrupted pause ends after it."""
+
+
+@record
+class Welcome:
+    """What a host tells a program that takes a robot.
+
+    Attributes:
+        version: The version of KiKS there.
+        robot: Number of the robot.
+        is_late: See `Start`.
+        end_ns: See `Start`.
+        thinking: See `Start`.
+        offered: See `Start`.
+        seed: See `Start`.
+    """
+
+    version: Text
+    robot: Annotated[Whole, Field(ge=1, le=ROBOTS_MAX)]
+    is_late: Switch
+    end_ns: Annotated[Whole, Field(ge=0, lt=1 << 64)]
+    thinking: ThinkingPolicy
+    offered: Annotated[tuple[Text, ...], Field(max_length=ROBOTS_MAX)]
+    seed: Text
+
+    @property
+    def start(self) -> Start:
+        """What the program gets at its start."""
+        return Start(self.is_late, self.end_ns, self.thinking, list(self.offered), self.seed)
+
+
+class Address(NamedTuple):
+    """The address of a robot of a host.
+
+    Attributes:
+        place: Host and TCP port.
+        token: The token of the robot.
+        robot: Number of the robot; 0: the one of the token.
+    """
+
+    place: str
+    token: str
+    robot: int = 0
+
+    @staticmethod
+    def parse(url: str) -> Address:
+        """Return the address in `kiks://HOST:PORT/1?token=TOKEN`.
+
+        Example:
+            >>> Address.parse("kiks://127.0.0.1:8123/2?token=abc")
+            Address(place='127.0.0.1:8123', token='abc', robot=2)
+        """
+        parts = urlsplit(url)
+        number = parts.path.strip("/")
+        tokens = parse_qs(parts.query).get("token", [])
+        if not (number.isascii() and number.isdigit() and len(number) < 5 and len(tokens) == 1):
+            raise LinkError(
+                "a robot on another computer must be named as kiks host prints it, kiks://HOST:PORT/1?token=TOKEN, but "
+                f"it was {shown(url.partition('?')[0])}. Copy the whole address, in quotes."
+            )
+        return Address(parts.netloc, tokens[0], int(number))
+
+    def url(self) -> str:
+        """Return the address as one text."""
+        return f"kiks://{self.place}/{self.robot}?token={self.token}"
+
+
+class HostLink:
+    """The connection to a host; it has the methods of a socket that a `SocketConnection` needs.
+
+    Args:
+        address: The address of the robot.
+
+    Attributes:
+        robot: Number of the robot.
+        start: What the program has to know of the world.
+
+    Raises:
+        LinkError: If there is no host, or it does not let the program in.
+    """
+
+    def __init__(self, address: Address) -> None:
+        # Imported here: few programs need it.
+        from websockets.exceptions import InvalidStatus, WebSocketException
+        from websockets.sync.client import connect
+
+        self.place = address.place
+        self._has_left = False
+        self._failures = (OSError, WebSocketException)
+        self._open = ExitStack()
+        host = f"the host of robots at {shown(address.place)}"
+        try:
+            connection = connect(
+                f"ws://{address.place}{PATH}",
+                additional_headers={"Authorization": f"Bearer {address.token}"},
+                compression=None,
+                proxy=None,
+                open_timeout=OPEN_S,
+                max_size=MESSAGE_BYTES_MAX,
+            )
+            self._socket: Any = self._open.enter_context(connection)
+            first = self._socket.recv(OPEN_S)
+        except InvalidStatus as refusal:
+            raise LinkError(
+                f"{host} must know the token, but it does not let this program in ({refusal.response.status_code}). "
+                "Take the address that kiks host prints there now."
+            ) from None
+        except self._failures as error:
+            with suppress(*self._failures):
+                self._open.close()
+            raise LinkError(
+                f"{host} must let the program in, but it does not: {self._why(error)} Is kiks host running there, with "
+                "--host for other computers?"
+            ) from None
+        try:
+            self.robot, self.start = self._welcomed(first, address)
+        except LinkError:
+            self.close()
+            raise
+
+    def _welcomed(self, first: object, address: Address) -> tuple[int, Start]:
+        try:
+            told = json.loads(first) if isinstance(first, str) else None
+        except ValueError:
+            told = None
+        version = told.get("version") if isinstance(told, dict) else None
+        if version != __version__:
+            raise LinkError(
+                f"both computers must have the same KiKS, but {shown(address.place)} has {shown(version)}, and this is "
+                f"{__version__}. Install the same one."
+            )
+        welcome = check(Welcome, told, f"the host at {shown(address.place)}", error=LinkError)
+        if welcome.thinking.startswith("replay"):
+            raise LinkError("a host must tell the program's thinking time, but it asks for a file of this computer.")
+        if address.robot not in (0, welcome.robot):
+            raise LinkError(
+                f"the token must be that of robot {address.robot}, but it is that of robot {welcome.robot}. Copy the "
+                "whole address that kiks host prints."
+            )
+        return welcome.robot, welcome.start
+
+    def sendall(self, data: bytes) -> None:
+        """Send bytes.
+
+        Raises:
+            OSError: If the connection is closed.
+        """
+        try:
+            self._socket.send(data)
+        except self._failures as error:
+            raise OSError(self._why(error)) from None
+
+    def recv(self, _size: int = 0, *, timeout_s: float | None = None) -> bytes:
+        """Return the next bytes; none if the connection is closed.
+
+        Raises:
+            TimeoutError: If none come in time.
+        """
+        try:
+            data = self._socket.recv(timeout_s)
+            return data if isinstance(data, bytes) else b""
+        except TimeoutError:
+            raise
+        except self._failures:
+            return b""
+
+    @property
+    def farewell(self) -> str:
+        """Why the host has closed the connection, as a sentence; empty if this end has."""
+        if self._has_left:
+            return ""
+        reason = self._socket.protocol.close_reason
+        return shown(reason)[1:-1] if reason else "The connection was lost."
+
+    def close(self) -> None:
+        """Close the connection; the host learns that the program has left by itself."""
+        self._has_left = self._has_left or self._socket.protocol.close_rcvd is None
+        with suppress(*self._failures):
+            self._open.close()
+
+    def _why(self, error: BaseException) -> str:
+        closed = getattr(getattr(self, "_socket", None), "protocol", None)
+        if closed is not None and closed.close_reason:
+            return self.farewell
+        return f"{shown(getattr(error, 'strerror', None) or str(error))[1:-1].rstrip('.')}."
+
+
+class HostedConnection(SocketConnection):
+    """The connection of a program in this process to a world on another computer.
+
+    Args:
+        link: The connection to the host.
+        check_awaited: Called now and then while the program waits for an answer; it may raise an error.
+    """
+
+    def __init__(self, link: HostLink, check_awaited: Callable[[], None] = lambda: None) -> None:
+        super().__init__(link, is_late=link.start.is_late, end_ns=link.start.end_ns)
+        self._link = link
+        self._check_awaited = check_awaited
+
+    def take(self) -> bytes:
+        """Return the next bytes of the host."""
+        while True:
+            self._check_awaited()
+            with suppress(TimeoutError):
+                return self._link.recv(timeout_s=CHECK_S)
+
+    def end(self) -> None:
+        """Tell that the connection has ended.
+
+        Raises:
+            LinkError: Always.
+        """
+        raise LinkError(
+            f"the host at {shown(self._link.place)} must be there, but has gone: {self._link.farewell} Open the port "
+            "again: the program then goes on from there."
+        )
+
+    def pass_to(self, time_ns: int) -> None:
+        """Let time pass up to a time [ns], in pieces: an interrupted pause ends after one."""
+        now_ns = self.now_ns
+        while now_ns + SLICE_NS < time_ns:
+            now_ns += SLICE_NS
+            super().pass_to(now_ns)
+            self.ask(Kind.MEET)
+        super().pass_to(time_ns)
+
+    def leave(self) -> None:
+        """Leave the world; earlier requests are still done."""
+        with suppress(LinkError):
+            self.tell(Kind.REACHED)
+        self._link.close()
+
+
+class HostedPort(VirtualPort):
+    """The port of a robot on another computer. The program takes part in that world until it closes the port.
+
+    Args:
+        url: The address of the robot.
+
+    Attributes:
+        robot: Number of the robot.
+    """
+
+    def __init__(self, url: str) -> None:
+        link = HostLink(Address.parse(url))
+        connection = HostedConnection(link)
+        super().__init__(RemoteLine(connection, link.robot), ProgramClock(link.start.thinking))
+        self.robot, self._place = link.robot, link.place
+        # At the end of the process, too: a connection that only breaks off counts as lost.
+        self._leave = weakref.finalize(self, connection.leave)
+
+    def claim(self, holder: str) -> None:
+        """Reserve the line; the name of the holder has no token."""
+        super().claim("a program elsewhere")
+
+    def close(self) -> None:
+        """Close the port and leave the world. The robot drives on."""
+        with suppress(LinkError):
+            super().close()
+        self._leave()
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: robot {self.robot} at {self._place}{'' if self.is_open else ', closed'}>"
+
+
+def relay(link: HostLink, connection: socket.socket) -> None:
+    """Carry the bytes of a program at the end of a socket, until it or the host ends."""
+
+    def to_host() -> None:
+        with suppress(OSError):
+            while data := connection.recv(RECEIVE_SIZE):
+                link.sendall(data)
+        link.close()
+
+    threading.Thread(target=to_host, name="kiks relay", daemon=True).start()
+    with suppress(OSError):
+        while data := link.recv():
+            connection.sendall(data)
+        connection.shutdown(socket.SHUT_RDWR)
