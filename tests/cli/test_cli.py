@@ -361,6 +361,8 @@ RESULTS = {
     ("monitor", "csv"): ("monitor", "--port", "kiks://1", "--csv", "PLACE"),
     ("compare", "picture"): ("compare", "one", "two", "--picture", "PLACE"),
     ("evolve", "out"): ("evolve", "--out", "PLACE"),
+    ("sweep", "out"): ("sweep", "--out", "PLACE", WANDER),
+    ("sweep", "picture"): ("sweep", "--picture", "PLACE", WANDER),
     ("maze", "out"): ("arena", "maze", "PLACE"),
     ("new", "out"): ("arena", "new", "--width-mm", "200", "--height-mm", "200", "PLACE"),
 }

@@ -28,6 +28,7 @@ from kiks.cli.run import RunCommand, run
 from kiks.cli.schema import schema
 from kiks.cli.serve import serve
 from kiks.cli.session import session
+from kiks.cli.sweep import sweep
 from kiks.cli.warmup import warmup
 from kiks.ending import INTERRUPTED, leave_threads, tell
 from kiks.errors import KiksError
@@ -56,6 +57,7 @@ for _command in (
     examples,
     evolve,
     champion,
+    sweep,
     compare,
     replay,
     export,

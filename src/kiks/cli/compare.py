@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from kiks.cli.options import print_table
 from kiks.cli.outputs import has_results, output, tell_results
 from kiks.errors import ParameterError
 from kiks.export.kinds import KINDS
@@ -74,13 +75,13 @@ def print_seeds(results: Sequence[Result]) -> None:
     ]
     _, middle, _, passed, *costs = _figures(results)
     rows.append(("all", middle, "", passed, "", *costs))
-    _print_table(("seed", "fitness", "found in", "exam", "imperfect", "evaluations", "seconds"), rows)
+    print_table(("seed", "fitness", "found in", "exam", "imperfect", "evaluations", "seconds"), rows)
 
 
 def print_groups(groups: Mapping[str, Sequence[Result]]) -> None:
     """Print a table of groups of evolutions: quartiles and medians, and how many champions passed the exam."""
     columns = ("folder", "runs", "quartile", "median", "quartile", "exams", "evaluations", "seconds")
-    _print_table(columns, [(name, str(len(group)), *_figures(group)) for name, group in groups.items()])
+    print_table(columns, [(name, str(len(group)), *_figures(group)) for name, group in groups.items()])
 
 
 def _figures(results: Sequence[Result]) -> tuple[str, ...]:
@@ -103,18 +104,3 @@ def _exam_texts(result: Result) -> tuple[str, str]:
         return "-", "-"
     exam = result.exam
     return f"{exam.solved} of {exam.starts}", f"{exam.imperfect_solved} of {exam.imperfect_starts}"
-
-
-def _print_table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Print a table; the first column stands left, the numbers right."""
-    from rich.box import SIMPLE
-    from rich.console import Console
-    from rich.table import Table
-
-    table = Table(box=SIMPLE, pad_edge=False)
-    for number, name in enumerate(columns):
-        table.add_column(name, justify="right" if number else "left", overflow="fold")
-    for row in rows:
-        table.add_row(*row)
-    console = Console(markup=False, highlight=False)
-    console.print(table)

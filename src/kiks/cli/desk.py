@@ -78,7 +78,7 @@ def desk(
     if not home.is_dir():
         raise ParameterError(f"--folder must be a folder, but {str(home)!r} is none. Create it first.")
     project = replace(
-        _with_kinds(project, world.robot or []),
+        with_kinds(project, world.robot or []),
         thinking=thinking or project.thinking,
         speed=project.speed if speed is None else speed or None,
     )
@@ -102,7 +102,7 @@ def desk(
         open_desk(shown, host=host, port=port, browser=browser, waits=not no_wait)
 
 
-def _with_kinds(project: Project, kinds: list[str]) -> Project:
+def with_kinds(project: Project, kinds: list[str]) -> Project:
     """Return a project with other kinds of robots, whose files lie in its folder: the desk saves it and begins anew."""
     robots = project.robots
     if kinds and len(kinds) not in (1, len(robots)):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import shlex
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import wraps
@@ -129,7 +129,10 @@ class Silence:
 
 
 def with_options(function: Callable[..., None]) -> Callable[..., None]:
-    """Return a command that takes the fields of its dataclass parameters as options of their own."""
+    """Return a command that takes the fields of its dataclass parameters as options of their own.
+
+    A parameter of the command takes the place of a field of its name, which keeps its default.
+    """
     hints = get_type_hints(function, include_extras=True)
     groups: dict[str, Any] = {name: kind for name, kind in hints.items() if is_dataclass(kind)}
     options: list[Parameter] = []
@@ -142,12 +145,13 @@ def with_options(function: Callable[..., None]) -> Callable[..., None]:
         options += [
             Parameter(each.name, Parameter.KEYWORD_ONLY, default=each.default, annotation=kinds[each.name])
             for each in fields(group)
+            if each.name not in hints
         ]
 
     @wraps(function)
     def command(**given: Any) -> None:
         for name, group in groups.items():
-            given[name] = group(**{each.name: given.pop(each.name) for each in fields(group)})
+            given[name] = group(**{each.name: given.pop(each.name) for each in fields(group) if each.name not in hints})
         function(**given)
 
     command.__signature__ = Signature(options)  # type: ignore[attr-defined]
@@ -194,6 +198,21 @@ def progress_bar(work: str) -> Iterator[Callable[..., None]]:
     with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
         bar = progress.add_task(work, total=None)
         yield lambda done, count=1: progress.update(bar, completed=done, total=count)
+
+
+def print_table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """Print a table; the first column stands left, the numbers right."""
+    from rich.box import SIMPLE
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(box=SIMPLE, pad_edge=False)
+    for number, name in enumerate(columns):
+        table.add_column(name, justify="right" if number else "left", overflow="fold")
+    for row in rows:
+        table.add_row(*row)
+    console = Console(markup=False, highlight=False)
+    console.print(table)
 
 
 def parse_turret(entry: str, robot_count: int) -> tuple[str, int | None]:

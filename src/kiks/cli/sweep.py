@@ -1,0 +1,169 @@
+"""`kiks sweep`."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from statistics import median
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from kiks.cli.compare import FIGURES
+from kiks.cli.engine_start import ready_engine
+from kiks.cli.job import job_of
+from kiks.cli.options import World, print_table, progress_bar, say, written_folder
+from kiks.cli.outputs import has_results, output, tell_results
+from kiks.cli.ranges import numbers_of
+from kiks.ending import end_as_with_ctrl_c
+from kiks.errors import counted
+
+if TYPE_CHECKING:
+    from kiks.cli.job import Job
+    from kiks.model.project import Project
+    from kiks.trials.sweep import Row
+
+FAMILY_MAX, SEEDS_MAX = 1000, 1000
+
+
+@has_results
+def sweep(
+    context: typer.Context,
+    world: World,
+    program: Annotated[
+        str,
+        typer.Argument(
+            help="What kiks run takes: a program, a project (.kiks), a demonstration, or a champion's file."
+        ),
+    ],
+    arguments: Annotated[
+        list[str] | None,
+        typer.Argument(help="The program's arguments, those with a - after --; or programs for a project's robots."),
+    ] = None,
+    think: Annotated[
+        str, typer.Option(metavar="MS", help="Thinking times [ms]: numbers, and ranges such as 0..40 or 0..40:5.")
+    ] = "0..40",
+    baud: Annotated[
+        str | None,
+        typer.Option(metavar="BAUD", help="Speeds of the line, such as 9600,19200, whatever the program sets."),
+    ] = None,
+    family: Annotated[
+        int,
+        typer.Option(
+            help="Robots of the family of imperfect ones; 0 for the exact robot alone.", min=0, max=FAMILY_MAX
+        ),
+    ] = 3,
+    seeds: Annotated[int, typer.Option(help="Seeds, from --seed on.", min=1, max=SEEDS_MAX)] = 3,
+    solved: Annotated[
+        str | None, typer.Option(metavar="FORMULA", help="When a run is solved, in place of the project's goal.")
+    ] = None,
+    failed: Annotated[str | None, typer.Option(metavar="FORMULA", help="When a run has failed.")] = None,
+    points: Annotated[str | None, typer.Option(metavar="FORMULA", help="The points of a run.")] = None,
+    seconds: Annotated[
+        float | None, typer.Option(help="Time limit of a run [s of simulated time]; the project's, else 60.", min=0.1)
+    ] = None,
+    share: Annotated[
+        float, typer.Option(help="Share of the runs that must be solved where the program holds.", min=0.01, max=1.0)
+    ] = 1.0,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            help="Folder of recordings, outcomes and picture; kiks-sweep-PROGRAM if left out.", callback=written_folder
+        ),
+    ] = None,
+    picture: Annotated[
+        Path | None,
+        typer.Option(
+            help=f"File of the picture, {', '.join(FIGURES)}; sweep.png in the folder if left out.",
+            callback=output(*FIGURES),
+        ),
+    ] = None,
+) -> None:
+    """Try a program with more and more thinking time, on several lines, robots and seeds: up to where does it hold?
+
+    The program runs with each thinking time, at each baud rate, with each robot and each seed, on all cores. Each run
+    is judged by the project's goal, or by --solved. Without either, a program must touch nothing and get about. After
+    Ctrl-C or a kill, the same command goes on.
+
+    Example: kiks sweep wander.py --baud 9600,19200 --think 0..40:2 --family 10 --seeds 20
+    """
+    from kiks.trials.sweep import Axes
+    from kiks.trials.sweep import sweep as swept
+    from kiks.trials.sweep_plot import save_sweep_plot
+
+    job = job_of(program, arguments or [], world)
+    project = _project(job, {"solved": solved, "failed": failed, "points": points}, seconds)
+    axes = Axes(
+        numbers_of(think, "--think"),
+        () if baud is None else tuple(map(int, numbers_of(baud, "--baud"))),
+        tuple(range(1, family + 1)) or (0,),
+        tuple(range(project.seed, project.seed + seeds)),
+    )
+    count = len(axes.cases())
+    folder = out or written_folder_of(program)
+    goal, name = project.goal, Path(program).name
+    assert goal is not None
+    end_as_with_ctrl_c()
+    ready_engine()
+    say(f"{counted(count, 'run')} of {project.seconds:g} s at most. Goal: {goal.text or goal.solved}.")
+    with progress_bar("runs") as progress:
+        found = swept(
+            project,
+            job.folder,
+            job.commands,
+            axes,
+            folder,
+            share=share,
+            on_outcome=lambda outcome, done: progress(done, count),
+        )
+    save_sweep_plot(found, file := picture or folder / "sweep.png", f"{name}: {goal.text or goal.solved}")
+    print_table(
+        ("baud", "thinking [ms]", "solved", "least points", "median", "most", "worst"), list(map(_cells, found.rows))
+    )
+    see = f"see it with kiks replay {folder / found.worst.outcome.recording}"
+    results: dict[str, Any] = {
+        "program": program,
+        "goal": {each: getattr(goal, each) for each in ("text", "solved", "failed", "points")},
+        "share": share,
+        "holds_up_to_ms": [{"baud": each, "ms": found.holds_up_to_ms(each)} for each in found.bauds],
+        "rows": [row.to_dict() for row in found.rows],
+        "verdict": found.verdict,
+        "picture": str(file),
+        "folder": str(folder),
+    }
+    tell_results(context, results, [f"Picture: {file}", f"{name} {found.verdict}; {see}"])
+
+
+def written_folder_of(program: str) -> Path:
+    """Return the folder of a sweep that names none, and make it."""
+    from kiks.model.atomic_files import make_folder
+
+    folder = Path(f"kiks-sweep-{Path(program).stem}")
+    make_folder(folder, "--out")
+    return folder
+
+
+def _project(job: Job, formulas: dict[str, str | None], seconds: float | None) -> Project:
+    """Return the world of a sweep, with a goal and a time limit."""
+    from kiks.cli.desk import with_kinds
+    from kiks.model.data_file import check
+    from kiks.model.goal import Goal
+    from kiks.trials.sweep import GETTING_ABOUT, SECONDS
+
+    goal, told = job.project.goal, {name: text for name, text in formulas.items() if text is not None}
+    if told:
+        goal = check(Goal, ({} if goal is None or "solved" in told else vars(goal) | {"text": ""}) | told, "the goal")
+    project = with_kinds(job.project, [each for each in job.kinds if isinstance(each, str)])
+    return replace(project, goal=goal or GETTING_ABOUT, seconds=seconds or project.seconds or SECONDS)
+
+
+def _cells(row: Row) -> tuple[str, ...]:
+    """Return the cells of a row of the table."""
+    worst = row.tried[0]
+    return (
+        "own" if row.baud is None else str(row.baud),
+        f"{row.thinking_ms:g}",
+        f"{row.solved} of {len(row.tried)}",
+        *(f"{value:.4g}" for value in (row.points[0], median(row.points), row.points[-1])),
+        "" if worst.is_solved else str(worst),
+    )
