@@ -12,9 +12,10 @@ import socket
 import subprocess
 import sys
 import threading
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from importlib.machinery import ModuleSpec, PathFinder
 from pathlib import Path
 from typing import IO, Any, NamedTuple
@@ -151,6 +152,7 @@ class Process:
         writer: Writes its output to the terminal, if the output is not kept; None: the program writes it itself.
         on_end: Called by that thread after the end.
         hear: Called with each line of its output, unless the program writes that itself.
+        launch: Starts it elsewhere, such as in a sandbox; None: in a process with the rights of this one.
 
     Attributes:
         output: Its output; None if it is not kept.
@@ -166,60 +168,64 @@ class Process:
         writer: OutputWriter | None = None,
         on_end: Callable[[], None] = lambda: None,
         hear: Callable[[str], None] = lambda line: None,
+        launch: Launch | None = None,
     ) -> None:
         self.output: RingBuffer[OutputLine] | None = RingBuffer(OUTPUT_LIMIT) if keeps_output else None
         self._writer = _OutputKeeper(self.output) if self.output is not None else writer
         self._on_end, self._hear = on_end, hear
-        self._popen: subprocess.Popen[bytes] | None = None
+        self._child: Child | None = None
         self._is_over = threading.Event()
         has_started = threading.Event()
-        failures: list[OSError] = []
-        line = python_line("-m", "kiks.script.child_main", str(connection.fileno()), json.dumps(start))
+        failures: list[OSError | KiksError] = []
+        if launch is None:
+            launch = partial(OwnChild, start, connection, is_apart=keeps_output)
 
         def run() -> None:
             # The process inherits it, and so hears Ctrl-C only when it has loaded (`child_main.py`): Python's own start
             # would end in a traceback.
             signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
             try:
-                self._popen = self._start(line, connection)
-            except OSError as error:
+                pipes = self._begin(launch)
+            except (OSError, KiksError) as error:
                 failures.append(error)
                 self._is_over.set()
                 return
             finally:
                 has_started.set()
-            self._wait_for_end(self._popen)
+            assert self._child is not None
+            self._wait_for_end(self._child, pipes)
 
         threading.Thread(target=run, name=f"kiks: {name}", daemon=True).start()
         has_started.wait()
-        if failures:
-            raise KiksError(f"Cannot start {name}: {failures[0]}. End other programs.")
+        for failure in failures:
+            if isinstance(failure, KiksError):
+                raise failure
+            raise KiksError(f"Cannot start {name}: {failure}. End other programs.")
 
     @property
     def code(self) -> int | None:
         """Its exit code, or minus the number of the signal that ended it; None while it runs."""
-        return self._popen.returncode if self._popen is not None and self._is_over.is_set() else None
+        return self._child.code if self._child is not None and self._is_over.is_set() else None
+
+    @property
+    def reason(self) -> str:
+        """Which limit of its sandbox it has broken, such as 'used more than 512 MB of memory'; empty if none."""
+        return "" if self._child is None else self._child.reason
 
     @property
     def processor_s(self) -> float:
         """Processor time that it has taken, with its children that have ended [s]; 0 where the system does not tell."""
-        popen = self._popen
-        if popen is None:
-            return 0.0
-        try:
-            # Its name, in brackets, may hold anything. See proc(5): utime, stime, cutime and cstime.
-            times = Path(f"/proc/{popen.pid}/stat").read_text("utf-8", "replace").rpartition(")")[2].split()[11:15]
-        except OSError:
-            return 0.0
-        return sum(map(int, times)) / os.sysconf("SC_CLK_TCK")
+        return 0.0 if self._child is None else self._child.processor_s
 
     def interrupt(self) -> None:
         """Interrupt it, as Ctrl-C does."""
-        self._signal(signal.SIGINT)
+        if self._child is not None:
+            self._child.signal(signal.SIGINT)
 
     def kill(self) -> None:
         """Kill it."""
-        self._signal(signal.SIGKILL)
+        if self._child is not None:
+            self._child.signal(signal.SIGKILL)
 
     def wait(self) -> None:
         """Wait until it has ended and its output has been read, at most `END_WAIT_S`."""
@@ -227,51 +233,135 @@ class Process:
 
     # ---- inside ----
 
-    def _start(self, line: list[str], connection: socket.socket) -> subprocess.Popen[bytes]:
-        environment = HASH_SEED | os.environ
+    def _begin(self, launch: Launch) -> list[IO[bytes]]:
+        """Start the program; return the pipes with its output and its errors, if anything reads them here."""
         if self._writer is None:
-            return subprocess.Popen(line, pass_fds=[connection.fileno()], env=environment)
-        # Unbuffered: each line of output comes at once.
-        environment["PYTHONUNBUFFERED"] = "1"
-        keeps_output = self.output is not None
-        if keeps_output:
-            environment["PYTHONIOENCODING"] = "utf-8:backslashreplace"
-        return subprocess.Popen(
-            line,
-            pass_fds=[connection.fileno()],
-            stdin=subprocess.DEVNULL if keeps_output else None,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            env=environment,
-            start_new_session=keeps_output,
-        )
+            self._child = launch(None)
+            return []
+        pipes = [os.pipe(), os.pipe()]
+        readers: list[IO[bytes]] = [os.fdopen(reader, "rb", buffering=0) for reader, _ in pipes]
+        try:
+            self._child = launch((pipes[0][1], pipes[1][1]))
+        except BaseException:
+            for each in readers:
+                each.close()
+            raise
+        finally:
+            for _, writer in pipes:
+                os.close(writer)
+        return readers
 
-    def _wait_for_end(self, popen: subprocess.Popen[bytes]) -> None:
+    def _wait_for_end(self, child: Child, pipes: list[IO[bytes]]) -> None:
         if self._writer is None:
-            popen.wait()
+            child.wait()
         else:
-            assert popen.stdout is not None
-            assert popen.stderr is not None
-            pipes = {popen.stdout: False, popen.stderr: True}
-            reader = threading.Thread(target=_read_output, args=(pipes, self._writer, self._hear), daemon=True)
+            hear = self._hear
+            streams = dict(zip(pipes, _STREAMS, strict=True))
+            arguments = (streams, self._writer, hear, child.note_output)
+            reader = threading.Thread(target=_read_output, args=arguments, daemon=True)
             reader.start()
-            popen.wait()
+            child.wait()
             if self.output is not None:
-                with contextlib.suppress(ProcessLookupError, PermissionError):
-                    os.killpg(popen.pid, signal.SIGKILL)
+                child.end_others()
             reader.join(OUTPUT_WAIT_S)
         self._is_over.set()
         self._on_end()
 
-    def _signal(self, number: int) -> None:
-        popen = self._popen
-        if popen is None or popen.poll() is not None:
-            return
+
+Launch = Callable[[tuple[int, int] | None], "Child"]
+"""Starts a program with descriptors for its output and its errors; None: they go where those of this process go."""
+
+
+class Child(ABC):
+    """A running program as a child of this process: here (`OwnChild`), or in a sandbox.
+
+    Attributes:
+        code: Its exit code, or minus the number of the signal that ended it; None until `wait` has returned.
+        reason: Which limit it has broken, such as 'used more than 512 MB of memory'; empty if none.
+    """
+
+    code: int | None = None
+    reason = ""
+
+    @property
+    @abstractmethod
+    def processor_s(self) -> float:
+        """Processor time that it has taken, with its children that have ended [s]; 0 where the system does not tell."""
+
+    @abstractmethod
+    def signal(self, number: int) -> None:
+        """Send it a signal, if it still runs, and its child processes if their group is its own."""
+
+    @abstractmethod
+    def wait(self) -> None:
+        """Wait until it has ended."""
+
+    @abstractmethod
+    def end_others(self) -> None:
+        """Kill the child processes that it has left in its group."""
+
+    def note_output(self, count: int) -> None:
+        """Note that it has printed some bytes."""
+        _ = count
+
+
+class OwnChild(Child):
+    """A program in a process that has the rights of this one.
+
+    Args:
+        start: What it gets.
+        connection: Its end of the socket to the world.
+        streams: See `Launch`.
+        is_apart: Whether it has no keyboard, and a process group of its own.
+    """
+
+    def __init__(
+        self, start: Start, connection: socket.socket, streams: tuple[int, int] | None, *, is_apart: bool
+    ) -> None:
+        self._is_apart = is_apart
+        environment = HASH_SEED | os.environ
+        if streams is not None:
+            # Unbuffered: each line of output comes at once.
+            environment["PYTHONUNBUFFERED"] = "1"
+        if is_apart:
+            environment["PYTHONIOENCODING"] = "utf-8:backslashreplace"
+        self._popen = subprocess.Popen(
+            python_line("-m", "kiks.script.child_main", str(connection.fileno()), json.dumps(start)),
+            pass_fds=[connection.fileno()],
+            stdin=subprocess.DEVNULL if is_apart else None,
+            stdout=None if streams is None else streams[0],
+            stderr=None if streams is None else streams[1],
+            env=environment,
+            start_new_session=is_apart,
+        )
+
+    @property
+    def processor_s(self) -> float:
+        """Processor time that it has taken, with its children that have ended [s]; 0 where the system does not tell."""
+        try:
+            # Its name, in brackets, may hold anything. See proc(5): utime, stime, cutime and cstime.
+            text = Path(f"/proc/{self._popen.pid}/stat").read_text("utf-8", "replace")
+        except OSError:
+            return 0.0
+        return sum(map(int, text.rpartition(")")[2].split()[11:15])) / os.sysconf("SC_CLK_TCK")
+
+    def signal(self, number: int) -> None:
+        """Send it a signal, if it still runs, and its child processes if their group is its own."""
+        if self._popen.poll() is None:
+            with contextlib.suppress(ProcessLookupError, PermissionError):
+                if self._is_apart:
+                    os.killpg(self._popen.pid, number)
+                else:
+                    self._popen.send_signal(number)
+
+    def wait(self) -> None:
+        """Wait until it has ended."""
+        self.code = self._popen.wait()
+
+    def end_others(self) -> None:
+        """Kill the child processes that it has left in its group."""
         with contextlib.suppress(ProcessLookupError, PermissionError):
-            if self.output is None:
-                popen.send_signal(number)
-            else:
-                os.killpg(popen.pid, number)
+            os.killpg(self._popen.pid, signal.SIGKILL)
 
 
 class OutputWriter:
@@ -376,8 +466,10 @@ class _LabelledWriter(OutputWriter):
         return self._labels.are_terminals[is_error]
 
 
-def _read_output(pipes: dict[IO[bytes], bool], writer: OutputWriter, hear: Callable[[str], None]) -> None:
-    """Read the output of a process until its end."""
+def _read_output(
+    pipes: dict[IO[bytes], bool], writer: OutputWriter, hear: Callable[[str], None], note: Callable[[int], None]
+) -> None:
+    """Read the output of a process until its end; `note` is told of the number of bytes that have come."""
     with selectors.DefaultSelector() as selector:
         unfinished = {}
         for pipe, is_error in pipes.items():
@@ -392,6 +484,7 @@ def _read_output(pipes: dict[IO[bytes], bool], writer: OutputWriter, hear: Calla
             for key, _ in ready:
                 is_error = key.data
                 piece = os.read(key.fd, _READ_SIZE)
+                note(len(piece))
                 *lines, rest = (unfinished[is_error] + piece).split(b"\n")
                 if not piece or len(rest) > writer.longest:
                     lines += [rest] if rest else []

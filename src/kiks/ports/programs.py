@@ -7,7 +7,8 @@ import logging
 import selectors
 import socket
 import threading
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import NoReturn
 
@@ -23,6 +24,7 @@ from kiks.ports.port_names import PortNames
 from kiks.ports.program_process import Command, Labels, OutputLine, Permission, Process, chance_seed
 from kiks.ports.program_scheduler import PATIENCE_S, START_PATIENCE_S, VISIT_PATIENCE_S, ProgramScheduler
 from kiks.ports.resources import opening
+from kiks.ports.sandbox import Sandbox
 from kiks.ports.socket_participant import SocketParticipant
 from kiks.sim.ring_buffer import RingBuffer
 from kiks.sim.simulation import Simulation
@@ -100,6 +102,10 @@ class Handle(SocketParticipant):
             return "stopped"
         return "silenced" if self.is_silenced else f"ended {self.how}"
 
+    def progress(self) -> int | None:
+        """Return something that changes when it lets simulated time pass; None while it waits for the world."""
+        return None if self.is_held_up else self.acts_from_ns
+
     @property
     def how(self) -> str:
         """How it has ended; empty while it runs."""
@@ -152,6 +158,8 @@ class Programs:
         players: Robots that programs elsewhere take (see `let_in`). With thinking 'live' the world waits for none of
             them, and goes on in real time.
         gate: Where the world waits for the players: it opens when all are there, or begins when a person opens it.
+        sandbox: Where the programs run, or where that of each robot runs, by its number; None: in processes with the
+            rights of this one.
 
     Attributes:
         handles: The programs; of ended ones, the last one of each robot.
@@ -176,6 +184,7 @@ class Programs:
         are_apart: bool = False,
         players: Collection[int] = (),
         gate: Gate | None = None,
+        sandbox: Sandbox | Mapping[int, Sandbox] | None = None,
     ) -> None:
         self.sim = sim
         self.permission = Permission(None)
@@ -185,7 +194,7 @@ class Programs:
         self._is_moving = False
         self._moved = threading.Condition(sim.lock)
         self._say, self._thinking, self._record = say, thinking, record
-        self._keeps_output, self._labels = keeps_output, labels
+        self._keeps_output, self._labels, self._sandbox = keeps_output, labels, sandbox
         self._over: tuple[int, str] | None = None
         self._signals, self._count, self._was_touched, self._is_closed = 0, 0, False, False
         self._first_programs = [(robot, command) for robot, command in enumerate(commands, 1) if command is not None]
@@ -471,6 +480,7 @@ class Programs:
             program=str(command.program),
             arguments=list(command.arguments),
         )
+        sandbox = self._sandbox.get(robot) if isinstance(self._sandbox, Mapping) else self._sandbox
         with there:
             try:
                 handle.process = Process(
@@ -481,6 +491,7 @@ class Programs:
                     writer=None if self._labels is None else self._labels.writer(number, command.name),
                     on_end=lambda: self._end(handle),
                     hear=lambda line: self._record_line(robot, line),
+                    launch=None if sandbox is None else partial(sandbox.start, start, there, handle.progress),
                 )
             except KiksError:
                 handle.hang_up()
@@ -510,7 +521,8 @@ class Programs:
 
     def _end(self, handle: Handle) -> None:
         """Free the robots of a stopped program: here, because `round` may be waiting at the gate."""
-        if handle.is_stopped and not self._is_closed:
+        handle.reason = handle.reason or handle.process.reason
+        if (handle.is_stopped or handle.reason) and not self._is_closed:
             with self.sim.lock:
                 handle.disconnect()
         handle.has_ended.set()

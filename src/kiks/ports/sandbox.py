@@ -1,0 +1,533 @@
+"""Where the program of a stranger runs: it reaches no file, network or neighbour, and has limits.
+
+A sandbox has one warm process, the nursery (`script/nursery.py`), which forks for each program that starts: so a start
+takes milliseconds. bubblewrap (`bwrap`) starts the nursery in namespaces of its own: without a network, without other
+processes, with read-only folders of Python, of KiKS and of the program, and with a small folder in memory for all that
+is written. Limits of each process (`setrlimit`) are the first line. A thread outside looks ten times a second at what
+all processes take together; when a limit is broken it kills the whole sandbox, and says which. The next start makes a
+new one.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import resource
+import select
+import shutil
+import signal
+import site
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import kiks
+from kiks.clock.patience import Patience
+from kiks.errors import KiksError
+from kiks.ports.environment_marks import HASH_SEED
+from kiks.ports.messages import Start
+from kiks.ports.program_process import Child, python_line
+
+SAMPLE_S = 0.1
+"""Time between two looks at the processes of a sandbox [s of real time], while a program runs."""
+
+START_PATIENCE_S = 30.0
+"""Longest wait for the start of a sandbox [s of real time]."""
+
+STREAMS = {"PYTHONUNBUFFERED": "1", "PYTHONIOENCODING": "utf-8:backslashreplace"}
+"""The environment of a program whose output another process reads: each line comes at once."""
+
+_ENVIRONMENT = {"PATH": "/usr/bin:/bin", "LANG": "C.UTF-8", "HOME": "/tmp", "TMPDIR": "/tmp"}
+_SYSTEM_FOLDERS = ("/bin", "/sbin", "/lib", "/lib32", "/lib64", "/libx32")
+_SYSTEM_FILES = ("/etc/ld.so.cache", "/etc/alternatives", "/etc/localtime")
+_WRITABLE = ("/tmp", "/dev/shm")
+_ADDRESS_SPACE_BYTES = 4 << 30
+_DESCRIPTORS_MAX = 256
+_MEGABYTE = 1_000_000
+_TICKS_A_SECOND = os.sysconf("SC_CLK_TCK")
+_PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What the programs in a sandbox may take, all processes together.
+
+    Attributes:
+        memory_mb: Memory [MB].
+        processes: Number of processes.
+        processor_s: Processor time of a run [s].
+        computing_s: Processor time in which it lets no simulated time pass [s].
+        waiting_s: Real time in which it waits for something that is not simulated [s].
+        output_mb: What a program prints [MB].
+        files_mb: Files that it writes [MB].
+
+    Example:
+        >>> Limits(memory_mb=1000).memory_mb
+        1000
+    """
+
+    memory_mb: float = 512
+    processes: int = 32
+    processor_s: float = 300.0
+    computing_s: float = 10.0
+    waiting_s: float = 30.0
+    output_mb: float = 5
+    files_mb: float = 64
+
+
+class Sandbox:
+    """A place in which the programs of one submission or one student run.
+
+    Args:
+        files: Files and folders that the programs may read, at the same paths: each program, or its folder. In a folder
+            they find what is changed later, too.
+        limits: What the programs may take, together.
+        is_trusted: Whether the programs may do what this user may: then it needs no `bwrap`, and its limits hold as far
+            as the system lets them.
+
+    Example:
+        >>> with Sandbox([Path("ann")]) as sandbox:  # doctest: +SKIP
+        ...     Programs(sim, [Command(Path("ann/program.py"))], sandbox=sandbox).run()
+    """
+
+    def __init__(self, files: Sequence[Path] = (), *, limits: Limits | None = None, is_trusted: bool = False) -> None:
+        self.files = [Path(os.path.abspath(each)) for each in files]
+        self.limits = limits or Limits()
+        self.is_trusted = is_trusted
+        self._lock = threading.Lock()
+        self._house: _House | None = None
+
+    def __enter__(self) -> Sandbox:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def warm(self) -> None:
+        """Start the warm process, if it does not run.
+
+        Raises:
+            KiksError: If there can be no sandbox on this computer.
+        """
+        with self._lock:
+            self._warm()
+
+    def start(
+        self,
+        start: Start,
+        connection: socket.socket,
+        progress: Callable[[], object],
+        streams: tuple[int, int] | None,
+    ) -> Child:
+        """Start a program.
+
+        Args:
+            start: The program, and what it finds.
+            connection: Its end of the socket to the world.
+            progress: Returns something that changes when the program lets simulated time pass; None while it waits for
+                the world.
+            streams: Descriptors for its output and its errors; None: they go where those of this process go.
+        """
+        start = start._replace(program=os.path.abspath(start.program))
+        with self._lock:
+            return self._warm().start(start, [connection.fileno(), *(streams or (1, 2))], progress)
+
+    def close(self) -> None:
+        """End all processes in it."""
+        with self._lock:
+            if self._house is not None:
+                self._house.close()
+                self._house = None
+
+    def _warm(self) -> _House:
+        if self._house is None or self._house.is_over:
+            self._house = _House(self)
+        return self._house
+
+
+class SandboxedProgram(Child):
+    """A program in a sandbox."""
+
+    def __init__(self, house: _House, number: int, progress: Callable[[], object]) -> None:
+        self._house, self._number, self._progress = house, number, progress
+        self._begin_s = self._mark_s = house.processor_s
+        self._mark: object = None
+        self._waited_s = 0.0
+        self._printed_count = 0
+        self._has_ended = threading.Event()
+        self.code: int | None = None
+        self.reason = ""
+
+    @property
+    def processor_s(self) -> float:
+        """Processor time since its start, of all programs in its sandbox [s]."""
+        return self._house.processor_s - self._begin_s
+
+    def signal(self, number: int) -> None:
+        """Send a signal to it and its child processes."""
+        self._house.send(["signal", self._number, number])
+
+    def wait(self) -> None:
+        """Wait until it has ended."""
+        self._has_ended.wait()
+
+    def end_others(self) -> None:
+        """Do nothing: the nursery ends its child processes."""
+
+    def note_output(self, count: int) -> None:
+        """Note that it has printed some bytes."""
+        self._printed_count += count
+        if self._printed_count > self._house.limits.output_mb * _MEGABYTE:
+            self._house.kill(f"printed more than {self._house.limits.output_mb:g} MB", self)
+
+    def end(self, code: int) -> None:
+        """Note that it has ended, with an exit code or minus the number of a signal."""
+        if self.code is None:
+            self.code = code
+            self._has_ended.set()
+
+    def broken_limit(self, is_running: bool, passed_s: float) -> str:
+        """Return which limit of its own it has broken; empty if none.
+
+        Args:
+            is_running: Whether a process of the sandbox computes now, or has since the last look.
+            passed_s: Real time since then [s].
+        """
+        limits, now_s, mark = self._house.limits, self._house.processor_s, self._progress()
+        if now_s - self._begin_s > limits.processor_s:
+            return f"computed for more than {limits.processor_s:g} s in all"
+        if mark is None or mark != self._mark:
+            self._mark, self._mark_s, self._waited_s = mark, now_s, 0.0
+            return ""
+        if now_s - self._mark_s > limits.computing_s:
+            return f"computed for {limits.computing_s:g} s without using its robot"
+        if not is_running:
+            self._waited_s += passed_s
+        if self._waited_s > limits.waiting_s:
+            return f"waited for {limits.waiting_s:g} s without using its robot"
+        return ""
+
+
+class _Sample(NamedTuple):
+    """A process at an instant: its processor time with that of its ended children [s], and its memory [bytes]."""
+
+    process: int
+    parent: int
+    is_running: bool
+    processor_s: float
+    memory: int
+
+
+class _House:
+    """The processes of a sandbox, from the start of the nursery to its end.
+
+    Attributes:
+        limits: What they may take.
+        processor_s: Processor time that they have taken, at the last look [s].
+    """
+
+    def __init__(self, sandbox: Sandbox) -> None:
+        self.limits = sandbox.limits
+        self.processor_s = 0.0
+        self._is_trusted = sandbox.is_trusted
+        self._programs: dict[int, SandboxedProgram] = {}
+        self._count = 0
+        self._scratch = tempfile.mkdtemp(prefix="kiks-sandbox-") if sandbox.is_trusted else ""
+        self._control, there = socket.socketpair()
+        self._sending = threading.Lock()
+        self._is_ready = threading.Event()
+        self._complaint = ""
+        self._processes = -1
+        self._first = 0
+        with there:
+            self._begin(sandbox, there)
+        self._is_ready.wait()
+        if self._complaint:
+            self._thread.join()
+            raise KiksError(self._complaint)
+
+    @property
+    def is_over(self) -> bool:
+        """Whether its processes have ended."""
+        return not self._thread.is_alive()
+
+    def start(self, start: Start, descriptors: list[int], progress: Callable[[], object]) -> SandboxedProgram:
+        """Start a program; its descriptors are those of its connection, its output and its errors."""
+        self._count += 1
+        program = self._programs[self._count] = SandboxedProgram(self, self._count, progress)
+        self.send(["start", self._count, list(start)], descriptors)
+        if self.is_over:  # meanwhile
+            program.end(-signal.SIGKILL)
+        return program
+
+    def send(self, words: list[Any], descriptors: Sequence[int] = ()) -> None:
+        """Send a line to the nursery."""
+        data = json.dumps(words).encode() + b"\n"
+        with self._sending, contextlib.suppress(OSError):
+            sent = socket.send_fds(self._control, [data], descriptors)
+            self._control.sendall(data[sent:])
+
+    def kill(self, reason: str, culprit: SandboxedProgram | None = None) -> None:
+        """Kill all processes, because the programs have broken a limit, or one of them has."""
+        for program in [culprit] if culprit is not None else list(self._programs.values()):
+            program.reason = program.reason or reason
+        self._kill()
+
+    def close(self) -> None:
+        """End all processes."""
+        self._kill()
+        self._thread.join()
+
+    # ---- inside ----
+
+    def _begin(self, sandbox: Sandbox, there: socket.socket) -> None:
+        """Start the nursery in a thread that lives as long: Linux ends a child with the thread that started it."""
+        limits = self.limits
+        folders = [self._scratch] if self._is_trusted else list(_WRITABLE)
+        seen = [] if self._is_trusted else [str(path) for path in [*_python_folders(), *sandbox.files]]
+        each = {
+            "RLIMIT_AS": int(limits.memory_mb * _MEGABYTE) + _ADDRESS_SPACE_BYTES,
+            "RLIMIT_FSIZE": int(limits.files_mb * _MEGABYTE),
+            "RLIMIT_NOFILE": min(_DESCRIPTORS_MAX, resource.getrlimit(resource.RLIMIT_NOFILE)[1]),
+            "RLIMIT_CORE": 0,
+        }
+        line = python_line("-m", "kiks.script.nursery", str(there.fileno()), json.dumps([folders, seen, each]))
+        environment = HASH_SEED | os.environ | STREAMS if self._is_trusted else HASH_SEED | _ENVIRONMENT | STREAMS
+        passed, info = [there.fileno()], None
+        if not self._is_trusted:
+            info, info_there = os.pipe()
+            passed.append(info_there)
+            line = [*_bwrap(seen, int(limits.files_mb * _MEGABYTE), info_there), *line]
+        errors, errors_there = os.pipe()
+        has_started = threading.Event()
+
+        def run() -> None:
+            # As in `Process`: the terminal's Ctrl-C is not for the nursery.
+            signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+            try:
+                self._popen = subprocess.Popen(
+                    line,
+                    pass_fds=passed,
+                    stdin=subprocess.DEVNULL,
+                    stdout=subprocess.DEVNULL,
+                    stderr=errors_there,
+                    env=environment,
+                    start_new_session=True,
+                )
+            except OSError as error:
+                self._complaint = f"Cannot start a sandbox: {error}. End other programs."
+            finally:
+                os.close(errors_there)
+                if info is not None:
+                    os.close(info_there)
+                has_started.set()
+            if not self._complaint:
+                self._watch(errors, info)
+            os.close(errors)
+            if info is not None:
+                os.close(info)
+            self._control.close()
+            self._is_ready.set()
+
+        self._thread = threading.Thread(target=run, name="kiks: sandbox", daemon=True)
+        self._thread.start()
+        has_started.wait()
+
+    def _watch(self, errors: int, info: int | None) -> None:
+        """Hear what the nursery says, and look at the processes, to the end."""
+        try:
+            if self._hear_ready(info):
+                self._is_ready.set()
+                self._hear()
+            else:
+                self._complaint = _complaint(errors)
+        finally:
+            self._kill()
+            self._popen.wait()
+            for program in list(self._programs.values()):
+                program.reason = program.reason or "ended its sandbox"
+                program.end(-signal.SIGKILL)
+            self._programs.clear()
+            if self._processes >= 0:
+                os.close(self._processes)
+            if self._scratch:
+                shutil.rmtree(self._scratch, ignore_errors=True)
+
+    def _hear_ready(self, info: int | None) -> bool:
+        self._control.settimeout(START_PATIENCE_S)
+        try:
+            if not self._control.recv(1 << 12):
+                return False
+        except OSError:
+            return False
+        self._control.settimeout(None)
+        self._first = self._popen.pid if info is None else json.loads(os.read(info, 1 << 12))["child-pid"]
+        with contextlib.suppress(OSError):
+            folder = "/proc" if info is None else f"/proc/{self._first}/root/proc"
+            self._processes = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+        return True
+
+    def _hear(self) -> None:
+        rest, since = b"", Patience(SAMPLE_S)
+        while True:
+            is_due = not self._programs or since.left_s() == 0
+            ready, _, _ = select.select([self._control], [], [], since.left_s() if self._programs else None)
+            if ready:
+                try:
+                    data = self._control.recv(1 << 16)
+                except OSError:
+                    return
+                if not data:
+                    return
+                *lines, rest = (rest + data).split(b"\n")
+                for what, number, *values in map(json.loads, lines):
+                    if what == "ended":
+                        self._programs.pop(number).end(*values)
+            if self._programs and is_due:
+                passed_s = since.waited_s()
+                since.renew()
+                reason, culprit = self._broken_limit(passed_s)
+                if reason:
+                    self.kill(reason, culprit)
+                    return
+
+    def _broken_limit(self, passed_s: float) -> tuple[str, SandboxedProgram | None]:
+        """Look at all processes; return which limit is broken, empty if none, and by which program if that is known."""
+        samples = self._samples()
+        taken_s = sum(each.processor_s for each in samples)
+        is_running = taken_s > self.processor_s or any(each.is_running for each in samples[1:])
+        self.processor_s = max(self.processor_s, taken_s)
+        limits, others = self.limits, samples[1:]
+        if len(others) > limits.processes:
+            return f"started more than {limits.processes} processes", None
+        if sum(each.memory for each in others) > limits.memory_mb * _MEGABYTE and (
+            sum(self._own_memory(each) for each in others) > limits.memory_mb * _MEGABYTE
+        ):
+            return f"used more than {limits.memory_mb:g} MB of memory", None
+        for program in list(self._programs.values()):
+            reason = program.broken_limit(is_running, passed_s)
+            if reason:
+                return reason, program
+        return "", None
+
+    def _samples(self) -> list[_Sample]:
+        """Return the processes of the sandbox; the nursery comes first."""
+        if self._processes < 0:
+            return []
+        first = self._first if self._is_trusted else 1
+        found = {}
+        for name in os.listdir(self._processes):
+            if name.isdigit() and (sample := _sample(self._processes, int(name))) is not None:
+                found[sample.process] = sample
+        if first not in found:
+            return []
+        if not self._is_trusted:
+            return [found.pop(first), *found.values()]
+        children: dict[int, list[int]] = {}
+        for each in found.values():
+            children.setdefault(each.parent, []).append(each.process)
+        family = [first]
+        for process in family:
+            family += children.get(process, [])
+        return [found[process] for process in family]
+
+    def _own_memory(self, sample: _Sample) -> int:
+        """Return the memory of a process, of shared pages its share [bytes]."""
+        text = _read(self._processes, f"{sample.process}/smaps_rollup")
+        shares = [line.split()[1] for line in text.splitlines() if line.startswith("Pss:")]
+        return int(shares[0]) * 1024 if shares else sample.memory
+
+    def _kill(self) -> None:
+        popen = self._popen
+        if self._is_trusted:
+            # Twice: a process may have forked meanwhile. A namespace ends with its first process.
+            for _ in range(2):
+                for sample in self._samples()[1:]:
+                    with contextlib.suppress(ProcessLookupError, PermissionError):
+                        os.kill(sample.process, signal.SIGKILL)
+        popen.kill()
+
+
+def _sample(folder: int, process: int) -> _Sample | None:
+    text = _read(folder, f"{process}/stat")
+    # Its name, in brackets, may hold anything. See proc(5).
+    fields = text.rpartition(")")[2].split()
+    if len(fields) < 22:
+        return None
+    processor_s = sum(map(int, fields[11:15])) / _TICKS_A_SECOND
+    return _Sample(process, int(fields[1]), fields[0] in "RD", processor_s, int(fields[21]) * _PAGE_BYTES)
+
+
+def _read(folder: int, name: str) -> str:
+    try:
+        with open(name, "rb", opener=lambda path, flags: os.open(path, flags, dir_fd=folder)) as file:
+            return file.read().decode(errors="replace")
+    except OSError:
+        return ""
+
+
+def _bwrap(files: Sequence[str], size: int, info: int) -> list[str]:
+    """Return the beginning of a command line that runs the rest of it in namespaces of its own.
+
+    Args:
+        files: Files and folders that it may read.
+        size: Largest sum of the files that it writes [bytes].
+        info: Descriptor to which the number of the process is written.
+
+    Raises:
+        KiksError: If there is no bubblewrap.
+    """
+    bwrap = shutil.which("bwrap")
+    if bwrap is None:
+        raise KiksError(
+            "a program of somebody else must run in a sandbox, but bubblewrap (bwrap) is not installed. Install it "
+            "(Debian: sudo apt-get install bubblewrap), or say --trusted if you have read the programs."
+        )
+    words = [bwrap, "--unshare-all", "--unshare-user", "--die-with-parent", "--new-session", "--as-pid-1"]
+    words += ["--info-fd", str(info), "--cap-drop", "ALL", "--ro-bind", "/usr", "/usr"]
+    for folder in _SYSTEM_FOLDERS:
+        if os.path.islink(folder):
+            words += ["--symlink", os.readlink(folder), folder]
+        elif os.path.isdir(folder):
+            words += ["--ro-bind", folder, folder]
+    for file in _SYSTEM_FILES:
+        words += ["--ro-bind-try", file, file]
+    words += ["--proc", "/proc", "--dev", "/dev"]
+    for folder in _WRITABLE:
+        words += ["--size", str(size), "--tmpfs", folder]
+    for file in files:
+        words += ["--ro-bind", file, file]
+    # What bubblewrap has made in memory itself has no limit.
+    return [*words, "--remount-ro", "/dev", "--remount-ro", "/", "--chdir", "/tmp", "--"]
+
+
+def _python_folders() -> list[Path]:
+    """Return the folders that this Python and KiKS need, none of which may hold the home folder."""
+    names = {sys.prefix, sys.exec_prefix, sys.base_prefix, sys.base_exec_prefix, *kiks.__path__}
+    names |= {*site.getsitepackages(), *([site.getusersitepackages()] if site.ENABLE_USER_SITE else [])}
+    folders = {Path(name).resolve() for name in names} | {Path(name) for name in names}
+    home = Path.home()
+    return sorted(
+        each for each in folders if each.is_dir() and not home.is_relative_to(each) and not each.is_relative_to("/usr")
+    )
+
+
+def _complaint(errors: int) -> str:
+    """Return why there is no sandbox, from what bubblewrap or Python has said."""
+    os.set_blocking(errors, False)
+    said = ""
+    with contextlib.suppress(OSError):
+        said = os.read(errors, 1 << 12).decode(errors="replace").strip()
+    last = said.splitlines()[-1][:200] if said else "nothing"
+    return (
+        f"a program of somebody else must run in a sandbox, but bubblewrap could not make one and said: {last!r}. "
+        "Allow it namespaces (kernel.unprivileged_userns_clone=1 on Debian, an AppArmor profile for bwrap on Ubuntu), "
+        "or say --trusted if you have read the programs."
+    )

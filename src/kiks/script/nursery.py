@@ -1,0 +1,214 @@
+"""A warm process in a sandbox: it has imported what a program needs, and forks for each start of one.
+
+`ports/sandbox.py` starts it by `python -m kiks.script.nursery`, sends it lines over a socket, and is told of ends. In a
+forked process, `main` goes on as in a process of `child_main.py` of its own. The program in it is a stranger's: it gets
+none of the nursery's descriptors, and in a namespace of its own may neither look into the nursery nor end it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import gc
+import json
+import os
+import resource
+import selectors
+import shutil
+import signal
+import socket
+import sys
+from collections import deque
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from kiks.ports.messages import Start
+from kiks.script import child_main
+
+DUMPABLE, CHILD_SUBREAPER = 4, 36
+"""PR_SET_DUMPABLE and PR_SET_CHILD_SUBREAPER of Linux (linux/prctl.h)."""
+
+LINKS_MAX = 1000
+"""Most files of a program to which its working folder has links."""
+
+
+class Nursery:
+    """Forks for each program.
+
+    Args:
+        control: The socket at whose other end the sandbox is.
+        folders: Folders into which programs may write; the first one holds the working folders.
+        kept: Files and folders of others, some perhaps below those.
+        limits: Limits of each process, by the name of a constant of `resource`.
+    """
+
+    def __init__(
+        self, control: socket.socket, folders: Sequence[str], kept: Sequence[str], limits: dict[str, int]
+    ) -> None:
+        self._control, self._folders, self._limits = control, folders, limits
+        self._kept = set(kept)
+        self._above = {str(folder) for path in kept for folder in Path(path).parents}
+        self._descriptors: deque[int] = deque()
+        self._programs: dict[int, tuple[int, str]] = {}
+        self._rest = b""
+        self._wake, waker = socket.socketpair()
+        for each in (self._wake, waker):
+            each.setblocking(False)
+        # Its handler does nothing, but with one the signal is heard.
+        signal.signal(signal.SIGCHLD, lambda _number, _frame: None)
+        signal.set_wakeup_fd(waker.fileno(), warn_on_full_buffer=False)
+        self._waker = waker
+
+    def serve(self) -> Callable[[], int] | None:
+        """Serve until the sandbox has gone; in a forked process, return the function that runs the program."""
+        with selectors.DefaultSelector() as selector:
+            selector.register(self._control, selectors.EVENT_READ)
+            selector.register(self._wake, selectors.EVENT_READ)
+            self._tell("ready")
+            while True:
+                for key, _ in selector.select():
+                    if key.fileobj is self._wake:
+                        self._wake.recv(1 << 12)
+                        self._take_ends()
+                        continue
+                    data, descriptors, _, _ = socket.recv_fds(self._control, 1 << 16, 16)
+                    self._descriptors += descriptors
+                    if not data:
+                        return None
+                    *lines, self._rest = (self._rest + data).split(b"\n")
+                    for line in lines:
+                        what, number, *rest = json.loads(line)
+                        if what == "signal":
+                            self._signal(number, *rest)
+                        elif (run := self._start(number, *rest)) is not None:
+                            return run
+
+    # ---- inside ----
+
+    def _tell(self, *words: Any) -> None:
+        self._control.sendall(json.dumps(words).encode() + b"\n")
+
+    def _start(self, number: int, fields: list[Any]) -> Callable[[], int] | None:
+        start = Start(*fields)
+        connection, *streams = (self._descriptors.popleft() for _ in range(3))
+        if not self._programs:
+            self._clean()
+        folder = self._working_folder(start)
+        if process := os.fork():
+            for each in (connection, *streams):
+                os.close(each)
+            self._programs[process] = number, folder
+            self._tell("started", number)
+            return None
+        os.setsid()
+        signal.set_wakeup_fd(-1)
+        signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+        for each_socket in (self._control, self._wake, self._waker):
+            each_socket.close()
+        os.chdir(folder)
+        for target, each in enumerate(streams, 1):
+            os.dup2(each, target)
+            os.close(each)
+        _control_process(DUMPABLE, 1)
+        for name, most in self._limits.items():
+            resource.setrlimit(getattr(resource, name), (most, most))
+        return lambda: child_main.main(connection, start)
+
+    def _working_folder(self, start: Start) -> str:
+        """Make a working folder, with links to the files beside the program; return its path."""
+        count = 1
+        while os.path.lexists(folder := os.path.join(self._folders[0], f"work{count}")):
+            count += 1
+        os.mkdir(folder)
+        program = Path(start.program)
+        beside = program if program.is_dir() else program.parent
+        with contextlib.suppress(OSError):
+            for entry in sorted(os.listdir(beside))[:LINKS_MAX]:
+                os.symlink(beside / entry, os.path.join(folder, entry))
+        return folder
+
+    def _signal(self, number: int, signal_number: int) -> None:
+        for process, (each, _) in self._programs.items():
+            if each == number:
+                _kill_group(process, signal_number)
+
+    def _take_ends(self) -> None:
+        """Tell of the programs that have ended, and end the processes that they have left."""
+        ends = []
+        while True:
+            try:
+                process, status = os.waitpid(-1, os.WNOHANG)
+            except ChildProcessError:
+                break
+            if not process:
+                break
+            if process in self._programs:
+                ends.append((self._programs.pop(process)[0], os.waitstatus_to_exitcode(status)))
+                _kill_group(process, signal.SIGKILL)
+        if ends and not self._programs:
+            _kill_all()
+        for number, code in ends:
+            self._tell("ended", number, code)
+
+    def _clean(self) -> None:
+        """Remove all that earlier programs have written: a run depends on no other."""
+        if os.getpid() == 1:
+            _kill_all()
+            with contextlib.suppress(ChildProcessError):
+                while True:
+                    os.waitpid(-1, 0)
+        for folder in self._folders:
+            self._empty(folder)
+
+    def _empty(self, folder: str) -> None:
+        for entry in os.scandir(folder):
+            if entry.path in self._kept:
+                continue
+            if entry.path in self._above:
+                self._empty(entry.path)
+            elif entry.is_dir(follow_symlinks=False):
+                shutil.rmtree(entry)
+            else:
+                os.unlink(entry)
+
+
+def _kill_group(process: int, signal_number: int) -> None:
+    with contextlib.suppress(ProcessLookupError, PermissionError):
+        os.killpg(process, signal_number)
+
+
+def _kill_all() -> None:
+    """Kill all other processes of the namespace, if this one is its first; else -1 would mean the user's processes."""
+    if os.getpid() == 1:
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            os.kill(-1, signal.SIGKILL)
+
+
+def _control_process(option: int, value: int) -> None:
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(option, value, 0, 0, 0)
+
+
+def main(descriptor: int, folders: list[str], kept: list[str], limits: dict[str, int]) -> int:
+    """Serve, and in each forked process run the program; return the exit code of the process.
+
+    Args:
+        descriptor: The socket to the sandbox.
+        folders: See `Nursery`.
+        kept: See `Nursery`.
+        limits: See `Nursery`.
+    """
+    # Programs are forked with it blocked, as they are started elsewhere (`child_main.py`).
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    # No program may look into this process, or take its descriptors.
+    _control_process(DUMPABLE, 0)
+    _control_process(CHILD_SUBREAPER, 1)
+    os.set_inheritable(descriptor, False)
+    gc.freeze()
+    run = Nursery(socket.socket(fileno=descriptor), folders, kept, limits).serve()
+    return 0 if run is None else run()
+
+
+if __name__ == "__main__":
+    sys.exit(main(int(sys.argv[1]), *json.loads(sys.argv[2])))
