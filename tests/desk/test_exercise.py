@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 from playwright.sync_api import expect
-from tests.desk.visitor import NewPage, Visitor, check_access, open_desk
+from tests.desk.visitor import NewPage, Visitor, check_access, check_reach, open_desk
 
 from kiks.desk.panels.exercise_text import parts_of
 from kiks.model.arena import Arena
 from kiks.model.arena_objects import Lamp, Pose
-from kiks.model.exercise import Cases, Exercise
+from kiks.model.exercise import Cases, Exercise, cases_of
 from kiks.model.goal import Goal
 from kiks.model.project import Project
 from kiks.trials.hand_in import PAGE, SCORE, program_of
@@ -120,5 +120,58 @@ def test_exercise_is_read_solved_tried_and_handed_in(tmp_path: Path, new_page: N
         visitor.at("apply").click()
         visitor.told("it is locked")
         assert visitor.sim.pose(1) == lies
+    finally:
+        shown.close()
+
+
+@pytest.mark.slow
+def test_lecturer_saves_a_world_as_an_exercise_and_opens_it(tmp_path: Path, new_page: NewPage) -> None:
+    shown = open_desk(tmp_path)
+    try:
+        visitor = Visitor(new_page(), shown)
+        expect(visitor.at("tab-exercise")).to_be_hidden()
+        visitor.tab("programs")
+        visitor.write(DRIVE)
+        visitor.tab("arena")
+        visitor.at("save-exercise").click()
+        visitor.at("exercise-title").fill("Find it")
+        visitor.at("exercise-text").fill(TEXT)
+        for typed, wrong in (("ligt_mm < 80", "Did you mean 'light_mm'?"), ("light_mm <", "must be a formula")):
+            visitor.at("goal-solved").fill(typed)
+            expect(visitor.page.get_by_text(wrong)).to_be_visible()
+        visitor.at("dialog-yes").click()
+        visitor.told("solved must be a formula")
+        visitor.at("goal-solved").fill("light_mm < 80")
+        expect(visitor.page.get_by_text("must be a formula")).to_have_count(0)
+        visitor.at("limit").fill("30")
+        visitor.at("case-0-seed").fill("1..20")
+        visitor.at("case-0-start").fill("100, 100; 100, 300, 90")
+        visitor.at("add-case").click()
+        visitor.at("case-1-family").fill("1, 2")
+        visitor.at("case-1-is_hidden").click()
+        check_access(visitor.page, "save as exercise")
+        visitor.picture("save-as-exercise")
+        visitor.page.set_viewport_size({"width": 390, "height": 844})
+        check_reach(visitor.page, "save as exercise")
+        visitor.picture("save-as-exercise-390")
+        visitor.page.set_viewport_size({"width": 1366, "height": 768})
+        visitor.at("exercise-name").fill("find")
+        visitor.at("dialog-yes").click()
+        visitor.told("Saved as find.kiks and find-students.kiks.")
+
+        made = Project.load(tmp_path / "find.kiks")
+        assert made.goal is not None
+        assert made.exercise == Exercise("Find it", text=TEXT, template=DRIVE)
+        assert (made.goal.solved, made.seconds) == ("light_mm < 80", 30)
+        assert [len(cases_of([each])) for each in made.cases] == [40, 2]
+        assert Project.load(tmp_path / "find-students.kiks").cases == made.cases[:1]
+
+        visitor.at("open-name").fill("find-s")
+        visitor.page.locator(".q-menu .q-item").get_by_text("find-students.kiks").click()
+        visitor.at("open").click()
+        expect(visitor.page.get_by_role("heading", name="Find it")).to_be_visible()
+        visitor.tab("arena")
+        visitor.at("save-exercise").click()
+        visitor.told("it is locked")
     finally:
         shown.close()

@@ -193,6 +193,10 @@ class Project:
         """Return a project of an arena, with a Khepera for each of its starts, at least one."""
         return cls(arena, robots=(ProjectRobot(),) * max(len(arena.starts), 1))
 
+    def for_students(self) -> Project:
+        """Return it without what only the lecturer's file has: hidden cases."""
+        return replace(self, cases=tuple(each for each in self.cases if not each.is_hidden))
+
     def save(self, path: str | Path) -> None:
         """Write the file, in one step."""
         ending_of(path, "a project's file", (".kiks",))

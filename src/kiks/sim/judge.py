@@ -29,6 +29,39 @@ POINTS, RESULT = "points", "result"
 """Entries of the score that the judge writes."""
 
 
+OWN_NAMES = {
+    "time_s": "Simulated time [s].",
+    "is_solved": "1 if the goal is solved, else 0.",
+    "is_over": "1 at the end of a run that is neither solved nor failed, else 0.",
+    "wall_mm": "The gap to the nearest wall [mm].",
+    'score("laps")': "A number that the supervisor has counted.",
+    "held_s(wall_mm < 40)": "For how long a condition has held without a break [s].",
+    "total_s(wall_mm < 40)": "For how long a condition has held in all [s].",
+}
+"""Names of formulas besides measures, as they are typed, with what they mean."""
+
+
+def goal_names() -> dict[str, str]:
+    """Return what formulas of goals may name, as it is typed, with what each means.
+
+    Example:
+        >>> goal_names()["contacts"]
+        'How often it has met something.'
+    """
+    found = {}
+    for name in measures.__all__:
+        made = getattr(measures, name)
+        told, typed = made, name
+        if isinstance(made, Measure):
+            told = made.kernel
+        else:
+            needed = inspect.signature(made).parameters.values()
+            names = [each.name for each in needed if each.default is each.empty and each.name != "arena"]
+            typed += f"({', '.join(names)})"
+        found[typed] = (inspect.getdoc(told) or "").split("\n")[0]
+    return OWN_NAMES | found
+
+
 @dataclass(frozen=True)
 class Judgement:
     """How a run has done.

@@ -12,6 +12,7 @@ import numpy as np
 from nicegui import ui
 
 from kiks.desk.panels.arena_view import ArenaView, Points
+from kiks.desk.panels.exercise_dialog import Template
 from kiks.desk.panels.files import FilesPanel
 from kiks.desk.panels.new_arena import ask_for_box, ask_for_maze
 from kiks.desk.panels.properties import PropertiesPanel
@@ -68,9 +69,10 @@ class EditorPanel(Panel):
         desk: The desk.
         editing: Edits its world.
         view: The view in which people draw.
+        template: Returns the program in the editor of programs, with which an exercise may begin.
     """
 
-    def __init__(self, desk: Desk, editing: Editing, view: ArenaView) -> None:
+    def __init__(self, desk: Desk, editing: Editing, view: ArenaView, template: Template) -> None:
         super().__init__(desk)
         self._editing, self._view = editing, view
         self._tool = "hand"
@@ -82,7 +84,7 @@ class EditorPanel(Panel):
             self._build_tools()
             self._build_brush()
             self._build_steps()
-            FilesPanel(desk, editing)
+            FilesPanel(desk, editing, template)
         self._choose("hand")
         self.refresh()
 

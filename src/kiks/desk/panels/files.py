@@ -9,6 +9,7 @@ from pathlib import Path, PurePosixPath
 from nicegui import ui
 from nicegui.events import UploadEventArguments
 
+from kiks.desk.panels.exercise_dialog import ExerciseDialog, Template
 from kiks.desk.panels.film import FilmDialog
 from kiks.desk.panels.widgets import agrees, named, number, select, text_button, told, with_props
 from kiks.desk.server.desk import Desk
@@ -26,9 +27,10 @@ class FilesPanel:
     Args:
         desk: The desk.
         editing: Edits its world.
+        template: Returns the program in the editor, with which an exercise may begin.
     """
 
-    def __init__(self, desk: Desk, editing: Editing) -> None:
+    def __init__(self, desk: Desk, editing: Editing, template: Template) -> None:
         # Uploads start at once, so the list of waiting files is always empty. The button that chooses one has a name.
         ui.add_css(
             ".kiks-upload :is(.q-uploader__list, .q-uploader__input) { display: none }"
@@ -37,6 +39,7 @@ class FilesPanel:
         self._desk = desk
         self._editing = editing
         self._folder = Folder(desk.folder)
+        self._exercise = ExerciseDialog(desk, template)
         ui.separator()
         self._build_open()
         self._build_save()
@@ -60,6 +63,8 @@ class FilesPanel:
             self._name.tooltip("Name in the folder; .kiks saves the world, .kad an arena for the Matlab KiKS")
             text_button("Save", "save", "save", "Save the world with everything where it is now", self._save)
             text_button("", "download", "download", "Download the world under this name instead", self._download)
+            tip = "Save the world as an exercise: with a text, a goal, cases and a template"
+            text_button("", "school", "save-exercise", tip, told(self._exercise.open))
             text_button("", "movie", "film", "Make a film of the run and download it", FilmDialog(self._desk).open)
 
     def _build_upload(self) -> None:

@@ -100,7 +100,7 @@ class Page:
             ("exercise", "Exercise", lambda: ExercisePanel(desk, self._program)),
             ("robot", "Robot", lambda: MonitorPanel(desk, feed)),
             ("wire", "Wire", lambda: WirePanel(desk)),
-            ("arena", "Arena", lambda: EditorPanel(desk, self._editing, self._view)),
+            ("arena", "Arena", lambda: EditorPanel(desk, self._editing, self._view, self._template)),
             ("programs", "Programs", lambda: ProgramsPanel(desk)),
             ("settings", "Settings", lambda: SettingsPanel(desk)),
         ]
@@ -136,6 +136,12 @@ class Page:
         programs = self._panel("programs")
         assert isinstance(programs, ProgramsPanel)
         return await programs.command()
+
+    def _template(self) -> str:
+        """Return the program in the editor."""
+        programs = self._panel("programs")
+        assert isinstance(programs, ProgramsPanel)
+        return programs.text
 
     def _open(self, name: str) -> None:
         """Show a panel, and let the others rest."""

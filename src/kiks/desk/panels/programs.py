@@ -345,6 +345,11 @@ class ProgramsPanel(Panel):
             where = "an unchanged example, with nothing to save" if is_example else f"saved in {self._desk.folder}"
             ui.notify(f"{script.name} is {where}.")
 
+    @property
+    def text(self) -> str:
+        """The program in the editor; empty if there is no editor."""
+        return self._editor.value or "" if self._desk.may_run_programs else ""
+
     async def command(self) -> Command | None:
         """Check the program in the editor, save it, and return how it is started; None if a person wants it otherwise.
 

@@ -7,7 +7,6 @@ import logging
 import re
 import secrets
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import partial
 from pathlib import Path, PurePosixPath
 from urllib.parse import urlsplit
@@ -69,7 +68,7 @@ class Room:
     def __init__(
         self, project: Project, home: Path, names: Sequence[str], folder: Path, *, code: str = "", address: str = ""
     ) -> None:
-        self.project = replace(project, cases=tuple(each for each in project.cases if not each.is_hidden))
+        self.project = project.for_students()
         self.title = (project.exercise.title if project.exercise is not None else "") or project.arena.name
         self.folder, self._home = folder.resolve(), home
         is_new = not self.folder.exists()
