@@ -2,36 +2,45 @@
 
 from __future__ import annotations
 
+import subprocess
 import tempfile
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
-from kiks.errors import KiksError, ParameterError
+from kiks.errors import KiksError, ParameterError, WorkError
 from kiks.model.exercise import Case, cases_of
 from kiks.model.project import Project
-from kiks.ports.program_process import Command, commands_of
+from kiks.ports.program_process import Command, commands_of, python_line
 from kiks.ports.resources import processor_count
 from kiks.sim.from_project import in_case
 from kiks.trials.hand_in import PAGE, Tried, packed
-from kiks.trials.runner import run_trials
+from kiks.trials.runner import ASK_S, run_trials
 from kiks.trials.trial import Outcome, Trial
+
+_TURNS = threading.BoundedSemaphore(max(processor_count() - 1, 1))
+"""One turn for each core but one, which is the server's: thirty students of a room may press 'Try all' at once."""
 
 
 class Tries:
     """The tries of one program; new ones take their place.
 
+    Args:
+        is_for_others: Whether the program is that of another person, so that it is not trusted, and has one process.
+
     Attributes:
         is_trusted: Whether the program may do what this user may; else it runs in a sandbox.
-        workers: How many processes try; one for each core but one, which is the desk's, if None.
+        workers: How many processes try.
         project: The exercise; None before the first try.
         cases: The cases, in order.
         outcomes: What has come out so far, by numbers of the cases, from 0.
         error: Why they cannot begin; empty if they can.
     """
 
-    def __init__(self) -> None:
-        self.is_trusted = True
-        self.workers: int | None = None
+    def __init__(self, *, is_for_others: bool = False) -> None:
+        self.is_trusted = not is_for_others
+        self.workers = 1 if is_for_others else max(processor_count() - 1, 1)
         self.project: Project | None = None
         self.cases: list[Case] = []
         self.outcomes: dict[int, Outcome] = {}
@@ -90,15 +99,27 @@ class Tries:
                 Trial(str(number), in_case(project, case, home), home, programs, self.is_trusted)
                 for number, case in enumerate(self.cases)
             ]
-            run_trials(
-                trials,
-                self._path(),
-                workers=self.workers or max(processor_count() - 1, 1),
-                on_outcome=self._take,
-                goes_on=lambda: self._is_wanted,
-            )
+            with self._turn():
+                run_trials(
+                    trials,
+                    self._path(),
+                    workers=self.workers,
+                    on_outcome=self._take,
+                    goes_on=lambda: self._is_wanted,
+                )
         except (KiksError, OSError) as error:
             self.error = str(error)
+
+    @contextmanager
+    def _turn(self) -> Iterator[None]:
+        """Wait for a turn, unless these tries are stopped meanwhile."""
+        while not (has_turn := _TURNS.acquire(timeout=ASK_S)) and self._is_wanted:
+            pass
+        try:
+            yield
+        finally:
+            if has_turn:
+                _TURNS.release()
 
     def _take(self, outcome: Outcome, _count: int) -> None:
         self.outcomes[int(outcome.name)] = outcome
@@ -124,9 +145,6 @@ class Tries:
 
     def packed(self) -> bytes:
         """Return the file that is handed in when all cases have come out; its run is the one with the fewest points."""
-        from kiks.export.page import save_page
-        from kiks.recording.recording import Recording
-
         if self.error:
             raise ParameterError(self.error)
         if not self.is_whole:
@@ -134,9 +152,18 @@ class Tries:
         assert self.project is not None
         worst = min(self.outcomes, key=lambda number: (self.outcomes[number].points, number))
         file, page = self.recording(worst), self._path() / PAGE
-        title = "" if self.project.exercise is None else self.project.exercise.title
-        save_page(Recording(file), page, title=f"{title}: {self.cases[worst].name}" if title else None)
-        return packed(self._program, self.tried, exercise=title, recording=file.read_bytes(), page=page.read_bytes())
+        exercise = "" if self.project.exercise is None else self.project.exercise.title
+        self._write_page(file, page, f"{exercise}: {self.cases[worst].name}")
+        return packed(self._program, self.tried, exercise=exercise, recording=file.read_bytes(), page=page.read_bytes())
+
+    def _write_page(self, recording: Path, page: Path, title: str) -> None:
+        """Write the page of a recording in a process of its own: figures would take the time of the desk."""
+        line = python_line("-m", "kiks", "export", str(recording), str(page), "--force", f"--title={title}")
+        with self._turn():
+            made = subprocess.run(line, stdin=subprocess.DEVNULL, capture_output=True, check=False)
+        if made.returncode:
+            said = made.stderr.decode(errors="replace").strip().splitlines()
+            raise WorkError(f"Cannot write the page of the run: {said[-1] if said else 'its process has ended'}.")
 
     def close(self) -> None:
         """End all, and forget what has come out."""
