@@ -91,7 +91,7 @@ def exercise() -> Project:
 
 @pytest.fixture
 def room(tmp_path: Path) -> Iterator[Room]:
-    room = Room(exercise(), tmp_path, NAMES, tmp_path / "room", code=CODE)
+    room = Room(exercise(), tmp_path, NAMES, tmp_path / "room", code=CODE, is_trusted=True)
     with open_room(room, port=0):
         yield room
 
@@ -294,7 +294,7 @@ def test_what_is_handed_in_lies_in_one_folder(room: Room) -> None:
 def test_a_room_comes_up_again(tmp_path: Path) -> None:
     ada = Browser()
     for _ in range(2):
-        room = Room(exercise(), tmp_path, NAMES[::-1], tmp_path / "room")
+        room = Room(exercise(), tmp_path, NAMES[::-1], tmp_path / "room", is_trusted=True)
         with open_room(room, port=0):
             if not ada.cookie:
                 assert ada.enter("Ada", room.code) == 200
@@ -312,18 +312,18 @@ def test_a_room_comes_up_again(tmp_path: Path) -> None:
     assert (tmp_path / "room" / "room.json").stat().st_mode & 0o77 == 0
     (tmp_path / "room" / "room.json").write_text("{")
     with pytest.raises(ParameterError, match="file of the room"):
-        Room(exercise(), tmp_path, NAMES, tmp_path / "room")
+        Room(exercise(), tmp_path, NAMES, tmp_path / "room", is_trusted=True)
 
 
-def test_a_supervisor_of_a_student_never_runs(room: Room) -> None:
+def test_a_desk_stays_with_the_exercise(room: Room) -> None:
+    """A project of a student's own could have a supervisor, which would run in the server's process."""
     assert Browser().enter("Ada") == 200
     desk = room.desks["Ada"].desk
-    mark = room.folder / "mark"
-    (desk.folder / "evil.py").write_text(f"open({str(mark)!r}, 'w')\ndef supervise(sim):\n    yield 1\n")
+    (desk.folder / "evil.py").write_text("def supervise(sim):\n    yield 1\n")
     project = replace(exercise(), supervisor="evil.py")
-    SERVER.run(desk.replace(project, desk.folder))
-    assert not mark.exists()
-    assert any("was left out" in each for each in desk.news.since(0)[1])
+    with pytest.raises(ParameterError, match="must stay with its exercise"):
+        SERVER.run(desk.replace(project, desk.folder))
+    assert desk.project == room.project
 
 
 def test_a_desk_of_a_room_has_a_highest_speed(room: Room) -> None:

@@ -18,15 +18,17 @@ from kiks.desk.room.pictures import Pictures
 from kiks.desk.room.seats import Seat, read_seats, write_seats
 from kiks.desk.server.access import ADVICE
 from kiks.desk.server.desk import Desk
+from kiks.desk.server.scripts import EXAMPLES
 from kiks.desk.server.server import SERVER
 from kiks.desk.server.show import Shown
 from kiks.desk.server.token import Token
 from kiks.errors import KiksError, ParameterError, shown
 from kiks.model.atomic_files import make_folder, replace_file
-from kiks.model.limits import UPLOAD_BYTES_MAX
 from kiks.model.project import Project
 from kiks.ports.program_process import commands_of, supervisor_of
+from kiks.ports.sandbox import Sandbox
 from kiks.sim.from_project import simulation_of
+from kiks.trials.hand_in import HAND_IN_BYTES_MAX
 
 SPEED_MAX = 5.0
 """Highest speed of a desk in a room [simulated seconds per real second]."""
@@ -55,6 +57,7 @@ class Room:
         folder: Where the room keeps the students' folders and what they hand in.
         code: The code of the entrance; that of the last time if left out, or a random one.
         address: The address that people open, if it is that of a proxy.
+        is_trusted: Whether students' programs run with the rights of this process; else each student's in a sandbox.
 
     Attributes:
         project: What each desk begins with: the exercise without its hidden cases.
@@ -66,8 +69,19 @@ class Room:
     """
 
     def __init__(
-        self, project: Project, home: Path, names: Sequence[str], folder: Path, *, code: str = "", address: str = ""
+        self,
+        project: Project,
+        home: Path,
+        names: Sequence[str],
+        folder: Path,
+        *,
+        code: str = "",
+        address: str = "",
+        is_trusted: bool = False,
     ) -> None:
+        if not is_trusted:
+            with Sandbox() as sandbox:
+                sandbox.warm()
         self.project = project.for_students()
         self.title = (project.exercise.title if project.exercise is not None else "") or project.arena.name
         self.folder, self._home = folder.resolve(), home
@@ -82,6 +96,8 @@ class Room:
         self.may_hand_in = True
         self._pictures: dict[str, Pictures] = {}
         self._public = address
+        self._is_trusted = is_trusted
+        self._sandboxes: list[Sandbox] = []
         self._turn = asyncio.Lock()
         self._is_over = False
 
@@ -119,6 +135,8 @@ class Room:
         door.entrance, door.advice, door.name, door.is_secure = None, ADVICE, None, False
         for each in self.desks.values():
             each.close()
+        for sandbox in self._sandboxes:
+            sandbox.close()
         SERVER.run(self._leave())
 
     async def _leave(self) -> None:
@@ -195,6 +213,12 @@ class Room:
         """Open the desk of a student."""
         folder = self.folder / DESKS / seat.folder
         make_folder(folder, "a student's folder")
+        commands = commands_of(self.project, self._home)
+        sandbox = None
+        if not self._is_trusted:
+            sandbox = Sandbox([folder, EXAMPLES.parent, *(each.program for each in commands if each is not None)])
+            self._sandboxes.append(sandbox)
+            sandbox.warm()
         desk = Desk(
             simulation_of(self.project, self._home),
             project=self.project,
@@ -205,9 +229,11 @@ class Room:
             owns_world=True,
             may_run_programs=True,
             is_for_others=True,
-            commands=commands_of(self.project, self._home),
+            sandbox=sandbox,
+            commands=commands,
             supervisor=supervisor_of(self.project, self._home),
         )
+        desk.tries.is_trusted = self._is_trusted
         desk.hand_in, desk.may_hand_in = partial(self._take_in, seat), self.may_hand_in
         opened = Shown(desk, number=seat.number)
         desk.begin()
@@ -220,9 +246,9 @@ class Room:
         if not self.may_hand_in:
             raise ParameterError("Handing in must be open, but your teacher has closed it. Ask your teacher.")
         ending = PurePosixPath(name).suffix.lower()
-        if not re.fullmatch(r"\.[a-z0-9]{1,8}", ending) or len(data) > UPLOAD_BYTES_MAX:
+        if not re.fullmatch(r"\.[a-z0-9]{1,8}", ending) or len(data) > HAND_IN_BYTES_MAX:
             raise ParameterError(
-                f"What is handed in must be a file of at most {UPLOAD_BYTES_MAX >> 20} MiB, but it was "
+                f"What is handed in must be a file of at most {HAND_IN_BYTES_MAX >> 20} MiB, but it was "
                 f"{shown(name)} of {len(data) / 2**20:.1f}. Hand in another one."
             )
         file = f"{seat.folder}{ending}"

@@ -24,6 +24,7 @@ from kiks.model.checks import CLOCK_END_NS
 from kiks.model.project import Project, ProjectRobot
 from kiks.ports.program_process import Command, Permission, commands_of, supervisor_of
 from kiks.ports.programs import Programs
+from kiks.ports.sandbox import Sandbox
 from kiks.sim.from_project import described, project_of, simulation_of
 from kiks.sim.judge import Judgement
 from kiks.sim.ring_buffer import RingBuffer
@@ -78,8 +79,9 @@ class Desk:
         speed_max: The highest speed that people may choose; None for no limit.
         owns_world: Whether the world may be replaced; False if a program outside holds it.
         may_run_programs: Whether a browser or a project may start programs other than `commands`.
-        is_for_others: Whether its people are others than the user of this computer: then no file of theirs becomes a
-            supervisor.
+        is_for_others: Whether its people are others than the user of this computer: then the desk stays with its
+            project, whose supervisor runs in this process.
+        sandbox: Where people's programs run; None: in processes with the rights of this one.
         commands: Programs that start with the world, the first for robot 1 and so on; they are always permitted.
         supervisor: File of the project's supervisor, which is permitted, too.
         new_programs: Factory of a world's program host; the default takes the project's settings.
@@ -117,6 +119,7 @@ class Desk:
         owns_world: bool = False,
         may_run_programs: bool = False,
         is_for_others: bool = False,
+        sandbox: Sandbox | None = None,
         commands: Sequence[Command | None] = (),
         supervisor: Path | None = None,
         new_programs: NewPrograms | None = None,
@@ -131,6 +134,7 @@ class Desk:
         self.may_run_programs = may_run_programs
         self.may_edit = may_edit
         self.is_for_others = is_for_others
+        self._sandbox = sandbox
         self.has_old_coordinates = has_old_coordinates
         self.project_of = project_of
         self.scene = 0
@@ -216,14 +220,21 @@ class Desk:
 
     def _usual_programs(self, sim: Simulation, commands: Sequence[Command | None], gate: Gate) -> Programs:
         return Programs(
-            sim, commands, thinking=self.project.thinking, say=self.say, keeps_output=True, new_patience=gate.patience
+            sim,
+            commands,
+            thinking=self.project.thinking,
+            say=self.say,
+            keeps_output=True,
+            new_patience=gate.patience,
+            sandbox=self._sandbox,
         )
 
     def _permission(self) -> Permission:
         return Permission(self._granted, folders=(self.folder, EXAMPLES.parent), may_start_others=self.may_run_programs)
 
-    def _permitted(self, commands: Sequence[Command | None], permission: Permission) -> list[Command | None]:
+    def _permitted(self, commands: Sequence[Command | None]) -> list[Command | None]:
         """Return the programs with None for each that may not start; people get a message about those."""
+        permission = self._permission()
 
         def permitted(command: Command | None) -> Command | None:
             try:
@@ -328,7 +339,10 @@ class Desk:
 
         Raises:
             LinkError: If the world cannot be replaced.
+            ParameterError: If it is another project, and the desk is for others.
         """
+        if folder is not None and self.is_for_others:
+            raise ParameterError("This desk must stay with its exercise, so no other world can be opened here.")
         home = folder or self._home
         await self._put(project, commands_of(project, home), _command_of(supervisor_of(project, home)), home)
         self._home = home
@@ -356,6 +370,9 @@ class Desk:
     ) -> None:
         """Begin the world of a project, which lies in a folder."""
         self._check_owns()
+        if self._sandbox is not None:
+            # A program that has broken a limit has ended it, and the programs below are not to wait for another one.
+            await asyncio.to_thread(self._sandbox.warm)
         sim = await asyncio.to_thread(simulation_of, project, home)
         old, before = self.present, (self.project, self._commands, self._supervisor)
         was_paused = old.gate.is_paused
@@ -363,10 +380,7 @@ class Desk:
         if was_paused and self.past is None:
             world.pause()
         self.project = project
-        self._commands = self._permitted(commands, self._permission())
-        # A supervisor runs in this process, which a sandbox is to protect.
-        only = Permission(self._granted) if self.is_for_others else self._permission()
-        (self._supervisor,) = self._permitted([supervisor], only)
+        *self._commands, self._supervisor = self._permitted([*commands, supervisor])
         # Its recording ends without a wait for the thread that moves it.
         await old.do(lambda _: old.pause())
         try:
