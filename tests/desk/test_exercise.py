@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import io
 import json
+import re
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from playwright.sync_api import expect
-from tests.desk.visitor import NewPage, Visitor, check_access, check_reach, open_desk
+from tests.desk.visitor import NewPage, Visitor, check_access, check_reach, make_project, open_desk
 
 from kiks.desk.panels.exercise_text import parts_of
 from kiks.model.arena import Arena
@@ -17,6 +19,8 @@ from kiks.model.arena_objects import Lamp, Pose
 from kiks.model.exercise import Cases, Exercise, cases_of
 from kiks.model.goal import Goal
 from kiks.model.project import Project
+from kiks.sim.from_project import simulation_of
+from kiks.sim.judge import Judge
 from kiks.trials.hand_in import PAGE, SCORE, program_of
 
 TEXT = """Drive to the lamp.
@@ -122,6 +126,15 @@ def test_exercise_is_read_solved_tried_and_handed_in(tmp_path: Path, new_page: N
         assert visitor.sim.pose(1) == lies
     finally:
         shown.close()
+
+
+def test_formulas_of_the_page_can_be_judged() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "howto" / "exercises.md").read_text("utf-8")
+    formulas = re.findall(r"^\| `(.+?)` \|", page[page.index("## Formulas") :], re.MULTILINE)
+    assert len(formulas) > 15
+    sim = simulation_of(replace(make_project(), seconds=1.0))
+    for formula in formulas:
+        Judge(sim, Goal(solved=formula))
 
 
 @pytest.mark.slow

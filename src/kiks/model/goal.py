@@ -1,4 +1,4 @@
-"""The goal of a project: when a run has solved it, and how many points it gets (the page "Goals")."""
+"""The goal of a project: when a run has solved it, and how many points it gets (the page "Projects")."""
 
 from __future__ import annotations
 
