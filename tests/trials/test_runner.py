@@ -20,9 +20,10 @@ from kiks.model.arena import Arena, Pose
 from kiks.model.goal import Goal
 from kiks.model.project import Project
 from kiks.ports.program_process import Command, python_line
-from kiks.trials import watch
+from kiks.ports.sandbox import Limits
 from kiks.trials.one_run import run_trial
 from kiks.trials.runner import OUTCOMES, run_trials
+from kiks.trials.sandboxes import Sandboxes
 from kiks.trials.trial import CRASHED, ENDED, ENDLESS, OUT_OF_TIME, RUNNING, STOPPED, Trial
 
 PROGRAMS = {
@@ -130,7 +131,7 @@ def test_a_changed_file_is_another_trial(tmp_path: Path) -> None:
 
 def test_a_trial_is_the_run_that_its_recording_and_kiks_run_show(tmp_path: Path) -> None:
     trial = trials_in(tmp_path)[0]
-    outcome = run_trial(trial, tmp_path)
+    outcome = run_trial(trial, tmp_path, Sandboxes())
     recording = Recording(tmp_path / outcome.recording)
     assert recording.world_at(outcome.time_s).state_hash() == outcome.state
     assert set(recording.programs) == {"1-drives.py", "2-judge.py"}
@@ -140,34 +141,33 @@ def test_a_trial_is_the_run_that_its_recording_and_kiks_run_show(tmp_path: Path)
     assert outcome.state in said
 
 
-def test_what_lets_no_time_pass_is_stopped_and_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(watch, "COMPUTING_S", 0.5)
-    monkeypatch.setattr(watch, "STILL_S", 0.5)
+def test_what_lets_no_time_pass_is_stopped_and_named(tmp_path: Path) -> None:
     loop = write(tmp_path, "loop", "while True: pass")
     # Another process waits in real time, which KiKS does not simulate.
     still = write(tmp_path, "still", "import subprocess; subprocess.run(['sleep', '100'])")
     project = Project(Arena.box(300, 300), seconds=1.0)
-    end = run_trial(Trial("loop", project, tmp_path, (loop,), is_trusted=True), tmp_path).end_of()
-    assert end.how == ENDLESS
-    assert end.detail.startswith("it computed for ")
-    end = run_trial(Trial("still", project, tmp_path, (still,), is_trusted=True), tmp_path).end_of()
-    assert end.how == ENDLESS
-    assert end.detail.startswith("it waited for ")
+    sandboxes = Sandboxes(Limits(computing_s=0.3, waiting_s=0.3))
+    for command, words in ((loop, "computed for 0.3 s"), (still, "waited for 0.3 s")):
+        trial = Trial(command.name, project, tmp_path, (command,), is_trusted=True)
+        outcome = run_trial(trial, tmp_path, sandboxes)
+        assert outcome.end_of().how == ENDLESS
+        assert outcome.end_of().detail.startswith(words)
+        assert not outcome.doubt
+    sandboxes.close()
 
 
 def test_a_program_that_waits_runs_out_of_simulated_time(tmp_path: Path) -> None:
     sleeps = write(tmp_path, "sleeps", "import time\nwhile True: time.sleep(1)")
-    outcome = run_trial(Trial("a", Project(seconds=7.0), tmp_path, (sleeps,), is_trusted=True), tmp_path)
+    outcome = run_trial(Trial("a", Project(seconds=7.0), tmp_path, (sleeps,), is_trusted=True), tmp_path, Sandboxes())
     assert outcome.end_of().how == OUT_OF_TIME
     assert outcome.time_s == 7.0
 
 
 def test_a_trial_that_takes_its_worker_with_it_is_named_and_costs_no_other(tmp_path: Path) -> None:
-    killer = write(
-        tmp_path, "killer", f"import os; os.kill(os.getppid(), {int(signal.SIGKILL)}); import time; time.sleep(9)"
-    )
     trials = trials_in(tmp_path)[:2]
-    trials.insert(1, Trial("killer", trials[0].project, tmp_path, (killer,), is_trusted=True))
+    write(tmp_path, "killer", "import os\ndef supervise(sim):\n    yield 0.1\n    os.kill(os.getpid(), 9)")
+    project = replace(trials[0].project, supervisor="killer.py")
+    trials.insert(1, replace(trials[0], name="killer", project=project))
     first, lost, last = run_trials(trials, tmp_path / "out", workers=1)
     assert lost.end_of().how == STOPPED
     assert "by signal 9, 2 times" in lost.doubt

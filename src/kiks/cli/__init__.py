@@ -17,6 +17,7 @@ from kiks.cli.evolve import evolve
 from kiks.cli.examples import DemoCommand, examples
 from kiks.cli.export import export
 from kiks.cli.fit import fit
+from kiks.cli.grade import grade
 from kiks.cli.host import host
 from kiks.cli.matlab import matlab
 from kiks.cli.monitor import monitor
@@ -54,6 +55,7 @@ app = typer.Typer(
 for _command in (
     desk,
     run,
+    grade,
     examples,
     evolve,
     champion,

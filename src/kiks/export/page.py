@@ -11,6 +11,7 @@ import hashlib
 from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import jinja2
 from markupsafe import Markup
@@ -57,8 +58,7 @@ def save_page(
     """
     figures = panels_of(recording, robot=robot)
     frames = RunFrames(recording.log, on_progress)
-    template, script, style = _parts()
-    page = template.render(
+    page = page_template("run_page.html").render(
         contents_of(recording, frames, robot),
         title=title,
         robot=robot,
@@ -67,23 +67,33 @@ def save_page(
             for name, (head, text) in FIGURES.items()
             if name in figures
         ],
-        no_robot=NO_ROBOT,
+        **player_values(frames),
         frames=frames,
         packed=frames.pack(),
-        is_coarse=frames.period_ns > PERIOD_NS,
-        period_s=s_from_ns(frames.period_ns),
         version=__version__,
-        script=Markup(script),
-        script_hash=base64.b64encode(hashlib.sha256(script.encode()).digest()).decode(),
-        style=Markup(style),
+        script=Markup(player_script()),
+        script_hash=hash_of(player_script()),
+        style=Markup(player_style()),
     )
     # The name of a file may hold what is no text.
     replace_file(path, page.encode("utf-8", "replace"), "a page")
 
 
-@lru_cache(1)
-def _parts() -> tuple[jinja2.Template, str, str]:
-    """Return template, script and style, which are the same for all pages and made once."""
+def player_values(frames: RunFrames) -> dict[str, Any]:
+    """Return what `web/run_player.html` needs to show a run, by name."""
+    return {
+        "begin_s": s_from_ns(frames.begin_ns),
+        "end_s": s_from_ns(frames.end_ns),
+        "robot_count": max(len(scene["robots"]) for scene in frames.scenes),
+        "no_robot": NO_ROBOT,
+        "is_coarse": frames.period_ns > PERIOD_NS,
+        "period_s": s_from_ns(frames.period_ns),
+    }
+
+
+@lru_cache
+def page_template(name: str) -> jinja2.Template:
+    """Return a template of `desk/web`, which escapes all that it is given."""
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(WEB),
         autoescape=True,
@@ -92,5 +102,21 @@ def _parts() -> tuple[jinja2.Template, str, str]:
         lstrip_blocks=True,
     )
     environment.filters["clock"] = clock_text
-    style = "\n".join((WEB / name).read_text("utf-8") for name in STYLES)
-    return environment.get_template("run_page.html"), bundle(WEB / "run_page.js"), style
+    return environment.get_template(name)
+
+
+@lru_cache(1)
+def player_script() -> str:
+    """Return the script of the player, which is the same for all runs."""
+    return bundle(WEB / "run_page.js")
+
+
+@lru_cache(1)
+def player_style() -> str:
+    """Return the style sheets of the player."""
+    return "\n".join((WEB / name).read_text("utf-8") for name in STYLES)
+
+
+def hash_of(script: str) -> str:
+    """Return by what a page's security policy names a script that it may run."""
+    return base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()

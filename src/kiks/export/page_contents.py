@@ -16,7 +16,7 @@ from kiks.export.run_frames import RunFrames
 from kiks.recording.analysis import time_shares
 from kiks.recording.recording import Recording
 from kiks.recording.tables import Table
-from kiks.units import clock_text, s_from_ns
+from kiks.units import clock_text
 from kiks.version import __version__
 
 MOMENTS_MAX = 1000
@@ -55,9 +55,6 @@ def contents_of(recording: Recording, frames: RunFrames, robot: int) -> dict[str
             f"seed {recording.start.head.seed}",
         ),
         "is_whole": recording.is_whole,
-        "begin_s": s_from_ns(recording.log.begin_ns),
-        "end_s": s_from_ns(recording.log.end_ns),
-        "robot_count": max(len(scene["robots"]) for scene in frames.scenes),
         "facts": _facts(recording, frames),
         "numbers": _numbers(recording, frames, wire),
         "events": [(*row[:3], _cut(row[3])) for row in events[:MOMENTS_MAX].tolist()],

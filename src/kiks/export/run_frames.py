@@ -38,6 +38,8 @@ class RunFrames:
         on_progress: Called now and then with the share that is done.
 
     Attributes:
+        begin_ns: When the run begins [ns].
+        end_ns: When it ends [ns].
         period_ns: Time between two frames [ns]; the last one may come earlier.
         frames: Of `pack_frame`. The scene of each is an index of `scenes`.
         scenes: Messages of `describe_scene`; `picture` of the arena is an index of `pictures`.
@@ -57,7 +59,7 @@ class RunFrames:
         self.first = Replay(log, log.begin_ns).sim
         self.replay = Replay(log, log.begin_ns)
         self._take()
-        begin_ns, end_ns = log.begin_ns, log.end_ns
+        self.begin_ns, self.end_ns = begin_ns, end_ns = log.begin_ns, log.end_ns
         self.period_ns = _period_ns(end_ns - begin_ns, len(self.frames[0]))
         for time_ns in range(begin_ns + self.period_ns, end_ns, self.period_ns):
             self.replay.sim.advance_to(time_ns)

@@ -356,7 +356,8 @@ class _House:
                 program.end(-signal.SIGKILL)
             self._programs.clear()
             if self._processes >= 0:
-                os.close(self._processes)
+                folder, self._processes = self._processes, -1
+                os.close(folder)
             if self._scratch:
                 shutil.rmtree(self._scratch, ignore_errors=True)
 

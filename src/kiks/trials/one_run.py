@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import ExitStack, suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import NoReturn
 
@@ -14,23 +15,27 @@ from kiks.sim.from_project import simulation_of, thinking_of
 from kiks.sim.judge import POINTS, Judgement
 from kiks.sim.simulation import Simulation
 from kiks.sim.supervision import JUDGE, Supervision
-from kiks.trials.trial import CRASHED, ENDED, ENDLESS, OUT_OF_TIME, RUNNING, Outcome, ProgramEnd, Trial
-from kiks.trials.watch import Watch
+from kiks.trials.sandboxes import Sandboxes
+from kiks.trials.trial import CRASHED, ENDED, ENDLESS, OUT_OF_TIME, RUNNING, STOPPED, Outcome, ProgramEnd, Trial
 from kiks.units import ns_from_s
 
 LINES = 10
 """Most lines of what a program has printed last that an outcome keeps."""
 
+_ENDLESS = ("computed", "waited")
+"""How reasons of a sandbox begin that mean an endless loop or wait."""
+
 LINE_CHARACTERS = 300
 """Most characters of such a line."""
 
 
-def run_trial(trial: Trial, folder: Path) -> Outcome:
+def run_trial(trial: Trial, folder: Path, sandboxes: Sandboxes) -> Outcome:
     """Run a trial in this process, each program in one of its own; must be called in the main thread.
 
     Args:
         trial: The trial.
         folder: The output folder, where its recording goes.
+        sandboxes: Where its programs run.
     """
     project = trial.project
     seconds = project.seconds
@@ -57,29 +62,37 @@ def run_trial(trial: Trial, folder: Path) -> Outcome:
         texts = program_texts(files + ([] if supervisor is None else [supervisor]))
         at_the_end.enter_context(RunRecorder(sim, recording, programs=texts, about={"command": trial.command}))
         programs = run.programs = Programs(
-            sim, commands, thinking=thinking, when_silent="wait", keeps_output=True, say=lambda text: None
+            sim,
+            commands,
+            thinking=thinking,
+            when_silent="wait",
+            keeps_output=True,
+            say=lambda text: None,
+            sandbox=sandboxes.of(trial),
         )
         supervision.end = run.end_by_judge
         sim.loop.end_at(ns_from_s(seconds), run.end_by_time)
-        with Watch(programs, seconds) as watch:
-            programs.run()
-        ends = tuple(_end_of(handle, run.how, watch.reasons) for handle in programs.handles)
+        programs.run()
+        ends = tuple(_end_of(handle, run.how) for handle in programs.handles)
         state = sim.state_hash()
         judgement = run.judgement(supervision)
-    score = {str(what): value for what, value in sim.score.items()}
-    return Outcome(
+    made = Outcome(
         trial.key,
         trial.name,
         is_solved=judgement.is_solved,
         is_failed=judgement.is_failed,
         points=judgement.points,
         time_s=sim.time_s,
-        score=score,
+        score={str(what): value for what, value in sim.score.items()},
         ends=ends,
         state=state,
         recording=trial.recording,
-        doubt=run.doubt or ("" if any(watch.reasons) else programs.doubt),
+        doubt=run.doubt or ("" if any(handle.reason for handle in programs.handles) else programs.doubt),
     )
+    if any(end.how == STOPPED for end in ends):
+        # When that was depends on the computer, so nothing of it counts.
+        return replace(made, is_solved=False, is_failed=True, points=0, time_s=0.0, score={}, state="")
+    return made
 
 
 class _Run:
@@ -117,25 +130,24 @@ class _Run:
         self.programs.end(code, message)
 
 
-def _end_of(handle: Handle, how: str, reasons: dict[int, str]) -> ProgramEnd:
+def _end_of(handle: Handle, how: str) -> ProgramEnd:
     """Return how a program has ended.
 
     Args:
         handle: The program.
         how: What has ended the run, for a program that still ran.
-        reasons: Why programs were killed, by robot.
     """
-    output = handle.output
-    lines = [] if output is None else output.since(0)[1]
-    printed = tuple(_cut(line.text) for line in lines[-LINES:])
+    lines = [] if handle.output is None else handle.output.since(0)[1]
     detail = ""
-    if (reason := reasons.get(handle.robot)) is not None:
-        how, detail = ENDLESS, reason
+    if handle.reason:
+        # What it takes is measured in time; nothing else that stops it is its own endless loop.
+        how, detail = ENDLESS if handle.reason.startswith(_ENDLESS) else STOPPED, handle.reason
     elif not handle.is_stopped:
         how = CRASHED if handle.code else ENDED
         if handle.code:
             errors = [line.text for line in lines if line.is_error and line.text.strip()]
             detail = _cut(errors[-1].removeprefix("kiks: ")) if errors else handle.how
+    printed = () if how == STOPPED else tuple(_cut(line.text) for line in lines[-LINES:])
     return ProgramEnd(handle.robot, handle.command.name, how, detail, printed)
 
 

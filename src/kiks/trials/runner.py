@@ -1,38 +1,23 @@
 """The runner: hands trials out to warm worker processes, one for each core, and keeps outcomes as they come.
 
-Need: a class is graded on all cores, a killed run goes on where it was, and a trial that takes its worker with it costs
-no other. Method: each worker has one trial at a time, so the slowest does not decide. An outcome is a line of a file,
-under the digest of all that it depends on. What a person has interrupted finds it at the next start. At the end the
-file has the outcomes in the order of the trials, so it is the same however many workers there were.
+Need: a class is graded on all cores, and a killed run goes on where it was. Method: an outcome is a line of a file,
+under the digest of all that it depends on, and found there at the next start. At the end the file has the outcomes in
+the order of the trials, so it is the same however many workers there were.
 """
 
 from __future__ import annotations
 
-import contextlib
-import json
-import selectors
-import subprocess
-from collections import deque
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from kiks.errors import KiksError, ParameterError, WorkError, shown
+from kiks.errors import KiksError, ParameterError, shown
 from kiks.model.atomic_files import explained, make_folder, replace_file
-from kiks.ports.program_process import python_line
-from kiks.ports.resources import processor_count
+from kiks.trials.crew import Order, answers_of
 from kiks.trials.trial import STOPPED, Outcome, ProgramEnd, Trial
-from kiks.trials.worker import packed
+from kiks.trials.worker import RUN, packed
 
 OUTCOMES = "outcomes.jsonl"
 """The file of the outcomes in the output folder."""
-
-ATTEMPTS = 2
-"""How often a trial is begun whose worker dies."""
-
-ASK_S = 0.2
-"""Period at which a caller is asked whether the trials go on [s]."""
-
-_READ_SIZE = 1 << 16
 
 
 def run_trials(
@@ -97,7 +82,13 @@ def run_trials(
         # A line that a kill has cut short ends here.
         with explained(file, "outcomes"), file.open("ab") as lines:
             lines.write(b"\n")
-        _Crew(missing, folder.absolute(), min(workers or processor_count(), len(missing)), take).run(goes_on)
+        trials_by_name = {trial.name: trial for trial in missing}
+        orders = [Order(trial.name, RUN, packed(trial, folder.absolute())) for trial in missing]
+        for name, answer in answers_of(orders, workers, goes_on):
+            trial = trials_by_name[name]
+            if answer.error:
+                raise KiksError(f"{shown(name)} cannot begin: {answer.error}")
+            take(_lost(trial, answer.lost) if answer.lost else Outcome.from_line(answer.result))
     made = [outcomes[trial.name] for trial in trials if trial.name in outcomes]
     replace_file(file, "".join(f"{outcome.to_line()}\n" for outcome in made), "outcomes")
     return made
@@ -122,122 +113,6 @@ def _outcomes_in(file: Path) -> dict[str, Outcome]:
 def _is_there(outcome: Outcome, folder: Path) -> bool:
     """Return whether an outcome stands for its trial: nothing speaks against it, and its recording is there."""
     return not outcome.doubt and (folder / outcome.recording).is_file()
-
-
-class _Worker:
-    """A worker process, with the trial that it has.
-
-    Attributes:
-        trial: The trial; None while it waits.
-    """
-
-    def __init__(self) -> None:
-        line = python_line("-m", "kiks.trials.worker")
-        try:
-            self.process = subprocess.Popen(line, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
-        except OSError as error:
-            raise WorkError(f"Cannot start a worker: {error.strerror or error}. End other programs.") from None
-        self.trial: Trial | None = None
-        self._rest = b""
-        assert self.process.stdout is not None
-        self.answers = self.process.stdout
-
-    def begin(self, trial: Trial, folder: Path) -> None:
-        """Hand a trial over."""
-        self.trial = trial
-        assert self.process.stdin is not None
-        with contextlib.suppress(OSError):  # it has died, which the other pipe tells
-            self.process.stdin.write(packed(trial, folder))
-            self.process.stdin.flush()
-
-    def take(self) -> dict[str, str] | None:
-        """Return its answer if that is complete, else None.
-
-        Raises:
-            EOFError: If it has died.
-        """
-        piece = self.answers.read1(_READ_SIZE)  # type: ignore[attr-defined]
-        if not piece:
-            raise EOFError
-        line, end, rest = (self._rest + piece).partition(b"\n")
-        self._rest = rest if end else line
-        if not end:
-            return None
-        answer: dict[str, str] = json.loads(line)
-        return answer
-
-    def close(self) -> str:
-        """End it; return how it has ended."""
-        self.process.kill()
-        code = self.process.wait()
-        for pipe in (self.process.stdin, self.process.stdout):
-            assert pipe is not None
-            with contextlib.suppress(OSError):
-                pipe.close()
-        return f"by signal {-code}" if code < 0 else f"with exit code {code}"
-
-
-class _Crew:
-    """Workers and the trials that are left."""
-
-    def __init__(self, trials: Sequence[Trial], folder: Path, count: int, take: Callable[[Outcome], None]) -> None:
-        self._left, self._folder, self._count, self._take = deque(trials), folder, count, take
-        self._attempts: dict[str, int] = {}
-        self._workers: set[_Worker] = set()
-        self._selector = selectors.DefaultSelector()
-
-    def run(self, goes_on: Callable[[], bool]) -> None:
-        """Run all trials, or as many as are done when they shall not go on."""
-        try:
-            for _ in range(self._count):
-                self._hire()
-            while any(worker.trial is not None for worker in self._workers) and goes_on():
-                for key, _ in self._selector.select(ASK_S):
-                    self._hear(key.data)
-        finally:
-            for worker in self._workers:
-                worker.close()
-            self._selector.close()
-
-    def _hire(self) -> None:
-        worker = _Worker()
-        self._workers.add(worker)
-        self._selector.register(worker.answers, selectors.EVENT_READ, worker)
-        self._hand_out(worker)
-
-    def _hand_out(self, worker: _Worker) -> None:
-        worker.trial = None
-        if self._left:
-            worker.begin(self._left.popleft(), self._folder)
-
-    def _hear(self, worker: _Worker) -> None:
-        try:
-            answer = worker.take()
-        except EOFError:
-            self._replace(worker)
-            return
-        if answer is None:
-            return
-        if "error" in answer:
-            assert worker.trial is not None
-            raise KiksError(f"{shown(worker.trial.name)} cannot begin: {answer['error']}")
-        self._take(Outcome.from_line(answer["outcome"]))
-        self._hand_out(worker)
-
-    def _replace(self, worker: _Worker) -> None:
-        """Put another worker in the place of one that has died, perhaps of its trial."""
-        trial = worker.trial
-        self._selector.unregister(worker.answers)
-        self._workers.discard(worker)
-        how = worker.close()
-        if trial is not None:
-            attempts = self._attempts[trial.name] = self._attempts.get(trial.name, 0) + 1
-            if attempts < ATTEMPTS:
-                self._left.appendleft(trial)
-            else:
-                self._take(_lost(trial, f"the process of its world has ended {how}, {attempts} times"))
-        if self._left:
-            self._hire()
 
 
 def _lost(trial: Trial, why: str) -> Outcome:

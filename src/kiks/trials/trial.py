@@ -29,10 +29,10 @@ CRASHED = "crashed"
 """It has ended with an error."""
 
 ENDLESS = "endless"
-"""It computed, or waited in real time, and let no simulated time pass: it was killed."""
+"""It computed, or waited in real time, and let no simulated time pass: it was stopped."""
 
 STOPPED = "stopped"
-"""The sandbox has stopped it, or its worker has died."""
+"""The sandbox has stopped it, or the process of its world has died: then nothing of the run counts."""
 
 
 @dataclass(frozen=True)
@@ -114,7 +114,7 @@ class ProgramEnd:
         robot: Number of its robot.
         name: The program's name.
         how: One of `ENDED`, `RUNNING`, `OUT_OF_TIME`, `CRASHED`, `ENDLESS`, `STOPPED`.
-        detail: The last line of its error, or why it was stopped; empty if neither.
+        detail: The last line of its error, or why it was stopped ('used more than 512 MB of memory'); empty if neither.
         printed: The last lines that it has printed.
     """
 

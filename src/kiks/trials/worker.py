@@ -1,4 +1,4 @@
-"""A warm worker of the runner: `python -m kiks.trials.worker` takes trials and answers each, in a line."""
+"""A warm worker of a crew: `python -m kiks.trials.worker` takes orders and answers each, in a line."""
 
 from __future__ import annotations
 
@@ -8,51 +8,68 @@ import logging
 import os
 import signal
 import sys
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 from kiks.ending import end_with_parent
 from kiks.errors import KiksError
 from kiks.model.project import Project
 from kiks.ports.program_process import Command
 from kiks.trials.one_run import run_trial
+from kiks.trials.sandboxes import Sandboxes
 from kiks.trials.trial import Trial
 
+RUN, SHOW = "run", "show"
+"""Kinds of orders: to run a trial, and to prepare the player of its recording."""
 
-def packed(trial: Trial, folder: Path) -> bytes:
-    """Return a trial as a line for a worker, with the output folder."""
+
+def packed(trial: Trial, folder: Path) -> str:
+    """Return a trial as text for a worker, with the output folder."""
     programs = [each and [str(each.program), each.arguments, each.module] for each in trial.programs]
     text = trial.project.to_bytes().decode()
     fields = [str(folder), trial.name, text, str(trial.folder), programs, trial.is_trusted, trial.command]
-    return json.dumps(fields).encode() + b"\n"
+    return json.dumps(fields)
 
 
-def unpacked(line: bytes) -> tuple[Trial, Path]:
-    """Return the trial and the output folder of a line of `packed`."""
-    folder, name, text, home, programs, is_trusted, command = json.loads(line)
+def unpacked(text: str) -> tuple[Trial, Path]:
+    """Return the trial and the output folder of a text of `packed`."""
+    folder, name, project, home, programs, is_trusted, command = json.loads(text)
     commands = tuple(each and Command(Path(each[0]), each[1], each[2]) for each in programs)
-    return Trial(name, Project.from_bytes(text.encode()), Path(home), commands, is_trusted, command), Path(folder)
+    return Trial(name, Project.from_bytes(project.encode()), Path(home), commands, is_trusted, command), Path(folder)
+
+
+def _show(recording: str) -> str:
+    from kiks.trials.player import player_of
+
+    return json.dumps(player_of(Path(recording)))
 
 
 def main() -> None:
-    """Take trials from the standard input until it ends."""
+    """Take orders from the standard input until it ends."""
     end_with_parent()
-    # Ctrl-C is for the process that hands out the trials, which ends this one.
+    # Ctrl-C is for the process that hands out the orders, which ends this one.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     logging.getLogger("kiks").setLevel(logging.CRITICAL)
     # What a supervisor prints must not come between the answers.
-    answers = os.fdopen(os.dup(1), "wb", buffering=0)
+    answers = os.fdopen(os.dup(1), "wb")
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
     orders = os.fdopen(os.dup(0), "rb")
     os.dup2(os.open(os.devnull, os.O_RDONLY), 0)
+    sandboxes = Sandboxes()
+    kinds: dict[str, Callable[[str], str]] = {
+        RUN: lambda told: run_trial(*unpacked(told), sandboxes).to_line(),
+        SHOW: _show,
+    }
     gc.freeze()
     for line in orders:
-        answer: dict[str, Any]
+        kind, told = json.loads(line)
         try:
-            answer = {"outcome": run_trial(*unpacked(line)).to_line()}
+            answer = {"result": kinds[kind](told)}
         except KiksError as error:
             answer = {"error": str(error)}
         answers.write(json.dumps(answer).encode() + b"\n")
+        answers.flush()
+    sandboxes.close()
 
 
 if __name__ == "__main__":

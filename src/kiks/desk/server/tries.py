@@ -15,8 +15,9 @@ from kiks.model.project import Project
 from kiks.ports.program_process import Command, commands_of, python_line
 from kiks.ports.resources import processor_count
 from kiks.sim.from_project import in_case
+from kiks.trials.crew import ASK_S
 from kiks.trials.hand_in import PAGE, Tried, packed
-from kiks.trials.runner import ASK_S, run_trials
+from kiks.trials.runner import run_trials
 from kiks.trials.trial import Outcome, Trial
 
 _TURNS = threading.BoundedSemaphore(max(processor_count() - 1, 1))

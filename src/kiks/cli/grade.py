@@ -1,0 +1,160 @@
+"""`kiks grade`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from kiks.cli.engine_start import ready_engine
+from kiks.cli.options import progress_bar, say
+from kiks.cli.outputs import has_results, tell_results
+from kiks.ending import end_as_with_ctrl_c
+from kiks.errors import counted
+
+if TYPE_CHECKING:
+    from kiks.trials.grading import Graded
+    from kiks.trials.trial import Outcome
+
+Workers = Annotated[int | None, typer.Option(help="Worlds at once; one for each core if left out.", min=1, max=1000)]
+Trusted = Annotated[
+    bool, typer.Option("--trusted", help="Run the programs without a sandbox: they may do all that you may.")
+]
+
+
+@has_results
+def grade(
+    context: typer.Context,
+    exercise: Annotated[
+        Path, typer.Argument(help="A project with a goal and a time limit (.kiks), or the folder of an exercise.")
+    ],
+    submissions: Annotated[
+        list[Path],
+        typer.Argument(
+            help="Programs (.py), folders of them, or archives (.zip), such as Moodle and Gradescope export. A folder "
+            "with a __main__.py is one program."
+        ),
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Folder of the tables, the report and the recordings; grades-EXERCISE if left out."),
+    ] = None,
+    workers: Workers = None,
+    trusted: Trusted = False,
+) -> None:
+    """Grade programs: run each in all cases of an exercise, and judge it by its goal.
+
+    Each drives robot 1 in a sandbox: it reaches no file of yours, no network and no other program. A line says so if
+    there is no bubblewrap, which makes the sandbox. What is left is grades.csv, moodle.csv, results/ for Gradescope,
+    report.html, and a recording of each run (kiks replay). A command that was stopped goes on when it starts again.
+
+    Example: kiks grade lamp.kiks submissions/
+
+    Example: kiks grade exercises/wall moodle_export.zip --out grades
+    """
+    from kiks.ports.sandbox import Sandbox
+    from kiks.trials.grading import grade as graded_of
+    from kiks.trials.grading import load_exercise, trials_of
+    from kiks.trials.report import save_grades
+    from kiks.trials.submissions import submissions_in
+
+    project, folder = load_exercise(exercise)
+    if not trusted:
+        with Sandbox() as sandbox:
+            sandbox.warm()  # Without one nothing is copied or compiled.
+    out = Path(f"grades-{exercise.stem}") if out is None else out
+    found = submissions_in(submissions, out / "programs")
+    count = len(trials_of(project, folder, found, is_trusted=trusted))
+    ready_engine()
+    end_as_with_ctrl_c()
+    done = 0
+    try:
+        with progress_bar(f"{counted(len(found), 'submission')}") as show:
+
+            def note(outcome: Outcome, number: int) -> None:
+                nonlocal done
+                done = number
+                show(number, count)
+
+            graded = graded_of(
+                project,
+                folder,
+                found,
+                out,
+                title=exercise.stem,
+                is_trusted=trusted,
+                workers=workers,
+                on_outcome=note,
+            )
+        with progress_bar("report") as show:
+            save_grades(graded, out, workers=workers, on_progress=show)
+    except KeyboardInterrupt:
+        say(f"stopped after {done} of {counted(count, 'run')}. The same command goes on from there.")
+        raise
+    tell_results(context, _results(graded, out))
+    _tell(graded, out)
+
+
+def _tell(graded: Graded, out: Path) -> None:
+    """Print the table, on the error output where the results are JSON."""
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    from kiks.trials.tables import COUNTED, rows_of
+
+    console = Console(highlight=False)
+    rows = rows_of(graded)
+    heads = ["Name", "Points", "Solved", *(how.capitalize() for how in COUNTED), "Said last"]
+    last = len(heads) - 1
+    shown = [place for place, head in enumerate(heads) if place < 3 or any(row[place] for row in rows)]
+    table = Table(title=Text(plain(graded.title)), title_justify="left", expand=True)
+    for place in shown:
+        justify: Literal["left", "right"] = "right" if 0 < place < last else "left"
+        ratio = 1 if place == last else None
+        table.add_column(heads[place], justify=justify, ratio=ratio, overflow="ellipsis", no_wrap=place == last)
+    for row in rows:
+        # Text takes no markup of what students have written.
+        table.add_row(*(Text(plain(row[place])) for place in shown))
+    console.print(table)
+    for pair in graded.likenesses:
+        how = (
+            "identical, but for names, comments, layout, numbers and texts"
+            if pair.share == 1
+            else f"{pair.share:.0%} alike"
+        )
+        console.print(Text(plain(f"{pair.first} and {pair.second} are {how}.")))
+    for grade in graded.grades:
+        if grade.submission.problem:
+            say(plain(f"{grade.submission.name} was not graded: {grade.submission.problem}."))
+        for outcome in grade.outcomes:
+            if outcome.doubt:
+                say(plain(f"{outcome.name} may come out differently next time: {outcome.doubt}."))
+    console.print(Text(f"{out / 'report.html'}: open it in a browser. {out / 'grades.csv'}, {out / 'moodle.csv'}"))
+
+
+def plain(text: str) -> str:
+    r"""Return a text without what would steer a terminal.
+
+    Example:
+        >>> plain("red\x1b[31m")
+        'red?[31m'
+    """
+    return "".join(each if each.isprintable() else "?" for each in text)
+
+
+def _results(graded: Graded, out: Path) -> dict[str, Any]:
+    from kiks.trials.tables import gradescope_results
+
+    return {
+        "title": graded.title,
+        "folder": str(out),
+        "cases": [case.name for case in graded.cases],
+        "submissions": [
+            {"name": each.submission.name, "id": each.submission.id, "problem": each.submission.problem or None}
+            | gradescope_results(graded, each)
+            for each in graded.grades
+        ],
+        "alike": [vars(pair) for pair in graded.likenesses],
+    }

@@ -1,0 +1,195 @@
+"""Grades: an exercise, its cases and what students have handed in become trials, and outcomes become grades."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from kiks.errors import ParameterError, shown
+from kiks.model.exercise import Case, cases_of
+from kiks.model.project import Project, project_file
+from kiks.ports.program_process import commands_of
+from kiks.sim.from_project import in_case
+from kiks.trials.runner import run_trials
+from kiks.trials.similarity import Likeness, alike
+from kiks.trials.submissions import Submission
+from kiks.trials.trial import CRASHED, ENDLESS, OUT_OF_TIME, STOPPED, Outcome, Trial
+
+
+@dataclass(frozen=True)
+class Grade:
+    """What a submission has got.
+
+    Attributes:
+        submission: The submission.
+        outcomes: What came out in each case, in their order; () if it could not be graded.
+        like: Names of submissions that are alike, and how much.
+    """
+
+    submission: Submission
+    outcomes: tuple[Outcome, ...]
+    like: tuple[tuple[str, float], ...] = ()
+
+    @property
+    def points(self) -> float:
+        """Its points: the mean of those in the cases, so that they do not depend on how many cases there are."""
+        points = [outcome.points for outcome in self.outcomes]
+        return round(sum(points) / len(points), 3) if points else 0.0
+
+    @property
+    def solved(self) -> int:
+        """Number of cases that it has solved."""
+        return sum(outcome.is_solved for outcome in self.outcomes)
+
+    @property
+    def time_s(self) -> float:
+        """Mean time of its runs [s of simulated time]."""
+        times = [outcome.time_s for outcome in self.outcomes]
+        return round(sum(times) / len(times), 3) if times else 0.0
+
+    def count(self, how: str) -> int:
+        """Return in how many cases it ended so; at the time limit, only those that were not solved count."""
+        return sum(
+            outcome.end_of().how == how and not (how == OUT_OF_TIME and outcome.is_solved) for outcome in self.outcomes
+        )
+
+    @property
+    def worst(self) -> Outcome | None:
+        """The case with the fewest points; of several, one in which the program did not end as it should."""
+        rank = {STOPPED: 0, ENDLESS: 1, CRASHED: 2}
+        return min(
+            self.outcomes,
+            key=lambda each: (each.points, each.is_solved, rank.get(each.end_of().how, 3), -each.time_s),
+            default=None,
+        )
+
+    @property
+    def said_last(self) -> str:
+        """What it printed last, or what was wrong, in a line."""
+        if self.submission.problem:
+            return self.submission.problem
+        for outcome in [each for each in (self.worst, *self.outcomes) if each is not None]:
+            end = outcome.end_of()
+            if text := end.detail or next(filter(None, map(str.strip, reversed(end.printed))), ""):
+                return text
+        return ""
+
+
+@dataclass(frozen=True)
+class Graded:
+    """An exercise with all grades.
+
+    Attributes:
+        title: The exercise's title.
+        text: Its goal in a line.
+        seconds: Its time limit [s of simulated time].
+        cases: The cases in which programs were tried.
+        grades: The grades, in the order of the submissions.
+        likenesses: Pairs of programs that are alike.
+    """
+
+    title: str
+    text: str
+    seconds: float
+    cases: tuple[Case, ...]
+    grades: tuple[Grade, ...]
+    likenesses: tuple[Likeness, ...]
+
+
+def load_exercise(path: Path) -> tuple[Project, Path]:
+    """Return a project in which programs can be graded, and its folder.
+
+    Raises:
+        ParameterError: If it says neither what is solved nor how long a run may take.
+    """
+    project = Project.load(path)
+    what = shown(str(path))
+    if project.goal is None and project.supervisor is None:
+        raise ParameterError(
+            f"EXERCISE must have a goal, but {what} has none. Write [goal] with solved and points, or name a "
+            "supervisor."
+        )
+    if project.seconds is None:
+        raise ParameterError(f"EXERCISE must have a time limit, but {what} has none. Write seconds = 60.0.")
+    if not project.robots:
+        raise ParameterError(f"EXERCISE must have a robot, but {what} has none. Write [[robot]].")
+    if project.thinking.startswith("live"):
+        raise ParameterError(
+            f"EXERCISE must have a repeatable thinking time, but that of {what} is {project.thinking!r}. Write "
+            'thinking = "none" or "fixed:20".'
+        )
+    return project, project_file(path).parent
+
+
+def trials_of(
+    project: Project, folder: Path, submissions: Sequence[Submission], *, is_trusted: bool = False
+) -> list[Trial]:
+    """Return a trial for each submission in each case of an exercise; the submission drives robot 1.
+
+    Args:
+        project: The exercise.
+        folder: Where it lies.
+        submissions: What was handed in.
+        is_trusted: Whether the programs run without a sandbox.
+    """
+    cases = cases_of(project.cases)
+    worlds = [in_case(project, case, folder) for case in cases]
+    width = len(str(len(cases)))
+    trials = []
+    for submission in submissions:
+        if submission.command is None:
+            continue
+        for number, world in enumerate(worlds, 1):
+            others = commands_of(world, folder)[1:]
+            name = f"{submission.id}/{number:0{width}}"
+            trials.append(Trial(name, world, folder, (submission.command, *others), is_trusted))
+    return trials
+
+
+def grade(
+    project: Project,
+    folder: Path,
+    submissions: Sequence[Submission],
+    out: Path,
+    *,
+    title: str = "",
+    is_trusted: bool = False,
+    workers: int | None = None,
+    on_outcome: Callable[[Outcome, int], object] = lambda outcome, count: None,
+) -> Graded:
+    """Grade submissions: run each in all cases of an exercise; see `run_trials`.
+
+    Args:
+        project: The exercise.
+        folder: Where it lies.
+        submissions: What was handed in.
+        out: Where outcomes and recordings go.
+        title: Its title if it says none.
+        is_trusted: Whether the programs run without a sandbox.
+        workers: See `run_trials`.
+        on_outcome: See `run_trials`.
+    """
+    trials = trials_of(project, folder, submissions, is_trusted=is_trusted)
+    outcomes = iter(run_trials(trials, out, workers=workers, on_outcome=on_outcome))
+    cases = cases_of(project.cases)
+    grades = []
+    for submission in submissions:
+        count = 0 if submission.command is None else len(cases)
+        grades.append(Grade(submission, tuple(next(outcomes) for _ in range(count))))
+    template = project.exercise.template if project.exercise else ""
+    likenesses = alike({each.id: "\n".join(each.files.values()) for each in submissions}, template)
+    like: dict[str, list[tuple[str, float]]] = {}
+    names = {each.id: each.name for each in submissions}
+    for pair in likenesses:
+        like.setdefault(pair.first, []).append((names[pair.second], pair.share))
+        like.setdefault(pair.second, []).append((names[pair.first], pair.share))
+    exercise, goal = project.exercise, project.goal
+    return Graded(
+        (exercise.title if exercise else "") or title or project.arena.name,
+        goal.text if goal else "",
+        project.seconds or 0.0,
+        tuple(cases),
+        tuple(replace(each, like=tuple(like.get(each.submission.id, ()))) for each in grades),
+        tuple(Likeness(names[each.first], names[each.second], each.share) for each in likenesses),
+    )

@@ -1,0 +1,137 @@
+"""Grades as tables: a CSV for spreadsheets, one that Moodle takes, and results as Gradescope reads them.
+
+What a student has written may begin a formula of a spreadsheet, which could send what is in it elsewhere. So such a
+cell gets an apostrophe before it.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from kiks.errors import figure
+from kiks.trials.grading import Grade, Graded
+from kiks.trials.trial import CRASHED, ENDED, ENDLESS, OUT_OF_TIME, STOPPED, Outcome
+
+COUNTED = (CRASHED, ENDLESS, OUT_OF_TIME, STOPPED)
+"""How programs end that the tables count."""
+
+
+def cell(value: object) -> object:
+    """Return a value for a CSV: of a text a line, with an apostrophe where a spreadsheet would take it for a formula.
+
+    Example:
+        >>> cell("=1+1"), cell("ann"), cell(-2.5)
+        ("'=1+1", 'ann', -2.5)
+    """
+    if not isinstance(value, str):
+        return value
+    value = "".join(each if each.isprintable() else " " for each in value)
+    if value.lstrip()[:1] in ("=", "+", "-", "@", "|", "%"):
+        return f"'{value}"
+    return value
+
+
+def _csv(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow([cell(name) for name in head])
+    writer.writerows([[cell(value) for value in row] for row in rows])
+    return text.getvalue()
+
+
+def how_it_went(outcome: Outcome) -> str:
+    """Return in a few words how a case went."""
+    end = outcome.end_of()
+    if outcome.is_solved:
+        return f"solved after {outcome.time_s:.1f} s"
+    if end.how in (ENDED, CRASHED, ENDLESS, OUT_OF_TIME, STOPPED):
+        return f"{end.how} after {outcome.time_s:.1f} s"
+    return f"{'failed' if outcome.is_failed else 'not solved'} after {outcome.time_s:.1f} s"
+
+
+def likeness_of(grade: Grade) -> str:
+    """Return which others a submission is like."""
+    return ", ".join(f"{name} ({'identical' if share == 1 else f'{share:.0%}'})" for name, share in grade.like)
+
+
+def grades_csv(graded: Graded) -> str:
+    """Return a row for each submission, with the points in each case."""
+    cases = [case.name for case in graded.cases]
+    head = ["name", "points", "solved", "cases", *COUNTED, "time_s", "like", "said_last", *cases]
+    rows = []
+    for grade in graded.grades:
+        points: list[object] = [outcome.points for outcome in grade.outcomes]
+        points = points or [""] * len(cases)
+        counts = [grade.count(how) for how in COUNTED]
+        told = (likeness_of(grade), grade.said_last)
+        rows.append(
+            (grade.submission.name, grade.points, grade.solved, len(cases), *counts, grade.time_s, *told, *points)
+        )
+    return _csv(head, rows)
+
+
+def moodle_csv(graded: Graded) -> str:
+    """Return the grades as Moodle's grading worksheet has them, which also its import of grades reads.
+
+    Moodle finds a student by the number that its export has in the names of files.
+    """
+    head = ("Identifier", "Full name", "Email address", "Grade", "Last modified (grade)", "Feedback comments")
+    rows = []
+    for grade in graded.grades:
+        submission = grade.submission
+        participant = f"Participant {submission.participant}" if submission.participant else submission.name
+        solved = f"{grade.solved} of {len(graded.cases)} cases solved"
+        said = f"{solved}. {grade.said_last}" if grade.said_last else f"{solved}."
+        rows.append((participant, submission.name, submission.email, grade.points, "", said))
+    return _csv(head, rows)
+
+
+def gradescope_results(graded: Graded, grade: Grade) -> dict[str, Any]:
+    """Return the results of a submission as Gradescope's autograder reads them, with its leaderboard.
+
+    A case counts the mean's share of its points, so their sum is the submission's.
+    """
+    count = len(graded.cases)
+    tests = []
+    for case, outcome in zip(graded.cases, grade.outcomes, strict=False):
+        end = outcome.end_of()
+        lines = [how_it_went(outcome), *([end.detail] if end.detail else []), *end.printed]
+        tests.append(
+            {
+                "name": case.name,
+                "score": round(outcome.points / count, 6),
+                "status": "passed" if outcome.is_solved else "failed",
+                "output": "\n".join(lines),
+                "output_format": "text",
+                "visibility": "hidden" if case.is_hidden else "visible",
+            }
+        )
+    return {
+        "score": grade.points,
+        "output": grade.submission.problem or f"{grade.solved} of {count} cases solved.",
+        "output_format": "text",
+        "tests": tests,
+        "leaderboard": [
+            {"name": "Points", "value": grade.points},
+            {"name": "Solved", "value": grade.solved},
+            {"name": "Time [s]", "value": grade.time_s, "order": "asc"},
+        ],
+    }
+
+
+def ranked(graded: Graded) -> list[Grade]:
+    """Return the grades, the best first; of equal ones, the one that took less time."""
+    return sorted(graded.grades, key=lambda each: (-each.points, -each.solved, each.time_s, each.submission.name))
+
+
+def rows_of(graded: Graded) -> list[list[str]]:
+    """Return what a terminal shows of each submission, the best first."""
+    rows = []
+    for grade in ranked(graded):
+        counts = [str(count) if (count := grade.count(how)) else "" for how in COUNTED]
+        solved = f"{grade.solved}/{len(graded.cases)}"
+        rows.append([grade.submission.name, figure(grade.points), solved, *counts, grade.said_last])
+    return rows
