@@ -14,10 +14,20 @@ from kiks.desk.server.desk import Desk
 from kiks.errors import ParameterError, counted
 from kiks.ports.program_process import Command
 from kiks.trials.hand_in import score_of
-from kiks.trials.trial import CRASHED, ENDLESS, STOPPED, Outcome
+from kiks.trials.trial import CRASHED, ENDED, ENDLESS, OUT_OF_TIME, RUNNING, STOPPED, Outcome
 
 CLOSED = "Handing in is closed now. Ask your lecturer to open it."
 """What people read who cannot hand in."""
+
+ENDS = {
+    ENDED: "The program ended by itself",
+    RUNNING: "The program still ran when this was decided",
+    OUT_OF_TIME: "The program still ran at the time limit",
+    CRASHED: "The program crashed",
+    ENDLESS: "The program let no time pass",
+    STOPPED: "The program was stopped",
+}
+"""What people read of how a program has ended."""
 
 CSS = """
 .tries { width: 100%; border-collapse: collapse; font-size: 14px }
@@ -76,14 +86,17 @@ class TriesPanel(Panel):
         self._table.clear()
         if is_shown:
             self._said.text = self._state() or self._said.text
-            with self._table:
-                self._build_table()
+            if tries.outcomes:
+                with self._table:
+                    self._build_table()
 
     def _state(self) -> str:
         tries = self._desk.tries
         if tries.error:
             return tries.error
         score = score_of(tries.tried)
+        if not (tries.outcomes or tries.is_running):
+            return f"Stopped; {counted(len(tries.cases), 'case')} not tried."
         if tries.is_running:
             return f"{len(tries.outcomes)} of {counted(len(tries.cases), 'case')} tried."
         if self._is_packing:
@@ -164,9 +177,6 @@ def _detail(outcome: Outcome, robot: int) -> str:
         end = outcome.end_of(robot)
     except KeyError:
         return outcome.doubt
-    lines = list(end.printed[-1:])
-    if end.how in (CRASHED, ENDLESS, STOPPED):
-        lines = [f"{end.how}: {end.detail}" if end.detail else end.how]
-    else:
-        lines = [f"The program: {end.how}", *lines]
-    return "\n".join([*lines, *([outcome.doubt] if outcome.doubt else [])])
+    lines = [f"{ENDS[end.how]}: {end.detail}" if end.detail else f"{ENDS[end.how]}."]
+    lines += [f"Printed last: {line}" for line in end.printed[-1:] if end.how != CRASHED]
+    return "\n".join([*lines, *filter(None, [outcome.doubt])])

@@ -233,7 +233,6 @@ class Room:
             commands=commands,
             supervisor=supervisor_of(self.project, self._home),
         )
-        desk.tries.is_trusted = self._is_trusted
         desk.hand_in, desk.may_hand_in = partial(self._take_in, seat), self.may_hand_in
         opened = Shown(desk, number=seat.number)
         desk.begin()

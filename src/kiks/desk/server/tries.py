@@ -10,7 +10,9 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from kiks.errors import KiksError, ParameterError, WorkError
+from kiks.model.data_file import read_file
 from kiks.model.exercise import Case, cases_of
+from kiks.model.limits import PROGRAM_BYTES_MAX
 from kiks.model.project import Project
 from kiks.ports.program_process import Command, commands_of, python_line
 from kiks.ports.resources import processor_count
@@ -28,10 +30,10 @@ class Tries:
     """The tries of one program; new ones take their place.
 
     Args:
-        is_for_others: Whether the program is that of another person, so that it is not trusted, and has one process.
+        is_for_others: Whether the program is that of another person, so that many may want tries at once.
+        is_trusted: Whether the program may do what this user may; else it runs in a sandbox.
 
     Attributes:
-        is_trusted: Whether the program may do what this user may; else it runs in a sandbox.
         workers: How many processes try.
         project: The exercise; None before the first try.
         cases: The cases, in order.
@@ -39,8 +41,8 @@ class Tries:
         error: Why they cannot begin; empty if they can.
     """
 
-    def __init__(self, *, is_for_others: bool = False) -> None:
-        self.is_trusted = not is_for_others
+    def __init__(self, *, is_for_others: bool = False, is_trusted: bool = True) -> None:
+        self._is_trusted = is_trusted
         self.workers = 1 if is_for_others else max(processor_count() - 1, 1)
         self.project: Project | None = None
         self.cases: list[Case] = []
@@ -70,7 +72,7 @@ class Tries:
     def is_of(self, project: Project, command: Command) -> bool:
         """Return whether these are all tries of a program, as it is now, in an exercise."""
         same = self.is_whole and (self.project, self._command) == (project, command)
-        return same and self._program == command.program.read_bytes()
+        return same and self._program == _bytes_of(command)
 
     def begin(self, project: Project, home: Path, command: Command, *, robot: int, has_hidden: bool) -> None:
         """Begin to try a program.
@@ -84,7 +86,7 @@ class Tries:
         """
         if self.is_running:
             raise ParameterError("These tries must end first. Wait, or stop them.")
-        self.project, self._command, self._program = project, command, command.program.read_bytes()
+        self.project, self._command, self._program = project, command, _bytes_of(command)
         self.cases = [case for case in cases_of(project.cases) if has_hidden or not case.is_hidden]
         self.outcomes, self.error, self._is_wanted = {}, "", True
         if self._folder is None:
@@ -97,7 +99,7 @@ class Tries:
     def _run(self, project: Project, home: Path, programs: tuple[Command | None, ...]) -> None:
         try:
             trials = [
-                Trial(str(number), in_case(project, case, home), home, programs, self.is_trusted)
+                Trial(str(number), in_case(project, case, home), home, programs, self._is_trusted)
                 for number, case in enumerate(self.cases)
             ]
             with self._turn():
@@ -172,3 +174,7 @@ class Tries:
         self.wait()
         if self._folder is not None:
             self._folder.cleanup()
+
+
+def _bytes_of(command: Command) -> bytes:
+    return read_file(command.program, f"the program {command.name}", bytes_max=PROGRAM_BYTES_MAX)
