@@ -136,8 +136,16 @@ class ProgramParticipant(Participant):
         """
         if not self.reason:
             self.reason = reason
-            self.disconnect()
+            self.abort()
             self.expel()
+
+    def abort(self) -> None:
+        """Disconnect the program at once, or as the world begins: it waits for as many programs as are to come."""
+        if self._scheduler.has_begun:
+            self.disconnect()
+        else:
+            self._requests.clear()
+            self.leave()
 
     def expel(self) -> None:
         """Close the connection to a program that has broken a rule."""

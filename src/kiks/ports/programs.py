@@ -524,7 +524,7 @@ class Programs:
         handle.reason = handle.reason or handle.process.reason
         if (handle.is_stopped or handle.reason) and not self._is_closed:
             with self.sim.lock:
-                handle.disconnect()
+                handle.abort()
         handle.has_ended.set()
         self._wake()
 

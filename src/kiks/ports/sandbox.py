@@ -209,7 +209,7 @@ class SandboxedProgram(Child):
         if now_s - self._mark_s > limits.computing_s:
             return f"computed for {limits.computing_s:g} s without using its robot"
         if not is_running:
-            self._waited_s += passed_s
+            self._waited_s += min(passed_s, 2 * SAMPLE_S)  # longer if this thread itself has waited for a processor
         if self._waited_s > limits.waiting_s:
             return f"waited for {limits.waiting_s:g} s without using its robot"
         return ""
@@ -246,8 +246,12 @@ class _House:
         self._complaint = ""
         self._processes = -1
         self._first = 0
-        with there:
-            self._begin(sandbox, there)
+        try:
+            with there:
+                self._begin(sandbox, there)
+        except KiksError:
+            self._control.close()
+            raise
         self._is_ready.wait()
         if self._complaint:
             self._thread.join()

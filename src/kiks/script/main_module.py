@@ -47,11 +47,11 @@ def main_module(program: Path, arguments: list[str], module: str) -> Iterator[Ca
         yield run
     finally:
         sys.argv, sys.path[:], sys.modules["__main__"] = before
-        _clear(vars(main))
+        clear_names(vars(main))
 
 
-def _clear(names: dict[str, Any]) -> None:
-    """Let go of the globals of a program as Python does at its end (`_PyModule_ClearDict`).
+def clear_names(names: dict[str, Any]) -> None:
+    """Let go of the globals of a program's module as Python does at its end (`_PyModule_ClearDict`).
 
     As garbage in a cycle with its functions, an open file would lose what it has not written yet.
     """

@@ -7,6 +7,7 @@ none of the nursery's descriptors, and in a namespace of its own may neither loo
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import ctypes
 import gc
@@ -20,14 +21,31 @@ import socket
 import sys
 from collections import deque
 from collections.abc import Callable, Sequence
+from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 from kiks.ports.messages import Start
 from kiks.script import child_main
+from kiks.script.main_module import clear_names
 
 DUMPABLE, CHILD_SUBREAPER = 4, 36
 """PR_SET_DUMPABLE and PR_SET_CHILD_SUBREAPER of Linux (linux/prctl.h)."""
+
+WARM = (
+    "encodings.ascii",
+    "serial.rfc2217",
+    "serial.tools.list_ports",
+    "serial.urlhandler.protocol_socket",
+    "kiks.ports.pyserial.protocol_kiks",
+)
+"""What every start of a program imports."""
+
+WARM_FOR = {b"numpy": "numpy", b"kiks": "kiks.client"}
+"""What a program imports, perhaps, whose text has a word in it."""
+
+TEXT_MAX = 1 << 20
+"""Most bytes that are read of a program's text."""
 
 LINKS_MAX = 1000
 """Most files of a program to which its working folder has links."""
@@ -95,6 +113,7 @@ class Nursery:
         if not self._programs:
             self._clean()
         folder = self._working_folder(start)
+        _warm_for(start)
         if process := os.fork():
             for each in (connection, *streams):
                 os.close(each)
@@ -173,6 +192,17 @@ class Nursery:
                 os.unlink(entry)
 
 
+def _warm_for(start: Start) -> None:
+    """Import what a program will import, as far as its text tells: forked processes have it then."""
+    program = Path(start.program)
+    with contextlib.suppress(OSError), open(program / "__main__.py" if program.is_dir() else program, "rb") as file:
+        text = file.read(TEXT_MAX)
+        for word, module in WARM_FOR.items():
+            if word in text:
+                import_module(module)
+                gc.freeze()
+
+
 def _kill_group(process: int, signal_number: int) -> None:
     with contextlib.suppress(ProcessLookupError, PermissionError):
         os.killpg(process, signal_number)
@@ -183,6 +213,25 @@ def _kill_all() -> None:
     if os.getpid() == 1:
         with contextlib.suppress(ProcessLookupError, PermissionError):
             os.kill(-1, signal.SIGKILL)
+
+
+def _end(code: int, warm: set[str]) -> NoReturn:
+    """End a forked process as Python does, but for the modules of the nursery: to take those down takes 10 ms.
+
+    Args:
+        code: The exit code.
+        warm: Names of the modules that the nursery has.
+    """
+    atexit._run_exitfuncs()
+    for name in [name for name in sys.modules if name not in warm]:
+        clear_names(vars(sys.modules[name]))
+    gc.collect()
+    try:
+        sys.stdout.flush()
+        sys.stderr.flush()
+    except OSError:
+        code = 120  # as of Python
+    os._exit(code & 0xFF)
 
 
 def _control_process(option: int, value: int) -> None:
@@ -205,9 +254,14 @@ def main(descriptor: int, folders: list[str], kept: list[str], limits: dict[str,
     _control_process(DUMPABLE, 0)
     _control_process(CHILD_SUBREAPER, 1)
     os.set_inheritable(descriptor, False)
+    for module in WARM:
+        import_module(module)
     gc.freeze()
     run = Nursery(socket.socket(fileno=descriptor), folders, kept, limits).serve()
-    return 0 if run is None else run()
+    if run is not None:
+        warm = set(sys.modules)
+        _end(run(), warm)
+    return 0
 
 
 if __name__ == "__main__":

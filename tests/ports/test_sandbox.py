@@ -1,0 +1,303 @@
+"""Programs of strangers: whatever one does, it is stopped, its reason is named, and no other program notices it."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import socket
+import subprocess
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+from tests.served import PROGRAMS, fresh
+
+from kiks.errors import KiksError
+from kiks.ports.program_process import Command
+from kiks.ports.programs import Handle, Programs
+from kiks.ports.sandbox import Limits, Sandbox
+
+
+def has_namespaces() -> bool:
+    command = ["bwrap", "--unshare-all", "--ro-bind", "/", "/", "true"]
+    return shutil.which("bwrap") is not None and not subprocess.run(command, capture_output=True).returncode
+
+
+pytestmark = [
+    # Each test starts processes.
+    pytest.mark.slow,
+    pytest.mark.skipif(not has_namespaces(), reason="no bubblewrap here that makes namespaces (package bubblewrap)"),
+]
+
+LIMITS = Limits(memory_mb=150, processes=8, computing_s=0.5, waiting_s=1.5, output_mb=0.5, files_mb=8)
+
+GOOD = """
+import random, serial
+port = serial.Serial("COM1", timeout=1)
+for _ in range(40):
+    port.write(b"D,%d,%d\\n" % (random.randint(-9, 9), random.randint(-9, 9)))
+    port.readline()
+    port.write(b"H\\n")
+    print(port.readline())
+"""
+
+BEGIN = """
+import ctypes, os, sys, serial
+port = serial.Serial("COM1", timeout=1)
+port.write(b"N\\n")
+port.readline()
+"""
+
+HOSTILE = {
+    # Python's own fork is refused already, as a program in simulated time is one process.
+    "started more than 8 processes": "fork = ctypes.CDLL(None).fork\nwhile True: fork()",
+    "used more than 150 MB of memory": "kept = []\nwhile True: kept.append(b'x' * (1 << 20))",
+    "computed for 0.5 s without using its robot": "while True: pass",
+    "waited for 1.5 s without using its robot": 'os.execv("/bin/sleep", ["sleep", "100"])',
+    "printed more than 0.5 MB": "while True: os.write(1, b'x' * 4095 + b'\\n')",
+    "sent a message of 4294967295 bytes to the world": """
+for each in os.listdir("/proc/self/fd"):
+    if int(each) > 2:
+        try: os.write(int(each), b"\\xff" * 1000)
+        except OSError: pass
+while True: pass
+""",
+    "sent something to the world that is no message": """
+for each in os.listdir("/proc/self/fd"):
+    if int(each) > 2:
+        try: os.write(int(each), b"\\x02\\0\\0\\0\\x01\\x02")
+        except OSError: pass
+while True: pass
+""",
+}
+
+
+def write(folder: Path, text: str) -> Command:
+    folder.mkdir(exist_ok=True)
+    program = folder / "program.py"
+    program.write_text(text)
+    return Command(program)
+
+
+def printed(handle: Handle) -> list[str]:
+    assert handle.output is not None
+    return [line.text for line in handle.output.since(0)[1]]
+
+
+def run(command: Command, sandbox: Sandbox | None) -> tuple[str, int, list[str]]:
+    """Run a program alone in a world; return state, exit code and output."""
+    sim = fresh()
+    programs = Programs(sim, [command], keeps_output=True, when_silent="wait", sandbox=sandbox)
+    code = programs.run()
+    return sim.state_hash(), code, printed(programs.handles[0])
+
+
+@pytest.fixture(scope="module")
+def good(tmp_path_factory: pytest.TempPathFactory) -> Command:
+    return write(tmp_path_factory.mktemp("good"), GOOD)
+
+
+@pytest.fixture(scope="module")
+def usual(good: Command) -> tuple[str, int, list[str]]:
+    """What comes of the good program outside of a sandbox."""
+    return run(good, None)
+
+
+@pytest.fixture(scope="module")
+def usual_second(good: Command) -> list[str]:
+    """What the good program prints that drives robot 2."""
+    programs = Programs(fresh(2), [None, good], keeps_output=True)
+    programs.run()
+    return printed(programs.handles[0])
+
+
+@pytest.fixture(scope="module")
+def beside(good: Command) -> Iterator[Sandbox]:
+    with Sandbox([good.program]) as sandbox:
+        yield sandbox
+
+
+@pytest.mark.parametrize(("reason", "text"), HOSTILE.items(), ids=HOSTILE)
+def test_hostile_program_is_stopped_and_named_and_no_other_one_notices(
+    reason: str,
+    text: str,
+    good: Command,
+    usual: tuple[str, int, list[str]],
+    usual_second: list[str],
+    beside: Sandbox,
+    tmp_path: Path,
+) -> None:
+    hostile = write(tmp_path / "hostile", BEGIN + text)
+    with Sandbox([tmp_path / "hostile"], limits=LIMITS) as sandbox:
+        programs = Programs(
+            fresh(2),
+            [hostile, good],
+            keeps_output=True,
+            when_silent="wait",
+            are_apart=True,
+            sandbox={1: sandbox, 2: beside},
+        )
+        programs.run()
+        first, second = programs.handles
+        assert (first.reason, first.how) == (reason, f"because it {reason}")
+        assert (second.reason, second.code) == ("", 0)
+        assert printed(second) == usual_second
+        # The next program finds a sandbox as if nothing had been.
+        write(tmp_path / "hostile", GOOD)
+        assert run(hostile, sandbox) == usual
+
+
+PLAIN = """
+import ctypes, os, sys
+words = [sys.executable, os.path.join(os.path.dirname(__file__), "program.py"), *sys.argv[1:]]
+words = [os.fsencode(word) for word in words]
+ctypes.CDLL(None).execv(words[0], (ctypes.c_char_p * (len(words) + 1))(*words))
+"""
+
+PROWLER = """
+import ctypes, json, os, resource, shutil, socket, sys
+secret, neighbour, tcp, udp, abstract, pid = json.loads(sys.argv[1])
+
+def attempt(name, do):
+    try:
+        print(name, "DONE", do())
+    except Exception as error:
+        print(name, type(error).__name__)
+
+def connected(family, address, kind=socket.SOCK_STREAM):
+    with socket.socket(family, kind) as there:
+        there.settimeout(5)
+        there.connect(address)
+        there.send(b"x")
+
+def fill(folder):
+    number = 0
+    while True:
+        number += 1
+        with open(f"{folder}/{number}", "wb") as file:
+            file.write(bytes(1 << 20))
+
+def traced(process):
+    libc = ctypes.CDLL(None, use_errno=True)
+    if libc.ptrace(16, process, 0, 0):
+        raise OSError(ctypes.get_errno(), "ptrace")
+
+attempt("reads the home folder", lambda: open(secret).read())
+attempt("lists the home folder", lambda: os.listdir(os.path.dirname(secret)))
+attempt("writes to its neighbour", lambda: open(neighbour, "w"))
+attempt("writes to its own file", lambda: open(__file__, "a"))
+attempt("writes to KiKS", lambda: open(os.path.join(sys.prefix, "x"), "w"))
+attempt("TCP", lambda: connected(socket.AF_INET, tuple(tcp)))
+attempt("UDP", lambda: connected(socket.AF_INET, tuple(udp), socket.SOCK_DGRAM))
+attempt("abstract socket", lambda: connected(socket.AF_UNIX, "\\0" + abstract))
+attempt("kills a process of others", lambda: os.kill(pid, 9))
+attempt("kills its parent", lambda: os.kill(os.getppid(), 9))
+attempt("kills all", lambda: os.kill(-1, 9))
+attempt("traces its parent", lambda: traced(os.getppid()))
+attempt("reads memory", lambda: open(f"/proc/{os.getppid()}/mem", "rb").read(1))
+attempt("its parent's environment", lambda: open(f"/proc/{os.getppid()}/environ", "rb").read())
+attempt("fills /tmp", lambda: fill("/tmp"))
+attempt("fills /dev/shm", lambda: fill("/dev/shm"))
+attempt("fills /", lambda: fill("/"))
+attempt("fills /dev", lambda: fill("/dev"))
+attempt("mounts", lambda: os.execv("/bin/mount", ["mount", "-o", "remount,rw", "/"]) if not os.fork() else os.wait()[1])
+attempt("one large file", lambda: open("/dev/shm/large", "wb").truncate(1 << 30))
+attempt("10 GB", lambda: bytearray(10 << 30))
+attempt("more memory", lambda: resource.setrlimit(resource.RLIMIT_AS, (1 << 40, 1 << 40)))
+print("processes", sorted(map(int, filter(str.isdigit, os.listdir("/proc"))))[:1] == [1])
+print("environment", sorted(os.environ))
+"""
+
+
+def test_program_reaches_no_file_network_or_neighbour(
+    good: Command, usual: tuple[str, int, list[str]], tmp_path: Path
+) -> None:
+    secret, neighbour = tmp_path / "home" / "secret", tmp_path / "neighbour" / "program.py"
+    for each in (secret, neighbour):
+        each.parent.mkdir()
+        each.write_text("untouched")
+    abstract = f"kiks-test-{os.getpid()}"
+    with (
+        closing(socket.create_server(("127.0.0.1", 0))) as tcp,
+        closing(socket.socket(socket.AF_INET, socket.SOCK_DGRAM)) as udp,
+        closing(socket.socket(socket.AF_UNIX)) as local,
+        subprocess.Popen(["sleep", "100"]) as victim,
+    ):
+        udp.bind(("127.0.0.1", 0))
+        local.bind("\0" + abstract)
+        local.listen()
+        told = [str(secret), str(neighbour), tcp.getsockname(), udp.getsockname(), abstract, victim.pid]
+        # A plain Python: what KiKS itself refuses to programs in simulated time is not what is tested here.
+        write(tmp_path / "prowler", PROWLER)
+        plain = tmp_path / "prowler" / "plain.py"
+        plain.write_text(PLAIN)
+        with Sandbox([tmp_path / "prowler"], limits=Limits(files_mb=8)) as sandbox:
+            _, code, lines = run(Command(plain, [json.dumps(told)]), sandbox)
+            house = sandbox._house
+            plain.write_text(GOOD)
+            assert run(Command(plain), sandbox) == usual
+            assert sandbox._house is house, "its warm process lives on"
+        for each in (tcp, udp, local):
+            each.setblocking(False)
+            with pytest.raises(BlockingIOError):
+                each.recv(1) if each is udp else each.accept()
+        assert victim.poll() is None
+        victim.kill()
+    assert secret.read_text() == neighbour.read_text() == "untouched"
+    assert code == 0, lines
+    *outcomes, processes, environment = lines
+    assert not [
+        line for line in outcomes if "DONE" in line and not line.startswith(("UDP", "kills its parent", "mounts"))
+    ]
+    assert "mounts DONE 0" not in outcomes
+    assert processes == "processes True"
+    assert set(eval(environment.removeprefix("environment "))) <= {
+        "HOME", "LANG", "LC_CTYPE", "PATH", "PWD", "PYTHONHASHSEED", "PYTHONIOENCODING", "PYTHONUNBUFFERED", "TMPDIR"
+    }  # fmt: skip
+
+
+LOOKS = """
+import os, random, sys, time
+import serial
+print(sys.argv, sys.modules["__main__"].__name__, __file__, sys.path[0], hash("x"), {"a", "b", "c"})
+print(time.time(), random.random(), os.urandom(4), sys.stdout, sys.stderr, sys.stdin.read())
+port = serial.Serial("COM1", timeout=1)
+port.write(b"D,4,%d\\n" % random.randint(0, 9))
+print(port.readline())
+sys.exit(int(sys.argv[1]))
+"""
+
+
+@pytest.mark.parametrize("is_trusted", [False, True], ids=["sandbox", "trusted"])
+def test_program_is_the_same_as_in_a_process_of_its_own(is_trusted: bool, tmp_path: Path) -> None:
+    looks = Command(write(tmp_path / "looks", LOOKS).program, ["7", "x"])
+    with Sandbox([tmp_path / "looks", PROGRAMS], is_trusted=is_trusted) as sandbox:
+        for command in (looks, looks, Command(PROGRAMS / "wander.py"), Command(PROGRAMS / "any_port.py", ["3"])):
+            assert run(command, sandbox) == run(command, None)
+
+
+def test_each_start_finds_an_empty_working_folder_with_the_files_of_the_program(tmp_path: Path) -> None:
+    command = write(
+        tmp_path / "first", "import os\nprint(sorted(os.listdir()))\nopen('left', 'w')\nopen('/tmp/left', 'w')"
+    )
+    (tmp_path / "first" / "map.txt").write_text("here")
+    with Sandbox([tmp_path / "first"]) as sandbox:
+        for _ in range(2):
+            assert run(command, sandbox)[2] == ["['map.txt', 'program.py']"]
+
+
+def test_without_bubblewrap_one_line_says_what_to_do(good: Command, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("PATH", "/nowhere")
+    with Sandbox([good.program]) as sandbox, pytest.raises(KiksError, match="is not installed") as caught:
+        sandbox.warm()
+    assert "\n" not in str(caught.value)
+
+
+def test_trusted_program_has_limits_as_well(usual: tuple[str, int, list[str]], tmp_path: Path) -> None:
+    hostile = write(tmp_path / "hostile", BEGIN + "while True: pass")
+    with Sandbox(limits=LIMITS, is_trusted=True) as sandbox:
+        assert run(hostile, sandbox)[1] == 137
+        write(tmp_path / "hostile", GOOD)
+        assert run(hostile, sandbox) == usual
