@@ -83,7 +83,7 @@ def test_an_export_of_gradescope_names_students(tmp_path: Path) -> None:
 
 
 def test_a_file_of_the_page_alone_and_within_an_export(tmp_path: Path) -> None:
-    data = hand_in.packed(TEXT.encode(), [], exercise="Lamp", recording=b"\x89MCAP", page=b"<html>")
+    data = hand_in.packed(TEXT.encode(), {"points": 1}, recording=b"\x89MCAP", page=b"<html>")
     (tmp_path / "ann.zip").write_bytes(data)
     export = zipped(tmp_path / "all.zip", {"Bob_7_assignsubmission_file_/lamp.zip": data})
     for each in found_in(tmp_path, tmp_path / "ann.zip", export):

@@ -29,6 +29,9 @@ LONG_TEXT_MAX = 200_000
 MEMBER_MAX = 10_000
 """Highest number of an imperfect robot."""
 
+STUDENT = 1
+"""The robot that a student's program drives."""
+
 LongText = Annotated[str, Field(strict=True, max_length=LONG_TEXT_MAX, pattern=r"^[^\x00]*$")]
 Member = Annotated[Whole, Field(ge=0, le=MEMBER_MAX, description="0 is the exact robot.")]
 

@@ -17,7 +17,7 @@ from kiks.desk.server.desk import Desk
 from kiks.desk.server.folder import Folder
 from kiks.desk.server.scripts import NEW
 from kiks.errors import ParameterError
-from kiks.model.exercise import Cases, Exercise
+from kiks.model.exercise import STUDENT, Cases, Exercise
 from kiks.model.goal import Goal
 from kiks.model.project import Project
 from kiks.sim.judge import Judge, goal_names
@@ -29,20 +29,19 @@ GOAL_LABELS = {"text": "In a line for people", "points": "Points", "robot": "Who
 
 GOAL_TIPS = {
     "text": "Students read it above the arena",
-    "solved": "A formula, looked at every 0.1 s; the run ends when it is true",
-    "failed": "A formula; the run ends when it is true, as it cannot be solved any more",
-    "points": "A formula; what the run is worth at its end",
+    "solved": "A formula: the run ends when it is true",
+    "failed": "A formula: the run ends when it is true",
+    "points": "A formula: what the run is worth at its end",
 }
 
 CASE_TIPS = {
     "name": "What people call these cases",
     "seed": "Such as 1, 2, 3 or 1..20",
-    "start": "Where robot 1 starts: x, y, heading; and the next after a semicolon",
-    "arena": "Arenas in place of this one: names of those that come with KiKS, or files beside the exercise",
+    "start": "Places of robot 1: x, y, heading; x, y, heading",
+    "arena": "Arenas in place of this one, such as maze, or files beside the exercise",
     "baud": "Speeds of the serial line, such as 9600, 38400",
     "thinking": "Such as none, fixed:5",
     "family": "Numbers of imperfect robots, such as 0, 1, 2; 0 is the exact one",
-    "is_hidden": "Only your file has these cases; the students' file does not",
 }
 
 CSS = """
@@ -180,9 +179,8 @@ class ExerciseDialog:
         if not self._begins_here.value:
             project = replace(project, arena=replace(self._desk.project.arena, name=project.arena.name))
         robots = list(project.robots)
-        if goal.robot <= len(robots):
-            # The student writes this one's program.
-            robots[goal.robot - 1] = replace(robots[goal.robot - 1], program=None, arguments=())
+        if robots:
+            robots[STUDENT - 1] = replace(robots[STUDENT - 1], program=None, arguments=())
         return replace(
             project,
             robots=tuple(robots),

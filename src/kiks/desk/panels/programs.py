@@ -16,7 +16,7 @@ from kiks.desk.server import scripts
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.scripts import EXAMPLES, NEW
 from kiks.errors import ParameterError
-from kiks.model.exercise import Exercise
+from kiks.model.exercise import STUDENT, Exercise
 from kiks.ports.program_process import Command
 from kiks.ports.programs import Handle
 
@@ -171,12 +171,11 @@ class ProgramsPanel(Panel):
         self._offer()
         project = self._desk.project
         if (exercise := project.exercise) is not None:
-            own = self._desk.own_robot
-            if (command := attached.get(own)) is not None:
-                attached = {own: command}
+            if (command := attached.get(STUDENT)) is not None:
+                attached = {STUDENT: command}
             elif exercise != self._exercise:
                 self._exercise = exercise
-                self._begin_exercise(exercise, own)
+                self._begin_exercise(exercise)
                 return
             else:
                 return
@@ -188,10 +187,10 @@ class ProgramsPanel(Panel):
         if is_first:
             self._choice.value = EXAMPLES / "first_steps.py"
 
-    def _begin_exercise(self, exercise: Exercise, robot: int) -> None:
+    def _begin_exercise(self, exercise: Exercise) -> None:
         """Show the student's program of an exercise, which may be there from an earlier day; else its template."""
         name = scripts.name_of(exercise.title or self._desk.project.arena.name)
-        self._robot.value = robot
+        self._robot.value = STUDENT
         if (program := self._folder.path / name) in self._choice.options:
             self._choice.value = program
         else:

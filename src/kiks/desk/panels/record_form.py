@@ -11,7 +11,7 @@ from typing import Any
 from nicegui import ui
 
 from kiks.desk.panels.properties import label_of, rules_of
-from kiks.desk.panels.widgets import named
+from kiks.desk.panels.widgets import named, with_props
 from kiks.errors import KiksError, ParameterError, shown
 from kiks.model.data_file import check
 from kiks.model.exercise import LISTED_MAX
@@ -27,7 +27,7 @@ class RecordForm:
         values: The values of the fields, by name; that of the class for one that is left out.
         name: What tests call the form.
         labels: What people read above fields, by name; the names of others say it.
-        tips: What people read about fields, by name.
+        tips: What people read below fields, by name.
         wide: Names of fields that take a whole row.
         long: Names of those that take several lines, too.
         left_out: Names of fields that are not shown; they keep their values.
@@ -75,8 +75,8 @@ class RecordForm:
                 field.classes("desk-wide")
             if is_long:
                 field.props("autogrow input-style='min-height: 7rem; max-height: 40vh'")
-        if tip := self._tips.get(name, ""):
-            field.tooltip(tip)
+            if tip := self._tips.get(name, ""):
+                with_props(field, hint=tip)
         return named(field, f"{self._name}-{name}")
 
     def _value(self, name: str, typed: Any) -> Any:

@@ -12,8 +12,8 @@ from nicegui import ui
 from kiks.desk.panels.widgets import Panel, icon_button, named
 from kiks.desk.server.desk import Desk
 from kiks.errors import ParameterError, counted
+from kiks.model.exercise import STUDENT
 from kiks.ports.program_process import Command
-from kiks.trials.hand_in import score_of
 from kiks.trials.trial import CRASHED, ENDED, ENDLESS, OUT_OF_TIME, RUNNING, STOPPED, Outcome
 
 CLOSED = "Handing in is closed now. Ask your lecturer to open it."
@@ -94,7 +94,7 @@ class TriesPanel(Panel):
         tries = self._desk.tries
         if tries.error:
             return tries.error
-        score = score_of(tries.tried)
+        grade = tries.grade
         if not (tries.outcomes or tries.is_running):
             return f"Stopped; {counted(len(tries.cases), 'case')} not tried."
         if tries.is_running:
@@ -102,7 +102,7 @@ class TriesPanel(Panel):
         if self._is_packing:
             return "Writing what is handed in ..."
         of = "" if tries.is_whole else f", {len(tries.cases) - len(tries.outcomes)} not tried"
-        return f"{score['solved']} of {score['cases']} solved, {_points(score['points'])}{of}."
+        return f"{grade.solved} of {len(grade.outcomes)} solved, {_points(grade.points)}{of}."
 
     def _build_table(self) -> None:
         tries = self._desk.tries
@@ -122,7 +122,7 @@ class TriesPanel(Panel):
                 how, look = ("solved", "solved") if outcome.is_solved else ("not solved", "open")
                 how, look = ("failed", "failed") if outcome.is_failed else (how, look)
                 ui.label(how).classes(f"tries-{look}")
-                if text := _detail(outcome, self._desk.own_robot):
+                if text := _detail(outcome):
                     ui.label(text).classes("tries-detail")
             for text in (f"{outcome.points:g}", f"{outcome.time_s:.1f} s"):
                 with ui.element("td").classes("tries-number"):
@@ -171,12 +171,9 @@ def _points(points: float) -> str:
     return f"{points:g} point{'' if points == 1 else 's'}"
 
 
-def _detail(outcome: Outcome, robot: int) -> str:
-    """Return how the program of a robot has ended, and what it has printed last."""
-    try:
-        end = outcome.end_of(robot)
-    except KeyError:
-        return outcome.doubt
+def _detail(outcome: Outcome) -> str:
+    """Return how the program has ended, and what it has printed last."""
+    end = outcome.end_of(STUDENT)
     lines = [f"{ENDS[end.how]}: {end.detail}" if end.detail else f"{ENDS[end.how]}."]
     lines += [f"Printed last: {line}" for line in end.printed[-1:] if end.how != CRASHED]
     return "\n".join([*lines, *filter(None, [outcome.doubt])])

@@ -21,6 +21,7 @@ from kiks.errors import KiksError, LinkError, ParameterError
 from kiks.model.arena import Arena
 from kiks.model.atomic_files import program_in
 from kiks.model.checks import CLOCK_END_NS
+from kiks.model.exercise import STUDENT
 from kiks.model.project import Project, ProjectRobot
 from kiks.ports.program_process import Command, Permission, commands_of, supervisor_of
 from kiks.ports.programs import Programs
@@ -307,11 +308,6 @@ class Desk:
             )
 
     @property
-    def own_robot(self) -> int:
-        """The robot that people's programs drive in an exercise."""
-        return 1 if self.project.goal is None else self.project.goal.robot
-
-    @property
     def is_locked(self) -> bool:
         """Whether walls, things and settings must stay as the exercise has them."""
         exercise = self.project.exercise
@@ -326,7 +322,7 @@ class Desk:
         """Try a person's program in all cases of the project, while the world goes on; see `tries`."""
         self._permission().check(command)
         has_hidden = self.may_edit or not self.is_locked
-        self.tries.begin(self.project, self._home, command, robot=self.own_robot, has_hidden=has_hidden)
+        self.tries.begin(self.project, self._home, command, has_hidden=has_hidden)
 
     # ---- another world ----
 
@@ -404,7 +400,7 @@ class Desk:
             sim.loop.end_at(CLOCK_END_NS, end_time)  # a person may let it go on
             end(0, f"The project ends after {seconds:g} s of simulated time.")
 
-        if self.project.exercise is not None and self.attached(self.own_robot) is None:
+        if self.project.exercise is not None and self.attached(STUDENT) is None:
             world.pause()  # its clock runs for a program
         file = None if self._supervisor is None else self._supervisor.program
         supervision = Supervision(sim, file, self.project.goal)

@@ -7,20 +7,24 @@ import tempfile
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import asdict
 from pathlib import Path
 
 from kiks.errors import KiksError, ParameterError, WorkError
 from kiks.model.data_file import read_file
-from kiks.model.exercise import Case, cases_of
+from kiks.model.exercise import STUDENT, Case, cases_of
 from kiks.model.limits import PROGRAM_BYTES_MAX
 from kiks.model.project import Project
 from kiks.ports.program_process import Command, commands_of, python_line
 from kiks.ports.resources import processor_count
 from kiks.sim.from_project import in_case
 from kiks.trials.crew import ASK_S
-from kiks.trials.hand_in import PAGE, Tried, packed
+from kiks.trials.grading import Grade
+from kiks.trials.hand_in import PAGE, packed
 from kiks.trials.runner import run_trials
+from kiks.trials.submissions import Submission
 from kiks.trials.trial import Outcome, Trial
+from kiks.version import __version__
 
 _TURNS = threading.BoundedSemaphore(max(processor_count() - 1, 1))
 """One turn for each core but one, which is the server's: thirty students of a room may press 'Try all' at once."""
@@ -65,23 +69,24 @@ class Tries:
         return len(self.outcomes) == len(self.cases) > 0
 
     @property
-    def tried(self) -> list[Tried]:
-        """The cases that have come out."""
-        return [Tried(self.cases[number].name, outcome) for number, outcome in sorted(self.outcomes.items())]
+    def grade(self) -> Grade:
+        """What has come out so far, as a grade: `kiks grade` would give the same in these cases."""
+        name = "" if self._command is None else self._command.name
+        outcomes = tuple(outcome for _, outcome in sorted(self.outcomes.items()))
+        return Grade(Submission(name, name, self._command), outcomes)
 
     def is_of(self, project: Project, command: Command) -> bool:
         """Return whether these are all tries of a program, as it is now, in an exercise."""
         same = self.is_whole and (self.project, self._command) == (project, command)
         return same and self._program == _bytes_of(command)
 
-    def begin(self, project: Project, home: Path, command: Command, *, robot: int, has_hidden: bool) -> None:
+    def begin(self, project: Project, home: Path, command: Command, *, has_hidden: bool) -> None:
         """Begin to try a program.
 
         Args:
             project: The exercise.
             home: The folder of the exercise.
             command: The program.
-            robot: The robot that it drives.
             has_hidden: Whether to try it in hidden cases, too.
         """
         if self.is_running:
@@ -92,7 +97,7 @@ class Tries:
         if self._folder is None:
             self._folder = tempfile.TemporaryDirectory(prefix="kiks-tries-", ignore_cleanup_errors=True)
         programs = commands_of(project, home)
-        programs[robot - 1] = command
+        programs[STUDENT - 1] = command
         self._thread = threading.Thread(target=self._run, args=(project, home, tuple(programs)), daemon=True)
         self._thread.start()
 
@@ -152,12 +157,21 @@ class Tries:
             raise ParameterError(self.error)
         if not self.is_whole:
             raise ParameterError("All cases must have come out before a program is handed in. Hand it in again.")
-        assert self.project is not None
-        worst = min(self.outcomes, key=lambda number: (self.outcomes[number].points, number))
+        grade, exercise = self.grade, None if self.project is None else self.project.exercise
+        assert grade.worst is not None
+        worst = int(grade.worst.name)
         file, page = self.recording(worst), self._path() / PAGE
-        exercise = "" if self.project.exercise is None else self.project.exercise.title
-        self._write_page(file, page, f"{exercise}: {self.cases[worst].name}")
-        return packed(self._program, self.tried, exercise=exercise, recording=file.read_bytes(), page=page.read_bytes())
+        title = "" if exercise is None else exercise.title
+        self._write_page(file, page, f"{title}: {self.cases[worst].name}")
+        score = {
+            "kiks": __version__,
+            "exercise": title,
+            "points": grade.points,
+            "solved": grade.solved,
+            "cases": len(self.cases),
+            "each": [{**asdict(outcome), "name": self.cases[int(outcome.name)].name} for outcome in grade.outcomes],
+        }
+        return packed(self._program, score, recording=file.read_bytes(), page=page.read_bytes())
 
     def _write_page(self, recording: Path, page: Path, title: str) -> None:
         """Write the page of a recording in a process of its own: figures would take the time of the desk."""
