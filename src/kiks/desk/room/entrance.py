@@ -15,7 +15,7 @@ from starlette.requests import Request
 from starlette.responses import HTMLResponse, Response
 from starlette.types import Receive, Scope, Send
 
-from kiks.desk.server.access import LOOPBACK, Door
+from kiks.desk.server.access import LOOPBACK, TIMER, Door
 from kiks.desk.server.token import Token
 from kiks.errors import ParameterError, shown
 
@@ -154,6 +154,8 @@ class Entrance:
         if not hmac.compare_digest(plain_code(code).encode(), self._code.encode()):
             self.guesses.note_wrong(address)
             return self._page("code", fault="The code is another one. Look at the blackboard again.", status=403)
+        if (timer := request.scope.get("state", {}).get(TIMER)) is not None:
+            timer.cancel()  # the code is as good as a token: while a whole class comes in, a desk takes its time
         if request.method == "GET" or not name:
             return self._page("names")
         try:

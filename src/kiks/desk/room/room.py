@@ -7,6 +7,7 @@ import logging
 import re
 import secrets
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path, PurePosixPath
 from urllib.parse import urlsplit
@@ -98,6 +99,7 @@ class Room:
         self._public = address
         self._is_trusted = is_trusted
         self._sandboxes: list[Sandbox] = []
+        self._starter = ThreadPoolExecutor(1, "kiks room")
         self._turn = asyncio.Lock()
         self._is_over = False
 
@@ -133,15 +135,17 @@ class Room:
         self._is_over = True
         door = SERVER.door
         door.entrance, door.advice, door.name, door.is_secure = None, ADVICE, None, False
+        self._starter.shutdown(cancel_futures=True)
+        SERVER.run(self._leave())
         for each in self.desks.values():
             each.close()
         for sandbox in self._sandboxes:
             sandbox.close()
-        SERVER.run(self._leave())
 
     async def _leave(self) -> None:
-        for key in tuple(SERVER.door.keys.values()):
-            await SERVER.door.remove(key)
+        async with self._turn:  # nobody is coming in
+            for key in tuple(SERVER.door.keys.values()):
+                await SERVER.door.remove(key)
 
     @property
     def address(self) -> str:
@@ -171,6 +175,8 @@ class Room:
             ParameterError: If the name is none of the class, or not free.
         """
         async with self._turn:
+            if self._is_over:
+                raise ParameterError("The room must be open, but it has been closed.")
             if (seat := self.seats.get(name)) is None:
                 raise ParameterError(f"The name must be one of the class, but it was {shown(name)}. Choose another.")
             if seat.key is not None:
@@ -218,7 +224,6 @@ class Room:
         if not self._is_trusted:
             sandbox = Sandbox([folder, EXAMPLES.parent, *(each.program for each in commands if each is not None)])
             self._sandboxes.append(sandbox)
-            sandbox.warm()
         desk = Desk(
             simulation_of(self.project, self._home),
             project=self.project,
@@ -232,13 +237,24 @@ class Room:
             sandbox=sandbox,
             commands=commands,
             supervisor=supervisor_of(self.project, self._home),
+            is_held=True,
         )
         desk.hand_in, desk.may_hand_in = partial(self._take_in, seat), self.may_hand_in
         opened = Shown(desk, number=seat.number)
-        desk.begin()
         opened.drive()
+        # One after the other: a class comes at once, and a student sees the desk before its first program starts.
+        self._starter.submit(self._begin_at, desk, sandbox)
         self._pictures[seat.name] = Pictures(desk)
         self.desks[seat.name] = opened
+
+    def _begin_at(self, desk: Desk, sandbox: Sandbox | None) -> None:
+        """Make a desk ready for programs, and start those of the exercise."""
+        try:
+            if sandbox is not None:
+                sandbox.warm()
+            desk.begin()
+        except KiksError as error:
+            desk.say(str(error))
 
     def _take_in(self, seat: Seat, data: bytes, name: str) -> None:
         """Take what a student hands in; the latest counts."""
