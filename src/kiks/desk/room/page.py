@@ -104,7 +104,7 @@ class _Card:
             with ui.row().classes("w-full items-center no-wrap gap-1 q-px-sm"):
                 with ui.column().classes("col gap-0").style("min-width: 0"):
                     ui.label(seat.name).classes("text-weight-medium ellipsis full-width")
-                    self._state = named(ui.label().classes("text-caption ellipsis full-width"), "state")
+                    self._state = named(ui.label().classes("text-caption room-state"), "state")
                 self._solved = with_props(ui.icon("check_circle", size="sm").classes("room-solved"), title="Solved")
                 tip = "Give the name free, so that another browser can take it; the desk stays as it is"
                 self._free = icon_button("lock_open", f"Give free: {seat.name}", "give-free", self._give_free, tip=tip)
@@ -118,11 +118,11 @@ class _Card:
             words.append("has not come yet")
         else:
             is_running = any(each.is_running for each in opened.desk.programs.handles)
-            words.append("no browser" if seat.key is None else "a program runs" if is_running else "at the desk")
             if seat.points is not None:
                 words.append(f"{seat.points:g} point{'' if seat.points == 1 else 's'}")
             if seat.handed_in:
                 words.append("handed in")
+            words.append("no browser" if seat.key is None else "a program runs" if is_running else "at the desk")
         shown = (words, seat.is_solved, seat.number, opened is None, seat.key is None)
         if shown == self._shown:
             return

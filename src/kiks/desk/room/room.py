@@ -144,8 +144,7 @@ class Room:
 
     async def _leave(self) -> None:
         async with self._turn:  # nobody is coming in
-            for key in tuple(SERVER.door.keys.values()):
-                await SERVER.door.remove(key)
+            SERVER.door.keys.clear()
 
     @property
     def address(self) -> str:

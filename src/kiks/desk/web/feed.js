@@ -30,6 +30,8 @@ const FIRST_PAUSE_MS = 250;
 const LONGEST_PAUSE_MS = 5000;
 /** How long the page tries to find its desk again. */
 const LONGEST_LOSS_MS = 60_000;
+/** Code with which the server closes a socket whose token it does not know any more: the page then says so. */
+const REFUSED = 1008;
 /** Longest period between two frames that is interpolated; beyond it, things would seem to lag. */
 const LONGEST_INTERVAL_MS = 120;
 
@@ -72,7 +74,8 @@ export class Feed {
     this._socket = socket;
     socket.onopen = () => (this._owed = 0);
     socket.onmessage = (event) => (typeof event.data === "string" ? this._hear(event.data) : this._see(event.data));
-    socket.onclose = () => {
+    socket.onclose = ({ code }) => {
+      if (code === REFUSED) return location.reload();
       window.socket?.disconnect();
       this._lost_ms ??= performance.now();
       if (this.connection === "gone") return;

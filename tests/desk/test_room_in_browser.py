@@ -1,0 +1,110 @@
+"""A room in Chromium: three students and the lecturer, from the first click to what is handed in."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser, Page, expect
+from tests.desk.test_exercise import DRIVE, make_exercise
+from tests.desk.visitor import FIRST_PICTURE, NewPage, check_access, check_reach, leave_picture
+
+from kiks.desk.room.page import open_room
+from kiks.desk.room.room import Room
+from kiks.trials.hand_in import program_of
+
+NAMES = ["Ada Lovelace", "Alan Turing", "Grace <b>Hopper</b>", "J\xf6rg M\xfcller"]
+
+LOOKS = ((1366, 768, "light"), (1280, 800, "dark"))
+"""Screens and colours of two students."""
+
+
+def come_in(page: Page, room: Room, name: str) -> None:
+    """Give the code, choose a name, and wait for the desk."""
+    page.goto(room.address)
+    check_access(page, "entrance")
+    page.get_by_label("The code of the room").fill(f" {room.code.lower()} ")
+    page.keyboard.press("Enter")
+    expect(page.get_by_role("button", name=name)).to_be_visible()
+    check_access(page, "names")
+    page.get_by_label("Find a name").fill(name[:4].lower())
+    expect(page.locator(".names button:visible")).to_have_count(1)
+    leave_picture(page, f"room-names-{name[:4]}")
+    page.get_by_role("button", name=name).click()
+    page.wait_for_function(FIRST_PICTURE)
+
+
+def solve(page: Page) -> None:
+    """Write a program and run it until the goal is reached."""
+    page.get_by_test_id("tab-programs").click()
+    page.locator(".cm-content").click()
+    page.keyboard.press("Control+a")
+    page.keyboard.insert_text(DRIVE)
+    page.get_by_test_id("run-program").click()
+    expect(page.get_by_test_id("board-result")).to_contain_text("solved after 2.")
+
+
+@pytest.mark.slow
+def test_a_class_comes_solves_and_hands_in(tmp_path: Path, new_page: NewPage, browser: Browser) -> None:
+    project, is_trusted = make_exercise(), shutil.which("bwrap") is None
+    room = Room(project, tmp_path, NAMES, tmp_path / "room", is_trusted=is_trusted)
+    with open_room(room, port=0):
+        lecturer = new_page(1366, 768, color_scheme="light")
+        lecturer.goto(room.lecturer_address)
+        expect(lecturer.get_by_test_id("sum")).to_have_text("0 of 4 have come, 0 solved it, 0 handed in")
+        lecturer.get_by_test_id("code").click()
+        expect(lecturer.get_by_test_id("address")).to_have_text(room.address)
+        expect(lecturer.get_by_role("img", name="QR code").locator("svg")).to_be_visible()
+        leave_picture(lecturer, "room-code")
+        lecturer.get_by_role("button", name="Close").click()
+
+        students = [new_page(width, height, color_scheme=look) for width, height, look in LOOKS]
+        # This one is refused at times, which Chromium reports as an error.
+        students.append(browser.new_page(color_scheme="dark"))
+        students[2].set_viewport_size({"width": 390, "height": 844})
+        for page, name in zip(students, NAMES, strict=False):
+            come_in(page, room, name)
+        for page in students[:2]:
+            solve(page)
+        expect(lecturer.get_by_test_id("sum")).to_have_text("3 of 4 have come, 2 solved it, 0 handed in")
+        card = lecturer.get_by_test_id(f"seat-{NAMES[0]}")
+        expect(card.get_by_test_id("state")).to_have_text("10 points, at the desk")
+        expect(card.locator("img")).to_have_js_property("naturalWidth", 256)
+
+        students[0].get_by_test_id("tab-exercise").click()
+        students[0].get_by_test_id("hand-in").click()
+        expect(card.get_by_test_id("state")).to_contain_text("handed in")
+        (file,) = (room.folder / "handed-in").iterdir()
+        assert (file.name, program_of(file.read_bytes())) == ("Ada Lovelace.zip", DRIVE.encode())
+        for width, height in ((1366, 768), (390, 844)):
+            lecturer.set_viewport_size({"width": width, "height": height})
+            for look in ("light", "dark"):
+                lecturer.emulate_media(color_scheme=look)  # type: ignore[arg-type]
+                check_access(lecturer, f"room, {look}, {width}")
+                leave_picture(lecturer, f"room-{look}-{width}")
+            check_reach(lecturer, f"room, {width}")
+
+        lecturer.get_by_test_id("may-hand-in").click()
+        students[1].get_by_test_id("tab-exercise").click()
+        expect(students[1].get_by_test_id("hand-in")).to_be_disabled()
+        with lecturer.context.expect_page() as opened:
+            lecturer.get_by_role("link", name=f"Open the desk of {NAMES[1]}").click()
+        expect(opened.value.get_by_test_id("board-result")).to_contain_text("solved after 2.")
+        assert opened.value.url.endswith(f"/desk/{room.seats[NAMES[1]].number}")
+        opened.value.close()
+
+        lecturer.get_by_role("button", name=f"Give free: {NAMES[2]}").click()
+        lecturer.get_by_test_id("dialog-yes").click()
+        expect(lecturer.get_by_test_id(f"seat-{NAMES[2]}").get_by_test_id("state")).to_have_text("no browser")
+        expect(students[2].get_by_text("access denied")).to_be_visible()
+        leave_picture(students[2], "room-denied")
+        students[2].get_by_role("link", name="Choose your name again").click()
+        expect(students[2].get_by_label("The code of the room")).to_be_visible()
+        expect(students[2].get_by_text("Go on as")).to_be_hidden()
+        come_in(students[2], room, NAMES[2])
+        students[0].goto(room.address)
+        students[0].get_by_role("button", name=f"Go on as {NAMES[0]}").click()
+        students[0].wait_for_function(FIRST_PICTURE)
+        assert students[0].url.endswith("/desk/1")
+        students[2].context.close()
