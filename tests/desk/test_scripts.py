@@ -29,7 +29,7 @@ def test_own_programs_and_examples_are_offered(tmp_path: Path) -> None:
     (tmp_path / "folder.py" / "below.py").write_text("")
     labels = [*offered(ProgramFolder(tmp_path)).values()]
     assert labels[:3] == ["a.py", "b.py", "example: avoid"]
-    examples = len(demonstrations()) - 1  # all but soccer, whose program lies elsewhere
+    examples = sum(path.parent.name == "demos" for path in demonstrations().values())
     assert len(labels) == 2 + examples
     assert len(offered(ProgramFolder(tmp_path / "nowhere"))) == examples
 
