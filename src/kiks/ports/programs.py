@@ -102,9 +102,12 @@ class Handle(SocketParticipant):
             return "stopped"
         return "silenced" if self.is_silenced else f"ended {self.how}"
 
-    def progress(self) -> int | None:
-        """Return something that changes when it lets simulated time pass; None while it waits for the world."""
-        return None if self.is_held_up else self.acts_from_ns
+    def progress(self) -> tuple[int, bool]:
+        """Return its time [ns], and whether it waits for the world; for any thread."""
+        try:
+            return self.acts_from_ns, self.is_held_up
+        except IndexError:  # the request that was last is done meanwhile
+            return self.acts_from_ns, True
 
     @property
     def how(self) -> str:

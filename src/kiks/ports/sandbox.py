@@ -34,6 +34,7 @@ from kiks.errors import KiksError
 from kiks.ports.environment_marks import HASH_SEED
 from kiks.ports.messages import Start
 from kiks.ports.program_process import Child, python_line
+from kiks.units import s_from_ns
 
 SAMPLE_S = 0.1
 """Time between two looks at the processes of a sandbox [s of real time], while a program runs."""
@@ -55,6 +56,10 @@ _TICKS_A_SECOND = os.sysconf("SC_CLK_TCK")
 _PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")
 
 
+Progress = Callable[[], tuple[int, bool]]
+"""Returns the time of a program [ns], and whether it waits for the world; any thread calls it."""
+
+
 @dataclass(frozen=True)
 class Limits:
     """What the programs in a sandbox may take, all processes together.
@@ -62,7 +67,7 @@ class Limits:
     Attributes:
         memory_mb: Memory [MB].
         processes: Number of processes.
-        processor_s: Processor time of a run [s].
+        processor_s: Processor time of a run, beyond a second for each simulated second [s].
         computing_s: Processor time in which it lets no simulated time pass [s].
         waiting_s: Real time in which it waits for something that is not simulated [s].
         output_mb: What a program prints [MB].
@@ -123,7 +128,7 @@ class Sandbox:
         self,
         start: Start,
         connection: socket.socket,
-        progress: Callable[[], object],
+        progress: Progress,
         streams: tuple[int, int] | None,
     ) -> Child:
         """Start a program.
@@ -131,13 +136,14 @@ class Sandbox:
         Args:
             start: The program, and what it finds.
             connection: Its end of the socket to the world.
-            progress: Returns something that changes when the program lets simulated time pass; None while it waits for
-                the world.
+            progress: Tells how far the program is.
             streams: Descriptors for its output and its errors; None: they go where those of this process go.
         """
         start = start._replace(program=os.path.abspath(start.program))
         with self._lock:
-            return self._warm().start(start, [connection.fileno(), *(streams or (1, 2))], progress)
+            while (program := self._warm().start(start, [connection.fileno(), *(streams or (1, 2))], progress)) is None:
+                pass  # it has ended meanwhile
+            return program
 
     def close(self) -> None:
         """End all processes in it."""
@@ -155,10 +161,10 @@ class Sandbox:
 class SandboxedProgram(Child):
     """A program in a sandbox."""
 
-    def __init__(self, house: _House, number: int, progress: Callable[[], object]) -> None:
+    def __init__(self, house: _House, number: int, progress: Progress) -> None:
         self._house, self._number, self._progress = house, number, progress
         self._begin_s = self._mark_s = house.processor_s
-        self._mark: object = None
+        self._mark_ns = progress()[0]
         self._waited_s = 0.0
         self._printed_count = 0
         self._has_ended = threading.Event()
@@ -200,15 +206,18 @@ class SandboxedProgram(Child):
             is_running: Whether a process of the sandbox computes now, or has since the last look.
             passed_s: Real time since then [s].
         """
-        limits, now_s, mark = self._house.limits, self._house.processor_s, self._progress()
-        if now_s - self._begin_s > limits.processor_s:
-            return f"computed for more than {limits.processor_s:g} s in all"
-        if mark is None or mark != self._mark:
-            self._mark, self._mark_s, self._waited_s = mark, now_s, 0.0
+        limits, now_s = self._house.limits, self._house.processor_s
+        at_ns, is_held_up = self._progress()
+        if now_s - self._begin_s > limits.processor_s + s_from_ns(at_ns):
+            return f"computed for {now_s - self._begin_s:.0f} s in all"
+        if at_ns != self._mark_ns:
+            self._mark_ns, self._mark_s, self._waited_s = at_ns, now_s, 0.0
             return ""
         if now_s - self._mark_s > limits.computing_s:
             return f"computed for {limits.computing_s:g} s without using its robot"
-        if not is_running:
+        if is_held_up:
+            self._waited_s = 0.0
+        elif not is_running:
             self._waited_s += min(passed_s, 2 * SAMPLE_S)  # longer if this thread itself has waited for a processor
         if self._waited_s > limits.waiting_s:
             return f"waited for {limits.waiting_s:g} s without using its robot"
@@ -216,12 +225,13 @@ class SandboxedProgram(Child):
 
 
 class _Sample(NamedTuple):
-    """A process at an instant: its processor time with that of its ended children [s], and its memory [bytes]."""
+    """A process at an instant: its processor time, and that of its ended children [s]; its memory [bytes]."""
 
     process: int
     parent: int
     is_running: bool
-    processor_s: float
+    own_s: float
+    children_s: float
     memory: int
 
 
@@ -231,11 +241,14 @@ class _House:
     Attributes:
         limits: What they may take.
         processor_s: Processor time that they have taken, at the last look [s].
+        is_over: Whether they end or have ended.
     """
 
     def __init__(self, sandbox: Sandbox) -> None:
         self.limits = sandbox.limits
         self.processor_s = 0.0
+        self.is_over = False
+        self._lock = threading.Lock()
         self._is_trusted = sandbox.is_trusted
         self._programs: dict[int, SandboxedProgram] = {}
         self._count = 0
@@ -257,18 +270,20 @@ class _House:
             self._thread.join()
             raise KiksError(self._complaint)
 
-    @property
-    def is_over(self) -> bool:
-        """Whether its processes have ended."""
-        return not self._thread.is_alive()
+    def start(self, start: Start, descriptors: list[int], progress: Progress) -> SandboxedProgram | None:
+        """Start a program and return it; None if the end of all has come.
 
-    def start(self, start: Start, descriptors: list[int], progress: Callable[[], object]) -> SandboxedProgram:
-        """Start a program; its descriptors are those of its connection, its output and its errors."""
-        self._count += 1
-        program = self._programs[self._count] = SandboxedProgram(self, self._count, progress)
+        Args:
+            start: The program.
+            descriptors: Those of its connection, its output and its errors.
+            progress: Tells how far it is.
+        """
+        with self._lock:
+            if self.is_over:
+                return None
+            self._count += 1
+            program = self._programs[self._count] = SandboxedProgram(self, self._count, progress)
         self.send(["start", self._count, list(start)], descriptors)
-        if self.is_over:  # meanwhile
-            program.end(-signal.SIGKILL)
         return program
 
     def send(self, words: list[Any], descriptors: Sequence[int] = ()) -> None:
@@ -280,8 +295,10 @@ class _House:
 
     def kill(self, reason: str, culprit: SandboxedProgram | None = None) -> None:
         """Kill all processes, because the programs have broken a limit, or one of them has."""
-        for program in [culprit] if culprit is not None else list(self._programs.values()):
-            program.reason = program.reason or reason
+        with self._lock:
+            self.is_over = True
+            for program in [culprit] if culprit is not None else self._programs.values():
+                program.reason = program.reason or reason
         self._kill()
 
     def close(self) -> None:
@@ -353,12 +370,13 @@ class _House:
             else:
                 self._complaint = _complaint(errors)
         finally:
+            with self._lock:
+                self.is_over = True
             self._kill()
             self._popen.wait()
-            for program in list(self._programs.values()):
+            for program in self._programs.values():
                 program.reason = program.reason or "ended its sandbox"
                 program.end(-signal.SIGKILL)
-            self._programs.clear()
             if self._processes >= 0:
                 folder, self._processes = self._processes, -1
                 os.close(folder)
@@ -394,7 +412,9 @@ class _House:
                 *lines, rest = (rest + data).split(b"\n")
                 for what, number, *values in map(json.loads, lines):
                     if what == "ended":
-                        self._programs.pop(number).end(*values)
+                        with self._lock:
+                            program = self._programs.pop(number)
+                        program.end(*values)
             if self._programs and is_due:
                 passed_s = since.waited_s()
                 since.renew()
@@ -406,7 +426,8 @@ class _House:
     def _broken_limit(self, passed_s: float) -> tuple[str, SandboxedProgram | None]:
         """Look at all processes; return which limit is broken, empty if none, and by which program if that is known."""
         samples = self._samples()
-        taken_s = sum(each.processor_s for each in samples)
+        # Of the nursery's own time only that of the programs that have ended.
+        taken_s = sum(each.children_s for each in samples) + sum(each.own_s for each in samples[1:])
         is_running = taken_s > self.processor_s or any(each.is_running for each in samples[1:])
         self.processor_s = max(self.processor_s, taken_s)
         limits, others = self.limits, samples[1:]
@@ -466,8 +487,8 @@ def _sample(folder: int, process: int) -> _Sample | None:
     fields = text.rpartition(")")[2].split()
     if len(fields) < 22:
         return None
-    processor_s = sum(map(int, fields[11:15])) / _TICKS_A_SECOND
-    return _Sample(process, int(fields[1]), fields[0] in "RD", processor_s, int(fields[21]) * _PAGE_BYTES)
+    own_s, children_s = (sum(map(int, fields[at : at + 2])) / _TICKS_A_SECOND for at in (11, 13))
+    return _Sample(process, int(fields[1]), fields[0] in "RD", own_s, children_s, int(fields[21]) * _PAGE_BYTES)
 
 
 def _read(folder: int, name: str) -> str:
