@@ -2,23 +2,33 @@
 
 from __future__ import annotations
 
+import re
+import socket
 import threading
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
+from urllib.error import HTTPError
+from urllib.request import Request, urlopen
 
 import pytest
 from tests import forked
-from tests.at_length import cases
+from tests.at_length import cases, share
 from tests.guard import GUARD_S, wait_until
+from tests.matlab.octave import Octave, needs_octave
 from tests.served import PROGRAMS, fresh
 
+import kiks
 from kiks.clock.gate import Gate
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.players import Players
 from kiks.desk.server.server import SERVER
 from kiks.desk.server.show import Driver, Shown
+from kiks.errors import LinkError
+from kiks.ports.joining import PATH, Address, HostedPort, HostLink
+from kiks.ports.messages import Inbox, Kind, packed
 from kiks.ports.program_process import Command
 from kiks.ports.programs import Programs
 from kiks.sim.simulation import Simulation
@@ -38,7 +48,7 @@ class Host:
             options: dict[str, Any] = {"patience_s": GUARD_S, "say": self.said.append}
             return Programs(sim, commands, thinking=thinking, players=numbers, gate=gate, **options)
 
-        self.desk = Desk(self.sim, speed=None, new_programs=new_programs)
+        self.desk = Desk(self.sim, speed=1.0 if thinking == "live" else None, new_programs=new_programs)
         self.shown = Shown(self.desk, port=0)
         self.players = Players(self.desk, numbers, self.said.append)
         SERVER.let_in(self.players)
@@ -124,3 +134,227 @@ def test_robots_of_a_host_run_as_those_of_kiks_run(thinking: str, tmp_path: Path
     assert Programs(here, commands, thinking=thinking, patience_s=GUARD_S).run() == 0
     assert heard == [file.read_text() for file in files]
     assert there == (here.now_ns, here.state_hash())
+
+
+OCTAVE = r"""
+kiks('--join', '{place}', '{token}')
+ref = kopen([-1, 9600, 1]);
+for loop = 0:{last}
+    ksend(['N' 10], ref);
+    ksend(sprintf('D,%d,%d\n', {left}, {right} - mod(loop, 4)), ref);
+    reply = ksend(['E' 10], ref);
+end
+say('reply', reply)
+kclose(ref);
+say('pulse', kiks_mm2p(80))
+say('sees', caught(@() kiks_siminfo_robotpos()))
+say('changes', caught(@() kiks_arena(zeros(300))))
+say('second', caught(@() kopen([-2, 9600, 1])))
+kiks_quit
+"""
+
+IDENTIFIED = f"""
+import sys, serial
+port = serial.Serial('COM1', timeout=1)
+port.write(b'B\\n')  # as kopen of Octave does
+port.readline()
+port.close()
+exec(open({DRIVE!r}).read())
+"""
+
+
+@needs_octave
+def test_octave_and_python_run_together_as_python_alone_under_kiks_run(tmp_path: Path) -> None:
+    count = max(2, share(2, 8))
+    words = [[str(8 - number), str(3 + number), str(5 - number)] for number in range(count)]
+    with hosted(count, "fixed:1.5") as host:
+
+        def octave(number: int) -> Octave:
+            last, left, right = int(words[number][0]) - 1, words[number][1], words[number][2]
+            text = OCTAVE.format(place=SERVER.place(), token=host.tokens[number + 1], last=last, left=left, right=right)
+            (folder := tmp_path / f"octave {number}").mkdir()
+            with Octave(text, folder) as program:
+                return program.finish()
+
+        def python(number: int) -> str:
+            done = forked.run("run", "--join", host.url(number + 1), str(program), "COM1", *words[number])
+            assert done.returncode == 0, done.stderr
+            return done.stdout
+
+        (program := tmp_path / "identified.py").write_text(IDENTIFIED)
+        acts = [partial(octave if number % 2 else python, number) for number in range(count)]
+        done = at_once(*acts)
+        assert not [each for each in done if isinstance(each, Exception)], done
+        there = wait_until(lambda: host.ends)[0]
+    here = fresh(count)
+    files = [tmp_path / f"{number}.txt" for number in range(count)]
+    commands = [
+        Command(PROGRAMS / "into_file.py", [str(file), str(program), "COM1", *each])
+        for file, each in zip(files, words, strict=True)
+    ]
+    assert Programs(here, commands, thinking="fixed:1.5", patience_s=GUARD_S).run() == 0
+    assert there == (here.now_ns, here.state_hash())
+    for number, heard in enumerate(done):
+        text = files[number].read_text()
+        assert text.splitlines()[-1] == heard.said["reply"] if number % 2 else heard == text
+    said = done[1].said
+    assert said["pulse"] == 1000
+    assert "the world must be on this computer for that, but the joined robot is on another" in said["sees"]
+    assert "the world must be on this computer for that" in said["changes"]
+    assert "a program that has joined a robot elsewhere must open port -1" in said["second"]
+
+
+# ---- programs that get lost, come back, or do what they may not ----
+
+
+def link_to(host: Host, robot: int = 1) -> HostLink:
+    return HostLink(Address.parse(host.url(robot)))
+
+
+def break_off(link: HostLink) -> None:
+    """Let the connection of a program break, as when its computer loses the network or it is killed."""
+    link._socket.socket.shutdown(socket.SHUT_RDWR)
+
+
+def test_a_lost_program_leaves_its_robot_standing_and_comes_back() -> None:
+    with hosted(2) as host:
+
+        def other() -> tuple[int, int]:
+            with kiks.Khepera(host.url(2)) as robot:
+                robot.set_speed(2, 2)
+                robot.pause(20)
+                return robot.encoders()
+
+        def lost() -> str:
+            port = HostedPort(host.url(1))
+            port.claim("")
+            robot = kiks.Khepera(port)
+            robot.set_speed(9, 9)
+            robot.pause(1)
+            robot.encoders()
+            break_off(port._link)
+            with pytest.raises(LinkError) as error:
+                robot.encoders()
+            return str(error.value)
+
+        way, why = at_once(other, lost)
+        assert min(way) > 3000, "the others go on"
+        assert re.fullmatch(r"the host at '\S+' must be there, but has gone: The connection was lost\. Open .*", why)
+        host.wait_said("The program of robot 1 was lost. Its robot stands; the program may come back.")
+        wait_until(lambda: host.ends)
+        assert host.desk.programs.doubt
+        with kiks.Khepera(host.url(1)) as back:
+            way = back.encoders()
+            back.pause(1)
+            assert back.encoders() == way
+            assert 900 < min(way) < 1500
+
+
+def test_another_program_with_the_same_token_takes_the_robot() -> None:
+    with hosted() as host:
+        first = HostedPort(host.url())
+        assert first.ask_ns() == 0
+        second = kiks.Khepera(host.url())
+        second.set_speed(3, 3)
+        with pytest.raises(LinkError, match="Another program has taken robot 1 with the same token"):
+            first.read(1)
+        first.close()
+        second.close()
+
+
+def test_a_world_with_live_thinking_waits_for_no_program() -> None:
+    with hosted(2, "live") as host:
+        silent = HostedPort(host.url(1))
+        _, robot = at_once(lambda: silent.claim(""), lambda: kiks.Khepera(host.url(2)))
+        robot.set_speed(2, 2)
+        robot.pause(1)
+        assert robot.encoders() > (100, 100)
+        silent.close()
+        robot.close()
+
+
+def test_a_person_begins_without_those_who_have_not_come() -> None:
+    with hosted(3) as host:
+        assert host.desk.is_paused
+        port = HostedPort(host.url(2))
+        SERVER.run(host.desk.go_on())
+        port.claim("")
+        robot = kiks.Khepera(port)
+        robot.set_speed(2, 2)
+        assert not host.desk.is_paused
+        assert host.desk.programs.doubt == "the world did not wait for every program"
+        robot.close()
+
+
+def hostile(*messages: object) -> bytes:
+    return b"".join(each if isinstance(each, bytes) else packed(each) for each in messages)
+
+
+CLAIM = (Kind.CLAIM, 1, 0, 1, 0, ("me",))
+READ = (Kind.READ, 1, 0, 2, 0, (1, None, None, 0))
+FOREIGN = [
+    (Kind.CLAIM, 2, 0, 1, 0, ("me",)),
+    (Kind.FIND, 0, 0, 1, 0, ("kiks://2",)),
+    (Kind.FIND, 0, 0, 1, 0, ("kiks://127.0.0.1:22/1?token=x",)),
+    (Kind.FIND, 0, 0, 1, 0, ("kiks://127.0.0.1:22/1",)),
+]
+BROKEN = {
+    "garbage": b"GET / HTTP/1.1\r\n\r\n" * 100,
+    "a huge length": b"\xff\xff\xff\xff",
+    "marshalled code": hostile((1, 1, 1)),
+    "another robot": hostile(CLAIM, (Kind.SEND, 2, 0, 0, 0, (b"D,9,9\n",))),
+    "no robot": hostile((Kind.SEND, 0, 0, 0, 0, (b"D,9,9\n",))),
+    "a read of another robot": hostile(CLAIM, (Kind.WAIT, 0, 0, 2, 0, (((2, 1, None),), 5))),
+    "endless commands": hostile(CLAIM, *[(Kind.SEND, 1, 0, 0, 0, (b"N\n" * 1000,))] * 1000),
+    "no answers": hostile(CLAIM, *[(Kind.BAUD, 1, 0, 3, 0, ())] * 200_000),
+}
+
+
+def test_hostile_programs_end_alone() -> None:
+    with hosted(3, "live") as host:
+        ports = [HostedPort(host.url(robot)) for robot in (1, 2)]
+        good, *_ = at_once(lambda: kiks.Khepera(host.url(3)), *(partial(port.claim, "") for port in ports))
+        for port in ports:
+            port.close()
+        good.set_speed(2, 2)
+        for request in FOREIGN:
+            link = link_to(host)
+            link.sendall(hostile(request))
+            (answer,) = Inbox(1 << 20).take(link.recv(timeout_s=GUARD_S))
+            assert answer[4], request
+            link.close()
+        for name, data in BROKEN.items():
+            link = link_to(host)
+            with suppress(OSError):
+                for begin in range(0, len(data), 1 << 16):
+                    link.sendall(data[begin : begin + (1 << 16)])
+            host.wait_said("The program of robot 1 was disconnected: The program ")
+            host.said.clear()
+            good.pause(0.1)
+            assert good.encoders() > (0, 0), name
+            link.close()
+        slow = link_to(host)
+        slow.sendall(b"\x00")
+        good.pause(0.1)
+        slow.close()
+        with host.sim.lock:
+            assert host.sim.travelled_mm(2) == 0
+        good.close()
+
+
+def test_a_wrong_token_is_refused() -> None:
+    with hosted() as host:
+        for token in ("", "x", "\xe9", "a" * 5000, SERVER.key.token):
+            with pytest.raises(LinkError, match=r"must (know the token|let the program in|be named as)"):
+                kiks.Khepera(host.url(token=token))
+        assert not host.desk.programs.are_there
+        with pytest.raises(LinkError, match=r"must be that of robot 2, but it is that of robot 1\."):
+            kiks.Khepera(host.url(1).replace("/1?", "/2?"))
+
+
+def test_a_token_of_a_robot_opens_no_page() -> None:
+    with hosted() as host:
+        for path in (PATH, "/", "/desk/1", f"{SERVER.key.place}/desk/1"):
+            request = Request(f"http://{SERVER.place()}{path}", headers={"Authorization": f"Bearer {host.tokens[1]}"})
+            with pytest.raises(HTTPError, match="403"):
+                urlopen(request, timeout=GUARD_S)

@@ -20,7 +20,7 @@ from pydantic import Field
 from kiks.clock.program_clock import ProgramClock
 from kiks.errors import LinkError, shown
 from kiks.model.checks import ROBOTS_MAX
-from kiks.model.data_file import Switch, Text, Whole, check, record
+from kiks.model.data_file import Number, Switch, Text, Whole, check, record
 from kiks.model.limits import MESSAGE_BYTES_MAX
 from kiks.model.settings import ThinkingPolicy
 from kiks.ports.messages import RECEIVE_SIZE, Kind, Start
@@ -54,6 +54,7 @@ class Welcome:
         thinking: See `Start`.
         offered: See `Start`.
         seed: See `Start`.
+        pulse_mm: Way of its wheels for a pulse of their encoders [mm].
     """
 
     version: Text
@@ -63,6 +64,7 @@ class Welcome:
     thinking: ThinkingPolicy
     offered: Annotated[tuple[Text, ...], Field(max_length=ROBOTS_MAX)]
     seed: Text
+    pulse_mm: Annotated[Number, Field(gt=0, le=1000)]
 
     @property
     def start(self) -> Start:
@@ -115,6 +117,7 @@ class HostLink:
     Attributes:
         robot: Number of the robot.
         start: What the program has to know of the world.
+        pulse_mm: See `Welcome`.
 
     Raises:
         LinkError: If there is no host, or it does not let the program in.
@@ -154,12 +157,13 @@ class HostLink:
                 "--host for other computers?"
             ) from None
         try:
-            self.robot, self.start = self._welcomed(first, address)
+            welcome = self._welcomed(first, address)
         except LinkError:
             self.close()
             raise
+        self.robot, self.start, self.pulse_mm = welcome.robot, welcome.start, welcome.pulse_mm
 
-    def _welcomed(self, first: object, address: Address) -> tuple[int, Start]:
+    def _welcomed(self, first: object, address: Address) -> Welcome:
         try:
             told = json.loads(first) if isinstance(first, str) else None
         except ValueError:
@@ -178,7 +182,7 @@ class HostLink:
                 f"the token must be that of robot {address.robot}, but it is that of robot {welcome.robot}. Copy the "
                 "whole address that kiks host prints."
             )
-        return welcome.robot, welcome.start
+        return welcome
 
     def sendall(self, data: bytes) -> None:
         """Send bytes.
@@ -263,8 +267,12 @@ class HostedConnection(SocketConnection):
         while now_ns + SLICE_NS < time_ns:
             now_ns += SLICE_NS
             super().pass_to(now_ns)
-            self.ask(Kind.MEET)
+            self.meet()
         super().pass_to(time_ns)
+
+    def meet(self) -> None:
+        """Wait until the world has come to the program's time."""
+        self.ask(Kind.MEET)
 
     def leave(self) -> None:
         """Leave the world; earlier requests are still done."""
@@ -285,9 +293,9 @@ class HostedPort(VirtualPort):
 
     def __init__(self, url: str) -> None:
         link = HostLink(Address.parse(url))
-        connection = HostedConnection(link)
+        self._link, connection = link, HostedConnection(link)
         super().__init__(RemoteLine(connection, link.robot), ProgramClock(link.start.thinking))
-        self.robot, self._place = link.robot, link.place
+        self.robot = link.robot
         # At the end of the process, too: a connection that only breaks off counts as lost.
         self._leave = weakref.finalize(self, connection.leave)
 
@@ -302,7 +310,7 @@ class HostedPort(VirtualPort):
         self._leave()
 
     def __repr__(self) -> str:
-        return f"<{type(self).__name__}: robot {self.robot} at {self._place}{'' if self.is_open else ', closed'}>"
+        return f"<{type(self).__name__}: robot {self.robot} at {self._link.place}{'' if self.is_open else ', closed'}>"
 
 
 def relay(link: HostLink, connection: socket.socket) -> None:

@@ -21,6 +21,7 @@ from kiks.recording.recorder import RunRecorder
 from kiks.sim.from_project import simulation_of, spec_of
 from kiks.sim.simulation import Simulation
 from kiks.toolbox.preferences import Settings
+from kiks.toolbox.robot_elsewhere import RobotElsewhere
 from kiks.units import NS_PER_S
 
 if TYPE_CHECKING:
@@ -65,6 +66,7 @@ class Session:
     Attributes:
         settings: Settings of the next world.
         desk: The desk of the world; None before the first.
+        elsewhere: The robot on another computer that its program drives in place of a world; None without one.
         clients: The programs that take part.
         owners: The client that owns each robot, by the robot's number.
         lock: Held while a client creates a world or takes a robot.
@@ -73,6 +75,7 @@ class Session:
     def __init__(self, *, ready: Callable[[], None] = lambda: None, has_window: bool = False) -> None:
         self.settings = Settings()
         self.desk: Desk | None = None
+        self.elsewhere: RobotElsewhere | None = None
         self.clients: list[Client] = []
         self.owners: dict[int, object] = {}
         self.lock = threading.RLock()
@@ -94,9 +97,46 @@ class Session:
         return self._present_desk().present.sim
 
     @property
+    def has_begun(self) -> bool:
+        """Whether it has a world, or a robot elsewhere."""
+        return self.desk is not None or self.elsewhere is not None
+
+    @property
+    def place(self) -> object:
+        """What open ports belong to: the world, or the visit to another one.
+
+        Raises:
+            LinkError: If there is none yet.
+        """
+        return self.world if self.elsewhere is None else self.elsewhere.visit
+
+    def join(self, address: str) -> int:
+        """Let the program drive a robot on another computer, by the address that `kiks host` prints there.
+
+        Returns:
+            Number of the robot.
+
+        Raises:
+            LinkError: If the session has a world or a robot already, or the host does not let it in.
+        """
+        with self.lock:
+            if self.has_begun or len(self.clients) > 1:
+                raise LinkError(
+                    "a robot elsewhere must be the first that a session has, but this one has begun. Call kiks_quit "
+                    "first."
+                )
+            self.elsewhere = RobotElsewhere(address)
+            return self.elsewhere.robot
+
+    @property
     def url(self) -> str:
         """URL of the desk; an empty text if it is not shown."""
         return "" if self._shown is None else self._shown.url
+
+    @property
+    def thinking(self) -> str:
+        """The policy for thinking times of its programs."""
+        return self._present_desk().project.thinking if self.elsewhere is None else self.elsewhere.thinking
 
     def begin(self, project: Project, folder: Path) -> None:
         """Begin a world in place of the present one.
@@ -108,6 +148,7 @@ class Session:
         from kiks.desk.server.desk import Desk, OutsidePrograms
 
         with self.lock:
+            self._check_is_here()
             if self.desk is None:
                 self._ready()
                 sim = simulation_of(project, folder)
@@ -300,12 +341,22 @@ class Session:
         """End the world and all programs in it."""
         if self._recorder is not None:
             self._end_recording()
+        if self.elsewhere is not None:
+            self.elsewhere.close()
         if self._shown is not None:
             self._shown.close()
         elif self.desk is not None:
             self.desk.close()
 
+    def _check_is_here(self) -> None:
+        if self.elsewhere is not None:
+            raise LinkError(
+                "the world must be on this computer for that, but the joined robot is on another one. Drive it with "
+                "commands: its host sees and changes the world. kiks_quit leaves it."
+            )
+
     def _present_desk(self) -> Desk:
+        self._check_is_here()
         if self.desk is None:
             raise LinkError("there must be a world first, but none was begun. Call kiks(ARENA) or kiks_kopen.")
         return self.desk

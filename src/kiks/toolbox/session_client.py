@@ -22,6 +22,7 @@ from kiks.ports.remote_link import RemoteLine
 from kiks.sim.port import VirtualPort
 from kiks.sim.simulation import Simulation
 from kiks.toolbox.own_turrets import OwnTurret, TurretOrder, turret_of
+from kiks.toolbox.robot_elsewhere import ElsewhereConnection
 from kiks.toolbox.session import Session
 from kiks.toolbox.session_film import SessionFilm
 from kiks.toolbox.wire_format import escape
@@ -115,8 +116,8 @@ class SessionClient:
         self.turrets: dict[int, str] = {}
         self.last_line = 0
         self.typed: deque[str] = deque()
-        self._sim: Simulation | None = None
-        self._connection: LocalConnection | None = None
+        self._place: object = None
+        self._connection: LocalConnection | ElsewhereConnection | None = None
         self._pace = 1.0, 1.0
         session.clients.append(self)
 
@@ -133,49 +134,61 @@ class SessionClient:
             raise LinkError(
                 f"port {-number} must be closed before it is opened, but it is open. Use kiks_kclose([]) first."
             )
-        if session.desk is None:
+        if not session.has_begun:
             session.begin_arena(Arena.default())
-        sim = session.world
-        if sim is not self._sim:
+        if session.place is not self._place:
             self._lose_world()
-            self._sim = sim
+            self._place = session.place
         if self._connection is None:
-            assert session.desk is not None
-            self._connection = LocalConnection(
-                session.desk.programs, self.name, self.number, self.awaited, SILENCE_ADVICE
-            )
+            self._connection = self._connect(number)
         if not self.ports:
             self._connection.wake()
             # A new clock, so that the time without an open port does not count as thinking.
-            assert session.desk is not None
-            self._program = ProgramClock(session.desk.project.thinking)
+            self._program = ProgramClock(session.thinking)
         try:
-            self.ports[number] = self.openings[number] = self._open(number, baud, self._connection, sim)
+            self.ports[number] = self.openings[number] = self._open(number, baud, self._connection)
         finally:
             self._rest_if_idle()
         self.asked = number
 
-    def _open(self, number: int, baud: int, connection: LocalConnection, sim: Simulation) -> OpenPort:
-        known = self.openings.get(number)
+    def _connect(self, number: int) -> LocalConnection | ElsewhereConnection:
+        session = self.session
+        if session.elsewhere is not None:
+            return session.elsewhere.connect(number, self.awaited)
+        assert session.desk is not None
+        return LocalConnection(session.desk.programs, self.name, self.number, self.awaited, SILENCE_ADVICE)
+
+    def _open(self, number: int, baud: int, connection: LocalConnection | ElsewhereConnection) -> OpenPort:
+        elsewhere = self.session.elsewhere
+        robot = self._robot_here(number) if elsewhere is None else elsewhere.robot_of(number)
+        port = VirtualPort(RemoteLine(connection, robot), self._program)
+        port.claim(f"{self.name}, port {-number}")
+        port.baudrate = baud
+        port.timeout = ANSWER_S
+        self._meet()
+        way_mm = start_mm = 0.0, 0.0
+        if elsewhere is None:
+            sim = self.session.world
+            with sim.lock:
+                start_mm = sim.pose(robot)[:2]
+                forwards_mm, backwards_mm, _ = sim.distances_mm()[robot - 1].tolist()
+                way_mm = forwards_mm, backwards_mm
+        now_ns, now_s = port.ask_ns(), time.monotonic()
+        return OpenPort(port, robot, now_ns, now_s, way_mm, start_mm, now_ns, now_s)
+
+    def _robot_here(self, number: int) -> int:
+        """Return the robot of a port about to be opened, in a world of this computer, with the program's turrets."""
+        sim, known = self.session.world, self.openings.get(number)
         robot = self.take_robot(number) if known is None else known.robot
         for turret, name in self.turrets.items():
             if turret not in sim.wires[robot - 1].firmware.turrets:
                 sim.fit(robot, OwnTurret(turret, name))
         self.session.trace(for_new_port=True)
-        port = VirtualPort(RemoteLine(connection, robot), self._program)
-        port.baudrate = baud
-        port.claim(f"{self.name}, port {-number}")
-        port.timeout = ANSWER_S
-        self._meet()
-        with sim.lock:
-            x_mm, y_mm, _ = sim.pose(robot)
-            forwards_mm, backwards_mm, _ = sim.distances_mm()[robot - 1].tolist()
-        now_ns, now_s = port.ask_ns(), time.monotonic()
-        return OpenPort(port, robot, now_ns, now_s, (forwards_mm, backwards_mm), (x_mm, y_mm), now_ns, now_s)
+        return robot
 
     def close(self, number: int) -> None:
         """Close a port, or all ports for number 0; ignore a closed one. The robot drives on."""
-        if self.ports and self._sim is not self.session.world:
+        if self.ports and self._place is not self.session.place:
             self._lose_world()
         for each in list(self.ports) if number == 0 else [number]:
             if each in self.ports:
@@ -214,7 +227,7 @@ class SessionClient:
             raise LinkError(
                 f"port {-number} must be open, but it is not. Open it: ref = kiks_kopen([{-number} 9600 1])."
             )
-        if self._sim is not self.session.world:
+        if self._place is not self.session.place:
             self._lose_world()
             raise LinkError(
                 "the port must belong to the present world, but another world has taken its place. Open the port "
@@ -402,7 +415,7 @@ class SessionClient:
 
     def robot(self, number: int) -> int | None:
         """Return the number of the robot of an open or closed port; None if it has none yet."""
-        if self._sim is self.session.world and number in self.openings:
+        if self._place is self.session.world and number in self.openings:
             return self.openings[number].robot
         robot = self._usual_robot(number)
         is_there = 1 <= robot <= self.session.world.robot_count
@@ -425,8 +438,8 @@ class SessionClient:
 
     def _rest_if_idle(self) -> None:
         """Let the world run without this program while it has no open port."""
-        if not self.ports and self._connection is not None:
-            self._connection.rest()
+        if not self.ports and self._connection is not None and not self._connection.rest():
+            self._connection = None
 
     def _lose_world(self) -> None:
         self.ports.clear()

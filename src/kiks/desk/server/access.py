@@ -46,6 +46,9 @@ STRANGER_S = 10.0
 TIMER = "kiks_timer"
 """Key of a connection's timer in the state of its requests."""
 
+ABORT = "kiks_abort"
+"""Key of the function that closes a connection at once, in the state of its requests."""
+
 KEY = "kiks_key"
 """Key of the token of a request in its scope."""
 
@@ -120,7 +123,7 @@ class LimitedConnection(H11Protocol):
         """Start the timer of a new connection and enforce the limit."""
         super().connection_made(transport)
         self.timer = self.loop.call_later(STRANGER_S, transport.abort)
-        self.app_state = {**self.app_state, TIMER: self.timer}
+        self.app_state = {**self.app_state, TIMER: self.timer, ABORT: transport.abort}
         connections = [each for each in self.connections if isinstance(each, LimitedConnection)]
         strangers = [each for each in connections if not each.timer.cancelled()]
         if len(strangers) > STRANGERS_MAX:
@@ -176,7 +179,8 @@ class AccessControl:
         scope, is_page = request.scope, request.scope["type"] == "http"
         if (key := self._known_key(request)) is not None and not key.opens(scope["path"].removeprefix(key.place)):
             raise HTTPException(403, "A page must belong to your own desk, but this one does not")
-        key = key or self._bearer(request)
+        if scope["type"] == "websocket":
+            key = key or self._bearer(request)
         if key is not None:
             if (timer := scope.get("state", {}).get(TIMER)) is not None:
                 timer.cancel()

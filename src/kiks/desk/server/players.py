@@ -5,12 +5,14 @@ from __future__ import annotations
 import asyncio
 import json
 import socket
+import time
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import asdict
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from kiks.desk.server.access import ABORT
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.token import Token
 from kiks.errors import KiksError
@@ -26,6 +28,12 @@ REASON_BYTES_MAX = 120
 
 LEFT = 1000
 """Code with which a program that leaves by itself closes its WebSocket (RFC 6455, 7.4.1); any other one is lost."""
+
+BACK_S = 0.5
+"""Time after which another program may take a robot [s of real time], so that one that comes and goes costs little."""
+
+CLOSE_S = 2.0
+"""Longest wait for a program that does not take the message that its connection ends [s]."""
 
 ENDED, REFUSED = 1001, 1008
 """Codes with which a host closes it: it goes away, or a program violates a policy."""
@@ -47,6 +55,8 @@ class Players:
         self.robots = {Token(): robot for robot in robots}
         self._desk, self._say = desk, say
         self._has_paused = False
+        self._coming: set[int] = set()
+        self._next_s = dict.fromkeys(robots, 0.0)
 
     def pause(self) -> None:
         """Pause the world until a program comes, as all have left; the caller holds the lock of the world."""
@@ -55,8 +65,17 @@ class Players:
 
     async def serve(self, web: WebSocket, key: Token) -> None:
         """Carry the messages of a program until it leaves, or the world lets go of it."""
-        robot, programs = self.robots[key], self._desk.programs
+        robot = self.robots[key]
         await web.accept()
+        if robot in self._coming:
+            await _close(web, REFUSED, f"Another program comes for robot {robot} at this moment. Try again.")
+            return
+        self._coming.add(robot)
+        try:
+            await asyncio.sleep(max(self._next_s[robot] - time.monotonic(), 0))
+        finally:
+            self._coming.discard(robot)
+            self._next_s[robot] = time.monotonic() + BACK_S
         try:
             with opening("a program elsewhere"):
                 here, there = socket.socketpair()
@@ -65,19 +84,26 @@ class Players:
             return
         with here:
             here.setblocking(False)
-            try:
-                player, start = await asyncio.to_thread(programs.let_in, there, robot, f"the program of robot {robot}")
-            except KiksError as error:
-                there.close()
-                await _close(web, REFUSED, str(error))
-                return
-            self._go_on(robot, web)
-            welcome = Welcome(__version__, robot, *start[:3], tuple(start.offered), start.seed)
-            try:
+            await self._play(web, robot, here, there)
+
+    async def _play(self, web: WebSocket, robot: int, here: socket.socket, there: socket.socket) -> None:
+        """Let a program drive a robot at the other end of a pair of sockets."""
+        programs = self._desk.programs
+        try:
+            player, start = await asyncio.to_thread(programs.let_in, there, robot, f"the program of robot {robot}")
+        except KiksError as error:
+            there.close()
+            await _close(web, REFUSED, str(error))
+            return
+        self._go_on(robot, web)
+        pulse_mm = programs.sim.specs[robot - 1].body.pulse_mm
+        welcome = Welcome(__version__, robot, *start[:3], tuple(start.offered), start.seed, pulse_mm)
+        has_left = False
+        try:
+            with suppress(WebSocketDisconnect):
                 await web.send_text(json.dumps(asdict(welcome)))
                 has_left = await _relay(web, here)
-            except WebSocketDisconnect:
-                has_left = False
+        finally:
             await self._part(web, programs, player, has_left=has_left)
 
     def _go_on(self, robot: int, web: WebSocket) -> None:
@@ -129,5 +155,9 @@ async def _relay(web: WebSocket, connection: socket.socket) -> bool:
 
 async def _close(web: WebSocket, code: int, reason: str) -> None:
     """Close a WebSocket that may be closed already."""
-    with suppress(RuntimeError, WebSocketDisconnect):
-        await web.close(code, reason.encode()[:REASON_BYTES_MAX].decode(errors="ignore"))
+    text = reason.encode()[:REASON_BYTES_MAX].decode(errors="ignore")
+    try:
+        with suppress(RuntimeError, WebSocketDisconnect):
+            await asyncio.wait_for(web.close(code, text), CLOSE_S)
+    except TimeoutError:
+        web.scope["state"][ABORT]()

@@ -1,0 +1,114 @@
+"""A robot on another computer that a session's program drives, as `kiks('--join', ADDRESS)` says."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from kiks.errors import LinkError
+from kiks.ports.joining import Address, HostedConnection, HostLink
+from kiks.ports.messages import AwaitedAnswer
+
+
+class ElsewhereConnection(HostedConnection):
+    """The connection of a session's program to a host, with the methods of `LocalConnection`.
+
+    Args:
+        link: The connection to the host.
+        awaited: The answer that the program waits for.
+        ended: Called when the host has ended the connection.
+    """
+
+    def __init__(self, link: HostLink, awaited: AwaitedAnswer, ended: Callable[[], None]) -> None:
+        def check_awaited() -> None:
+            if awaited.is_given_up:
+                raise LinkError("the answer must be waited for, but the program was interrupted. Ask again.")
+
+        super().__init__(link, check_awaited)
+        self._ended = ended
+
+    def end(self) -> None:
+        """Tell that the connection has ended.
+
+        Raises:
+            LinkError: Always.
+        """
+        self._ended()
+        super().end()
+
+    def wake(self) -> None:
+        """Do nothing: the host waits for the program as soon as it acts."""
+
+    def rest(self) -> bool:
+        """Leave the world.
+
+        Returns:
+            False: the connection is closed.
+        """
+        self.leave()
+        return False
+
+    close = halt = HostedConnection.leave
+
+    def cancel(self) -> None:
+        """Do nothing: the program's thread looks itself whether its answer was cancelled."""
+
+    def live(self, time_ns: int) -> bool:
+        """Return False: the host lets time pass."""
+        return False
+
+
+class RobotElsewhere:
+    """A robot on another computer. The host knows of the program as soon as this is made.
+
+    Args:
+        address: Its address, which `kiks host` prints there.
+
+    Attributes:
+        robot: Number of the robot there.
+        pulse_mm: Way of its wheels for a pulse of their encoders [mm].
+        thinking: The policy for the program's thinking time.
+        visit: What open ports belong to: another object when the host has ended the connection.
+
+    Raises:
+        LinkError: If the host does not let the program in.
+    """
+
+    def __init__(self, address: str) -> None:
+        self._address = Address.parse(address)
+        self._link: HostLink | None = HostLink(self._address)
+        self.robot, self.pulse_mm = self._link.robot, self._link.pulse_mm
+        self.thinking = self._link.start.thinking
+        self.visit = object()
+
+    def robot_of(self, number: int) -> int:
+        """Return the robot of a port: it has one, port -1.
+
+        Raises:
+            LinkError: If it is another port.
+        """
+        if number != 1:
+            raise LinkError(
+                f"a program that has joined a robot elsewhere must open port -1, for it has one robot, but it was port "
+                f"{-number}. Open [-1 9600 1]."
+            )
+        return self.robot
+
+    def connect(self, number: int, awaited: AwaitedAnswer) -> ElsewhereConnection:
+        """Return the connection, or a new one if the program has left meanwhile.
+
+        Args:
+            number: Number of the port for which it is.
+            awaited: The answer that the program waits for.
+        """
+        self.robot_of(number)
+        link, self._link = self._link or HostLink(self._address), None
+        self.thinking = link.start.thinking
+        return ElsewhereConnection(link, awaited, self._end_visit)
+
+    def close(self) -> None:
+        """Leave, if the program has opened no port yet."""
+        if self._link is not None:
+            self._link.close()
+
+    def _end_visit(self) -> None:
+        self.visit = object()
