@@ -1,14 +1,15 @@
 function kiks_kiksnet(password)
-% kiks_kiksnet  Has nothing to do any more: worlds are shared without a server.
+% kiks_kiksnet  Has nothing to do any more: the command kiks host in a shell is the server.
 %
-%   kiks_kiksnet(password) says that and returns, so that old programs run. To let several programs drive in one world,
-%   start a session with kiks and an arena with a start pose for each; in each further Octave or MATLAB on this computer
-%   call kiks('--join').
+%   kiks_kiksnet(password) says that and returns, so that old programs run. Programs on other computers drive robots of
+%   that server by kiks('--join', 'HOST:PORT', TOKEN). To let several programs of this computer drive in one world, start
+%   a session with kiks and an arena with a start pose for each; in each further Octave or MATLAB call kiks('--join').
 %
 %   Example:
 %     kiks_kiksnet
 %
 %   See also kiks.
 
-disp('kiks_kiksnet: no server is needed. kiks(''--join'') in another Octave or MATLAB takes part in this world.');
+disp(['kiks_kiksnet: kiks host in a shell is the server for other computers. On this one none is needed: ' ...
+    'kiks(''--join'') in another Octave or MATLAB takes part in this world.']);
 end

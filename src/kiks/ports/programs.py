@@ -334,6 +334,17 @@ class Programs:
         self._wake()
         return player, start
 
+    def dismiss_players(self, why: str) -> None:
+        """Disconnect all programs elsewhere: their robots stop. Needs the lock.
+
+        Args:
+            why: For their users, as a sentence.
+        """
+        for player in self._players.values():
+            if player is not None and not player.has_left:
+                self._was_touched = True
+                player.dismiss(why)
+
     def lose(self, player: Player) -> None:
         """Disconnect a program elsewhere whose connection was lost: its robot stops."""
         with self.sim.lock:
@@ -454,9 +465,7 @@ class Programs:
         with self.sim.lock:
             for participant in self._visitors:
                 participant.close()
-            for player in self._players.values():
-                if player is not None:
-                    player.dismiss("The world has ended.")
+            self.dismiss_players("The world has ended.")
             self._moved.notify_all()
         self._selector.close()
         self._wake_receiver.close()

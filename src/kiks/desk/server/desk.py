@@ -515,6 +515,7 @@ class Desk:
         self.outside.halt()
 
         def stop(sim: Simulation) -> None:
+            self.programs.dismiss_players("Halt was pressed on the desk of the host.")
             for wire in sim.wires:
                 wire.stop(sim.now_ns)
 
