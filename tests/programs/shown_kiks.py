@@ -9,8 +9,8 @@ import shlex
 import subprocess
 import sys
 
-READY = re.compile(r"The desk: http|  TCP  ")
-"""How the line begins that says where a desk or a served robot is."""
+READY = re.compile(r"The desk: http|For you alone: http|  TCP  ")
+"""How the line begins that says where a desk, a room or a served robot is."""
 
 _, command, length, *words = sys.argv
 if length == "short" and words[0] == "evolve":
