@@ -6,6 +6,7 @@ import asyncio
 import http.client
 import json
 import re
+import shutil
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -30,6 +31,7 @@ from kiks.model.arena import Arena
 from kiks.model.exercise import Cases, Exercise
 from kiks.model.goal import Goal
 from kiks.model.project import Project, ProjectRobot
+from kiks.ports.program_process import Command
 
 NAMES = ["Ada", "Bob", "../etc", "<b>Eve</b>"]
 CODE = "KX7Q2M"
@@ -324,6 +326,46 @@ def test_a_desk_stays_with_the_exercise(room: Room) -> None:
     with pytest.raises(ParameterError, match="must stay with its exercise"):
         SERVER.run(desk.replace(project, desk.folder))
     assert desk.project == room.project
+
+
+SPY = """
+import sys
+from pathlib import Path
+
+for place in map(Path, sys.argv[1:]):
+    for look in (Path.read_bytes, lambda path: list(path.iterdir())):
+        try:
+            look(place)
+            print("reached", place)
+        except OSError:
+            pass
+for place in map(Path, sys.argv[1:]):
+    try:
+        place.write_text("x")  # it may be a file in the sandbox's own memory
+    except OSError:
+        pass
+print("done")
+"""
+
+
+@pytest.mark.skipif(shutil.which("bwrap") is None, reason="needs bubblewrap")
+def test_a_program_of_a_student_reaches_nothing_of_another(tmp_path: Path) -> None:
+    (tmp_path / "names.txt").write_text("Ada")
+    room = Room(exercise(), tmp_path, NAMES, tmp_path / "room")
+    with open_room(room, port=0):
+        ada, bob = Browser(), Browser()
+        assert ada.enter("Ada", room.code) == bob.enter("Bob", room.code) == 200
+        desk, other = room.desks["Ada"].desk, room.desks["Bob"].desk
+        (other.folder / "secret.py").write_text("print(1)")
+        (desk.folder / "spy.py").write_text(SPY)
+        places = [other.folder, other.folder / "secret.py", room.folder / "room.json", tmp_path / "names.txt"]
+        command = Command(desk.folder / "spy.py", [*map(str, places), "/etc/passwd"])
+        SERVER.run(desk.go_on())
+        handle = SERVER.run(desk.change(lambda _: desk.programs.start(command)))
+        assert handle.has_ended.wait(GUARD_S)
+        assert handle.output is not None
+        assert [each.text for each in handle.output.since(0)[1]] == ["done"]
+        assert (other.folder / "secret.py").read_text() == "print(1)"
 
 
 def test_a_desk_of_a_room_has_a_highest_speed(room: Room) -> None:
