@@ -36,7 +36,7 @@ MATLAB_KIKS_SETTINGS = """
 *Time mode* and *CPU*: thinking `live` with a factor, above. *Time acceleration*: the speed above the arena.
 *Movement limit* and *interpolation limit*: not needed, motion is exact at any speed. *Fast sensors*: sensor
 model `fast`. *Grid*, *redraw* (clear trails) and *visualization*: the layers button above the arena. *KiKSnet*:
-several robots in one world, each with its own program, `kiks host` for programs on other computers, and `kiks serve` for
+several robots in one world, each with its own program; `kiks host` for programs on other computers, `kiks serve` for
 programs in any language.
 """
 
