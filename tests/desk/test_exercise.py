@@ -66,6 +66,13 @@ def test_text_loads_and_runs_nothing() -> None:
     assert "<em>a plan</em>" in html
 
 
+def test_text_of_brackets_takes_no_time() -> None:
+    # markdown-it would take a minute for these.
+    for text in ("[" * 200_000, "![" * 100_000, "[a](" * 50_000):
+        (part,) = parts_of(text)
+        assert part.html == f"<p>\n{text}</p>\n"
+
+
 @pytest.mark.slow
 def test_exercise_is_read_solved_tried_and_handed_in(tmp_path: Path, new_page: NewPage) -> None:
     shown = open_desk(tmp_path, make_exercise())

@@ -6,9 +6,10 @@ from collections.abc import Awaitable, Callable
 
 from nicegui import ui
 
+from kiks.desk.panels.exercise_dialog import ExerciseDialog, Template
 from kiks.desk.panels.exercise_text import parts_of
 from kiks.desk.panels.tries import TriesPanel
-from kiks.desk.panels.widgets import Panel, heading, named
+from kiks.desk.panels.widgets import Panel, heading, named, text_button, told
 from kiks.desk.server.desk import Desk
 from kiks.model.exercise import Exercise
 from kiks.ports.program_process import Command
@@ -37,9 +38,10 @@ class ExercisePanel(Panel):
     Args:
         desk: The desk.
         program: Saves the program in the editor and returns it; None if a person wants it otherwise.
+        template: Returns the program in the editor.
     """
 
-    def __init__(self, desk: Desk, program: Callable[[], Awaitable[Command | None]]) -> None:
+    def __init__(self, desk: Desk, program: Callable[[], Awaitable[Command | None]], template: Template) -> None:
         super().__init__(desk)
         self._shown: Exercise | None = None
         ui.add_css(CSS)
@@ -47,6 +49,9 @@ class ExercisePanel(Panel):
             self._text = named(ui.column().classes("w-full gap-0"), "exercise-text")
             ui.separator()
             self._tries = TriesPanel(desk, program)
+            change = told(ExerciseDialog(desk, template).open)
+            tip = "Change the text, the goal, the cases or the template, and save the exercise"
+            self._change = text_button("Change this exercise", "edit", "change-exercise", tip, change)
         self.refresh()
 
     def set_visible(self, is_visible: bool) -> None:
@@ -56,6 +61,7 @@ class ExercisePanel(Panel):
 
     def refresh(self) -> None:
         """Show the text of another exercise."""
+        self._change.set_visibility(not self._desk.is_locked)
         exercise = self._desk.project.exercise
         if exercise == self._shown:
             return

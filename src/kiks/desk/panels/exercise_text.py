@@ -6,10 +6,14 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from markdown_it import MarkdownIt
+from markdown_it.rules_core import StateCore
 from markdown_it.token import Token
 
 HINT = "hint"
 """A section whose heading begins with this word is folded."""
+
+BRACKETS_MAX = 1000
+"""Most brackets of a paragraph with links and pictures: the time to read them grows with the square of their number."""
 
 
 class TextPart(NamedTuple):
@@ -33,6 +37,7 @@ def parts_of(text: str) -> list[TextPart]:
     """
     markdown = MarkdownIt("js-default")
     markdown.add_render_rule("image", _picture)
+    markdown.core.ruler.before("inline", "brackets", _leave_brackets)
     found: list[tuple[str, list[Token]]] = [("", [])]
     level = 0  # of the hint's heading; 0 outside of hints
     tokens = markdown.parse(text)
@@ -53,6 +58,13 @@ def parts_of(text: str) -> list[TextPart]:
     return [
         TextPart(hint, markdown.renderer.render(part, markdown.options, {})) for hint, part in found if part or hint
     ]
+
+
+def _leave_brackets(state: StateCore) -> None:
+    """Show a paragraph with too many brackets as it is written."""
+    for token in state.tokens:
+        if token.type == "inline" and token.content.count("[") > BRACKETS_MAX:
+            token.type = "text"
 
 
 def _picture(self: Any, tokens: Sequence[Token], index: int, options: Any, env: Any) -> str:

@@ -97,7 +97,7 @@ class Page:
         """Build the tabs beside the arena; the panel of each is built when it is first opened."""
         desk = self._desk
         tabs: list[tuple[str, str, Callable[[], Panel]]] = [
-            ("exercise", "Exercise", lambda: ExercisePanel(desk, self._program)),
+            ("exercise", "Exercise", lambda: ExercisePanel(desk, self._program, self._template)),
             ("robot", "Robot", lambda: MonitorPanel(desk, feed)),
             ("wire", "Wire", lambda: WirePanel(desk)),
             ("arena", "Arena", lambda: EditorPanel(desk, self._editing, self._view, self._template)),
