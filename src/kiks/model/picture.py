@@ -6,6 +6,7 @@ Black is floor. Any other colour must stay wall, so each conversion below keeps 
 from __future__ import annotations
 
 import warnings
+from functools import lru_cache
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -72,10 +73,24 @@ def decode_picture(data: bytes, mm_per_pixel: float, what: str = "The picture") 
             raise ArenaError(f"{what} must be complete and readable, but: {one_line(error)}. {_SAVE_AGAIN}") from None
 
 
+_KEPT_BYTES_MAX = 4 << 20
+"""Largest raster whose PNG is kept [bytes]."""
+
+
 def encode_picture(brightness: npt.NDArray[np.uint8], *, compress_level: int = 6) -> bytes:
     """Return the PNG of a raster, uint8 [row, column] with row 0 at the bottom."""
+    rows, columns = brightness.shape
+    data = np.ascontiguousarray(brightness).tobytes()
+    # Worlds in one arena differ in seed and start: their walls are packed once.
+    encode = _encoded if len(data) <= _KEPT_BYTES_MAX else _encoded.__wrapped__
+    return encode(data, rows, columns, compress_level)
+
+
+@lru_cache(8)
+def _encoded(data: bytes, rows: int, columns: int, compress_level: int) -> bytes:
     from PIL import Image
 
+    brightness = np.frombuffer(data, np.uint8).reshape(rows, columns)
     file = BytesIO()
     Image.fromarray(np.flipud(brightness)).save(file, "PNG", compress_level=compress_level)
     return file.getvalue()
