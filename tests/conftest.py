@@ -12,7 +12,7 @@ from hypothesis import settings
 from tests.at_length import AT_LENGTH, share
 
 # Programs to be run as processes, not modules to be imported.
-collect_ignore_glob = ["programs/*"]
+collect_ignore_glob = ["programs/*", "exercises/solutions/*"]
 
 
 def pytest_configure(config: pytest.Config) -> None:

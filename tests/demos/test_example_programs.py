@@ -45,7 +45,7 @@ def test_a_program_follows_another(tmp_path: Path) -> None:
 
 
 def test_a_program_takes_an_exercise(tmp_path: Path) -> None:
-    drive(str(ROOT / "examples" / "exercise.kiks"), str(PROGRAMS / "to_the_light.py"), cwd=tmp_path)
+    drive(str(ROOT / "examples" / "exercises" / "lamp"), str(PROGRAMS / "to_the_light.py"), cwd=tmp_path)
 
 
 def maze() -> kiks.Simulation:

@@ -75,8 +75,8 @@ def test_cases_are_named_by_what_differs() -> None:
     assert [case.name for case in cases_of([home, other])] == [
         "home, seed 1",
         "home, seed 2",
-        "from 100, 50, thinking fixed:2, the exact robot",
-        "from 100, 50, thinking fixed:2, robot 3 of the family",
+        "from 100, 50 at 90 deg, thinking fixed:2, the exact robot",
+        "from 100, 50 at 90 deg, thinking fixed:2, robot 3 of the family",
     ]
     assert [case.name for case in cases_of([Cases("a"), Cases("a")])] == ["a", "a (2)"]
 

@@ -105,6 +105,8 @@ def _demonstrations() -> dict[str, Path]:
 def _is_champion(word: str) -> bool:
     """Return whether a word names a champion's file, or the folder of an evolution."""
     folder = Path(word)
+    if is_project(word):  # the folder of an exercise may hold arenas
+        return False
     return word.endswith(".toml") or (any(folder.glob("*.toml")) and not (folder / "__main__.py").exists())
 
 

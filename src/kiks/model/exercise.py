@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from itertools import product
+from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import Field
@@ -139,8 +140,8 @@ class Cases:
 
 _WORDS: dict[str, Any] = {
     "seed": lambda seed: f"seed {seed}",
-    "start": lambda start: f"from {start.at_mm[0]:g}, {start.at_mm[1]:g}",
-    "arena": lambda arena: str(arena),
+    "start": lambda start: f"from {start.at_mm[0]:g}, {start.at_mm[1]:g} at {start.heading_deg:g} deg",
+    "arena": lambda arena: Path(arena).stem,
     "baud": lambda baud: f"{baud} baud",
     "thinking": lambda thinking: f"thinking {thinking}",
     "family": lambda number: f"robot {number} of the family" if number else "the exact robot",
