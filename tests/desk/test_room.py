@@ -214,6 +214,15 @@ def test_messages_reach_pages_of_the_same_token_alone(room: Room) -> None:
     assert ada.ask(upload, "POST", "x", content_length="1")[0] == 404
 
 
+def test_a_student_who_asks_too_much_is_refused(room: Room) -> None:
+    ada, bob = Browser(), Browser()
+    assert ada.enter("Ada") == bob.enter("Bob") == 200
+    answers = [ada.page("desk/1/unknown")[0] for _ in range(40)]
+    assert answers[:15] == [404] * 15
+    assert answers[-1] == 429
+    assert bob.page("desk/2")[0] == owner().page("desk/1")[0] == 200
+
+
 def test_wrong_codes_are_few() -> None:
     now = [0.0]
     guesses = Guesses(wall_s=lambda: now[0])

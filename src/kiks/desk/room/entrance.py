@@ -5,9 +5,8 @@ from __future__ import annotations
 import hmac
 import re
 import time
-from collections.abc import Awaitable, Callable, Iterable
+from collections.abc import Awaitable, Callable
 from pathlib import Path
-from typing import NamedTuple
 from urllib.parse import parse_qs
 
 from jinja2 import Environment
@@ -16,6 +15,7 @@ from starlette.responses import HTMLResponse, Response
 from starlette.types import Receive, Scope, Send
 
 from kiks.desk.server.access import LOOPBACK, TIMER, Door
+from kiks.desk.server.fair_share import Bucket, Rate
 from kiks.desk.server.token import Token
 from kiks.errors import ParameterError, shown
 
@@ -55,15 +55,9 @@ def plain_code(code: str) -> str:
     return re.sub(r"[\s-]", "", code).upper()
 
 
-class Rate(NamedTuple):
-    """How many wrong codes are borne: some at once, and then so many a second."""
-
-    at_once: float
-    per_s: float
-
-
 OF_ONE, OF_ALL = Rate(20, 0.5), Rate(200, 5.0)
-"""Of one address, which a whole class may share; of all together. A code of KiKS is one of a thousand million."""
+"""How many wrong codes are borne: of one address, which a whole class may share, and of all together. A code that
+KiKS makes is one of a thousand million."""
 
 
 class Guesses:
@@ -75,7 +69,7 @@ class Guesses:
     Example:
         >>> now = [0.0]
         >>> guesses = Guesses(wall_s=lambda: now[0])
-        >>> for _ in range(20):
+        >>> for _ in range(21):
         ...     guesses.note_wrong("192.0.2.1")
         >>> guesses.must_wait("192.0.2.1"), guesses.must_wait("192.0.2.2")
         (True, False)
@@ -86,29 +80,24 @@ class Guesses:
 
     def __init__(self, *, wall_s: Callable[[], float] = time.monotonic) -> None:
         self._wall_s = wall_s
-        # Since when [s], and how many are not forgotten yet; the newest last.
-        self._counts: dict[str, tuple[float, float]] = {}
+        self._all = Bucket(OF_ALL, wall_s=wall_s)
+        self._each: dict[str, Bucket] = {}  # the newest last
 
     def must_wait(self, address: str) -> bool:
         """Return whether no code of an address is looked at now, be it right or wrong."""
-        return any(self._count(name, rate) > rate.at_once - 1 for name, rate in _rates(address))
+        return any(each.add(0) > 0 for each in (self._all, self._bucket(address)))
 
     def note_wrong(self, address: str) -> None:
         """Count a wrong code."""
-        for name, rate in _rates(address):
-            count = self._count(name, rate) + 1
-            self._counts.pop(name, None)
-            self._counts[name] = self._wall_s(), count
-        while len(self._counts) > ADDRESSES_MAX:
-            del self._counts[next(iter(self._counts))]
+        for each in (self._all, self._bucket(address)):
+            each.add(1)
 
-    def _count(self, name: str, rate: Rate) -> float:
-        since_s, count = self._counts.get(name, (0.0, 0.0))
-        return max(count - rate.per_s * (self._wall_s() - since_s), 0.0)
-
-
-def _rates(address: str) -> Iterable[tuple[str, Rate]]:
-    return (address, OF_ONE), ("", OF_ALL)
+    def _bucket(self, address: str) -> Bucket:
+        bucket = self._each.pop(address, None) or Bucket(OF_ONE, wall_s=self._wall_s)
+        self._each[address] = bucket
+        while len(self._each) > ADDRESSES_MAX:
+            del self._each[next(iter(self._each))]
+        return bucket
 
 
 class Entrance:

@@ -61,7 +61,7 @@ def folder_name(name: str) -> str:
 
     Example:
         >>> folder_name("Ada Lovelace"), folder_name("../etc")
-        ('Ada Lovelace', 'etc-d1a8c1c4')
+        ('Ada Lovelace', 'etc-f7f9121f')
     """
     plain = _OTHERS.sub("_", name).strip(" ._-'")
     try:

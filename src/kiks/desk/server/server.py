@@ -20,6 +20,7 @@ from starlette.responses import RedirectResponse
 from kiks.desk.panels.page import Page
 from kiks.desk.server.access import HEADERS, KEY, LOOPBACK, AccessControl, Door, LimitedConnection
 from kiks.desk.server.desk import Desk
+from kiks.desk.server.fair_share import FairShare
 from kiks.desk.server.gateway import Gateway
 from kiks.desk.server.page_guard import PageGuard, guard_messages
 from kiks.desk.server.players import Players
@@ -174,7 +175,7 @@ class DeskServer:
 
         nicegui_app.on_startup(begin)
         config = uvicorn.Config(
-            AccessControl(PageGuard(app), self.key, is_local=self._is_local, door=self.door),
+            AccessControl(FairShare(PageGuard(app)), self.key, is_local=self._is_local, door=self.door),
             http=LimitedConnection,
             headers=HEADERS,
             # uvloop ends the process when there is no file descriptor for its loop.
