@@ -1,6 +1,6 @@
 #!/bin/sh
 # What KiKS needs of the system: Python's venv module, and for the tests a C compiler (a robot is driven from C),
-# Chromium and Firefox (the desk is used in real browsers), Octave (the toolbox) and a virtual screen (programs with
+# bubblewrap (programs of others), Chromium and Firefox (the desk is used in real browsers), Octave (the toolbox) and a virtual screen (programs with
 # windows): system-packages.sh [tests].
 # As root on Debian this installs what is missing; otherwise it names it.
 set -eu
@@ -9,6 +9,7 @@ python="${PYTHON:-python3}"
 missing=""
 if [ "${1:-}" = tests ]; then
     command -v gcc >/dev/null 2>&1 || missing="$missing gcc libc6-dev"
+    command -v bwrap >/dev/null 2>&1 || missing="$missing bubblewrap"
     command -v chromium >/dev/null 2>&1 || missing="$missing chromium fonts-dejavu-core"
     command -v firefox-esr >/dev/null 2>&1 || command -v firefox >/dev/null 2>&1 || missing="$missing firefox-esr"
     command -v Xvfb >/dev/null 2>&1 || missing="$missing xvfb"

@@ -291,7 +291,7 @@ def test_each_start_finds_an_empty_working_folder_with_the_files_of_the_program(
 def test_without_bubblewrap_one_line_says_what_to_do(good: Command, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("PATH", "/nowhere")
     with Sandbox([good.program]) as sandbox, pytest.raises(KiksError, match="is not installed") as caught:
-        sandbox.warm()
+        run(good, sandbox)
     assert "\n" not in str(caught.value)
 
 

@@ -29,6 +29,7 @@ EXTRAS = {
 PROGRAMS = {
     "octave": (("octave", "octave-cli"), "programs for the Matlab KiKS"),
     "a browser": (("chromium", "google-chrome", "firefox", "firefox-esr"), "the desk"),
+    "bubblewrap": (("bwrap",), "programs of others: kiks grade and kiks room"),
     "make": (("make",), "developers"),
 }
 """Programs, by the names that they may have, and what they are for."""

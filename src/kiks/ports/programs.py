@@ -119,6 +119,11 @@ class Handle(SocketParticipant):
             return ""
         return f"with exit code {code}" if code >= 0 else f"by signal {-code}"
 
+    def leave(self) -> None:
+        """Disconnect the program after its requests are done; its sandbox has noted why it ended it, if it did."""
+        self.reason = self.reason or self.process.reason
+        super().leave()
+
     def drop(self) -> None:
         """Disconnect the program, and kill its process."""
         super().drop()
@@ -506,8 +511,7 @@ class Programs:
                     launch=None if sandbox is None else partial(sandbox.start, start, there, handle.progress),
                 )
             except KiksError:
-                handle.hang_up()
-                handle.close()
+                SocketParticipant.expel(handle)
                 raise
         # A running world does not wait for the imports of a new program.
         handle.is_waited_for = not self._scheduler.has_begun
