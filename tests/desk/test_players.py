@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import signal
 import socket
 import threading
 from collections.abc import Iterator, Sequence
@@ -16,9 +17,10 @@ from urllib.request import Request, urlopen
 import pytest
 from tests import forked
 from tests.at_length import cases, share
+from tests.desk.test_desk_command import line_with, started
 from tests.guard import GUARD_S, wait_until
 from tests.matlab.octave import Octave, needs_octave
-from tests.served import PROGRAMS, fresh
+from tests.served import BOX, PROGRAMS, fresh
 
 import kiks
 from kiks.clock.gate import Gate
@@ -27,6 +29,7 @@ from kiks.desk.server.players import Players
 from kiks.desk.server.server import SERVER
 from kiks.desk.server.show import Driver, Shown
 from kiks.errors import LinkError
+from kiks.model.project import Project, ProjectRobot
 from kiks.ports.joining import PATH, Address, HostedPort, HostLink
 from kiks.ports.messages import Inbox, Kind, packed
 from kiks.ports.program_process import Command
@@ -48,7 +51,9 @@ class Host:
             options: dict[str, Any] = {"patience_s": GUARD_S, "say": self.said.append}
             return Programs(sim, commands, thinking=thinking, players=numbers, gate=gate, **options)
 
-        self.desk = Desk(self.sim, speed=1.0 if thinking == "live" else None, new_programs=new_programs)
+        self.desk = Desk(
+            self.sim, speed=1.0 if thinking == "live" else None, new_programs=new_programs, owns_world=True
+        )
         self.shown = Shown(self.desk, port=0)
         self.players = Players(self.desk, numbers, self.said.append)
         SERVER.let_in(self.players)
@@ -250,7 +255,7 @@ def test_a_lost_program_leaves_its_robot_standing_and_comes_back() -> None:
             assert 900 < min(way) < 1500
 
 
-def test_another_program_with_the_same_token_takes_the_robot() -> None:
+def test_another_program_takes_the_robot_and_halt_and_a_new_world_end_it() -> None:
     with hosted() as host:
         first = HostedPort(host.url())
         assert first.ask_ns() == 0
@@ -259,7 +264,17 @@ def test_another_program_with_the_same_token_takes_the_robot() -> None:
         with pytest.raises(LinkError, match="Another program has taken robot 1 with the same token"):
             first.read(1)
         first.close()
-        second.close()
+        SERVER.run(host.desk.halt())
+        with pytest.raises(LinkError, match="Halt was pressed on the desk of the host"):
+            second.encoders()
+        third = kiks.Khepera(host.url())
+        assert third.encoders() > (0, 0)
+        SERVER.run(host.desk.start_over())
+        with pytest.raises(LinkError, match="The world has ended"):
+            third.encoders()
+        with kiks.Khepera(host.url()) as fourth:
+            assert fourth.encoders() == (0, 0)
+            assert host.desk.sim is not host.sim
 
 
 def test_a_world_with_live_thinking_waits_for_no_program() -> None:
@@ -358,3 +373,53 @@ def test_a_token_of_a_robot_opens_no_page() -> None:
             request = Request(f"http://{SERVER.place()}{path}", headers={"Authorization": f"Bearer {host.tokens[1]}"})
             with pytest.raises(HTTPError, match="403"):
                 urlopen(request, timeout=GUARD_S)
+
+
+# ---- the commands ----
+
+
+def test_kiks_host_runs_a_project_with_programs_elsewhere_and_its_own(tmp_path: Path) -> None:
+    (tmp_path / "own.py").write_text(f"import sys\nsys.argv[1:] = ['COM1', '9', '2', '6']\n{Path(DRIVE).read_text()}")
+    robots = (ProjectRobot(), ProjectRobot(program="own.py"), ProjectRobot())
+    Project(BOX, robots=robots, seed=7, thinking="fixed:1").save(tmp_path / "match.kiks")
+    words = ("host", "match.kiks", "--players", "1", "--port", "0", "--no-browser", "--speed", "0")
+    with started(*words, folder=tmp_path) as (process, output):
+        address = line_with(output, "Robot 1: ").split()[-1]
+        line_with(output, "The run begins when")
+        assert joined(address, "20", "5", "3").count("\n") == 60
+        state = line_with(output, "s simulated, seed 7, state ").split()[-1]
+        process.send_signal(signal.SIGINT)
+        assert "Stopped after" in line_with(output, "Stopped after")
+        assert process.wait(GUARD_S) == 0
+    done = forked.run("run", str(tmp_path / "match.kiks"), DRIVE, "COM1", "20", "5", "3")
+    assert f"state {state}" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("run", "--join", "kiks://127.0.0.1:1/1?token=x", DRIVE), "must let the program in, but it does not: "),
+        (("run", "--join", "kiks://1", DRIVE), "must be named as kiks host prints it"),
+        (
+            ("run", "--join", "x", "--seed", "3", DRIVE),
+            "--seed must be left out with --join, as the host has the world",
+        ),
+        (("run", "--join", "x", DRIVE, DRIVE), "--join must have one program, for its address is that of one robot"),
+        (("host", "--thinking", "replay:x"), "thinking must be none, fixed:MS or live for programs elsewhere"),
+        (("host", "--thinking", "live", "--patience", "3"), "--patience must be left out with --thinking live"),
+    ],
+)
+def test_wrong_words_are_told(words: tuple[str, ...], message: str) -> None:
+    done = forked.run(*words)
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert "token=" not in done.stderr or "TOKEN" in done.stderr
+
+
+def test_a_program_in_simulated_time_opens_no_robot_elsewhere(tmp_path: Path) -> None:
+    (program := tmp_path / "opens.py").write_text("import kiks\nkiks.Khepera('kiks://127.0.0.1:1/1?token=secret')\n")
+    for words in ((str(program),), (str(program), str(program))):
+        done = forked.run("run", *words)
+        assert "is on another computer. Run it there: kiks run --join ADDRESS PROGRAM." in done.stderr
+        assert "secret" not in done.stderr

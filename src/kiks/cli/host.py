@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from kiks.cli.desk import open_desk
 from kiks.cli.engine_start import ready_engine
 from kiks.cli.options import Silence, World, say, show_log
-from kiks.cli.outputs import leave_out
+from kiks.cli.outputs import has_results, leave_out, tell_results
 from kiks.cli.record import RecordFile, recorded, tell_run
 from kiks.errors import ParameterError, shown
 
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from kiks.sim.simulation import Simulation
 
 
+@has_results
 def host(
     context: typer.Context,
     world: World,
@@ -107,9 +108,11 @@ def host(
         SERVER.let_in(door)
         typer.echo("The run begins when a program is there for each, or when a person starts it on the desk.")
 
+    runs: list[dict[str, Any]] = []
+
     def end(sim: Simulation) -> None:
         door.pause()
-        tell_run(sim, "thinking was live" if policy.startswith("live") else desk.programs.doubt)
+        runs.append(tell_run(sim, "thinking was live" if policy.startswith("live") else desk.programs.doubt))
 
     own = [None if robot in robots else command for robot, command in enumerate(commands_of(read, home), 1)]
     desk = Desk(
@@ -126,3 +129,4 @@ def host(
     door = Players(desk, robots, tell)
     with recorded(desk.sim, record=record):
         open_desk(desk, host=host, port=port, browser=browser, waits=False, opened=open_door, programs_ended=end)
+    tell_results(context, {"runs": runs})
