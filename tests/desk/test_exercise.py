@@ -195,5 +195,15 @@ def test_lecturer_saves_a_world_as_an_exercise_and_opens_it(tmp_path: Path, new_
         visitor.tab("arena")
         visitor.at("save-exercise").click()
         visitor.told("it is locked")
+
+        # An exercise in a folder has its text beside it, and so have the programs of other robots.
+        folder = tmp_path / "third"
+        folder.mkdir()
+        made.for_students().save(folder / "exercise.kiks")
+        (folder / "text.md").write_text("Here is **another** text.")
+        visitor.at("open-name").fill("third")
+        visitor.page.locator(".q-menu .q-item").get_by_text("third/exercise.kiks").click()
+        visitor.at("open").click()
+        expect(visitor.at("exercise-text")).to_contain_text("Here is another text.")
     finally:
         shown.close()

@@ -112,8 +112,8 @@ def test_a_folder_is_an_exercise_with_its_text_and_template_beside(tmp_path: Pat
     assert Project.load(tmp_path).exercise == project.exercise
     (tmp_path / EXERCISE_FILES["text"]).write_text("# Title\nlong")
     (tmp_path / EXERCISE_FILES["template"]).write_text("import serial\n")
-    assert Project.load(tmp_path).exercise == Exercise("Title", "# Title\nlong", "import serial\n")
-    assert Project.load(tmp_path / "exercise.kiks").exercise == project.exercise
+    for path in (tmp_path, tmp_path / "exercise.kiks"):
+        assert Project.load(path).exercise == Exercise("Title", "# Title\nlong", "import serial\n")
     (tmp_path / EXERCISE_FILES["text"]).write_text("a" * (LONG_TEXT_MAX + 1))
     with pytest.raises(KiksError, match="at most 200000 characters"):
         Project.load(tmp_path)

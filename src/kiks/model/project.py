@@ -179,14 +179,13 @@ class Project:
 
         A folder is an exercise: the project `exercise.kiks` in it, with the exercise's text and template beside it.
         """
-        path = path_of(path)
-        if path.is_dir():
-            return _load_exercise(path)
+        path = project_file(path_of(path))
         if path.suffix.lower() != ".kiks":
             return cls.of_arena(Arena.load(path))
         what = f"Project file {str(path)!r}"
         data = read_file(path, what, bytes_max=PROJECT_FILE_BYTES_MAX, error=ArenaError)
-        return cls.from_bytes(data, name=path.stem, what=what)
+        project = cls.from_bytes(data, name=path.stem, what=what)
+        return _with_files_beside(project, path.parent) if path.name == EXERCISE_FILE else project
 
     @classmethod
     def of_arena(cls, arena: Arena) -> Project:
@@ -327,24 +326,27 @@ _READERS: dict[str, Callable[[Path], Arena]] = {
 }
 
 
+EXERCISE_FILE = "exercise.kiks"
+"""The project in the folder of an exercise."""
+
 EXERCISE_FILES = {"text": "text.md", "template": "template.py"}
-"""Files in the folder of an exercise, by what they hold."""
+"""Files beside it, by what they hold."""
 
 
 def project_file(path: Path) -> Path:
     """Return the file of a project: in the folder of an exercise it has a name of its own."""
-    return path / "exercise.kiks" if path.is_dir() else path
+    return path / EXERCISE_FILE if path.is_dir() else path
 
 
-def _load_exercise(folder: Path) -> Project:
-    project = Project.load(project_file(folder))
+def _with_files_beside(project: Project, folder: Path) -> Project:
+    """Return the project of an exercise with what lies beside it in its folder."""
     beside: dict[str, Any] = {}
     for name, file in EXERCISE_FILES.items():
         if (folder / file).exists():
             what = f"The exercise's {name} {str(folder / file)!r}"
             data = read_file(folder / file, what, bytes_max=4 * LONG_TEXT_MAX, error=ArenaError)
             beside[name] = data.decode("utf-8", errors="replace")
-    return replace(project, exercise=replace(project.exercise or Exercise(), **beside))
+    return replace(project, exercise=replace(project.exercise or Exercise(), **beside)) if beside else project
 
 
 def load_arena_file(path: Path) -> Arena:

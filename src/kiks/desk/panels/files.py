@@ -17,7 +17,7 @@ from kiks.desk.server.folder import OPENED, PICTURES, Folder, decode, encode
 from kiks.desk.server.live_editing import Editing
 from kiks.errors import ParameterError
 from kiks.model.limits import UPLOAD_BYTES_MAX
-from kiks.model.project import Project
+from kiks.model.project import EXERCISE_FILE, Project
 from kiks.model.shipped import demonstrations
 
 
@@ -98,7 +98,10 @@ class FilesPanel:
         name = self._choice.value
         if not name:
             raise ParameterError("A file must be chosen first. Save one, or open an example.")
-        await self._open_file(name, await asyncio.to_thread(Project.load, self._folder.open(name)))
+        path = self._folder.open(name)
+        # What an exercise names lies in its folder.
+        home = path.parent if path.name == EXERCISE_FILE else self._desk.folder
+        await self._open_file(name, await asyncio.to_thread(Project.load, path), home)
         self._name.value = str(PurePosixPath(name).with_suffix(".kiks"))
 
     @told
@@ -106,10 +109,10 @@ class FilesPanel:
         path = demonstrations()[str(self._example.value)]
         await self._begin(await asyncio.to_thread(Project.load, path), path.parent)
 
-    async def _open_file(self, name: str, read: Project) -> None:
+    async def _open_file(self, name: str, read: Project, home: Path) -> None:
         """Begin the world of a file: a project, or an arena, to which the desk adds what is not in the file."""
         is_project = PurePosixPath(name).suffix.lower() == ".kiks"
-        await self._begin(read if is_project else self._desk.project_of(read.arena), self._desk.folder)
+        await self._begin(read if is_project else self._desk.project_of(read.arena), home)
 
     async def _begin(self, project: Project, folder: Path) -> None:
         await self._desk.replace(project, folder)
@@ -143,7 +146,7 @@ class FilesPanel:
         if PurePosixPath(name).suffix.lower() in PICTURES:
             await self._editing.begin(project.arena)
         else:
-            await self._open_file(name, project)
+            await self._open_file(name, project, self._desk.folder)
 
 
 async def save_in(
