@@ -12,7 +12,7 @@ from tests.desk.visitor import FIRST_PICTURE, NewPage, check_access, check_reach
 
 from kiks.desk.room.page import open_room
 from kiks.desk.room.room import Room
-from kiks.trials.hand_in import program_of
+from kiks.trials.submissions import submissions_in
 
 NAMES = ["Ada Lovelace", "Alan Turing", "Grace <b>Hopper</b>", "J\xf6rg M\xfcller"]
 
@@ -75,8 +75,9 @@ def test_a_class_comes_solves_and_hands_in(tmp_path: Path, new_page: NewPage, br
         students[0].get_by_test_id("tab-exercise").click()
         students[0].get_by_test_id("hand-in").click()
         expect(card.get_by_test_id("state")).to_contain_text("handed in")
-        (file,) = (room.folder / "handed-in").iterdir()
-        assert (file.name, program_of(file.read_bytes())) == ("Ada Lovelace.zip", DRIVE.encode())
+        (submission,) = submissions_in([room.folder / "handed-in"], tmp_path / "submissions")
+        assert submission.name == "Ada Lovelace"
+        assert list(submission.files.values()) == [DRIVE]
         for width, height in ((1366, 768), (390, 844)):
             lecturer.set_viewport_size({"width": width, "height": height})
             for look in ("light", "dark"):
