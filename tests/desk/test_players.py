@@ -28,7 +28,7 @@ from kiks.desk.server.desk import Desk
 from kiks.desk.server.players import Players
 from kiks.desk.server.server import SERVER
 from kiks.desk.server.show import Driver, Shown
-from kiks.errors import LinkError
+from kiks.errors import LinkError, ParameterError
 from kiks.model.project import Project, ProjectRobot
 from kiks.ports.joining import PATH, Address, HostedPort, HostLink
 from kiks.ports.messages import Inbox, Kind, packed
@@ -291,6 +291,8 @@ def test_a_world_with_live_thinking_waits_for_no_program() -> None:
 def test_a_person_begins_without_those_who_have_not_come() -> None:
     with hosted(3) as host:
         assert host.desk.is_paused
+        with pytest.raises(ParameterError, match="robot 1 must be for programs of this computer"):
+            host.desk.programs.start(Command(Path(DRIVE)), 1)
         port = HostedPort(host.url(2))
         SERVER.run(host.desk.go_on())
         port.claim("")
@@ -298,6 +300,7 @@ def test_a_person_begins_without_those_who_have_not_come() -> None:
         robot.set_speed(2, 2)
         assert not host.desk.is_paused
         assert host.desk.programs.doubt == "the world did not wait for every program"
+        assert host.desk.programs.players == {1: "has not come yet", 2: "drives", 3: "has not come yet"}
         robot.close()
 
 

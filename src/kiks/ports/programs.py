@@ -278,6 +278,11 @@ class Programs:
         with self.sim.lock:
             self._check_open(command.name)
             self.sim.index_of(robot)
+            if robot in self._players:
+                raise ParameterError(
+                    f"robot {robot} must be for programs of this computer, but it is for one elsewhere. Take another "
+                    "robot, or join with its address: kiks run --join ADDRESS PROGRAM."
+                )
             for handle in [each for each in self.handles if each.robot == robot]:
                 if handle.is_running:
                     raise ParameterError(
@@ -338,6 +343,13 @@ class Programs:
             start = self._start_of(robot, self._thinking)
         self._wake()
         return player, start
+
+    @property
+    def players(self) -> dict[int, str]:
+        """What the program elsewhere of each robot does, as the rest of a sentence; empty where no such program may."""
+        return {
+            robot: "has not come yet" if player is None else player.state for robot, player in self._players.items()
+        }
 
     def dismiss_players(self, why: str) -> None:
         """Disconnect all programs elsewhere: their robots stop. Needs the lock.

@@ -101,7 +101,8 @@ class ProgramsPanel(Panel):
         if self._shown not in handles:
             self._show(handles[-1] if handles else None)
         attached = {robot: command for robot in range(1, desk.sim.robot_count + 1) if (command := desk.attached(robot))}
-        drawn = [(handle, handle.state, handle is self._shown) for handle in handles], attached, desk.names()
+        states = [(handle, handle.state, handle is self._shown) for handle in handles]
+        drawn = states, desk.programs.players, attached, desk.names()
         if drawn != self._drawn:
             self._drawn = drawn
             self._list.clear()
@@ -120,8 +121,12 @@ class ProgramsPanel(Panel):
             self._log.add(self._shown.output, lambda line: (line.text, "desk-error" if line.is_error else ""))
 
     def _draw_list(self, handles: list[Handle]) -> None:
-        if not handles and self._desk.owns_world:
+        players = self._desk.programs.players
+        if not handles and not players and self._desk.owns_world:
             ui.label("No program runs.").classes("text-body2")
+        for robot, state in players.items():
+            name = self._desk.names()[robot - 1]
+            named(ui.label(f"The program elsewhere of robot {name} {state}."), "player").classes("text-body2")
         for handle in handles:
             is_shown = handle is self._shown
             with ui.row().classes("w-full items-center no-wrap gap-1"):
