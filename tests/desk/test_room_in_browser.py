@@ -35,12 +35,17 @@ def come_in(page: Page, room: Room, name: str) -> None:
     page.wait_for_function(FIRST_PICTURE)
 
 
+def write(page: Page, text: str) -> None:
+    """Replace the program in the editor."""
+    page.locator(".cm-content").click()
+    page.keyboard.press("Control+a")
+    page.keyboard.insert_text(text)
+
+
 def solve(page: Page) -> None:
     """Write a program and run it until the goal is reached."""
     page.get_by_test_id("tab-programs").click()
-    page.locator(".cm-content").click()
-    page.keyboard.press("Control+a")
-    page.keyboard.insert_text(DRIVE)
+    write(page, DRIVE)
     page.get_by_test_id("run-program").click()
     expect(page.get_by_test_id("board-result")).to_contain_text("solved after 2.")
 
@@ -93,7 +98,16 @@ def test_a_class_comes_solves_and_hands_in(tmp_path: Path, new_page: NewPage, br
             lecturer.get_by_role("link", name=f"Open the desk of {NAMES[1]}").click()
         expect(opened.value.get_by_test_id("board-result")).to_contain_text("solved after 2.")
         assert opened.value.url.endswith(f"/desk/{room.seats[NAMES[1]].number}")
-        opened.value.close()
+        helper = opened.value
+        for page in (helper, students[1]):
+            page.get_by_test_id("tab-programs").click()
+            expect(page.locator(".cm-content")).to_contain_text("D,30,30")
+        write(helper, "print('helped')")
+        expect(students[1].locator(".cm-content")).to_have_text("print('helped')")
+        write(students[1], "print('thanks')")
+        expect(helper.locator(".cm-content")).to_have_text("print('thanks')")
+        assert (room.folder / "desks" / NAMES[1] / "to_the_lamp.py").read_text() == "print('thanks')"
+        helper.close()
 
         lecturer.get_by_role("button", name=f"Give free: {NAMES[2]}").click()
         lecturer.get_by_test_id("dialog-yes").click()

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import asyncio
 import shlex
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
-from nicegui import ui
+from nicegui import background_tasks, ui
 
 from kiks.desk.panels.files import save_in
 from kiks.desk.panels.widgets import LogBox, Panel, icon_button, named, offer_robots, select, told, with_props
 from kiks.desk.server import scripts
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.scripts import EXAMPLES, NEW
-from kiks.errors import ParameterError
+from kiks.errors import KiksError, ParameterError
 from kiks.model.exercise import STUDENT, Exercise
 from kiks.ports.program_process import Command
 from kiks.ports.programs import Handle
@@ -78,6 +79,7 @@ class ProgramsPanel(Panel):
         self._exercise: Exercise | None = None
         self._text: str | None = NEW  # as it was read or saved last; None with a draft
         self._drafts: dict[Path | None, str] = {}
+        self._is_saving = False
         self._seen = self._checked = NEW
         ui.add_css(CSS)
         with ui.column().classes("w-full q-pa-sm gap-2"):
@@ -113,7 +115,9 @@ class ProgramsPanel(Panel):
                 self._draw_attached(attached)
         if desk.may_run_programs:
             offer_robots(self._robot, desk)
-            self._check_pause()
+            is_still = self._check_pause()
+            if desk.is_for_others:
+                self._follow_file(is_still=is_still)
             if self._world is not desk.present:
                 self._choose_attached(attached, is_first=self._world is None)
                 self._world = desk.present
@@ -298,12 +302,53 @@ class ProgramsPanel(Panel):
         if self._drafts[self._script] == self._text:
             del self._drafts[self._script]
 
-    def _check_pause(self) -> None:
-        """Look for a mistake when the person has stopped to type."""
+    def _check_pause(self) -> bool:
+        """Look for a mistake when the person has stopped to type; return whether that is so."""
         text, before = self._editor.value or "", self._seen
         self._seen = text
         if text == before and text != self._checked and len(text) <= CHECKED_MAX:
             self._check()
+        return text == before
+
+    def _follow_file(self, *, is_still: bool) -> None:
+        """Keep editor and file the same: what a person types is saved, and what another page saves is shown.
+
+        So nothing is lost when a room ends, and student and lecturer see the same program; the last who types wins.
+
+        Args:
+            is_still: Whether the person has stopped to type.
+        """
+        script, folder = self._script, self._folder
+        is_own = script is not None and script.parent == folder.path
+        if (self._editor.value or "") != self._text:
+            if is_still and (is_own or script is None) and not self._is_saving:
+                self._is_saving = True
+                background_tasks.create(self._save_silently(), name="kiks program")
+        elif is_own and script is not None and not folder.is_known(script.name) and script.is_file():
+            with suppress(ParameterError):
+                folder.open(script.name)
+                self._text = scripts.read_script(script)
+                self._edit(script, script.name, self._text)
+
+    async def _save_silently(self) -> None:
+        """Save the program under its name, if no other one has it."""
+        script, text, folder = self._script, self._editor.value or "", self._folder
+        name = folder.full_name(script.name if script is not None else self._name.value or "")
+        try:
+            if script is not None:
+                folder.question(name)
+            data = scripts.encode_script(text)
+            await asyncio.to_thread(folder.save, data, name, "a program", may_replace=script is not None)
+        except KiksError:
+            return  # "Save" says what is wrong
+        finally:
+            self._is_saving = False
+        if self._script == script and not self._list.is_deleted:
+            self._drafts.pop(script, None)
+            self._script, self._text = folder.path / name, text
+            with self._list:
+                self._offer()
+                self._choice.value = self._script
 
     def _check(self) -> bool:
         """Mark the first mistake of the program, and return whether there is one."""
