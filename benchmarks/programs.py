@@ -3,6 +3,9 @@
 Each sends D and N in a loop at 9600 baud. Run: python benchmarks/programs.py [--json]. Each figure is a median, from
 the first command to the last end.
 
+`programs.sandbox_start_ms` and `programs.sandbox_run_ms` are of a program in a warm sandbox (`bwrap`): from its start
+to its first command, and to the end of a run in which it sends no other.
+
 The programs of `programs.match_*` play soccer (`kiks demo soccer`):
 
 * `programs.match_start_s`: real time from the start of their processes to the first command;
@@ -18,6 +21,7 @@ import contextlib
 import io
 import logging
 import resource
+import shutil
 import statistics
 import tempfile
 import time
@@ -28,6 +32,7 @@ from calibration import calibration_loops_per_s, report
 from kiks.model.project import Project
 from kiks.ports.program_process import Command, commands_of
 from kiks.ports.programs import Programs
+from kiks.ports.sandbox import Sandbox
 from kiks.script.runner import run_here
 from kiks.sim.from_project import simulation_of
 from kiks.sim.supervision import Supervision
@@ -109,6 +114,35 @@ def processor_s() -> float:
     return sum(each.ru_utime + each.ru_stime for each in used)
 
 
+ONE_COMMAND = """
+import serial
+port = serial.Serial("/dev/ttyUSB0", 9600, stopbits=2, timeout=2)
+port.write(b"N\\n"); port.readline()
+"""
+
+
+def sandbox_figures(folder: Path) -> list[tuple[str, float, str]]:
+    """Return the figures of starts in a warm sandbox."""
+    program = folder / "one_command.py"
+    program.write_text(ONE_COMMAND)
+    starts, runs = [], []
+    with Sandbox([program]) as sandbox:
+        sandbox.warm()
+        for _ in range(30):
+            programs = Programs(kiks.Simulation(seed=1), [Command(program)], keeps_output=True, sandbox=sandbox)
+            start_s = time.perf_counter()
+            programs.begin()
+            while not programs.handles[0].is_here:
+                programs.round(0.05)
+            starts.append(time.perf_counter() - start_s)
+            programs.run()
+            runs.append(time.perf_counter() - start_s)
+    return [
+        ("programs.sandbox_start_ms", 1e3 * statistics.median(starts), "ms"),
+        ("programs.sandbox_run_ms", 1e3 * statistics.median(runs), "ms"),
+    ]
+
+
 def match_figures() -> list[tuple[str, float, str]]:
     """Return the figures of soccer matches; the difference of two lengths leaves out the start."""
     pairs, costs, ratios = [], [], []
@@ -147,6 +181,7 @@ def main() -> None:
             exchanges = statistics.median(2 * count * options.loops / real for _, real in runs)
             figures.append((f"programs.{count}_speedup", speedup, "x real time"))
             figures.append((f"programs.{count}_exchanges_per_s", exchanges, "1/s"))
+        figures += sandbox_figures(Path(folder)) if shutil.which("bwrap") else []
     figures += match_figures()
     report(figures, as_json=options.json)
 

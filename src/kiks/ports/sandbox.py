@@ -34,6 +34,7 @@ from kiks.errors import KiksError
 from kiks.ports.environment_marks import HASH_SEED
 from kiks.ports.messages import Start
 from kiks.ports.program_process import Child, python_line
+from kiks.ports.system_calls import system_call_filter
 from kiks.units import s_from_ns
 
 SAMPLE_S = 0.1
@@ -323,9 +324,16 @@ class _House:
         environment = HASH_SEED | os.environ | STREAMS if self._is_trusted else HASH_SEED | _ENVIRONMENT | STREAMS
         passed, info = [there.fileno()], None
         if not self._is_trusted:
+            words = _bwrap(seen, int(limits.files_mb * _MEGABYTE))
             info, info_there = os.pipe()
             passed.append(info_there)
-            line = [*_bwrap(seen, int(limits.files_mb * _MEGABYTE), info_there), *line]
+            calls, calls_there = os.pipe()
+            if rules := system_call_filter():
+                os.write(calls_there, rules)
+                words += ["--seccomp", str(calls)]
+            os.close(calls_there)
+            passed.append(calls)
+            line = [*words, "--info-fd", str(info_there), "--", *line]
         errors, errors_there = os.pipe()
         has_started = threading.Event()
 
@@ -348,6 +356,7 @@ class _House:
                 os.close(errors_there)
                 if info is not None:
                     os.close(info_there)
+                    os.close(calls)
                 has_started.set()
             if not self._complaint:
                 self._watch(errors, info)
@@ -499,13 +508,12 @@ def _read(folder: int, name: str) -> str:
         return ""
 
 
-def _bwrap(files: Sequence[str], size: int, info: int) -> list[str]:
+def _bwrap(files: Sequence[str], size: int) -> list[str]:
     """Return the beginning of a command line that runs the rest of it in namespaces of its own.
 
     Args:
         files: Files and folders that it may read.
         size: Largest sum of the files that it writes [bytes].
-        info: Descriptor to which the number of the process is written.
 
     Raises:
         KiksError: If there is no bubblewrap.
@@ -517,7 +525,7 @@ def _bwrap(files: Sequence[str], size: int, info: int) -> list[str]:
             "(Debian: sudo apt-get install bubblewrap), or say --trusted if you have read the programs."
         )
     words = [bwrap, "--unshare-all", "--unshare-user", "--die-with-parent", "--new-session", "--as-pid-1"]
-    words += ["--info-fd", str(info), "--cap-drop", "ALL", "--ro-bind", "/usr", "/usr"]
+    words += ["--cap-drop", "ALL", "--ro-bind", "/usr", "/usr"]
     for folder in _SYSTEM_FOLDERS:
         if os.path.islink(folder):
             words += ["--symlink", os.readlink(folder), folder]
@@ -531,7 +539,7 @@ def _bwrap(files: Sequence[str], size: int, info: int) -> list[str]:
     for file in files:
         words += ["--ro-bind", file, file]
     # What bubblewrap has made in memory itself has no limit.
-    return [*words, "--remount-ro", "/dev", "--remount-ro", "/", "--chdir", "/tmp", "--"]
+    return [*words, "--remount-ro", "/dev", "--remount-ro", "/", "--chdir", "/tmp"]
 
 
 def _python_folders() -> list[Path]:

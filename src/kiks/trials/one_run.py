@@ -68,6 +68,7 @@ def run_trial(trial: Trial, folder: Path, sandboxes: Sandboxes) -> Outcome:
             when_silent="wait",
             keeps_output=True,
             say=lambda text: None,
+            are_apart=True,
             sandbox=sandboxes.of(trial),
         )
         supervision.end = run.end_by_judge
