@@ -89,6 +89,10 @@ def test_exercise_is_read_solved_tried_and_handed_in(tmp_path: Path, new_page: N
 
         visitor.tab("programs")
         expect(visitor.page.locator(".cm-content")).to_contain_text("D,0,0")
+        visitor.write(DRIVE.replace("sleep(5)", "sleep(0.4)"))
+        visitor.at("run-program").click()
+        expect(visitor.at("board-result")).to_contain_text("not solved after 0.4")
+        visitor.told("All programs have ended. Goal not solved")
         visitor.write(DRIVE)
         visitor.at("run-program").click()
         expect(visitor.at("board-result")).to_contain_text("solved after 2.")
@@ -152,6 +156,7 @@ def test_lecturer_saves_a_world_as_an_exercise_and_opens_it(tmp_path: Path, new_
         expect(visitor.at("tab-exercise")).to_be_hidden()
         visitor.tab("programs")
         visitor.write(DRIVE)
+        visitor.choose("dark", "Dark")
         visitor.tab("arena")
         visitor.at("save-exercise").click()
         visitor.at("exercise-title").fill("Find it")
@@ -159,6 +164,7 @@ def test_lecturer_saves_a_world_as_an_exercise_and_opens_it(tmp_path: Path, new_
         for typed, wrong in (("ligt_mm < 80", "Did you mean 'light_mm'?"), ("light_mm <", "must be a formula")):
             visitor.at("goal-solved").fill(typed)
             expect(visitor.page.get_by_text(wrong)).to_be_visible()
+        check_access(visitor.page, "a wrong formula")
         visitor.at("dialog-yes").click()
         visitor.told("solved must be a formula")
         visitor.at("goal-solved").fill("light_mm < 80")

@@ -97,6 +97,7 @@ class Desk:
         looking: How people look back.
         project: The project it was built from.
         programs: The programs in the present world.
+        programs_ended: Called with the locked world when all of them have ended: a run of an exercise is over then.
         is_seen: Set when a page has shown it for the first time.
         scene: Counts up whenever a thing appears, disappears or changes its looks.
         outside: The programs in the world that this desk has not started.
@@ -405,6 +406,13 @@ class Desk:
         file = None if self._supervisor is None else self._supervisor.program
         supervision = Supervision(sim, file, self.project.goal)
         supervision.end = end
+        judge = None if self.project.exercise is None else supervision.judge
+
+        def end_with_programs() -> None:
+            if judge is not None and judge.judgement is None and self.present is world:
+                end(0, "All programs have ended.")
+
+        self.programs_ended = end_with_programs
         if seconds is not None:
             sim.loop.end_at(ns_from_s(seconds), end_time)
 

@@ -47,6 +47,7 @@ class Driver:
             if not programs.drive:
                 with programs.sim.lock:
                     if had_programs and not programs.are_there:
+                        self._desk.programs_ended()
                         self._programs_ended(programs.sim)
                     programs.sim.advance_to(programs.sim.now_ns + SLICE_NS)
                     programs.sim.sync()
