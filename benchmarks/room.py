@@ -10,7 +10,8 @@ of their own.
 `room.server_cores` is what the process of `kiks room` takes of the processors, `room.programs_cores` what the students'
 programs take in their processes. `room.fewest_pictures_per_s` is what the worst-off student gets, and
 `room.longest_pause_s` the longest time between two frames of any student. `room.come_in_s` is how long it takes until
-all students, who come at once, see their robots. `room.server_mb` is the server's memory.
+all students, who come at once, see their robots, and `room.ready_s` until all programs run. `room.server_mb` is the
+server's memory.
 """
 
 from __future__ import annotations
@@ -32,6 +33,7 @@ from websockets.asyncio.client import ClientConnection, connect
 
 from calibration import calibration_loops_per_s, report
 from desk import address_in, cpu_s
+from kiks.export.frames import PROGRAM_DRIVES
 from kiks.model.arena import Arena
 from kiks.model.exercise import Exercise
 from kiks.model.goal import Goal
@@ -67,6 +69,7 @@ class Person:
         self._http = httpx.AsyncClient(base_url=address, timeout=READY_S, follow_redirects=True)
         self._netloc = urlsplit(address).netloc
         self.frames_s: list[float] = []
+        self.is_driven = False
 
     async def enter(self, name: str) -> str:
         """Choose a name, and return where the desk is."""
@@ -109,6 +112,7 @@ class Person:
         async with self._socket(f"{path}/feed") as socket:
             async for message in socket:
                 if isinstance(message, bytes):
+                    self.is_driven = self.is_driven or bool(message[2] & PROGRAM_DRIVES)
                     self.frames_s.append(time.monotonic())
                     if len(self.frames_s) % 2 == 0:
                         await socket.send('{"kind": "ack", "count": 2}')
@@ -167,6 +171,9 @@ async def measure(addresses: list[str], pid: int, students: int, seconds: float)
     while not all(person.frames_s for person in people):
         await asyncio.sleep(0.01)
     come_in_s = time.monotonic() - begin_s
+    while not all(person.is_driven for person in people):
+        await asyncio.sleep(0.01)
+    ready_s = time.monotonic() - begin_s
     await lecturer.open(lecturers)
     tasks += [asyncio.create_task(lecturer.hold_page()), asyncio.create_task(lecturer.look_at_all(students))]
     await asyncio.sleep(5)
@@ -191,6 +198,7 @@ async def measure(addresses: list[str], pid: int, students: int, seconds: float)
         ("room.pictures_per_s", statistics.mean(counts), "1/s"),
         ("room.longest_pause_s", max(pauses), "s"),
         ("room.come_in_s", come_in_s, "s"),
+        ("room.ready_s", ready_s, "s"),
         ("room.server_mb", int(status.partition("VmRSS:")[2].split()[0]) / 1024, "MB"),
     ]
 

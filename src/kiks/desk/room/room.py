@@ -27,6 +27,7 @@ from kiks.errors import KiksError, ParameterError, shown
 from kiks.model.atomic_files import make_folder, replace_file
 from kiks.model.project import Project
 from kiks.ports.program_process import commands_of, supervisor_of
+from kiks.ports.resources import processor_count
 from kiks.ports.sandbox import Sandbox
 from kiks.sim.from_project import simulation_of
 from kiks.trials.hand_in import HAND_IN_BYTES_MAX
@@ -99,7 +100,7 @@ class Room:
         self._public = address
         self._is_trusted = is_trusted
         self._sandboxes: list[Sandbox] = []
-        self._starter = ThreadPoolExecutor(1, "kiks room")
+        self._starter = ThreadPoolExecutor(max(processor_count() // 2, 1), "kiks room")
         self._turn = asyncio.Lock()
         self._is_over = False
 
@@ -241,7 +242,7 @@ class Room:
         desk.hand_in, desk.may_hand_in = partial(self._take_in, seat), self.may_hand_in
         opened = Shown(desk, number=seat.number)
         opened.drive()
-        # One after the other: a class comes at once, and a student sees the desk before its first program starts.
+        # Some at a time: a class comes at once, and a student sees the desk before a program can start.
         self._starter.submit(self._begin_at, desk, sandbox)
         self._pictures[seat.name] = Pictures(desk)
         self.desks[seat.name] = opened
