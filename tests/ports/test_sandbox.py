@@ -10,6 +10,7 @@ import subprocess
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
+from typing import Any
 
 import pytest
 from tests.served import PROGRAMS, fresh
@@ -86,10 +87,10 @@ def printed(handle: Handle) -> list[str]:
     return [line.text for line in handle.output.since(0)[1]]
 
 
-def run(command: Command, sandbox: Sandbox | None) -> tuple[str, int, list[str]]:
+def run(command: Command, sandbox: Sandbox | None, **options: Any) -> tuple[str, int, list[str]]:
     """Run a program alone in a world; return state, exit code and output."""
     sim = fresh()
-    programs = Programs(sim, [command], keeps_output=True, when_silent="wait", sandbox=sandbox)
+    programs = Programs(sim, [command], keeps_output=True, when_silent="wait", sandbox=sandbox, **options)
     code = programs.run()
     return sim.state_hash(), code, printed(programs.handles[0])
 
@@ -277,6 +278,11 @@ def test_program_is_the_same_as_in_a_process_of_its_own(is_trusted: bool, tmp_pa
     with Sandbox([tmp_path / "looks", PROGRAMS], is_trusted=is_trusted) as sandbox:
         for command in (looks, looks, Command(PROGRAMS / "wander.py"), Command(PROGRAMS / "any_port.py", ["3"])):
             assert run(command, sandbox) == run(command, None)
+        times = tmp_path / "times"
+        times.write_text("7000000\n" * 40)
+        replayed = run(looks, sandbox, thinking=f"replay:{times}")
+        assert replayed == run(looks, None, thinking=f"replay:{times}")
+        assert replayed[0] != run(looks, None)[0]
 
 
 def test_each_start_finds_an_empty_working_folder_with_the_files_of_the_program(tmp_path: Path) -> None:

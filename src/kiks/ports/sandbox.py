@@ -24,6 +24,7 @@ import sys
 import tempfile
 import threading
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -31,6 +32,7 @@ from typing import Any, NamedTuple
 import kiks
 from kiks.clock.patience import Patience
 from kiks.errors import KiksError
+from kiks.model.thinking_policy import split_thinking
 from kiks.ports.environment_marks import HASH_SEED
 from kiks.ports.messages import Start
 from kiks.ports.program_process import Child, python_line
@@ -39,6 +41,9 @@ from kiks.units import s_from_ns
 
 SAMPLE_S = 0.1
 """Time between two looks at the processes of a sandbox [s of real time], while a program runs."""
+
+TRUSTED_SAMPLE_S = 0.5
+"""The same without namespaces, where all processes of the computer have to be looked at [s of real time]."""
 
 START_PATIENCE_S = 30.0
 """Longest wait for the start of a sandbox [s of real time]."""
@@ -141,8 +146,12 @@ class Sandbox:
             streams: Descriptors for its output and its errors; None: they go where those of this process go.
         """
         start = start._replace(program=os.path.abspath(start.program))
-        with self._lock:
-            while (program := self._warm().start(start, [connection.fileno(), *(streams or (1, 2))], progress)) is None:
+        descriptors = [connection.fileno(), *(streams or (1, 2))]
+        replay = split_thinking(start.thinking)[1]
+        with ExitStack() as at_the_end, self._lock:
+            if isinstance(replay, str):
+                descriptors.append(at_the_end.enter_context(open(replay, "rb")).fileno())
+            while (program := self._warm().start(start, descriptors, progress)) is None:
                 pass  # it has ended meanwhile
             return program
 
@@ -219,7 +228,9 @@ class SandboxedProgram(Child):
         if is_held_up:
             self._waited_s = 0.0
         elif not is_running:
-            self._waited_s += min(passed_s, 2 * SAMPLE_S)  # longer if this thread itself has waited for a processor
+            self._waited_s += min(
+                passed_s, 2 * self._house.sample_s
+            )  # longer if this thread itself has waited for a processor
         if self._waited_s > limits.waiting_s:
             return f"waited for {limits.waiting_s:g} s without using its robot"
         return ""
@@ -243,12 +254,14 @@ class _House:
         limits: What they may take.
         processor_s: Processor time that they have taken, at the last look [s].
         is_over: Whether they end or have ended.
+        sample_s: Time between two looks [s of real time].
     """
 
     def __init__(self, sandbox: Sandbox) -> None:
         self.limits = sandbox.limits
         self.processor_s = 0.0
         self.is_over = False
+        self.sample_s = TRUSTED_SAMPLE_S if sandbox.is_trusted else SAMPLE_S
         self._lock = threading.Lock()
         self._is_trusted = sandbox.is_trusted
         self._programs: dict[int, SandboxedProgram] = {}
@@ -276,7 +289,7 @@ class _House:
 
         Args:
             start: The program.
-            descriptors: Those of its connection, its output and its errors.
+            descriptors: Those of its connection, its output and its errors, and of the times that it replays, if any.
             progress: Tells how far it is.
         """
         with self._lock:
@@ -407,7 +420,7 @@ class _House:
         return True
 
     def _hear(self) -> None:
-        rest, since = b"", Patience(SAMPLE_S)
+        rest, since = b"", Patience(self.sample_s)
         while True:
             is_due = not self._programs or since.left_s() == 0
             ready, _, _ = select.select([self._control], [], [], since.left_s() if self._programs else None)

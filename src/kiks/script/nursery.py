@@ -109,13 +109,17 @@ class Nursery:
 
     def _start(self, number: int, fields: list[Any]) -> Callable[[], int] | None:
         start = Start(*fields)
-        connection, *streams = (self._descriptors.popleft() for _ in range(3))
+        is_replay = start.thinking.startswith("replay:")
+        descriptors = [self._descriptors.popleft() for _ in range(3 + is_replay)]
+        connection, *streams = descriptors[:3]
+        if is_replay:
+            start = start._replace(thinking=f"replay:/dev/fd/{descriptors[3]}")
         if not self._programs:
             self._clean()
         folder = self._working_folder(start)
         _warm_for(start)
         if process := os.fork():
-            for each in (connection, *streams):
+            for each in descriptors:
                 os.close(each)
             self._programs[process] = number, folder
             self._tell("started", number)
