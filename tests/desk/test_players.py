@@ -362,7 +362,7 @@ def test_hostile_programs_end_alone() -> None:
 
 def test_a_wrong_token_is_refused() -> None:
     with hosted() as host:
-        for token in ("", "x", "\xe9", "a" * 5000, SERVER.key.token):
+        for token in ("", "x", "\xe9", "%0d%0aX:%20y", "a" * 5000, SERVER.key.token):
             with pytest.raises(LinkError, match=r"must (know the token|let the program in|be named as)"):
                 kiks.Khepera(host.url(token=token))
         assert not host.desk.programs.are_there
@@ -403,6 +403,8 @@ def test_kiks_host_runs_a_project_with_programs_elsewhere_and_its_own(tmp_path: 
     [
         (("run", "--join", "kiks://127.0.0.1:1/1?token=x", DRIVE), "must let the program in, but it does not: "),
         (("run", "--join", "kiks://1", DRIVE), "must be named as kiks host prints it"),
+        (("run", "--join", "kiks://[::1:8123/1?token=x", DRIVE), "must be named as kiks host prints it"),
+        (("run", "--join", "kiks://127.0.0.1:99999/1?token=x", DRIVE), "must be named as kiks host prints it"),
         (
             ("run", "--join", "x", "--seed", "3", DRIVE),
             "--seed must be left out with --join, as the host has the world",

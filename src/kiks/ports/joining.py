@@ -7,13 +7,14 @@ WebSocket of the desk's server.
 from __future__ import annotations
 
 import json
+import re
 import socket
 import threading
 import weakref
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from typing import Annotated, Any, NamedTuple
-from urllib.parse import parse_qs, urlsplit
+from urllib.parse import urlsplit
 
 from pydantic import Field
 
@@ -37,6 +38,8 @@ OPEN_S = 10.0
 
 CHECK_S = 0.05
 """Longest time between two checks of a program that waits for an answer [s of real time]."""
+
+_ROBOT = re.compile(r"/(?P<robot>[0-9]{1,4})/?\?token=(?P<token>[A-Za-z0-9_-]+)")
 
 SLICE_NS = NS_PER_S
 """Simulated time that passes in one piece while a program pauses [ns]: an interrupted pause ends after it."""
@@ -93,19 +96,17 @@ class Address(NamedTuple):
             >>> Address.parse("kiks://127.0.0.1:8123/2?token=abc")
             Address(place='127.0.0.1:8123', token='abc', robot=2)
         """
-        parts = urlsplit(url)
-        number = parts.path.strip("/")
-        tokens = parse_qs(parts.query).get("token", [])
-        if not (number.isascii() and number.isdigit() and len(number) < 5 and len(tokens) == 1):
+        try:
+            parts = urlsplit(url)
+            has_place = parts.scheme == "kiks" and bool(parts.hostname and parts.port)
+        except ValueError:  # a bracket that is not closed, or a port that is no number
+            has_place = False
+        if not (has_place and (found := _ROBOT.fullmatch(f"{parts.path}?{parts.query}"))):
             raise LinkError(
                 "a robot on another computer must be named as kiks host prints it, kiks://HOST:PORT/1?token=TOKEN, but "
                 f"it was {shown(url.partition('?')[0])}. Copy the whole address, in quotes."
             )
-        return Address(parts.netloc, tokens[0], int(number))
-
-    def url(self) -> str:
-        """Return the address as one text."""
-        return f"kiks://{self.place}/{self.robot}?token={self.token}"
+        return Address(parts.netloc, found["token"], int(found["robot"]))
 
 
 class HostLink:
