@@ -90,7 +90,7 @@ def installing(extra: str) -> str:
     """Return how the libraries of an extra are installed, beside the KiKS that is there already.
 
     Args:
-        extra: The extra: 'film', 'learn', 'ray' or 'render'.
+        extra: The extra: 'film', 'learn', 'ray', 'render' or 'tournament'.
 
     Example:
         >>> installing("learn")

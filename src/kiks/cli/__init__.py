@@ -30,6 +30,7 @@ from kiks.cli.schema import schema
 from kiks.cli.serve import serve
 from kiks.cli.session import session
 from kiks.cli.sweep import sweep
+from kiks.cli.tournament import tournament
 from kiks.cli.warmup import warmup
 from kiks.ending import INTERRUPTED, leave_threads, tell
 from kiks.errors import KiksError
@@ -60,6 +61,7 @@ for _command in (
     evolve,
     champion,
     sweep,
+    tournament,
     compare,
     replay,
     export,

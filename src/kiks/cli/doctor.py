@@ -22,6 +22,7 @@ EXTRAS = {
     "film": ("av", "films"),
     "learn": ("ribs", "evolution, Gymnasium and PettingZoo"),
     "ray": ("ray", "evolution on several computers"),
+    "tournament": ("openskill", "ratings of tournaments"),
     "render": ("vtk", "films in space and photos"),
 }
 """A library of each extra, and what the extra is for."""

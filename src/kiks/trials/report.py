@@ -1,7 +1,6 @@
 """Writes what is left of a grading: tables, results for platforms, and a report that needs no network.
 
-All that students have written reaches the report through a template that escapes it, and the report's security policy
-lets nothing run but its two scripts, named by their hashes. The player's code is there once.
+All that students have written reaches the report through a template that escapes it.
 """
 
 from __future__ import annotations
@@ -11,16 +10,12 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from markupsafe import Markup
-
 from kiks.errors import figure
-from kiks.export.page import WEB, hash_of, page_template, player_script, player_style
+from kiks.export.page import page_template
 from kiks.model.atomic_files import make_folder, replace_file
-from kiks.trials.crew import Order, answers_of
 from kiks.trials.grading import Graded
+from kiks.trials.report_parts import Run, page_parts, shown_runs
 from kiks.trials.tables import COUNTED, grades_csv, gradescope_results, how_it_went, likeness_of, moodle_csv, ranked
-from kiks.trials.worker import SHOW
-from kiks.version import __version__
 
 REPORT = "report.html"
 """The report's name in the output folder."""
@@ -58,23 +53,16 @@ def save_grades(
         if len(graded.grades) == 1:
             # Where Gradescope itself runs the command, for one submission.
             replace_file(out / "results.json", text, "results")
-    orders = []
-    for each in graded.grades:
-        if each.worst is not None and each.worst.recording:
-            orders.append(Order(each.submission.id, SHOW, str((out / each.worst.recording).absolute())))
-    runs = {}
-    for done, (name, answer) in enumerate(answers_of(orders, workers), 1):
-        on_progress(done, len(orders))
-        if answer.result:
-            runs[name] = json.loads(answer.result)
-    # As they come is not in the same order each time.
-    runs = {order.name: runs[order.name] for order in orders if order.name in runs}
+    recordings = {
+        each.submission.id: out / each.worst.recording
+        for each in graded.grades
+        if each.worst is not None and each.worst.recording
+    }
+    runs = shown_runs(recordings, workers, on_progress)
     replace_file(out / REPORT, _report(graded, runs, out).encode("utf-8", "replace"), "the report")
 
 
-def _report(graded: Graded, runs: dict[str, dict[str, str]], out: Path) -> str:
-    script = (WEB / "grades.js").read_text("utf-8")
-    player = page_template("run_frame.html").render(script=Markup(player_script()), style=Markup(player_style()))
+def _report(graded: Graded, runs: dict[str, Run], out: Path) -> str:
     low, high, spread = _spread(graded)
     names = {
         outcome.name: case.name
@@ -93,13 +81,7 @@ def _report(graded: Graded, runs: dict[str, dict[str, str]], out: Path) -> str:
         spread=spread,
         names=names,
         folder=str(out),
-        player=player,
-        runs=runs,
-        version=__version__,
-        script=Markup(script),
-        script_hash=hash_of(script),
-        player_hash=hash_of(player_script()),
-        style=Markup("\n".join((player_style(), (WEB / "grades.css").read_text("utf-8")))),
+        **page_parts(runs),
     )
 
 

@@ -82,13 +82,14 @@ _Tree = dict[PurePosixPath, Callable[[int], bytes]]
 """Files by their names, each with a function that reads it: at most some bytes, else it raises."""
 
 
-def submissions_in(paths: Sequence[Path], folder: Path) -> list[Submission]:
+def submissions_in(paths: Sequence[Path], folder: Path, what: str = "SUBMISSIONS") -> list[Submission]:
     """Return the submissions in files, folders and archives; their files are copied below a folder.
 
     Args:
         paths: Programs (.py); folders, each a program if it has a `__main__.py`, else with a submission in each entry;
             archives (.zip) of the same, such as Moodle and Gradescope export, or one that the desk's page hands in.
         folder: Where the copies go: `ID/` for each submission.
+        what: What messages call the paths.
 
     Example:
         >>> import tempfile
@@ -106,7 +107,7 @@ def submissions_in(paths: Sequence[Path], folder: Path) -> list[Submission]:
             )
     if not found:
         raise ParameterError(
-            "SUBMISSIONS must hold programs, but there is no .py, .zip or folder in them. Give files, or the folder or "
+            f"{what} must hold programs, but there is no .py, .zip or folder in them. Give files, or the folder or "
             "the archive in which they are."
         )
     with explained(folder, "the copies", "folder"):
@@ -117,7 +118,7 @@ def submissions_in(paths: Sequence[Path], folder: Path) -> list[Submission]:
             )
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir(parents=True)
-        (folder / _MARK).write_text("kiks grade copies programs here, and deletes this folder at its next start.\n")
+        (folder / _MARK).write_text("KiKS copies programs here, and deletes this folder at its next start.\n")
         taken: set[str] = set()
         return [_submission(name, tree, problem, folder, taken) for name, tree, problem in found]
 

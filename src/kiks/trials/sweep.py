@@ -19,7 +19,7 @@ from kiks.model.project import Project
 from kiks.ports.program_process import Command
 from kiks.sim.from_project import in_case
 from kiks.trials.runner import run_trials
-from kiks.trials.trial import ENDED, OUT_OF_TIME, RUNNING, Outcome, ProgramEnd, Trial
+from kiks.trials.trial import FAILURES, Outcome, ProgramEnd, Trial
 
 GETTING_ABOUT = Goal(
     "Touch nothing, and get about",
@@ -84,7 +84,7 @@ class Tried:
 
     @property
     def _failure(self) -> ProgramEnd | None:
-        return next((end for end in self.outcome.ends if end.how not in (ENDED, RUNNING, OUT_OF_TIME)), None)
+        return next((end for end in self.outcome.ends if end.how in FAILURES), None)
 
     @property
     def how(self) -> str:

@@ -34,7 +34,8 @@ def cell(value: object) -> object:
     return value
 
 
-def _csv(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+def csv_of(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    """Return a table as CSV that no spreadsheet takes for formulas."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow([cell(name) for name in head])
@@ -70,7 +71,7 @@ def grades_csv(graded: Graded) -> str:
         rows.append(
             (grade.submission.name, grade.points, grade.solved, len(cases), *counts, grade.time_s, *told, *points)
         )
-    return _csv(head, rows)
+    return csv_of(head, rows)
 
 
 def moodle_csv(graded: Graded) -> str:
@@ -86,7 +87,7 @@ def moodle_csv(graded: Graded) -> str:
         solved = f"{grade.solved} of {len(graded.cases)} cases solved"
         said = f"{solved}. {grade.said_last}" if grade.said_last else f"{solved}."
         rows.append((participant, submission.name, submission.email, grade.points, "", said))
-    return _csv(head, rows)
+    return csv_of(head, rows)
 
 
 def gradescope_results(graded: Graded, grade: Grade) -> dict[str, Any]:

@@ -34,6 +34,9 @@ ENDLESS = "endless"
 STOPPED = "stopped"
 """The sandbox has stopped it, or the process of its world has died: then nothing of the run counts."""
 
+FAILURES = (CRASHED, ENDLESS, STOPPED)
+"""Ends of a program that has failed."""
+
 
 @dataclass(frozen=True)
 class Trial:

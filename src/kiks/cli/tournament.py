@@ -1,0 +1,108 @@
+"""`kiks tournament`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from kiks.cli.engine_start import ready_engine
+from kiks.cli.grade import Trusted, Workers, plain
+from kiks.cli.job import demonstration_of
+from kiks.cli.options import SeedOrOwn, print_table, progress_bar, say
+from kiks.cli.outputs import has_results, tell_results
+from kiks.ending import end_as_with_ctrl_c
+from kiks.errors import ParameterError, counted
+
+
+@has_results
+def tournament(
+    context: typer.Context,
+    match: Annotated[
+        str, typer.Argument(help="A project with a robot for each player and a referee: sumo, soccer, or a .kiks file.")
+    ],
+    players: Annotated[
+        list[Path],
+        typer.Argument(
+            help="Programs (.py), folders of them, or archives (.zip). A folder with a __main__.py is one program."
+        ),
+    ],
+    rounds: Annotated[
+        int | None,
+        typer.Option(help="Rounds of the Swiss system; each meets each, round robin, if left out.", min=1, max=100),
+    ] = None,
+    seed: SeedOrOwn = None,
+    seeds: Annotated[
+        int, typer.Option(help="Seeds with which the same players meet, from --seed on.", min=1, max=1000)
+    ] = 2,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Folder of tables, page and recordings; tournament-MATCH if left out."),
+    ] = None,
+    workers: Workers = None,
+    trusted: Trusted = False,
+) -> None:
+    """Let programs meet in a match, each on each side, and rate them.
+
+    Each player runs in a sandbox of its own. The one with the higher score wins; one that crashes or hangs loses. What
+    is left is tournament.csv, games.csv, tournament.html, where each game can be played, and a recording of each (kiks
+    replay). The table is the same on every computer. A command that was stopped goes on when it starts again.
+
+    Example: kiks tournament sumo players/
+
+    Example: kiks tournament soccer ann.py bob.py eve.py --rounds 5 --seeds 4
+    """
+    from kiks.model.shipped import demonstrations
+    from kiks.trials.submissions import submissions_in
+    from kiks.trials.tournament import Match, Played, play
+    from kiks.trials.tournament_report import HEADS, PAGE, results_of, rows_of, save_tournament
+
+    chosen = Match.load(demonstrations()[match] if demonstration_of(match) else Path(match))
+    out = out or Path(f"tournament-{chosen.title}")
+    found = submissions_in(players, out / "programs", "PLAYERS")
+    for each in found:
+        if each.problem:
+            say(plain(f"{each.name} does not play: {each.problem}."))
+    playing = [each for each in found if each.command is not None]
+    first = chosen.project.seed if seed is None else seed
+    ready_engine()
+    end_as_with_ctrl_c()
+    done = 0
+    try:
+        with progress_bar(counted(len(playing), "player")) as show:
+
+            def note(played: Played, count: int) -> None:
+                nonlocal done
+                done += 1
+                show(done, count)
+
+            made = play(
+                chosen,
+                playing,
+                out,
+                rounds=rounds,
+                seeds=range(first, first + seeds),
+                is_trusted=trusted,
+                workers=workers,
+                on_played=note,
+            )
+        with progress_bar("page") as show:
+            assert chosen.project.seconds is not None
+            save_tournament(made, out, chosen.project.seconds, workers=workers, on_progress=show)
+    except KeyboardInterrupt:
+        say(f"stopped after {counted(done, 'game')}. The same command goes on from there.")
+        raise
+    rows = [tuple(map(plain, row)) for row in rows_of(made)]
+    shown = [place for place, head in enumerate(HEADS) if head != "failed" or any(row[place] for row in rows)]
+    print_table([HEADS[place] for place in shown], [[row[place] for place in shown] for row in rows])
+    for played in made.played:
+        for text in played.notes:
+            say(plain(f"{' - '.join(played.names)}, seed {played.game.seed}: {text}."))
+    if not made.played:
+        raise ParameterError("a tournament must have games, but there are none. Add players or rounds.")
+    tell_results(
+        context,
+        results_of(made, out),
+        [f"{out / PAGE}: open it in a browser. kiks replay shows the recordings in {out}."],
+    )

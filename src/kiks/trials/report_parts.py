@@ -1,0 +1,57 @@
+"""What all reports of trials have in common: runs that play in them, and the scripts and styles of the page.
+
+The player's code is in a report once, and the page's security policy lets nothing run but its two scripts, named by
+their hashes.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from markupsafe import Markup
+
+from kiks.export.page import WEB, hash_of, page_template, player_script, player_style
+from kiks.trials.crew import Order, answers_of
+from kiks.trials.worker import SHOW
+from kiks.version import __version__
+
+Run = dict[str, str]
+
+
+def shown_runs(
+    recordings: Mapping[str, Path],
+    workers: int | None = None,
+    on_progress: Callable[[int, int], object] = lambda done, count: None,
+) -> dict[str, Run]:
+    """Return what reports need to play recordings, by their names; nothing of one that cannot be read.
+
+    Args:
+        recordings: Files of recordings, by names.
+        workers: How many processes; one for each core if left out.
+        on_progress: Called with how many are ready, and of how many.
+    """
+    orders = [Order(name, SHOW, str(path.absolute())) for name, path in recordings.items()]
+    runs = {}
+    for done, (name, answer) in enumerate(answers_of(orders, workers), 1):
+        on_progress(done, len(orders))
+        if answer.result:
+            runs[name] = json.loads(answer.result)
+    # As they come is not in the same order each time.
+    return {name: runs[name] for name in recordings if name in runs}
+
+
+def page_parts(runs: Mapping[str, Run]) -> dict[str, Any]:
+    """Return what the template of a report needs beside its contents, by name."""
+    script = (WEB / "grades.js").read_text("utf-8")
+    return {
+        "player": page_template("run_frame.html").render(script=Markup(player_script()), style=Markup(player_style())),
+        "runs": runs,
+        "version": __version__,
+        "script": Markup(script),
+        "script_hash": hash_of(script),
+        "player_hash": hash_of(player_script()),
+        "style": Markup("\n".join((player_style(), (WEB / "grades.css").read_text("utf-8")))),
+    }
