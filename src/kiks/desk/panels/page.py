@@ -29,6 +29,8 @@ lighter: see `web/page.css`."""
 
 HINT = "Drag a robot to move it, its rim to turn it. Click it to see its readings."
 
+LOCKED_HINT = "Click a robot to see its readings."
+
 PAST_HINT = "Space plays the recording. Drag the bar to any time; its marks say what happened."
 
 MEMORY = """<script>
@@ -85,7 +87,9 @@ class Page:
                     self._view = ArenaView(
                         feed, on_pick=self._pick, on_edit=self._edit, on_draw=self._draw, on_remove=self._remove
                     )
-                    self._hint = ui.label(HINT if desk.past is None else PAST_HINT).classes("desk-hint")
+                    self._hint = ui.label(
+                        LOCKED_HINT if desk.is_locked else HINT if desk.past is None else PAST_HINT
+                    ).classes("desk-hint")
                 TimeBar(desk, feed)
             with halves.after, ui.column().classes("w-full gap-0 no-wrap"):
                 self._build_tabs(feed)
