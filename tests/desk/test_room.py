@@ -26,7 +26,7 @@ from kiks.desk.room.page import open_room
 from kiks.desk.room.room import SPEED_MAX, Room
 from kiks.desk.server.server import SERVER
 from kiks.desk.server.token import COOKIE
-from kiks.errors import ParameterError
+from kiks.errors import KiksError, ParameterError
 from kiks.model.arena import Arena
 from kiks.model.exercise import Cases, Exercise
 from kiks.model.goal import Goal
@@ -335,6 +335,14 @@ def test_a_desk_stays_with_the_exercise(room: Room) -> None:
     with pytest.raises(ParameterError, match="must stay with its exercise"):
         SERVER.run(desk.replace(project, desk.folder))
     assert desk.project == room.project
+
+
+def test_a_room_without_a_sandbox_does_not_open(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("kiks.ports.sandbox.shutil.which", lambda name: None)
+    with pytest.raises(KiksError, match="bubblewrap .bwrap. is not installed") as raised:
+        Room(exercise(), tmp_path, NAMES, tmp_path / "room")
+    assert "--trusted" in str(raised.value)
+    assert not (tmp_path / "room").exists()
 
 
 SPY = """

@@ -43,7 +43,7 @@ def room(
     Students give the code and choose their names. The address that is printed for you shows all desks. Ctrl-C ends it;
     what students have written is there again the next time.
 
-    Example: kiks room square.kiks --students names.txt --host 0.0.0.0
+    Example: kiks room examples/exercises/lamp --students names.txt --host 0.0.0.0
     """
     from kiks.desk.room.entrance import check_code
     from kiks.desk.room.names import read_names

@@ -137,7 +137,8 @@ class Room:
         door = SERVER.door
         door.entrance, door.advice, door.name, door.is_secure = None, ADVICE, None, False
         self._starter.shutdown(cancel_futures=True)
-        SERVER.run(self._leave())
+        if SERVER.is_running:
+            SERVER.run(self._leave())
         for each in self.desks.values():
             each.close()
         for sandbox in self._sandboxes:

@@ -148,6 +148,11 @@ class DeskServer:
         self.players = players
         self.door.bearers[PATH] = list(players.robots)
 
+    @property
+    def is_running(self) -> bool:
+        """Whether it listens."""
+        return self._loop is not None
+
     def run(self, work: Coroutine[Any, Any, Done]) -> Done:
         """Run a coroutine in the server's thread, and return its result; from any other thread."""
         assert self._loop is not None
