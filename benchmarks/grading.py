@@ -4,6 +4,7 @@ Run: python benchmarks/grading.py [--json] [--submissions 30] [--workers 2] [--t
 and runs trials in this process.
 
 * `grading.class_s`: real time of the command, with tables and report;
+* `grading.class_cpu_s`: the time of processors of all its processes;
 * `grading.report_mb`: size of the report;
 * `grading.overhead_ms`: real time of a run in which the program says one command and ends, in a warm worker and a warm
   sandbox: what a run costs beyond what it simulates; a median;
@@ -14,6 +15,7 @@ and runs trials in this process.
 from __future__ import annotations
 
 import argparse
+import resource
 import statistics
 import subprocess
 import tempfile
@@ -101,6 +103,12 @@ def single_runs(home: Path, *, is_trusted: bool) -> list[tuple[str, float, str]]
     return [*figures, ("grading.sandbox_ms", statistics.median(taken_ms), "ms")]
 
 
+def processor_s() -> float:
+    """Return the time of processors that child processes have taken that have ended [s]."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
 def main() -> None:
     """Measure and report."""
     arguments = argparse.ArgumentParser(description=__doc__)
@@ -117,9 +125,10 @@ def main() -> None:
         exercise(options.cases).save(home / "office.kiks")
         words = ["grade", str(home / "office.kiks"), str(home / "class"), "--out", str(home / "out")]
         words += ["--workers", str(options.workers), *["--trusted"] * options.trusted]
-        start_s = time.perf_counter()
+        start_s, before_s = time.perf_counter(), processor_s()
         subprocess.run(python_line("-m", "kiks", *words), check=True, stdout=subprocess.DEVNULL)
         figures.append(("grading.class_s", time.perf_counter() - start_s, "s"))
+        figures.append(("grading.class_cpu_s", processor_s() - before_s, "s"))
         figures.append(("grading.report_mb", (home / "out" / "report.html").stat().st_size / 1e6, "MB"))
     report(figures, as_json=options.json)
 

@@ -18,6 +18,7 @@ from tests.guard import GUARD_S, wait_until
 
 from kiks.errors import ParameterError
 from kiks.model.arena import Arena
+from kiks.model.atomic_files import alone_in
 from kiks.model.exercise import Cases, Exercise
 from kiks.model.goal import Goal
 from kiks.model.project import Project
@@ -170,6 +171,14 @@ def test_what_cannot_be_graded_is_refused(tmp_path: Path) -> None:
         project.save(tmp_path / "it.kiks")
         with pytest.raises(ParameterError, match=words):
             load_exercise(tmp_path / "it.kiks")
+
+
+def test_two_runs_do_not_write_into_one_folder(tmp_path: Path) -> None:
+    project, programs = exercise(tmp_path), write(tmp_path / "class", {"ann": GOOD})
+    with alone_in(tmp_path / "out", "it"):
+        done = grade(project, programs, "--trusted", "--out", tmp_path / "out")
+    assert done.returncode == 2
+    assert "--out must belong to one run, but another one writes into" in done.stderr
 
 
 def test_no_cell_begins_a_formula() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shlex
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -53,6 +55,7 @@ def grade(
 
     Example: kiks grade exercises/wall moodle_export.zip --out grades
     """
+    from kiks.model.atomic_files import alone_in
     from kiks.ports.sandbox import Sandbox
     from kiks.trials.grading import grade as graded_of
     from kiks.trials.grading import load_exercise, trials_of
@@ -64,34 +67,28 @@ def grade(
         with Sandbox() as sandbox:
             sandbox.warm()  # Without one nothing is copied or compiled.
     out = Path(f"grades-{exercise.stem}") if out is None else out
-    found = submissions_in(submissions, out / "programs")
-    count = len(trials_of(project, folder, found, is_trusted=trusted))
-    ready_engine()
-    end_as_with_ctrl_c()
-    done = 0
-    try:
-        with progress_bar(f"{counted(len(found), 'submission')}") as show:
+    with alone_in(out, "--out"):
+        found = submissions_in(submissions, out / "programs")
+        count = len(trials_of(project, folder, found))
+        ready_engine()
+        end_as_with_ctrl_c()
+        done = 0
 
-            def note(outcome: Outcome, number: int) -> None:
-                nonlocal done
-                done = number
-                show(number, count)
+        def note(outcome: Outcome, number: int) -> None:
+            nonlocal done
+            done = number
+            show(number, count)
 
-            graded = graded_of(
-                project,
-                folder,
-                found,
-                out,
-                title=exercise.stem,
-                is_trusted=trusted,
-                workers=workers,
-                on_outcome=note,
-            )
-        with progress_bar("report") as show:
-            save_grades(graded, out, workers=workers, on_progress=show)
-    except KeyboardInterrupt:
-        say(f"stopped after {done} of {counted(count, 'run')}. The same command goes on from there.")
-        raise
+        options: dict[str, Any] = {"title": exercise.stem, "is_trusted": trusted, "workers": workers}
+        try:
+            with progress_bar(counted(len(found), "submission")) as show:
+                command = shlex.join(["kiks", *sys.argv[1:]])
+                graded = graded_of(project, folder, found, out, command=command, on_outcome=note, **options)
+            with progress_bar("report") as show_report:
+                save_grades(graded, out, workers=workers, on_progress=show_report)
+        except KeyboardInterrupt:
+            say(f"stopped after {done} of {counted(count, 'run')}. The same command goes on from there.")
+            raise
     tell_results(context, _results(graded, out))
     _tell(graded, out)
 

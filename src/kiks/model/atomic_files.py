@@ -218,6 +218,30 @@ def make_folder(path: str | Path, what: str) -> None:
         FileBeside(Path(path, "file"), 0o600).close()
 
 
+@contextmanager
+def alone_in(folder: Path, what: str) -> Iterator[None]:
+    """Make a folder if it is not there, and lock it meanwhile against other runs that write into it.
+
+    Raises:
+        ParameterError: If another one does.
+    """
+    make_folder(folder, what)
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        try:
+            lock(descriptor, folder)
+        except BlockingIOError:
+            raise ParameterError(
+                f"{what} must belong to one run, but another one writes into {str(folder)!r}. Wait for its end, or "
+                "choose another folder."
+            ) from None
+        except OSError:
+            pass  # a network drive without locks
+        yield
+    finally:
+        os.close(descriptor)
+
+
 def target_of(path: str | Path) -> Path:
     """Return the target of a path, through links; it may not exist.
 

@@ -123,7 +123,12 @@ def load_exercise(path: Path) -> tuple[Project, Path]:
 
 
 def trials_of(
-    project: Project, folder: Path, submissions: Sequence[Submission], *, is_trusted: bool = False
+    project: Project,
+    folder: Path,
+    submissions: Sequence[Submission],
+    *,
+    is_trusted: bool = False,
+    command: str = "",
 ) -> list[Trial]:
     """Return a trial for each submission in each case of an exercise; the submission drives robot 1.
 
@@ -132,6 +137,7 @@ def trials_of(
         folder: Where it lies.
         submissions: What was handed in.
         is_trusted: Whether the programs run without a sandbox.
+        command: The command that has begun it, for the recordings.
     """
     cases = cases_of(project.cases)
     worlds = [in_case(project, case, folder) for case in cases]
@@ -143,7 +149,7 @@ def trials_of(
         for number, world in enumerate(worlds, 1):
             others = commands_of(world, folder)[1:]
             name = f"{submission.id}/{number:0{width}}"
-            trials.append(Trial(name, world, folder, (submission.command, *others), is_trusted))
+            trials.append(Trial(name, world, folder, (submission.command, *others), is_trusted, command))
     return trials
 
 
@@ -155,6 +161,7 @@ def grade(
     *,
     title: str = "",
     is_trusted: bool = False,
+    command: str = "",
     workers: int | None = None,
     on_outcome: Callable[[Outcome, int], object] = lambda outcome, count: None,
 ) -> Graded:
@@ -167,10 +174,11 @@ def grade(
         out: Where outcomes and recordings go.
         title: Its title if it says none.
         is_trusted: Whether the programs run without a sandbox.
+        command: The command that has begun it, for the recordings.
         workers: See `run_trials`.
         on_outcome: See `run_trials`.
     """
-    trials = trials_of(project, folder, submissions, is_trusted=is_trusted)
+    trials = trials_of(project, folder, submissions, is_trusted=is_trusted, command=command)
     outcomes = iter(run_trials(trials, out, workers=workers, on_outcome=on_outcome))
     cases = cases_of(project.cases)
     grades = []

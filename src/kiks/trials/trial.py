@@ -48,7 +48,7 @@ class Trial:
         folder: Where the project lies: robot files, replays and the supervisor are looked up from there.
         programs: The program of each robot; None for a robot without one.
         is_trusted: Whether the programs may do what this user may; otherwise each runs in a sandbox.
-        command: The command that runs it alone, for its recording; empty for none.
+        command: The command that has begun it, for its recording; empty for none.
 
     Example:
         >>> from kiks.ports.program_process import Command
