@@ -61,7 +61,7 @@ sphinx_gallery_conf = {
     "abort_on_example_error": True,
     "image_scrapers": ("gallery.keep_pictures",),
     "capture_repr": (),
-    "subsection_order": [f"../build/gallery/{name}" for name in ("scripts", "demonstrations")],
+    "subsection_order": [f"../build/gallery/{name}" for name in ("scripts", "demonstrations", "exercises")],
     "within_subsection_order": "FileNameSortKey",
     "download_all_examples": False,
     "show_signature": False,

@@ -1,4 +1,4 @@
-"""What sphinx-gallery runs: the scripts of `examples/gallery`, and an entry for each demonstration."""
+"""What sphinx-gallery runs: the scripts of `examples/gallery`, an entry for each demonstration and each exercise."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from typing import Any
 from sphinx_gallery.scrapers import figure_rst
 
 from kiks.cli.examples import first_program
-from kiks.model.shipped import demonstrations
+from kiks.model.project import Project
+from kiks.model.shipped import demonstrations, exercises
 
 ROOT = Path(__file__).parents[2]
 SOURCE, PAGES = ROOT / "build" / "gallery", "gallery"
@@ -28,6 +29,11 @@ HEADS = {
         "Demonstrations",
         "Programs for pyserial, which know nothing of the simulation. ``kiks demo NAME`` runs one, "
         "``kiks demo NAME --desk`` shows it in the browser.",
+    ),
+    "exercises": (
+        "Exercises",
+        "Write a program that reaches the goal in every case: from other starts, on slow computers, with robots that "
+        "differ. ``kiks desk examples/exercises/NAME`` opens one, with its text, hints, and a program to begin with.",
     ),
 }
 
@@ -52,6 +58,27 @@ print(run.stdout + run.stderr)
 '''
 
 
+EXERCISE = '''"""
+{title}
+{line}
+
+**{goal}.** {cases}
+
+.. literalinclude:: /../{path}/template.py
+   :caption: The program to begin with
+"""
+
+# %%
+# ``kiks desk {path}`` opens it. The room, and where the first program has led the robot:
+
+import subprocess
+
+command = ["kiks", "run", "--export", "{name}.png", "../../../{path}", "../../../{path}/template.py"]
+run = subprocess.run(command, capture_output=True, text=True, check=True)
+print(run.stdout + run.stderr)
+'''
+
+
 def prepare() -> None:
     """Lay the scripts out as sphinx-gallery reads them, and let them find the command `kiks`."""
     os.environ["PATH"] = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
@@ -64,6 +91,25 @@ def prepare() -> None:
         shutil.copy(path, SOURCE / "scripts")
     for name, project in demonstrations().items():
         (SOURCE / "demonstrations" / f"{name}.py").write_text(entry(name, project))
+    for name, folder in exercises().items():
+        (SOURCE / "exercises" / f"exercise_{name}.py").write_text(exercise_entry(name, folder))
+
+
+def exercise_entry(name: str, folder: Path) -> str:
+    """Return the script of an exercise, which shows its goal and its room."""
+    project = Project.load(folder)
+    assert project.exercise is not None
+    assert project.goal is not None
+    shown = ", ".join(dict.fromkeys(table.name for table in project.cases if not table.is_hidden))
+    title = project.exercise.title
+    return EXERCISE.format(
+        title=title,
+        line="=" * len(title),
+        goal=project.goal.text,
+        cases=f"It is tried in these cases, and in some that you do not see: {shown}.",
+        name=name,
+        path=folder.relative_to(ROOT),
+    )
 
 
 def entry(name: str, path: Path) -> str:
