@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from kiks.desk.server.folder import LISTED_MAX, OPENED, Folder, decode, encode
+from kiks.desk.server.scripts import ProgramFolder
 from kiks.errors import ArenaError, KiksError, ParameterError
 from kiks.model.arena import Arena, Lamp
 from kiks.model.limits import UPLOAD_BYTES_MAX
@@ -169,3 +170,12 @@ def test_uploads_become_projects():
 def test_invalid_uploads_are_refused(name, data, words):
     with pytest.raises((ArenaError, ParameterError), match=words):
         decode(name, data)
+
+
+def test_a_folder_has_at_most_so_many_files(tmp_path: Path) -> None:
+    folder = ProgramFolder(tmp_path)
+    folder.count_max = 2
+    for name in ("a", "b", "b"):
+        folder.save(b"1", name, "a program", may_replace=True)
+    with pytest.raises(ParameterError, match="at most 2 files"):
+        folder.save(b"1", "c", "a program")

@@ -84,7 +84,8 @@ class EditorPanel(Panel):
             self._build_tools()
             self._build_brush()
             self._build_steps()
-            FilesPanel(desk, editing, template)
+            if not desk.is_for_others:
+                FilesPanel(desk, editing, template)
         self._choose("hand")
         self.refresh()
 

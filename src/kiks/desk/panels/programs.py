@@ -33,6 +33,9 @@ NEWEST_LINES = 100
 CHECKED_MAX = 100_000
 """Most characters of a program that is checked while a person types: compiling more would take too long."""
 
+OTHERS_FILES_MAX = 100
+"""Most programs of a student in a room."""
+
 POLL_S = 0.02
 """Period at which the end of a program is polled [s]."""
 
@@ -72,6 +75,7 @@ class ProgramsPanel(Panel):
     def __init__(self, desk: Desk) -> None:
         super().__init__(desk, REFRESH_S)
         self._folder = scripts.ProgramFolder(desk.folder)
+        self._folder.count_max = OTHERS_FILES_MAX if desk.is_for_others else None
         self._drawn: object = None
         self._world: object = None
         self._shown: Handle | None = None

@@ -39,11 +39,13 @@ class Folder:
         opened: Endings of files that can be opened.
         saved: Endings of files that can be saved; the first one is the default.
         depth_max: How deep its subfolders may lie; 0 for files of the folder alone.
+        count_max: Most files that it may have, to save another one; None for no limit.
     """
 
     opened: tuple[str, ...] = OPENED
     saved: tuple[str, ...] = SAVED
     depth_max = 3
+    count_max: int | None = None
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
@@ -88,6 +90,10 @@ class Folder:
         path = self._path(full, self.saved)
         if path.exists() and not (may_replace and self.is_known(full)):
             raise ParameterError(f"The name must be new, but {full!r} exists. Choose another one, or replace it.")
+        if self.count_max is not None and not path.exists() and len(self.names()) >= self.count_max:
+            raise ParameterError(
+                f"The folder must have at most {self.count_max} files. Save under the name of another."
+            )
         replace_file(path, data, what)
         self._known[full] = self._version(full)
         return full
