@@ -127,11 +127,11 @@ class LookingBack:
     async def show_run(self, file: Path) -> None:
         """Play the recording of another run; the present stands still until people go back to it."""
         async with self._turn:
+            reader = McapReader(file)
             if self.past is None:
                 await self._stop_present()
             elif self.has_present:
                 self.stop()
-            reader = McapReader(file)
             self._own = self._own or (self._source, self._log, self._reader, self.marks)
             self._use(reader)
             self.marks = []

@@ -53,7 +53,7 @@ class Tries:
         self.outcomes: dict[int, Outcome] = {}
         self.error = ""
         self._command: Command | None = None
-        self._program = b""
+        self._program = self._packed = b""
         self._folder: tempfile.TemporaryDirectory[str] | None = None
         self._thread: threading.Thread | None = None
         self._is_wanted = False
@@ -91,9 +91,11 @@ class Tries:
         """
         if self.is_running:
             raise ParameterError("These tries must end first. Wait, or stop them.")
+        if len(project.robots) < STUDENT:
+            raise ParameterError("A world must have a robot for a program to be tried in it. Place one.")
         self.project, self._command, self._program = project, command, _bytes_of(command)
         self.cases = [case for case in cases_of(project.cases) if has_hidden or not case.is_hidden]
-        self.outcomes, self.error, self._is_wanted = {}, "", True
+        self.outcomes, self.error, self._is_wanted, self._packed = {}, "", True, b""
         if self._folder is None:
             self._folder = tempfile.TemporaryDirectory(prefix="kiks-tries-", ignore_cleanup_errors=True)
         programs = commands_of(project, home)
@@ -157,6 +159,8 @@ class Tries:
             raise ParameterError(self.error)
         if not self.is_whole:
             raise ParameterError("All cases must have come out before a program is handed in. Hand it in again.")
+        if self._packed:
+            return self._packed
         grade, exercise = self.grade, None if self.project is None else self.project.exercise
         assert grade.worst is not None
         worst = int(grade.worst.name)
@@ -171,7 +175,8 @@ class Tries:
             "cases": len(self.cases),
             "each": [{**asdict(outcome), "name": self.cases[int(outcome.name)].name} for outcome in grade.outcomes],
         }
-        return packed(self._program, score, recording=file.read_bytes(), page=page.read_bytes())
+        self._packed = packed(self._program, score, recording=file.read_bytes(), page=page.read_bytes())
+        return self._packed
 
     def _write_page(self, recording: Path, page: Path, title: str) -> None:
         """Write the page of a recording in a process of its own: figures would take the time of the desk."""
