@@ -229,9 +229,8 @@ class SandboxedProgram(Child):
         if is_held_up:
             self._waited_s = 0.0
         elif not is_running:
-            self._waited_s += min(
-                passed_s, 2 * self._house.sample_s
-            )  # longer if this thread itself has waited for a processor
+            # More has passed if the thread that looks has itself waited for a processor.
+            self._waited_s += min(passed_s, 2 * self._house.sample_s)
         if self._waited_s > limits.waiting_s:
             return f"waited for {limits.waiting_s:g} s without using its robot"
         return ""
@@ -394,7 +393,7 @@ class _House:
                 self._is_ready.set()
                 self._hear()
             else:
-                self._complaint = _complaint(errors)
+                self._complaint = _complaint(errors, is_trusted=self._is_trusted)
         finally:
             with self._lock:
                 self.is_over = True
@@ -576,13 +575,15 @@ def _python_folders() -> list[Path]:
     )
 
 
-def _complaint(errors: int) -> str:
+def _complaint(errors: int, *, is_trusted: bool) -> str:
     """Return why there is no sandbox, from what bubblewrap or Python has said."""
     os.set_blocking(errors, False)
     said = ""
     with contextlib.suppress(OSError):
         said = os.read(errors, 1 << 12).decode(errors="replace").strip()
     last = said.splitlines()[-1][:200] if said else "nothing"
+    if is_trusted:
+        return f"Cannot start a process for programs: it said {last!r}. End other programs."
     return (
         f"a program of somebody else must run in a sandbox, but bubblewrap could not make one and said: {last!r}. "
         "Allow it namespaces (kernel.unprivileged_userns_clone=1 on Debian, an AppArmor profile for bwrap on Ubuntu), "
