@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import signal
 import socket
@@ -21,6 +22,7 @@ from tests.desk.test_desk_command import line_with, started
 from tests.guard import GUARD_S, wait_until
 from tests.matlab.octave import Octave, needs_octave
 from tests.served import BOX, PROGRAMS, fresh
+from websockets.sync.server import ServerConnection, serve
 
 import kiks
 from kiks.clock.gate import Gate
@@ -35,6 +37,7 @@ from kiks.ports.messages import Inbox, Kind, packed
 from kiks.ports.program_process import Command
 from kiks.ports.programs import Programs
 from kiks.sim.simulation import Simulation
+from kiks.version import __version__
 
 pytestmark = pytest.mark.slow
 
@@ -428,3 +431,36 @@ def test_a_program_in_simulated_time_opens_no_robot_elsewhere(tmp_path: Path) ->
         done = forked.run("run", *words)
         assert "is on another computer. Run it there: kiks run --join ADDRESS PROGRAM." in done.stderr
         assert "secret" not in done.stderr
+
+
+WELCOME = {"version": __version__, "robot": 1, "is_late": False, "end_ns": 1 << 63, "thinking": "none"}
+WELCOME |= {"offered": ["COM1"], "seed": "0 1", "pulse_mm": 0.08}
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        ([b"no text"], "both computers must have the same KiKS, but"),
+        (["{"], "both computers must have the same KiKS, but"),
+        ([json.dumps(WELCOME | {"version": "0.1"})], "has '0.1', and this is"),
+        ([json.dumps(WELCOME | {"robot": 0})], "the host at"),
+        ([json.dumps(WELCOME | {"thinking": "replay:times.txt"})], "it asks for a file of this computer"),
+        ([json.dumps(WELCOME), b"\xff" * 100], "must answer as KiKS does, but it does not"),
+        ([json.dumps(WELCOME), packed((1,))], "must answer as KiKS does, but it does not"),
+        ([json.dumps(WELCOME), packed((1, -5, None, 0, ""))], "must answer as KiKS does, but it does not"),
+        ([json.dumps(WELCOME), "text"], "must be there, but has gone"),
+        ([], "must let the program in, but it does not"),
+    ],
+)
+def test_a_host_is_not_trusted_either(words: list[str | bytes], message: str) -> None:
+    def attend(web: ServerConnection) -> None:
+        for word in words:
+            web.send(word)
+        if len(words) > 1:
+            web.recv(GUARD_S)
+
+    with serve(attend, "127.0.0.1", 0) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        place = f"127.0.0.1:{server.socket.getsockname()[1]}"
+        with pytest.raises(LinkError, match=re.escape(message)):
+            kiks.Khepera(f"kiks://{place}/1?token=x")

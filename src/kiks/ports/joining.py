@@ -24,7 +24,7 @@ from kiks.model.checks import ROBOTS_MAX
 from kiks.model.data_file import Number, Switch, Text, Whole, check, record
 from kiks.model.limits import MESSAGE_BYTES_MAX
 from kiks.model.settings import ThinkingPolicy
-from kiks.ports.messages import RECEIVE_SIZE, Kind, Start
+from kiks.ports.messages import RECEIVE_SIZE, Answer, Kind, ProtocolError, Start, checked_answer
 from kiks.ports.remote_link import RemoteLine, SocketConnection
 from kiks.sim.port import VirtualPort
 from kiks.units import NS_PER_S
@@ -243,6 +243,22 @@ class HostedConnection(SocketConnection):
         super().__init__(link, is_late=link.start.is_late, end_ns=link.start.end_ns)
         self._link = link
         self._check_awaited = check_awaited
+
+    answer_of = staticmethod(checked_answer)
+
+    def ask(self, kind: int, robot: int = 0, *arguments: Any) -> Answer:
+        """Send a request and wait for the answer.
+
+        Raises:
+            LinkError: If the answer is an error, or none at all.
+        """
+        try:
+            return super().ask(kind, robot, *arguments)
+        except ProtocolError:
+            self._link.close()
+            raise LinkError(
+                f"the host at {shown(self._link.place)} must answer as KiKS does, but it does not. Is it kiks host?"
+            ) from None
 
     def take(self) -> bytes:
         """Return the next bytes of the host."""

@@ -245,6 +245,23 @@ def checked_request(fields: Any) -> Request:
     raise ProtocolError("sent something to the world that is no request")
 
 
+def checked_answer(fields: Any) -> Answer:
+    """Return the fields of a message as an answer; what it results in depends on the request.
+
+    Raises:
+        ProtocolError: If they are none.
+    """
+    if fields.__class__ is tuple and len(fields) == 5:
+        ticket, now_ns, _, ahead_count, error = fields
+        if (
+            ticket.__class__ is now_ns.__class__ is ahead_count.__class__ is int
+            and error.__class__ is str
+            and 0 <= now_ns <= CLOCK_END_NS
+        ):
+            return Answer._make(fields)
+    raise ProtocolError("sent something to the program that is no answer")
+
+
 _as_request: Callable[[type[Request], tuple[Any, ...]], Request] = tuple.__new__
 """`Request._make` without a check of the length, in half its time."""
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 import os
 import sys
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from typing import Any, Protocol
 
@@ -139,6 +139,9 @@ class SocketConnection(Connection):
         self._send_all, self._receive = connection.sendall, connection.recv
         self._inbox = Inbox(ANSWER_BYTES_MAX)
 
+    answer_of: Callable[[Any], Answer] = staticmethod(Answer._make)
+    """Makes an answer of the fields of a message."""
+
     def _transmit(self, request: Request) -> None:
         try:
             self._send_all(packed(tuple(request)))
@@ -153,8 +156,8 @@ class SocketConnection(Connection):
             if not received:
                 self.end()
             for fields in self._inbox.take(received):
-                if fields[0] == ticket:
-                    return Answer._make(fields)
+                if (answer := self.answer_of(fields)).ticket == ticket:
+                    return answer
 
     def take(self) -> bytes:
         """Return the next bytes of the world; none if the connection is closed."""
