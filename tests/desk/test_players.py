@@ -9,6 +9,7 @@ import socket
 import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -305,6 +306,14 @@ def test_a_person_begins_without_those_who_have_not_come() -> None:
         assert host.desk.programs.doubt == "the world did not wait for every program"
         assert host.desk.programs.players == {1: "has not come yet", 2: "drives", 3: "has not come yet"}
         robot.close()
+
+
+def test_a_world_without_the_robot_lets_no_program_in() -> None:
+    with hosted(2) as host:
+        fewer = replace(host.desk.project, robots=host.desk.project.robots[:1])
+        SERVER.run(host.desk.replace(fewer))
+        with pytest.raises(LinkError, match="it does not: robot must be "):
+            kiks.Khepera(host.url(2))
 
 
 def hostile(*messages: object) -> bytes:

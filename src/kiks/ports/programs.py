@@ -330,6 +330,7 @@ class Programs:
         """
         with self.sim.lock:
             self._check_open(name)
+            self.sim.index_of(robot)  # a person may have opened a world with fewer robots
             if (before := self._players[robot]) is not None:
                 before.dismiss(f"Another program has taken robot {robot} with the same token.")
             has_begun = self._scheduler.has_begun
