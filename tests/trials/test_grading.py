@@ -14,6 +14,8 @@ from pathlib import Path
 from textwrap import dedent
 
 import pytest
+from playwright.sync_api import expect
+from tests.desk.visitor import NewPage, check_access, leave_picture
 from tests.guard import GUARD_S, wait_until
 
 from kiks.errors import ParameterError
@@ -117,6 +119,28 @@ def test_a_class_is_graded(tmp_path: Path) -> None:
     moodle = [*csv.reader(io.StringIO((tmp_path / "out" / "moodle.csv").read_text()))]
     assert moodle[0][0] == "Identifier"
     assert {"Grade", "Last modified (grade)"} <= set(moodle[0])
+
+
+def test_the_report_opens_what_belongs_to_a_name(tmp_path: Path, new_page: NewPage) -> None:
+    programs = write(tmp_path / "class", {"ann": GOOD, **BROKEN})
+    assert grade(exercise(tmp_path), programs, "--trusted", "--out", tmp_path / "out").returncode == 0
+    page = new_page(1366, 768)
+    for colours, width in (("light", 1366), ("dark", 390)):
+        page.emulate_media(color_scheme=colours)  # type: ignore[arg-type]
+        page.set_viewport_size({"width": width, "height": 800})
+        page.goto((tmp_path / "out" / "report.html").as_uri())
+        check_access(page, colours)
+        for name in ("ann", "carl"):
+            page.get_by_role("button", name=name, exact=True).click()
+            expect(page.locator(".details:visible h2")).to_contain_text(name)
+            frame = page.frame_locator("iframe")
+            frame.get_by_role("button", name="Play").click()
+            expect(page.locator("iframe")).to_have_count(1)
+        assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+        leave_picture(page, f"grades_{colours}_{width}", full_page=True)
+        expect(page.locator(".details:visible")).to_contain_text("ValueError: =1+1 <b>what</b>")
+        page.get_by_role("button", name="carl", exact=True).click()
+        expect(page.locator(".details:visible")).to_have_count(0)
 
 
 @needs_sandbox
