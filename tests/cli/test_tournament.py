@@ -23,8 +23,10 @@ arguments = ["kiks://1"]
 arguments = ["kiks://2"]
 [[start]]
 at_mm = [100.0, 100.0]
+heading_deg = 0.0
 [[start]]
 at_mm = [100.0, 300.0]
+heading_deg = 0.0
 [walls]
 size_mm = [800, 400]
 """

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import threading
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -11,9 +13,13 @@ from kiks.cli.engine_start import ready_engine
 from kiks.cli.grade import Trusted, Workers, plain
 from kiks.cli.job import demonstration_of
 from kiks.cli.options import SeedOrOwn, print_table, progress_bar, say
-from kiks.cli.outputs import has_results, tell_results
+from kiks.cli.outputs import has_results, leave_out, tell_results
 from kiks.ending import end_as_with_ctrl_c
-from kiks.errors import ParameterError, counted
+from kiks.errors import KiksError, ParameterError, counted
+
+if TYPE_CHECKING:
+    from kiks.trials.submissions import Submission
+    from kiks.trials.tournament import Match, Played, Tournament
 
 
 @has_results
@@ -42,6 +48,9 @@ def tournament(
     ] = None,
     workers: Workers = None,
     trusted: Trusted = False,
+    desk: Annotated[
+        bool, typer.Option("--desk", help="Show the games in a browser, one after the other, with the table between.")
+    ] = False,
 ) -> None:
     """Let programs meet in a match, each on each side, and rate them.
 
@@ -55,7 +64,7 @@ def tournament(
     """
     from kiks.model.shipped import demonstrations
     from kiks.trials.submissions import submissions_in
-    from kiks.trials.tournament import Match, Played, play
+    from kiks.trials.tournament import Match, play
     from kiks.trials.tournament_report import HEADS, PAGE, results_of, rows_of, save_tournament
 
     chosen = Match.load(demonstrations()[match] if demonstration_of(match) else Path(match))
@@ -67,6 +76,23 @@ def tournament(
     playing = [each for each in found if each.command is not None]
     first = chosen.project.seed if seed is None else seed
     ready_engine()
+
+    def played(on_played: Callable[[Played, int], object]) -> Tournament:
+        return play(
+            chosen,
+            playing,
+            out,
+            rounds=rounds,
+            seeds=range(first, first + seeds),
+            is_trusted=trusted,
+            workers=workers,
+            on_played=on_played,
+        )
+
+    if desk:
+        leave_out(context, "with --desk, where the games are shown", "json")
+        _show(chosen, playing, out, played)
+        return
     end_as_with_ctrl_c()
     done = 0
     try:
@@ -77,16 +103,7 @@ def tournament(
                 done += 1
                 show(done, count)
 
-            made = play(
-                chosen,
-                playing,
-                out,
-                rounds=rounds,
-                seeds=range(first, first + seeds),
-                is_trusted=trusted,
-                workers=workers,
-                on_played=note,
-            )
+            made = played(note)
         with progress_bar("page") as show:
             assert chosen.project.seconds is not None
             save_tournament(made, out, chosen.project.seconds, workers=workers, on_progress=show)
@@ -96,9 +113,9 @@ def tournament(
     rows = [tuple(map(plain, row)) for row in rows_of(made)]
     shown = [place for place, head in enumerate(HEADS) if head != "failed" or any(row[place] for row in rows)]
     print_table([HEADS[place] for place in shown], [[row[place] for place in shown] for row in rows])
-    for played in made.played:
-        for text in played.notes:
-            say(plain(f"{' - '.join(played.names)}, seed {played.game.seed}: {text}."))
+    for each_played in made.played:
+        for text in each_played.notes:
+            say(plain(f"{' - '.join(each_played.names)}, seed {each_played.game.seed}: {text}."))
     if not made.played:
         raise ParameterError("a tournament must have games, but there are none. Add players or rounds.")
     tell_results(
@@ -106,3 +123,37 @@ def tournament(
         results_of(made, out),
         [f"{out / PAGE}: open it in a browser. kiks replay shows the recordings in {out}."],
     )
+
+
+def _show(
+    match: Match,
+    players: Sequence[Submission],
+    out: Path,
+    play: Callable[[Callable[[Played, int], object]], Tournament],
+) -> None:
+    """Show the games on a desk until Ctrl-C, while they are played ahead in another thread."""
+    from kiks.cli.desk import open_desk
+    from kiks.desk.server.desk import Desk
+    from kiks.desk.server.hall import Hall
+    from kiks.sim.from_project import simulation_of
+    from kiks.trials.tournament import in_order
+    from kiks.trials.tournament_report import PAGE, save_tournament
+
+    seconds = match.project.seconds
+    assert seconds is not None
+    desk = Desk(
+        simulation_of(match.project, match.folder, program_count=match.sides), project=match.project, is_held=True
+    )
+    desk.present.pause()
+    desk.hall = hall = Hall(match.title, tuple(each.name for each in in_order(players)), out)
+
+    def work() -> None:
+        try:
+            save_tournament(play(hall.note), out, seconds)
+            say(f"all games are played: {out / PAGE}.")
+        except KiksError as error:
+            desk.say(f"The tournament has ended: {error}")
+        hall.end()
+
+    threading.Thread(target=work, name="kiks tournament", daemon=True).start()
+    open_desk(desk)

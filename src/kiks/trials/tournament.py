@@ -80,6 +80,11 @@ class Played:
         )
 
     @property
+    def number(self) -> int:
+        """Its number in the order in which the games were drawn, from 1."""
+        return int(self.outcome.name.partition("-")[0])
+
+    @property
     def text(self) -> str:
         """The score for people, such as '4 : 2'."""
         return " : ".join(f"{value:g}" for value in self.score)
@@ -241,6 +246,14 @@ def _driving(player: Submission, robot: ProjectRobot) -> Command:
     return replace(player.command, arguments=list(robot.arguments))
 
 
+def in_order(players: Sequence[Submission]) -> list[Submission]:
+    """Return players in the order in which they are numbered, with names that differ."""
+    ordered = sorted(players, key=lambda each: each.id)
+    if len({each.name for each in ordered}) < len(ordered):
+        return [replace(each, name=each.id) for each in ordered]
+    return ordered
+
+
 def play(
     match: Match,
     players: Sequence[Submission],
@@ -264,11 +277,8 @@ def play(
         workers: How many games at once; one for each core if left out.
         on_played: Called with each game as it is played, and with the number of games that are known so far.
     """
-    ordered = sorted(players, key=lambda each: each.id)
+    ordered = in_order(players)
     names = tuple(each.name for each in ordered)
-    if len(set(names)) < len(names):
-        ordered = [replace(each, name=each.id) for each in ordered]
-        names = tuple(each.name for each in ordered)
     if len(ordered) < match.sides:
         raise ParameterError(
             f"PLAYERS must be at least {match.sides}, for so many meet, but there are {len(ordered)}. Add another one."

@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, Protocol, TypeVar
 
 from kiks.clock.gate import Gate
 from kiks.desk.server.desk_world import DeskWorld
@@ -65,6 +65,16 @@ class OutsidePrograms:
     evaluate: Callable[[int, str], None] = lambda number, command: None
 
 
+class Showing(Protocol):
+    """What shows runs on a desk by itself, such as the games of a tournament."""
+
+    async def tend(self, desk: Desk) -> None:
+        """Show the next run when it is time; called about once a second."""
+
+    def describe(self) -> dict[str, Any]:
+        """Return what the board shows of it."""
+
+
 class Desk:
     """A world on a desk.
 
@@ -107,6 +117,7 @@ class Desk:
         hand_in: Takes a file that a person hands in, its bytes and its name; None: the browser downloads it. Raises
             a `ParameterError` with a message for that person if it is not taken.
         may_hand_in: Whether a file would be taken now.
+        hall: The tournament whose games are shown; None without one.
     """
 
     def __init__(
@@ -145,6 +156,7 @@ class Desk:
         self.outside = OutsidePrograms()
         self.hand_in: Callable[[bytes, str], None] | None = None
         self.may_hand_in = True
+        self.hall: Showing | None = None
         self.tries = Tries(is_for_others=is_for_others, is_trusted=sandbox is None)
         self.is_seen = threading.Event()
         self.looking = LookingBack(lambda: self.present, self.say)

@@ -158,6 +158,8 @@ class Gateway:
         """Keep the past of the world."""
         while True:
             await self.desk.looking.tend()
+            if self.desk.hall is not None:
+                await self.desk.hall.tend(self.desk)
             await asyncio.sleep(TEND_S)
 
     def _look(self, sim: Simulation) -> bytes:
@@ -218,7 +220,9 @@ class Gateway:
             judged = {each["name"]: each["value"] for each in entries if each["name"] in (POINTS, RESULT)}
             entries = [each for each in entries if each["name"] not in judged]
             goal = {"text": project.goal.text or "Goal", "points": judged.get(POINTS), "result": judged.get(RESULT)}
-        self._news["board"] = {"kind": "board", "score": entries, "goal": goal, "end_s": project.seconds}
+        hall = None if self.desk.hall is None else self.desk.hall.describe()
+        told = {"kind": "board", "score": entries, "goal": goal, "end_s": project.seconds, "hall": hall}
+        self._news["board"] = told
 
     def _show(self, frame: bytes) -> None:
         for viewer in self._viewers:

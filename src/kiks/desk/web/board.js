@@ -9,8 +9,13 @@ const HALL = "desk-hall";
 
 export default {
   template: `
-    <div class="kiks-board" v-show="isHall || goal || entries.length" data-testid="board" role="region" aria-label="Score">
-      <div v-if="isHall" class="kiks-board-clock" data-testid="board-clock" role="timer">{{ clock }}<small
+    <div class="kiks-board" v-show="isHall || hall || goal || entries.length" data-testid="board" role="region" aria-label="Score">
+      <div v-if="hall" class="kiks-board-hall" data-testid="board-hall" role="status">
+        <strong>{{ hall.title }}</strong>
+        <span v-if="hall.last">{{ hall.last }}</span>
+        <span v-if="hall.next">Next: <b>{{ hall.next }}</b></span>
+      </div>
+      <div v-if="isHall && !hall?.table.length" class="kiks-board-clock" data-testid="board-clock" role="timer">{{ clock }}<small
         v-if="end_s"> of {{ clockText(end_s).slice(0, -3) }}</small></div>
       <div v-if="goal" class="kiks-board-goal" data-testid="board-goal">
         <span class="kiks-board-text">{{ goal.text }}</span>
@@ -21,7 +26,12 @@ export default {
         <strong v-if="goal.result" :class="['kiks-board-result', outcome]" role="status" data-testid="board-result">{{
           goal.result }}</strong>
       </div>
-      <div v-if="isMatch" class="kiks-board-match">
+      <table v-if="hall?.table.length" class="kiks-board-table" data-testid="board-table">
+        <thead><tr><th></th><th>Player</th><th>Games</th><th>Points</th></tr></thead>
+        <tbody><tr v-for="(row, place) in hall.table" :key="row[0]">
+          <td>{{ place + 1 }}.</td><th>{{ row[0] }}</th><td>{{ row[1] }}</td><td>{{ row[2] }}</td></tr></tbody>
+      </table>
+      <div v-else-if="isMatch" class="kiks-board-match">
         <span class="kiks-board-side"><i :style="ink(entries[0])"></i><b>{{ entries[0].name }}</b></span>
         <span class="kiks-board-value" data-testid="board-match">{{ entries[0].value }} : {{ entries[1].value }}</span>
         <span class="kiks-board-side"><b>{{ entries[1].name }}</b><i :style="ink(entries[1])"></i></span>
@@ -35,7 +45,7 @@ export default {
               title="Leave the hall view (Escape)" @click="leave">&#x2715;</button>
     </div>`,
   props: { feed: { type: String, default: "/desk/feed" } },
-  data: () => ({ entries: [], goal: null, end_s: null, isHall: false, clock: "" }),
+  data: () => ({ entries: [], goal: null, hall: null, end_s: null, isHall: false, clock: "" }),
   computed: {
     /** How the goal was decided; the judge begins its result so. */
     outcome() { return ["solved", "failed"].find((word) => this.goal.result.startsWith(word)) ?? "open"; },
@@ -66,9 +76,10 @@ export default {
   methods: {
     clockText,
 
-    take({ score, goal, end_s }) {
+    take({ score, goal, end_s, hall }) {
       this.entries = score;
       this.goal = goal;
+      this.hall = hall;
       this.end_s = end_s;
     },
 
