@@ -295,11 +295,22 @@ def test_each_start_finds_an_empty_working_folder_with_the_files_of_the_program(
             assert run(command, sandbox)[2] == ["['map.txt', 'program.py']"]
 
 
-def test_without_bubblewrap_one_line_says_what_to_do(good: Command, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("PATH", "/nowhere")
-    with Sandbox([good.program]) as sandbox, pytest.raises(KiksError, match="is not installed") as caught:
+@pytest.mark.parametrize(
+    ("bwrap", "message"),
+    [("", "is not installed"), ("#!/bin/sh\necho 'bwrap: No permissions' >&2\nexit 1\n", "'bwrap: No permissions'")],
+    ids=["not installed", "without namespaces"],
+)
+def test_without_bubblewrap_one_line_says_what_to_do(
+    bwrap: str, message: str, good: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if bwrap:
+        (tmp_path / "bwrap").write_text(bwrap)
+        (tmp_path / "bwrap").chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with Sandbox([good.program]) as sandbox, pytest.raises(KiksError, match=message) as caught:
         run(good, sandbox)
     assert "\n" not in str(caught.value)
+    assert "--trusted" in str(caught.value)
 
 
 def test_trusted_program_has_limits_as_well(usual: tuple[str, int, list[str]], tmp_path: Path) -> None:

@@ -93,6 +93,7 @@ class Nursery:
                     data, descriptors, _, _ = socket.recv_fds(self._control, 1 << 16, 16)
                     self._descriptors += descriptors
                     if not data:
+                        self._close()
                         return None
                     *lines, self._rest = (self._rest + data).split(b"\n")
                     for line in lines:
@@ -173,6 +174,14 @@ class Nursery:
             _kill_all()
         for number, code in ends:
             self._tell("ended", number, code)
+
+    def _close(self) -> None:
+        """End all programs and remove what they have written: what has started the nursery may have been killed."""
+        for process in self._programs:
+            _kill_group(process, signal.SIGKILL)
+        if os.getpid() != 1:
+            for folder in self._folders:
+                shutil.rmtree(folder, ignore_errors=True)
 
     def _clean(self) -> None:
         """Remove all that earlier programs have written: a run depends on no other."""
