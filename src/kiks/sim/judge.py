@@ -14,7 +14,7 @@ from kiks.control.measure import Measure, Moment
 from kiks.errors import KiksError, ParameterError, nearest, shown
 from kiks.model.arena import Arena
 from kiks.model.checks import check_number
-from kiks.model.formula import TIMERS, Formula, Term
+from kiks.model.formula import Formula, Term
 from kiks.model.goal import Goal
 from kiks.sim.simulation import SCORE_MAX, Simulation
 from kiks.units import ns_from_s, s_from_ns
@@ -232,21 +232,14 @@ def _watcher(term: Term, sim: Simulation, robot: int, own: dict[str, Callable[[]
     return _measured(_measure(term, named, sim.arena), sim, robot)
 
 
-_USES = {
-    "time_s": "'time_s'",
-    "is_solved": "'is_solved'",
-    "is_over": "'is_over'",
-    "wall_mm": "'wall_mm' or 'wall_mm(robot=2)'",
-    "score": "'score(\"laps\")' or 'score(2)'",
-}
-"""How names are used that are neither measures nor timers."""
+_TYPED = {typed.partition("(")[0]: typed for typed in OWN_NAMES}
 
 
 def _measure(term: Term, named: dict[str, Any], arena: Arena) -> Measure:
     """Return the measure that a term names."""
-    known = [*measures.__all__, *_USES, *TIMERS]
-    if (use := _USES.get(term.name)) is not None:
-        raise ParameterError(f"must use {term.name} as {use}, but it was {shown(str(term))}.")
+    known = [*measures.__all__, *_TYPED]
+    if (typed := _TYPED.get(term.name)) is not None:
+        raise ParameterError(f"must use {term.name} as in {typed!r}, but it was {shown(str(term))}.")
     if term.name not in measures.__all__:
         raise ParameterError(
             f"must name measures, but {shown(str(term))} is none.{nearest(term.name, known)} The page "
