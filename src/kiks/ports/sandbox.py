@@ -3,9 +3,9 @@
 A sandbox has one warm process, the nursery (`script/nursery.py`), which forks for each program that starts: so a start
 takes milliseconds. bubblewrap (`bwrap`) starts the nursery in namespaces of its own: without a network, without other
 processes, with read-only folders of Python, of KiKS and of the program, and with a small folder in memory for all that
-is written. Limits of each process (`setrlimit`) are the first line. A thread outside looks ten times a second at what
-all processes take together; when a limit is broken it kills the whole sandbox, and says which. The next start makes a
-new one.
+is written. Limits of each process (`setrlimit`) are the first line. A thread outside looks twenty times a second at
+what all processes take together; when a limit is broken it kills the whole sandbox, and says which. The next start
+makes a new one.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from kiks.ports.program_process import Child, python_line
 from kiks.ports.system_calls import system_call_filter
 from kiks.units import s_from_ns
 
-SAMPLE_S = 0.1
+SAMPLE_S = 0.05
 """Time between two looks at the processes of a sandbox [s of real time], while a program runs."""
 
 TRUSTED_SAMPLE_S = 0.5
