@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
 from pathlib import Path
+from typing import Any
 
 from kiks.errors import ParameterError, counted, library
 from kiks.model.project import Project, ProjectRobot
@@ -170,7 +171,7 @@ class Tournament:
 
     def _ratings(self) -> list[tuple[float, float]]:
         """Return mean and standard deviation of each player's rating after all games."""
-        model = library("openskill.models", "tournament").PlackettLuce()
+        model = _models().PlackettLuce()
         ratings = [model.rating() for _ in self.players]
         for each in self.played:
             teams = [[ratings[player]] for player in each.game.players]
@@ -246,6 +247,11 @@ def _driving(player: Submission, robot: ProjectRobot) -> Command:
     return replace(player.command, arguments=list(robot.arguments))
 
 
+def _models() -> Any:
+    """Return the models of ratings."""
+    return library("openskill.models", "tournament")
+
+
 def in_order(players: Sequence[Submission]) -> list[Submission]:
     """Return players in the order in which they are numbered, with names that differ."""
     ordered = sorted(players, key=lambda each: each.id)
@@ -277,6 +283,7 @@ def play(
         workers: How many games at once; one for each core if left out.
         on_played: Called with each game as it is played, and with the number of games that are known so far.
     """
+    _models()  # that it is missing is said before the games
     ordered = in_order(players)
     names = tuple(each.name for each in ordered)
     if len(ordered) < match.sides:
