@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import sys
 from itertools import combinations
 from pathlib import Path
 
 import pytest
 
 from kiks.errors import ParameterError
-from kiks.trials.tournament import Game, Match, Played, Tournament, round_robin, swiss
+from kiks.model.project import Project
+from kiks.trials.tournament import Game, Match, Played, Tournament, play, round_robin, swiss
 from kiks.trials.trial import CRASHED, RUNNING, Outcome, ProgramEnd
 
 NAMES = ("ann", "bob", "eve")
@@ -97,3 +99,9 @@ def test_a_project_that_is_no_match_is_an_error(text: str, message: str, tmp_pat
     (tmp_path / "match.kiks").write_text(f"kiks = 1\n{text}[walls]\nsize_mm = [400, 400]\n")
     with pytest.raises(ParameterError, match=message):
         Match.load(tmp_path / "match.kiks")
+
+
+def test_the_library_of_ratings_is_missed_before_the_games(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "openskill.models", None)
+    with pytest.raises(ParameterError, match=r"This needs openskill.*pip install 'kiks\[tournament\]'"):
+        play(Match("race", Project(), tmp_path), [], tmp_path)
