@@ -73,7 +73,8 @@ EXERCISE = '''"""
 
 import subprocess
 
-command = ["kiks", "run", "--export", "{name}.png", "../../../{path}", "../../../{path}/template.py"]
+folder = "../../../{path}"
+command = ["kiks", "run", "--export", "{name}.png", folder, f"{{folder}}/template.py"]
 run = subprocess.run(command, capture_output=True, text=True, check=True)
 print(run.stdout + run.stderr)
 '''
