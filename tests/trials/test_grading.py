@@ -191,6 +191,7 @@ def test_what_cannot_be_graded_is_refused(tmp_path: Path) -> None:
         (Project(seconds=1.0), "EXERCISE must have a goal"),
         (Project(goal=Goal(solved="contacts > 0")), "EXERCISE must have a time limit"),
         (Project(goal=Goal(), seconds=1.0, thinking="live"), "EXERCISE must have a repeatable thinking time"),
+        (Project(goal=Goal(), seconds=1.0, cases=(Cases(thinking=("live",)),)), "that of .* is 'live'"),
     ):
         project.save(tmp_path / "it.kiks")
         with pytest.raises(ParameterError, match=words):

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from itertools import combinations
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
+from kiks.cli import app
 from kiks.errors import ParameterError
 from kiks.model.project import Project
 from kiks.trials.tournament import Game, Match, Played, Tournament, play, round_robin, swiss
@@ -105,3 +108,12 @@ def test_the_library_of_ratings_is_missed_before_the_games(tmp_path: Path, monke
     monkeypatch.setitem(sys.modules, "openskill.models", None)
     with pytest.raises(ParameterError, match=r"This needs openskill.*pip install 'kiks\[tournament\]'"):
         play(Match("race", Project(), tmp_path), [], tmp_path)
+
+
+def test_a_match_or_a_player_that_is_not_there_is_named(tmp_path: Path) -> None:
+    for match, message in (
+        ("summo", "MATCH must be a match that comes with KiKS, .* there is no 'summo'. Did you mean 'sumo'"),
+        ("sumo", "PLAYERS must be files or folders, but there is no 'nobody.py'"),
+    ):
+        done = CliRunner().invoke(app, ["tournament", match, "nobody.py", "--out", str(tmp_path / "out")])
+        assert re.search(message, str(done.exception or done.output)), done.output

@@ -99,7 +99,7 @@ def _tell(graded: Graded, out: Path) -> None:
     from rich.table import Table
     from rich.text import Text
 
-    from kiks.trials.tables import COUNTED, rows_of
+    from kiks.trials.tables import COUNTED, likenesses_of, rows_of
 
     console = Console(highlight=False)
     rows = rows_of(graded)
@@ -115,13 +115,8 @@ def _tell(graded: Graded, out: Path) -> None:
         # Text takes no markup of what students have written.
         table.add_row(*(Text(plain(row[place])) for place in shown))
     console.print(table)
-    for pair in graded.likenesses:
-        how = (
-            "identical, but for names, comments, layout, numbers and texts"
-            if pair.share == 1
-            else f"{pair.share:.0%} alike"
-        )
-        console.print(Text(plain(f"{pair.first} and {pair.second} are {how}.")))
+    for line in likenesses_of(graded):
+        console.print(Text(plain(line)))
     for grade in graded.grades:
         if grade.submission.problem:
             say(plain(f"{grade.submission.name} was not graded: {grade.submission.problem}."))

@@ -14,6 +14,7 @@ from kiks.cli.options import Silence, World, say, show_log
 from kiks.cli.outputs import has_results, leave_out, tell_results
 from kiks.cli.record import RecordFile, recorded, tell_run
 from kiks.errors import ParameterError, shown
+from kiks.model.checks import ROBOTS_MAX
 
 if TYPE_CHECKING:
     from kiks.clock.gate import Gate
@@ -36,6 +37,7 @@ def host(
             help="Robots for programs elsewhere, from robot 1 on; programs of the project drive the others. All if "
             "left out.",
             min=1,
+            max=ROBOTS_MAX,
         ),
     ] = None,
     thinking: Annotated[

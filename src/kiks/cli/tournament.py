@@ -15,7 +15,7 @@ from kiks.cli.job import demonstration_of
 from kiks.cli.options import SeedOrOwn, print_table, progress_bar, say
 from kiks.cli.outputs import has_results, leave_out, tell_results
 from kiks.ending import end_as_with_ctrl_c
-from kiks.errors import KiksError, ParameterError, counted
+from kiks.errors import KiksError, ParameterError, counted, nearest
 
 if TYPE_CHECKING:
     from kiks.trials.submissions import Submission
@@ -67,7 +67,13 @@ def tournament(
     from kiks.trials.tournament import Match, play
     from kiks.trials.tournament_report import HEADS, PAGE, results_of, rows_of, save_tournament
 
-    chosen = Match.load(demonstrations()[match] if demonstration_of(match) else Path(match))
+    path = demonstrations()[match] if demonstration_of(match) else Path(match)
+    if not path.exists():
+        raise ParameterError(
+            f"MATCH must be a match that comes with KiKS, such as sumo, or a project, but there is no {match!r}."
+            f"{nearest(match, demonstrations())}"
+        )
+    chosen = Match.load(path)
     out = out or Path(f"tournament-{chosen.title}")
     found = submissions_in(players, out / "programs", "PLAYERS")
     for each in found:

@@ -114,11 +114,12 @@ def load_exercise(path: Path) -> tuple[Project, Path]:
         raise ParameterError(f"EXERCISE must have a time limit, but {what} has none. Write seconds = 60.0.")
     if not project.robots:
         raise ParameterError(f"EXERCISE must have a robot, but {what} has none. Write [[robot]].")
-    if project.thinking.startswith("live"):
-        raise ParameterError(
-            f"EXERCISE must have a repeatable thinking time, but that of {what} is {project.thinking!r}. Write "
-            'thinking = "none" or "fixed:20".'
-        )
+    for thinking in (project.thinking, *(policy for case in project.cases for policy in case.thinking)):
+        if thinking.startswith("live"):
+            raise ParameterError(
+                f"EXERCISE must have a repeatable thinking time, but that of {what} is {thinking!r}. Write "
+                'thinking = "none" or "fixed:20".'
+            )
     return project, project_file(path).parent
 
 

@@ -16,7 +16,16 @@ from kiks.export.page import page_template
 from kiks.model.atomic_files import make_folder, replace_file
 from kiks.trials.grading import Graded
 from kiks.trials.report_parts import Run, page_parts, shown_runs
-from kiks.trials.tables import COUNTED, grades_csv, gradescope_results, how_it_went, likeness_of, moodle_csv, ranked
+from kiks.trials.tables import (
+    COUNTED,
+    grades_csv,
+    gradescope_results,
+    how_it_went,
+    likeness_of,
+    likenesses_of,
+    moodle_csv,
+    ranked,
+)
 
 REPORT = "report.html"
 """The report's name in the output folder."""
@@ -75,6 +84,7 @@ def _report(graded: Graded, runs: dict[str, Run], out: Path) -> str:
         figure=figure,
         how=how_it_went,
         likeness=likeness_of,
+        likenesses=likenesses_of(graded),
         ranked=ranked(graded),
         counted=[how for how in COUNTED if any(each.count(how) for each in graded.grades)],
         low=low,

@@ -100,10 +100,10 @@ def submissions_in(paths: Sequence[Path], folder: Path, what: str = "SUBMISSIONS
     """
     found: list[tuple[str, _Tree, str]] = []
     for path in paths:
-        found += _found_in(path)
+        found += _found_in(path, what)
         if len(found) > SUBMISSIONS_MAX:
             raise ParameterError(
-                f"submissions must be at most {SUBMISSIONS_MAX}, but there are more. Grade some at once."
+                f"{what} must be at most {SUBMISSIONS_MAX}, but there are more. Take some of them at once."
             )
     if not found:
         raise ParameterError(
@@ -123,13 +123,13 @@ def submissions_in(paths: Sequence[Path], folder: Path, what: str = "SUBMISSIONS
         return [_submission(name, tree, problem, folder, taken) for name, tree, problem in found]
 
 
-def _found_in(path: Path) -> list[tuple[str, _Tree, str]]:
+def _found_in(path: Path, what: str) -> list[tuple[str, _Tree, str]]:
     """Return name, files and problem of each submission in a path."""
     if path.is_dir():
         tree = _tree_of_folder(path)
         return [(path.name, tree, "")] if PurePosixPath(_MAIN) in tree else [*_split(tree)]
     if not path.is_file():
-        raise ParameterError(f"SUBMISSIONS must be files or folders, but there is no {shown(str(path))}.")
+        raise ParameterError(f"{what} must be files or folders, but there is no {shown(str(path))}.")
     read = _reader(path)
     if not zipfile.is_zipfile(path):
         return [(path.stem, {PurePosixPath(path.name): read}, "")]

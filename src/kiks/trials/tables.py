@@ -11,12 +11,15 @@ import io
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from kiks.errors import figure
+from kiks.errors import counted, figure
 from kiks.trials.grading import Grade, Graded
 from kiks.trials.trial import CRASHED, ENDED, ENDLESS, OUT_OF_TIME, STOPPED, Outcome
 
 COUNTED = (CRASHED, ENDLESS, OUT_OF_TIME, STOPPED)
 """How programs end that the tables count."""
+
+LIKENESSES_MAX = 20
+"""Most sentences about programs that are alike."""
 
 
 def cell(value: object) -> object:
@@ -56,6 +59,41 @@ def how_it_went(outcome: Outcome) -> str:
 def likeness_of(grade: Grade) -> str:
     """Return which others a submission is like."""
     return ", ".join(f"{name} ({'identical' if share == 1 else f'{share:.0%}'})" for name, share in grade.like)
+
+
+def likenesses_of(graded: Graded) -> list[str]:
+    r"""Return a sentence for each group of identical programs and each pair of nearly identical ones, at most 20.
+
+    Of a group that is like another program, only the first one is named.
+
+    Example:
+        >>> from kiks.trials.similarity import Likeness
+        >>> same = [Likeness(*pair, 1.0) for pair in (("ann", "bob"), ("ann", "eve"), ("bob", "eve"))]
+        >>> others = [Likeness("ann", "joe", 0.9), Likeness("bob", "joe", 0.9)]
+        >>> print(*likenesses_of(Graded("", "", 1.0, (), (), (*same, *others))), sep="\n")
+        ann, bob and eve are identical, but for names, comments, layout, numbers and texts.
+        ann and joe are 90% alike.
+    """
+    groups: dict[str, list[str]] = {}
+    first_of: dict[str, str] = {}
+    for pair in graded.likenesses:
+        if pair.share == 1:
+            first = first_of.setdefault(pair.first, pair.first)
+            if pair.second not in first_of:
+                first_of[pair.second] = first
+                groups.setdefault(first, [first]).append(pair.second)
+    lines = [
+        f"{', '.join(names[:-1])} and {names[-1]} are identical, but for names, comments, layout, numbers and texts."
+        for names in groups.values()
+    ] + [
+        f"{pair.first} and {pair.second} are {pair.share:.0%} alike."
+        for pair in graded.likenesses
+        if pair.share < 1 and all(first_of.get(name, name) == name for name in (pair.first, pair.second))
+    ]
+    if len(lines) > LIKENESSES_MAX:
+        more = len(lines) - LIKENESSES_MAX
+        lines[LIKENESSES_MAX:] = [f"So are {counted(more, 'pair')} more: see the column like of grades.csv."]
+    return lines
 
 
 def grades_csv(graded: Graded) -> str:
