@@ -111,25 +111,34 @@ class Judge:
         self._is_solved, self._is_over = False, False
         self._looked_ns: int | None = None
         self._began_ns = sim.now_ns
-        self._watched = self._watch(goal)
-        for name, watched in self._watch(goal).items():
-            # What is wrong with a formula is said before the run, of which this look is no part.
-            watched.look(0)
-            watched.number(name)
+        self._formulas = goal.formulas()
+        # What is wrong with a formula is said before the run, of which this look is no part.
+        terms = self._terms_of(goal)
+        terms.look(0)
+        for name, formula in self._formulas.items():
+            terms.number(formula, name)
+        self._terms = self._terms_of(goal)
 
-    def _watch(self, goal: Goal) -> dict[str, _Watched]:
-        own: dict[str, Callable[[], float]] = {
-            "time_s": lambda: self._sim.time_s,
-            "is_solved": lambda: float(self._is_solved),
-            "is_over": lambda: float(self._is_over),
-        }
-        found = {}
-        for name, formula in goal.formulas().items():
+    def _terms_of(self, goal: Goal) -> _Terms:
+        terms = _Terms(
+            self._sim,
+            goal.robot,
+            {
+                "time_s": lambda: self._sim.time_s,
+                "is_solved": lambda: float(self._is_solved),
+                "is_over": lambda: float(self._is_over),
+            },
+        )
+        for name, formula in self._formulas.items():
             try:
-                found[name] = _Watched(formula, self._sim, goal.robot, own)
+                terms.add(formula)
             except KiksError as error:
                 raise ParameterError(f"the goal's {name} {error}") from None
-        return found
+        return terms
+
+    def _number(self, name: str) -> float:
+        """Return the value of a formula at the last look."""
+        return self._terms.number(self._formulas[name], name)
 
     def supervise(self, sim: Simulation) -> Generator[float, None, None]:
         """Look at the goal until it is solved or has failed; see `kiks.sim.supervision.Supervision`."""
@@ -139,22 +148,22 @@ class Judge:
             if self.judgement is not None:
                 continue  # a person lets the world go on
             self._look()
-            if self._is_solved or self._watched["failed"].number("failed"):
+            if self._is_solved or self._number("failed"):
                 self.end()
                 return
             if sim.now_ns >= shown_ns:
                 shown_ns = sim.now_ns + ns_from_s(SHOWN_S)
-                sim.set_score(POINTS, self._watched["points"].number("points"))
+                sim.set_score(POINTS, self._number("points"))
 
     def end(self) -> Judgement:
         """Decide, if that is not done yet, write the result into the score, and return it."""
         if self.judgement is None:
             if self._sim.now_ns != self._looked_ns:
                 self._look()
-            is_failed = not self._is_solved and self._watched["failed"].number("failed") != 0
+            is_failed = not self._is_solved and self._number("failed") != 0
             self._is_over = not (self._is_solved or is_failed)
             self._solve()
-            points = round(self._watched["points"].number("points"), 3)
+            points = round(self._number("points"), 3)
             points = int(points) if points.is_integer() else points
             self.judgement = Judgement(self._is_solved, is_failed, points, self._sim.time_s)
             self._sim.set_score(POINTS, points)
@@ -165,71 +174,105 @@ class Judge:
         now_ns = self._sim.now_ns
         passed_ns = now_ns - (self._began_ns if self._looked_ns is None else self._looked_ns)
         self._looked_ns = now_ns
-        for watched in self._watched.values():
-            watched.look(passed_ns)
+        self._terms.look(passed_ns)
         self._solve()
 
     def _solve(self) -> None:
-        self._is_solved = self._is_solved or self._watched["solved"].number("solved") != 0
+        self._is_solved = self._is_solved or self._number("solved") != 0
 
 
 Watch = Callable[[int], Any]
 """What looks at the world for a term of a formula and returns its value; it is told the time since it looked [ns]."""
 
 
-class _Watched:
-    """A formula in a world: what each of its terms has seen.
+class _Terms:
+    """The terms of a goal's formulas in a world: each looks once at an instant, whichever formulas have it.
 
     Args:
-        formula: The formula.
         sim: The world.
         robot: The robot whose measures count.
-        own: The values of the judge's own names.
+        own: The values of the judge's own names, which change without a look.
     """
 
-    def __init__(self, formula: Formula, sim: Simulation, robot: int, own: dict[str, Callable[[], float]]) -> None:
-        self._formula, self._sim = formula, sim
-        self._terms = [_watcher(term, sim, robot, own) for term in formula.terms]
-        self._own = [own.get(str(term)) for term in formula.terms]
+    def __init__(self, sim: Simulation, robot: int, own: dict[str, Callable[[], float]]) -> None:
+        self._sim, self._robot, self._own = sim, robot, own
+        self._watches: dict[Term, Watch] = {}
+        self._values: dict[Term, Any] = {}
+        self._moments: dict[tuple[int, tuple[str, ...]], Any] = {}
+
+    def add(self, formula: Formula) -> None:
+        """Add the terms of a formula."""
+        for term in formula.terms:
+            if term.condition is not None:
+                self.add(term.condition)  # before the timer: it looks before
+            if term not in self._watches and str(term) not in self._own:
+                self._watches[term] = self._watch(term)
 
     def look(self, passed_ns: int) -> None:
-        """Let all terms look at the world once."""
-        self._values = [watch(passed_ns) for watch in self._terms]
+        """Let all terms look at the world once; the last look was some time ago [ns]."""
+        self._moments.clear()
+        for term, watch in self._watches.items():
+            self._values[term] = watch(passed_ns)
 
-    def number(self, name: str) -> float:
-        """Return the value at the last look, with the judge's own names as they are now.
+    def number(self, formula: Formula, name: str) -> float:
+        """Return the value of a formula at the last look, with the judge's own names as they are now.
 
         Args:
-            name: What messages call the formula.
+            formula: The formula.
+            name: What messages call it.
         """
-        values = [seen if tell is None else tell() for seen, tell in zip(self._values, self._own, strict=True)]
+        own = self._own
+        values = [tell() if (tell := own.get(str(term))) else self._values[term] for term in formula.terms]
         try:
-            return check_number(f"the goal's {name}", float(self._formula.value(values)), -SCORE_MAX, SCORE_MAX)
+            return check_number(f"the goal's {name}", float(formula.value(values)), -SCORE_MAX, SCORE_MAX)
         except (ArithmeticError, TypeError, ValueError) as error:
             if isinstance(error, KiksError):
                 raise
             raise ParameterError(
-                f"the goal's {name} must be a number, but {self._formula.text!r} has none at {self._sim.time_s:.1f} s: "
+                f"the goal's {name} must be a number, but {formula.text!r} has none at {self._sim.time_s:.1f} s: "
                 f"{error}."
             ) from None
 
+    def _watch(self, term: Term) -> Watch:
+        """Return what looks at the world for a term."""
+        sim = self._sim
+        if term.condition is not None:
+            return self._timer(term.condition, is_broken=term.name == "held_s")
+        named: dict[str, Any] = dict(term.named)
+        robot = sim.index_of(named.pop("robot", self._robot)) + 1
+        if term.name == "wall_mm" and not (term.arguments or named):
+            radius_mm = sim.specs[robot - 1].body.radius_mm
+            return lambda _: sim.world.free_space.wall_gap_mm(*sim.pose(robot)[:2], radius_mm)
+        if term.name == "score" and len(term.arguments) == 1 and not (named or isinstance(term.arguments[0], float)):
+            what = term.arguments[0]
+            return lambda _: _counted(sim, what)
+        return self._measured(_measure(term, named, sim.arena), robot)
 
-def _watcher(term: Term, sim: Simulation, robot: int, own: dict[str, Callable[[], float]]) -> Watch:
-    """Return what looks at the world for a term."""
-    if term.condition is not None:
-        return _timer(_Watched(term.condition, sim, robot, own), is_broken=term.name == "held_s")
-    named: dict[str, Any] = dict(term.named)
-    robot = sim.index_of(named.pop("robot", robot)) + 1
-    if term.name in own and not (term.arguments or named):
-        tell = own[term.name]
-        return lambda _: tell()
-    if term.name == "wall_mm" and not (term.arguments or named):
-        radius_mm = sim.specs[robot - 1].body.radius_mm
-        return lambda _: sim.world.free_space.wall_gap_mm(*sim.pose(robot)[:2], radius_mm)
-    if term.name == "score" and len(term.arguments) == 1 and not (named or isinstance(term.arguments[0], float)):
-        what = term.arguments[0]
-        return lambda _: _counted(sim, what)
-    return _measured(_measure(term, named, sim.arena), sim, robot)
+    def _measured(self, measure: Measure, robot: int) -> Watch:
+        """Return what lets a measure look at a robot."""
+        notes, key = np.zeros(measure.note_count), (robot, tuple(measure.senses))
+
+        def watch(passed_ns: int) -> float:
+            if key not in self._moments:
+                self._moments[key] = _moment(self._sim, *key, s_from_ns(passed_ns))
+            measure.kernel(self._moments[key], notes)
+            return float(measure.value(notes[None, None]).item())
+
+        return watch
+
+    def _timer(self, condition: Formula, *, is_broken: bool) -> Watch:
+        """Return what counts for how long a condition holds [s], from anew when it was broken, or in all."""
+        held_ns = 0
+
+        def watch(passed_ns: int) -> float:
+            nonlocal held_ns
+            if self.number(condition, "condition"):
+                held_ns += passed_ns
+            elif is_broken:
+                held_ns = 0
+            return s_from_ns(held_ns)
+
+        return watch
 
 
 _TYPED = {typed.partition("(")[0]: typed for typed in OWN_NAMES}
@@ -255,17 +298,6 @@ def _measure(term: Term, named: dict[str, Any], arena: Arena) -> Measure:
         return cast(Measure, made(*given, **named))
     except TypeError as error:
         raise ParameterError(f"must use {term.name} as its reference says, but {shown(str(term))}: {error}.") from None
-
-
-def _measured(measure: Measure, sim: Simulation, robot: int) -> Watch:
-    """Return what lets a measure look at a robot."""
-    notes = np.zeros(measure.note_count)
-
-    def watch(passed_ns: int) -> float:
-        measure.kernel(_moment(sim, robot, measure.senses, s_from_ns(passed_ns)), notes)
-        return float(measure.value(notes[None, None]).item())
-
-    return watch
 
 
 def _moment(sim: Simulation, robot: int, senses: Sequence[str], period_s: float) -> Any:
@@ -307,19 +339,3 @@ def _counted(sim: Simulation, what: int | str) -> float:
     if isinstance(value, str):
         raise ParameterError(f"the goal must use numbers of the score, but {shown(what)} is {shown(value)}.")
     return value
-
-
-def _timer(condition: _Watched, *, is_broken: bool) -> Watch:
-    """Return what counts for how long a condition holds [s], from anew when it was broken, or in all."""
-    held_ns = 0
-
-    def watch(passed_ns: int) -> float:
-        nonlocal held_ns
-        condition.look(passed_ns)
-        if condition.number("condition"):
-            held_ns += passed_ns
-        elif is_broken:
-            held_ns = 0
-        return s_from_ns(held_ns)
-
-    return watch
