@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import random
+import re
 import shutil
 import signal
 import subprocess
@@ -154,6 +155,16 @@ def test_what_lets_no_time_pass_is_stopped_and_named(tmp_path: Path) -> None:
         assert outcome.end_of().detail.startswith(words)
         assert not outcome.doubt
     sandboxes.close()
+
+
+def test_nothing_counts_of_a_run_that_a_faster_computer_would_have_had_more_of(tmp_path: Path) -> None:
+    text = "import time\nwhile True: sum(range(1_000_000)); time.sleep(0.001)"
+    project = Project(goal=Goal(points="1 + time_s"), seconds=10.0)
+    trial = Trial("a", project, tmp_path, (write(tmp_path, "a", text),), is_trusted=True)
+    outcome = run_trial(trial, tmp_path, Sandboxes(Limits(processor_s=0.1)))
+    assert outcome.end_of().how == STOPPED
+    assert re.fullmatch(r"computed for \d+ s in all", outcome.end_of().detail)
+    assert (outcome.points, outcome.time_s, outcome.state) == (0, 0.0, "")
 
 
 def test_a_program_that_waits_runs_out_of_simulated_time(tmp_path: Path) -> None:

@@ -94,7 +94,14 @@ def test_the_table_has_the_best_first_with_ratings_and_intervals() -> None:
     [
         ("seconds = 5.0\n", "has 1 robot. It needs a robot for each player"),
         ("seconds = 5.0\n[[robot]]\n[[robot]]\n", "names none. Write supervisor"),
-        ('supervisor = "referee.py"\n[[robot]]\n[[robot]]\n', "has no time limit. Write seconds"),
+        (
+            'supervisor = "referee.py"\n[[robot]]\n[[robot]]\n',
+            "must have a time limit, but 'match.kiks' has none. Write",
+        ),
+        (
+            'supervisor = "referee.py"\nseconds = 5.0\nthinking = "live"\n[[robot]]\n[[robot]]\n',
+            "must have a repeatable thinking time",
+        ),
     ],
 )
 def test_a_project_that_is_no_match_is_an_error(text: str, message: str, tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ import typer
 from kiks.cli.compare import FIGURES
 from kiks.cli.engine_start import ready_engine
 from kiks.cli.job import job_of
-from kiks.cli.options import World, print_table, progress_bar, say, written_folder
+from kiks.cli.options import World, print_table, progress_bar, say
 from kiks.cli.outputs import has_results, output, tell_results
 from kiks.cli.ranges import numbers_of
 from kiks.ending import end_as_with_ctrl_c
@@ -67,9 +67,7 @@ def sweep(
     ] = 1.0,
     out: Annotated[
         Path | None,
-        typer.Option(
-            help="Folder of recordings, outcomes and picture; kiks-sweep-PROGRAM if left out.", callback=written_folder
-        ),
+        typer.Option(help="Folder of recordings, outcomes and picture; kiks-sweep-PROGRAM if left out."),
     ] = None,
     picture: Annotated[
         Path | None,
@@ -87,6 +85,7 @@ def sweep(
 
     Example: kiks sweep wander.py --baud 9600,19200 --think 0..40:2 --family 10 --seeds 20
     """
+    from kiks.model.atomic_files import alone_in
     from kiks.trials.sweep import Axes
     from kiks.trials.sweep import sweep as swept
     from kiks.trials.sweep_plot import save_sweep_plot
@@ -100,7 +99,8 @@ def sweep(
         tuple(range(project.seed, project.seed + seeds)),
     )
     count = len(axes.cases())
-    folder = out or written_folder_of(program)
+    folder = out or Path(f"kiks-sweep-{Path(program).stem}")
+    context.with_resource(alone_in(folder, "--out"))
     goal, name = project.goal, Path(program).name
     assert goal is not None
     end_as_with_ctrl_c()
@@ -132,15 +132,6 @@ def sweep(
         "folder": str(folder),
     }
     tell_results(context, results, [f"Picture: {file}", f"{name} {found.verdict}; {see}"])
-
-
-def written_folder_of(program: str) -> Path:
-    """Return the folder of a sweep that names none, and make it."""
-    from kiks.model.atomic_files import make_folder
-
-    folder = Path(f"kiks-sweep-{Path(program).stem}")
-    make_folder(folder, "--out")
-    return folder
 
 
 def _project(job: Job, formulas: dict[str, str | None], seconds: float | None) -> Project:

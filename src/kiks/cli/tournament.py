@@ -62,6 +62,7 @@ def tournament(
 
     Example: kiks tournament soccer ann.py bob.py eve.py --rounds 5 --seeds 4
     """
+    from kiks.model.atomic_files import alone_in
     from kiks.model.shipped import demonstrations
     from kiks.trials.submissions import submissions_in
     from kiks.trials.tournament import Match, play
@@ -75,6 +76,7 @@ def tournament(
         )
     chosen = Match.load(path)
     out = out or Path(f"tournament-{chosen.title}")
+    context.with_resource(alone_in(out, "--out"))
     found = submissions_in(players, out / "programs", "PLAYERS")
     for each in found:
         if each.problem:

@@ -49,6 +49,9 @@ TRUSTED_SAMPLE_S = 0.5
 START_PATIENCE_S = 30.0
 """Longest wait for the start of a sandbox [s of real time]."""
 
+IDLE = "without using its robot"
+"""How a limit is named that only a program breaks which lets no simulated time pass."""
+
 STREAMS = {"PYTHONUNBUFFERED": "1", "PYTHONIOENCODING": "utf-8:backslashreplace"}
 """The environment of a program whose output another process reads: each line comes at once."""
 
@@ -225,14 +228,14 @@ class SandboxedProgram(Child):
             self._mark_ns, self._mark_s, self._waited_s = at_ns, now_s, 0.0
             return ""
         if now_s - self._mark_s > limits.computing_s:
-            return f"computed for {limits.computing_s:g} s without using its robot"
+            return f"computed for {limits.computing_s:g} s {IDLE}"
         if is_held_up:
             self._waited_s = 0.0
         elif not is_running:
             # More has passed if the thread that looks has itself waited for a processor.
             self._waited_s += min(passed_s, 2 * self._house.sample_s)
         if self._waited_s > limits.waiting_s:
-            return f"waited for {limits.waiting_s:g} s without using its robot"
+            return f"waited for {limits.waiting_s:g} s {IDLE}"
         return ""
 
 

@@ -14,7 +14,7 @@ from kiks.sim.from_project import in_case
 from kiks.trials.runner import run_trials
 from kiks.trials.similarity import Likeness, alike
 from kiks.trials.submissions import Submission
-from kiks.trials.trial import CRASHED, ENDLESS, OUT_OF_TIME, STOPPED, Outcome, Trial
+from kiks.trials.trial import CRASHED, ENDLESS, OUT_OF_TIME, STOPPED, Outcome, Trial, limit_of
 
 
 @dataclass(frozen=True)
@@ -110,16 +110,9 @@ def load_exercise(path: Path) -> tuple[Project, Path]:
             f"EXERCISE must have a goal, but {what} has none. Write [goal] with solved and points, or name a "
             "supervisor."
         )
-    if project.seconds is None:
-        raise ParameterError(f"EXERCISE must have a time limit, but {what} has none. Write seconds = 60.0.")
+    limit_of(project, "EXERCISE", what)
     if not project.robots:
         raise ParameterError(f"EXERCISE must have a robot, but {what} has none. Write [[robot]].")
-    for thinking in (project.thinking, *(policy for case in project.cases for policy in case.thinking)):
-        if thinking.startswith("live"):
-            raise ParameterError(
-                f"EXERCISE must have a repeatable thinking time, but that of {what} is {thinking!r}. Write "
-                'thinking = "none" or "fixed:20".'
-            )
     return project, project_file(path).parent
 
 

@@ -7,23 +7,32 @@ from dataclasses import replace
 from pathlib import Path
 from typing import NoReturn
 
-from kiks.errors import KiksError, ParameterError
+from kiks.errors import KiksError
 from kiks.ports.program_process import supervisor_of
 from kiks.ports.programs import Handle, Programs
+from kiks.ports.sandbox import IDLE
 from kiks.recording.recorder import RunRecorder, program_texts
 from kiks.sim.from_project import simulation_of, thinking_of
 from kiks.sim.judge import POINTS, Judgement
 from kiks.sim.simulation import Simulation
 from kiks.sim.supervision import JUDGE, Supervision
 from kiks.trials.sandboxes import Sandboxes
-from kiks.trials.trial import CRASHED, ENDED, ENDLESS, OUT_OF_TIME, RUNNING, STOPPED, Outcome, ProgramEnd, Trial
+from kiks.trials.trial import (
+    CRASHED,
+    ENDED,
+    ENDLESS,
+    OUT_OF_TIME,
+    RUNNING,
+    STOPPED,
+    Outcome,
+    ProgramEnd,
+    Trial,
+    limit_of,
+)
 from kiks.units import ns_from_s
 
 LINES = 10
 """Most lines of what a program has printed last that an outcome keeps."""
-
-_ENDLESS = ("computed", "waited")
-"""How reasons of a sandbox begin that mean an endless loop or wait."""
 
 LINE_CHARACTERS = 300
 """Most characters of such a line."""
@@ -38,12 +47,7 @@ def run_trial(trial: Trial, folder: Path, sandboxes: Sandboxes) -> Outcome:
         sandboxes: Where its programs run.
     """
     project = trial.project
-    seconds = project.seconds
-    if seconds is None:
-        raise ParameterError(
-            "a project in which programs are tried must have a time limit, but it says no seconds. Write "
-            "seconds = 60.0."
-        )
+    seconds = limit_of(project, "a project in which programs are tried", "it")
     commands = trial.programs
     for command in filter(None, commands):
         command.check_file()
@@ -141,8 +145,8 @@ def _end_of(handle: Handle, how: str) -> ProgramEnd:
     lines = [] if handle.output is None else handle.output.since(0)[1]
     detail = ""
     if handle.reason:
-        # What it takes is measured in time; nothing else that stops it is its own endless loop.
-        how, detail = ENDLESS if handle.reason.startswith(_ENDLESS) else STOPPED, handle.reason
+        # At which simulated time that was is the same on every computer only if it let no time pass.
+        how, detail = ENDLESS if handle.reason.endswith(IDLE) else STOPPED, handle.reason
     elif not handle.is_stopped:
         how = CRASHED if handle.code else ENDED
         if handle.code:

@@ -11,6 +11,7 @@ import ast
 import io
 import keyword
 import tokenize
+import warnings
 import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -103,7 +104,8 @@ def _tokens(text: str) -> list[str]:
 def _own_names(text: str) -> set[str] | None:
     """Return the names that a program gives; None if it is no Python."""
     try:
-        tree = ast.parse(text)
+        with warnings.catch_warnings(action="ignore"):
+            tree = ast.parse(text)
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         return None
     names = set()

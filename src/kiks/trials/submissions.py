@@ -152,7 +152,7 @@ def _reader(path: Path) -> Callable[[int], bytes]:
 
 def _bounded(data: bytes, most: int) -> bytes:
     if len(data) > most:
-        raise _ProblemError(f"it has more than {BYTES_MAX >> 20} MB")
+        raise _ProblemError(f"it has more than {max(most, BYTES_MAX) >> 20} MiB")
     return data
 
 

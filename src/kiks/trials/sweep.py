@@ -16,6 +16,7 @@ from kiks.errors import ParameterError
 from kiks.model.exercise import Case, Cases
 from kiks.model.goal import Goal
 from kiks.model.project import Project
+from kiks.model.thinking_policy import split_thinking
 from kiks.ports.program_process import Command
 from kiks.sim.from_project import in_case
 from kiks.trials.runner import run_trials
@@ -250,7 +251,7 @@ def sweep(
 
 
 def _thinking_ms(case: Case) -> float:
-    return float((case.thinking or "fixed:0").partition(":")[2])
+    return float(split_thinking(case.thinking or "none")[1])
 
 
 def _name_of(case: Case) -> str:

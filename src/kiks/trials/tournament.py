@@ -14,15 +14,18 @@ from itertools import combinations
 from pathlib import Path
 from typing import Any
 
-from kiks.errors import ParameterError, counted, library
-from kiks.model.project import Project, ProjectRobot
+from kiks.errors import ParameterError, counted, library, shown
+from kiks.model.project import Project, ProjectRobot, project_file
 from kiks.ports.program_process import Command, supervisor_of
 from kiks.trials.runner import run_trials
 from kiks.trials.submissions import Submission
-from kiks.trials.trial import FAILURES, Outcome, ProgramEnd, Trial
+from kiks.trials.trial import FAILURES, Outcome, ProgramEnd, Trial, limit_of
 
 GAMES_MAX = 20_000
 """Most games of a tournament."""
+
+NAME_MAX = 60
+"""Most characters of a game's name, which with an ending is that of a file: 255 bytes at most, four a character."""
 
 INTERVAL_SIGMAS = 2.0
 """Half the width of the interval in which a rating lies, in standard deviations: it holds in 95 of 100 cases."""
@@ -211,7 +214,7 @@ class Match:
             ParameterError: If the project is none: it needs two robots, a supervisor and a time limit.
         """
         project = Project.load(path)
-        folder = path if path.is_dir() else path.parent
+        folder = project_file(path).parent
         what = f"a match must be a project with a supervisor that counts the score, but {path.name!r}"
         if len(project.robots) < 2:
             raise ParameterError(
@@ -219,8 +222,7 @@ class Match:
             )
         if supervisor_of(project, folder) is None:
             raise ParameterError(f'{what} names none. Write supervisor = "referee.py".')
-        if project.seconds is None:
-            raise ParameterError(f"{what} has no time limit. Write seconds = 120.0.")
+        limit_of(project, "a match", shown(path.name))
         return cls(path.stem, project, folder)
 
     @property
@@ -237,7 +239,7 @@ class Match:
         )
         commands = tuple(_driving(player, robot) for player, robot in zip(own, self.project.robots, strict=True))
         project = replace(self.project, robots=robots, seed=game.seed, speed=None)
-        name = f"{number:04}-{'-'.join(player.id for player in own)}"
+        name = f"{number:04}-{'-'.join(player.id for player in own)}"[:NAME_MAX]
         return Trial(name, project, self.folder, commands, is_trusted=is_trusted)
 
 

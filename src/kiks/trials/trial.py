@@ -10,6 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from kiks.errors import ParameterError
 from kiks.model.atomic_files import inside
 from kiks.model.project import Project
 from kiks.model.thinking_policy import split_thinking
@@ -36,6 +37,28 @@ STOPPED = "stopped"
 
 FAILURES = (CRASHED, ENDLESS, STOPPED)
 """Ends of a program that has failed."""
+
+
+def limit_of(project: Project, kind: str, name: str) -> float:
+    """Return the time limit of a project whose runs are judged [s of simulated time].
+
+    Args:
+        project: The project.
+        kind: What messages call such a project, such as 'EXERCISE'.
+        name: What they call this one.
+
+    Raises:
+        ParameterError: If it has none, or a run would come out differently each time.
+    """
+    if project.seconds is None:
+        raise ParameterError(f"{kind} must have a time limit, but {name} has none. Write seconds = 60.0.")
+    for thinking in (project.thinking, *(policy for cases in project.cases for policy in cases.thinking)):
+        if split_thinking(thinking)[0] == "live":
+            raise ParameterError(
+                f"{kind} must have a repeatable thinking time, but that of {name} is {thinking!r}. Write "
+                'thinking = "none" or "fixed:20".'
+            )
+    return project.seconds
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ import asyncio
 import logging
 import re
 import secrets
+import threading
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
@@ -102,6 +103,7 @@ class Room:
         self._sandboxes: list[Sandbox] = []
         self._starter = ThreadPoolExecutor(max(processor_count() // 2, 1), "kiks room")
         self._turn = asyncio.Lock()
+        self._saving = threading.Lock()
         self._is_over = False
 
     # ---- from the thread of the command ----
@@ -203,7 +205,7 @@ class Room:
     def let_hand_in(self, is_open: bool) -> None:
         """Open or close handing in."""
         self.may_hand_in = is_open
-        for each in self.desks.values():
+        for each in tuple(self.desks.values()):  # another thread may open one meanwhile
             each.desk.may_hand_in = is_open
 
     async def picture(self, name: str) -> bytes:
@@ -213,8 +215,9 @@ class Room:
     # ---- inside ----
 
     def save(self) -> None:
-        """Write down which browser has which name, and how the desks do."""
-        write_seats(self.folder, self.seats, self.code)
+        """Write down which browser has which name, and how the desks do; from any thread."""
+        with self._saving:
+            write_seats(self.folder, self.seats, self.code)
 
     def _open(self, seat: Seat) -> None:
         """Open the desk of a student."""

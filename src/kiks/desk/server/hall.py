@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from kiks.desk.server.desk import Desk
+from kiks.errors import KiksError
 from kiks.trials.tournament import Played, Tournament
 
 BREAK_S = 8.0
@@ -80,7 +81,11 @@ class Hall:
         self._game = _Game(following)
         robots = zip(desk.project.robots, following.names, strict=True)
         desk.project = replace(desk.project, robots=tuple(replace(robot, name=name) for robot, name in robots))
-        await desk.looking.show_run(self._folder / following.outcome.recording)
+        try:
+            await desk.looking.show_run(self._folder / following.outcome.recording)
+        except KiksError as error:
+            desk.say(f"Game {following.number} cannot be shown: {error}")
+            self._finish(self._game)
         desk.tell()
 
     def _finish(self, game: _Game) -> None:
