@@ -125,6 +125,20 @@ def shown(value: object) -> str:
     return text if len(text) <= SHOWN_MAX else f"{text[: SHOWN_MAX - 4]}...{text[-1]}"
 
 
+def printable(text: str, instead: str = " ") -> str:
+    r"""Return a text of somebody else without what would steer a terminal, or break a line.
+
+    Args:
+        text: The text.
+        instead: What stands for each such character.
+
+    Example:
+        >>> printable("red\x1b[31m", "?")
+        'red?[31m'
+    """
+    return "".join(each if each.isprintable() else instead for each in text)
+
+
 def figure(limit: float) -> str:
     """Return how a message writes a limit.
 
@@ -135,14 +149,15 @@ def figure(limit: float) -> str:
     return str(limit) if isinstance(limit, int) else f"{limit:g}".replace("e+0", "e")
 
 
-def counted(count: int, noun: str) -> str:
+def counted(count: float, noun: str) -> str:
     """Return how many there are of something.
 
     Example:
-        >>> counted(1, "robot"), counted(3, "robot")
-        ('1 robot', '3 robots')
+        >>> counted(1, "robot"), counted(3, "robot"), counted(2.5, "point")
+        ('1 robot', '3 robots', '2.5 points')
     """
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+    number = str(count) if isinstance(count, int) else f"{count:g}"
+    return f"{number} {noun}" if count == 1 else f"{number} {noun}s"
 
 
 def library(name: str, extra: str = "learn") -> Any:

@@ -115,7 +115,7 @@ def test_what_an_archive_of_a_stranger_may_hold_is_named_and_reaches_nothing(tmp
     for words in (
         "has a link, 'link.py'",
         "names a file outside of it, '../../outside.py'",
-        "more than 10 MB",
+        "more than 10 MiB",
         "no program",
     ):
         assert words in told

@@ -5,24 +5,19 @@ from __future__ import annotations
 import shlex
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from kiks.cli.engine_start import ready_engine
-from kiks.cli.options import progress_bar, say
+from kiks.cli.options import Trusted, Workers, print_table, progress_bar, say
 from kiks.cli.outputs import has_results, tell_results
 from kiks.ending import end_as_with_ctrl_c
-from kiks.errors import counted
+from kiks.errors import counted, printable
 
 if TYPE_CHECKING:
     from kiks.trials.grading import Graded
     from kiks.trials.trial import Outcome
-
-Workers = Annotated[int | None, typer.Option(help="Worlds at once; one for each core if left out.", min=1, max=1000)]
-Trusted = Annotated[
-    bool, typer.Option("--trusted", help="Run the programs without a sandbox: they may do all that you may.")
-]
 
 
 @has_results
@@ -94,46 +89,21 @@ def grade(
 
 
 def _tell(graded: Graded, out: Path) -> None:
-    """Print the table, on the error output where the results are JSON."""
-    from rich.console import Console
-    from rich.table import Table
-    from rich.text import Text
-
+    """Print the table, and what people have to look at."""
     from kiks.trials.tables import COUNTED, likenesses_of, rows_of
 
-    console = Console(highlight=False)
-    rows = rows_of(graded)
-    heads = ["Name", "Points", "Solved", *(how.capitalize() for how in COUNTED), "Said last"]
-    last = len(heads) - 1
-    shown = [place for place, head in enumerate(heads) if place < 3 or any(row[place] for row in rows)]
-    table = Table(title=Text(plain(graded.title)), title_justify="left", expand=True)
-    for place in shown:
-        justify: Literal["left", "right"] = "right" if 0 < place < last else "left"
-        ratio = 1 if place == last else None
-        table.add_column(heads[place], justify=justify, ratio=ratio, overflow="ellipsis", no_wrap=place == last)
-    for row in rows:
-        # Text takes no markup of what students have written.
-        table.add_row(*(Text(plain(row[place])) for place in shown))
-    console.print(table)
+    typer.echo(printable(graded.title))
+    heads = ["name", "points", "solved", *COUNTED, "said last"]
+    print_table(heads, rows_of(graded), last_is_text=True)
     for line in likenesses_of(graded):
-        console.print(Text(plain(line)))
+        typer.echo(printable(line))
     for grade in graded.grades:
         if grade.submission.problem:
-            say(plain(f"{grade.submission.name} was not graded: {grade.submission.problem}."))
+            say(printable(f"{grade.submission.name} was not graded: {grade.submission.problem}."))
         for outcome in grade.outcomes:
             if outcome.doubt:
-                say(plain(f"{outcome.name} may come out differently next time: {outcome.doubt}."))
-    console.print(Text(f"{out / 'report.html'}: open it in a browser. {out / 'grades.csv'}, {out / 'moodle.csv'}"))
-
-
-def plain(text: str) -> str:
-    r"""Return a text without what would steer a terminal.
-
-    Example:
-        >>> plain("red\x1b[31m")
-        'red?[31m'
-    """
-    return "".join(each if each.isprintable() else "?" for each in text)
+                say(printable(f"{outcome.name} may come out differently next time: {outcome.doubt}."))
+    typer.echo(f"{out / 'report.html'}: open it in a browser. {out / 'grades.csv'}, {out / 'moodle.csv'}")
 
 
 def _results(graded: Graded, out: Path) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 
-from kiks.errors import ParameterError, nearest, shown
+from kiks.errors import ParameterError, nearest, printable, shown
 from kiks.model.atomic_files import make_folder
 from kiks.model.checks import ROBOTS_MAX
 
@@ -183,6 +183,12 @@ def is_project(file: str | Path) -> bool:
     return str(file).lower().endswith(".kiks") or (Path(file) / "exercise.kiks").is_file()
 
 
+Workers = Annotated[int | None, typer.Option(help="Worlds at once; one for each core if left out.", min=1, max=1000)]
+Trusted = Annotated[
+    bool, typer.Option("--trusted", help="Run the programs without a sandbox: they may do all that you may.")
+]
+
+
 def say(text: str) -> None:
     """Print a message for the user on the error output, apart from the results."""
     typer.echo(f"kiks: {text}", err=True)
@@ -200,17 +206,31 @@ def progress_bar(work: str) -> Iterator[Callable[..., None]]:
         yield lambda done, count=1: progress.update(bar, completed=done, total=count)
 
 
-def print_table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Print a table; the first column stands left, the numbers right."""
+def print_table(columns: Sequence[str], rows: Sequence[Sequence[str]], *, last_is_text: bool = False) -> None:
+    """Print a table without the columns that are empty; the first column stands left, the numbers right.
+
+    Args:
+        columns: The heads.
+        rows: The cells; what would steer the terminal is left out.
+        last_is_text: Whether the last column is a text, which stands left and is cut where the line ends.
+    """
     from rich.box import SIMPLE
     from rich.console import Console
     from rich.table import Table
 
+    used = [place for place in range(len(columns)) if any(row[place] for row in rows)]
     table = Table(box=SIMPLE, pad_edge=False)
-    for number, name in enumerate(columns):
-        table.add_column(name, justify="right" if number else "left", overflow="fold")
+    for place in used:
+        is_text = last_is_text and place == len(columns) - 1
+        table.add_column(
+            columns[place],
+            justify="right" if place and not is_text else "left",
+            overflow="ellipsis" if is_text else "fold",
+            min_width=max(map(len, columns[place].split()), default=0),
+            no_wrap=is_text,
+        )
     for row in rows:
-        table.add_row(*row)
+        table.add_row(*(printable(row[place], "?") for place in used))
     console = Console(markup=False, highlight=False)
     console.print(table)
 

@@ -11,6 +11,7 @@ import typer
 
 from kiks.cli.desk import wait_for
 from kiks.cli.engine_start import ready_engine
+from kiks.cli.options import Trusted
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import ParameterError, shown
 
@@ -34,9 +35,7 @@ def room(
         str,
         typer.Option(metavar="URL", help="The address that people open, behind a proxy: https://kiks.school.example."),
     ] = "",
-    trusted: Annotated[
-        bool, typer.Option("--trusted", help="Run students' programs with your rights where there is no sandbox.")
-    ] = False,
+    trusted: Trusted = False,
 ) -> None:
     """Open a room: one address for a class, and a desk for each student.
 
@@ -47,7 +46,7 @@ def room(
     """
     from kiks.desk.room.entrance import check_code
     from kiks.desk.room.names import read_names
-    from kiks.model.project import Project
+    from kiks.model.project import Project, project_file
 
     names, code = read_names(students), check_code(code) if code is not None else ""
     _check_address(address)
@@ -56,8 +55,7 @@ def room(
     from kiks.desk.room.page import open_room
     from kiks.desk.room.room import Room
 
-    home = exercise if exercise.is_dir() else exercise.parent
-    opened = Room(project, home, names, folder, code=code, address=address, is_trusted=trusted)
+    opened = Room(project, project_file(exercise).parent, names, folder, code=code, address=address, is_trusted=trusted)
     with open_room(opened, host=host, port=port):
         end_as_with_ctrl_c()
         typer.echo(f"For the class: {opened.address}   The code: {opened.code}")

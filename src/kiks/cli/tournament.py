@@ -10,12 +10,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from kiks.cli.engine_start import ready_engine
-from kiks.cli.grade import Trusted, Workers, plain
 from kiks.cli.job import demonstration_of
-from kiks.cli.options import SeedOrOwn, print_table, progress_bar, say
+from kiks.cli.options import SeedOrOwn, Trusted, Workers, print_table, progress_bar, say
 from kiks.cli.outputs import has_results, leave_out, tell_results
 from kiks.ending import end_as_with_ctrl_c
-from kiks.errors import KiksError, ParameterError, counted, nearest
+from kiks.errors import KiksError, ParameterError, counted, nearest, printable
 
 if TYPE_CHECKING:
     from kiks.trials.submissions import Submission
@@ -80,7 +79,7 @@ def tournament(
     found = submissions_in(players, out / "programs", "PLAYERS")
     for each in found:
         if each.problem:
-            say(plain(f"{each.name} does not play: {each.problem}."))
+            say(printable(f"{each.name} does not play: {each.problem}."))
     playing = [each for each in found if each.command is not None]
     first = chosen.project.seed if seed is None else seed
     ready_engine()
@@ -118,12 +117,10 @@ def tournament(
     except KeyboardInterrupt:
         say(f"stopped after {counted(done, 'game')}. The same command goes on from there.")
         raise
-    rows = [tuple(map(plain, row)) for row in rows_of(made)]
-    shown = [place for place, head in enumerate(HEADS) if head != "failed" or any(row[place] for row in rows)]
-    print_table([HEADS[place] for place in shown], [[row[place] for place in shown] for row in rows])
+    print_table(HEADS, rows_of(made))
     for each_played in made.played:
         for text in each_played.notes:
-            say(plain(f"{' - '.join(each_played.names)}, seed {each_played.game.seed}: {text}."))
+            say(printable(f"{' - '.join(each_played.names)}, seed {each_played.game.seed}: {text}."))
     if not made.played:
         raise ParameterError("a tournament must have games, but there are none. Add players or rounds.")
     tell_results(

@@ -34,7 +34,7 @@ import pydantic.dataclasses
 from pydantic import ConfigDict, Field, Strict, Tag, TypeAdapter, ValidationError
 from pydantic_core import core_schema
 
-from kiks.errors import SHOWN_MAX, KiksError, ParameterError, nearest, shown
+from kiks.errors import SHOWN_MAX, KiksError, ParameterError, nearest, printable, shown
 from kiks.model.limits import DATA_FILE_BYTES_MAX
 
 TEXT_MAX = 1000
@@ -206,7 +206,7 @@ def _load_toml(text: str) -> dict[str, Any]:
 
 def one_line(failure: BaseException) -> str:
     """Return the text of a foreign exception, for the middle of a message."""
-    text = " ".join("".join(sign if sign.isprintable() else " " for sign in str(failure)).split())
+    text = " ".join(printable(str(failure)).split())
     if isinstance(failure, RecursionError):
         return "it is nested too deeply"
     if "set_int_max_str_digits" in text:

@@ -14,7 +14,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from kiks.errors import ParameterError, nearest, shown
+from kiks.errors import ParameterError, nearest, printable, shown
 from kiks.model.arena_file import toml
 from kiks.model.atomic_files import path_of, replace_file
 from kiks.model.checks import ROBOTS_MAX, check_count
@@ -457,4 +457,4 @@ def robot_toml(spec: RobotSpec, comment: str = "") -> str:
 
 def _printable(line: str) -> str:
     """Return a line without characters that TOML allows in no comment."""
-    return "".join(character if character.isprintable() else "?" for character in line)
+    return printable(line, "?")

@@ -8,7 +8,7 @@ from collections.abc import Callable, Generator
 from inspect import isgeneratorfunction
 from pathlib import Path
 
-from kiks.errors import KiksError, ParameterError
+from kiks.errors import KiksError, ParameterError, counted
 from kiks.model.checks import SECONDS_MAX, check_number
 from kiks.model.goal import Goal
 from kiks.sim.judge import Judge
@@ -87,7 +87,7 @@ class Supervision:
         if self.judge is None:
             return ""
         judgement = self.judge.end()
-        return f"Goal {judgement}, {judgement.points:g} point{'' if judgement.points == 1 else 's'}."
+        return f"Goal {judgement}, {counted(judgement.points, 'point')}."
 
     def _finish(self, code: int, message: str) -> None:
         self._due_ns = dict.fromkeys(self._due_ns, NEVER_NS)

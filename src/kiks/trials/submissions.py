@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 
-from kiks.errors import ParameterError, shown
+from kiks.errors import ParameterError, printable, shown
 from kiks.model.atomic_files import explained
 from kiks.ports.program_process import Command
 from kiks.trials.hand_in import HAND_IN_BYTES_MAX, PROGRAM
@@ -272,7 +272,7 @@ def _submission(name: str, tree: _Tree, problem: str, folder: Path, taken: set[s
     participant = moodle["id"] if moodle else ""
     email = found[1] if (found := re.search(r" <([^<>]*)>$", name)) else ""
     plain = moodle["name"] if moodle else name.removesuffix(f" <{email}>")
-    plain = " ".join("".join(each if each.isprintable() else " " for each in plain).split())[:NAME_MAX] or "nameless"
+    plain = " ".join(printable(plain).split())[:NAME_MAX] or "nameless"
     word = base = re.sub(r"[^\w-]+", "-", plain).strip("-")[:NAME_MAX] or "nameless"
     number = 1
     while word.lower() in taken:

@@ -91,8 +91,8 @@ class Tried:
     def how(self) -> str:
         """How it has ended."""
         if (end := self._failure) is not None:
-            return f"{end.name} {end.how}: {end.detail}" if end.detail else f"{end.name} {end.how}"
-        return f"{self.outcome.points:.4g} points" if self.is_solved else str(self.outcome.score["result"])
+            return f"{end.name} {end}"
+        return f"{self.outcome.points:.4g} points" if self.is_solved else str(self.outcome.judgement)
 
     def __str__(self) -> str:
         return f"seed {self.seed}, {f'robot {self.robot}' if self.robot else 'the exact robot'}"

@@ -11,9 +11,9 @@ import io
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from kiks.errors import counted, figure
+from kiks.errors import counted, figure, printable
 from kiks.trials.grading import Grade, Graded
-from kiks.trials.trial import CRASHED, ENDED, ENDLESS, OUT_OF_TIME, STOPPED, Outcome
+from kiks.trials.trial import CRASHED, ENDLESS, OUT_OF_TIME, RUNNING, STOPPED, Outcome
 
 COUNTED = (CRASHED, ENDLESS, OUT_OF_TIME, STOPPED)
 """How programs end that the tables count."""
@@ -31,7 +31,7 @@ def cell(value: object) -> object:
     """
     if not isinstance(value, str):
         return value
-    value = "".join(each if each.isprintable() else " " for each in value)
+    value = printable(value)
     if value.lstrip()[:1] in ("=", "+", "-", "@", "|", "%"):
         return f"'{value}"
     return value
@@ -48,12 +48,8 @@ def csv_of(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
 
 def how_it_went(outcome: Outcome) -> str:
     """Return in a few words how a case went."""
-    end = outcome.end_of()
-    if outcome.is_solved:
-        return f"solved after {outcome.time_s:.1f} s"
-    if end.how in (ENDED, CRASHED, ENDLESS, OUT_OF_TIME, STOPPED):
-        return f"{end.how} after {outcome.time_s:.1f} s"
-    return f"{'failed' if outcome.is_failed else 'not solved'} after {outcome.time_s:.1f} s"
+    how = outcome.end_of().how
+    return str(outcome.judgement) if outcome.is_solved or how == RUNNING else f"{how} after {outcome.time_s:.1f} s"
 
 
 def likeness_of(grade: Grade) -> str:

@@ -97,7 +97,7 @@ class Played:
     def notes(self) -> list[str]:
         """A line for each player that has failed."""
         named = zip(self.names, self.failures, strict=True)
-        return [f"{name} {end.how}{f': {end.detail}' if end.detail else ''}" for name, end in named if end is not None]
+        return [f"{name} {end}" for name, end in named if end is not None]
 
 
 @dataclass(frozen=True)

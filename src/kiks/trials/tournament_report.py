@@ -95,10 +95,9 @@ def save_tournament(
         left -= sum(map(len, run.values()))
         if left < 0:
             del runs[name]
-    page = page_template("tournament.html")
-    page.environment.filters["figure"] = figure
     text = page_template("tournament.html").render(
         tournament=tournament,
+        figure=figure,
         heads=[head.capitalize() for head in HEADS],
         rows=rows_of(tournament),
         seconds=seconds,

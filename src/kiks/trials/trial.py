@@ -15,6 +15,7 @@ from kiks.model.atomic_files import inside
 from kiks.model.project import Project
 from kiks.model.thinking_policy import split_thinking
 from kiks.ports.program_process import Command, supervisor_of
+from kiks.sim.judge import Judgement
 from kiks.version import __version__
 
 ENDED = "ended"
@@ -150,6 +151,9 @@ class ProgramEnd:
     detail: str = ""
     printed: tuple[str, ...] = ()
 
+    def __str__(self) -> str:
+        return f"{self.how}: {self.detail}" if self.detail else self.how
+
 
 @dataclass(frozen=True)
 class Outcome:
@@ -180,6 +184,11 @@ class Outcome:
     state: str
     recording: str
     doubt: str = ""
+
+    @property
+    def judgement(self) -> Judgement:
+        """How the run was judged."""
+        return Judgement(self.is_solved, self.is_failed, self.points, self.time_s)
 
     def end_of(self, robot: int = 1) -> ProgramEnd:
         """Return how the program of a robot has ended.

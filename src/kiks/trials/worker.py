@@ -41,9 +41,14 @@ def unpacked(text: str) -> tuple[Trial, Path]:
 
 
 def _show(recording: str) -> str:
-    from kiks.trials.player import player_of
+    """Return what `web/grades.js` puts together to a page that plays a recording, as JSON."""
+    from kiks.export.page import page_template, player_values
+    from kiks.export.run_frames import RunFrames
+    from kiks.recording.recording import Recording
 
-    return json.dumps(player_of(Path(recording)))
+    frames = RunFrames(Recording(recording).log)
+    section = page_template("run_player.html").render(player_values(frames))
+    return json.dumps({"section": section, "frames": frames.pack()})
 
 
 def main() -> None:

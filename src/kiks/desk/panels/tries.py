@@ -102,7 +102,7 @@ class TriesPanel(Panel):
         if self._is_packing:
             return "Writing what is handed in ..."
         of = "" if tries.is_whole else f", {len(tries.cases) - len(tries.outcomes)} not tried"
-        return f"{grade.solved} of {len(grade.outcomes)} solved, {_points(grade.points)}{of}."
+        return f"{grade.solved} of {len(grade.outcomes)} solved, {counted(grade.points, 'point')}{of}."
 
     def _build_table(self) -> None:
         tries = self._desk.tries
@@ -165,10 +165,6 @@ class TriesPanel(Panel):
         else:
             await asyncio.to_thread(desk.hand_in, data, name)
             ui.notify(f"Handed in: {self._state()}", type="positive")
-
-
-def _points(points: float) -> str:
-    return f"{points:g} point{'' if points == 1 else 's'}"
 
 
 def _detail(outcome: Outcome) -> str:

@@ -14,6 +14,7 @@ from kiks.desk.panels.page import ACCENT, POSITIVE, PRIMARY
 from kiks.desk.panels.widgets import WEB, agrees, dialog, heading, icon_button, named, told, with_props
 from kiks.desk.room.room import Room
 from kiks.desk.room.seats import Seat
+from kiks.errors import counted
 
 REFRESH_S = 1.0
 """Period at which the texts are refreshed [s]; pictures are as old at most."""
@@ -119,7 +120,7 @@ class _Card:
         else:
             is_running = any(each.is_running for each in opened.desk.programs.handles)
             if seat.points is not None:
-                words.append(f"{seat.points:g} point{'' if seat.points == 1 else 's'}")
+                words.append(counted(seat.points, "point"))
             if seat.handed_in:
                 words.append("handed in")
             words.append("no browser" if seat.key is None else "a program runs" if is_running else "at the desk")
