@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from kiks.cli.ranges import numbers_of
 from kiks.errors import ParameterError
+from kiks.model.ranges import numbers_of
 from kiks.trials.sweep import Axes, Sweep, Tried
 from kiks.trials.trial import CRASHED, RUNNING, Outcome, ProgramEnd
 

@@ -14,9 +14,9 @@ from kiks.cli.engine_start import ready_engine
 from kiks.cli.job import job_of
 from kiks.cli.options import World, print_table, progress_bar, say
 from kiks.cli.outputs import has_results, output, tell_results
-from kiks.cli.ranges import numbers_of
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import counted
+from kiks.model.ranges import numbers_of
 
 if TYPE_CHECKING:
     from kiks.cli.job import Job

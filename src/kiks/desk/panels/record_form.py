@@ -14,7 +14,7 @@ from kiks.desk.panels.properties import label_of, rules_of
 from kiks.desk.panels.widgets import named, with_props
 from kiks.errors import KiksError, ParameterError, shown
 from kiks.model.data_file import check
-from kiks.model.exercise import LISTED_MAX
+from kiks.model.ranges import numbers_of
 
 Examine = Callable[[str, Any], Awaitable[object]]
 
@@ -138,19 +138,7 @@ def _read(typed: str, rule: Mapping[str, Any], before: Any) -> Any:
     if "$ref" in items:
         return tuple(_place(each) for each in typed.split(";") if each.strip())
     words = [each.strip() for each in typed.split(",") if each.strip()]
-    if items.get("type") != "integer":
-        return tuple(words)
-    return tuple(value for word in words for value in _span(word))
-
-
-def _span(word: str) -> Sequence[Any]:
-    """Return the numbers of a word: one, or those from the first to the last of '1..20'."""
-    if (found := re.fullmatch(r"(\d{1,18})\.\.(\d{1,18})", word)) is None:
-        return [_number(word, int)]
-    first, last = int(found[1]), int(found[2])
-    if last - first >= LISTED_MAX:
-        raise ParameterError(f"must be at most {LISTED_MAX} values, but {shown(word)} are more. Shorten it.")
-    return range(first, last + 1)
+    return numbers_of(",".join(words), "The list", step=1) if words and items.get("type") == "integer" else tuple(words)
 
 
 def _place(typed: str) -> dict[str, Any]:
