@@ -338,7 +338,7 @@ def test_a_desk_stays_with_the_exercise(room: Room) -> None:
 
 
 def test_a_room_without_a_sandbox_does_not_open(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("kiks.ports.sandbox.shutil.which", lambda name: None)
+    monkeypatch.setattr("kiks.ports.bubblewrap.shutil.which", lambda name: None)
     with pytest.raises(KiksError, match="must run in a sandbox") as raised:
         Room(exercise(), tmp_path, NAMES, tmp_path / "room")
     assert "--trusted" in str(raised.value)

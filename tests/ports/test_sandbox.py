@@ -241,10 +241,10 @@ def test_program_reaches_no_file_network_or_neighbour(
         plain.write_text(PLAIN)
         with Sandbox([tmp_path / "prowler"], limits=Limits(files_mb=8)) as sandbox:
             _, code, lines = run(Command(plain, [json.dumps(told)]), sandbox)
-            house = sandbox._house
+            before = sandbox._processes
             plain.write_text(GOOD)
             assert run(Command(plain), sandbox) == usual
-            assert sandbox._house is house, "its warm process lives on"
+            assert sandbox._processes is before, "its warm process lives on"
         for each in (tcp, udp, local):
             each.setblocking(False)
             with pytest.raises(BlockingIOError):

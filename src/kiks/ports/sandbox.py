@@ -18,24 +18,23 @@ import resource
 import select
 import shutil
 import signal
-import site
 import socket
 import subprocess
-import sys
 import tempfile
 import threading
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
-import kiks
 from kiks.clock.patience import Patience
 from kiks.errors import KiksError
 from kiks.model.thinking_policy import split_thinking
+from kiks.ports.bubblewrap import WRITABLE, bubblewrap_line, complaint_of, python_folders
 from kiks.ports.environment_marks import HASH_SEED
 from kiks.ports.messages import Start
+from kiks.ports.process_table import ProcessTable
 from kiks.ports.program_process import Child, python_line
 from kiks.ports.system_calls import system_call_filter
 from kiks.units import s_from_ns
@@ -56,14 +55,9 @@ STREAMS = {"PYTHONUNBUFFERED": "1", "PYTHONIOENCODING": "utf-8:backslashreplace"
 """The environment of a program whose output another process reads: each line comes at once."""
 
 _ENVIRONMENT = {"PATH": "/usr/bin:/bin", "LANG": "C.UTF-8", "HOME": "/tmp", "TMPDIR": "/tmp"}
-_SYSTEM_FOLDERS = ("/bin", "/sbin", "/lib", "/lib32", "/lib64", "/libx32")
-_SYSTEM_FILES = ("/etc/ld.so.cache", "/etc/alternatives", "/etc/localtime")
-_WRITABLE = ("/tmp", "/dev/shm")
 _ADDRESS_SPACE_BYTES = 4 << 30
 _DESCRIPTORS_MAX = 256
 _MEGABYTE = 1_000_000
-_TICKS_A_SECOND = os.sysconf("SC_CLK_TCK")
-_PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")
 
 
 Progress = Callable[[], tuple[int, bool]]
@@ -117,7 +111,7 @@ class Sandbox:
         self.limits = limits or Limits()
         self.is_trusted = is_trusted
         self._lock = threading.Lock()
-        self._house: _House | None = None
+        self._processes: _Processes | None = None
 
     def __enter__(self) -> Sandbox:
         return self
@@ -162,22 +156,22 @@ class Sandbox:
     def close(self) -> None:
         """End all processes in it."""
         with self._lock:
-            if self._house is not None:
-                self._house.close()
-                self._house = None
+            if self._processes is not None:
+                self._processes.close()
+                self._processes = None
 
-    def _warm(self) -> _House:
-        if self._house is None or self._house.is_over:
-            self._house = _House(self)
-        return self._house
+    def _warm(self) -> _Processes:
+        if self._processes is None or self._processes.is_over:
+            self._processes = _Processes(self)
+        return self._processes
 
 
 class SandboxedProgram(Child):
     """A program in a sandbox."""
 
-    def __init__(self, house: _House, number: int, progress: Progress) -> None:
-        self._house, self._number, self._progress = house, number, progress
-        self._begin_s = self._mark_s = house.processor_s
+    def __init__(self, processes: _Processes, number: int, progress: Progress) -> None:
+        self._processes, self._number, self._progress = processes, number, progress
+        self._begin_s = self._mark_s = processes.processor_s
         self._mark_ns = progress()[0]
         self._waited_s = 0.0
         self._printed_count = 0
@@ -188,11 +182,11 @@ class SandboxedProgram(Child):
     @property
     def processor_s(self) -> float:
         """Processor time since its start, of all programs in its sandbox [s]."""
-        return self._house.processor_s - self._begin_s
+        return self._processes.processor_s - self._begin_s
 
     def signal(self, number: int) -> None:
         """Send a signal to it and its child processes."""
-        self._house.send(["signal", self._number, number])
+        self._processes.send(["signal", self._number, number])
 
     def wait(self) -> None:
         """Wait until it has ended."""
@@ -204,8 +198,8 @@ class SandboxedProgram(Child):
     def note_output(self, count: int) -> None:
         """Note that it has printed some bytes."""
         self._printed_count += count
-        if self._printed_count > self._house.limits.output_mb * _MEGABYTE:
-            self._house.kill(f"printed more than {self._house.limits.output_mb:g} MB", self)
+        if self._printed_count > self._processes.limits.output_mb * _MEGABYTE:
+            self._processes.kill(f"printed more than {self._processes.limits.output_mb:g} MB", self)
 
     def end(self, code: int) -> None:
         """Note that it has ended, with an exit code or minus the number of a signal."""
@@ -220,7 +214,7 @@ class SandboxedProgram(Child):
             is_running: Whether a process of the sandbox computes now, or has since the last look.
             passed_s: Real time since then [s].
         """
-        limits, now_s = self._house.limits, self._house.processor_s
+        limits, now_s = self._processes.limits, self._processes.processor_s
         at_ns, is_held_up = self._progress()
         if now_s - self._begin_s > limits.processor_s + s_from_ns(at_ns):
             return f"computed for {now_s - self._begin_s:.0f} s in all"
@@ -233,24 +227,13 @@ class SandboxedProgram(Child):
             self._waited_s = 0.0
         elif not is_running:
             # More has passed if the thread that looks has itself waited for a processor.
-            self._waited_s += min(passed_s, 2 * self._house.sample_s)
+            self._waited_s += min(passed_s, 2 * self._processes.sample_s)
         if self._waited_s > limits.waiting_s:
             return f"waited for {limits.waiting_s:g} s {IDLE}"
         return ""
 
 
-class _Sample(NamedTuple):
-    """A process at an instant: its processor time, and that of its ended children [s]; its memory [bytes]."""
-
-    process: int
-    parent: int
-    is_running: bool
-    own_s: float
-    children_s: float
-    memory: int
-
-
-class _House:
+class _Processes:
     """The processes of a sandbox, from the start of the nursery to its end.
 
     Attributes:
@@ -274,8 +257,7 @@ class _House:
         self._sending = threading.Lock()
         self._is_ready = threading.Event()
         self._complaint = ""
-        self._processes = -1
-        self._first = 0
+        self._table: ProcessTable | None = None
         try:
             with there:
                 self._begin(sandbox, there)
@@ -328,8 +310,8 @@ class _House:
     def _begin(self, sandbox: Sandbox, there: socket.socket) -> None:
         """Start the nursery in a thread that lives as long: Linux ends a child with the thread that started it."""
         limits = self.limits
-        folders = [self._scratch] if self._is_trusted else list(_WRITABLE)
-        seen = [] if self._is_trusted else [str(path) for path in [*_python_folders(), *sandbox.files]]
+        folders = [self._scratch] if self._is_trusted else list(WRITABLE)
+        seen = [] if self._is_trusted else [str(path) for path in [*python_folders(), *sandbox.files]]
         each = {
             "RLIMIT_AS": int(limits.memory_mb * _MEGABYTE) + _ADDRESS_SPACE_BYTES,
             "RLIMIT_FSIZE": int(limits.files_mb * _MEGABYTE),
@@ -343,7 +325,7 @@ class _House:
         environment = HASH_SEED | os.environ | STREAMS if self._is_trusted else HASH_SEED | _ENVIRONMENT | STREAMS
         passed, info = [there.fileno()], None
         if not self._is_trusted:
-            words = _bwrap(seen, int(limits.files_mb * _MEGABYTE))
+            words = bubblewrap_line(seen, int(limits.files_mb * _MEGABYTE))
             info, info_there = os.pipe()
             passed.append(info_there)
             calls, calls_there = os.pipe()
@@ -396,7 +378,7 @@ class _House:
                 self._is_ready.set()
                 self._hear()
             else:
-                self._complaint = _complaint(errors, is_trusted=self._is_trusted)
+                self._complaint = complaint_of(errors, is_trusted=self._is_trusted)
         finally:
             with self._lock:
                 self.is_over = True
@@ -405,9 +387,8 @@ class _House:
             for program in self._programs.values():
                 program.reason = program.reason or "ended its sandbox"
                 program.end(-signal.SIGKILL)
-            if self._processes >= 0:
-                folder, self._processes = self._processes, -1
-                os.close(folder)
+            if self._table is not None:
+                self._table.close()
             if self._scratch:
                 shutil.rmtree(self._scratch, ignore_errors=True)
 
@@ -419,10 +400,8 @@ class _House:
         except OSError:
             return False
         self._control.settimeout(None)
-        self._first = self._popen.pid if info is None else json.loads(os.read(info, 1 << 12))["child-pid"]
-        with contextlib.suppress(OSError):
-            folder = "/proc" if info is None else f"/proc/{self._first}/root/proc"
-            self._processes = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+        first = self._popen.pid if info is None else json.loads(os.read(info, 1 << 12))["child-pid"]
+        self._table = ProcessTable(first, is_namespace=info is not None)
         return True
 
     def _hear(self) -> None:
@@ -453,7 +432,8 @@ class _House:
 
     def _broken_limit(self, passed_s: float) -> tuple[str, SandboxedProgram | None]:
         """Look at all processes; return which limit is broken, empty if none, and by which program if that is known."""
-        samples = self._samples()
+        assert self._table is not None
+        samples = self._table.samples()
         # Of the nursery's own time only that of the programs that have ended.
         taken_s = sum(each.children_s for each in samples) + sum(each.own_s for each in samples[1:])
         is_running = taken_s > self.processor_s or any(each.is_running for each in samples[1:])
@@ -462,7 +442,7 @@ class _House:
         if len(others) > limits.processes:
             return f"started more than {limits.processes} processes", None
         if sum(each.memory for each in others) > limits.memory_mb * _MEGABYTE and (
-            sum(self._own_memory(each) for each in others) > limits.memory_mb * _MEGABYTE
+            sum(self._table.own_memory(each) for each in others) > limits.memory_mb * _MEGABYTE
         ):
             return f"used more than {limits.memory_mb:g} MB of memory", None
         for program in list(self._programs.values()):
@@ -471,124 +451,18 @@ class _House:
                 return reason, program
         return "", None
 
-    def _samples(self) -> list[_Sample]:
-        """Return the processes of the sandbox; the nursery comes first."""
-        if self._processes < 0:
-            return []
-        first = self._first if self._is_trusted else 1
-        found = {}
-        for name in os.listdir(self._processes):
-            if name.isdigit() and (sample := _sample(self._processes, int(name))) is not None:
-                found[sample.process] = sample
-        if first not in found:
-            return []
-        if not self._is_trusted:
-            return [found.pop(first), *found.values()]
-        children: dict[int, list[int]] = {}
-        for each in found.values():
-            children.setdefault(each.parent, []).append(each.process)
-        family = [first]
-        for process in family:
-            family += children.get(process, [])
-        return [found[process] for process in family]
-
-    def _own_memory(self, sample: _Sample) -> int:
-        """Return the memory of a process, of shared pages its share [bytes]."""
-        text = _read(self._processes, f"{sample.process}/smaps_rollup")
-        shares = [line.split()[1] for line in text.splitlines() if line.startswith("Pss:")]
-        return int(shares[0]) * 1024 if shares else sample.memory
-
     def _kill(self) -> None:
         popen = self._popen
-        if self._is_trusted:
+        if self._is_trusted and self._table is not None:
             # Twice: a process may have forked meanwhile. A namespace ends with its first process.
             for _ in range(2):
-                for sample in self._samples()[1:]:
+                for sample in self._table.samples()[1:]:
                     with contextlib.suppress(ProcessLookupError, PermissionError):
                         os.kill(sample.process, signal.SIGKILL)
         popen.kill()
-
-
-def _sample(folder: int, process: int) -> _Sample | None:
-    text = _read(folder, f"{process}/stat")
-    # Its name, in brackets, may hold anything. See proc(5).
-    fields = text.rpartition(")")[2].split()
-    if len(fields) < 22:
-        return None
-    own_s, children_s = (sum(map(int, fields[at : at + 2])) / _TICKS_A_SECOND for at in (11, 13))
-    return _Sample(process, int(fields[1]), fields[0] in "RD", own_s, children_s, int(fields[21]) * _PAGE_BYTES)
-
-
-def _read(folder: int, name: str) -> str:
-    try:
-        with open(name, "rb", opener=lambda path, flags: os.open(path, flags, dir_fd=folder)) as file:
-            return file.read().decode(errors="replace")
-    except OSError:
-        return ""
 
 
 def _counts_by_namespace() -> bool:
     """Return whether the system counts the processes of a user in each namespace apart: Linux since 5.14."""
     found = re.match(r"(\d+)\.(\d+)", os.uname().release)
     return found is not None and (int(found[1]), int(found[2])) >= (5, 14)
-
-
-def _bwrap(files: Sequence[str], size: int) -> list[str]:
-    """Return the beginning of a command line that runs the rest of it in namespaces of its own.
-
-    Args:
-        files: Files and folders that it may read.
-        size: Largest sum of the files that it writes [bytes].
-
-    Raises:
-        KiksError: If there is no bubblewrap.
-    """
-    bwrap = shutil.which("bwrap")
-    if bwrap is None:
-        raise KiksError(
-            "a program of somebody else must run in a sandbox, but bubblewrap (bwrap) is not installed. Install it "
-            "(Debian: sudo apt-get install bubblewrap), or say --trusted if you have read the programs."
-        )
-    words = [bwrap, "--unshare-all", "--unshare-user", "--die-with-parent", "--new-session", "--as-pid-1"]
-    words += ["--cap-drop", "ALL", "--ro-bind", "/usr", "/usr"]
-    for folder in _SYSTEM_FOLDERS:
-        if os.path.islink(folder):
-            words += ["--symlink", os.readlink(folder), folder]
-        elif os.path.isdir(folder):
-            words += ["--ro-bind", folder, folder]
-    for file in _SYSTEM_FILES:
-        words += ["--ro-bind-try", file, file]
-    words += ["--proc", "/proc", "--dev", "/dev"]
-    for folder in _WRITABLE:
-        words += ["--size", str(size), "--tmpfs", folder]
-    for file in files:
-        words += ["--ro-bind", file, file]
-    # What bubblewrap has made in memory itself has no limit.
-    return [*words, "--remount-ro", "/dev", "--remount-ro", "/", "--chdir", "/tmp"]
-
-
-def _python_folders() -> list[Path]:
-    """Return the folders that this Python and KiKS need, none of which may hold the home folder."""
-    names = {sys.prefix, sys.exec_prefix, sys.base_prefix, sys.base_exec_prefix, *kiks.__path__}
-    names |= {*site.getsitepackages(), *([site.getusersitepackages()] if site.ENABLE_USER_SITE else [])}
-    folders = {Path(name).resolve() for name in names} | {Path(name) for name in names}
-    home = Path.home()
-    return sorted(
-        each for each in folders if each.is_dir() and not home.is_relative_to(each) and not each.is_relative_to("/usr")
-    )
-
-
-def _complaint(errors: int, *, is_trusted: bool) -> str:
-    """Return why there is no sandbox, from what bubblewrap or Python has said."""
-    os.set_blocking(errors, False)
-    said = ""
-    with contextlib.suppress(OSError):
-        said = os.read(errors, 1 << 12).decode(errors="replace").strip()
-    last = said.splitlines()[-1][:200] if said else "nothing"
-    if is_trusted:
-        return f"Cannot start a process for programs: it said {last!r}. End other programs."
-    return (
-        f"a program of somebody else must run in a sandbox, but bubblewrap could not make one and said: {last!r}. "
-        "Allow it namespaces (kernel.unprivileged_userns_clone=1 on Debian, an AppArmor profile for bwrap on Ubuntu), "
-        "or say --trusted if you have read the programs."
-    )
