@@ -11,7 +11,7 @@ from tests.at_length import AT_LENGTH, share
 
 from kiks.model.exercise import Case, cases_of
 from kiks.model.project import Project
-from kiks.model.shipped import exercises
+from kiks.model.shipped import shipped
 from kiks.ports.program_process import Command
 from kiks.sim.from_project import in_case
 from kiks.trials.runner import run_trials
@@ -25,7 +25,8 @@ SEEDS = share((8001,), (8001, 8002, 8003))
 POINTS_MAX = 10.0
 """Most points of a case, the same in all exercises."""
 
-NAMES = sorted(exercises())
+FOLDER = shipped("examples/exercises")
+NAMES = sorted(path.parent.name for path in FOLDER.glob("*/exercise.kiks"))
 
 
 def tried_cases(project: Project) -> Iterator[Case]:
@@ -38,7 +39,7 @@ def tried_cases(project: Project) -> Iterator[Case]:
 
 def trials_of(name: str) -> Iterator[Trial]:
     """Return the trials of an exercise's programs, named 'exercise/program/number'."""
-    folder = exercises()[name]
+    folder = FOLDER / name
     project = Project.load(folder)
     programs = {
         "solution": SOLUTIONS / f"{name}.py",
@@ -73,7 +74,7 @@ def test_solutions_solve_them_and_less_than_that_earns_less(tmp_path: Path) -> N
 
 @pytest.mark.parametrize("name", NAMES)
 def test_it_has_what_a_class_needs(name: str) -> None:
-    folder = exercises()[name]
+    folder = FOLDER / name
     project = Project.load(folder)
     exercise, goal, cases = project.exercise, project.goal, cases_of(project.cases)
     assert exercise is not None

@@ -68,6 +68,18 @@ def test_a_file_that_is_no_supervisor_is_an_error(text: str, message: str, tmp_p
         supervised(tmp_path, text)
 
 
+@pytest.mark.parametrize(
+    "text", ["def supervise(sim:\n", "import nothing_of_this_name\n", "def supervise(sim):\n    yield 1 / 0\n"]
+)
+def test_a_supervisor_that_cannot_begin_is_an_error(
+    text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "referee.py").write_text(text)
+    with pytest.raises(ParameterError, match=r"able to begin, but referee\.py has failed"):
+        Supervision(Simulation(), tmp_path / "referee.py")
+    assert "Traceback" in capsys.readouterr().err
+
+
 def test_a_supervisor_that_fails_ends_the_run(tmp_path: Path) -> None:
     (tmp_path / "referee.py").write_text("def supervise(sim):\n    yield 0.5\n    print(1 / 0)\n")
     (tmp_path / "waits.py").write_text("import time\ntime.sleep(5)\n")

@@ -158,7 +158,8 @@ def _show(
             say(f"all games are played: {out / PAGE}.")
         except KiksError as error:
             desk.say(f"The tournament has ended: {error}")
-        hall.end()
+        finally:
+            hall.end()
 
     threading.Thread(target=work, name="kiks tournament", daemon=True).start()
     open_desk(desk)

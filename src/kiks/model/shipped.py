@@ -31,8 +31,3 @@ def shipped_arenas() -> dict[str, Path]:
 def demonstrations() -> dict[str, Path]:
     """Return the projects that come with KiKS, by name."""
     return {path.stem: path for path in sorted(shipped("examples").glob("*/*.kiks"))}
-
-
-def exercises() -> dict[str, Path]:
-    """Return the folders of the exercises that come with KiKS, by name."""
-    return {path.parent.name: path.parent for path in sorted(shipped("examples/exercises").glob("*/exercise.kiks"))}

@@ -46,19 +46,31 @@ class Supervision:
         self.end: Callable[[int, str], object] = lambda code, message: None
         self.judge = None if goal is None else Judge(sim, goal)
         self._acts: dict[str, Acts] = {}
-        if file is not None:
-            self._acts[REFEREE] = _supervise_of(file)(sim)
-        if self.judge is not None:
-            self._acts[JUDGE] = self.judge.supervise(sim)
         self._due_ns: dict[str, int] = {}
-        for who in self._acts:
-            try:
-                self._prepare(who, sim.now_ns)
-            except StopIteration:
-                self._due_ns[who] = NEVER_NS
+        try:
+            if file is not None:
+                self._acts[REFEREE] = _supervise_of(file)(sim)
+            if self.judge is not None:
+                self._acts[JUDGE] = self.judge.supervise(sim)
+            for who in self._acts:
+                self._begin(who)
+        except KiksError:
+            raise
+        except Exception as error:
+            traceback.print_exc()
+            name = JUDGE if self._file is None else self._file.name
+            raise ParameterError(
+                f"a supervisor must be able to begin, but {name} has failed: {error}. Mend it where the lines above say."
+            ) from None
         self.next_ns = min(self._due_ns.values(), default=NEVER_NS)
         if self._acts:
             sim.loop.supervisor = self
+
+    def _begin(self, who: str) -> None:
+        try:
+            self._prepare(who, self._sim.now_ns)
+        except StopIteration:
+            self._due_ns[who] = NEVER_NS
 
     def _prepare(self, who: str, now_ns: int) -> None:
         wait_s = check_number("the time that a supervisor yields", next(self._acts[who]), 0.001, SECONDS_MAX)
