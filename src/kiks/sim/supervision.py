@@ -60,7 +60,8 @@ class Supervision:
             traceback.print_exc()
             name = JUDGE if self._file is None else self._file.name
             raise ParameterError(
-                f"a supervisor must be able to begin, but {name} has failed: {error}. Mend it where the lines above say."
+                f"a supervisor must be able to begin, but {name} has failed: {error}. Mend it where the lines above "
+                "say."
             ) from None
         self.next_ns = min(self._due_ns.values(), default=NEVER_NS)
         if self._acts:
