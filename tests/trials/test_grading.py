@@ -43,7 +43,7 @@ BROKEN = {
 }
 
 HOSTILE = {
-    "mallory": "import subprocess\nsubprocess.run(['bash', '-c', 'bomb() { bomb | bomb & }; bomb; sleep 100'])",
+    "mallory": "import subprocess\nsubprocess.run(['bash', '-c', 'b() { sleep 0.01; b | b & }; b; sleep 9'])",
     "oscar": "hoard = []\nwhile True: hoard.append(bytearray(50_000_000))",
     "trudy": "while True: print('x' * 1_000_000)",
     "victor": "import os, signal\nos.kill(os.getppid(), signal.SIGKILL)\nos.kill(-1, signal.SIGKILL)\nos.abort()",
