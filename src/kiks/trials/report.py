@@ -6,7 +6,6 @@ All that students have written reaches the report through a template that escape
 from __future__ import annotations
 
 import json
-import shlex
 from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -91,8 +90,7 @@ def _report(graded: Graded, runs: dict[str, Run], out: Path) -> str:
         high=high,
         spread=spread,
         names=names,
-        replay=lambda outcome: shlex.join(["kiks", "replay", str(out / outcome.recording)]),
-        **page_parts(runs),
+        **page_parts(runs, out),
     )
 
 

@@ -7,6 +7,7 @@ their hashes.
 from __future__ import annotations
 
 import json
+import shlex
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -43,12 +44,18 @@ def shown_runs(
     return {name: runs[name] for name in recordings if name in runs}
 
 
-def page_parts(runs: Mapping[str, Run]) -> dict[str, Any]:
-    """Return what the template of a report needs beside its contents, by name."""
+def page_parts(runs: Mapping[str, Run], out: Path) -> dict[str, Any]:
+    """Return what the template of a report, `desk/web/report.html`, needs beside its contents, by name.
+
+    Args:
+        runs: The runs that play in it, of `shown_runs`.
+        out: The folder in which their recordings are.
+    """
     script = (WEB / "grades.js").read_text("utf-8")
     return {
         "player": page_template("run_frame.html").render(script=Markup(player_script()), style=Markup(player_style())),
         "runs": runs,
+        "replay": lambda outcome: shlex.join(["kiks", "replay", str(out / outcome.recording)]),
         "version": __version__,
         "script": Markup(script),
         "script_hash": hash_of(script),

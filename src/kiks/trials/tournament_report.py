@@ -101,7 +101,6 @@ def save_tournament(
         heads=[head.capitalize() for head in HEADS],
         rows=rows_of(tournament),
         seconds=seconds,
-        folder=str(out),
-        **page_parts(runs),
+        **page_parts(runs, out),
     )
     replace_file(out / PAGE, text.encode("utf-8", "replace"), "the page")
