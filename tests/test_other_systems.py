@@ -34,7 +34,7 @@ for name in dir(signal):
         delattr(signal, name)
 for name in (
     "O_CLOEXEC O_DIRECTORY O_NOCTTY O_NOFOLLOW O_NONBLOCK WNOHANG chown fchmod fork forkpty geteuid getuid killpg "
-    "mkfifo openpty register_at_fork sched_getaffinity setsid wait waitid"
+    "mkfifo openpty register_at_fork sched_getaffinity setsid sysconf wait waitid"
 ).split():
     delattr(os, name)
 for name in ("recv_fds", "send_fds"):

@@ -25,6 +25,8 @@ from kiks.learn.evaluation import evaluate
 from kiks.learn.gymnasium_envs import KheperaEnv, KheperaVectorEnv
 from kiks.learn.pettingzoo_env import KheperaTeam
 from kiks.model.arena import Ball, Cylinder, Lamp, Pose
+from kiks.model.exercise import Cases, Exercise
+from kiks.model.goal import Goal
 from kiks.model.project import Project, ProjectRobot
 from kiks.sim.drag import Drags
 from kiks.sim.from_project import simulation_of
@@ -390,6 +392,8 @@ def _project(rng: random.Random) -> Subject:
         "response": "thesis", "noise": True,
         "speed": 1.0, "kind": "khepera", "turrets": ("k213",), "name": "a", "program": "a.py", "arguments": ("a",),
         "brightness": 99, "changes": {"body": {"diameter_mm": 60.0}}, "seconds": 5.0, "supervisor": None,
+        "keeps_baud": False, "goal": Goal(solved="path_mm > 9"), "cases": (Cases(seed=(1, 2)),),
+        "exercise": Exercise("a"),
     }  # fmt: skip
 
     def project(**settings: Any) -> None:

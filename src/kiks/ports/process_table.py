@@ -6,9 +6,6 @@ import contextlib
 import os
 from typing import NamedTuple
 
-_TICKS_A_SECOND = os.sysconf("SC_CLK_TCK")
-_PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")
-
 
 class Sample(NamedTuple):
     """A process at an instant: its processor time, and that of its ended children [s]; its memory [bytes]."""
@@ -79,8 +76,9 @@ def _sample(folder: int, process: int) -> Sample | None:
     fields = text.rpartition(")")[2].split()
     if len(fields) < 22:
         return None
-    own_s, children_s = (sum(map(int, fields[at : at + 2])) / _TICKS_A_SECOND for at in (11, 13))
-    return Sample(process, int(fields[1]), fields[0] in "RD", own_s, children_s, int(fields[21]) * _PAGE_BYTES)
+    ticks_a_second, page_bytes = os.sysconf("SC_CLK_TCK"), os.sysconf("SC_PAGE_SIZE")
+    own_s, children_s = (sum(map(int, fields[at : at + 2])) / ticks_a_second for at in (11, 13))
+    return Sample(process, int(fields[1]), fields[0] in "RD", own_s, children_s, int(fields[21]) * page_bytes)
 
 
 def _read(folder: int, name: str) -> str:

@@ -14,7 +14,6 @@ import contextlib
 import json
 import os
 import re
-import resource
 import select
 import shutil
 import signal
@@ -315,7 +314,7 @@ class _Processes:
         each = {
             "RLIMIT_AS": int(limits.memory_mb * _MEGABYTE) + _ADDRESS_SPACE_BYTES,
             "RLIMIT_FSIZE": int(limits.files_mb * _MEGABYTE),
-            "RLIMIT_NOFILE": min(_DESCRIPTORS_MAX, resource.getrlimit(resource.RLIMIT_NOFILE)[1]),
+            "RLIMIT_NOFILE": _DESCRIPTORS_MAX,
             "RLIMIT_CORE": 0,
         }
         if not self._is_trusted and _counts_by_namespace():

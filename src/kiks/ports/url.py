@@ -82,7 +82,7 @@ def find_sim_port(url: str, newest: Simulation | None = None) -> SimPort:
     if options:
         sim = _new_simulation(options, url)
     else:
-        alive = dict(SIMULATIONS)
+        alive = dict(SIMULATIONS.items())
         if name and name not in alive:
             known = " or ".join(list(alive)[-_SHOWN_NAMES:]) or "none now"
             raise LinkError(

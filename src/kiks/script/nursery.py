@@ -136,7 +136,10 @@ class Nursery:
             os.close(each)
         _control_process(DUMPABLE, 1)
         for name, most in self._limits.items():
-            resource.setrlimit(getattr(resource, name), (most, most))
+            kind = getattr(resource, name)
+            allowed = resource.getrlimit(kind)[1]
+            most = most if allowed == resource.RLIM_INFINITY else min(most, allowed)
+            resource.setrlimit(kind, (most, most))
         return lambda: child_main.main(connection, start)
 
     def _working_folder(self, start: Start) -> str:
