@@ -212,11 +212,6 @@ class Process:
         """Which limit of its sandbox it has broken, such as 'used more than 512 MB of memory'; empty if none."""
         return "" if self._child is None else self._child.reason
 
-    @property
-    def processor_s(self) -> float:
-        """Processor time that it has taken, with its children that have ended [s]; 0 where the system does not tell."""
-        return 0.0 if self._child is None else self._child.processor_s
-
     def interrupt(self) -> None:
         """Interrupt it, as Ctrl-C does."""
         if self._child is not None:
@@ -283,11 +278,6 @@ class Child(ABC):
     code: int | None = None
     reason = ""
 
-    @property
-    @abstractmethod
-    def processor_s(self) -> float:
-        """Processor time that it has taken, with its children that have ended [s]; 0 where the system does not tell."""
-
     @abstractmethod
     def signal(self, number: int) -> None:
         """Send it a signal, if it still runs, and its child processes if their group is its own."""
@@ -334,16 +324,6 @@ class OwnChild(Child):
             env=environment,
             start_new_session=is_apart,
         )
-
-    @property
-    def processor_s(self) -> float:
-        """Processor time that it has taken, with its children that have ended [s]; 0 where the system does not tell."""
-        try:
-            # Its name, in brackets, may hold anything. See proc(5): utime, stime, cutime and cstime.
-            text = Path(f"/proc/{self._popen.pid}/stat").read_text("utf-8", "replace")
-        except OSError:
-            return 0.0
-        return sum(map(int, text.rpartition(")")[2].split()[11:15])) / os.sysconf("SC_CLK_TCK")
 
     def signal(self, number: int) -> None:
         """Send it a signal, if it still runs, and its child processes if their group is its own."""

@@ -178,11 +178,6 @@ class SandboxedProgram(Child):
         self.code: int | None = None
         self.reason = ""
 
-    @property
-    def processor_s(self) -> float:
-        """Processor time since its start, of all programs in its sandbox [s]."""
-        return self._processes.processor_s - self._begin_s
-
     def signal(self, number: int) -> None:
         """Send a signal to it and its child processes."""
         self._processes.send(["signal", self._number, number])
