@@ -110,8 +110,8 @@ end
 
 function join_host(place, token)
 if ~ischar(token)
-    error('kiks:argument', ['The token must be a text, but it was %s. Copy it from what the command kiks host prints ' ...
-        'there: it stands behind token=.'], shown(token));
+    error('kiks:argument', ['The token must be a text, but it was %s. Copy it from what the command kiks host ' ...
+        'prints there: it stands behind token=.'], shown(token));
 end
 if ~strncmp(place, 'kiks:', 5)
     place = ['kiks://' place '/0?token=' token];

@@ -2,8 +2,9 @@ function kiks_kiksnet(password)
 % kiks_kiksnet  Has nothing to do any more: the command kiks host in a shell is the server.
 %
 %   kiks_kiksnet(password) says that and returns, so that old programs run. Programs on other computers drive robots of
-%   that server by kiks('--join', 'HOST:PORT', TOKEN). To let several programs of this computer drive in one world, start
-%   a session with kiks and an arena with a start pose for each; in each further Octave or MATLAB call kiks('--join').
+%   that server by kiks('--join', 'HOST:PORT', TOKEN). To let several programs of this computer drive in one world,
+%   start a session with kiks and an arena with a start pose for each; in each further Octave or MATLAB call
+%   kiks('--join').
 %
 %   Example:
 %     kiks_kiksnet
