@@ -12,7 +12,7 @@ from sphinx_gallery.scrapers import figure_rst
 
 from kiks.cli.examples import first_program
 from kiks.model.project import Project
-from kiks.model.shipped import demonstrations, exercises
+from kiks.model.shipped import demonstrations
 
 ROOT = Path(__file__).parents[2]
 SOURCE, PAGES = ROOT / "build" / "gallery", "gallery"
@@ -92,7 +92,8 @@ def prepare() -> None:
         shutil.copy(path, SOURCE / "scripts")
     for name, project in demonstrations().items():
         (SOURCE / "demonstrations" / f"{name}.py").write_text(entry(name, project))
-    for name, folder in exercises().items():
+    for path in (ROOT / "examples" / "exercises").glob("*/exercise.kiks"):
+        name, folder = path.parent.name, path.parent
         (SOURCE / "exercises" / f"exercise_{name}.py").write_text(exercise_entry(name, folder))
 
 
