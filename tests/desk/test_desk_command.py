@@ -191,6 +191,21 @@ def test_errors_are_one_clear_line(words: tuple[str, ...], message: str, tmp_pat
     assert "Traceback" not in result.stderr
 
 
+def test_programs_of_a_project_lie_beside_it_wherever_the_desk_saves(tmp_path: Path) -> None:
+    (tmp_path / "own").mkdir()
+    (tmp_path / "set").mkdir()
+    (tmp_path / "set" / "judge.py").write_text("def supervise(sim):\n    yield 1\n")
+    (tmp_path / "set" / "it.kiks").write_text(
+        'kiks = 1\nsupervisor = "judge.py"\n[walls]\nsize_mm = [400, 400]\n[[robot]]\n'
+    )
+    words = ("desk", "set/it.kiks", "--folder", "own", "--no-browser", "--port", "0")
+    with started(*words, folder=tmp_path) as (process, output):
+        with browser().open(url_of(output), timeout=GUARD_S) as answer:
+            assert answer.status == 200
+        process.send_signal(signal.SIGINT)
+        assert process.wait(GUARD_S) == 0
+
+
 @at_length
 def test_a_recording_is_shown_from_a_time_on(tmp_path: Path) -> None:
     recorded = forked.run("run", "--record", "run.mcap", DRIVE, "COM1", "5", "3", "5", cwd=tmp_path)

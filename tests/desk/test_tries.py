@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from tests.guard import wait_until
 
-from kiks.desk.server.tries import Tries
+from kiks.desk.server.tries import _TURNS, Tries
 from kiks.errors import ParameterError
 from kiks.model.arena import Arena
 from kiks.model.exercise import Cases, Exercise
@@ -57,6 +57,20 @@ def test_tries_are_those_of_a_program_and_can_be_stopped(tmp_path: Path, program
     assert (len(tries.cases), tries.outcomes, tries.is_whole) == (3, {}, False)
     with pytest.raises(ParameterError, match="All cases must have come out"):
         tries.packed()
+    tries.close()
+
+
+def test_tries_that_wait_for_others_say_so(tmp_path: Path, program: Callable[[str], Command]) -> None:
+    tries = Tries()
+    turns = 0
+    while _TURNS.acquire(blocking=False):
+        turns += 1
+    tries.begin(PROJECT, tmp_path, program(DRIVE), has_hidden=False)
+    wait_until(lambda: tries.is_waiting)
+    _TURNS.release(turns)
+    tries.wait()
+    assert not tries.is_waiting
+    assert tries.is_whole
     tries.close()
 
 

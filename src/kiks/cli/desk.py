@@ -74,9 +74,11 @@ def desk(
     file = words.pop(0) if words and is_project(words[0]) else None
     begin = parse_words(words)
     project, home = world.project(file, programs=len(begin), fills_starts=True)
-    home = folder or home
-    if not home.is_dir():
-        raise ParameterError(f"--folder must be a folder, but {str(home)!r} is none. Create it first.")
+    folder = folder or home
+    if not folder.is_dir():
+        raise ParameterError(f"--folder must be a folder, but {str(folder)!r} is none. Create it first.")
+    if not is_project(file or world.arena or ""):
+        home = folder
     project = replace(
         with_kinds(project, world.robot or []),
         thinking=thinking or project.thinking,
@@ -89,7 +91,8 @@ def desk(
         sim,
         project=project,
         speed=project.speed,
-        folder=home,
+        folder=folder,
+        home=home,
         owns_world=True,
         may_run_programs=run_programs or host in LOOPBACK,
         commands=commands,

@@ -78,7 +78,8 @@ class TriesPanel(Panel):
         self._try.set_enabled(not is_running)
         self._stop.set_visibility(is_running)
         self._hand_in.set_enabled(desk.may_hand_in and not (is_running or self._is_packing))
-        drawn = is_shown, is_running, len(tries.outcomes), tries.error, desk.may_hand_in, self._is_packing
+        told = tries.error, tries.is_waiting, desk.may_hand_in, self._is_packing
+        drawn = is_shown, is_running, len(tries.outcomes), told
         if drawn == self._drawn:
             return
         self._drawn = drawn
@@ -97,6 +98,8 @@ class TriesPanel(Panel):
         grade = tries.grade
         if not (tries.outcomes or tries.is_running):
             return f"Stopped; {counted(len(tries.cases), 'case')} not tried."
+        if tries.is_waiting:
+            return "Others are trying their programs; yours is next after them."
         if tries.is_running:
             return f"{len(tries.outcomes)} of {counted(len(tries.cases), 'case')} tried."
         if self._is_packing:

@@ -43,6 +43,7 @@ class Tries:
         cases: The cases, in order.
         outcomes: What has come out so far, by numbers of the cases, from 0.
         error: Why they cannot begin; empty if they can.
+        is_waiting: Whether others have their turns first.
     """
 
     def __init__(self, *, is_for_others: bool = False, is_trusted: bool = True) -> None:
@@ -52,6 +53,7 @@ class Tries:
         self.cases: list[Case] = []
         self.outcomes: dict[int, Outcome] = {}
         self.error = ""
+        self.is_waiting = False
         self._command: Command | None = None
         self._program = self._packed = b""
         self._folder: tempfile.TemporaryDirectory[str] | None = None
@@ -124,7 +126,8 @@ class Tries:
     def _turn(self) -> Iterator[None]:
         """Wait for a turn, unless these tries are stopped meanwhile."""
         while not (has_turn := _TURNS.acquire(timeout=ASK_S)) and self._is_wanted:
-            pass
+            self.is_waiting = True
+        self.is_waiting = False
         try:
             yield
         finally:
