@@ -50,12 +50,16 @@ def room(
 
     names, code = read_names(students), check_code(code) if code is not None else ""
     _check_address(address)
-    project = Project.load(exercise)
+    project, home = Project.load(exercise), project_file(exercise).parent
     ready_engine()
     from kiks.desk.room.page import open_room
     from kiks.desk.room.room import Room
+    from kiks.sim.from_project import simulation_of
+    from kiks.sim.judge import Judge
 
-    opened = Room(project, project_file(exercise).parent, names, folder, code=code, address=address, is_trusted=trusted)
+    if project.goal is not None:
+        Judge(simulation_of(project, home), project.goal)  # says what is wrong with the goal before a class has come
+    opened = Room(project, home, names, folder, code=code, address=address, is_trusted=trusted)
     with open_room(opened, host=host, port=port):
         end_as_with_ctrl_c()
         typer.echo(f"For the class: {opened.address}   The code: {opened.code}")
