@@ -79,7 +79,9 @@ def test_a_desk_that_closes_lets_its_supervisor_end(tmp_path: Path, capsys: pyte
     )
     desk = desk_in(tmp_path)
     asyncio.run(desk.replace(Project(supervisor="referee.py")))
+    asyncio.run(desk.start_over())
     desk.clear_away()
+    assert capsys.readouterr().out == "1:0\n"  # that of the world before
     desk.close()
     assert capsys.readouterr().out == "1:0\n"
 

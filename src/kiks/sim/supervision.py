@@ -5,6 +5,7 @@ from __future__ import annotations
 import runpy
 import traceback
 from collections.abc import Callable, Generator
+from contextlib import suppress
 from inspect import isgeneratorfunction
 from pathlib import Path
 
@@ -112,7 +113,8 @@ class Supervision:
         self._sim.loop.supervisor = None
         for acts in self._acts.values():
             acts.close()
-        self.decide()
+        with suppress(KiksError):  # what is wrong with the goal ends the run, and is said then
+            self.decide()
 
 
 def _supervise_of(file: Path) -> Callable[[Simulation], Acts]:

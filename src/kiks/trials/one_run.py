@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from typing import NoReturn
@@ -62,7 +62,7 @@ def run_trial(trial: Trial, folder: Path, sandboxes: Sandboxes) -> Outcome:
     with ExitStack() as at_the_end:
         run = _Run(sim)
         supervision = Supervision(sim, supervisor, project.goal)
-        at_the_end.callback(run.close, supervision)
+        at_the_end.callback(supervision.close)
         texts = program_texts(files + ([] if supervisor is None else [supervisor]))
         at_the_end.enter_context(RunRecorder(sim, recording, programs=texts, about={"command": trial.command}))
         programs = run.programs = Programs(
@@ -124,11 +124,6 @@ class _Run:
             self.doubt = self.doubt or f"{JUDGE} has failed: {error}"
         points = self._sim.score.get(POINTS, 0) if supervision.judge is None else 0
         return Judgement(False, False, points if isinstance(points, float | int) else 0, self._sim.time_s)
-
-    def close(self, supervision: Supervision) -> None:
-        """End the supervision; that the judge has failed is noted already."""
-        with suppress(KiksError):
-            supervision.close()
 
     def end_by_judge(self, code: int, message: str) -> NoReturn:
         self.doubt = message if code else ""

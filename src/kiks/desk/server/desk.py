@@ -443,9 +443,9 @@ class Desk:
             )
 
     def clear_away(self) -> None:
-        """End the programs of replaced worlds; called by the thread that moves the world."""
+        """End the programs and supervisors of replaced worlds; called by the thread that moves the world."""
         while self._retired:
-            self._retired.pop().close()
+            _end(self._retired.pop())
 
     async def present_project(self, world: DeskWorld | None = None) -> Project:
         """Return the project with the poses in a world: the one that is shown if left out."""
@@ -608,12 +608,9 @@ class Desk:
         self.looking.close()
         self.present.gate.close()
         self.clear_away()
-        self.programs.close()
-        sim = self.present.sim
-        with sim.lock:
-            sim.loop.gate = None
-            if isinstance(sim.loop.supervisor, Supervision):
-                sim.loop.supervisor.close()
+        _end(self.programs)
+        with self.present.sim.lock:
+            self.present.sim.loop.gate = None
 
 
 class NewsHandler(logging.Handler):
@@ -635,6 +632,14 @@ class NewsHandler(logging.Handler):
         """Show a log record."""
         if self.thread in (None, record.thread):
             self._desk.say(self.format(record))
+
+
+def _end(programs: Programs) -> None:
+    """End the programs of a world, and its supervisor."""
+    programs.close()
+    with programs.sim.lock:
+        if isinstance(supervision := programs.sim.loop.supervisor, Supervision):
+            supervision.close()
 
 
 def _command_of(supervisor: Path | None) -> Command | None:
