@@ -6,7 +6,6 @@ import asyncio
 import http.client
 import json
 import re
-import shutil
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,6 +16,7 @@ import pytest
 import socketio
 from nicegui import Client
 from tests.guard import GUARD_S
+from tests.namespaces import needs_sandbox
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
@@ -365,7 +365,7 @@ print("done")
 """
 
 
-@pytest.mark.skipif(shutil.which("bwrap") is None, reason="needs bubblewrap")
+@needs_sandbox
 def test_a_program_of_a_student_reaches_nothing_of_another(tmp_path: Path) -> None:
     (tmp_path / "names.txt").write_text("Ada")
     room = Room(exercise(), tmp_path, NAMES, tmp_path / "room")

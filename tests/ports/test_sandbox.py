@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 import socket
 import subprocess
 from collections.abc import Iterator
@@ -13,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.namespaces import needs_sandbox
 from tests.served import PROGRAMS, fresh
 
 from kiks.errors import KiksError
@@ -20,16 +20,10 @@ from kiks.ports.program_process import Command
 from kiks.ports.programs import Handle, Programs
 from kiks.ports.sandbox import Limits, Sandbox
 
-
-def has_namespaces() -> bool:
-    command = ["bwrap", "--unshare-all", "--ro-bind", "/", "/", "true"]
-    return shutil.which("bwrap") is not None and not subprocess.run(command, capture_output=True).returncode
-
-
 pytestmark = [
     # Each test starts processes.
     pytest.mark.slow,
-    pytest.mark.skipif(not has_namespaces(), reason="no bubblewrap here that makes namespaces (package bubblewrap)"),
+    needs_sandbox,
 ]
 
 LIMITS = Limits(memory_mb=150, processes=8, computing_s=0.5, waiting_s=1.5, output_mb=0.5, files_mb=8)

@@ -6,7 +6,6 @@ import csv
 import io
 import json
 import re
-import shutil
 import signal
 import socket
 import subprocess
@@ -17,6 +16,7 @@ import pytest
 from playwright.sync_api import expect
 from tests.desk.visitor import NewPage, check_access, leave_picture
 from tests.guard import GUARD_S, wait_until
+from tests.namespaces import needs_sandbox
 
 from kiks.errors import ParameterError
 from kiks.model.arena import Arena
@@ -60,8 +60,6 @@ NEIGHBOUR = """
     done = subprocess.run(["bash", "-c", looks], capture_output=True, text=True)
     print("found", done.stdout.split())
     """
-
-needs_sandbox = pytest.mark.skipif(shutil.which("bwrap") is None, reason="bubblewrap is not installed")
 
 
 def exercise(folder: Path, *cases: Cases) -> Path:
