@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from kiks.model.checks import check_count, check_number
@@ -40,35 +38,6 @@ def family(
         3
     """
     check_count("count", count, 1)
-    differences = differences_of(
-        spec,
-        count,
-        seed=seed,
-        gain_spread=gain_spread,
-        wheel_spread=wheel_spread,
-        motor_spread=motor_spread,
-        dead_share=dead_share,
-    )
-    return [
-        spec.with_changes(**{f"{part}__{key}": value for part, keys in each.items() for key, value in keys.items()})
-        for each in differences
-    ]
-
-
-def differences_of(
-    spec: RobotSpec,
-    count: int,
-    *,
-    seed: int,
-    gain_spread: float = 0.2,
-    wheel_spread: float = 0.02,
-    motor_spread: float = 0.03,
-    dead_share: float = 0.0,
-) -> list[dict[str, dict[str, Any]]]:
-    """Return what differs in each robot of a family, by section and key of a robot's file; see `family`.
-
-    A robot's number alone says what differs in it: a larger family begins with the same robots.
-    """
     shares = {"gain_spread": gain_spread, "wheel_spread": wheel_spread, "motor_spread": motor_spread}
     for name, share in (shares | {"dead_share": dead_share}).items():
         check_number(name, share, 0.0, 0.9)
@@ -77,17 +46,18 @@ def differences_of(
     def spread(share: float, values: tuple[float, ...]) -> tuple[float, ...]:
         return tuple((np.array(values) * (1.0 + share * rng.uniform(-1.0, 1.0, len(values)))).tolist())
 
-    robots: list[dict[str, dict[str, Any]]] = []
+    robots = []
     for _ in range(count):
         gains = np.array(spread(gain_spread, spec.proximity.gain))
         gains[rng.random(SENSOR_COUNT) < dead_share] = 0.0
         left_gain, right_gain = spread(motor_spread, (spec.motor.left_gain, spec.motor.right_gain))
         (pulse_mm,) = spread(wheel_spread, (spec.body.pulse_mm,))
         robots.append(
-            {
-                "proximity": {"gain": tuple(gains.tolist())},
-                "body": {"pulse_mm": pulse_mm},
-                "motor": {"left_gain": left_gain, "right_gain": right_gain},
-            }
+            spec.with_changes(
+                proximity__gain=tuple(gains.tolist()),
+                body__pulse_mm=pulse_mm,
+                motor__left_gain=left_gain,
+                motor__right_gain=right_gain,
+            )
         )
     return robots

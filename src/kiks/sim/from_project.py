@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,7 @@ from kiks.engine.state import BALL
 from kiks.model.arena import Arena, Ball, Cylinder, Lamp, Pose
 from kiks.model.atomic_files import inside
 from kiks.model.exercise import Case
-from kiks.model.family import differences_of
+from kiks.model.family import family
 from kiks.model.free_disc import free_place
 from kiks.model.project import Project, ProjectRobot
 from kiks.model.robot import RobotSpec, robot_names, specs_of
@@ -106,9 +106,16 @@ def _arena_of(name: str, folder: Path) -> Arena:
 
 def _imperfect(robot: ProjectRobot, project: Project, number: int, folder: Path) -> ProjectRobot:
     """Return a robot of a project as the imperfect one with a number."""
-    differences = differences_of(spec_of(robot, project, folder), number, seed=FAMILY_SEED)[-1]
-    parts = robot.changes.keys() | differences.keys()
-    changes = {part: robot.changes.get(part, {}) | differences.get(part, {}) for part in sorted(parts)}
+    exact = spec_of(robot, project, folder)
+    # A larger family begins with the same robots.
+    made = family(exact, number, seed=FAMILY_SEED)[-1]
+    changes = dict(robot.changes)
+    for part in fields(made):
+        old, new = getattr(exact, part.name), getattr(made, part.name)
+        if new != old:
+            others = {each.name: getattr(new, each.name) for each in fields(new)}
+            differing = {key: value for key, value in others.items() if value != getattr(old, key)}
+            changes[part.name] = changes.get(part.name, {}) | differing
     return replace(robot, changes=changes)
 
 
