@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import kiks
+from kiks.client.drive import Driver
 
 pytestmark = pytest.mark.slow
 
@@ -160,3 +161,32 @@ def test_step_by_step_is_the_same_as_at_once() -> None:
     rollouts = alone.run(wander, [1.0], seconds=1.95 + 1e-9, measures=measures)
     np.testing.assert_array_equal(alone.times_s, stepped.times_s)
     np.testing.assert_array_equal(rollouts.values, stepped.values)
+
+
+@kiks.measure(notes=2)
+def bumped(moment: Any, notes: Any) -> None:
+    """Seconds up to the first contact, once there was one."""
+    if moment.is_touching and notes[0] == 0.0:
+        notes[0] = moment.time_s
+    notes[1] += 1.0
+
+
+def test_a_trial_ends_with_its_robots_first_note_and_leaves_the_world_as_a_wire_does() -> None:
+    timing, speeds = kiks.Timing(0.06, 19200), np.array([[3.0], [0.0], [1.5]])
+    batch = kiks.Batch(arena(), 3, robots=2, seed=5, timing=timing)
+    endless = batch.run(wander, speeds, seconds=8.0, measures=[bumped])
+    until = batch.run(wander, speeds, seconds=8.0, measures=[kiks.measures.path_mm], until=bumped)
+    assert until.measures == ("path_mm",)
+    assert until.values.shape == (3, 2, 1)
+    assert (until.step_counts < endless.step_counts).tolist() == [True, False, True]  # robots of speed 0 touch nothing
+    for world, steps in enumerate(until.step_counts.tolist()):
+        sim = kiks.Simulation(arena(), robots=2, seed=5 + world)
+        ports = [sim.port(1), sim.port(2)]
+        for port in ports:
+            port.baudrate = 19200
+        driver = Driver(ports, wander, speeds[world], period_s=timing.period_s)
+        for _ in range(steps):
+            driver.step()
+        assert sim.state_hash() == batch.state_hash(world)
+    with pytest.raises(kiks.ParameterError, match="until must be"):
+        batch.run(wander, speeds, seconds=1.0, until="contact")  # type: ignore[arg-type]

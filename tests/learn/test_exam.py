@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.learn.small import ahead
+from tests.learn.small import ahead, small
 
 import kiks
 from kiks.errors import ParameterError
@@ -80,3 +80,25 @@ def test_an_exam_with_imperfect_robots_is_that_with_each_of_them():
     for number, robot in enumerate(robots):
         alone = exam_of().examine(replace(SLOW, robot=robot))
         assert (result.values[4 * number : 4 * number + 4] == alone.values).all()
+
+
+@kiks.measure
+def is_late(moment, notes):
+    notes[0] = moment.time_s > 0.95
+
+
+@kiks.measure
+def last_s(moment, notes):
+    notes[0] = moment.time_s
+
+
+def test_tasks_and_exams_end_a_trial_by_the_same_measure():
+    task = small(measures=[last_s], fitness=None, seconds=5.0, axes=(), until=is_late)
+    candidates, seeds = np.ones((2, task.parameter_count)), np.zeros(2, np.int64)
+    ends_s = task.evaluate(candidates, seeds, 1)[:, 1]
+    assert (ends_s > 0.95).all()
+    assert (ends_s < 1.1).all()
+    exam = kiks.Exam(task.arenas, [last_s], lambda values: values["last_s"] < 2, seconds=5, worlds=3)
+    champion = kiks.Champion(task.controller, tuple(candidates[0]))
+    assert not exam.examine(champion).solved.any()
+    assert exam.with_changes(until=is_late).examine(champion).solved.all()

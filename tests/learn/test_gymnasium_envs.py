@@ -36,7 +36,7 @@ def small_task(**changes: Any) -> kiks.Task:
         notes[0] = 1.0 if moment.path_mm > 40.0 else 0.0
 
     path_mm = kiks.measures.path_mm
-    given = {"reward": path_mm, "goal": arrived} | changes
+    given = {"reward": path_mm, "until": arrived} | changes
     return kiks.Task("go", (kiks.Arena.box(400, 300),), kiks.controllers.linear(), (path_mm,), **given)
 
 

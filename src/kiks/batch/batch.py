@@ -173,6 +173,7 @@ class Batch:
         *,
         seconds: float,
         measures: Sequence[Measure] = (),
+        until: Measure | None = None,
     ) -> Rollouts:
         """Reset all worlds, let controllers drive the robots, and return the values of the measures.
 
@@ -184,6 +185,8 @@ class Batch:
                 or [world, parameter].
             seconds: Simulated time after which no loop begins [s].
             measures: The measures.
+            until: A measure that ends the trial of a world: no further loop begins there once its first note is above
+                zero for one of its robots.
 
         Example:
             >>> import kiks
@@ -194,7 +197,7 @@ class Batch:
         """
         until_ns = ns_from_s(check_number("seconds", seconds, 0, SECONDS_MAX))
         driving = RobotControllers(controller, parameters, self.world_count, self.robot_count)
-        watching = MeasureSlots(measures, driving.common_senses, driving.names)
+        watching = MeasureSlots(measures, driving.common_senses, driving.names, until)
         shape = (self.world_count, self.robot_count)
         self._reset_worlds(np.arange(self.world_count), driving.has_camera)
         self._is_sensed = False
@@ -209,8 +212,9 @@ class Batch:
         )
         deciders = deciders_of(driving.controllers, driving.parameter_counts)
         functions = [*driving.controllers, *watching.measures]
-        self._on_all_cores(worlds, (0, UNLIMITED, until_ns), (deciders, watching.watchers), functions)
-        names = tuple(each.name for each in watching.measures)
+        callbacks = deciders, watching.watchers, watching.until_note
+        self._on_all_cores(worlds, (0, UNLIMITED, until_ns), callbacks, functions)
+        names = tuple(each.name for each in measures)
         return Rollouts(watching.values(worlds.notes), worlds.steps.copy(), names)
 
     # ---- step by step ----
@@ -412,7 +416,7 @@ class Batch:
 
     def _do_halves(self, first: int, end: int, chosen: NDArray[np.int64] | None = None) -> None:
         """Do halves of control loops with the present speeds of the wheels: even halves sense, odd halves act."""
-        span, callbacks = (first, end, UNLIMITED), (NO_DECIDERS, self._watching.watchers)
+        span, callbacks = (first, end, UNLIMITED), (NO_DECIDERS, self._watching.watchers, self._watching.until_note)
         # A measure that fails leaves worlds in the middle of a loop.
         is_sensed, self._is_sensed = self._is_sensed, False
         self._on_all_cores(self._worlds, span, callbacks, self._watching.measures, chosen=chosen, least=STEP_BLOCK)
@@ -422,7 +426,7 @@ class Batch:
         self,
         worlds: Any,
         span: tuple[int, int, int],
-        callbacks: tuple[NDArray[np.int64], NDArray[np.int64]],
+        callbacks: tuple[NDArray[np.int64], NDArray[np.int64], int],
         functions: Sequence[Compiled],
         *,
         chosen: NDArray[np.int64] | None = None,

@@ -230,8 +230,10 @@ def mask_ended(worlds: Any, numbers: Any, is_on: Any, until_ns: Any) -> Any:
 
 
 @spliced
-def call_measures(scene: Any, worlds: Any, bunch: Any, is_on: Any, times_ns: Any, watchers: Any, poses: Any) -> Any:
-    """Call the measures for the robots of a bunch.
+def call_measures(
+    scene: Any, worlds: Any, bunch: Any, is_on: Any, times_ns: Any, watchers: Any, until_note: Any, poses: Any
+) -> Any:
+    """Call the measures for the robots of a bunch, and mask the worlds whose trial has ended.
 
     Args:
         scene: The scene.
@@ -240,6 +242,7 @@ def call_measures(scene: Any, worlds: Any, bunch: Any, is_on: Any, times_ns: Any
         is_on: Their mask, bool [W].
         times_ns: When the last command of each world acted [ns], int64 [W].
         watchers: The measures (`kiks.batch.measure_slots.MeasureSlots.watchers`).
+        until_note: The trial of a world has ended when this note of one of its robots is above 0; -1 if none ends it.
         poses: Buffer for the poses of a world's robots, float64 [robot, 3].
     """
     for k in range(bunch.worlds.shape[0]):
@@ -274,6 +277,8 @@ def call_measures(scene: Any, worlds: Any, bunch: Any, is_on: Any, times_ns: Any
                 for number in range(watchers.shape[0]):
                     notes = worlds.notes[world, robot, watchers[number, 1] : watchers[number, 2]]
                     call_measure(watchers[number, 0], (moment, notes))
+                if until_note >= 0 and worlds.notes[world, robot, until_note] > 0.0:
+                    is_on[k] = False
 
 
 @entry
@@ -288,7 +293,8 @@ def roll_out(scene: Any, worlds: Any, size: Any, block: Any, span: Any, callback
         span: Number of the first half of a loop to do, and of the first one not to do: even halves sense, odd halves
             act; time at and after which no loop begins [ns].
         callbacks: The controllers (`kiks.batch.callbacks.deciders_of`), none if `worlds.wheels` holds the speeds
-            already; and the measures (`kiks.batch.measure_slots.MeasureSlots.watchers`).
+            already; the measures (`kiks.batch.measure_slots.MeasureSlots.watchers`); and the note that ends a trial
+            (`call_measures`).
     """
     scene = open_scene(scene[0])
     robot_count = scene.robots.shape[1]
@@ -302,7 +308,7 @@ def roll_out_block(
 ) -> Any:
     """Do what `roll_out` does, in an open scene, with memory as for `kiks.engine.bunch.take` and `call_measures`."""
     first_half, end_half, until_ns = span
-    deciders, watchers = callbacks
+    deciders, watchers, until_note = callbacks
     all_numbers, all_times_ns, all_on = stack_integers(LANES), stack_integers(LANES), stack_booleans(LANES)
     ticks = stack_integers(LANES)
     readers, counts = make_readers(), stack_floats(_READINGS).reshape((READERS, SENSOR_COUNT))
@@ -323,7 +329,7 @@ def roll_out_block(
                     call_decider(deciders[number, 0], (deciders[number], numbers, is_on, *given))
             else:
                 act(scene, worlds, bunch, is_on, times_ns)
-                call_measures(scene, worlds, bunch, is_on, times_ns, watchers, poses)
+                call_measures(scene, worlds, bunch, is_on, times_ns, watchers, until_note, poses)
         for k in range(count):
             times_ns[k] = worlds.begins_ns[numbers[k]]
         pass_to(scene, worlds, bunch, times_ns)

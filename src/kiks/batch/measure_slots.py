@@ -24,16 +24,23 @@ class MeasureSlots:
         measures: The measures.
         senses: Senses of these robots.
         subject: Subject of messages: the object that senses.
+        until: A measure that ends the trial of a world when its first note is above zero; it has no value of its own.
 
     Attributes:
-        measures: The measures.
+        measures: The measures, with `until` last, unless it is one of them.
         note_count: Number of state slots of all measures together, for each robot.
+        until_note: The slot that ends the trial of a world; -1 if none does.
     """
 
-    def __init__(self, measures: Sequence[Measure], senses: Sequence[str], subject: str) -> None:
+    def __init__(
+        self, measures: Sequence[Measure], senses: Sequence[str], subject: str, until: Measure | None = None
+    ) -> None:
         if not isinstance(measures, Sequence):
             raise ParameterError(f"measures must be a list of measures, but they were {shown(measures)}.")
-        self.measures = tuple(measures)
+        if until is not None:
+            check_kind("until", until, Measure, "Make one with @kiks.measure.")
+        self._value_count = len(measures)
+        self.measures = tuple(measures) if until is None or until in measures else (*measures, until)
         for each in self.measures:
             check_kind("each of measures", each, Measure, "Take some of kiks.measures, or make one with @kiks.measure.")
             if tuple(senses[: len(each.senses)]) != each.senses:
@@ -44,6 +51,7 @@ class MeasureSlots:
                 )
         self._ends = list(accumulate((each.note_count for each in self.measures), initial=0))
         self.note_count = self._ends[-1]
+        self.until_note = -1 if until is None else self._ends[self.measures.index(until)]
 
     def __getstate__(self) -> dict[str, Any]:
         return {name: part for name, part in vars(self).items() if name != "watchers"}  # which are addresses
@@ -56,7 +64,7 @@ class MeasureSlots:
 
     def values(self, notes: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the values of the measures for notes [world, robot, note], float64 [world, robot, measure]."""
-        values = np.zeros((*notes.shape[:2], len(self.measures)))
-        for k, (begin, end) in enumerate(pairwise(self._ends)):
+        values = np.zeros((*notes.shape[:2], self._value_count))
+        for k, (begin, end) in enumerate(pairwise(self._ends[: self._value_count + 1])):
             values[:, :, k] = self.measures[k].value(notes[:, :, begin:end])
         return values

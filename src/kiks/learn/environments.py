@@ -105,7 +105,7 @@ def maze() -> Task:
         (nearer_to_light,),
         starts="arena",
         reward=nearer_to_light,
-        goal=near_light_share(ARRIVED_MM),
+        until=near_light_share(ARRIVED_MM),
     )
 
 
@@ -120,7 +120,7 @@ def football() -> Task:
         worlds=task.worlds,
         timing=task.timing,
         reward=game.ball_gain,
-        goal=game.is_goal,
+        until=game.is_goal,
     )
 
 

@@ -58,7 +58,7 @@ class Episodes:
         self.task, self.senses = task, task.controller.senses
         reward: Any = environment_of(task).reward
         self._reward: Measure = reward
-        goals = () if task.goal is None else (task.goal,)
+        ends = () if task.until is None else (task.until,)
         self.batch = Batch(
             task.arenas,
             worlds,
@@ -68,9 +68,9 @@ class Episodes:
             timing=task.timings[0],
             response=response,
             threads=threads,
-            measures=(self._reward, path_mm, contacts, *goals),
+            measures=(self._reward, path_mm, contacts, *ends),
         )
-        self._goal_note = self._reward.note_count + 2 if goals else None
+        self._until_note = self._reward.note_count + 2 if ends else None
         self._body = self.batch.specs[0].body
         self._places = [self._free_places(arena) for arena in self.batch.arenas] if task.starts == "random" else []
         self._sensors = np.zeros((worlds, task.robots, task.controller.sensor_count))
@@ -147,11 +147,11 @@ class Episodes:
         return np.asarray(self._sensors / self._most, np.float32)
 
     def terminations(self) -> NDArray[np.bool_]:
-        """Return whether a robot of each world has reached the goal, bool [world]."""
-        if self._goal_note is None:
+        """Return whether a robot of each world has ended its episode, bool [world]."""
+        if self._until_note is None:
             return np.zeros(self.batch.world_count, np.bool_)
-        reached: NDArray[np.bool_] = np.any(self.batch.notes[:, :, self._goal_note] > 0, axis=1)
-        return reached
+        ended: NDArray[np.bool_] = np.any(self.batch.notes[:, :, self._until_note] > 0, axis=1)
+        return ended
 
     def infos(self) -> dict[str, NDArray[np.float64]]:
         """Return time_s, path_mm and contacts since the episodes began, each float64 [world, robot]."""

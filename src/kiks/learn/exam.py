@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import cycle
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,6 +94,7 @@ class Exam(Experiment):
         solved: Maps the measures, by name float64 [start], to whether each start is solved, bool [start].
         goal: What a solved start shows, in some words.
         seconds: Time for which the champion drives from each start [s].
+        until: A measure that ends the drive from a start earlier, as that of a task.
         worlds: Number of starts; a multiple of the number of arenas.
         starts: 'random' for free places anywhere, or 'arena' for the start poses of the arenas: lone robots take those
             of an arena in turn, each with noise of its own.
@@ -116,6 +117,7 @@ class Exam(Experiment):
     seconds: Annotated[Number, Field(ge=1e-3, le=1e5)] = 180.0
     worlds: Annotated[Whole, Field(ge=1, le=STARTS_MAX)] = 20
     starts: Starts = "random"
+    until: Annotated[Measure | None, Field(description="Write @kiks.measure over the function.")] = None
 
     # Functions cannot be compared: an exam equals itself only.
     __eq__ = object.__eq__
@@ -153,7 +155,8 @@ class Exam(Experiment):
             starts=None if poses is None else np.tile(poses, (len(named), 1, 1)),
             timing=champion.timing,
         )
-        rollouts = batch.run(champion.controller, champion.parameters, seconds=self.seconds, measures=self.measures)
+        ends: dict[str, Any] = {"seconds": self.seconds, "until": self.until}
+        rollouts = batch.run(champion.controller, champion.parameters, measures=self.measures, **ends)
         values = rollouts.values.mean(axis=1)
         result = self.solved({name: values[:, number] for number, name in enumerate(rollouts.measures)})
         solved = np.asarray(result)

@@ -45,7 +45,7 @@ BATCH_WORLDS_MAX = 20_000
 SECONDS_MIN, SECONDS_MAX = 1e-3, 1e6
 """Shortest and longest time for which candidates drive [s]."""
 
-_UNCOUNTED = {"name", "side", "reward", "goal", "about", "file", "algorithm", "population", "generations"}
+_UNCOUNTED = {"name", "side", "reward", "about", "file", "algorithm", "population", "generations"}
 """Arguments on which no value depends."""
 
 Seconds = Annotated[Number, Field(ge=SECONDS_MIN, le=SECONDS_MAX)]
@@ -182,7 +182,8 @@ class Task(Experiment):
         exam: The exam of its champions.
         reward: A measure whose first note accumulates: in the task's environment (`kiks.learn.environments`), its gain
             in a step is the reward of that step. Evolutions do not use it.
-        goal: A measure: an episode of the environment terminates once its first note is above zero for a robot.
+        until: A measure that ends the trial of a world before `seconds` are over, and an episode of the environment:
+            no further control step begins there once its first note is above zero for one of its robots.
         about: A description in one line.
         file: The user's file that defines it.
 
@@ -221,7 +222,7 @@ class Task(Experiment):
     population: Annotated[Whole, Field(ge=4)] = POPULATION
     exam: Annotated[Exam | None, Field(description="kiks.Exam(arenas, measures, solved) makes one.")] = None
     reward: Watched | None = None
-    goal: Watched | None = None
+    until: Watched | None = None
     about: Text = ""
     file: str = ""
 
@@ -489,7 +490,8 @@ class Task(Experiment):
                 threads=threads,
             )
             parameters = [part[here] for part in given]
-            measured[here] = batch.run(self.controllers, parameters, seconds=seconds, measures=self.measures).values
+            ends: dict[str, Any] = {"seconds": seconds, "until": self.until}
+            measured[here] = batch.run(self.controllers, parameters, measures=self.measures, **ends).values
         values = []
         for side, part in zip(self.sides, np.split(measured, [self.robots], axis=1), strict=False):
             means = part.mean(axis=1).reshape(count, self.worlds, len(self.measures))
