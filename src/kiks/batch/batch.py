@@ -141,6 +141,8 @@ class Batch:
             *(np.zeros(self.world_count, np.int64) for _ in range(5)),
             *(np.zeros((*shape, reading_count(self.senses))), np.zeros((*shape, 2)), np.zeros(shape, np.int64)),
             *(np.zeros((*shape, 0)), np.zeros((*shape, 0)), self.notes),
+            *(each[self.arena_indices] for each in initial.switches),
+            np.zeros(self.world_count, np.int64),
         )
         self._worlds = Worlds._make(parts)
         self._is_sensed = False
@@ -236,6 +238,8 @@ class Batch:
         """
         self.arena_indices[worlds] = arenas
         self._lamps[worlds] = self._initial_state.lamps[arenas]
+        ticks, codes = self._initial_state.switches
+        self._worlds.switch_ticks[worlds], self._worlds.switch_codes[worlds] = ticks[arenas], codes[arenas]
 
     @_alone
     def reset(
@@ -333,7 +337,14 @@ class Batch:
     @lamps.setter
     @_alone
     def lamps(self, lamps: ArrayLike) -> None:
-        self._lamps = check_numbers("lamps", lamps, (self.world_count, None, 4))
+        given = check_numbers("lamps", lamps, (self.world_count, None, 4))
+        switched = max((switch.lamp for arena in self.arenas for switch in arena.lamp_switches), default=0)
+        if given.shape[1] < switched:
+            raise ParameterError(
+                f"lamps must be at least {switched} in each world, as arenas switch so many, but they were "
+                f"{given.shape[1]}."
+            )
+        self._lamps = given
         for scene in self._scenes:
             scene.set_lamps(self._lamps)
 
@@ -412,6 +423,9 @@ class Batch:
         for count in (worlds.ticks, worlds.begins_ns, worlds.watched_ns, worlds.sensed_ns, worlds.steps):
             count[chosen] = 0
         self.notes[chosen] = 0.0
+        if worlds.switch_ticks.shape[1]:
+            worlds.switched[chosen] = 0
+            self._lamps[chosen, :, 3] = self._initial_state.lamps[self.arena_indices[chosen], :, 3]
         enter_worlds(self._scenes[0].record, chosen)
 
     def _do_halves(self, first: int, end: int, chosen: NDArray[np.int64] | None = None) -> None:

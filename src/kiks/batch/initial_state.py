@@ -21,6 +21,7 @@ from kiks.model.checks import ROBOTS_MAX, check_count
 from kiks.model.data_file import OneOf
 from kiks.model.robot import RobotSpec, specs_of
 from kiks.sim.simulation import Simulation
+from kiks.sim.world import NEVER_TICK
 
 ARENAS_LIMIT = 10_000
 """Most arenas of a batch."""
@@ -66,6 +67,7 @@ class InitialState:
         robot_count: Number of robots in each world.
         body_count: Number of balls and cylinders in each world.
         lamps: The lamps of each arena, float64 [arena, lamp, 4]; where there are fewer, the others are off.
+        switches: `switch_ticks` and `switch_codes` (`kiks.batch.kernel_args.Worlds`), int64 [2, arena, switch].
     """
 
     def __init__(
@@ -107,6 +109,11 @@ class InitialState:
         self.lamps = np.zeros((len(self.arenas), lamp_count, 4))
         for lamps, model in zip(self.lamps, self._models, strict=True):
             lamps[: len(model.lamps)] = model.lamps
+        switch_count = max(len(each.lamp_switches) for each in self.arenas)
+        self.switches = np.full((2, len(self.arenas), switch_count), NEVER_TICK)
+        for number, each in enumerate(self.arenas):
+            rows = [(switch.tick, 2 * (switch.lamp - 1) + switch.is_on) for switch in each.lamp_switches]
+            self.switches[:, number, : len(rows)] = np.array(rows, np.int64).reshape(-1, 2).T
 
     def __deepcopy__(self, memo: dict[int, Any]) -> InitialState:
         other = object.__new__(type(self))

@@ -8,7 +8,7 @@ from typing import Any
 Worlds: Any = namedtuple(
     "Worlds",
     "line sense_codes sense_counts has_camera ticks begins_ns watched_ns sensed_ns steps sensors wheels turns memory "
-    "parameters notes",
+    "parameters notes switch_ticks switch_codes switched",
 )
 """What the loop knows of all worlds of a batch.
 
@@ -26,7 +26,10 @@ Worlds: Any = namedtuple(
 * turns: the robots of each world in the order in which their commands act, int64 [world, robot];
 * memory: memory of the controllers, float64 [world, robot, number];
 * parameters: parameters of the controllers, float64 [world, robot, number];
-* notes: state slots of the measures, float64 [world, robot, note].
+* notes: state slots of the measures, float64 [world, robot, note];
+* switch_ticks: ticks after which lamps are switched, int64 [world, switch], in order;
+* switch_codes: twice the index of the lamp, and 1 more for on, int64 [world, switch];
+* switched: switches done, int64 [world].
 """
 
 PROXIMITY, AMBIENT, CAMERA = range(3)

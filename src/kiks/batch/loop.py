@@ -142,6 +142,21 @@ def pass_to(scene: Any, worlds: Any, bunch: Any, times_ns: Any) -> Any:
     if worlds.has_camera.any():
         take_pictures(scene, worlds, bunch, times_ns)
     tick_to(scene, bunch, times_ns)
+    if worlds.switch_ticks.shape[1] > 0:
+        switch_lamps(scene, worlds, bunch)
+
+
+@kernel
+def switch_lamps(scene: Any, worlds: Any, bunch: Any) -> Any:
+    """Switch the lamps that are due after the ticks of each world of a bunch, as `kiks.sim.world.World` does."""
+    for k in range(bunch.worlds.shape[0]):
+        world = bunch.worlds[k]
+        number = worlds.switched[world]
+        while number < worlds.switch_ticks.shape[1] and worlds.switch_ticks[world, number] <= bunch.ticks[k]:
+            code = worlds.switch_codes[world, number]
+            scene.lamps[world, code // 2, 3] = code % 2
+            number += 1
+        worlds.switched[world] = number
 
 
 @kernel

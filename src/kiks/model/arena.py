@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from kiks import upwards
 from kiks.errors import ArenaError, ParameterError, counted, shown
-from kiks.model.arena_objects import Ball, Cylinder, Lamp, Pose, checked_places
+from kiks.model.arena_objects import Ball, Cylinder, Lamp, LampSwitch, Pose, checked_places
 from kiks.model.atomic_files import path_of
 from kiks.model.box import Box
 from kiks.model.checks import check_kind, check_number
@@ -32,7 +32,7 @@ from kiks.model.raster import (
 from kiks.model.wall_tables import WallTables, tables_of
 from kiks.model.walls import Wall, painted
 
-__all__ = ["MAX_CELLS", "PAD", "SIZE_MIN_MM", "Arena", "Ball", "Cylinder", "Lamp", "Pose", "Wall"]
+__all__ = ["MAX_CELLS", "PAD", "SIZE_MIN_MM", "Arena", "Ball", "Cylinder", "Lamp", "LampSwitch", "Pose", "Wall"]
 
 _KINDS = (
     ("starts", "start", Pose),
@@ -60,6 +60,7 @@ class Arena:
         name: Its name.
         starts: Starts of robots, each on floor.
         lamps: Lamps, each inside the raster.
+        lamp_switches: When lamps are switched on or off in the course of a run.
         balls: Balls, each centre on floor.
         cylinders: Cylinders, each centre on floor.
         walls: Walls over the picture: lines, boxes and discs, the later ones over the earlier ones.
@@ -83,6 +84,7 @@ class Arena:
     balls: tuple[Ball, ...] = ()
     cylinders: tuple[Cylinder, ...] = ()
     walls: tuple[Wall, ...] = ()
+    lamp_switches: tuple[LampSwitch, ...] = ()
     brightness: npt.NDArray[np.uint8] = field(init=False)
     _tables: WallTables = field(init=False)
 
@@ -115,6 +117,9 @@ class Arena:
         object.__setattr__(self, "brightness", raster)
         object.__setattr__(self, "mm_per_cell", float(self.mm_per_cell))
         object.__setattr__(self, "_tables", tables_of(raster, self.mm_per_cell))
+        for switch in self.lamp_switches:
+            check_kind("each of lamp_switches", switch, LampSwitch)
+        object.__setattr__(self, "lamp_switches", tuple(sorted(self.lamp_switches, key=lambda each: each.time_s)))
         for name, label, kind in _KINDS:
             entries = checked_places(label, kind, getattr(self, name), raster, self.mm_per_cell)
             object.__setattr__(self, name, entries)

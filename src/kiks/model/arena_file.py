@@ -14,7 +14,18 @@ from pydantic import Field
 
 from kiks.errors import ArenaError, KiksError, ParameterError
 from kiks.model.arena import Arena
-from kiks.model.arena_objects import THINGS_MAX, Ball, Brightness, Cylinder, Friction, Lamp, Pose, Power, Radius
+from kiks.model.arena_objects import (
+    THINGS_MAX,
+    Ball,
+    Brightness,
+    Cylinder,
+    Friction,
+    Lamp,
+    LampSwitch,
+    Pose,
+    Power,
+    Radius,
+)
 from kiks.model.atomic_files import path_of, replace_files, within
 from kiks.model.box import PartMm, SideMm
 from kiks.model.data_file import Coordinate, Number, Point, Rule, Switch, Text, check, parse_toml, read_file, record
@@ -76,6 +87,9 @@ class CylinderEntry:
 
 Starts = Annotated[tuple[StartEntry, ...], Field(max_length=THINGS_MAX, description="Head each with [[start]].")]
 Lamps = Annotated[tuple[LampEntry, ...], Field(max_length=THINGS_MAX, description="Head each with [[lamp]].")]
+LampSwitches = Annotated[
+    tuple[LampSwitch, ...], Field(max_length=THINGS_MAX, description="Head each with [[lamp_switch]].")
+]
 Balls = Annotated[tuple[BallEntry, ...], Field(max_length=THINGS_MAX, description="Head each with [[ball]].")]
 WallShapes = Annotated[tuple[Wall, ...], Field(max_length=WALLS_MAX, description="Head each with [[wall]].")]
 Cylinders = Annotated[
@@ -118,6 +132,7 @@ class ArenaFile(Walls):
     invert: Annotated[Switch, Field(description="true where walls are black and the floor is white.")] | None = None
     start: Starts = ()
     lamp: Lamps = ()
+    lamp_switch: LampSwitches = ()
     ball: Balls = ()
     cylinder: Cylinders = ()
     wall: WallShapes = ()
@@ -170,7 +185,7 @@ def _picture_arena(file: ArenaFile, folder: Path | None) -> Arena:
 
 
 def places_of(file: Any) -> dict[str, Any]:
-    """Return the starts, lamps, balls, cylinders and walls with shapes of a file, for `dataclasses.replace`."""
+    """Return the starts, lamps, their switches, balls, cylinders and walls of a file, for `dataclasses.replace`."""
 
     def at(kind: Callable[..., Any], entries: Iterable[Any], *names: str) -> tuple[Any, ...]:
         return tuple(kind(*each.at_mm, *(getattr(each, name) for name in names)) for each in entries)
@@ -180,6 +195,7 @@ def places_of(file: Any) -> dict[str, Any]:
     return {
         "starts": tuple(starts),
         "lamps": at(Lamp, file.lamp, "power_w", "is_on"),
+        "lamp_switches": file.lamp_switch,
         "balls": at(Ball, file.ball, *body),
         "cylinders": at(Cylinder, file.cylinder, *body),
         "walls": file.wall,
@@ -210,6 +226,8 @@ def place_lines(arena: Arena) -> list[str]:
     for label, places in (("lamp", arena.lamps), ("ball", arena.balls), ("cylinder", arena.cylinders)):
         for place in places:
             entry(label, place, **dict(zip(place._fields[2:], place[2:], strict=True)))
+    for switch in arena.lamp_switches:
+        lines += ["", "[[lamp_switch]]", *(f"{name} = {toml(value)}" for name, value in vars(switch).items())]
     for wall in arena.walls:
         lines += ["", "[[wall]]", *(f"{name} = {toml(value)}" for name, value in wall.table().items())]
     return lines

@@ -13,8 +13,9 @@ from pydantic import AfterValidator, BeforeValidator, Field
 
 from kiks.errors import ArenaError, ParameterError, shown
 from kiks.model.checks import check_heading
-from kiks.model.data_file import Coordinate, Number, Switch, Whole, check
+from kiks.model.data_file import Coordinate, Number, Switch, Whole, check, record
 from kiks.model.materials import brightness_of
+from kiks.units import TICK_NS, ns_from_s
 
 THINGS_MAX = 1000
 """Most starts, lamps, balls and cylinders of a file, each."""
@@ -47,6 +48,30 @@ class Lamp(NamedTuple):
     y_mm: Coordinate
     power_w: Power = 1.0
     is_on: Switch = True
+
+
+@record
+class LampSwitch:
+    """A lamp that is switched in the course of a run.
+
+    Args:
+        time_s: When, from the beginning of the run on, in whole ticks of 10 ms, rounded up [s].
+        lamp: The row of the lamp, counted from 1.
+        is_on: Whether it is on from then on.
+
+    Example:
+        >>> LampSwitch(30, lamp=1, is_on=False)
+        LampSwitch(time_s=30.0, lamp=1, is_on=False)
+    """
+
+    time_s: Annotated[Number, Field(ge=0, le=1e6)]
+    lamp: Annotated[Whole, Field(ge=1, le=THINGS_MAX, description="1 is the first [[lamp]].")]
+    is_on: Switch
+
+    @property
+    def tick(self) -> int:
+        """The number of ticks after which it acts."""
+        return -(-ns_from_s(self.time_s) // TICK_NS)
 
 
 class Ball(NamedTuple):

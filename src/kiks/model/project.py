@@ -21,6 +21,7 @@ from kiks.model.arena_file import (
     Balls,
     Cylinders,
     Lamps,
+    LampSwitches,
     Pitch,
     Starts,
     Walls,
@@ -311,6 +312,7 @@ class ProjectFile:
     robot: Robots = (ProjectRobot(),)
     start: Starts = ()
     lamp: Lamps = ()
+    lamp_switch: LampSwitches = ()
     ball: Balls = ()
     cylinder: Cylinders = ()
     wall: WallShapes = ()

@@ -250,7 +250,9 @@ class Simulation:
             >>> sim.lamps
             array([[250., 300.,   1.,   1.]])
         """
-        return self.world.expose_lamps()
+        with self.lock:
+            self.sync()
+            return self.world.expose_lamps()
 
     @lamps.setter
     def lamps(self, lamps: NDArray[np.float64]) -> None:

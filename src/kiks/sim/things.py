@@ -145,11 +145,16 @@ class Things:
         if not len(lamps):
             raise ParameterError(f"lamp must be the row of a lamp, but it was {shown(lamp)}. There is none.")
         lamp = check_count("lamp", lamp, 1, len(lamps), "It is a row of lamps.")
+        if any(switch.lamp >= lamp for switch in self._world.arena.lamp_switches):
+            raise ParameterError(
+                f"lamp must come after all that the arena switches in the course of the run, but it was {lamp}. Switch "
+                "it off instead."
+            )
         self._world.lamps = np.delete(lamps, lamp - 1, axis=0)
 
     def _checked(self, **things: Any) -> Arena:
         """Return an arena with these things alone: so they are checked by the rules of arena files."""
-        nothing: dict[str, Any] = {"starts": (), "lamps": (), "balls": (), "cylinders": ()}
+        nothing: dict[str, Any] = {"starts": (), "lamps": (), "balls": (), "cylinders": (), "lamp_switches": ()}
         try:
             return replace(self._world.arena, **nothing | things)
         except KiksError as error:

@@ -81,7 +81,7 @@ class World:
         self.specs = list(specs)
         self.state = State.empty(world_count=1, robot_count=len(self.specs))
         self.watchers: tuple[Watcher, ...] = ()
-        self._from_tick = self._due_tick = NEVER_TICK
+        self._from_tick = self._due_tick = self._switch_tick = NEVER_TICK
         self.change_count = 0
         self.on_change: Callable[[], None] = lambda: None
         self.lamps_exposed = False
@@ -89,10 +89,14 @@ class World:
         self._lamps = np.array(arena.lamps, np.float64).reshape(-1, 4)
         self.free_space = FreeSpace(arena, self.specs, self.state)
         self._pack_specs()
+        begins = poses is None
         poses = self.free_space.start_poses(seed) if poses is None else poses
         for index, pose in enumerate(poses.tolist()):
             self.put_robot(index, *pose)
         self.rebuild_scene()
+        if begins:  # else a saved state follows, with the lamps of its time
+            _check_switches(arena, len(self._lamps))
+            self._switch_lamps(after_tick=-1)
 
     @property
     def robot_count(self) -> int:
@@ -106,7 +110,9 @@ class World:
 
     @lamps.setter
     def lamps(self, lamps: NDArray[np.float64]) -> None:
-        self._lamps = check_numbers("lamps", lamps, (None, 4))
+        lamps = check_numbers("lamps", lamps, (None, 4))
+        _check_switches(self.arena, len(lamps))
+        self._lamps = lamps
         self.note_change()
         self._scene.set_lamps(self._lamps[None])
 
@@ -162,6 +168,7 @@ class World:
         self._slice_ticks = min(max(SLICE_MOVES // max(things, 1), SLICE_TICKS[0]), SLICE_TICKS[1])
         self._scene = Scene(self.state, self.kinds, [self.arena], self._networks, lamps, seeds)
         self.scene = self._scene.record
+        self._switch_lamps(self.state.tick_count)
 
     # ---- time ----
 
@@ -180,6 +187,7 @@ class World:
             state.tick_count = until
             step.advance(self.scene, begin, until - begin)
             if until >= self._from_tick:
+                self._switch_lamps(begin)
                 self._look()
 
     def watch(self, watcher: Watcher) -> None:
@@ -192,10 +200,19 @@ class World:
         self.watchers = tuple(each for each in self.watchers if each is not watcher)
         self._look()
 
+    def _switch_lamps(self, after_tick: int) -> None:
+        """Switch the lamps whose ticks come after one, up to the present, and find out when the next one does."""
+        now_tick, switches = self.state.tick_count, self.arena.lamp_switches
+        for switch in switches:
+            if after_tick < switch.tick <= now_tick:
+                self._lamps[switch.lamp - 1, 3] = switch.is_on
+        self._switch_tick = min((switch.tick for switch in switches if switch.tick > now_tick), default=NEVER_TICK)
+        self._from_tick, self._due_tick = (min(each, self._switch_tick) for each in (self._from_tick, self._due_tick))
+
     def _look(self) -> None:
         """Let watchers look that are due, and find out when the next ones are."""
         state = self.state
-        from_tick = due_tick = NEVER_TICK
+        from_tick = due_tick = self._switch_tick
         for watcher in self.watchers:
             if watcher.from_tick <= state.tick_count:
                 watcher.look(state)
@@ -283,6 +300,15 @@ class World:
         distances_mm[:, 0], distances_mm[:, 1] = robots["forwards_mm"], robots["backwards_mm"]
         np.hypot(robots["x_mm"] - robots["start_x_mm"], robots["y_mm"] - robots["start_y_mm"], out=distances_mm[:, 2])
         return distances_mm
+
+
+def _check_switches(arena: Arena, lamp_count: int) -> None:
+    """Check that all lamps are there that an arena switches."""
+    if (last := max((switch.lamp for switch in arena.lamp_switches), default=0)) > lamp_count:
+        raise ParameterError(
+            f"lamp_switches of the arena {shown(arena.name)} must name lamps from 1 to {lamp_count}, but one names "
+            f"lamp {last}. Add the lamp, or remove the switch."
+        )
 
 
 def index_of_robot(robot: int, count: int) -> int:
