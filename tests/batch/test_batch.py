@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
@@ -176,6 +177,19 @@ def test_a_family_differs_and_repeats() -> None:
 def test_wrong_arguments_are_errors(options: dict[str, Any], words: str) -> None:
     with pytest.raises(kiks.ParameterError, match=words):
         kiks.Batch(arenas()[0], **{"worlds": 4} | options)
+
+
+def test_an_arena_may_come_in_several_turns() -> None:
+    one, other = arenas()
+    batch = kiks.Batch([one, other, one, one], 7, seed=3)
+    assert (batch.arenas, batch.arena_indices.tolist()) == ([one, other], [0, 1, 0, 0, 0, 1, 0])
+    again = pickle.loads(pickle.dumps(batch))
+    for each in (batch, again):
+        each.run(kiks.controllers.linear(), [0.5] * 18, seconds=1)
+        for world, index in enumerate(batch.arena_indices):
+            alone = kiks.Batch(batch.arenas[index], 1, seed=3 + world)
+            alone.run(kiks.controllers.linear(), [0.5] * 18, seconds=1)
+            assert each.state_hash(world) == alone.state_hash(0)
 
 
 def test_arenas_must_hold_as_many_bodies() -> None:

@@ -54,6 +54,9 @@ TASKS = {
     "random starts": lambda: kiks.tasks.avoid(seconds=2.0, worlds=6),
     "with things": lambda: kiks.tasks.gather(seconds=2.0, worlds=8),
     "with a lamp": lambda: kiks.tasks.light(seconds=2.0, worlds=3),
+    "many arenas": lambda: kiks.tasks.avoid(
+        seconds=2.0, worlds=2, arenas=[kiks.Arena.box(300 + 50 * number, 400) for number in range(5)]
+    ),
     "starts of the arena": lambda: kiks.tasks.maze(seconds=2.0),
     "two robots": lambda: kiks.tasks.gather(seconds=2.0, worlds=8, robots=2),
     "a short period": lambda: kiks.tasks.avoid(seconds=1.23, worlds=3, timing=kiks.Timing(0.05, 38400, 0.0025)),

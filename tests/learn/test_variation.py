@@ -1,4 +1,4 @@
-"""Robots and links that vary within the worlds of a candidate."""
+"""Robots, links and arenas that vary within the worlds of a candidate, or from one generation to the next."""
 
 from __future__ import annotations
 
@@ -60,6 +60,50 @@ def test_a_world_is_what_a_task_of_its_robot_and_timing_alone_would_have() -> No
         one = lambda values, world=world: values["path_mm"][:, world]  # noqa: E731
         alone = task_of(robot=robots[turns[world] % 2], timing=TIMINGS[timings[world]], fitness=one)
         assert values_of(task.with_changes(fitness=one), (7,))[0, 0] == values_of(alone, (7,))[0, 0]
+
+
+def many(count: int) -> list[kiks.Arena]:
+    return [kiks.Arena.box(300 + 50 * number, 400) for number in range(count)]
+
+
+def test_each_generation_draws_others_of_many_arenas() -> None:
+    arenas = many(7)
+    task = task_of(arenas=arenas, worlds=3, robot=family(KHEPERA, 4, seed=3), timing=TIMINGS)
+    drawn = [task.arenas_of(seed) for seed in range(40)]
+    assert drawn == [task.arenas_of(seed) for seed in range(40)]
+    assert all(len(set(each)) == 3 for each in drawn)
+    assert {arena for each in drawn for arena in each} == set(arenas)
+    together, parameters = values_of(task, tuple(range(5))), np.linspace(-3, 3, 18)
+    turns_of, timings_of = (each.reshape(5, 3) for each in task._turns(np.arange(5)))
+    for seed, (turns, timings) in enumerate(zip(turns_of, timings_of, strict=True)):
+        assert (values_of(task, (seed,))[0] == together[seed]).all()
+        starts, paths = task.start_poses(np.array([seed])), []
+        for world, arena in enumerate(task.arenas_of(seed)):
+            kind, timing = family(KHEPERA, 4, seed=3)[turns[world] % 4], TIMINGS[timings[world]]
+            batch = kiks.Batch(arena, 1, robot=[kind], starts=starts[world], seed=seed + world, timing=timing)
+            rollouts = batch.run(task.controller, parameters, seconds=1.0, measures=[kiks.measures.path_mm])
+            paths.append(rollouts.values.item())
+        assert together[seed][task.value_names.index("path_mm")] == pytest.approx(np.mean(paths), rel=1e-12)
+
+
+def test_many_arenas_need_no_multiple_of_worlds() -> None:
+    task = task_of(arenas=many(7), worlds=6, exam=None)
+    assert task.world().arena.width_mm in {arena.width_mm for arena in task.arenas_of(0)}
+    with pytest.raises(kiks.ParameterError, match="worlds must be a multiple of the number of arenas, 5, but it was 6"):
+        task_of(arenas=many(5), worlds=6)
+    assert task.digest() != task_of(arenas=many(8), worlds=6).digest()
+
+
+def test_an_evolution_in_many_arenas_resumes(tmp_path: Any) -> None:
+    task = task_of(arenas=many(7), worlds=2)
+    whole = kiks.Evolution(task, "ga", seed=4, population=6)
+    whole.run(generations=3)
+    kiks.Evolution(task, "ga", seed=4, population=6, folder=tmp_path).run(generations=2)
+    again = kiks.Evolution(task, "ga", seed=4, population=6, folder=tmp_path)
+    again.run(generations=3)
+    assert again.champion.parameters == whole.champion.parameters
+    with pytest.raises(kiks.ParameterError, match="arenas"):
+        kiks.Evolution(task_of(arenas=many(8), worlds=2), "ga", seed=4, population=6, folder=tmp_path)
 
 
 def test_values_do_not_depend_on_other_candidates() -> None:

@@ -59,7 +59,7 @@ class InitialState:
         response: Response of the proximity sensors, if not that of the robots' files.
 
     Attributes:
-        arenas: The arenas.
+        arenas: The arenas, each once.
         arena_indices: Index of each world's arena, int64 [world].
         specs: The kinds of robots.
         kinds: Their constants, records of `PARAMETERS`, shape [kind].
@@ -78,9 +78,10 @@ class InitialState:
         robots: int,
         response: str | None,
     ) -> None:
-        self.arenas = list(arena) if isinstance(arena, Iterable) else [arena]
-        if not self.arenas or not all(isinstance(each, Arena) for each in self.arenas):
+        turns = list(arena) if isinstance(arena, Iterable) else [arena]
+        if not turns or not all(isinstance(each, Arena) for each in turns):
             raise ParameterError(f"arena must be a kiks.Arena or several, but it was {shown(arena)}.")
+        self.arenas = list(dict.fromkeys(turns))
         worlds, robots = check_count("worlds", worlds, 1, WORLDS_LIMIT), check_count("robots", robots, 1, ROBOTS_MAX)
         named = _kinds_of(robot, worlds, robots, response)
         self.specs = list(dict.fromkeys(spec for row in named for spec in row))
@@ -94,7 +95,8 @@ class InitialState:
         for number, spec in enumerate(self.specs):
             self.kinds[number : number + 1] = pack(spec)
         self.networks = networks_for(*dict.fromkeys(spec.proximity.response for spec in self.specs))
-        self.arena_indices = np.arange(worlds) % len(self.arenas)
+        indices = {each: index for index, each in enumerate(self.arenas)}
+        self.arena_indices = np.array([indices[each] for each in turns], np.int64)[np.arange(worlds) % len(turns)]
         self._models = [Simulation(each, robot=list(named[0])) for each in self.arenas]
         body_counts = {model.world.state.bodies.shape[1] for model in self._models}
         if len(body_counts) > 1:
@@ -103,7 +105,7 @@ class InitialState:
                 f"{sorted(body_counts)}. Make a batch for each number."
             )
         self.robot_count, self.body_count = robots, body_counts.pop()
-        self._given = self.arenas, worlds, robot, robots, response
+        self._given = turns, worlds, robot, robots, response
         self._kind_numbers = np.array([[numbers[spec] for spec in row] for row in named], np.int64)
         lamp_count = max(len(model.lamps) for model in self._models)
         self.lamps = np.zeros((len(self.arenas), lamp_count, 4))

@@ -30,13 +30,18 @@ class Experiment:
     worlds: int
 
     def __post_init__(self) -> None:
-        if self.worlds % len(self.arenas):
+        if self.worlds % len(self.arenas) and not self.draws_arenas:
             raise ParameterError(
                 f"worlds must be a multiple of the number of arenas, {len(self.arenas)}, but it was {self.worlds}."
             )
         names = self.measure_names
         if len(set(names)) != len(names):
             raise ParameterError(f"measures must have different names, but they were {shown(names)}.")
+
+    @property
+    def draws_arenas(self) -> bool:
+        """Whether there are more arenas than worlds, from which each evaluation draws some."""
+        return False
 
     @property
     def measure_names(self) -> tuple[str, ...]:

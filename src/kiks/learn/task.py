@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import Field
 
 from kiks.batch.batch import Batch
-from kiks.batch.initial_state import Arenas, Starts
+from kiks.batch.initial_state import Arenas, Starts, random_starts
 from kiks.batch.loop_timing import Timing
 from kiks.control.controller import Controller
 from kiks.control.controllers import SPEED_LIMIT
@@ -23,7 +23,7 @@ from kiks.learn.evaluation import Floats, Integers, check_candidates
 from kiks.learn.exam import Exam, world_of
 from kiks.learn.experiment import CLEAR_MM, Experiment, Fitness, fitness_of
 from kiks.learn.fingerprint import fingerprints
-from kiks.model.arena import Pose
+from kiks.model.arena import Arena, Pose
 from kiks.model.checks import ROBOTS_MAX, check_count, check_number
 from kiks.model.data_file import Number, OneOf, Rule, Text, Whole, record
 from kiks.model.project import Project, ProjectRobot
@@ -149,8 +149,8 @@ class Side:
 class Task(Experiment):
     """A task for which controllers are evolved.
 
-    A candidate is the parameters of a controller. It drives in `worlds` worlds, which the arenas share evenly. The
-    measures, averaged over a world's robots, become one number, its fitness.
+    A candidate is the parameters of a controller. It drives in `worlds` worlds, which the arenas share evenly; or each
+    world has another of many arenas. The measures, averaged over a world's robots, become one number, its fitness.
 
     A task with another side `against` evolves two controllers, which meet in these worlds. A candidate is then a pair:
     the parameters of the first side's controller, followed by those of the other side's. The robots of the first side
@@ -158,13 +158,14 @@ class Task(Experiment):
 
     Args:
         name: Its name.
-        arenas: Arenas for training.
+        arenas: Arenas for training. If they are more than the worlds, each generation draws others of them, all
+            different.
         controller: The controller to evolve; it must state the number of its parameters.
         measures: The measures, each with a different name.
         fitness: Maps the measures, by name float64 [candidate, world], to the fitness, float64 [candidate]; more is
             better. Left out, it is `cautious_mean` of the first measure.
         seconds: Time for which a candidate drives in each world [s].
-        worlds: Number of worlds; a multiple of the number of arenas.
+        worlds: Number of worlds; a multiple of the number of arenas, or fewer than these.
         axes: Axes along which behaviours differ, for algorithms that look for many of them.
         robot: Kind of robot: a name, a robot file or a `RobotSpec`. Or several, such as a `family`: the worlds of a
             candidate take them in turn, each generation from another one on. Champions drive the first.
@@ -345,6 +346,31 @@ class Task(Experiment):
         parts = np.split(candidates, [self.sides[0].parameter_count], axis=-1)
         return [part for side, part in zip(self.sides, parts, strict=False) for _ in range(side.robots)]
 
+    @property
+    def draws_arenas(self) -> bool:
+        """Whether there are more arenas than worlds, of which each generation draws others.
+
+        Example:
+            >>> import kiks
+            >>> kiks.tasks.avoid(worlds=1, arenas=[kiks.Arena.box(500, 500), kiks.Arena.box(900, 900)]).draws_arenas
+            True
+        """
+        return len(self.arenas) > self.worlds
+
+    def arenas_of(self, seed: int) -> list[Arena]:
+        """Return the arena of each world of a candidate with such a seed, always the same for the same seed.
+
+        Example:
+            >>> import kiks
+            >>> arenas = [kiks.Arena.box(size_mm, size_mm) for size_mm in (500, 600, 700, 800)]
+            >>> task = kiks.tasks.avoid(arenas=arenas, worlds=2)
+            >>> len(set(task.arenas_of(1)))
+            2
+        """
+        count = len(self.arenas)
+        numbers = np.random.default_rng((seed, count)).permutation(count) if self.draws_arenas else range(count)
+        return [self.arenas[numbers[world % count]] for world in range(self.worlds)]
+
     def start_poses(self, seeds: Integers) -> Floats | None:
         """Return the starts of candidates with such seeds, float64 [candidate and world, robot, 3].
 
@@ -363,7 +389,12 @@ class Task(Experiment):
         given: dict[str, Any] = {"robots": len(self.controllers), "radius_mm": radius_mm, "apart_mm": self.apart_mm}
         poses: dict[int, Floats] = {}
         for seed in dict.fromkeys(seeds.tolist()):
-            poses[seed] = self.random_starts(seed, **given)
+            if self.draws_arenas:
+                each = enumerate(self.arenas_of(seed))
+                own = [random_starts(arena, 1, seed=seed + k, clear_mm=CLEAR_MM, **given) for k, arena in each]
+                poses[seed] = np.concatenate(own)
+            else:
+                poses[seed] = self.random_starts(seed, **given)
         return np.concatenate([poses[seed] for seed in seeds.tolist()])
 
     def world(self) -> Project:
@@ -376,9 +407,9 @@ class Task(Experiment):
         """
         if self.exam is not None:
             return self.exam.world(self.sides[0].specs[0], self.robots)
-        poses = self.start_poses(np.zeros(1, np.int64))
-        robots = len(self.controllers)
-        return world_of(self.arenas[0], None if poses is None else poses[:: len(self.arenas)].reshape(-1, 3), robots, 0)
+        arenas, poses, robots = self.arenas_of(0), self.start_poses(np.zeros(1, np.int64)), len(self.controllers)
+        here = [each is arenas[0] for each in arenas]
+        return world_of(arenas[0], None if poses is None else poses[here].reshape(-1, 3), robots, 0)
 
     def individual(self, parameters: Floats, seed: int, world: int = 0) -> Champion:
         """Return a candidate of a task of one side as a champion, whose world is one of those of its evaluation.
@@ -401,7 +432,7 @@ class Task(Experiment):
             raise ParameterError(f"the task must have one side, but {self.name} has two. Show its champions instead.")
         world, seeds = check_count("world", world, 0, self.worlds - 1), np.array([seed])
         turns, timings = self._turns(seeds)
-        arena = self.arenas[world % len(self.arenas)]
+        arena = self.arenas_of(seed)[world]
         if (starts := self.start_poses(seeds)) is not None:
             arena = replace(arena, starts=tuple(Pose(*each) for each in starts[world].tolist()))
         specs = self.sides[0].specs
@@ -471,6 +502,8 @@ class Task(Experiment):
 
     def _evaluate(self, candidates: Floats, seeds: Integers, threads: int | None, seconds: float) -> Floats:
         count, starts, (turns, timings) = len(candidates), self.start_poses(seeds), self._turns(seeds)
+        drawn = {seed: self.arenas_of(seed) for seed in dict.fromkeys(seeds.tolist())}
+        arenas = [arena for seed in seeds.tolist() for arena in drawn[seed]]
         world_seeds = (seeds[:, None] + np.arange(self.worlds)).ravel()
         given = self.parameters_of(np.repeat(candidates, self.worlds, axis=0))
         robots = [side.specs for side in self.sides for _ in range(side.robots)]
@@ -480,7 +513,7 @@ class Task(Experiment):
             here = np.flatnonzero(timings == number)
             each = [tuple(specs[turn % len(specs)] for specs in robots) for turn in turns[here].tolist()]
             batch = Batch(
-                self.arenas,
+                [arenas[world] for world in here.tolist()],
                 len(here),
                 robot=robots[0][0] if is_one_kind else each,
                 robots=len(robots),
@@ -501,8 +534,7 @@ class Task(Experiment):
     def _turns(self, seeds: Integers) -> tuple[Integers, Integers]:
         """Return the turn of each world's kinds of robots and the number of its timing, int64 [world].
 
-        The arenas' turn comes round faster than the others': each arena gets all robots, each robot all timings. Worlds
-        with the same timing are whole rounds of the arenas, as a batch takes them.
+        The arenas' turn comes round faster than the others': each arena gets all robots, each robot all timings.
         """
         world = np.arange(self.worlds)
         turn = (seeds[:, None] % 2**32 + world // len(self.arenas)).ravel()

@@ -47,7 +47,7 @@ class TaskFile:
     about: Annotated[Text, Field(description="A description in one line.")] | None = None
     seconds: Annotated[Seconds, Field(description="Time for which a candidate drives in each world.")] | None = None
     worlds: (
-        Annotated[Whole, Field(ge=1, le=WORLDS_MAX, description="Worlds of a candidate, a multiple of the arenas.")]
+        Annotated[Whole, Field(ge=1, le=WORLDS_MAX, description="Worlds of a candidate: n times the arenas, or fewer.")]
         | None
     ) = None
     arenas: (
