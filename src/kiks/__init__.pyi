@@ -16,6 +16,8 @@ from .control.controller import Controller as Controller
 from .control.controller import controller as controller
 from .control.measure import Measure as Measure
 from .control.measure import measure as measure
+from .control.senses import Sense as Sense
+from .control.senses import sense as sense
 from .errors import (
     ArenaError as ArenaError,
 )

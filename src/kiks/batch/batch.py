@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kiks.batch.callbacks import NO_DECIDERS, deciders_of
-from kiks.batch.initial_state import InitialState
+from kiks.batch.initial_state import CAMERA, InitialState
 from kiks.batch.kernel_args import Worlds
 from kiks.batch.loop import roll_out
 from kiks.batch.loop_timing import Timing
@@ -23,7 +23,7 @@ from kiks.control.compiled_function import Compiled, explained
 from kiks.control.controller import Controller
 from kiks.control.measure import Measure
 from kiks.control.robot_controllers import RobotControllers
-from kiks.control.senses import SENSES, check_senses, reading_count
+from kiks.control.senses import AnySense, check_senses, reading_count, rows_of, sense_of, turrets_of
 from kiks.engine.bunch import worlds_in_bunch
 from kiks.engine.scene import Scene, enter_worlds
 from kiks.engine.simd.lanes import LANES
@@ -38,9 +38,6 @@ from kiks.upwards import shown_in_notebooks
 
 BLOCKS_PER_THREAD = 4
 """Blocks of worlds per thread: with several, no thread waits long for the slowest one."""
-
-NO_PICTURE = -1
-"""Time of the last picture of a camera that has not taken one yet [ns]."""
 
 UNLIMITED = 2**62
 """More half loops than a run has, and a time [ns] after its end."""
@@ -80,8 +77,8 @@ class Batch:
         seed: Seed of world 0, from which the other seeds count up; or a seed for each world, int64 [world].
         starts: Start poses: x_mm, y_mm, heading_rad, float64 [world, robot, 3] or anything that broadcasts to it; the
             start poses of a simulation with the world's seed if left out.
-        senses: Readings that `reset` and `step` return, of 'proximity', 'ambient' and 'camera'. `run` uses its
-            controller's. Robots with the camera carry a K213, which takes a picture every 200 ms.
+        senses: Readings that `reset` and `step` return, as for `kiks.Controller`; `run` uses its controller's. Robots
+            carry the turrets that their senses need; a camera takes a picture every 200 ms.
         measures: Measures for step-by-step use, see `values`; `run` has an argument of its own.
         timing: Timing of the control loop.
         response: Response of the proximity sensors, if not that of the robots' files.
@@ -110,7 +107,7 @@ class Batch:
         robots: int = 1,
         seed: int | ArrayLike = 0,
         starts: ArrayLike | None = None,
-        senses: str | Sequence[str] = ("proximity",),
+        senses: AnySense | Sequence[AnySense] = ("proximity",),
         measures: Sequence[Measure] = (),
         timing: Timing | None = None,
         response: str | None = None,
@@ -124,6 +121,7 @@ class Batch:
         self.world_count, self.robot_count = len(self.arena_indices), initial.robot_count
         self.threads = check_count("threads", (os.cpu_count() or 1) if threads is None else threads, 1, 4096)
         self.senses = check_senses(senses)
+        self._turrets = [turrets_of(self.senses)] * self.robot_count
         self.state = State.empty(
             world_count=self.world_count, robot_count=self.robot_count, body_count=initial.body_count
         )
@@ -135,9 +133,9 @@ class Batch:
         shape = self.state.robots.shape
         self.notes = np.zeros((*shape, self._watching.note_count))
         parts = (
-            *(self.timing.line(self.specs[0]), _codes_of(self.senses)),
+            *(self.timing.line(self.specs[0]), rows_of(self.senses)),
             np.full(self.robot_count, len(self.senses)),
-            np.full(self.robot_count, "camera" in self.senses),
+            np.full(self.robot_count, CAMERA in self._turrets[0]),
             *(np.zeros(self.world_count, np.int64) for _ in range(5)),
             *(np.zeros((*shape, reading_count(self.senses))), np.zeros((*shape, 2)), np.zeros(shape, np.int64)),
             *(np.zeros((*shape, 0)), np.zeros((*shape, 0)), self.notes),
@@ -146,7 +144,7 @@ class Batch:
         )
         self._worlds = Worlds._make(parts)
         self._is_sensed = False
-        self._reset_worlds(np.arange(self.world_count), self._worlds.has_camera)
+        self._reset_worlds(np.arange(self.world_count), self._turrets)
 
     def _make_scenes(self) -> list[Scene]:
         kinds = self._initial_state.kinds
@@ -160,6 +158,7 @@ class Batch:
     def __setstate__(self, parts: dict[str, Any]) -> None:
         vars(self).update(parts)
         self._lock, self._scenes = threading.RLock(), self._make_scenes()
+        self._worlds = self._worlds._replace(senses=rows_of(self.senses))  # which are addresses
 
     def __repr__(self) -> str:
         robots = counted(self.robot_count, "robot")
@@ -201,19 +200,19 @@ class Batch:
         driving = RobotControllers(controller, parameters, self.world_count, self.robot_count)
         watching = MeasureSlots(measures, driving.common_senses, driving.names, until)
         shape = (self.world_count, self.robot_count)
-        self._reset_worlds(np.arange(self.world_count), driving.has_camera)
+        self._reset_worlds(np.arange(self.world_count), driving.turrets)
         self._is_sensed = False
         worlds = self._worlds._replace(
-            sense_codes=_codes_of(driving.senses),
+            senses=rows_of(driving.senses),
             sense_counts=driving.sense_counts,
-            has_camera=driving.has_camera,
+            has_camera=np.array([CAMERA in each for each in driving.turrets]),
             sensors=np.zeros((*shape, reading_count(driving.senses))),
             memory=np.zeros((*shape, driving.memory_count)),
             parameters=driving.parameters,
             notes=np.zeros((*shape, watching.note_count)),
         )
         deciders = deciders_of(driving.controllers, driving.parameter_counts)
-        functions = [*driving.controllers, *watching.measures]
+        functions = [*driving.controllers, *map(sense_of, driving.senses), *watching.measures]
         callbacks = deciders, watching.watchers, watching.until_note
         self._on_all_cores(worlds, (0, UNLIMITED, until_ns), callbacks, functions)
         names = tuple(each.name for each in measures)
@@ -281,7 +280,7 @@ class Batch:
             self.seeds[chosen] = self._initial_state.check_seeds(seeds, len(chosen))
         if starts is not None or seeds is not None:
             self._starts[chosen] = self._initial_state.starts_of(self.seeds[chosen], starts, chosen)
-        self._reset_worlds(chosen, self._worlds.has_camera)
+        self._reset_worlds(chosen, self._turrets)
         if len(chosen) and (self._is_sensed or worlds is None):
             self._do_halves(0, 1, chosen)
             self._is_sensed = self._is_sensed or worlds is None
@@ -415,10 +414,10 @@ class Batch:
 
     # ---- inside ----
 
-    def _reset_worlds(self, chosen: NDArray[np.int64], has_camera: NDArray[np.bool_]) -> None:
-        """Reset worlds to their initial state; some robots, bool [robot], have a camera."""
+    def _reset_worlds(self, chosen: NDArray[np.int64], turrets: Sequence[tuple[Any, ...]]) -> None:
+        """Reset worlds to their initial state; each robot carries some turrets."""
         self._initial_state.reset(self.state, chosen, self._starts[chosen])
-        self.state.robots["camera_taken_ns"][np.ix_(chosen, has_camera)] = NO_PICTURE
+        self._initial_state.fit(self.state, chosen, turrets)
         worlds = self._worlds
         for count in (worlds.ticks, worlds.begins_ns, worlds.watched_ns, worlds.sensed_ns, worlds.steps):
             count[chosen] = 0
@@ -431,9 +430,10 @@ class Batch:
     def _do_halves(self, first: int, end: int, chosen: NDArray[np.int64] | None = None) -> None:
         """Do halves of control loops with the present speeds of the wheels: even halves sense, odd halves act."""
         span, callbacks = (first, end, UNLIMITED), (NO_DECIDERS, self._watching.watchers, self._watching.until_note)
+        functions = [*map(sense_of, self.senses), *self._watching.measures]
         # A measure that fails leaves worlds in the middle of a loop.
         is_sensed, self._is_sensed = self._is_sensed, False
-        self._on_all_cores(self._worlds, span, callbacks, self._watching.measures, chosen=chosen, least=STEP_BLOCK)
+        self._on_all_cores(self._worlds, span, callbacks, functions, chosen=chosen, least=STEP_BLOCK)
         self._is_sensed = is_sensed
 
     def _on_all_cores(
@@ -480,8 +480,3 @@ class Batch:
             here = chosen[self.arena_indices[chosen] == index]
             for first in range(0, len(here), length):
                 yield scene, np.ascontiguousarray(here[first : first + length])
-
-
-def _codes_of(senses: Sequence[str]) -> NDArray[np.int64]:
-    """Return the numbers of senses, as kernels know them."""
-    return np.array([list(SENSES).index(sense) for sense in senses], np.int64)

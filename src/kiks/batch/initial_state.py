@@ -11,7 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import BeforeValidator, Field, InstanceOf
 
+from kiks.engine.compiling import make_ready
 from kiks.engine.parameters import PARAMETERS, pack
+from kiks.engine.scene import MEETING
 from kiks.engine.sensing.thesis_networks import networks_for
 from kiks.engine.state import State
 from kiks.errors import ParameterError, shown
@@ -41,6 +43,9 @@ Arenas = Annotated[
     tuple[InstanceOf[Arena], ...], BeforeValidator(_listed), Field(min_length=1, max_length=ARENAS_LIMIT)
 ]
 """Arenas that worlds take in turn; a single arena needs no list."""
+
+CAMERA, NO_PICTURE = "k213", -1
+"""The camera's name, and the time of the last picture of one that has not taken any yet [ns]."""
 
 Starts = Annotated[str, OneOf(("random", "arena"))]
 """Where robots start: at random places, or where the arena puts them."""
@@ -105,6 +110,7 @@ class InitialState:
                 f"{sorted(body_counts)}. Make a batch for each number."
             )
         self.robot_count, self.body_count = robots, body_counts.pop()
+        self._fields: dict[tuple[Any, ...], dict[str, Any]] = {(): {}}
         self._given = turns, worlds, robot, robots, response
         self._kind_numbers = np.array([[numbers[spec] for spec in row] for row in named], np.int64)
         lamp_count = max(len(model.lamps) for model in self._models)
@@ -197,6 +203,29 @@ class InitialState:
         robots["start_x_mm"], robots["start_y_mm"] = starts[:, :, 0], starts[:, :, 1]
         robots["trail"] = starts[:, :, None, :]
         state.robots[worlds] = robots
+
+    def fit(self, state: State, worlds: NDArray[np.int64], turrets: Sequence[tuple[Any, ...]]) -> None:
+        """Put turrets on the robots of worlds that have been reset: of each robot, names and classes."""
+        for robot, its in enumerate(turrets):
+            for name, value in self._fitted(its).items():
+                state.robots[name][worlds, robot] = value
+
+    def _fitted(self, turrets: tuple[Any, ...]) -> dict[str, Any]:
+        """Return what some turrets write into the record of a robot, by field, when they are fitted."""
+        if turrets not in self._fields:
+            model = Simulation(self.arenas[0], robot=self.specs[0])
+            before = model.world.state.robots.copy()
+            for each in turrets:
+                if each != CAMERA:  # which would take a picture at once
+                    model.fit(1, each if isinstance(each, str) else each())
+            after = model.world.state.robots
+            changed = [name for name in before.dtype.names or () if (before[name] != after[name]).any()]
+            self._fields[turrets] = {name: after[name][0, 0].copy() for name in changed}
+            if CAMERA in turrets:
+                self._fields[turrets]["camera_taken_ns"] = NO_PICTURE
+            if after["has_gripper"].any():
+                make_ready(MEETING)
+        return self._fields[turrets]
 
 
 def _kinds_of(

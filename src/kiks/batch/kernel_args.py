@@ -7,13 +7,13 @@ from typing import Any
 
 Worlds: Any = namedtuple(
     "Worlds",
-    "line sense_codes sense_counts has_camera ticks begins_ns watched_ns sensed_ns steps sensors wheels turns memory "
+    "line senses sense_counts has_camera ticks begins_ns watched_ns sensed_ns steps sensors wheels turns memory "
     "parameters notes switch_ticks switch_codes switched",
 )
 """What the loop knows of all worlds of a batch.
 
 * line: the serial lines (`kiks.batch.loop_timing.Line`);
-* sense_codes: the senses, `PROXIMITY`, `AMBIENT` or `CAMERA`, int64 [sense];
+* senses: the senses (`kiks.control.senses.rows_of`), int64 [sense, 6];
 * sense_counts: how many of these each robot has, int64 [robot];
 * has_camera: whether each robot has a camera, bool [robot];
 * ticks: ticks done, int64 [world];
@@ -31,6 +31,3 @@ Worlds: Any = namedtuple(
 * switch_codes: twice the index of the lamp, and 1 more for on, int64 [world, switch];
 * switched: switches done, int64 [world].
 """
-
-PROXIMITY, AMBIENT, CAMERA = range(3)
-"""Senses in the order of `kiks.control.senses.SENSES`."""

@@ -11,16 +11,14 @@ from typing import Any
 import numpy as np
 
 from kiks.batch.callbacks import call_decider, call_measure
-from kiks.batch.kernel_args import AMBIENT, CAMERA, PROXIMITY
-from kiks.batch.loop_timing import ASK_LENGTHS, LENGTHS, acts_at, answer_length, order_length
+from kiks.batch.loop_timing import LENGTHS, acts_at, answer_length, order_length
 from kiks.control.controller import whole_speed
 from kiks.control.measure import Moment
-from kiks.control.senses import SENSES
-from kiks.engine.bunch import give_back, make_lanes, make_room, robot_in, show_tracks, take
+from kiks.control.senses import IN_PACKETS, call_sense, view_of
+from kiks.engine.bunch import give_back, make_lanes, make_room, robot_in, show_robot, show_tracks, take
 from kiks.engine.compiling import entry, inlined, kernel, spliced
 from kiks.engine.physics.motor import command_speed
 from kiks.engine.scene import open_scene
-from kiks.engine.sensing.ambient import sense_ambient
 from kiks.engine.sensing.camera import take_image_in
 from kiks.engine.sensing.proximity import READERS, make_readers, sense_proximity
 from kiks.engine.simd.lanes import LANES
@@ -32,9 +30,7 @@ from kiks.model.robot import SENSOR_COUNT
 from kiks.units import NS_PER_S, TICK_NS
 
 _READINGS = READERS * SENSOR_COUNT  # the size of a stack array must be a constant
-_SIZES = tuple(sense.size for sense in SENSES.values())
 _PICTURE_NS = PERIODS_NS[0]  # cameras have the reading period of the power-on
-_PIXEL_STEP = PIXEL_COUNT // SENSES["camera"].size
 
 
 @spliced
@@ -56,11 +52,11 @@ def sense(scene: Any, worlds: Any, bunch: Any, is_on: Any, times_ns: Any, reader
         if is_on[k]:
             worlds.sensed_ns[numbers[k]] = times_ns[k]
     first = 0
-    for place in range(worlds.sense_codes.shape[0]):
-        code = worlds.sense_codes[place]
+    for place in range(worlds.senses.shape[0]):
+        address, size, ask_length = worlds.senses[place, 0], worlds.senses[place, 1], worlds.senses[place, 2]
         for k in range(numbers.shape[0]):
             if is_on[k]:
-                times_ns[k] = acts_at(line, worlds.sensed_ns[numbers[k]], ASK_LENGTHS[code])
+                times_ns[k] = acts_at(line, worlds.sensed_ns[numbers[k]], ask_length)
         pass_to(scene, worlds, bunch, times_ns)
         show_tracks(scene, bunch)
         count = 0
@@ -68,46 +64,59 @@ def sense(scene: Any, worlds: Any, bunch: Any, is_on: Any, times_ns: Any, reader
             for robot in range(worlds.sensors.shape[1] if is_on[k] else 0):
                 if place >= worlds.sense_counts[robot]:
                     continue
+                if address != IN_PACKETS:
+                    show_robot(scene, bunch, k, robot)
+                    ticks, time_ns = bunch.ticks[k], times_ns[k]
+                    read_sense(scene, worlds, place, numbers[k], robot, ticks, time_ns, first)
+                    continue
                 readers.worlds[count], readers.robots[count] = numbers[k], robot
                 readers.ticks[count], readers.times_ns[count] = bunch.ticks[k], times_ns[k]
                 count += 1
                 if count == READERS:
-                    read_sense(scene, worlds, code, first, readers, count, counts)
+                    read_proximity(scene, worlds, place, first, readers, count, counts)
                     count = 0
-        read_sense(scene, worlds, code, first, readers, count, counts)
-        first += _SIZES[code]
+        read_proximity(scene, worlds, place, first, readers, count, counts)
+        first += size
 
 
 @inlined
-def read_sense(scene: Any, worlds: Any, code: Any, first: Any, readers: Any, count: Any, counts: Any) -> Any:
-    """Read a sense of some robots, and note when their replies have arrived.
+def read_proximity(scene: Any, worlds: Any, place: Any, first: Any, readers: Any, count: Any, counts: Any) -> Any:
+    """Read the proximity sensors of some robots, and note when their replies have arrived.
 
     Args:
         scene: The scene.
         worlds: What the loop knows of all worlds.
-        code: The sense, `PROXIMITY`, `AMBIENT` or `CAMERA`.
+        place: Place of this sense among all.
         first: Place of its first reading among the sensors of a robot.
         readers: Which robots, and when (`kiks.engine.sensing.proximity.Readers`).
         count: Their number.
         counts: Buffer for readings, float64 [`READERS`, 8].
     """
-    if code == PROXIMITY:
+    if count > 0:
         sense_proximity(scene, readers, count, True, counts)
     for k in range(count):
-        world, robot, time_ns = readers.worlds[k], readers.robots[k], readers.times_ns[k]
-        if code == AMBIENT:
-            sense_ambient(scene, world, robot, readers.ticks[k], time_ns, True, counts[k])
-        readings = worlds.sensors[world, robot, first : first + _SIZES[code]]
-        if code == CAMERA:
-            for number in range(readings.shape[0]):
-                readings[number] = scene.robots[world, robot].camera_pixels[_PIXEL_STEP * number]
-            length = answer_length(CAMERA, readings)
-        else:
-            for sensor in range(SENSOR_COUNT):
-                readings[sensor] = counts[k, sensor]
-            length = answer_length(PROXIMITY, counts[k])  # as long for each letter
-        heard_ns = time_ns + length * worlds.line.character_ns
-        worlds.sensed_ns[world] = max(worlds.sensed_ns[world], heard_ns)
+        readings = worlds.sensors[readers.worlds[k], readers.robots[k], first : first + SENSOR_COUNT]
+        for sensor in range(SENSOR_COUNT):
+            readings[sensor] = counts[k, sensor]
+        note_reply(worlds, place, readers.worlds[k], readers.times_ns[k], counts[k])
+
+
+@kernel
+def read_sense(
+    scene: Any, worlds: Any, place: Any, world: Any, robot: Any, tick_count: Any, time_ns: Any, first: Any
+) -> Any:
+    """Read another sense of a robot at a time; arguments as for `read_proximity`."""
+    row = worlds.senses[place]
+    readings = worlds.sensors[world, robot, first : first + row[1]]
+    call_sense(row[0], (view_of(scene, world, robot, tick_count, time_ns, True, row[4], row[5]), readings))
+    note_reply(worlds, place, world, time_ns, readings)
+
+
+@inlined
+def note_reply(worlds: Any, place: Any, world: Any, time_ns: Any, readings: Any) -> Any:
+    """Note when the reply has arrived to a command that acted at a time."""
+    heard_ns = time_ns + answer_length(worlds.senses[place, 3], readings) * worlds.line.character_ns
+    worlds.sensed_ns[world] = max(worlds.sensed_ns[world], heard_ns)
 
 
 @kernel

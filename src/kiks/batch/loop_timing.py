@@ -15,7 +15,6 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
-from kiks.control.senses import SENSES
 from kiks.engine.compiling import kernel
 from kiks.errors import ParameterError
 from kiks.model.data_file import Number, Whole, record
@@ -28,9 +27,6 @@ Line: Any = namedtuple("Line", ("character_ns", "processing_ns", "think_ns", "pe
 Baud = Annotated[Whole, Field(ge=110, le=10_000_000, description="The Khepera knows 9600, 19200, 38400 and 57600.")]
 
 Milliseconds = Annotated[Number, Field(ge=0, le=1e6)]
-
-ASK_LENGTHS = tuple(len(sense.command) + 1 for sense in SENSES.values())
-"""Number of characters of the command that reads each sense, with a line feed. The reply repeats all but that."""
 
 LENGTHS = 13
 """One more than the most characters of a command that sets speeds: `D,-127,-127` and a line feed."""
@@ -85,11 +81,16 @@ def digit_count(number: Any) -> Any:
 
 
 @kernel
-def answer_length(code: Any, readings: Any) -> Any:
-    """Return the number of characters of a sense's reply: its command, a comma before each reading, and CR LF."""
-    length = ASK_LENGTHS[code] + 1 + readings.shape[0]
+def answer_length(head: Any, readings: Any) -> Any:
+    """Return the number of characters of a sense's reply: its head, and a comma and a number for each reading."""
+    length = head + readings.shape[0]
     for k in range(readings.shape[0]):
-        length += digit_count(np.int64(readings[k]))
+        number = np.int64(readings[k])
+        length += digit_count(number)
+        size = abs(number)
+        while size >= 10_000:
+            size //= 10
+            length += 1
     return length
 
 

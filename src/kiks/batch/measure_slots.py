@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from kiks.batch.callbacks import MEASURE
 from kiks.control.measure import Measure
+from kiks.control.senses import AnySense, named
 from kiks.engine.compiling import address_of
 from kiks.errors import ParameterError, shown
 from kiks.model.checks import check_kind
@@ -33,7 +34,7 @@ class MeasureSlots:
     """
 
     def __init__(
-        self, measures: Sequence[Measure], senses: Sequence[str], subject: str, until: Measure | None = None
+        self, measures: Sequence[Measure], senses: Sequence[AnySense], subject: str, until: Measure | None = None
     ) -> None:
         if not isinstance(measures, Sequence):
             raise ParameterError(f"measures must be a list of measures, but they were {shown(measures)}.")
@@ -45,9 +46,9 @@ class MeasureSlots:
             check_kind("each of measures", each, Measure, "Take some of kiks.measures, or make one with @kiks.measure.")
             if tuple(senses[: len(each.senses)]) != each.senses:
                 raise ParameterError(
-                    f"the measure {shown(each.name)} must find {' and '.join(each.senses)} first among what is "
+                    f"the measure {shown(each.name)} must find {named(each.senses)} first among what is "
                     "sensed, but "
-                    f"{subject} senses {', '.join(senses)}. Let it sense that, too."
+                    f"{subject} senses {named(senses)}. Let it sense that, too."
                 )
         self._ends = list(accumulate((each.note_count for each in self.measures), initial=0))
         self.note_count = self._ends[-1]

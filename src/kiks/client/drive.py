@@ -12,7 +12,7 @@ from kiks.client.khepera import Khepera
 from kiks.client.port import Port
 from kiks.control.controller import Controller, whole_speeds
 from kiks.control.robot_controllers import RobotControllers
-from kiks.control.senses import SENSES, reading_count
+from kiks.control.senses import reading_count, sense_of
 from kiks.errors import ParameterError
 from kiks.model.checks import SECONDS_MAX, check_number
 from kiks.units import ns_from_s, s_from_ns
@@ -119,7 +119,7 @@ class Driver:
         robots, sensors, wheels = self._robots, self._sensors, self._wheels
         first = 0
         for number, name in enumerate(self._senses):
-            sense = SENSES[name]
+            sense = sense_of(name)
             sensing = [k for k, each in enumerate(self._controllers) if number < len(each.senses)]
             for k in sensing:
                 robots[k].port.write(sense.request)

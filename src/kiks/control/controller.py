@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from kiks.control.compiled_function import RETURNS, Compiled, decorator, explained
 from kiks.control.recipes import recipe_of
-from kiks.control.senses import check_senses, reading_count
+from kiks.control.senses import AnySense, check_senses, named, reading_count
 from kiks.engine.compiling import entry, kernel
 from kiks.engine.physics.motor import SPEED_MAX
 from kiks.errors import ParameterError, counted, shown
@@ -28,13 +28,13 @@ class Controller(Compiled):
     """A function `(sensors, memory, parameters, wheels)` of four float64 arrays that writes the last.
 
     It is called once a control step. `sensors` has the readings of each sense, in the order of `senses`: eight counts
-    of proximity or ambient light, clockwise from the left, or sixteen greys of the camera, from the left. `memory` is
+    of proximity or ambient light, clockwise from the left, sixteen greys of the camera, from the left. `memory` is
     zeros at the start and its own from then on. `wheels` takes the speeds of the left and right wheel [pulses/10 ms],
     which are rounded and cut to +-127 when they are sent.
 
     Args:
         function: The function.
-        senses: Its senses, of 'proximity', 'ambient' and 'camera'.
+        senses: Its senses, of `kiks.control.senses.SENSES` or of a user's own (`kiks.sense`).
         memory: How many numbers it remembers.
         parameters: How many parameters it has; any count if left out.
 
@@ -63,7 +63,7 @@ class Controller(Compiled):
         self,
         function: Callable[..., Any],
         *,
-        senses: Sequence[str] = ("proximity",),
+        senses: AnySense | Sequence[AnySense] = ("proximity",),
         memory: int = 0,
         parameters: int | None = None,
     ) -> None:
@@ -79,7 +79,7 @@ class Controller(Compiled):
         count = (
             "any number of parameters" if self.parameter_count is None else counted(self.parameter_count, "parameter")
         )
-        return f"<{type(self).__name__} {self.name!r}: {', '.join(self.senses)}; {count}>"
+        return f"<{type(self).__name__} {self.name!r}: {named(self.senses)}; {count}>"
 
     @property
     def sizes(self) -> dict[str, int | None]:

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ParamSpec, TypeAlias, Union, c
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BeforeValidator, Discriminator, Field, Tag
+from pydantic import BeforeValidator, Discriminator, Field, PlainSerializer, Tag
 
 from kiks.control.arguments import checked_call, record_of
 from kiks.control.controller import Controller
@@ -40,7 +40,7 @@ from kiks.control.neural_nets import (
     senses_as_inputs,
 )
 from kiks.control.recipes import FunctionRecipe, find, relative_to
-from kiks.control.senses import check_senses, reading_count
+from kiks.control.senses import check_senses, reading_count, recipes_for
 from kiks.engine.numbers import tanh
 from kiks.engine.simd.stack_arrays import stack_floats
 from kiks.errors import ParameterError, shown
@@ -76,11 +76,14 @@ PLASTIC_NEURONS_MAX = 64
 
 Units = Annotated[Whole, Field(ge=1, le=UNITS_MAX)]
 if TYPE_CHECKING:
-    Senses: TypeAlias = str | Sequence[str]
+    # One needs no list where a user gives it; the functions get several.
+    Senses: TypeAlias = Any
     Layers: TypeAlias = Sequence[int]
     Recipe: TypeAlias = Any
 else:
-    Senses = Annotated[tuple[str, ...], BeforeValidator(check_senses), Field(min_length=1)]
+    Senses = Annotated[
+        tuple[Any, ...], BeforeValidator(check_senses), PlainSerializer(recipes_for), Field(min_length=1)
+    ]
     Layers = Annotated[tuple[Units, ...], Field(max_length=LAYERS_MAX, description="One for each hidden layer.")]
 SpeedLimit = Annotated[Number, Field(ge=0, le=127, description="Speed of an output of 1 [pulses/10 ms].")]
 
@@ -121,7 +124,7 @@ def linear(*, senses: Senses = ("proximity",), speed_limit: SpeedLimit = SPEED_L
     Parameters: 2 biases, a matrix [N, 2]; with feedback [N + 2, 2], the last two inputs being the last outputs.
 
     Args:
-        senses: Its senses, of 'proximity', 'ambient' and 'camera'.
+        senses: Its senses, as for `kiks.Controller`.
         speed_limit: The speed of an output of 1 [pulses/10 ms].
         feedback: Whether its last outputs are inputs.
 
@@ -149,7 +152,7 @@ def mlp(
 
     Args:
         hidden: Units of each hidden layer.
-        senses: Its senses, of 'proximity', 'ambient' and 'camera'.
+        senses: Its senses, as for `kiks.Controller`.
         speed_limit: The speed of an output of 1 [pulses/10 ms].
         feedback: Whether its last outputs are inputs, after the sensors.
 
@@ -172,7 +175,7 @@ def elman(*, units: Units = 4, senses: Senses = ("proximity",), speed_limit: Spe
 
     Args:
         units: Number of hidden units.
-        senses: Its senses, of 'proximity', 'ambient' and 'camera'.
+        senses: Its senses, as for `kiks.Controller`.
         speed_limit: The highest speed [pulses/10 ms].
 
     Example:
@@ -221,7 +224,7 @@ def ctrnn(
         neurons: Number of neurons, at least 2.
         period_s: The time that passes in a call [s]: the period of the control loop.
         time_constant_s: T of a parameter of 0 [s].
-        senses: Its senses, of 'proximity', 'ambient' and 'camera'.
+        senses: Its senses, as for `kiks.Controller`.
         speed_limit: The highest speed [pulses/10 ms].
 
     Example:
@@ -273,7 +276,7 @@ def gru(*, units: Units = 4, senses: Senses = ("proximity",), speed_limit: Speed
 
     Args:
         units: Number of units.
-        senses: Its senses, of 'proximity', 'ambient' and 'camera'.
+        senses: Its senses, as for `kiks.Controller`.
         speed_limit: The highest speed [pulses/10 ms].
 
     Example:
@@ -343,7 +346,7 @@ def plastic(
     Args:
         neurons: Number of neurons, at least 2.
         per: What has a rule, a sign and a rate of its own: 'synapse' or 'neuron'.
-        senses: Its senses, of 'proximity', 'ambient' and 'camera'.
+        senses: Its senses, as for `kiks.Controller`.
         speed_limit: The highest speed [pulses/10 ms].
 
     Example:
@@ -413,7 +416,7 @@ def policy(
         hidden: Units of each hidden layer.
         activation: The function of hidden units: 'tanh' or 'relu'.
         output: What keeps outputs within +-1: 'clip' or 'tanh'.
-        senses: Its senses, of 'proximity', 'ambient' and 'camera'.
+        senses: Its senses, as for `kiks.Controller`.
         speed_limit: The speed of an output of 1 [pulses/10 ms].
 
     Example:

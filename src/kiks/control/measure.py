@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.control.compiled_function import Compiled, decorator, explained
-from kiks.control.senses import check_senses
+from kiks.control.senses import AnySense, check_senses
 from kiks.errors import ParameterError, shown
 from kiks.model.checks import check_count
 
@@ -67,8 +67,8 @@ class Measure(Compiled):
         function: The function; see `Moment` for what it sees.
         notes: Numbers that it keeps for each robot, zeros at the start.
         result: From the notes at the end, float64 [..., note], to the values, float64 [...]; the first if left out.
-        senses: The senses that must come first in `moment.sensors`, of 'proximity', 'ambient' and 'camera'; controllers
-            with others are rejected.
+        senses: The senses that must come first in `moment.sensors`, as for `kiks.Controller`; controllers with others
+            are rejected.
 
     Example:
         >>> import kiks
@@ -88,7 +88,7 @@ class Measure(Compiled):
         *,
         notes: int = 1,
         result: Result = first_note,
-        senses: Sequence[str] = (),
+        senses: AnySense | Sequence[AnySense] = (),
     ) -> None:
         super().__init__(function)
         self.note_count = check_count("notes", notes, least=1)

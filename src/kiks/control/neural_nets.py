@@ -14,13 +14,10 @@ from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
 
-from kiks.control.senses import SENSES, reading_count
+from kiks.control.senses import AnySense, reading_count, sense_of
 from kiks.engine.compiling import inlined, kernel
 from kiks.engine.numbers import exponential, tanh
 from kiks.engine.simd.stack_arrays import stack_floats
-
-DARK_COUNTS = 500.0
-"""The ambient count that is an input of 0: that of a Khepera in the dark (khepera-protocol.md 9.4)."""
 
 TIME_SCALE_LIMIT = 4.0
 """Time constants lie within e to this power of the one that is given, to either side."""
@@ -82,12 +79,10 @@ def do_layer(inputs: Any, input_count: Any, parameters: Any, first: Any, units: 
     add_products(inputs, input_count, parameters, first + unit_count, units, unit_count)
 
 
-def senses_as_inputs(senses: Sequence[str]) -> Any:
+def senses_as_inputs(senses: Sequence[AnySense]) -> Any:
     """Return a kernel `(sensors, inputs)` that writes the counts of senses as inputs.
 
-    Proximity and greys of the camera are shares of the largest reading. Ambient counts fall in light, so their inputs
-    are what is missing from `DARK_COUNTS`, as a share of it: about 0 in the dark, nearly 1 beside a lamp. As shares of
-    the largest count they would be half of full scale in the dark, more than the light of most lamps takes off.
+    A sense says which of its readings are inputs of 0 and of 1.
     """
     if not senses:
 
@@ -97,15 +92,15 @@ def senses_as_inputs(senses: Sequence[str]) -> Any:
 
         return take_none
 
-    take_others, sense = senses_as_inputs(senses[:-1]), SENSES[senses[-1]]
-    first, count, is_light = reading_count(senses[:-1]), sense.size, senses[-1] == "ambient"
-    share = 1.0 / (DARK_COUNTS if is_light else sense.most)
+    take_others, sense = senses_as_inputs(senses[:-1]), sense_of(senses[-1])
+    first, count, zero = reading_count(senses[:-1]), sense.size, sense.zero
+    share = 1.0 / (sense.full - zero)
 
     @inlined
     def take(sensors: Any, inputs: Any) -> None:
         take_others(sensors, inputs)
         for k in range(first, first + count):
-            inputs[k] = ((DARK_COUNTS - sensors[k]) if is_light else sensors[k]) * share
+            inputs[k] = (sensors[k] - zero) * share
 
     return take
 
@@ -142,7 +137,7 @@ def layers(counts: tuple[int, ...], activation: Any, first: int = 0) -> Any:
 
 def feed_forward(
     hidden: Sequence[int],
-    senses: Sequence[str],
+    senses: Sequence[AnySense],
     speed_limit: float,
     *,
     has_feedback: bool = False,

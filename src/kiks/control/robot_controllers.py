@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.control.controller import Controller
+from kiks.control.senses import named, turrets_of
 from kiks.errors import ParameterError, shown
 from kiks.model.checks import check_kind
 
@@ -29,7 +30,7 @@ class RobotControllers:
         senses: All senses: those of the controller with the most. Each other robot has the first of these.
         common_senses: The senses that all robots have.
         sense_counts: Number of senses of each robot, int64 [robot].
-        has_camera: Whether each robot has a camera, bool [robot].
+        turrets: The turrets of each robot, names and classes.
         memory_count: Largest number of numbers that a controller remembers.
     """
 
@@ -48,7 +49,7 @@ class RobotControllers:
             if each.senses != self.senses[: len(each.senses)]:
                 raise ParameterError(
                     f"the senses of one controller must come first among those of the one that has the most, but "
-                    f"{shown(each.name)} senses {', '.join(each.senses)} where another senses {', '.join(self.senses)}."
+                    f"{shown(each.name)} senses {named(each.senses)} where another senses {named(self.senses)}."
                 )
         if is_list:
             rows = _parameters_of_each(self.controllers, parameters, world_count)
@@ -61,7 +62,7 @@ class RobotControllers:
             self.parameter_counts = (self.parameters.shape[2],) * robot_count
         sense_counts = [len(each.senses) for each in self.controllers]
         self.common_senses, self.sense_counts = self.senses[: min(sense_counts)], np.array(sense_counts, np.int64)
-        self.has_camera = np.array(["camera" in each.senses for each in self.controllers])
+        self.turrets = [turrets_of(each.senses) for each in self.controllers]
         self.memory_count = max(each.memory_count for each in self.controllers)
 
     @property

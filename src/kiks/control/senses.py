@@ -1,59 +1,395 @@
-"""The senses of controllers: what a command reads."""
+"""The senses of controllers: for each the command that reads it on the wire, and the function that reads it in a batch.
+
+A sense is a compiled function, as controllers and measures are: the loop of a batch calls it at its address. Those that
+come with KiKS are in `SENSES` and have names; one of a user's own is an object.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple
+import functools
+from collections import namedtuple
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, TypeAlias
 
-from kiks.engine.state import PIXEL_COUNT
+import numpy as np
+from numba import types
+from numba.np.numpy_support import from_dtype
+from numpy.typing import NDArray
+
+from kiks.control.checked_code import is_trusted
+from kiks.control.compiled_function import Compiled, caller_of, decorator, explained
+from kiks.control.recipes import FunctionRecipe, find, recipe_of
+from kiks.engine.compiling import address_of, entry, inlined
+from kiks.engine.physics.gripper import BARRIER_BROKEN, find_between
+from kiks.engine.physics.motor import SPEED_MAX, counter
+from kiks.engine.scene import OPEN_SCENE, open_scene
+from kiks.engine.sensing.ambient import sense_ambient
+from kiks.engine.sensing.proximity import make_readers, pose_at, sense_linked
+from kiks.engine.state import BODY, PIXEL_COUNT, ROBOT
 from kiks.errors import ParameterError, nearest, shown
+from kiks.model.checks import check_count, check_number
+from kiks.model.data_file import check
 from kiks.model.robot import SENSOR_COUNT
 
+# Numba annotates these in part, and not as they are used here.
+_types: Any = types
+_tuple: Any = types.NamedTuple
 
-class Sense(NamedTuple):
-    """A sense of controllers.
+View: Any = namedtuple(
+    "View",
+    (
+        "robot",
+        "x_mm",
+        "y_mm",
+        "heading_rad",
+        "time_ns",
+        "memory",
+        "robots",
+        "bodies",
+        "is_noisy",
+        "tick_count",
+        "world",
+        "scene",
+    ),
+)
+"""The input of a sense: one robot, at the time at which its command acts.
+
+* robot: index of the robot in its world, from 0;
+* x_mm, y_mm, heading_rad: its pose at that time;
+* time_ns: the time [ns];
+* memory: numbers that the turret of the sense remembers, float64, as `Site.memory`;
+* robots: records of `kiks.engine.state.ROBOT`, all robots of its world, at the end of the last tick;
+* bodies: records of `kiks.engine.state.BODY`, the balls and cylinders, at the end of the last tick;
+* is_noisy: False if the readings are to be free of noise;
+* tick_count: ticks done;
+* world: index of its world in the scene;
+* scene: the arrays of the engine (`kiks.engine.scene.open_scene`).
+"""
+
+
+def _list(element: Any) -> Any:
+    return types.Array(element, 1, "C")
+
+
+_NUMBER, _ROW, _INTEGER = types.float64, _list(types.float64), types.int64
+
+ARGUMENTS = (
+    _tuple(
+        (
+            *(_INTEGER, _NUMBER, _NUMBER, _NUMBER, _INTEGER, _ROW, _list(from_dtype(ROBOT)), _list(from_dtype(BODY))),
+            *(types.boolean, _INTEGER, _INTEGER, OPEN_SCENE),
+        ),
+        View,
+    ),
+    _ROW,
+)
+"""Types of a view and readings."""
+
+call_sense = caller_of(ARGUMENTS)
+
+IN_PACKETS = 0
+"""Stands for the address of a sense that a batch reads of many robots together: proximity."""
+
+
+class Sense(Compiled):
+    r"""A function `(view, readings)` that writes what a command reads: whole numbers, into a float64 array.
+
+    A batch calls it; on the wire the command is sent. Both must give the same numbers. A sense
+    that is defined in the class of a turret belongs to it, and robots whose controllers have it carry the turret.
+
+    Args:
+        function: The function; see `View` for what it sees.
+        command: The command that reads it, such as 'E' or 'T,24,C'.
+        readings: Number of its readings.
+        most: The largest reading, which is an input of 1 for networks.
+        least: The smallest reading.
+        zero: The reading that is an input of 0 for networks.
+        full: The reading that is an input of 1, if not `most`.
+        turret: The turret that answers the command, a name or a class; none for a command of the robot's own.
 
     Attributes:
-        command: The command that reads it.
-        size: Number of its readings.
-        most: The largest reading.
+        name: Its name.
+        command: As above, as all others.
+        turret: The turret: a name, a class, or None.
+        recipe: The table that finds it again, of JSON values; None for one that cannot be imported.
+
+    Example:
+        >>> import kiks
+        >>> @kiks.sense(command="K", readings=6, least=-127, most=127)
+        ... def status(view, readings):
+        ...     readings[:] = 0.0
+        >>> status.request
+        b'K\n'
     """
 
-    command: str
-    size: int
-    most: int
+    what, arguments, options = "sense", ("view", "readings"), ("readings",)
+
+    def __init__(
+        self,
+        function: Callable[..., Any],
+        *,
+        command: str,
+        readings: int = 1,
+        most: float,
+        least: float = 0.0,
+        zero: float = 0.0,
+        full: float | None = None,
+        turret: Any = None,
+    ) -> None:
+        super().__init__(function)
+        if is_trusted(function):
+            self.kernel = entry(function)
+        if not isinstance(command, str) or not command.isascii() or not command.isprintable() or not command:
+            raise ParameterError(f"command must be a line such as 'E' or 'T,24,C', but it was {shown(command)}.")
+        self.command, self.size = command, check_count("readings", readings, least=1)
+        self.most, self.least = check_number("most", most), check_number("least", least)
+        self.zero = check_number("zero", zero)
+        self.full = self.most if full is None else check_number("full", full)
+        if self.full == self.zero:
+            raise ParameterError(f"full must differ from zero, but both were {self.full:g}. It is an input of 1.")
+        self.turret = turret
+        self.recipe = recipe_of(function)
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.turret = owner
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # The turret's class has this sense: each is made before the other is known.
+        if not isinstance(self.turret, type):
+            return super().__reduce__()
+        alone = object.__new__(type(self))
+        vars(alone).update(vars(self), turret=None)
+        return (*alone.__reduce__(), {"turret": self.turret})
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.name!r}: {self.command}>"
+
+    @property
+    def sizes(self) -> dict[str, int | None]:
+        """How many readings it has.
+
+        Example:
+            >>> from kiks.control.senses import SENSES
+            >>> SENSES["proximity"].sizes
+            {'readings': 8}
+        """
+        return {"readings": self.size}
 
     @property
     def request(self) -> bytes:
-        """The command as it is sent."""
+        r"""The command as it is sent.
+
+        Example:
+            >>> from kiks.control.senses import SENSES
+            >>> SENSES["barrier"].request
+            b'T,1,G\n'
+        """
         return f"{self.command}\n".encode()
 
+    @property
+    def address(self) -> int:
+        """Where a batch calls it; valid while it lives.
 
-SENSES = {
-    "proximity": Sense("N", SENSOR_COUNT, 1023),  # khepera-protocol.md 8.4
-    "ambient": Sense("O", SENSOR_COUNT, 1023),
-    "camera": Sense("T,2,T", PIXEL_COUNT // 4, 255),  # every fourth grey of a K213 (khepera-protocol.md 10.3)
-}
-"""The senses of controllers, in the order of their numbers in kernels."""
+        Example:
+            >>> from kiks.control.senses import SENSES
+            >>> SENSES["speeds"].address != 0
+            True
+        """
+        return address_of(self.check(ARGUMENTS))
+
+    @property
+    def memory_count(self) -> int:
+        """How many numbers its turret remembers.
+
+        Example:
+            >>> from kiks.control.senses import SENSES
+            >>> SENSES["speeds"].memory_count
+            0
+        """
+        return int(getattr(self.turret, "memory_count", 0))
+
+    def look(self, scene: Any, robot: int, tick_count: int, time_ns: int, *, is_noisy: bool = True) -> NDArray[Any]:
+        """Return what it reads of a robot in the first world of a scene, float64 [reading].
+
+        Args:
+            scene: The scene (`kiks.engine.scene.Scene.record`).
+            robot: Index of the robot.
+            tick_count: Ticks done.
+            time_ns: Time of the reading [ns].
+            is_noisy: False for readings free of noise.
+
+        Example:
+            >>> import kiks
+            >>> from kiks.control.senses import SENSES
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> SENSES["positions"].look(sim.world.scene, 0, 0, 0)
+            array([0., 0.])
+        """
+        readings = np.zeros(self.size)
+        try:
+            look(self.address, scene, robot, tick_count, time_ns, is_noisy, self.memory_count, readings)
+        except Exception as error:
+            raise explained(error, [self]) from None
+        return readings
 
 
-def reading_count(senses: Sequence[str]) -> int:
+sense = decorator(Sense)
+"""Make a sense of a function; a decorator, with the options of `Sense`."""
+
+
+@inlined
+def view_of(
+    scene: Any, world: Any, robot: Any, tick_count: Any, time_ns: Any, is_noisy: Any, first: Any, end: Any
+) -> Any:
+    """Return what a sense sees of a robot at a time; its turret remembers the numbers from `first` up to `end`."""
+    state = scene.robots[world, robot]
+    x_mm, y_mm, heading_rad = pose_at(state, tick_count, time_ns)
+    return View(
+        robot,
+        x_mm,
+        y_mm,
+        heading_rad,
+        time_ns,
+        state.turret_memory[first:end],
+        scene.robots[world],
+        scene.bodies[world],
+        is_noisy,
+        tick_count,
+        world,
+        scene,
+    )
+
+
+@entry
+def look(
+    address: Any, scene: Any, robot: Any, tick_count: Any, time_ns: Any, is_noisy: Any, count: Any, readings: Any
+) -> Any:
+    """Call a sense for a robot of the first world of a scene; its turret remembers `count` numbers."""
+    scene = open_scene(scene[0])
+    call_sense(address, (view_of(scene, 0, robot, tick_count, time_ns, is_noisy, 0, count), readings))
+
+
+# ---- those that come with KiKS ----
+
+
+@sense(command="N", readings=SENSOR_COUNT, most=1023)  # khepera-protocol.md 8.4
+def proximity(view: Any, readings: Any) -> None:
+    """Read the reflected light of the eight sensors; a batch reads many robots together, which gives the same."""
+    readers = make_readers()
+    readers.worlds[0], readers.robots[0] = view.world, view.robot
+    readers.ticks[0], readers.times_ns[0] = view.tick_count, view.time_ns
+    sense_linked(view.scene, readers, 1, view.is_noisy, readings.reshape((1, readings.shape[0])))
+
+
+@sense(command="O", readings=SENSOR_COUNT, most=1023, zero=500, full=0)  # khepera-protocol.md 9.4
+def ambient(view: Any, readings: Any) -> None:
+    """Read the ambient light. Counts fall in light: an input is 0 in the dark, nearly 1 beside a lamp.
+
+    As shares of the largest count they would be half of full scale in the dark, more than the light of most lamps takes
+    off.
+    """
+    sense_ambient(view.scene, view.world, view.robot, view.tick_count, view.time_ns, view.is_noisy, readings)
+
+
+@sense(command="T,2,T", readings=PIXEL_COUNT // 4, most=255, turret="k213")  # khepera-protocol.md 10.3
+def camera(view: Any, readings: Any) -> None:
+    """Read every fourth grey of the last picture of a K213."""
+    for number in range(readings.shape[0]):
+        readings[number] = view.robots[view.robot].camera_pixels[4 * number]
+
+
+@sense(command="H", readings=2, least=-(2**31), most=2**31 - 1, full=12_500)  # a metre (khepera-protocol.md 4.9)
+def positions(view: Any, readings: Any) -> None:
+    """Read the position counters of the wheels [pulses]."""
+    for wheel in range(2):
+        readings[wheel] = counter(view.robots[view.robot], wheel)
+
+
+@sense(command="E", readings=2, least=-SPEED_MAX, most=SPEED_MAX)
+def speeds(view: Any, readings: Any) -> None:
+    """Read the speeds that the robot measures [pulses/10 ms]."""
+    for wheel in range(2):
+        readings[wheel] = view.robots[view.robot].measured_speed[wheel]
+
+
+@sense(command="T,1,G", most=BARRIER_BROKEN, turret="gripper")  # khepera-protocol.md 10.2
+def barrier(view: Any, readings: Any) -> None:
+    """Read the light barrier between the jaws of a gripper."""
+    readings[0] = BARRIER_BROKEN if find_between(view.scene, view.world, view.robot) >= 0 else 0
+
+
+SENSES = {each.name: each for each in (proximity, ambient, camera, positions, speeds, barrier)}
+"""The senses that have names."""
+
+AnySense: TypeAlias = str | Sense
+"""A sense of `SENSES` by its name, or one of a user's own."""
+
+
+def sense_of(given: AnySense) -> Sense:
+    """Return a sense."""
+    return SENSES[given] if isinstance(given, str) else given
+
+
+def named(senses: Iterable[AnySense]) -> str:
+    """Return the names of some senses, for messages."""
+    return ", ".join(each if isinstance(each, str) else each.name for each in senses)
+
+
+def reading_count(senses: Sequence[AnySense]) -> int:
     """Return the number of readings of some senses together."""
-    return sum(SENSES[sense].size for sense in senses)
+    return sum(sense_of(each).size for each in senses)
 
 
-def check_senses(senses: str | Sequence[str]) -> tuple[str, ...]:
-    """Return some of `SENSES`."""
+def turrets_of(senses: Iterable[AnySense]) -> tuple[Any, ...]:
+    """Return the turrets that some senses need, names and classes, each once."""
+    needed = (sense_of(each).turret for each in senses)
+    return tuple(dict.fromkeys(each for each in needed if each is not None))
+
+
+def recipes_for(senses: Sequence[AnySense]) -> list[Any]:
+    """Return senses as JSON has them: names, and recipes of a user's own; `check_senses` takes them back."""
+    return [each if isinstance(each, str) else each.recipe for each in senses]
+
+
+def _found(given: Mapping[str, Any]) -> Any:
+    return find(check(FunctionRecipe, given, "the recipe of a sense"), ".")
+
+
+def check_senses(senses: AnySense | Sequence[AnySense]) -> tuple[AnySense, ...]:
+    """Return some of `SENSES`, or of a user's own."""
     try:
-        given = (senses,) if isinstance(senses, str) else tuple(senses)
+        given = (senses,) if isinstance(senses, str | Sense) else tuple(senses)
     except TypeError:
         raise ParameterError(f"senses must be some of {', '.join(SENSES)}, but they were {shown(senses)}.") from None
-    for sense in given:
-        if not isinstance(sense, str) or sense not in SENSES:
+    given = tuple(_found(each) if isinstance(each, Mapping) else each for each in given)
+    for each in given:
+        if not isinstance(each, Sense) and (not isinstance(each, str) or each not in SENSES):
             raise ParameterError(
-                f"senses must be some of {', '.join(SENSES)}, but {shown(sense)} was among them."
-                f"{nearest(shown(sense), SENSES)}"
+                f"senses must be some of {', '.join(SENSES)}, but {shown(each)} was among them."
+                f"{nearest(shown(each), SENSES)} One of your own is made by @kiks.sense."
             )
     if len(set(given)) != len(given):
-        raise ParameterError(f"senses must name each sense once, but they were {given}.")
+        raise ParameterError(f"senses must name each sense once, but they were {named(given)}.")
     return given
+
+
+@functools.lru_cache(maxsize=256)
+def rows_of(senses: tuple[AnySense, ...]) -> NDArray[np.int64]:
+    """Return what the loop of a batch knows of senses, int64 [sense, 6].
+
+    These are where it calls each, `IN_PACKETS` for proximity; the number of its readings; that of the characters of its
+    request, and of its reply but for commas and numbers; and where the numbers of its turret begin and end.
+    """
+    rows = []
+    first, begins = 0, dict[Any, int]()
+    for each in map(sense_of, senses):
+        if each.turret not in begins:
+            begins[each.turret] = first
+            first += each.memory_count
+        begin = begins[each.turret]
+        words = each.command.split(",")
+        # A turret's answer repeats its number and the letter of the order (khepera-protocol.md 4.18).
+        head = len(",".join(words[: 3 if words[0] == "T" else 1])) + 2
+        address = IN_PACKETS if each is proximity else each.address
+        rows.append((address, each.size, len(each.request), head, begin, begin + each.memory_count))
+    return np.array(rows, np.int64).reshape(-1, 6)

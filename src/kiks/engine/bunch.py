@@ -273,6 +273,13 @@ def show_tracks(scene: Any, bunch: Any) -> Any:
                     robot.trail[ago, axis] = one.trail[ago, axis]
 
 
+@kernel
+def show_robot(scene: Any, bunch: Any, k: Any, number: Any) -> Any:
+    """Write all that moves in a robot of a world of the bunch to the scene."""
+    place = k * scene.robots.shape[1] + number
+    store_lane(bunch.robots[place // LANES], place % LANES, scene.robots[bunch.worlds[k], number])
+
+
 @inlined
 def copy_pose(source: Any, target: Any) -> Any:
     """Copy the pose of a robot."""

@@ -10,12 +10,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import ClassVar
 
-from kiks.engine.physics.gripper import ARM_MAX, ARM_START, GAP_MM, GAP_PER_STEP, JAW_LENGTH_MM, JAWS_MAX
+from kiks.engine.physics.gripper import (
+    ARM_MAX,
+    ARM_START,
+    BARRIER_BROKEN,
+    GAP_MM,
+    GAP_PER_STEP,
+    JAW_LENGTH_MM,
+    JAWS_MAX,
+)
 from kiks.engine.scalar_math import sin_cos
 from kiks.firmware.turret import Orders, Shape, Site, Turret, Values
-
-BARRIER_BROKEN = 255
-"""What the light barrier between the jaws reads with something in it; clients take less than 100 for nothing (10.2)."""
 
 INSULATOR = 255
 """The largest resistivity: that of air."""

@@ -13,7 +13,7 @@ from kiks.batch.batch import Batch
 from kiks.batch.initial_state import random_starts
 from kiks.control.measure import Measure
 from kiks.control.measures import contacts, path_mm
-from kiks.control.senses import SENSES
+from kiks.control.senses import sense_of
 from kiks.errors import ParameterError
 from kiks.export.pictures import Picture
 from kiks.learn.environments import environment_of
@@ -74,7 +74,7 @@ class Episodes:
         self._body = self.batch.specs[0].body
         self._places = [self._free_places(arena) for arena in self.batch.arenas] if task.starts == "random" else []
         self._sensors = np.zeros((worlds, task.robots, task.controller.sensor_count))
-        self._most = np.concatenate([np.full(SENSES[name].size, SENSES[name].most) for name in self.senses])
+        self._most = np.concatenate([np.full(each.size, each.most) for each in map(sense_of, self.senses)])
         self._scores = np.zeros((worlds, task.robots))
         self._rngs: dict[int, np.random.Generator] = {}
         self.step_counts = np.zeros(worlds, np.int64)

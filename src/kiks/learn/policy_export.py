@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.control import controllers
-from kiks.control.neural_nets import DARK_COUNTS
-from kiks.control.senses import SENSES, reading_count
+from kiks.control.senses import AnySense, reading_count, sense_of
 from kiks.errors import ParameterError, shown
 from kiks.learn.champion import Champion
 from kiks.learn.environments import environment_of
@@ -205,14 +204,14 @@ def _chosen(name: str, given: str | None, found: str | None) -> str | None:
     return found if given is None else given
 
 
-def _with_inputs_of_controllers(layer: Layer, senses: tuple[str, ...]) -> Layer:
+def _with_inputs_of_controllers(layer: Layer, senses: tuple[AnySense, ...]) -> Layer:
     """Return the first layer for the inputs of controllers, in place of counts as shares of the largest one."""
     weights, biases = layer[0].copy(), layer[1].copy()
-    if "ambient" in senses:
-        first, sense = reading_count(senses[: senses.index("ambient")]), SENSES["ambient"]
-        light = weights[:, first : first + sense.size]
-        # An input u is (500 - counts) / 500, so the share of 1023 is (1 - u) 500 / 1023.
-        light *= DARK_COUNTS / sense.most
-        biases += light.sum(axis=1)
-        light *= -1.0
+    for place, sense in enumerate(map(sense_of, senses)):
+        first = reading_count(senses[:place])
+        its = weights[:, first : first + sense.size]
+        # An input u is (reading - zero) / (full - zero), so the share of the most is (zero + u (full - zero)) / most.
+        if (sense.zero, sense.full) != (0, sense.most):
+            biases += its.sum(axis=1) * (sense.zero / sense.most)
+            its *= (sense.full - sense.zero) / sense.most
     return weights, biases

@@ -11,6 +11,7 @@ import numpy as np
 
 from kiks.control import measures
 from kiks.control.measure import Measure, Moment
+from kiks.control.senses import AnySense, sense_of
 from kiks.errors import KiksError, ParameterError, nearest, shown
 from kiks.model.arena import Arena
 from kiks.model.checks import check_number
@@ -198,7 +199,7 @@ class _Terms:
         self._sim, self._robot, self._own = sim, robot, own
         self._watches: dict[Term, Watch] = {}
         self._values: dict[Term, Any] = {}
-        self._moments: dict[tuple[int, tuple[str, ...]], Any] = {}
+        self._moments: dict[tuple[int, tuple[AnySense, ...]], Any] = {}
 
     def add(self, formula: Formula) -> None:
         """Add the terms of a formula."""
@@ -300,12 +301,12 @@ def _measure(term: Term, named: dict[str, Any], arena: Arena) -> Measure:
         raise ParameterError(f"must use {term.name} as its reference says, but {shown(str(term))}: {error}.") from None
 
 
-def _moment(sim: Simulation, robot: int, senses: Sequence[str], period_s: float) -> Any:
+def _moment(sim: Simulation, robot: int, senses: Sequence[AnySense], period_s: float) -> Any:
     """Return what a measure sees of a robot now. Its readings are free of noise: the judge sees what is the case."""
     poses, world = sim.poses(), sim.world
     record = world.state.robots[0, robot - 1]
     forwards_mm, backwards_mm, _ = world.distances_mm()[robot - 1]
-    readings = [value for sense in senses for value in _SENSES[sense](sim, robot)]
+    readings = [value for sense in senses for value in _readings(sim, robot, sense)]
     return Moment(
         sim.time_s,
         period_s,
@@ -324,6 +325,16 @@ def _moment(sim: Simulation, robot: int, senses: Sequence[str], period_s: float)
         robot - 1,
         poses,
     )
+
+
+def _readings(sim: Simulation, robot: int, sense: AnySense) -> list[float]:
+    if isinstance(sense, str) and sense in _SENSES:
+        return _SENSES[sense](sim, robot)
+    world = sim.world
+    read: list[float] = (
+        sense_of(sense).look(world.scene, robot - 1, world.state.tick_count, world.now_ns, is_noisy=False).tolist()
+    )
+    return read
 
 
 _SENSES: dict[str, Callable[[Simulation, int], list[float]]] = {

@@ -35,6 +35,9 @@ ARM_MAX = 255.0
 ARM_START = 127.0
 """The arm at power-on: upright (kiks-behaviour.md 3.5)."""
 
+BARRIER_BROKEN = 255
+"""What the light barrier between the jaws reads with something in it; clients take less than 100 for nothing (10.2)."""
+
 ARM_DOWN = 215.0
 """From here on, a body between the jaws stands on the floor."""
 
@@ -236,21 +239,26 @@ def is_free(scene: Any, world: Any, row: Any) -> Any:
     return True
 
 
-# ---- for Python ----
-
-
-@entry
-def find_object(scene: Any, number: Any) -> Any:
+@kernel
+def find_between(scene: Any, world: Any, number: Any) -> Any:
     """Return the row of the body that a robot's gripper holds or has between its jaws, from 0; -1 for none."""
-    scene = open_scene(scene[0])
     robots, bodies, kinds = scene.robots, scene.bodies, scene.kinds
-    robot = robots[0, number]
+    robot = robots[world, number]
     found = -1
     for row in range(bodies.shape[1]):
-        body = bodies[0, row]
+        body = bodies[world, row]
         if body.holder == number + 1:
             return row
         is_there = robot.arm >= ARM_DOWN and body.holder == 0 and is_between_jaws(robot, kinds[robot.kind], body)
         if is_there and found < 0:
             found = row
     return found
+
+
+# ---- for Python ----
+
+
+@entry
+def find_object(scene: Any, number: Any) -> Any:
+    """Call `find_between` for the first world of a scene."""
+    return find_between(open_scene(scene[0]), 0, number)

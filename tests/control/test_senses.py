@@ -1,0 +1,190 @@
+"""Senses: what a batch reads is what a command reads on the wire, to the bit and in time."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import pickle
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from numba import njit
+
+import kiks
+from kiks.batch.loop_timing import answer_length
+from kiks.control.senses import SENSES, AnySense, check_senses, recipes_for, sense_of, turrets_of
+from kiks.firmware.turret import Turret
+
+
+class Compass(Turret):
+    """A turret of a user's own, whose sense is that of its order."""
+
+    number, name, memory_count = 24, "Compass", 1
+
+    @kiks.sense(command="T,24,C", least=-360, most=360)
+    def heading(view: Any, readings: Any) -> None:  # noqa: N805
+        readings[0] = np.floor(math.degrees(view.heading_rad) - view.memory[0]) % 361.0 - 180.0
+
+    def fit(self, site: Any) -> None:
+        super().fit(site)
+        site.memory[0] = 37.5
+
+    def read(self) -> tuple[int, ...]:
+        """C: the heading."""
+        return (int(np.floor(math.degrees(self.site.pose()[2]) - self.site.memory[0]) % 361.0 - 180.0),)
+
+    orders = {"C": (0, read)}  # noqa: RUF012
+
+
+def arena() -> kiks.Arena:
+    walls = np.zeros((400, 500), np.uint8)
+    walls[150:160, 150:400] = 255
+    drawn = kiks.Arena.from_array(walls)
+    from dataclasses import replace
+
+    from kiks.model.arena import Cylinder, Lamp
+
+    return replace(drawn, cylinders=(Cylinder(300, 300),), lamps=(Lamp(100, 300),))
+
+
+def wanderer(senses: Any) -> kiks.Controller:
+    """Return a controller that uses all its readings, as far as they fit into small speeds."""
+
+    def wander(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
+        memory[0] += 1.0
+        left = right = 0.0
+        for k in range(sensors.shape[0]):
+            left += parameters[k] * (sensors[k] % 32.0)
+            right -= parameters[-1 - k] * (sensors[k] % 17.0)
+        wheels[0], wheels[1] = 12.0 + left, 12.0 + right if memory[0] % 20.0 < 12.0 else -8.0 + right
+
+    return kiks.controller(senses=senses, memory=1)(wander)
+
+
+def driven(controller: kiks.Controller, parameters: Any, seed: int, period_s: float) -> tuple[int, str]:
+    """Return the loops on the wire, and the hash before the robot was stopped."""
+    sim = kiks.Simulation(arena(), seed=seed)
+    for turret in turrets_of(controller.senses):
+        sim.fit(1, turret if isinstance(turret, str) else turret())
+    port: Any = sim.port(1)
+    send, hashes = port.write, list[str]()
+
+    def note_and_send(data: bytes) -> int:
+        hashes.append(sim.state_hash())
+        return int(send(data))
+
+    port.write = note_and_send
+    loops = kiks.drive(port, controller, parameters, seconds=4.0, period_s=period_s)
+    return loops, hashes[-1]
+
+
+ALONE: list[tuple[AnySense, ...]] = [("positions",), ("speeds",), ("barrier",), (Compass.heading,)]
+TOGETHER: list[tuple[AnySense, ...]] = [
+    ("proximity", "positions", Compass.heading, "camera"),
+    ("speeds", "barrier", "ambient", "proximity", "positions"),
+]
+
+
+@pytest.mark.parametrize("senses", [*ALONE, *TOGETHER], ids=lambda senses: kiks.control.senses.named(senses))
+def test_a_batch_reads_what_the_wire_reads(senses: tuple[AnySense, ...]) -> None:
+    controller = wanderer(senses)
+    parameters = np.random.default_rng(3).normal(0.0, 0.1, (2, controller.sensor_count))
+    for period_s in (0.0, 0.13):
+        timing = kiks.Timing(period_s, 9600)
+        batch = kiks.Batch(arena(), worlds=2, seed=4, timing=timing)
+        rollouts = batch.run(controller, parameters, seconds=4.0)
+        for world in range(2):
+            found = driven(controller, parameters[world], 4 + world, period_s)
+            assert found == (rollouts.step_counts[world], batch.state_hash(world))
+
+
+def test_packets_are_the_function_of_the_sense() -> None:
+    alone: Any = kiks.Sense.__new__(kiks.Sense)
+    vars(alone).update(vars(SENSES["proximity"]))
+    first, second = (wanderer((each,)) for each in ("proximity", alone))
+    hashes = []
+    for controller in (first, second):
+        batch = kiks.Batch(arena(), worlds=11, seed=4)
+        batch.run(controller, [0.05] * 8, seconds=3.0)
+        hashes.append([batch.state_hash(world) for world in range(11)])
+    assert hashes[0] == hashes[1]
+
+
+@njit  # type: ignore[untyped-decorator, unused-ignore]
+def _length(readings: Any) -> Any:
+    return answer_length(3, readings)
+
+
+def test_every_digit_and_sign_takes_time() -> None:
+    ends = [sign * (10**power + less) for power in range(1, 10) for less in (-1, 0) for sign in (1, -1)]
+    for count in (1, 2):
+        for numbers in itertools.islice(itertools.permutations([0, *ends], count), 200):
+            expected = 3 + sum(1 + len(str(number)) for number in numbers)
+            assert _length(np.array(numbers, np.float64)) == expected
+
+
+@pytest.mark.parametrize("name", SENSES)
+def test_readings_lie_within_the_limits_of_the_table(name: str) -> None:
+    batch = kiks.Batch(arena(), worlds=5, senses=name, seed=1)
+    sense, readings = sense_of(name), [batch.reset()]
+    for _ in range(5):
+        readings.append(batch.step(np.full((5, 1, 2), -20.0)))
+    found = np.array(readings)
+    assert found.shape[-1] == sense.size
+    assert found.min() >= sense.least
+    assert found.max() <= sense.most
+    np.testing.assert_array_equal(found, np.rint(found))
+
+
+def test_a_barrier_notices_what_is_between_the_jaws() -> None:
+    batch = kiks.Batch(arena(), worlds=2, senses="barrier", starts=[[[245, 300, 0.0]], [[60, 300, 0.0]]])
+    batch.reset()
+    for _ in range(2):
+        readings = batch.step(np.zeros((2, 1, 2)))
+    assert (readings == 0).all()  # the arm is up
+    batch.state.robots["arm_target"] = 255.0
+    for _ in range(8):
+        readings = batch.step(np.zeros((2, 1, 2)))
+    assert readings[:, 0, 0].tolist() == [255, 0]
+
+
+def test_senses_survive_pickles_and_recipes() -> None:
+    found = pickle.loads(pickle.dumps(Compass.heading))
+    assert (found.command, found.turret, found.size) == ("T,24,C", Compass, 1)
+    assert check_senses(recipes_for(("speeds", Compass.heading))) == ("speeds", Compass.heading)
+    controller = kiks.controllers.mlp(senses=("proximity", Compass.heading))
+    assert controller.recipe is not None
+    assert kiks.controllers.from_recipe(controller.recipe) is controller
+    batch = pickle.loads(pickle.dumps(kiks.Batch(arena(), 1, senses=("speeds", Compass.heading))))
+    assert batch.reset().shape == (1, 1, 3)
+
+
+def _sense(**options: Any) -> Callable[[], Any]:
+    def read(view: Any, readings: Any) -> None:
+        readings[0] = 0.0
+
+    return lambda: kiks.sense(**{"command": "E", "most": 1} | options)(read)
+
+
+@kiks.sense(command="E", most=1)
+def leave(view: Any, readings: Any) -> None:
+    """Write beyond the readings."""
+    readings[1] = 0.0
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (_sense(command="E\n"), "command must be a line such as 'E'"),
+        (_sense(readings=0), "readings must be"),
+        (_sense(most=0), "full must differ from zero, but both were 0"),
+        (lambda: kiks.controller(senses=("smell",))(lambda s, m, p, w: None), "One of your own is made by @kiks.sense"),
+        (lambda: kiks.Batch(arena(), 1, senses=[leave]).reset(), r"'leave' must stay within its arrays, but line \d+"),
+    ],
+)
+def test_mistakes_are_refused(call: Callable[[], Any], words: str) -> None:
+    with pytest.raises(kiks.ParameterError, match=words) as caught:
+        call()
+    assert "\n" not in str(caught.value)
