@@ -5,7 +5,8 @@ A recording has a column, so that several stand side by side.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from textwrap import fill
@@ -19,6 +20,7 @@ from kiks.export.kinds import KINDS
 from kiks.export.looks import LAMPLIGHT, body_colour, css, robot_colour
 from kiks.export.pictures import Picture, Trails
 from kiks.export.vector_pen import file_of
+from kiks.model.arena import Arena
 from kiks.model.atomic_files import ending_of, replace_file
 from kiks.recording.analysis import odometry, time_shares
 from kiks.recording.recorder import RunRecorder, RunWriter
@@ -30,6 +32,28 @@ from kiks.units import s_from_ns
 NO_ROBOT = "There was no robot in this run"
 
 COLUMN_INCHES = 4.6
+
+COLUMN_MM, MM_IN_AN_INCH = 85.0, 25.4
+"""Width of a column of a journal [mm], and millimetres in an inch."""
+
+COLUMN_STYLE: dict[Any, Any] = {
+    "font.size": 7,
+    "axes.titlesize": 7,
+    "axes.labelsize": 7,
+    "xtick.labelsize": 6.5,
+    "ytick.labelsize": 6.5,
+    "legend.fontsize": 6.5,
+    "legend.frameon": False,
+    "axes.linewidth": 0.5,
+    "xtick.major.width": 0.5,
+    "ytick.major.width": 0.5,
+    "xtick.major.size": 2,
+    "ytick.major.size": 2,
+    "lines.linewidth": 1.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+}
+"""How a figure for a column looks: texts of 7 points, thin lines."""
 
 TITLE_CHARACTERS = 52
 """Most characters of a line of a title."""
@@ -64,10 +88,56 @@ def save_figures(recordings: Sequence[Recording], path: str | Path, *, robot: in
     replace_file(path, file_of(figure_of(recordings, robot=robot), kind), "figures")
 
 
-def save_figure(figure: Any, path: str | Path) -> None:
+def save_figure(figure: Any, path: str | Path, dots_per_inch: int = 110) -> None:
     """Write a figure, whose texts become plain: .png, .svg or .pdf."""
     kind = ending_of(path, "the picture", KINDS["figures"].endings)[1:]
-    replace_file(path, file_of(_with_plain_texts(figure), kind, 110), "the picture")
+    replace_file(path, file_of(_with_plain_texts(figure), kind, dots_per_inch), "the picture")
+
+
+@contextmanager
+def column_figure(path: str | Path, height_mm: float, width_mm: float = COLUMN_MM, **layout: Any) -> Iterator[Any]:
+    """Yield the axes of a figure as wide as a column of a journal, and write it: .png, .svg or .pdf.
+
+    Args:
+        path: File of the figure.
+        height_mm: Its height [mm].
+        width_mm: Its width [mm].
+        layout: Arguments of `Figure.subplots`, such as `nrows`.
+
+    Example:
+        >>> import tempfile
+        >>> file = Path(tempfile.mkdtemp()) / "line.svg"
+        >>> with column_figure(file, 40) as axes:
+        ...     _ = axes.plot([1, 2], [3, 4])
+        >>> file.exists()
+        True
+    """
+    from matplotlib import rc_context
+    from matplotlib.figure import Figure
+
+    ending_of(path, "the picture", KINDS["figures"].endings)
+    with rc_context(COLUMN_STYLE):
+        figure = Figure(figsize=(width_mm / MM_IN_AN_INCH, height_mm / MM_IN_AN_INCH), layout="constrained")
+        yield figure.subplots(**layout)
+        save_figure(figure, path, 200)
+
+
+def draw_paths(axes: Any, arena: Arena, paths: Sequence[Any], colours: Sequence[Any] = ()) -> None:
+    """Draw an arena from above, and paths in it; each begins with a dot.
+
+    Args:
+        axes: The axes.
+        arena: The arena.
+        paths: Of each path x_mm and y_mm, float64 [point, 2 or more].
+        colours: Their colours; those of Matplotlib if left out.
+    """
+    Picture.of_arena(replace(arena, starts=())).draw_on(axes, COLUMN_MM / MM_IN_AN_INCH)
+    for number, path in enumerate(paths):
+        colour = colours[number] if colours else f"C{number % 10}"
+        axes.plot(path[:, 0], path[:, 1], color=colour, linewidth=0.7)
+        axes.plot(*path[0, :2], "o", color=colour, markersize=2.5)
+    axes.set(xticks=[], yticks=[])
+    axes.spines[:].set_visible(False)
 
 
 def _with_plain_texts(figure: Any) -> Any:

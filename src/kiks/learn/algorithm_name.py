@@ -13,3 +13,4 @@ class AlgorithmName(enum.StrEnum):
     MAP_ELITES = "map-elites"
     CMA_ME = "cma-me"
     NOVELTY = "novelty"
+    ROULETTE = "roulette"

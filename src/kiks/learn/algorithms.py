@@ -122,6 +122,60 @@ class Ga:
         return best
 
 
+class Roulette:
+    """A simple genetic algorithm: a roulette wheel, one-point crossover, mutation, and nobody survives.
+
+    Fitness is scaled linearly before the wheel turns, so that the best candidate has `BEST` times the chance of an
+    average one, or less if the worst would have none (Goldberg, Genetic Algorithms in Search, Optimization, and Machine
+    Learning, 1989). Genes begin, and mutate, evenly spread with the deviation of the first generation; they have no
+    bounds.
+    """
+
+    BEST = 2.0
+    """Chance of the best candidate on the wheel, as a multiple of the mean one."""
+
+    CROSSOVER, MUTATION = 0.1, 0.2
+    """Chance that a pair of children is crossed, and that a gene mutates."""
+
+    def __init__(self, setting: Setting) -> None:
+        self._rng = np.random.default_rng(setting.seed)
+        self._reach = setting.spread * np.sqrt(3.0)
+        self._candidates = self._rng.uniform(-self._reach, self._reach, (setting.population, setting.parameter_count))
+        self._favourite = self._candidates[0]
+
+    def ask(self) -> Floats:
+        """Return the next generation."""
+        return self._candidates.copy()
+
+    def tell(self, fitness: Floats, behaviours: Floats) -> None:
+        """Breed the next generation."""
+        rng, (population, parameter_count) = self._rng, self._candidates.shape
+        self._favourite = self._candidates[np.argmax(fitness)].copy()
+        children = self._candidates[rng.choice(population, population, p=self.chances(fitness))]
+        for first in range(0, population - 1, 2):
+            if rng.random() < self.CROSSOVER:
+                tail = np.arange(parameter_count) >= rng.integers(1, max(parameter_count, 2))
+                pair = children[first : first + 2]
+                children[first : first + 2] = np.where(tail, pair[::-1], pair)
+        mutates = rng.random(children.shape) < self.MUTATION
+        self._candidates = children + mutates * rng.uniform(-self._reach, self._reach, children.shape)
+
+    def chances(self, fitness: Floats) -> Floats:
+        """Return the chance of each candidate on the wheel, float64 [candidate]."""
+        mean, best, worst = fitness.mean(), fitness.max(), fitness.min()
+        if best <= mean or worst >= mean:
+            return np.full(len(fitness), 1.0 / len(fitness))
+        gain = min((self.BEST - 1.0) / (best - mean), 1.0 / (mean - worst))
+        scaled = np.maximum(1.0 + gain * (fitness - mean), 0.0)
+        chances: Floats = scaled / scaled.sum()
+        return chances
+
+    def favourite(self) -> Floats:
+        """Return the best of the last generation."""
+        best: Floats = self._favourite.copy()
+        return best
+
+
 class Diverse:
     """Finds many behaviours: new candidates come from an archive of those that differ. pyribs keeps it and proposes.
 
@@ -246,6 +300,7 @@ ALGORITHMS: dict[str, Callable[[Setting], Algorithm]] = {
     AlgorithmName.MAP_ELITES.value: MapElites,
     AlgorithmName.CMA_ME.value: CmaMe,
     AlgorithmName.NOVELTY.value: Novelty,
+    AlgorithmName.ROULETTE.value: Roulette,
 }
 """The algorithms by their names."""
 

@@ -15,6 +15,7 @@ from kiks.learn.evolution import Evolution
 from kiks.learn.exam import PASS_SHARE
 from kiks.learn.finals import Tournament
 from kiks.learn.results import Baselines, Result, curves, passed_count
+from kiks.learn.statistics import mean_interval
 from kiks.learn.task import Axis
 
 CHAMPION_MARK: dict[str, Any] = {"color": "tab:red", "markersize": 12, "markeredgecolor": "white"}
@@ -144,6 +145,27 @@ def save_tournament_plot(tournament: Tournament, path: str | Path) -> None:
 
 
 # ---- several evolutions ----
+
+
+def draw_generations(
+    axes: Any, evolutions: Sequence[Evolution], side: int = 0, *, colour: str = "C0", name: str = ""
+) -> None:
+    """Draw the best and the mean fitness of each generation: means over evolutions, and their 95 % intervals.
+
+    Args:
+        axes: The axes.
+        evolutions: Evolutions with as many generations each, such as those of several seeds.
+        side: Number of the side.
+        colour: Colour of the lines: the best solid, the mean dashed.
+        name: What the labels begin with.
+    """
+    fitness = [[each.fitness_of(side) for each in evolution.generations] for evolution in evolutions]
+    numbers = np.arange(1, len(fitness[0]) + 1)
+    for label, style, pick in (("best", "-", np.max), ("mean", "--", np.mean)):
+        mean, low, high = mean_interval([[pick(each) for each in generations] for generations in fitness])
+        axes.fill_between(numbers, low, high, color=colour, alpha=0.2, linewidth=0)
+        axes.plot(numbers, mean, style, color=colour, label=f"{name} {label}".strip())
+    axes.set(xlabel="generation", ylabel="fitness", xlim=(1, max(2, numbers[-1])))
 
 
 def save_results_plot(groups: Mapping[str, Sequence[Result]], path: str | Path) -> None:

@@ -14,6 +14,7 @@ from kiks.control.controller import Controller
 from kiks.control.controllers import Recipe, controller_of
 from kiks.control.recipes import module_in
 from kiks.errors import KiksError, ParameterError, nearest, shown
+from kiks.learn.classic_tasks import floreano_mondada_1994
 from kiks.learn.ready_tasks import TASKS, avoid, disperse, follow, football, gather, light, maze, pursuit
 from kiks.learn.task import WORLDS_MAX, Seconds, Task
 from kiks.model.arena import Arena
@@ -22,7 +23,19 @@ from kiks.model.checks import ROBOTS_MAX
 from kiks.model.data_file import OneOf, Rule, Text, Whole, check, parse_toml, read_file, record
 from kiks.model.robot import robot_names
 
-__all__ = ["TASKS", "avoid", "disperse", "follow", "football", "gather", "light", "load", "maze", "pursuit"]
+__all__ = [
+    "TASKS",
+    "avoid",
+    "disperse",
+    "floreano_mondada_1994",
+    "follow",
+    "football",
+    "gather",
+    "light",
+    "load",
+    "maze",
+    "pursuit",
+]
 
 
 def __dir__() -> list[str]:

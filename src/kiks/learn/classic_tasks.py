@@ -1,0 +1,95 @@
+"""Ready tasks of the classic papers of evolutionary robotics; the page "Classics" says what of each is known.
+
+`examples/classics` has a script for each paper, which makes its figure.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from kiks.batch.loop_timing import Timing
+from kiks.control import controllers, measures
+from kiks.control.measure import measure
+from kiks.control.measures import FULL_COUNT, FULL_SPEED_MM_S, ROAMING_S, mean, moved_lately_mm, share_of_full
+from kiks.engine.compiling import kernel
+from kiks.learn.algorithm_name import AlgorithmName
+from kiks.learn.ready_tasks import Floats, Values, ready
+from kiks.learn.task import Task
+from kiks.model.shipped import shipped_arena
+
+
+def mean_of_first(values: Values) -> Floats:
+    """Return the mean of the first measure over all worlds: the fitness of most papers."""
+    fitness: Floats = next(iter(values.values())).mean(axis=1)
+    return fitness
+
+
+# ---- Floreano and Mondada 1994 ----
+
+HALF_UNIT_SPREAD = 0.5 / math.sqrt(3.0)
+"""Standard deviation of genes that are spread evenly over +-0.5."""
+
+
+@measure(notes=2, result=mean, senses=("proximity",))
+def navigation(moment: Any, notes: Any) -> None:
+    """Mean of V (1 - sqrt(dv)) (1 - i): fast, straight, and far from everything, whichever side leads.
+
+    V is the mean of both wheels' speeds without their signs, dv half of how much they differ with their signs, i the
+    highest proximity: each from 0 to 1. The measure `avoidance` differs: there driving back earns nothing.
+    """
+    speed = 0.5 * (abs(share_of_full(moment.wheels[0])) + abs(share_of_full(moment.wheels[1])))
+    notes[0] += speed * straight_and_clear(moment)
+    notes[1] += 1.0
+
+
+@measure(notes=4, result=mean, senses=("proximity",))
+def navigation_gained(moment: Any, notes: Any) -> None:
+    """The same with another V: the speed at which it gets away from where it was two seconds ago, as in `roaming`."""
+    away_mm = moved_lately_mm(moment, notes)
+    notes[0] += min(away_mm / (ROAMING_S * FULL_SPEED_MM_S), 1.0) * straight_and_clear(moment)
+    notes[1] += 1.0
+
+
+@kernel
+def straight_and_clear(moment: Any) -> Any:
+    """Return (1 - sqrt(dv)) (1 - i)."""
+    highest = 0.0
+    for k in range(8):
+        highest = max(highest, moment.sensors[k])
+    differ = 0.5 * abs(share_of_full(moment.wheels[0]) - share_of_full(moment.wheels[1]))
+    return (1.0 - np.sqrt(differ)) * (1.0 - min(highest / FULL_COUNT, 1.0))
+
+
+@ready
+def floreano_mondada_1994(shuttling: bool = False) -> Task:
+    """The task to navigate in a looping corridor (Floreano and Mondada 1994).
+
+    Args:
+        shuttling: Whether V counts the speeds of the wheels without their signs, as the paper has it. A robot that
+            shuttles on the spot then earns the most. Left out, V is how fast it gets away from where it was two seconds
+            ago.
+
+    Example:
+        >>> import kiks
+        >>> task = kiks.tasks.floreano_mondada_1994()
+        >>> task.parameter_count, task.timings[0].period_s, task.seconds
+        (22, 0.3, 24.0)
+    """
+    counted = navigation if shuttling else navigation_gained
+    return Task(
+        "floreano_mondada_1994" + ("_shuttling" if shuttling else ""),
+        (shipped_arena("classics/floreano_mondada_1994"),),
+        controllers.mlp(hidden=(), feedback=True),
+        (counted, measures.speed_pulses, measures.roaming, measures.contacts, measures.path_mm),
+        fitness=mean_of_first,
+        seconds=24.0,
+        timing=Timing(period_s=0.3),
+        spread=HALF_UNIT_SPREAD,
+        algorithm=AlgorithmName.ROULETTE.value,
+        generations=100,
+        population=80,
+        about="drive fast and straight through a looping corridor (1994)",
+    )
