@@ -61,8 +61,8 @@ class Evolution:
 
     Args:
         task: The task.
-        algorithm: 'cma' (CMA-ES), 'ga' or 'roulette' (genetic algorithms); for many different behaviours 'map-elites', 'cma-me'
-            or 'novelty'. The task's own if left out. Or, for a task of one side, an object with `ask()`, which returns
+        algorithm: 'cma' (CMA-ES), 'ga' or 'roulette' (genetic algorithms); for many different behaviours 'map-elites',
+            'cma-me' or 'novelty'. The task's own if left out. Or, for a task of one side, an object with `ask()`, which returns
             candidates, float64 [candidate, parameter], each time as many, and `tell(fitness, behaviours)`, float64
             [candidate] and [candidate, axis]. It may have `favourite()`, which returns the parameters that it considers
             best; else these are the best of the last generation.
