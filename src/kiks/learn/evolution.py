@@ -62,10 +62,10 @@ class Evolution:
     Args:
         task: The task.
         algorithm: 'cma' (CMA-ES), 'ga' or 'roulette' (genetic algorithms); for many different behaviours 'map-elites',
-            'cma-me' or 'novelty'. The task's own if left out. Or, for a task of one side, an object with `ask()`, which returns
-            candidates, float64 [candidate, parameter], each time as many, and `tell(fitness, behaviours)`, float64
-            [candidate] and [candidate, axis]. It may have `favourite()`, which returns the parameters that it considers
-            best; else these are the best of the last generation.
+            'cma-me' or 'novelty'. The task's own if left out. Or, for a task of one side, an object with `ask()`, which
+            returns candidates, float64 [candidate, parameter], each time as many, and `tell(fitness, behaviours)`,
+            float64 [candidate] and [candidate, axis]. It may have `favourite()`, which returns the parameters that it
+            considers best; else these are the best of the last generation.
         seed: Seed of all random numbers: the same seed gives the same evolution, with any number of workers.
         population: Number of candidates of a side in a generation; the task's own if left out, or as many as `ask`
             returns, if the algorithm is an object.
