@@ -89,3 +89,36 @@ def test_the_fitness_of_the_maze_puts_the_goal_before_thrift_and_thrift_before_n
     order = [task.fitness(arrays(*each))[0] for each in ((near, cheap), (near, dear), (far, cheap))]
     assert order == sorted(order, reverse=True)
     assert order[1] > order[2] + 1
+
+
+# ---- gather ----
+
+
+def test_the_camera_tells_a_cylinder_from_a_wall_where_proximity_tells_nothing() -> None:
+    shipped = shipped_arena("training/cylinders_0")
+    room = replace(shipped, cylinders=shipped.cylinders[:1])
+    counts: list[list[float]] = []
+
+    @kiks.controller(senses=("proximity", "camera"))
+    def stands(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
+        wheels[:] = 0.0
+
+    def result(notes: Any) -> Any:
+        counts.extend(notes.reshape(-1, 24).tolist())
+        return notes[..., 0]
+
+    @kiks.measure(notes=24, result=result)
+    def sees(moment: Any, notes: Any) -> None:
+        for k in range(24):
+            notes[k] = moment.sensors[k]
+
+    cylinder = room.cylinders[0]
+    poses = [(cylinder.x_mm - 150.0, cylinder.y_mm, 0.0), (200.0, 250.0, math.pi)]
+    batch = kiks.Batch(room, 2, seed=1, starts=np.array(poses)[:, None], timing=kiks.tasks.gather().timings[0])
+    batch.run(stands, (), seconds=0.5, measures=[sees])
+    at_cylinder, at_wall = np.array(counts)
+    assert at_cylinder[:8].max() < 30
+    assert at_wall[:8].max() < 30
+    middle, edges = slice(14, 18), [8, 9, 22, 23]
+    assert at_cylinder[middle].min() > at_cylinder[edges].max() + 80
+    assert at_wall[middle].min() < at_wall[edges].max() + 80

@@ -241,6 +241,9 @@ def light() -> Task:
 
 # ---- gather ----
 
+CAMERA_BAUD = 38400
+"""Speed of the lines [bit/s]: at 9600 a loop with a picture of the camera would take longer than 0.1 s."""
+
 GATHER_SPEED_LIMIT = 15.0
 """Highest speed of `gather` [pulses/10 ms]: 120 mm/s. Contacts do no harm here, and a faster robot meets more."""
 
@@ -263,27 +266,29 @@ def gather_fitness(values: Values) -> Floats:
 def gather() -> Task:
     """The task to push cylinders together, wherever that is.
 
-    A robot that senses proximity alone cannot know where the middle of a room is, but it notices what is near others
-    (Maris and te Boekhorst, Exploiting physical constraints: heap formation through behavioral error in a group of
-    robots, 1996).
+    The robot has the camera K213, which sees where other cylinders are; proximity ends 35 mm away. The cylinders are
+    white and the walls dark grey: so the camera tells them apart, and proximity sensors notice walls on touch only.
 
     Example:
         >>> import kiks
         >>> task = kiks.tasks.gather()
         >>> [measure.name for measure in task.measures], task.parameter_count
-        (['largest_group', 'closeness', 'contacts', 'path_mm'], 22)
+        (['largest_group', 'closeness', 'contacts', 'path_mm'], 54)
     """
-    default = controllers.mlp(hidden=(), feedback=True, speed_limit=GATHER_SPEED_LIMIT)
+    senses = ("proximity", "camera")
+    default = controllers.mlp(hidden=(), senses=senses, feedback=True, speed_limit=GATHER_SPEED_LIMIT)
     return Task(
         "gather",
         training(*(f"cylinders_{k}" for k in range(8))),
         default,
         (measures.largest_group(GROUP_MM), measures.closeness, measures.contacts, measures.path_mm),
         fitness=gather_fitness,
-        seconds=90.0,
+        seconds=120.0,
         worlds=8,
-        axes=(Axis("closeness", 0, 0.6), Axis("path_mm", 0, 10_000)),
-        generations=120,
+        timing=Timing(baud=CAMERA_BAUD),
+        axes=(Axis("closeness", 0, 1), Axis("path_mm", 0, 15_000)),
+        # Larger parameters saturate the wheels by the camera's sixteen greys alone.
+        spread=1.0,
         exam=Exam(
             training(*(f"cylinders_{k}" for k in range(100, 104))),
             (measures.largest_group(GROUP_MM),),
@@ -428,13 +433,13 @@ def maze() -> Task:
         controllers.mlp(hidden=(8,), speed_limit=MAZE_SPEED_LIMIT),
         (goal_mm, measures.final_x_mm, measures.final_y_mm, measures.turned_pulses),
         fitness=maze_fitness,
-        seconds=70.0,
+        seconds=180.0,
         axes=(Axis("final_x_mm", 0, MAZE_SIDE_MM, 32), Axis("final_y_mm", 0, MAZE_SIDE_MM, 32)),
         starts="arena",
         # Larger parameters saturate the wheels: then the robot turns on the spot or shuttles.
         spread=1.0,
         algorithm="map-elites",
-        generations=250,
+        generations=120,
         population=200,
         exam=Exam(
             training("kheperax"),
@@ -459,9 +464,6 @@ PURSUIT_MM = 470
 
 PREDATOR_SPEED, PREY_SPEED = 10.0, 20.0
 """Highest speeds [pulses/10 ms], 80 and 160 mm/s: the prey is twice as fast (Floreano and Nolfi 1997)."""
-
-CAMERA_BAUD = 38400
-"""Speed of the lines [bit/s]: at 9600 a loop with a picture of the camera would take longer than 0.1 s."""
 
 PLAYER_SPEED = 20.0
 """Highest speed of a football player [pulses/10 ms], 160 mm/s."""
