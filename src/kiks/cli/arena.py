@@ -54,6 +54,28 @@ def maze(
 
 
 @arena.command(cls=Command)
+def room(
+    out: Out,
+    width_mm: Annotated[int, typer.Option(help="Outer width [mm].")] = 1100,
+    height_mm: Annotated[int, typer.Option(help="Outer height [mm].")] = 1100,
+    walls: Annotated[int, typer.Option(help="Number of walls.")] = 4,
+    pillars: Annotated[int, typer.Option(help="Number of round pillars.")] = 3,
+    lamps: Annotated[int, typer.Option(help="Number of lamps.")] = 1,
+    seed: Annotated[int, typer.Option(help="Seed: the same seed, the same room.", min=0)] = 0,
+) -> None:
+    """Create a random room with walls, pillars and lamps.
+
+    A robot reaches every place.
+
+    Example: kiks arena room room.toml --walls 6 --seed 3
+    """
+    from kiks.model.arena import Arena
+
+    sizes = {"width_mm": width_mm, "height_mm": height_mm}
+    _save(Arena.room(**sizes, walls=walls, pillars=pillars, lamps=lamps, seed=seed), out)
+
+
+@arena.command(cls=Command)
 def new(
     out: Out,
     width_mm: Annotated[int, typer.Option(help="Outer width [mm].")],

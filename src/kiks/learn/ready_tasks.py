@@ -68,6 +68,12 @@ def training(*names: str) -> tuple[Arena, ...]:
     return tuple(shipped_arena(f"training/{name}") for name in names)
 
 
+@cache
+def rooms(count: int, **sizes: int) -> tuple[Arena, ...]:
+    """Return random rooms, the same objects each time; `sizes` are arguments of `kiks.Arena.room`."""
+    return tuple(Arena.room(seed=seed, **sizes) for seed in range(count))
+
+
 # ---- avoid ----
 
 AVOID_SPEED_LIMIT, AVOID_PERIOD_S = 5.0, 0.06
@@ -189,6 +195,10 @@ STAY_S = 30.0
 """Time at the end of the exam for which it must be there without a break [s]."""
 
 
+LIGHT_ROOMS = 12
+"""Number of rooms for training. In three of them, robots learn to search these; in others, they bounce to and fro."""
+
+
 def light_fitness(values: Values) -> Floats:
     """Return the fitness of `light`: the share of the way that was made, more if it ends at the lamp; 0 of standing."""
     scores = values["light_approach"] * (1 + values["near_light_share"])
@@ -215,7 +225,7 @@ def light() -> Task:
     default = controllers.mlp(hidden=(4,), senses=("proximity", "ambient"), speed_limit=LIGHT_SPEED_LIMIT)
     return Task(
         "light",
-        training("lit_pillars", "lit_walls", "lit_rooms"),
+        rooms(LIGHT_ROOMS),
         default,
         (
             measures.light_approach,

@@ -29,6 +29,7 @@ from kiks.model.raster import (
     between,
     cells_per_pixel,
 )
+from kiks.model.room import draw_room
 from kiks.model.wall_tables import WallTables, tables_of
 from kiks.model.walls import Wall, painted
 
@@ -263,6 +264,41 @@ class Arena:
         """
         picture, start, lamp = draw_maze(columns, rows, path_mm, wall_mm, seed)
         return replace(cls.from_array(picture, name="maze"), starts=(start,), lamps=(lamp,))
+
+    @classmethod
+    def room(
+        cls,
+        *,
+        width_mm: int = 1100,
+        height_mm: int = 1100,
+        walls: int = 4,
+        pillars: int = 3,
+        lamps: int = 1,
+        seed: int = 0,
+    ) -> Arena:
+        """Return a random room with walls and pillars of several shades, and lamps of 25 W.
+
+        A robot reaches every place: things are at least 120 mm apart. A list of many rooms trains a controller in
+        others of them in each generation (`kiks.Task`).
+
+        Args:
+            width_mm: Outer width [mm], from 500 to 3000.
+            height_mm: Outer height [mm], likewise.
+            walls: Number of walls, straight or with a corner; some begin at the frame.
+            pillars: Number of round pillars.
+            lamps: Number of lamps.
+            seed: The same seed, the same room, on every computer.
+
+        Raises:
+            ParameterError: If the things do not fit.
+
+        Example:
+            >>> rooms = [Arena.room(seed=seed) for seed in range(24)]
+            >>> len(rooms[0].walls), len(rooms[0].lamps)
+            (7, 1)
+        """
+        built, lit = draw_room(width_mm, height_mm, walls, pillars, lamps, seed)
+        return replace(cls.box(width_mm, height_mm), name=f"room {seed}", walls=built, lamps=lit)
 
     @property
     def width_mm(self) -> float:

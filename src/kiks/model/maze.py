@@ -76,7 +76,7 @@ def _passages(columns: int, rows: int, seed: int) -> Iterable[tuple[_Cell, _Cell
             column, row = cell
             around = ((column + 1, row), (column, row + 1), (column - 1, row), (column, row - 1))
             inside = [(c, r) for c, r in around if 0 <= c < columns and 0 <= r < rows]
-            onward[cell] = inside[_draw(seed, next(draws)) % len(inside)]
+            onward[cell] = inside[random_bits(seed, next(draws)) % len(inside)]
             cell = onward[cell]
         cell = first
         while cell not in joined:
@@ -85,6 +85,6 @@ def _passages(columns: int, rows: int, seed: int) -> Iterable[tuple[_Cell, _Cell
             cell = onward[cell]
 
 
-def _draw(seed: int, number: int) -> int:
+def random_bits(seed: int, number: int) -> int:
     """Return 64 random bits that depend on seed and number alone."""
     return int.from_bytes(blake2b(f"{seed} {number}".encode(), digest_size=8).digest(), "big")
