@@ -1,11 +1,16 @@
 """How long tasks take to evolve from random, and whether their champions solve them.
 
-Run: python benchmarks/evolve.py [--json] [--seeds 5] [--task NAME ...] [--kheperax FOLDER]. For each seed the task is
-evolved with its own algorithm, population and number of generations, and its champion takes the exam (`kiks.Exam`):
-twenty starts, with the timing of a line of 9600 baud, in arenas where it was not trained, but for the maze.
+Run: python benchmarks/evolve.py [--json] [--seeds 101-120] [--task NAME ...] [--kheperax FOLDER]. For each seed the
+task is evolved with its own algorithm, population and number of generations, and its champion takes the exam
+(`kiks.Exam`): twenty starts, with the timing of a line of 9600 baud, in arenas where it was not trained, but for the
+maze. The seeds are a range, a list such as 3,7 or 1-5,9, or a number such as 5 for those from 1 to 5. What is known is
+printed at once.
 
-* `evolve.NAME_solved`: the share of champions that pass; `evolve.NAME_s`: the median time of an evolution, and
-  `evolve.NAME_cpu_s` that of the processor.
+Settings of tasks are chosen on seeds 1 to 20. So results are to be reported on others.
+
+* `evolve.NAME_starts_SEED`: the starts that the champion of a seed solves, and the time of its evolution.
+* `evolve.NAME_solved`: the share of champions that pass, with Wilson's interval of 95 %; `evolve.NAME_s`: the median
+  time of an evolution, and `evolve.NAME_cpu_s` that of the processor.
 * `evolve.maze_coverage`, `evolve.maze_qd_score`: of the archive of `maze`, medians; `evolve.maze_kheperax_coverage`:
   that of MAP-Elites in Kheperax itself, in the same maze with as many cells, candidates and evaluations
   (benchmarks/kheperax_elites.py). Its environment is made in the folder if it is not there; without --kheperax it is
@@ -24,9 +29,12 @@ import argparse
 import json
 import statistics
 import subprocess
+import sys
 import time
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -35,11 +43,18 @@ import kiks
 from batch import kheperax_python
 from calibration import report
 from kiks.batch.initial_state import random_starts
+from kiks.learn.statistics import wilson_interval
 from kiks.model.arena import Ball
+from kiks.model.ranges import numbers_of
 
 ARENAS = Path(__file__).parent.parent / "examples" / "arenas"
 TASKS = ("avoid", "follow", "light", "gather", "maze")
 CONTEST, PERIODS = "pursuit", 5
+SWARMS = "swarm"
+ALL = (*TASKS, CONTEST, SWARMS)
+
+Row = tuple[str, float, str]
+"""Name, value and unit of a figure."""
 
 SWARM, SWARM_MM, SWARM_POPULATION, SWARM_GENERATIONS = 20, 2000, 100, 3
 
@@ -77,9 +92,15 @@ def swarm_task() -> kiks.Task:
     )
 
 
-def coevolutions(seeds: range) -> list[tuple[str, float, str]]:
-    """Return how long predator and prey take to evolve against each other, and who progressed."""
-    rows: list[tuple[str, float, str]] = []
+def seeds_of(text: str) -> list[int]:
+    """Return the seeds of a number, a list or a range."""
+    if text.isdigit():
+        return list(range(1, int(text) + 1))
+    return [int(seed) for seed in numbers_of(text.replace("-", ".."), "--seeds", step=1)]
+
+
+def coevolutions(seeds: list[int]) -> Iterator[Row]:
+    """Yield how long predator and prey take to evolve against each other, and who progressed."""
     contest, wholes_s = kiks.tasks.pursuit(), []
     for seed in seeds:
         start_s = time.perf_counter()
@@ -89,60 +110,72 @@ def coevolutions(seeds: range) -> list[tuple[str, float, str]]:
         tournament = coevolution.master_tournament()
         for side, means in zip(contest.side_names, tournament.means, strict=True):
             for number, period in enumerate(np.array_split(means, PERIODS), 1):
-                rows.append((f"evolve.pursuit_{side}_{number}", period.mean(), f"against all champions, seed {seed}"))
-    rows.append(("evolve.pursuit_s", statistics.median(wholes_s), f"s for {contest.generations} generations"))
-    return rows
+                yield f"evolve.pursuit_{side}_{number}", period.mean(), f"against all champions, seed {seed}"
+    yield "evolve.pursuit_s", statistics.median(wholes_s), f"s for {contest.generations} generations"
+
+
+def evolutions(name: str, seeds: list[int], kheperax: Path | None) -> Iterator[Row]:
+    """Yield how long a task takes to evolve, and how its champions do in its exams."""
+    task, wholes_s, cpus_s, passed = kiks.tasks.load(name), [], [], Counter[str]()
+    coverages: dict[str, list[float]] = {"coverage": [], "qd_score": [], "kheperax_coverage": []}
+    exams = exams_of(task)
+    for seed in seeds:
+        start_s, start_cpu_s = time.perf_counter(), time.process_time()
+        evolution = kiks.Evolution(task, seed=seed)
+        champion = evolution.run(generations=task.generations)
+        wholes_s.append(time.perf_counter() - start_s)
+        cpus_s.append(time.process_time() - start_cpu_s)
+        if name == "maze" and evolution.archive is not None:
+            coverages["coverage"].append(evolution.archive.coverage)
+            coverages["qd_score"].append(evolution.archive.qd_score)
+            if kheperax is not None:
+                coverages["kheperax_coverage"].append(kheperax_coverage(kheperax, task, seed))
+        for exam_name, exam in exams.items():
+            result = exam.examine(champion)
+            passed[exam_name] += result.is_passed
+            unit = f"of {len(result.solved)} solved, after {cpus_s[-1]:.1f} s of the processor"
+            yield f"evolve.{exam_name}_starts_{seed}", result.solved.sum(), unit
+    for each in exams:
+        low, high = wilson_interval(passed[each], len(seeds))
+        unit = f"of {len(seeds)} champions; 95 %: {low:.2f} to {high:.2f}"
+        yield f"evolve.{each}_solved", passed[each] / len(seeds), unit
+    yield f"evolve.{name}_s", statistics.median(wholes_s), f"s for {task.generations} generations"
+    yield f"evolve.{name}_cpu_s", statistics.median(cpus_s), "s of the processor"
+    cells = f"of {task.generations * task.population} evaluations"
+    for measure, found in coverages.items():
+        if found:
+            yield f"evolve.{name}_{measure}", statistics.median(found), cells
+    if name == "avoid":
+        pace = 60 * task.generations / statistics.median(wholes_s)
+        yield "evolve.generations_per_min", pace, "of one robot that avoids"
+
+
+def swarms() -> Iterator[Row]:
+    """Yield the pace at which a swarm evolves."""
+    start_s = time.perf_counter()
+    swarm = kiks.Evolution(swarm_task(), seed=1, population=SWARM_POPULATION)
+    swarm.run(generations=SWARM_GENERATIONS)
+    pace = 60 * SWARM_GENERATIONS / (time.perf_counter() - start_s)
+    yield "evolve.swarm_generations_per_min", pace, f"of {SWARM} robots and {SWARM} balls"
 
 
 def main() -> None:
     """Measure and report."""
     arguments = argparse.ArgumentParser(description=__doc__)
     arguments.add_argument("--json", action="store_true", help="one JSON object a line")
-    arguments.add_argument("--seeds", type=int, default=5, help="how many evolutions of each task")
-    arguments.add_argument("--task", nargs="+", choices=(*TASKS, CONTEST), default=(*TASKS, CONTEST), help="the tasks")
+    arguments.add_argument("--seeds", type=seeds_of, default="5", help="seeds of the evolutions: 101-120, 3,7 or 5")
+    arguments.add_argument("--task", nargs="+", choices=ALL, default=ALL, help="what to evolve")
     arguments.add_argument("--kheperax", type=Path, metavar="FOLDER", help="environment of Kheperax, for maze")
     options = arguments.parse_args()
 
-    rows: list[tuple[str, float, str]] = []
+    measured = [evolutions(name, options.seeds, options.kheperax) for name in TASKS if name in options.task]
     if CONTEST in options.task:
-        rows += coevolutions(range(1, options.seeds + 1))
-    for name in (name for name in options.task if name != CONTEST):
-        task, wholes_s, cpus_s, passed = kiks.tasks.load(name), [], [], Counter[str]()
-        coverages: dict[str, list[float]] = {"coverage": [], "qd_score": [], "kheperax_coverage": []}
-        exams = exams_of(task)
-        for seed in range(1, options.seeds + 1):
-            start_s, start_cpu_s = time.perf_counter(), time.process_time()
-            evolution = kiks.Evolution(task, seed=seed)
-            champion = evolution.run(generations=task.generations)
-            wholes_s.append(time.perf_counter() - start_s)
-            cpus_s.append(time.process_time() - start_cpu_s)
-            if name == "maze" and evolution.archive is not None:
-                coverages["coverage"].append(evolution.archive.coverage)
-                coverages["qd_score"].append(evolution.archive.qd_score)
-                if options.kheperax is not None:
-                    coverages["kheperax_coverage"].append(kheperax_coverage(options.kheperax, task, seed))
-            for exam_name, exam in exams.items():
-                result = exam.examine(champion)
-                passed[exam_name] += result.is_passed
-                rows.append(
-                    (f"evolve.{exam_name}_starts_{seed}", result.solved.sum(), f"of {len(result.solved)} solved")
-                )
-        rows += [(f"evolve.{each}_solved", passed[each] / options.seeds, "of the champions") for each in exams]
-        rows.append((f"evolve.{name}_s", statistics.median(wholes_s), f"s for {task.generations} generations"))
-        rows.append((f"evolve.{name}_cpu_s", statistics.median(cpus_s), "s of the processor"))
-        cells = f"of {task.generations * task.population} evaluations"
-        rows += [
-            (f"evolve.{name}_{each}", statistics.median(found), cells) for each, found in coverages.items() if found
-        ]
-        if name == "avoid":
-            pace = 60 * task.generations / statistics.median(wholes_s)
-            rows.append(("evolve.generations_per_min", pace, "of one robot that avoids"))
-    start_s = time.perf_counter()
-    swarm = kiks.Evolution(swarm_task(), seed=1, population=SWARM_POPULATION)
-    swarm.run(generations=SWARM_GENERATIONS)
-    pace = 60 * SWARM_GENERATIONS / (time.perf_counter() - start_s)
-    rows.append(("evolve.swarm_generations_per_min", pace, f"of {SWARM} robots and {SWARM} balls"))
-    report(rows, as_json=options.json)
+        measured.append(coevolutions(options.seeds))
+    if SWARMS in options.task:
+        measured.append(swarms())
+    for row in chain.from_iterable(measured):
+        report([row], as_json=options.json)
+        sys.stdout.flush()
 
 
 if __name__ == "__main__":

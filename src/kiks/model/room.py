@@ -8,7 +8,7 @@ angle is taken.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import count, repeat, takewhile
+from itertools import count, pairwise, repeat, takewhile
 from typing import Any
 
 import numpy as np
@@ -60,8 +60,8 @@ def draw_room(
         if len(things) == len(makes):
             return things[lamps:], things[:lamps]
     raise ParameterError(
-        f"a room must have space for its things, but {_ROOMS} rooms of {width_mm} x {height_mm} mm were full before they "
-        f"had {walls} walls, {pillars} pillars and {lamps} lamps. Take fewer, or a larger room."
+        f"a room must have space for its things, but {_ROOMS} rooms of {width_mm} x {height_mm} mm were full before "
+        f"they had {walls} walls, {pillars} pillars and {lamps} lamps. Take fewer, or a larger room."
     )
 
 
@@ -146,7 +146,7 @@ class _Room:
 def _points(corners: list[tuple[int, int]]) -> Iterator[tuple[float, float]]:
     """Yield points along a line, at most 10 mm apart."""
     yield corners[0]
-    for (x_mm, y_mm), (to_x_mm, to_y_mm) in zip(corners, corners[1:], strict=False):
+    for (x_mm, y_mm), (to_x_mm, to_y_mm) in pairwise(corners):
         across_mm, up_mm = to_x_mm - x_mm, to_y_mm - y_mm
         steps = (abs(across_mm) + abs(up_mm)) // 10 + 1
         for step in range(1, steps + 1):
