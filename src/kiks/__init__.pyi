@@ -12,6 +12,8 @@ from .client.matlab_functions import ktime as ktime
 from .client.matlab_functions import pause as pause
 from .control import controllers as controllers
 from .control import measures as measures
+from .control.actuators import Actuator as Actuator
+from .control.actuators import actuator as actuator
 from .control.controller import Controller as Controller
 from .control.controller import controller as controller
 from .control.measure import Measure as Measure

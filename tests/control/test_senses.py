@@ -14,7 +14,8 @@ from numba import njit
 
 import kiks
 from kiks.batch.loop_timing import answer_length
-from kiks.control.senses import SENSES, AnySense, check_senses, recipes_for, sense_of, turrets_of
+from kiks.control.senses import SENSES, AnySense, check_senses, recipes_for, sense_of
+from kiks.control.turret_parts import turrets_of
 from kiks.firmware.turret import Turret
 
 
@@ -66,7 +67,7 @@ def wanderer(senses: Any) -> kiks.Controller:
 def driven(controller: kiks.Controller, parameters: Any, seed: int, period_s: float) -> tuple[int, str]:
     """Return the loops on the wire, and the hash before the robot was stopped."""
     sim = kiks.Simulation(arena(), seed=seed)
-    for turret in turrets_of(controller.senses):
+    for turret in turrets_of(controller.parts):
         sim.fit(1, turret if isinstance(turret, str) else turret())
     port: Any = sim.port(1)
     send, hashes = port.write, list[str]()

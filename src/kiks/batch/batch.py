@@ -19,11 +19,13 @@ from kiks.batch.loop import roll_out
 from kiks.batch.loop_timing import Timing
 from kiks.batch.measure_slots import MeasureSlots
 from kiks.batch.rollouts import Rollouts
+from kiks.control.actuators import NOTHING, WHEELS, AnyActuator, check_actuators, order_rows_of, orders_of
 from kiks.control.compiled_function import Compiled, explained
 from kiks.control.controller import Controller
 from kiks.control.measure import Measure
 from kiks.control.robot_controllers import RobotControllers
-from kiks.control.senses import AnySense, check_senses, reading_count, rows_of, sense_of, turrets_of
+from kiks.control.senses import AnySense, check_senses, reading_count, rows_of, sense_of
+from kiks.control.turret_parts import turrets_of
 from kiks.engine.bunch import worlds_in_bunch
 from kiks.engine.scene import Scene, enter_worlds
 from kiks.engine.simd.lanes import LANES
@@ -79,6 +81,7 @@ class Batch:
             start poses of a simulation with the world's seed if left out.
         senses: Readings that `reset` and `step` return, as for `kiks.Controller`; `run` uses its controller's. Robots
             carry the turrets that their senses need; a camera takes a picture every 200 ms.
+        actuators: Actuators that `step` takes outputs for, likewise.
         measures: Measures for step-by-step use, see `values`; `run` has an argument of its own.
         timing: Timing of the control loop.
         response: Response of the proximity sensors, if not that of the robots' files.
@@ -108,6 +111,7 @@ class Batch:
         seed: int | ArrayLike = 0,
         starts: ArrayLike | None = None,
         senses: AnySense | Sequence[AnySense] = ("proximity",),
+        actuators: AnyActuator | Sequence[AnyActuator] = (WHEELS,),
         measures: Sequence[Measure] = (),
         timing: Timing | None = None,
         response: str | None = None,
@@ -121,7 +125,10 @@ class Batch:
         self.world_count, self.robot_count = len(self.arena_indices), initial.robot_count
         self.threads = check_count("threads", (os.cpu_count() or 1) if threads is None else threads, 1, 4096)
         self.senses = check_senses(senses)
-        self._turrets = [turrets_of(self.senses)] * self.robot_count
+        self.actuators = check_actuators(actuators)
+        orders = orders_of(self.actuators)
+        self._parts = (*map(sense_of, self.senses), *orders)
+        self._turrets = [turrets_of(self._parts)] * self.robot_count
         self.state = State.empty(
             world_count=self.world_count, robot_count=self.robot_count, body_count=initial.body_count
         )
@@ -137,8 +144,11 @@ class Batch:
             np.full(self.robot_count, len(self.senses)),
             np.full(self.robot_count, CAMERA in self._turrets[0]),
             *(np.zeros(self.world_count, np.int64) for _ in range(5)),
-            *(np.zeros((*shape, reading_count(self.senses))), np.zeros((*shape, 2)), np.zeros(shape, np.int64)),
+            *(np.zeros((*shape, count)) for count in (reading_count(self.senses), 2 + len(orders))),
+            np.zeros(shape, np.int64),
             *(np.zeros((*shape, 0)), np.zeros((*shape, 0)), self.notes),
+            *(order_rows_of(self._parts), np.full(self.robot_count, len(orders))),
+            np.full((*shape, len(orders)), NOTHING),
             *(each[self.arena_indices] for each in initial.switches),
             np.zeros(self.world_count, np.int64),
         )
@@ -158,7 +168,9 @@ class Batch:
     def __setstate__(self, parts: dict[str, Any]) -> None:
         vars(self).update(parts)
         self._lock, self._scenes = threading.RLock(), self._make_scenes()
-        self._worlds = self._worlds._replace(senses=rows_of(self.senses))  # which are addresses
+        self._worlds = self._worlds._replace(
+            senses=rows_of(self.senses), orders=order_rows_of(self._parts)
+        )  # which are addresses
 
     def __repr__(self) -> str:
         robots = counted(self.robot_count, "robot")
@@ -210,9 +222,13 @@ class Batch:
             memory=np.zeros((*shape, driving.memory_count)),
             parameters=driving.parameters,
             notes=np.zeros((*shape, watching.note_count)),
+            wheels=np.zeros((*shape, 2 + len(driving.orders))),
+            orders=order_rows_of(driving.parts),
+            order_counts=driving.order_counts,
+            sent=np.full((*shape, len(driving.orders)), NOTHING),
         )
         deciders = deciders_of(driving.controllers, driving.parameter_counts)
-        functions = [*driving.controllers, *map(sense_of, driving.senses), *watching.measures]
+        functions = [*driving.controllers, *driving.parts, *watching.measures]
         callbacks = deciders, watching.watchers, watching.until_note
         self._on_all_cores(worlds, (0, UNLIMITED, until_ns), callbacks, functions)
         names = tuple(each.name for each in measures)
@@ -291,8 +307,8 @@ class Batch:
         """Send all robots their speeds, wait for the next loop, and let them sense again.
 
         Args:
-            wheels: Speeds of the left and right wheels [pulses/10 ms], float64 [world, robot, 2]; rounded and cut to
-                +-127 when they are sent.
+            wheels: Speeds of the left and right wheels [pulses/10 ms], and a number for each other output, float64
+                [world, robot, output]; rounded and cut, the speeds to +-127, when they are sent.
 
         Returns:
             The readings of the robots, float64 [world, robot, sensor]; a copy.
@@ -307,8 +323,9 @@ class Batch:
         """
         given = array_of(wheels)
         if given is None or given.shape != self._worlds.wheels.shape:
+            wanted = self._worlds.wheels.shape
             found = "they were no numbers" if given is None else f"their shape was {given.shape}"
-            raise ParameterError(f"wheels must be [world, robot, 2], here {self._worlds.wheels.shape}, but {found}.")
+            raise ParameterError(f"wheels must be [world, robot, output], here {wanted}, but {found}.")
         if not self._is_sensed:
             raise ParameterError("reset() must be called before the first step(), and after a run().")
         if np.isnan(given).any():
@@ -421,7 +438,7 @@ class Batch:
         worlds = self._worlds
         for count in (worlds.ticks, worlds.begins_ns, worlds.watched_ns, worlds.sensed_ns, worlds.steps):
             count[chosen] = 0
-        self.notes[chosen] = 0.0
+        self.notes[chosen], worlds.sent[chosen] = 0.0, NOTHING
         if worlds.switch_ticks.shape[1]:
             worlds.switched[chosen] = 0
             self._lamps[chosen, :, 3] = self._initial_state.lamps[self.arena_indices[chosen], :, 3]
@@ -430,7 +447,7 @@ class Batch:
     def _do_halves(self, first: int, end: int, chosen: NDArray[np.int64] | None = None) -> None:
         """Do halves of control loops with the present speeds of the wheels: even halves sense, odd halves act."""
         span, callbacks = (first, end, UNLIMITED), (NO_DECIDERS, self._watching.watchers, self._watching.until_note)
-        functions = [*map(sense_of, self.senses), *self._watching.measures]
+        functions = [*self._parts, *self._watching.measures]
         # A measure that fails leaves worlds in the middle of a loop.
         is_sensed, self._is_sensed = self._is_sensed, False
         self._on_all_cores(self._worlds, span, callbacks, functions, chosen=chosen, least=STEP_BLOCK)

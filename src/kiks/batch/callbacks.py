@@ -75,6 +75,7 @@ def decider_of(controller: Controller, parameter_count: int) -> Any:
     """Return what calls a controller, with so many parameters, for its robots in all worlds of a bunch."""
     controller.check((_ROW,) * len(ARGUMENTS))
     decide, sensor_count, memory_count = controller.kernel, controller.sensor_count, controller.memory_count
+    output_count = controller.output_count
 
     @callable_kernel
     def decide_all(row: Any, numbers: Any, is_on: Any, sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
@@ -86,7 +87,7 @@ def decider_of(controller: Controller, parameter_count: int) -> Any:
                         begin_of(sensors[world, robot], sensor_count),
                         begin_of(memory[world, robot], memory_count),
                         begin_of(parameters[world, robot], parameter_count),
-                        begin_of(wheels[world, robot], 2),
+                        begin_of(wheels[world, robot], output_count),
                     )
 
     return compiled_for(decide_all, DECIDER)

@@ -8,7 +8,7 @@ from typing import Any
 Worlds: Any = namedtuple(
     "Worlds",
     "line senses sense_counts has_camera ticks begins_ns watched_ns sensed_ns steps sensors wheels turns memory "
-    "parameters notes switch_ticks switch_codes switched",
+    "parameters notes orders order_counts sent switch_ticks switch_codes switched",
 )
 """What the loop knows of all worlds of a batch.
 
@@ -22,11 +22,14 @@ Worlds: Any = namedtuple(
 * sensed_ns: when the last reply of the present loop had arrived [ns], int64 [world];
 * steps: loops done, int64 [world];
 * sensors: the last readings, float64 [world, robot, sensor];
-* wheels: the last sent speeds [pulses/10 ms], float64 [world, robot, 2];
+* wheels: the last sent speeds [pulses/10 ms], and outputs of other actuators, float64 [world, robot, 2 + order];
 * turns: the robots of each world in the order in which their commands act, int64 [world, robot];
 * memory: memory of the controllers, float64 [world, robot, number];
 * parameters: parameters of the controllers, float64 [world, robot, number];
 * notes: state slots of the measures, float64 [world, robot, note];
+* orders: the other actuators (`kiks.control.actuators.order_rows_of`), int64 [order, 7];
+* order_counts: how many of these each robot has, int64 [robot];
+* sent: what they have sent last, float64 [world, robot, order];
 * switch_ticks: ticks after which lamps are switched, int64 [world, switch], in order;
 * switch_codes: twice the index of the lamp, and 1 more for on, int64 [world, switch];
 * switched: switches done, int64 [world].

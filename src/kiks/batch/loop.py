@@ -6,16 +6,19 @@ the batch does what a `kiks.Simulation` does: first the ticks that have begun, t
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 
 from kiks.batch.callbacks import call_decider, call_measure
-from kiks.batch.loop_timing import LENGTHS, acts_at, answer_length, order_length
+from kiks.batch.loop_timing import LENGTHS, acts_at, answer_length, digits_of, order_length
+from kiks.control.actuators import call_actuator, whole_value
 from kiks.control.controller import whole_speed
 from kiks.control.measure import Moment
-from kiks.control.senses import IN_PACKETS, call_sense, view_of
-from kiks.engine.bunch import give_back, make_lanes, make_room, robot_in, show_robot, show_tracks, take
+from kiks.control.senses import IN_PACKETS, call_sense
+from kiks.control.turret_parts import view_of
+from kiks.engine.bunch import give_back, make_lanes, make_room, robot_in, show_robot, show_tracks, take, take_robot
 from kiks.engine.compiling import entry, inlined, kernel, spliced
 from kiks.engine.physics.motor import command_speed
 from kiks.engine.scene import open_scene
@@ -182,7 +185,7 @@ def tick_to(scene: Any, bunch: Any, times_ns: Any) -> Any:
 
 @spliced
 def act(scene: Any, worlds: Any, bunch: Any, is_on: Any, times_ns: Any) -> Any:
-    """Set the speeds of all robots, and note when the next loop begins; arguments as for `sense`.
+    """Set the speeds and other outputs of all robots, and note when the next loop begins; arguments as for `sense`.
 
     A shorter command acts sooner, so the commands of a world act in the order of their lengths. At the end, `times_ns`
     holds the time at which the last command of each world acted.
@@ -213,10 +216,74 @@ def act(scene: Any, worlds: Any, bunch: Any, is_on: Any, times_ns: Any) -> Any:
                 command_speed(robot_in(scene, bunch, k, robot)[0], np.int64(left), np.int64(right))
     for k in range(numbers.shape[0]):
         if is_on[k]:
+            worlds.sensed_ns[numbers[k]] = times_ns[k] + line.done_length * line.character_ns
+    if worlds.orders.shape[0] > 0:
+        send_orders(scene, worlds, bunch, is_on, times_ns)
+    for k in range(numbers.shape[0]):
+        if is_on[k]:
             world = numbers[k]
-            done_ns = times_ns[k] + line.done_length * line.character_ns
-            worlds.begins_ns[world] = max(done_ns, worlds.begins_ns[world] + line.period_ns)
+            worlds.begins_ns[world] = max(worlds.sensed_ns[world], worlds.begins_ns[world] + line.period_ns)
             worlds.steps[world] += 1
+
+
+@kernel
+def send_orders(scene: Any, worlds: Any, bunch: Any, is_on: Any, times_ns: Any) -> Any:
+    """Send what has changed of the outputs after those of the wheels, one after the other; arguments as for `act`.
+
+    The program sends one order to all its robots, then waits for all replies. Of several robots in a world, the one
+    with the shortest command acts first.
+    """
+    numbers = bunch.worlds
+    for place in range(worlds.orders.shape[0]):
+        head = worlds.orders[place, 1]
+        shortest, longest = head + 99, head
+        for k in range(numbers.shape[0]):
+            for robot in range(worlds.wheels.shape[1] if is_on[k] else 0):
+                if is_changed(worlds, place, numbers[k], robot):
+                    length = head + digits_of(worlds.wheels[numbers[k], robot, 2 + place])
+                    shortest, longest = min(shortest, length), max(longest, length)
+        for length in range(shortest, longest + 1):
+            for k in range(numbers.shape[0]):
+                for robot in range(worlds.wheels.shape[1] if is_on[k] else 0):
+                    value = worlds.wheels[numbers[k], robot, 2 + place]
+                    if is_changed(worlds, place, numbers[k], robot) and head + digits_of(value) == length:
+                        times_ns[k] = acts_at(worlds.line, worlds.sensed_ns[numbers[k]], length)
+            pass_to(scene, worlds, bunch, times_ns)
+            show_tracks(scene, bunch)
+            for k in range(numbers.shape[0]):
+                for robot in range(worlds.wheels.shape[1] if is_on[k] else 0):
+                    value = worlds.wheels[numbers[k], robot, 2 + place]
+                    if is_changed(worlds, place, numbers[k], robot) and head + digits_of(value) == length:
+                        carry_out(scene, worlds, bunch, k, robot, place, times_ns[k])
+        for k in range(numbers.shape[0]):
+            if is_on[k]:
+                world = numbers[k]
+                for robot in range(worlds.wheels.shape[1]):
+                    if is_changed(worlds, place, world, robot):
+                        worlds.sent[world, robot, place] = worlds.wheels[world, robot, 2 + place]
+                        heard_ns = times_ns[k] + worlds.orders[place, 2] * worlds.line.character_ns
+                        worlds.sensed_ns[world] = max(worlds.sensed_ns[world], heard_ns)
+
+
+@kernel
+def is_changed(worlds: Any, place: Any, world: Any, robot: Any) -> Any:
+    """Return whether an output of a robot must be sent; it is rounded to what is sent."""
+    if place >= worlds.order_counts[robot]:
+        return False
+    row, sent = worlds.orders[place], worlds.sent[world, robot, place]
+    value = whole_value(worlds.wheels[world, robot, 2 + place], 1.0 * row[3], 1.0 * row[4], sent)
+    worlds.wheels[world, robot, 2 + place] = value
+    return not math.isnan(value) and value != sent
+
+
+@kernel
+def carry_out(scene: Any, worlds: Any, bunch: Any, k: Any, robot: Any, place: Any, time_ns: Any) -> Any:
+    """Let an actuator of a robot in a world of the bunch act."""
+    world, row = bunch.worlds[k], worlds.orders[place]
+    show_robot(scene, bunch, k, robot)
+    view = view_of(scene, world, robot, bunch.ticks[k], time_ns, True, row[5], row[6])
+    call_actuator(row[0], (view, worlds.wheels[world, robot, 2 + place]))
+    take_robot(scene, bunch, k, robot)
 
 
 @kernel

@@ -85,12 +85,18 @@ def answer_length(head: Any, readings: Any) -> Any:
     """Return the number of characters of a sense's reply: its head, and a comma and a number for each reading."""
     length = head + readings.shape[0]
     for k in range(readings.shape[0]):
-        number = np.int64(readings[k])
-        length += digit_count(number)
-        size = abs(number)
-        while size >= 10_000:
-            size //= 10
-            length += 1
+        length += digits_of(readings[k])
+    return length
+
+
+@kernel
+def digits_of(number: Any) -> Any:
+    """Return the number of characters of any whole number, with its sign."""
+    whole = np.int64(number)
+    length, size = digit_count(whole), abs(whole)
+    while size >= 10_000:
+        size //= 10
+        length += 1
     return length
 
 

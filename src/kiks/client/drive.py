@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 
 from kiks.client.khepera import Khepera
 from kiks.client.port import Port
+from kiks.control.actuators import NOTHING, Actuator, value_of
 from kiks.control.controller import Controller, whole_speeds
 from kiks.control.robot_controllers import RobotControllers
 from kiks.control.senses import reading_count, sense_of
@@ -101,7 +103,9 @@ class Driver:
         self._given = [driving.parameters[0, k, :count] for k, count in enumerate(driving.parameter_counts)]
         self._sensors = np.zeros((len(ports), reading_count(driving.senses)))
         self._memory = [np.zeros(each.memory_count) for each in driving.controllers]
-        self._wheels = np.zeros((len(ports), 2))
+        self._orders, self._order_counts = driving.orders, driving.order_counts
+        self._wheels = np.zeros((len(ports), 2 + len(self._orders)))
+        self._sent = np.full((len(ports), len(self._orders)), NOTHING)
         # Compiles the controllers, so that a faulty one raises before a robot moves.
         for k in range(len(ports)):
             self._decide(k, self._memory[k].copy())
@@ -128,20 +132,35 @@ class Driver:
             first += sense.size
         for k, robot in enumerate(robots):
             self._decide(k, self._memory[k])
-            wheels[k] = whole_speeds(wheels[k])
-            robot.port.write(b"D,%d,%d\n" % tuple(wheels[k]))
+            wheels[k, :2] = whole_speeds(wheels[k])
+            robot.port.write(b"D,%d,%d\n" % tuple(wheels[k, :2]))
         for robot in robots:
             robot.read_confirmation(b"D\n")
+        for place, order in enumerate(self._orders):
+            self._send(place, order)
         self.loop_count += 1
         now_ns = ns_from_s(robots[0].time_s)
         if self.begin_ns + self._period_ns > now_ns:
             robots[0].pause(s_from_ns(self.begin_ns + self._period_ns - now_ns))
         self.begin_ns = max(self.begin_ns + self._period_ns, now_ns)
 
+    def _send(self, place: int, order: Actuator) -> None:
+        """Send an order to the robots for which its number has changed, and read their replies."""
+        wanted, sent, asked = self._wheels[:, 2 + place], self._sent[:, place], list[int]()
+        for k in np.flatnonzero(place < self._order_counts).tolist():
+            wanted[k] = value_of(wanted[k], float(order.least), float(order.most), sent[k])
+            if not math.isnan(wanted[k]) and wanted[k] != sent[k]:
+                self._robots[k].port.write(order.request(wanted[k]))
+                sent[k] = wanted[k]
+                asked.append(k)
+        for k in asked:
+            self._robots[k].read_confirmation(order.request(sent[k]))
+
     def _decide(self, robot: int, memory: NDArray[np.float64]) -> None:
         """Let the controller of a robot write its speeds."""
         decide = self._controllers[robot]
-        decide(self._sensors[robot, : decide.sensor_count], memory, self._given[robot], self._wheels[robot])
+        outputs = self._wheels[robot, : decide.output_count]
+        decide(self._sensors[robot, : decide.sensor_count], memory, self._given[robot], outputs)
 
     def stop(self) -> None:
         """Stop the robots."""

@@ -465,7 +465,7 @@ class Khepera:
     # ---- replies, for a program that sends a command to several robots before it reads the first reply ----
 
     def read_confirmation(self, request: bytes) -> None:
-        r"""Read the reply to a command that the robot confirms with its letter alone.
+        r"""Read the reply to a command that the robot confirms with its letter alone, a turret's order with `t,1,e`.
 
         Raises:
             LinkError: If the reply is unexpected, or does not come.
@@ -479,7 +479,8 @@ class Khepera:
         if request.__class__ is not bytes:
             check_kind("request", request, bytes)
         reply = self.port.read_until(b"\n")
-        if reply != request[:1].lower() + b"\r\n":
+        words = 3 if request[:1] == b"T" else 1
+        if reply != b",".join(request.rstrip().lower().split(b",")[:words]) + b"\r\n":
             raise self._unexpected(request, reply)
 
     def read_numbers(self, request: bytes, count: int) -> list[int]:

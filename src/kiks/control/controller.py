@@ -12,9 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from kiks.control.actuators import WHEELS, AnyActuator, check_actuators, orders_of
 from kiks.control.compiled_function import RETURNS, Compiled, decorator, explained
 from kiks.control.recipes import recipe_of
-from kiks.control.senses import AnySense, check_senses, named, reading_count
+from kiks.control.senses import AnySense, check_senses, named, reading_count, sense_of
+from kiks.control.turret_parts import TurretPart
 from kiks.engine.compiling import entry, kernel
 from kiks.engine.physics.motor import SPEED_MAX
 from kiks.errors import ParameterError, counted, shown
@@ -30,16 +32,20 @@ class Controller(Compiled):
     It is called once a control step. `sensors` has the readings of each sense, in the order of `senses`: eight counts
     of proximity or ambient light, clockwise from the left, sixteen greys of the camera, from the left. `memory` is
     zeros at the start and its own from then on. `wheels` takes the speeds of the left and right wheel [pulses/10 ms],
-    which are rounded and cut to +-127 when they are sent.
+    which are rounded and cut to +-127 when they are sent, and then a number for each other output: with a gripper, the
+    place of its arm (255 down, 127 upright, 0 folded back), and 0 for open jaws or 1 for closed ones.
 
     Args:
         function: The function.
         senses: Its senses, of `kiks.control.senses.SENSES` or of a user's own (`kiks.sense`).
+        actuators: Its actuators, of `kiks.control.actuators.ACTUATORS` or of a user's own (`kiks.actuator`), the wheels
+            first.
         memory: How many numbers it remembers.
         parameters: How many parameters it has; any count if left out.
 
     Attributes:
         senses: Its senses.
+        actuators: Its actuators.
         memory_count: Numbers in its memory.
         parameter_count: Number of its parameters; None if any number will do.
         recipe: The table that recreates it (`kiks.controllers.from_recipe`), of JSON values; None for a function inside
@@ -64,6 +70,7 @@ class Controller(Compiled):
         function: Callable[..., Any],
         *,
         senses: AnySense | Sequence[AnySense] = ("proximity",),
+        actuators: AnyActuator | Sequence[AnyActuator] = (WHEELS,),
         memory: int = 0,
         parameters: int | None = None,
     ) -> None:
@@ -71,6 +78,7 @@ class Controller(Compiled):
         self.senses = check_senses(senses)
         if not self.senses:
             raise ParameterError("senses must name one sense at least, but there was none.")
+        self.actuators = check_actuators(actuators)
         self.memory_count = check_count("memory", memory)
         self.parameter_count = None if parameters is None else check_count("parameters", parameters)
         self.recipe = recipe_of(function)
@@ -90,7 +98,7 @@ class Controller(Compiled):
             >>> kiks.controllers.linear().sizes
             {'sensors': 8, 'memory': 0, 'parameters': 18, 'wheels': 2}
         """
-        counts = self.sensor_count, self.memory_count, self.parameter_count, 2
+        counts = self.sensor_count, self.memory_count, self.parameter_count, self.output_count
         return dict(zip(ARGUMENTS, counts, strict=True))
 
     @property
@@ -103,6 +111,28 @@ class Controller(Compiled):
             16
         """
         return reading_count(self.senses)
+
+    @property
+    def output_count(self) -> int:
+        """Number of its outputs.
+
+        Example:
+            >>> import kiks
+            >>> kiks.controllers.linear().output_count
+            2
+        """
+        return 2 + len(orders_of(self.actuators))
+
+    @property
+    def parts(self) -> tuple[TurretPart, ...]:
+        """Its senses and its actuators after the wheels, with their commands.
+
+        Example:
+            >>> import kiks
+            >>> kiks.controllers.linear().parts
+            (<Sense 'proximity': N>,)
+        """
+        return (*map(sense_of, self.senses), *orders_of(self.actuators))
 
     def __call__(
         self,

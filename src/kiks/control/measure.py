@@ -40,7 +40,7 @@ Moment: Any = namedtuple(
 * time_s: simulated time [s];
 * period_s: time since the last call, the first since 0 [s];
 * sensors: the readings of the controller, float64;
-* wheels: the sent speeds, left and right [pulses/10 ms], float64;
+* wheels: the sent speeds, left and right [pulses/10 ms], then what other actuators were sent, float64;
 * x_mm, y_mm, heading_rad: the robot's pose;
 * start_x_mm, start_y_mm: its start;
 * path_mm: its path so far, forwards and backwards together [mm];

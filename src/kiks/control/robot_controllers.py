@@ -8,8 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kiks.control.actuators import orders_of
 from kiks.control.controller import Controller
-from kiks.control.senses import named, turrets_of
+from kiks.control.senses import named, sense_of
+from kiks.control.turret_parts import memory_of, turrets_of
 from kiks.errors import ParameterError, shown
 from kiks.model.checks import check_kind
 
@@ -30,6 +32,9 @@ class RobotControllers:
         senses: All senses: those of the controller with the most. Each other robot has the first of these.
         common_senses: The senses that all robots have.
         sense_counts: Number of senses of each robot, int64 [robot].
+        orders: All actuators after the wheels, likewise.
+        order_counts: Number of these of each robot, int64 [robot].
+        parts: Senses and actuators together, of the robot with the most.
         turrets: The turrets of each robot, names and classes.
         memory_count: Largest number of numbers that a controller remembers.
     """
@@ -62,7 +67,18 @@ class RobotControllers:
             self.parameter_counts = (self.parameters.shape[2],) * robot_count
         sense_counts = [len(each.senses) for each in self.controllers]
         self.common_senses, self.sense_counts = self.senses[: min(sense_counts)], np.array(sense_counts, np.int64)
-        self.turrets = [turrets_of(each.senses) for each in self.controllers]
+        self.turrets = [turrets_of(each.parts) for each in self.controllers]
+        orders = [orders_of(each.actuators) for each in self.controllers]
+        self.orders = max(orders, key=len)
+        self.order_counts = np.array([len(each) for each in orders], np.int64)
+        self.parts = (*map(sense_of, self.senses), *self.orders)
+        places = dict(zip(self.parts, memory_of(self.parts), strict=True))
+        for each, its in zip(self.controllers, orders, strict=True):
+            if its != self.orders[: len(its)] or [places[part] for part in each.parts] != memory_of(each.parts):
+                raise ParameterError(
+                    "the actuators of one controller must come first among those of the one that has the most, on the "
+                    f"same turrets, but those of {shown(each.name)} do not. Let all robots have the same."
+                )
         self.memory_count = max(each.memory_count for each in self.controllers)
 
     @property

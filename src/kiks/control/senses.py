@@ -7,25 +7,23 @@ come with KiKS are in `SENSES` and have names; one of a user's own is an object.
 from __future__ import annotations
 
 import functools
-from collections import namedtuple
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
 from numba import types
-from numba.np.numpy_support import from_dtype
 from numpy.typing import NDArray
 
-from kiks.control.checked_code import is_trusted
-from kiks.control.compiled_function import Compiled, caller_of, decorator, explained
-from kiks.control.recipes import FunctionRecipe, find, recipe_of
-from kiks.engine.compiling import address_of, entry, inlined
+from kiks.control.compiled_function import caller_of, decorator, explained
+from kiks.control.recipes import FunctionRecipe, find
+from kiks.control.turret_parts import VIEW, TurretPart, memory_of, view_of
+from kiks.engine.compiling import entry
 from kiks.engine.physics.gripper import BARRIER_BROKEN, find_between
 from kiks.engine.physics.motor import SPEED_MAX, counter
-from kiks.engine.scene import OPEN_SCENE, open_scene
+from kiks.engine.scene import open_scene
 from kiks.engine.sensing.ambient import sense_ambient
-from kiks.engine.sensing.proximity import make_readers, pose_at, sense_linked
-from kiks.engine.state import BODY, PIXEL_COUNT, ROBOT
+from kiks.engine.sensing.proximity import make_readers, sense_linked
+from kiks.engine.state import PIXEL_COUNT
 from kiks.errors import ParameterError, nearest, shown
 from kiks.model.checks import check_count, check_number
 from kiks.model.data_file import check
@@ -33,56 +31,8 @@ from kiks.model.robot import SENSOR_COUNT
 
 # Numba annotates these in part, and not as they are used here.
 _types: Any = types
-_tuple: Any = types.NamedTuple
 
-View: Any = namedtuple(
-    "View",
-    (
-        "robot",
-        "x_mm",
-        "y_mm",
-        "heading_rad",
-        "time_ns",
-        "memory",
-        "robots",
-        "bodies",
-        "is_noisy",
-        "tick_count",
-        "world",
-        "scene",
-    ),
-)
-"""The input of a sense: one robot, at the time at which its command acts.
-
-* robot: index of the robot in its world, from 0;
-* x_mm, y_mm, heading_rad: its pose at that time;
-* time_ns: the time [ns];
-* memory: numbers that the turret of the sense remembers, float64, as `Site.memory`;
-* robots: records of `kiks.engine.state.ROBOT`, all robots of its world, at the end of the last tick;
-* bodies: records of `kiks.engine.state.BODY`, the balls and cylinders, at the end of the last tick;
-* is_noisy: False if the readings are to be free of noise;
-* tick_count: ticks done;
-* world: index of its world in the scene;
-* scene: the arrays of the engine (`kiks.engine.scene.open_scene`).
-"""
-
-
-def _list(element: Any) -> Any:
-    return types.Array(element, 1, "C")
-
-
-_NUMBER, _ROW, _INTEGER = types.float64, _list(types.float64), types.int64
-
-ARGUMENTS = (
-    _tuple(
-        (
-            *(_INTEGER, _NUMBER, _NUMBER, _NUMBER, _INTEGER, _ROW, _list(from_dtype(ROBOT)), _list(from_dtype(BODY))),
-            *(types.boolean, _INTEGER, _INTEGER, OPEN_SCENE),
-        ),
-        View,
-    ),
-    _ROW,
-)
+ARGUMENTS = (VIEW, _types.float64[::1])
 """Types of a view and readings."""
 
 call_sense = caller_of(ARGUMENTS)
@@ -91,7 +41,7 @@ IN_PACKETS = 0
 """Stands for the address of a sense that a batch reads of many robots together: proximity."""
 
 
-class Sense(Compiled):
+class Sense(TurretPart):
     r"""A function `(view, readings)` that writes what a command reads: whole numbers, into a float64 array.
 
     A batch calls it; on the wire the command is sent. Both must give the same numbers. A sense
@@ -111,6 +61,7 @@ class Sense(Compiled):
         name: Its name.
         command: As above, as all others.
         turret: The turret: a name, a class, or None.
+        address: Where a batch calls it.
         recipe: The table that finds it again, of JSON values; None for one that cannot be imported.
 
     Example:
@@ -122,7 +73,7 @@ class Sense(Compiled):
         b'K\n'
     """
 
-    what, arguments, options = "sense", ("view", "readings"), ("readings",)
+    what, arguments, options, argument_types = "sense", ("view", "readings"), ("readings",), ARGUMENTS
 
     def __init__(
         self,
@@ -136,33 +87,13 @@ class Sense(Compiled):
         full: float | None = None,
         turret: Any = None,
     ) -> None:
-        super().__init__(function)
-        if is_trusted(function):
-            self.kernel = entry(function)
-        if not isinstance(command, str) or not command.isascii() or not command.isprintable() or not command:
-            raise ParameterError(f"command must be a line such as 'E' or 'T,24,C', but it was {shown(command)}.")
-        self.command, self.size = command, check_count("readings", readings, least=1)
+        super().__init__(function, command, turret)
+        self.size = check_count("readings", readings, least=1)
         self.most, self.least = check_number("most", most), check_number("least", least)
         self.zero = check_number("zero", zero)
         self.full = self.most if full is None else check_number("full", full)
         if self.full == self.zero:
             raise ParameterError(f"full must differ from zero, but both were {self.full:g}. It is an input of 1.")
-        self.turret = turret
-        self.recipe = recipe_of(function)
-
-    def __set_name__(self, owner: type, name: str) -> None:
-        self.turret = owner
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        # The turret's class has this sense: each is made before the other is known.
-        if not isinstance(self.turret, type):
-            return super().__reduce__()
-        alone = object.__new__(type(self))
-        vars(alone).update(vars(self), turret=None)
-        return (*alone.__reduce__(), {"turret": self.turret})
-
-    def __repr__(self) -> str:
-        return f"<{type(self).__name__} {self.name!r}: {self.command}>"
 
     @property
     def sizes(self) -> dict[str, int | None]:
@@ -185,28 +116,6 @@ class Sense(Compiled):
             b'T,1,G\n'
         """
         return f"{self.command}\n".encode()
-
-    @property
-    def address(self) -> int:
-        """Where a batch calls it; valid while it lives.
-
-        Example:
-            >>> from kiks.control.senses import SENSES
-            >>> SENSES["speeds"].address != 0
-            True
-        """
-        return address_of(self.check(ARGUMENTS))
-
-    @property
-    def memory_count(self) -> int:
-        """How many numbers its turret remembers.
-
-        Example:
-            >>> from kiks.control.senses import SENSES
-            >>> SENSES["speeds"].memory_count
-            0
-        """
-        return int(getattr(self.turret, "memory_count", 0))
 
     def look(self, scene: Any, robot: int, tick_count: int, time_ns: int, *, is_noisy: bool = True) -> NDArray[Any]:
         """Return what it reads of a robot in the first world of a scene, float64 [reading].
@@ -235,29 +144,6 @@ class Sense(Compiled):
 
 sense = decorator(Sense)
 """Make a sense of a function; a decorator, with the options of `Sense`."""
-
-
-@inlined
-def view_of(
-    scene: Any, world: Any, robot: Any, tick_count: Any, time_ns: Any, is_noisy: Any, first: Any, end: Any
-) -> Any:
-    """Return what a sense sees of a robot at a time; its turret remembers the numbers from `first` up to `end`."""
-    state = scene.robots[world, robot]
-    x_mm, y_mm, heading_rad = pose_at(state, tick_count, time_ns)
-    return View(
-        robot,
-        x_mm,
-        y_mm,
-        heading_rad,
-        time_ns,
-        state.turret_memory[first:end],
-        scene.robots[world],
-        scene.bodies[world],
-        is_noisy,
-        tick_count,
-        world,
-        scene,
-    )
 
 
 @entry
@@ -340,12 +226,6 @@ def reading_count(senses: Sequence[AnySense]) -> int:
     return sum(sense_of(each).size for each in senses)
 
 
-def turrets_of(senses: Iterable[AnySense]) -> tuple[Any, ...]:
-    """Return the turrets that some senses need, names and classes, each once."""
-    needed = (sense_of(each).turret for each in senses)
-    return tuple(dict.fromkeys(each for each in needed if each is not None))
-
-
 def recipes_for(senses: Sequence[AnySense]) -> list[Any]:
     """Return senses as JSON has them: names, and recipes of a user's own; `check_senses` takes them back."""
     return [each if isinstance(each, str) else each.recipe for each in senses]
@@ -380,16 +260,9 @@ def rows_of(senses: tuple[AnySense, ...]) -> NDArray[np.int64]:
     These are where it calls each, `IN_PACKETS` for proximity; the number of its readings; that of the characters of its
     request, and of its reply but for commas and numbers; and where the numbers of its turret begin and end.
     """
+    parts = [sense_of(each) for each in senses]
     rows = []
-    first, begins = 0, dict[Any, int]()
-    for each in map(sense_of, senses):
-        if each.turret not in begins:
-            begins[each.turret] = first
-            first += each.memory_count
-        begin = begins[each.turret]
-        words = each.command.split(",")
-        # A turret's answer repeats its number and the letter of the order (khepera-protocol.md 4.18).
-        head = len(",".join(words[: 3 if words[0] == "T" else 1])) + 2
+    for each, (begin, end) in zip(parts, memory_of(parts), strict=True):
         address = IN_PACKETS if each is proximity else each.address
-        rows.append((address, each.size, len(each.request), head, begin, begin + each.memory_count))
+        rows.append((address, each.size, len(each.request), len(each.head) + 2, begin, end))
     return np.array(rows, np.int64).reshape(-1, 6)

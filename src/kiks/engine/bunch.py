@@ -280,6 +280,13 @@ def show_robot(scene: Any, bunch: Any, k: Any, number: Any) -> Any:
     store_lane(bunch.robots[place // LANES], place % LANES, scene.robots[bunch.worlds[k], number])
 
 
+@kernel
+def take_robot(scene: Any, bunch: Any, k: Any, number: Any) -> Any:
+    """Take all that moves in a robot of a world of the bunch from the scene, where something has changed it."""
+    place = k * scene.robots.shape[1] + number
+    load_lane(bunch.robots[place // LANES], place % LANES, scene.robots[bunch.worlds[k], number])
+
+
 @inlined
 def copy_pose(source: Any, target: Any) -> Any:
     """Copy the pose of a robot."""

@@ -17,6 +17,7 @@ from kiks.client.port import Port
 from kiks.control.controller import Controller
 from kiks.control.controllers import Recipe, controller_of, recipe_for
 from kiks.control.recipes import file_of
+from kiks.control.turret_parts import turrets_of
 from kiks.learn.fingerprint import fingerprints
 from kiks.model.arena import Arena
 from kiks.model.arena_file import toml, toml_key
@@ -155,7 +156,7 @@ class Champion:
         return self.timing.baud or 57600
 
     def project(self, arena: Arena | None = None) -> Project:
-        """Return its own world, or that of an arena or the default box, with its timing and turrets for its senses.
+        """Return its own world, or that of an arena or the default box, with its timing and the turrets it needs.
 
         Example:
             >>> import kiks
@@ -165,9 +166,9 @@ class Champion:
         """
         own = self.world if arena is None else None
         project = own or Project(Arena.default() if arena is None else arena)
-        seen = ("k213",) if "camera" in self.controller.senses else ()
+        needed = [each for each in turrets_of(self.controller.parts) if isinstance(each, str)]
         robots = (
-            replace(each, turrets=tuple(dict.fromkeys((*each.turrets, *seen))))
+            replace(each, turrets=tuple(dict.fromkeys((*each.turrets, *needed))))
             for each in project.robots or (ProjectRobot(),)
         )
         think_s = self.timing.think_s
@@ -197,6 +198,10 @@ class Champion:
         named = (*there, *there[-1:] * count)[:count]
         project = replace(project, robots=named, seed=project.seed if seed is None else seed)
         sim = simulation_of(project, kinds=[self.robot])
+        for number in range(1, count + 1):
+            for turret in turrets_of(self.controller.parts):
+                if not isinstance(turret, str):
+                    sim.fit(number, turret())
         return sim, [sim.port(number) for number in range(1, count + 1)]
 
     # ---- files ----
