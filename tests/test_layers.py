@@ -85,7 +85,7 @@ def test_clocks_and_chance_come_from_outside(path: Path) -> None:
     here = layer(path)
     roots = {name.split(".")[0] for name in imports(path)}
     if path.name == "chance.py":
-        return  # a program's own chance is that of Python's library, with the world's seed
+        return  # of programs and libraries that draw from Python's own library, with a seed from outside
     assert not roots & (RANDOM - {"secrets"} if here in MAY_HAVE_SECRETS else RANDOM), (
         f"{path}: random numbers are counter-based (engine/numbers.py)"
     )

@@ -100,7 +100,7 @@ def test_every_response_is_that_of_the_wire(response: str) -> None:
         assert found == (rollouts.step_counts[world], batch.state_hash(world))
 
 
-@pytest.mark.parametrize("kind", ["linear", "mlp", "elman", "ctrnn", "gru", "plastic"])
+@pytest.mark.parametrize("kind", ["linear", "mlp", "elman", "ctrnn", "graph", "gru", "plastic"])
 def test_controllers_that_come_with_kiks_agree(kind: str) -> None:
     controller, timing = getattr(kiks.controllers, kind)(), kiks.Timing(0.1, 9600)
     parameters = kiks.controllers.random_parameters(controller, 1, seed=7)[0]

@@ -154,6 +154,18 @@ def test_elman() -> None:
     np.testing.assert_allclose(outputs(controller, parameters, sensors), expected, atol=1e-3)
 
 
+def test_graph() -> None:
+    controller = kiks.controllers.graph(hidden=3, senses=BOTH, speed_limit=8.0)
+    parameters = kiks.controllers.random_parameters(controller, 1, seed=4)[0]
+    (weights,) = taken(parameters, (1 + 16 + 5, 5))
+    y, expected = np.zeros(5), []
+    sensors = readings(controller)
+    for x in inputs_of(controller, sensors):
+        y = np.tanh(weights[0] + np.concatenate([x, y]) @ weights[1:])
+        expected.append(8.0 * y[:2])
+    np.testing.assert_allclose(outputs(controller, parameters, sensors), expected, atol=1e-3)
+
+
 def covariance(w: float, x: float, y: float) -> float:
     f = np.tanh(4 * (1 - abs(x - y)) - 2)
     return float((1 - w) * f if f > 0 else w * f)

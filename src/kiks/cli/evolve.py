@@ -48,7 +48,14 @@ def evolve(
     population: Annotated[
         int | None, typer.Option(help="Candidates in a generation; the task's own if left out.", min=4)
     ] = None,
-    algorithm: Annotated[AlgorithmName | None, typer.Option(help="The task's own if left out.")] = None,
+    algorithm: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME[:OPTION=VALUE,...]",
+            help=f"One of {', '.join(AlgorithmName)}, with options such as cma:separable=true; the task's own if left "
+            "out.",
+        ),
+    ] = None,
     controller: Annotated[
         str | None,
         typer.Option(metavar="KIND", help="Kind of the controller, such as mlp; the task's own if left out."),

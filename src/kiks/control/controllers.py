@@ -51,6 +51,7 @@ __all__ = [
     "ctrnn",
     "elman",
     "from_recipe",
+    "graph",
     "gru",
     "linear",
     "mlp",
@@ -262,6 +263,48 @@ def ctrnn(
             wheels[wheel] = speed_limit * tanh(0.5 * (memory[wheel] + GAIN * parameters[bias_first + wheel]))
 
     return decide, neurons, neurons_first + neurons * neurons
+
+
+@kind
+def graph(
+    *,
+    hidden: Annotated[Whole, Field(ge=0, le=UNITS_MAX, description="Neurons that are no wheels.")] = 8,
+    senses: Senses = ("proximity",),
+    speed_limit: SpeedLimit = SPEED_LIMIT,
+) -> Made:
+    """Return a network in which each neuron may be connected with each: any graph; the first two are the wheels.
+
+    In a call each neuron becomes tanh(weighted sum of the inputs and of all neurons as they were before). So a signal
+    needs a call for each connection on its way, and a connection that is not there is a weight of 0. The algorithm
+    `neat` evolves which there are.
+
+    Parameters: a bias for each neuron, a matrix [input, neuron], a matrix [neuron, neuron].
+
+    Args:
+        hidden: Number of neurons besides the wheels, at most.
+        senses: Its senses, as for `kiks.Controller`.
+        speed_limit: The speed of an output of 1 [pulses/10 ms].
+
+    Example:
+        >>> import kiks
+        >>> kiks.controllers.graph(hidden=8).parameter_count
+        190
+    """
+    neurons, sense_count, take_senses = 2 + hidden, reading_count(senses), senses_as_inputs(senses)
+    input_count = sense_count + neurons
+
+    def decide(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
+        inputs, fresh = stack_floats(input_count), stack_floats(neurons)
+        take_senses(sensors, inputs)
+        for k in range(neurons):
+            inputs[sense_count + k] = memory[k]
+        do_layer(inputs, input_count, parameters, 0, fresh, neurons)
+        for k in range(neurons):
+            memory[k] = tanh(fresh[k])
+        for wheel in range(2):
+            wheels[wheel] = speed_limit * memory[wheel]
+
+    return decide, neurons, layer_size(input_count, neurons)
 
 
 @kind

@@ -15,7 +15,6 @@ from kiks.control import controllers, measures
 from kiks.control.measure import measure
 from kiks.control.measures import FULL_COUNT, FULL_SPEED_MM_S, ROAMING_S, mean, moved_lately_mm, share_of_full
 from kiks.engine.compiling import kernel
-from kiks.learn.algorithm_name import AlgorithmName
 from kiks.learn.ready_tasks import Floats, Values, ready
 from kiks.learn.task import Task
 from kiks.model.shipped import shipped_arena
@@ -88,7 +87,7 @@ def floreano_mondada_1994(shuttling: bool = False) -> Task:
         seconds=24.0,
         timing=Timing(period_s=0.3),
         spread=HALF_UNIT_SPREAD,
-        algorithm=AlgorithmName.ROULETTE.value,
+        algorithm="sga:bits=0,selection=roulette,crossover=0.1,mutation=0.2",
         generations=100,
         population=80,
         about="drive fast and straight through a looping corridor (1994)",

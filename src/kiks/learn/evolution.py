@@ -28,7 +28,7 @@ from numpy.typing import ArrayLike
 
 from kiks.errors import ParameterError, counted, shown
 from kiks.learn import seeds
-from kiks.learn.algorithms import Algorithm, Setting, make_algorithm
+from kiks.learn.algorithms import Algorithm, Setting, make_algorithm, whole_name
 from kiks.learn.archive import Archive
 from kiks.learn.champion import Champion
 from kiks.learn.evaluation import Floats, Integers, evaluate
@@ -61,11 +61,13 @@ class Evolution:
 
     Args:
         task: The task.
-        algorithm: 'cma' (CMA-ES), 'ga' or 'roulette' (genetic algorithms); for many different behaviours 'map-elites',
-            'cma-me' or 'novelty'. The task's own if left out. Or, for a task of one side, an object with `ask()`, which
-            returns candidates, float64 [candidate, parameter], each time as many, and `tell(fitness, behaviours)`,
-            float64 [candidate] and [candidate, axis]. It may have `favourite()`, which returns the parameters that it
-            considers best; else these are the best of the last generation.
+        algorithm: 'cma' (CMA-ES), 'ga' or 'sga' (genetic algorithms), 'nsga2' (several objectives) or 'neat' (networks
+            that grow); for many different behaviours 'map-elites', 'cma-me' or 'novelty'. With options behind a colon,
+            such as 'cma:separable=true,restarts=ipop'. The task's own if left out. Or, for a task of one side, an
+            object with `ask()`, which returns candidates, float64 [candidate, parameter], each time as many, and
+            `tell(fitness, behaviours)`, float64 [candidate] and [candidate, axis and objective]. It may have
+            `favourite()`, which returns the parameters that it considers best; else these are the best of the last
+            generation.
         seed: Seed of all random numbers: the same seed gives the same evolution, with any number of workers.
         population: Number of candidates of a side in a generation; the task's own if left out, or as many as `ask`
             returns, if the algorithm is an object.
@@ -121,12 +123,16 @@ class Evolution:
         else:
             name = task.algorithm if algorithm is None else algorithm
             advice = "" if task.against else "Or give an object with ask and tell."
-            self.name = str(check_kind("algorithm", name, str, advice))
+            self.name = whole_name(check_kind("algorithm", name, str, advice))
             self.population = check_count("population", task.population if population is None else population, 4)
             purpose = seeds.ALGORITHM + self._first_purpose
             drawn = [seed_for(self.seed, purpose, number) for number in range(len(task.sides))]
             settings = [
-                Setting(side.parameter_count, self.population, seed, task.axes, task.spread)
+                Setting(
+                    *(side.parameter_count, self.population, seed, task.axes, task.spread),
+                    task.objectives,
+                    side.controller,
+                )
                 for side, seed in zip(task.sides, drawn, strict=True)
             ]
             self.algorithms = [make_algorithm(self.name, each) for each in settings]
@@ -298,7 +304,8 @@ class Evolution:
         for side, (algorithm, own, part) in enumerate(zip(self.algorithms, self._own, parts, strict=True)):
             behaviours = np.zeros((self.population, 0))
             if part.shape[1] == len(self._names):
-                behaviours = part[:, [self._names.index(axis.measure) for axis in self.task.axes]]
+                places = part[:, [self._names.index(axis.measure) for axis in self.task.axes]]
+                behaviours = np.concatenate([places, self._objectives(part)], axis=1)
             algorithm.tell(part[:, 0].copy(), behaviours)
             if self.archives and part.shape[1] == len(self._names):
                 self.archives[side].add(own, part, number)
@@ -311,6 +318,13 @@ class Evolution:
                 self._rival = next(untried, None) if self._tries_elites else favourite or best
         self.generations.append(generation)
         self._own, self.finals, self.tournament = [], None, None
+
+    def _objectives(self, values: Floats) -> Floats:
+        """Return the objectives of values [candidate, value], more is better, float64 [candidate, objective]."""
+        names = self.task.objectives
+        signs = np.array([-1.0 if name.startswith("-") else 1.0 for name in names])
+        chosen: Floats = values[:, [self._names.index(name.removeprefix("-")) for name in names]] * signs
+        return chosen
 
     def _favourite(self, side: int, best: Contender) -> Contender | None:
         """Return the candidate that an algorithm considers best; None if it prefers none.
@@ -594,6 +608,40 @@ class Evolution:
             contender = Contender(tuple(held.candidates[best].tolist()), number + 1)
         return self._champion(index, contender, values)
 
+    @property
+    def front(self) -> tuple[Champion, ...]:
+        """The Pareto front of the last generation of one side, by the first objective, the best first.
+
+        They are the candidates that no other one surpasses: none is better in an objective and as good in all others.
+        All have driven in the same worlds. Each is there as a champion, so that it can be saved and driven.
+
+        Example:
+            >>> import kiks
+            >>> task = kiks.tasks.avoid(seconds=1, worlds=3, objectives=["path_mm", "-contacts"])
+            >>> evolution = kiks.Evolution(task, "nsga2", seed=1, population=8)
+            >>> _ = evolution.run(generations=2)
+            >>> longest, *others = evolution.front
+            >>> all(each.measures["path_mm"] <= longest.measures["path_mm"] for each in others)
+            True
+        """
+        if len(self.task.objectives) < 2 or self.task.against or not self.generations:
+            raise ParameterError(
+                "a front must have a task of one side with at least two objectives, and a generation with measures, "
+                f"but the task has {len(self.task.sides)} and {len(self.task.objectives)}, and there are "
+                f"{counted(len(self.generations), 'generation')}."
+            )
+        last, number = self.generations[-1], len(self.generations)
+        if last.values.shape[1] < len(self._names):
+            raise ParameterError(
+                "tell() must be given fitness and measures for a front, but it was given fitness alone."
+            )
+        objectives = self._objectives(last.values[: self.population])
+        found = [
+            self._champion(0, Contender(tuple(last.candidates[k].tolist()), number), last.values[k])
+            for k in first_front(objectives).tolist()
+        ]
+        return tuple(found)
+
     def _champion(self, side: int, contender: Contender, values: Floats) -> Champion:
         task, own = self.task, self.task.sides[side]
         named = dict(zip(self._names, values.tolist(), strict=False))
@@ -648,6 +696,23 @@ def different(contenders: Iterable[Contender]) -> list[Contender]:
     for each in contenders:
         found.setdefault(each.parameters, each)
     return list(found.values())
+
+
+def first_front(objectives: Floats) -> Integers:
+    """Return who is surpassed by none, int64 [candidate], the best in the first objective first; of equals the first.
+
+    Args:
+        objectives: More is better, float64 [candidate, objective].
+
+    Example:
+        >>> first_front(np.array([[1.0, 3.0], [2.0, 2.0], [1.0, 2.0], [3.0, 1.0], [2.0, 2.0]])).tolist()
+        [3, 1, 0]
+    """
+    points, first = np.unique(objectives, axis=0, return_index=True)
+    is_as_good = (points[:, None] >= points).all(axis=2)
+    is_surpassed = is_as_good.sum(axis=0) > 1  # each is as good as itself
+    front: Integers = first[~is_surpassed][::-1]
+    return front
 
 
 def is_algorithm(algorithm: object) -> TypeGuard[Algorithm]:

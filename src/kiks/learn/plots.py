@@ -26,7 +26,7 @@ SIDE_COLOURS, GROUP_COLOURS = ("tab:red", "tab:blue"), ("tab:blue", "tab:orange"
 
 
 def save_plot(evolution: Evolution, path: str | Path, baselines: Baselines | None = None) -> None:
-    """Draw best, quartiles and median of each generation of a side, and the champion; and the archive, if there is one.
+    """Draw best, quartiles and median of each generation of a side, and the champion; and archive and front, if any.
 
     Args:
         evolution: The evolution.
@@ -41,13 +41,16 @@ def figure_of_evolution(evolution: Evolution, baselines: Baselines | None = None
     from matplotlib.figure import Figure
 
     sides, archives = evolution.task.sides, evolution.archives
-    count = len(sides) + len(archives)
+    has_front = len(evolution.task.objectives) > 1 and not evolution.task.against
+    count = len(sides) + len(archives) + has_front
     figure = Figure(figsize=(6.4 if count == 1 else 6.0 * count, 4.4), layout="constrained")
     axes = iter(figure.subplots(1, count, squeeze=False)[0])
     for side in range(len(sides)):
         _draw_fitness(next(axes), evolution, side, baselines)
     for archive, champion in zip(archives, evolution.champions, strict=False):
         _draw_archive(figure, next(axes), archive, champion)
+    if has_front:
+        _draw_front(next(axes), evolution)
     return figure
 
 
@@ -113,6 +116,24 @@ def _draw_archive(figure: Any, axes: Any, archive: Archive, champion: Champion) 
     axes.set(xlabel=across.measure, ylabel=up.measure, title=title)
     axes.legend(loc="best", fontsize="small")
     figure.colorbar(image, ax=axes, label="fitness")
+
+
+def _draw_front(axes: Any, evolution: Evolution) -> None:
+    """Draw the last generation along the first two objectives, its Pareto front and the champion."""
+    names = [name.removeprefix("-") for name in evolution.task.objectives[:2]]
+    values, known = evolution.generations[-1].values, evolution.task.value_names
+    if values.shape[1] == len(known):
+        of_all = values[: evolution.population, [known.index(name) for name in names]]
+        axes.plot(*of_all.T, ".", color="tab:gray", label="last generation")
+        front = [[{"fitness": each.fitness, **each.measures}[name] for name in names] for each in evolution.front]
+        is_line = "o-" if len(evolution.task.objectives) == 2 else "o"
+        axes.plot(*zip(*front, strict=True), is_line, color="tab:blue", label="its front")
+    champion = {"fitness": evolution.champion.fitness, **evolution.champion.measures}
+    axes.plot(*(champion.get(name, np.nan) for name in names), "*", **CHAMPION_MARK, label="champion")
+    less = [" (less is better)" if name.startswith("-") else "" for name in evolution.task.objectives[:2]]
+    axes.set(xlabel=names[0] + less[0], ylabel=names[1] + less[1], title="objectives")
+    axes.grid(alpha=0.3)
+    axes.legend(loc="best", fontsize="small")
 
 
 def _cell(axis: Axis) -> float:

@@ -17,7 +17,7 @@ from kiks.control.controller import Controller
 from kiks.control.controllers import SPEED_LIMIT
 from kiks.control.measure import Measure
 from kiks.errors import ParameterError, counted, shown
-from kiks.learn.algorithm_name import AlgorithmName
+from kiks.learn.algorithm_name import AlgorithmName, parts_of
 from kiks.learn.champion import Champion
 from kiks.learn.evaluation import Floats, Integers, check_candidates
 from kiks.learn.exam import Exam, world_of
@@ -25,7 +25,7 @@ from kiks.learn.experiment import CLEAR_MM, Experiment, Fitness, fitness_of
 from kiks.learn.fingerprint import fingerprints
 from kiks.model.arena import Arena, Pose
 from kiks.model.checks import ROBOTS_MAX, check_count, check_number
-from kiks.model.data_file import Number, OneOf, Rule, Text, Whole, record
+from kiks.model.data_file import Number, Rule, Text, Whole, record
 from kiks.model.project import Project, ProjectRobot
 from kiks.model.robot import RobotSpec, specs_of
 
@@ -167,6 +167,8 @@ class Task(Experiment):
         seconds: Time for which a candidate drives in each world [s].
         worlds: Number of worlds; a multiple of the number of arenas, or fewer than these.
         axes: Axes along which behaviours differ, for algorithms that look for many of them.
+        objectives: Names of fitness or measures of which more is better, or less with a minus before the name, for
+            algorithms with several objectives. Fitness still decides who is the champion.
         robot: Kind of robot: a name, a robot file or a `RobotSpec`. Or several, such as a `family`: the worlds of a
             candidate take them in turn, each generation from another one on. Champions drive the first.
         robots: Number of robots in each world, all with the same controller.
@@ -210,6 +212,7 @@ class Task(Experiment):
     seconds: Seconds = 30.0
     worlds: Annotated[Whole, Field(ge=1, le=WORLDS_MAX)] = 1
     axes: tuple[Axis, ...] = ()
+    objectives: Annotated[tuple[Text, ...], Field(max_length=MEASURES_MAX)] = ()
     robot: Kinds = "khepera"
     robots: Annotated[Whole, Field(ge=1, le=ROBOTS_MAX)] = 1
     against: Side | None = None
@@ -218,7 +221,7 @@ class Task(Experiment):
     timing: Timings = field(default_factory=Timing)
     starts: Starts = "random"
     spread: Annotated[Number, Field(gt=0, le=1000)] = SPREAD
-    algorithm: Annotated[str, OneOf(tuple(name.value for name in AlgorithmName))] = AlgorithmName.CMA.value
+    algorithm: Text = AlgorithmName.CMA.value
     generations: Annotated[Whole, Field(ge=1)] = GENERATIONS
     population: Annotated[Whole, Field(ge=4)] = POPULATION
     exam: Annotated[Exam | None, Field(description="kiks.Exam(arenas, measures, solved) makes one.")] = None
@@ -246,6 +249,13 @@ class Task(Experiment):
                 raise ParameterError(
                     f"an axis must name one of {', '.join(names)}, but it named {shown(axis.measure)}."
                 )
+        for objective in self.objectives:
+            if objective.removeprefix("-") not in (known := ("fitness", *names)):
+                raise ParameterError(
+                    f"an objective must name one of {', '.join(known)}, with a minus before it if less is better, but "
+                    f"it named {shown(objective)}."
+                )
+        parts_of(self.algorithm)
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _unpickled, (_pickled(self),)
