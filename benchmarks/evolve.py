@@ -108,7 +108,7 @@ def coevolutions(seeds: list[int]) -> Iterator[Row]:
         coevolution.run(generations=contest.generations)
         wholes_s.append(time.perf_counter() - start_s)
         tournament = coevolution.master_tournament()
-        for side, means in zip(contest.side_names, tournament.means, strict=True):
+        for side, means in zip(tournament.sides, tournament.means, strict=True):
             for number, period in enumerate(np.array_split(means, PERIODS), 1):
                 yield f"evolve.pursuit_{side}_{number}", period.mean(), f"against all champions, seed {seed}"
     yield "evolve.pursuit_s", statistics.median(wholes_s), f"s for {contest.generations} generations"

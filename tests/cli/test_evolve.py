@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import re
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -101,6 +103,39 @@ def test_two_sides_evolve_and_are_shown(tmp_path: Path, monkeypatch: pytest.Monk
         kiks("evolve", "pursuit", "--record", tmp_path / "run.mcap")
 
 
+@at_length
+def test_two_sides_are_compared_by_how_they_do_against_strangers(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from kiks.learn.ready_tasks import TASKS, pursuit
+
+    monkeypatch.setitem(TASKS, "pursuit", lambda *given: pursuit(*given, seconds=2.0))
+    one, other = tmp_path / "one", tmp_path / "other"
+    words = ("evolve", "pursuit", "--generations", 2, "--plots", "svg", "--seeds", 2, "--out")
+    said = kiks(*words, one, "--population", 4).output
+    assert re.search(r"\npredator, against all champions of the other side of its own evolution:\n", said)
+    assert re.search(r"\nprey, against all champions of the other side of its own evolution:\n", said)
+    assert {"fitness.svg", "tournament.svg"} <= {path.name for path in (one / "seed-1").iterdir()}
+    assert (one / "seeds.svg").exists()
+    kiks(*words, other, "--population", 6)
+    compared = kiks("compare", one, other, "--picture", tmp_path / "compared.png", "--json").stdout
+    found = json.loads(compared[compared.index("{") :])
+    assert list(found["differences"]) == ["predator", "prey"]
+    assert [len(each) for each in found["meetings"]["prey"].values()] == [2, 2]
+    assert (
+        "Compared: each champion against those of the other 3 evolutions, 8 times each."
+        in kiks("compare", one, other, "--picture", tmp_path / "compared.png").output
+    )
+
+
+def test_a_log_for_tensorboard_needs_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("tensorboard", "tensorboard.summary"):
+        monkeypatch.setitem(sys.modules, name, None)
+    (tmp_path / "quick.py").write_text(TASK)
+    with pytest.raises(KiksError, match=r"--tensorboard must have TensorBoard, .* pip install tensorboard\."):
+        kiks("evolve", tmp_path / "quick.py", "--tensorboard", "--generations", 1, "--out", tmp_path / "out")
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
@@ -163,17 +198,23 @@ def test_seeds_evolve_one_after_another_and_are_compared(folder: Path, tmp_path:
     assert (out / "seed-1/champion.toml").read_bytes() == (folder / "champion.toml").read_bytes()
     assert re.search(r"\n 1 +-?\d\.\d{4} +\d +\d+ of 20 +\d+ of 200 +44 ", said)
     assert re.search(r"\n all +-?\d\.\d{4} +\d of 2 +44 ", said)
+    assert re.search(r"\nall: at 95 %, median \S+ to \S+ \(bootstrap\), exams passed \d+ to \d+ % \(Wilson\)\n", said)
     again = kiks(*words, "--seeds", 3).output
     assert "Continuing after generation 3" in again
     assert (out / "seed-3/result.json").exists()
-    compared = kiks("compare", out, folder, "--picture", tmp_path / "compared.png").output
-    assert re.search(r"Fitness: U = [\d.]+, p = [\d.]+, A = \d\.\d\d \(\w+\)", compared)
-    assert re.search(r"Exam: U = ", compared)
-    assert (tmp_path / "compared.png").exists()
+    compared = kiks("compare", out, folder, out / "seed-2", "--picture", tmp_path / "compared.pdf").output
+    assert re.search(
+        r"\nFitness, p corrected for 3 pairs by Holm's method:\n  all Kruskal-Wallis .*: H = [\d.]+,", compared
+    )
+    assert re.search(r"\n  \S+two - \S+out   Mann-Whitney \(.*\): p = [\d.]+, A = \d\.\d\d \(\w+\)\n", compared)
+    assert re.search(r"\nShare of the exam's starts solved, p corrected", compared)
+    assert re.search(r"\nEvaluations until .*:\n  \S+ - \S+   log-rank \(normal approximation\): p = 1\n", compared)
+    assert (tmp_path / "compared.pdf").read_bytes().startswith(b"%PDF")
 
 
 def test_folders_that_cannot_be_compared_are_errors(tmp_path: Path) -> None:
-    with pytest.raises(KiksError, match="SECOND must be another folder than FIRST"):
-        kiks("compare", tmp_path, tmp_path)
+    for folders in ((tmp_path, tmp_path), (tmp_path,)):
+        with pytest.raises(KiksError, match="FOLDERS must be two or more, all different, but they were"):
+            kiks("compare", *folders)
     with pytest.raises(KiksError, match="must be a folder of `kiks evolve`, but it holds no evolution"):
         kiks("compare", tmp_path, tmp_path / "other")

@@ -9,30 +9,36 @@ from typing import Any
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.text import Text
 from tests.learn.small import small
 
 import kiks
 from kiks import ParameterError
 from kiks.learn.evolution_log import Folder, Identity
-from kiks.learn.plots import save_results_plot
+from kiks.learn.plots import figure_of_results, save_results_plot
 from kiks.learn.results import (
     RANDOM_COUNT,
     RESULT,
     Baselines,
     ExamScore,
     Result,
+    SideScore,
     baselines_of,
     comparable,
     curves,
-    difference,
+    evolutions_in,
     load_result,
     load_results,
+    of_sides,
     passed_count,
     quartiles,
     result_of,
     save_summary,
     seed_folder,
+    solved_of,
 )
+from kiks.learn.statistics import compare, compare_solved
 
 RESULTS = [
     Result(
@@ -51,7 +57,9 @@ RESULTS = [
         evaluations=(8, 24, 40),
         champion_fitness=(0.0, 0.05 * seed, 0.1 * seed),
         baselines=Baselines(0.0, 0.01),
+        finals=12,
         exam=ExamScore(17 + seed, 20, 160, 200, "Exam"),
+        solved=24 if seed else None,
     )
     for seed in range(4)
 ]
@@ -66,34 +74,7 @@ def put(result: Result, folder: Path, generations: int = 3) -> None:
     result.save(folder)
 
 
-# ---- statistics ----
-
-
-def test_the_difference_agrees_with_counting_pairs() -> None:
-    rng = np.random.default_rng(1)
-    for sizes in ((1, 1), (3, 5), (10, 10)):
-        first, second = (rng.integers(0, 6, size).astype(float).tolist() for size in sizes)
-        found = difference(first, second)
-        wins = sum((one > two) + (one == two) / 2 for one in first for two in second)
-        assert (found.u, found.a) == (wins, wins / (len(first) * len(second)))
-        other = difference(second, first)
-        assert other.a == pytest.approx(1 - found.a)
-        assert other.p == pytest.approx(found.p)
-
-
-@pytest.mark.parametrize(
-    ("first", "second", "a", "effect"),
-    [
-        ([1.0] * 5, [1.0] * 5, 0.5, "negligible"),
-        ([2.0] * 5, [1.0] * 5, 1.0, "large"),
-        ([0.0] * 5, [1.0] * 5, 0.0, "large"),
-        ([1.0, 2.0, 2.0, 2.0, 3.0], [1.0, 2.0, 2.0, 2.0, 2.0], 0.58, "small"),
-    ],
-)
-def test_effects_have_names(first: list[float], second: list[float], a: float, effect: str) -> None:
-    found = difference(first, second)
-    assert found.a == pytest.approx(a)
-    assert found.effect == effect
+# ---- figures of several ----
 
 
 def test_curves_go_as_far_as_all_evolutions() -> None:
@@ -121,7 +102,8 @@ def test_results_come_back_from_their_files(tmp_path: Path) -> None:
     summary = json.loads((tmp_path / "summary.json").read_text())
     assert summary["exams_passed"] == 3
     assert summary["median_fitness"] == pytest.approx(0.15)
-    assert [each["evaluations"] for each in summary["evolutions"]] == [40] * 4
+    assert [each["evaluations"] for each in summary["evolutions"]] == [52] * 4
+    assert summary["exams_passed_interval"] == pytest.approx((0.301, 0.954), abs=1e-3)
 
 
 def test_folders_without_finished_evolutions_are_errors(tmp_path: Path) -> None:
@@ -130,6 +112,7 @@ def test_folders_without_finished_evolutions_are_errors(tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match="must be a folder of `kiks evolve`"):
         load_results(tmp_path / "nowhere")
     put(RESULTS[0], tmp_path / "seed-0")
+    assert evolutions_in(tmp_path) == [tmp_path / "seed-0"]
     put(RESULTS[1], tmp_path / "seed-1", generations=4)
     with pytest.raises(ParameterError, match=r"seed-1' must be finished, but it is not"):
         load_results(tmp_path)
@@ -166,9 +149,9 @@ def test_what_cannot_be_compared_is_an_error(tmp_path: Path) -> None:
         ({"task_digest": digest | {"fitness": "4567"}}, "the same task, but these differ: fitness"),
     ):
         with pytest.raises(ParameterError, match=f"evolutions that are compared must have {message}"):
-            comparable(RESULTS, [replace(RESULTS[0], **change)])
+            comparable({"a": RESULTS, "b": RESULTS, "c": [replace(RESULTS[0], **change)]})
     other = replace(RESULTS[0], algorithm="ga", population=9, task_digest=digest | {"controller": "0"})
-    assert comparable(RESULTS, [other]) == [RESULTS, [other]]
+    assert comparable({"a": RESULTS, "b": [other]}) == {"a": RESULTS, "b": [other]}
     put(RESULTS[0], seed_folder(tmp_path, 0))
     put(replace(RESULTS[1], algorithm="ga"), seed_folder(tmp_path, 1))
     with pytest.raises(ParameterError, match="must have the same algorithm, but they have 'cma' and 'ga'"):
@@ -177,8 +160,23 @@ def test_what_cannot_be_compared_is_an_error(tmp_path: Path) -> None:
 
 def test_exams_that_differ_are_left_out() -> None:
     other = replace(RESULTS[0], task_digest=RESULTS[0].task_digest | {"exam": "89"})
-    for group in comparable(RESULTS, [other]):
-        assert [each.exam for each in group] == [None] * len(group)
+    for group in comparable({"a": RESULTS, "b": RESULTS, "c": [other]}).values():
+        assert [(each.exam, each.solved) for each in group] == [(None, None)] * len(group)
+        assert solved_of(group) is None
+
+
+def test_evolutions_that_did_not_solve_the_task_count_until_their_end() -> None:
+    assert solved_of(RESULTS) == ((52, 24, 24, 24), (False, True, True, True))
+
+
+def test_of_two_sides_each_has_its_results() -> None:
+    second = SideScore("prey", 0.7, 3, (0.5, 0.6, 0.7))
+    groups = {"a": [replace(RESULTS[1], exam=None, side="predator", against=second)]}
+    named = of_sides(groups)
+    assert named["predator"] == groups
+    (prey,) = named["prey"]["a"]
+    assert (prey.fitness, prey.generation, prey.champion_fitness) == (0.7, 3, (0.5, 0.6, 0.7))
+    assert of_sides({"a": RESULTS}) == {"": {"a": RESULTS}}
 
 
 def test_evolutions_of_one_folder_have_the_same_controller_and_exam(tmp_path: Path) -> None:
@@ -189,13 +187,50 @@ def test_evolutions_of_one_folder_have_the_same_controller_and_exam(tmp_path: Pa
             load_results(tmp_path / name)
 
 
+GROUPS = {f"runs/{name}": RESULTS for name in "abcde"}
+
+
 @pytest.mark.slow
-def test_pictures_are_png_files(tmp_path: Path) -> None:
-    without = [replace(each, exam=None) for each in RESULTS]
-    for number, groups in enumerate(({"a": RESULTS}, {"a": RESULTS, "b": RESULTS[:1]}, {"a": without})):
-        save_results_plot(groups, tmp_path / f"{number}.png")
-        assert (tmp_path / f"{number}.png").read_bytes().startswith(b"\x89PNG")
-    save_results_plot({"$_$": [replace(each, task="$^$") for each in RESULTS]}, tmp_path / "dollars.png")
+@pytest.mark.parametrize("count", [1, 3, 5])
+def test_figures_of_groups_say_their_methods_beside_the_axes(count: int) -> None:
+    groups = dict(list(GROUPS.items())[:count])
+    tested = {}
+    if count > 1:
+        tested["fitness"] = compare({name: [each.fitness for each in group] for name, group in groups.items()})
+        tested["solved"] = compare_solved({name: solved_of(group) for name, group in groups.items()})  # type: ignore[misc]
+    figure = figure_of_results(groups, tested, {})
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    caption = figure.get_supxlabel().replace("\n", " ")
+    assert ("Kruskal-Wallis (chi-squared approximation): p = 1." in caption) == (count > 1)
+    assert ("corrected by Holm's method" in caption) == (count > 1)
+    assert ("a - b p = 1, A = 0.50" in caption) == (count == 3)
+    assert ("10 pairs, p = 1 to p = 1" in caption) == (count == 5)
+    (legend,) = figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == [f"{name} (4 runs)" for name in "abcde"[:count]]
+    # Nothing is drawn over the data, and the caption and the legend are inside the figure and apart from the axes.
+    renderer = canvas.get_renderer()
+    boxes = [legend.get_window_extent(renderer), figure._supxlabel.get_window_extent(renderer)]
+    boxes += [axes.get_legend().get_window_extent(renderer) for axes in figure.axes if axes.get_legend()]
+    for box in boxes:
+        assert figure.bbox.x0 <= box.x0
+        assert figure.bbox.y0 <= box.y0
+        assert box.x1 <= figure.bbox.x1
+        assert box.y1 <= figure.bbox.y1
+        assert not any(box.overlaps(axes.bbox) for axes in figure.axes)
+    sizes = [text.get_fontsize() for text in figure.findobj(Text) if text.get_text()]
+    assert (min(sizes), max(sizes)) == (7.0, 8.0)
+    assert figure.get_figwidth() == pytest.approx(170 / 25.4)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("ending", "begin"), [("png", b"\x89PNG"), ("svg", b"<?xml"), ("pdf", b"%PDF")])
+def test_pictures_are_of_the_kind_that_their_name_says(ending: str, begin: bytes, tmp_path: Path) -> None:
+    without = [replace(each, exam=None, task="$^$") for each in RESULTS]
+    save_results_plot({"$_$": without, "b": without[:1]}, tmp_path / f"picture.{ending}")
+    assert (tmp_path / f"picture.{ending}").read_bytes().startswith(begin)
+    with pytest.raises(ParameterError, match=r"must end in \.png, \.svg or \.pdf"):
+        save_results_plot({"a": without}, tmp_path / "picture.bmp")
 
 
 @pytest.mark.slow
@@ -211,9 +246,12 @@ def test_the_result_of_an_evolution(tmp_path: Path) -> None:
     result.save(tmp_path)
     assert load_results(tmp_path) == [result]
     assert evolution.finals is not None
-    assert (result.generations, result.evaluations) == (3, (24, 40, 40 + len(evolution.finals.values)))
+    assert (result.generations, result.evaluations, result.finals) == (3, (24, 40), len(evolution.finals.values))
+    assert result.evaluation_count == 40 + result.finals
     assert result.seconds == evolution.finals.seconds > evolution.generations[-1].seconds
-    assert result.fitness == result.champion_fitness[-1] == evolution.champion.fitness
+    assert result.fitness == evolution.champion.fitness
+    assert result.champion_fitness == tuple(each.champion_fitness for each in evolution.generations[1:])
+    assert result.solved is None  # after a second nobody gets around
     assert result.exam is not None
     assert (result.exam.starts, result.exam.imperfect_starts) == (20, 200)
     evolution.run(generations=4)

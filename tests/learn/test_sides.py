@@ -15,10 +15,11 @@ import kiks
 from kiks import ParameterError
 from kiks.cli.evolve import winners_of
 from kiks.client.drive import Driver
+from kiks.learn.cross_tournament import MEETINGS, hold_cross_tournament
 from kiks.learn.finals import Tournament, latin_square
 from kiks.learn.fingerprint import differing
 from kiks.learn.plots import save_tournament_plot
-from kiks.learn.ready_tasks import CAUGHT_MM, PREY_SPEED
+from kiks.learn.ready_tasks import CAUGHT_MM, PREY_SPEED, TASKS
 from kiks.learn.results import load_results, result_of
 from kiks.learn.seeds import SQUARE, TOURNAMENT, seed_for
 from kiks.model.arena import Pose
@@ -280,3 +281,27 @@ def test_a_tournament_knows_the_best_and_the_winner(tmp_path: Path) -> None:
     ]
     save_tournament_plot(tournament, tmp_path / "tournament.png")
     assert (tmp_path / "tournament.png").read_bytes().startswith(b"\x89PNG")
+
+
+# ---- strangers ----
+
+
+def test_strangers_meet_from_the_same_starts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(TASKS, "pursuit", lambda _: small())
+    homes = [tmp_path / name for name in "abc"]
+    for seed, home in enumerate(homes):
+        run(home, generations=2, seed=seed, population=4)
+    met = hold_cross_tournament({"one": homes[:2], "other": homes[2:]})
+    task, starts = small(), [seed_for(0, TOURNAMENT, number) for number in range(MEETINGS)]
+    champions = [
+        [kiks.Champion.load(home / f"{side}.toml").parameters for side in ("predator", "prey")] for home in homes
+    ]
+    oracle = np.full((2, 3, 3), np.nan)
+    for row, column in ((0, 1), (0, 2), (1, 0), (1, 2), (2, 0), (2, 1)):
+        pair = np.tile([*champions[row][0], *champions[column][1]], (MEETINGS, 1))
+        oracle[:, row, column] = task.evaluate(pair, np.array(starts), 1)[:, [0, 4]].mean(axis=0)
+    predators, prey = np.nanmean(oracle[0], axis=1), np.nanmean(oracle[1], axis=0)
+    np.testing.assert_allclose([*met["predator"]["one"], *met["predator"]["other"]], predators)
+    np.testing.assert_allclose([*met["prey"]["one"], *met["prey"]["other"]], prey)
+    with pytest.raises(ParameterError, match="two evolutions or more, but it has one"):
+        hold_cross_tournament({"one": homes[:1]})

@@ -2,10 +2,28 @@
 
 from __future__ import annotations
 
+from itertools import combinations
+
+import numpy as np
 import pytest
 
 from kiks import ParameterError
-from kiks.learn.statistics import wilson_interval
+from kiks.learn.statistics import (
+    KRUSKAL_WALLIS,
+    MANN_WHITNEY,
+    MANN_WHITNEY_EXACT,
+    Pair,
+    Solved,
+    bootstrap_interval,
+    compare,
+    compare_solved,
+    holm,
+    mann_whitney,
+    survival,
+    wilson_interval,
+)
+
+# ---- intervals ----
 
 
 @pytest.mark.parametrize(
@@ -21,3 +39,118 @@ def test_wilsons_interval_is_that_of_newcombe(count: int, total: int, known: tup
 def test_a_share_is_of_something(count: int, total: int) -> None:
     with pytest.raises(ParameterError, match=f"from 0 to total.* were {count} and {total}"):
         wilson_interval(count, total)
+
+
+def test_the_bootstrap_covers_the_median_as_often_as_it_says() -> None:
+    """Of 5 values, the interval from the least to the greatest misses the median with a chance of 2 / 2**5."""
+    assert bootstrap_interval(np.median, [3.0]) is None
+    found = bootstrap_interval(np.median, [5.0, 1.0, 4.0, 2.0, 3.0])
+    assert found == bootstrap_interval(np.median, [5.0, 1.0, 4.0, 2.0, 3.0]) == (1.0, 5.0)
+    rng = np.random.default_rng(1)
+    intervals = [bootstrap_interval(np.median, rng.standard_normal(25).tolist()) for _ in range(60)]
+    covered = sum(each is not None and each.low <= 0.0 <= each.high for each in intervals)
+    assert wilson_interval(covered, 60).high > 0.95 > wilson_interval(covered, 60).low
+
+
+# ---- tests ----
+
+
+def test_the_exact_p_is_that_of_the_tables() -> None:
+    """U of 5 and 5 values is at most 2 in 4 of 252 orders: two-sided p is 0.0317 (Mann and Whitney 1947, table I)."""
+    found = mann_whitney([1.0, 2.0, 3.0, 4.0, 7.0], [5.0, 6.0, 8.0, 9.0, 10.0])
+    assert (found.method, found.statistic) == (MANN_WHITNEY_EXACT, 2.0)
+    assert found.p == pytest.approx(8 / 252)
+
+
+def test_a_counts_pairs() -> None:
+    rng = np.random.default_rng(1)
+    for sizes in ((1, 1), (3, 5), (10, 10)):
+        first, second = (rng.integers(0, 6, size).astype(float).tolist() for size in sizes)
+        (found,) = compare({"a": first, "b": second}).pairs
+        wins = sum((one > two) + (one == two) / 2 for one in first for two in second)
+        assert (found.test.statistic, found.a) == (wins, wins / (len(first) * len(second)))
+        (other,) = compare({"b": second, "a": first}).pairs
+        assert other.a == pytest.approx(1 - found.a)
+        assert other.p == pytest.approx(found.p)
+        if min(sizes) > 1:
+            assert found.a_interval is not None
+            assert found.a_interval.low <= found.a <= found.a_interval.high
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "a", "effect"),
+    [
+        ([1.0] * 5, [1.0] * 5, 0.5, "negligible"),
+        ([2.0] * 5, [1.0] * 5, 1.0, "large"),
+        ([0.0] * 5, [1.0] * 5, 0.0, "large"),
+        ([1.0, 2.0, 2.0, 2.0, 3.0], [1.0, 2.0, 2.0, 2.0, 2.0], 0.58, "small"),
+    ],
+)
+def test_effects_have_names(first: list[float], second: list[float], a: float, effect: str) -> None:
+    (found,) = compare({"a": first, "b": second}).pairs
+    assert found.a == pytest.approx(a)
+    assert found.effect == effect
+    assert found.test.method == MANN_WHITNEY
+
+
+def test_all_settings_together_and_each_two() -> None:
+    """H of ranks 1 to 12 in order is 9.846 (12 / (12 x 13) x (10**2 + 26**2 + 42**2) / 4 - 3 x 13)."""
+    samples = {"a": [1.0, 2.0, 3.0, 4.0], "b": [5.0, 6.0, 7.0, 8.0], "c": [9.0, 10.0, 11.0, 12.0]}
+    found = compare(samples)
+    assert found.omnibus is not None
+    assert found.omnibus.method == KRUSKAL_WALLIS
+    assert found.omnibus.statistic == pytest.approx(9.846, abs=1e-3)
+    assert found.omnibus.p == pytest.approx(np.exp(-9.846 / 2), abs=1e-5)  # of chi squared with two degrees of freedom
+    assert [(each.first, each.second) for each in found.pairs] == list(combinations("abc", 2))
+    assert [each.test.p for each in found.pairs] == pytest.approx([2 / 70] * 3)
+    assert [each.p for each in found.pairs] == pytest.approx([6 / 70] * 3)
+    assert found.correction == "Holm"
+    same = compare({name: [1.0, 1.0] for name in samples})
+    assert same.omnibus is not None
+    assert same.omnibus.p == 1.0
+    two = compare({name: samples[name] for name in "ab"})
+    assert (two.omnibus, two.correction, two.pairs[0].p) == (None, "", two.pairs[0].test.p)
+
+
+def test_holms_correction() -> None:
+    """The smallest p counts as many times as there are tests; none becomes smaller than the one before it."""
+    assert holm([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02])
+    assert holm([0.9, 0.8]) == [1.0, 1.0]
+    assert holm([]) == []
+
+
+# ---- survival ----
+
+TREATED = Solved(
+    (6, 6, 6, 6, 7, 9, 10, 10, 11, 13, 16, 17, 19, 20, 22, 23, 25, 32, 32, 34, 35),
+    tuple(bool(int(each)) for each in "111010100110001100000"),
+)
+PLACEBO = Solved((1, 1, 2, 2, 3, 4, 4, 5, 5, 8, 8, 8, 8, 11, 11, 12, 12, 15, 17, 22, 23), (True,) * 21)
+"""Weeks of remission with 6-mercaptopurine and without (Freireich et al., Blood 21, 1963)."""
+
+
+def test_survival_is_that_of_the_textbooks() -> None:
+    """Kalbfleisch and Prentice, The statistical analysis of failure time data, table 1.1 and section 1.4."""
+    found = survival(TREATED)
+    steps = np.searchsorted(found.evaluations, [6, 7, 10, 13, 16, 22, 23, 35])
+    known = [0.857, 0.807, 0.753, 0.690, 0.627, 0.538, 0.448, 0.448]
+    assert 1 - found.share[steps] == pytest.approx(known, abs=5e-4)
+    assert (found.low[steps] < found.share[steps]).all()
+    assert (found.share[steps] < found.high[steps]).all()
+    assert survival(PLACEBO).share[-1] == 1.0
+
+
+def test_the_log_rank_test_is_that_of_the_textbooks() -> None:
+    """Chi squared of these data is 16.79."""
+    (found,) = compare_solved({"treated": TREATED, "placebo": PLACEBO}).pairs
+    assert found.test.statistic**2 == pytest.approx(16.79, abs=5e-3)
+    assert found.p == pytest.approx(4.17e-5, abs=1e-7)
+    assert (found.a, found.effect) == (None, "")
+
+
+def test_evolutions_that_never_solve_a_task_do_not_differ() -> None:
+    never = Solved((10, 10), (False, False))
+    assert survival(never).share.tolist() == [0.0, 0.0]
+    pairs: tuple[Pair, ...] = compare_solved({"a": never, "b": never, "c": Solved((5,), (True,))}).pairs
+    assert pairs[0].p == 1.0
+    assert pairs[1].test.p < 1.0

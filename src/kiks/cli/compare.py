@@ -2,73 +2,143 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from kiks.cli.options import print_table
 from kiks.cli.outputs import has_results, output, tell_results
-from kiks.errors import ParameterError
+from kiks.errors import ParameterError, counted
 from kiks.export.kinds import KINDS
 
 FIGURES = KINDS["figures"].endings
 
 if TYPE_CHECKING:
     from kiks.learn.results import Result
+    from kiks.learn.statistics import Comparison
 
 
 @has_results
 def compare(
     context: typer.Context,
-    first: Annotated[Path, typer.Argument(help="A folder of kiks evolve, best with --seeds.")],
-    second: Annotated[Path, typer.Argument(help="Another folder, with evolutions of the same task.")],
+    folders: Annotated[
+        list[Path],
+        typer.Argument(help="Two folders of kiks evolve or more, best with --seeds, with evolutions of one task."),
+    ],
     picture: Annotated[
         Path, typer.Option(help=f"File of the picture, {', '.join(FIGURES)}.", callback=output(*FIGURES))
     ] = Path("kiks-compare.png"),
+    task: Annotated[
+        str | None, typer.Option(help="Of co-evolutions: the file of the task, if it is a Python file or was moved.")
+    ] = None,
 ) -> None:
-    """Compare the evolutions in two folders.
+    """Compare the evolutions in two or more folders.
 
-    It prints medians, exams, and the Mann-Whitney test with its effect size.
+    It prints medians, exams and tests, each with its method: fitness, the share of the exam's starts that were solved,
+    and how many evaluations it took to solve the task. Of more than two folders, the p of pairs are corrected.
+    Champions of co-evolutions meet those of all others first.
 
-    Example: kiks compare runs/linear runs/gru
+    Example: kiks compare runs/linear runs/mlp runs/gru --picture compare.pdf
     """
+    from kiks.learn import statistics
     from kiks.learn.plots import save_results_plot
-    from kiks.learn.results import comparable, difference, load_results, summary_of
+    from kiks.learn.results import comparable, load_results, of_sides, solved_of, summary_of
 
-    if first.resolve() == second.resolve():
-        raise ParameterError(f"SECOND must be another folder than FIRST, but both are {str(first)!r}.")
-    one, two = comparable(load_results(first), load_results(second))
-    groups = {str(first): one, str(second): two}
-    print_groups(groups)
-    samples = {"Fitness": [[each.fitness for each in group] for group in (one, two)]}
-    if all(each.exam is not None for each in (*one, *two)):
-        samples["Exam"] = [[each.exam.share for each in group if each.exam is not None] for group in (one, two)]
-    differences = {}
-    for name, sample in samples.items():
-        found = difference(*sample)
-        differences[name.lower()] = asdict(found) | {"effect": found.effect}
-        typer.echo(
-            f"{name}: U = {found.u:g}, p = {found.p:.3g}, A = {found.a:.2f} ({found.effect}): the share of pairs in "
-            f"which {first} is better"
-        )
-    save_results_plot(groups, picture)
+    if len({each.resolve() for each in folders}) < max(len(folders), 2):
+        given = ", ".join(map(str, folders))
+        raise ParameterError(f"FOLDERS must be two or more, all different, but they were {given}.")
+    groups = comparable({str(folder): load_results(folder) for folder in folders})
+    tested: dict[str, Comparison] = {}
+    against = groups[str(folders[0])][0].against
+    samples: dict[str, dict[str, list[float]]] = {}
+    if against is not None:
+        samples = _meetings(folders, task)
+        tested |= {side: statistics.compare(sample) for side, sample in samples.items()}
+    else:
+        tested["fitness"] = statistics.compare({name: [each.fitness for each in of] for name, of in groups.items()})
+    for side, of_side in of_sides(groups).items():
+        if side:
+            typer.echo(f"{side}, against all champions of the other side of its own evolution:")
+        print_groups(of_side)
+    solved = {name: found for name, of in groups.items() if (found := solved_of(of)) is not None}
+    if len(solved) == len(groups):
+        shares = {name: [each.exam.share for each in of if each.exam is not None] for name, of in groups.items()}
+        tested |= {"exam": statistics.compare(shares), "solved": statistics.compare_solved(solved)}
+    for line in (line for name, comparison in tested.items() for line in lines_of(name, comparison)):
+        typer.echo(line)
+    save_results_plot(groups, picture, tested, samples)
     typer.echo(f"Picture: {picture}")
-    summaries = {folder: summary_of(group) for folder, group in groups.items()}
-    tell_results(context, {"folders": summaries, "differences": differences})
+    results: dict[str, Any] = {"folders": {name: summary_of(group) for name, group in groups.items()}}
+    if samples:
+        results["meetings"] = samples
+    tell_results(context, results | {"differences": {name: _plain(each) for name, each in tested.items()}})
+
+
+def _meetings(folders: Sequence[Path], task: str | None) -> dict[str, dict[str, list[float]]]:
+    """Let the champions of co-evolutions meet those of all others, and return their mean fitness."""
+    from kiks.cli.engine_start import ready_batch
+    from kiks.learn import tasks
+    from kiks.learn.cross_tournament import MEETINGS, hold_cross_tournament
+    from kiks.learn.results import evolutions_in
+
+    given = None if task is None else tasks.load(task)
+    homes = {str(folder): evolutions_in(folder) for folder in folders}
+    ready_batch()
+    count = sum(map(len, homes.values()))
+    typer.echo(
+        f"Compared: each champion against those of the other {counted(count - 1, 'evolution')}, {MEETINGS} times each."
+    )
+    return hold_cross_tournament(homes, given)
+
+
+def lines_of(name: str, comparison: Comparison) -> Iterator[str]:
+    """Yield lines that say what tests say about groups: what is compared, with which test, and each pair."""
+    from kiks.learn.results import title_of
+    from kiks.learn.statistics import CONFIDENCE
+
+    correction = f", p corrected for {len(comparison.pairs)} pairs by {comparison.correction}'s method"
+    yield f"{title_of(name)}{correction if comparison.correction else ''}:"
+    if (omnibus := comparison.omnibus) is not None:
+        yield f"  all {omnibus.method}: H = {omnibus.statistic:.3g}, p = {omnibus.p:.3g}"
+    for pair in comparison.pairs:
+        line = f"  {pair.first} - {pair.second}   {pair.test.method}: p = {pair.p:.3g}"
+        if pair.a is not None:
+            interval = (
+                "" if pair.a_interval is None else "{:.2f} to {:.2f} at {:.0%}, ".format(*pair.a_interval, CONFIDENCE)
+            )
+            line += f", A = {pair.a:.2f} ({interval}{pair.effect})"
+        yield line
+
+
+def _plain(comparison: Comparison) -> dict[str, Any]:
+    """Return a comparison for scripts."""
+    plain = asdict(comparison)
+    for pair, known in zip(comparison.pairs, plain["pairs"], strict=True):
+        known |= {"effect": pair.effect}
+    return plain
 
 
 def print_seeds(results: Sequence[Result]) -> None:
     """Print a table of evolutions that differ in their seed; the last row holds medians, and how many passed."""
+    from kiks.learn.results import of_sides
+
+    for side, named in of_sides({"": results}).items():
+        if side:
+            typer.echo(f"{side}, against all champions of the other side of its own evolution:")
+        _print_seeds(named[""])
+
+
+def _print_seeds(results: Sequence[Result]) -> None:
     rows: list[tuple[str, ...]] = [
         (
             str(each.seed),
             f"{each.fitness:.4f}",
             str(each.generation),
             *_exam_texts(each),
-            str(each.evaluations[-1]),
+            str(each.evaluation_count),
             f"{each.seconds:.0f}",
         )
         for each in results
@@ -76,12 +146,32 @@ def print_seeds(results: Sequence[Result]) -> None:
     _, middle, _, passed, *costs = _figures(results)
     rows.append(("all", middle, "", passed, "", *costs))
     print_table(("seed", "fitness", "found in", "exam", "imperfect", "evaluations", "seconds"), rows)
+    _print_intervals(results, "all: ")
 
 
 def print_groups(groups: Mapping[str, Sequence[Result]]) -> None:
     """Print a table of groups of evolutions: quartiles and medians, and how many champions passed the exam."""
     columns = ("folder", "runs", "quartile", "median", "quartile", "exams", "evaluations", "seconds")
     print_table(columns, [(name, str(len(group)), *_figures(group)) for name, group in groups.items()])
+    for name, group in groups.items():
+        _print_intervals(group, f"{name}: ")
+
+
+def _print_intervals(results: Sequence[Result], begin: str = "") -> None:
+    """Print the intervals of the median and of the share of exams, with their methods, if there are several results."""
+    import numpy as np
+
+    from kiks.learn.results import passed_count
+    from kiks.learn.statistics import bootstrap_interval, wilson_interval
+
+    interval = bootstrap_interval(np.median, [each.fitness for each in results])
+    if interval is None:
+        return
+    line = f"{begin}at 95 %, median {interval.low:.4f} to {interval.high:.4f} (bootstrap)"
+    if (passed := passed_count(results)) is not None:
+        low, high = wilson_interval(passed, len(results))
+        line += f", exams passed {100 * low:.0f} to {100 * high:.0f} % (Wilson)"
+    typer.echo(line)
 
 
 def _figures(results: Sequence[Result]) -> tuple[str, ...]:
@@ -94,7 +184,7 @@ def _figures(results: Sequence[Result]) -> tuple[str, ...]:
     return (
         *(f"{value:.4f}" for value in quartiles(results)),
         "-" if passed is None else f"{passed} of {len(results)}",
-        f"{median(each.evaluations[-1] for each in results):.0f}",
+        f"{median(each.evaluation_count for each in results):.0f}",
         f"{median(each.seconds for each in results):.0f}",
     )
 

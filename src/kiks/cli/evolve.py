@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor
 from contextlib import ExitStack
+from enum import StrEnum
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
@@ -26,6 +27,15 @@ if TYPE_CHECKING:
     from kiks.learn.finals import Tournament
     from kiks.learn.results import Result
     from kiks.learn.task import Task
+
+
+class PlotEnding(StrEnum):
+    """Kinds of pictures: the ending of their files."""
+
+    PNG = "png"
+    SVG = "svg"
+    PDF = "pdf"
+
 
 PERIODS = 5
 """Number of periods of an evolution of two sides whose winners are listed."""
@@ -70,6 +80,10 @@ def evolve(
         typer.Option(help="Evaluate on a Ray cluster: its address, auto, or local; on all cores here if left out."),
     ] = None,
     record: RecordFile = None,
+    plots: Annotated[PlotEnding, typer.Option(help="Kind of its pictures; svg and pdf for print.")] = PlotEnding.PNG,
+    tensorboard: Annotated[
+        bool, typer.Option("--tensorboard", help="Write a log for TensorBoard into the folder, too.")
+    ] = False,
     list_: Annotated[bool, typer.Option("--list", help="List the tasks that come with KiKS.")] = False,
 ) -> None:
     """Evolve a controller for a task.
@@ -121,27 +135,41 @@ def evolve(
 
                     executor = stack.enter_context(RayExecutor(None if cluster == "local" else cluster))
                 ready_batch()
-                with Progress(evolution, until, seconds) as progress:
-                    evolution.run(
-                        generations=until,
-                        seconds=seconds,
-                        executor=executor,
-                        each=progress.each,
-                        each_round=progress.each_round,
-                    )
+                _run(evolution, until, seconds, executor, home if tensorboard else None)
                 if evolution.generations:
-                    results.append(_finish(evolution, home))
+                    results.append(_finish(evolution, home, plots))
                     if record is not None:
                         _record(evolution, home, record)
             except KeyboardInterrupt:
                 _stop(evolution, home)
     if seeds is not None and results:
-        _tell_seeds(results, folder)
+        _tell_seeds(results, folder, plots)
     if results:
         tell_results(context, summary_of(results))
 
 
-def _finish(evolution: Evolution, folder: Path) -> Result:
+def _run(
+    evolution: Evolution, until: int | None, seconds: float | None, executor: Executor | None, log_in: Path | None
+) -> None:
+    """Run an evolution and show how far it is; with a log for TensorBoard in a folder, if one is given."""
+    with ExitStack() as stack:
+        told: list[Callable[[Evolution], None]] = []
+        if log_in is not None:
+            from kiks.learn import tensorboard_log
+
+            told.append(stack.enter_context(tensorboard_log.TensorBoardLog(log_in / tensorboard_log.FOLDER)))
+            told[0](evolution)  # what was evolved before
+        progress = stack.enter_context(Progress(evolution, until, seconds))
+        told.append(progress.each)
+
+        def each(now: Evolution) -> None:
+            for tell in told:
+                tell(now)
+
+        evolution.run(generations=until, seconds=seconds, executor=executor, each=each, each_round=progress.each_round)
+
+
+def _finish(evolution: Evolution, folder: Path, plots: PlotEnding) -> Result:
     """Save result and pictures of an evolution that has come to its end, print the result, and return it."""
     from kiks.learn.plots import save_plot, save_tournament_plot
     from kiks.learn.results import load_result, result_of
@@ -150,9 +178,9 @@ def _finish(evolution: Evolution, folder: Path) -> Result:
     if result is None:
         result = result_of(evolution)
         result.save(folder)
-    save_plot(evolution, folder / "fitness.png", result.baselines)
+    save_plot(evolution, folder / f"fitness.{plots}", result.baselines)
     if (tournament := evolution.tournament) is not None:
-        save_tournament_plot(tournament, folder / "tournament.png")
+        save_tournament_plot(tournament, folder / f"tournament.{plots}")
         for line in winners_of(tournament):
             typer.echo(line)
     _tell_champion(evolution, folder)
@@ -222,13 +250,13 @@ def _tell_champion(evolution: Evolution, folder: Path) -> None:
     typer.echo(f"Folder: {folder}   See it drive: kiks run {shown}")
 
 
-def _tell_seeds(results: Sequence[Result], folder: Path) -> None:
+def _tell_seeds(results: Sequence[Result], folder: Path, plots: PlotEnding) -> None:
     """Save summary and picture of several evolutions, and print them as a table."""
     from kiks.cli.compare import print_seeds
     from kiks.learn.plots import save_results_plot
     from kiks.learn.results import SUMMARY, save_summary
 
-    picture = folder / "seeds.png"
+    picture = folder / f"seeds.{plots}"
     save_summary(results, folder)
     save_results_plot({str(folder): results}, picture)
     print_seeds(results)

@@ -37,12 +37,12 @@ COLUMN_MM, MM_IN_AN_INCH = 85.0, 25.4
 """Width of a column of a journal [mm], and millimetres in an inch."""
 
 COLUMN_STYLE: dict[Any, Any] = {
-    "font.size": 7,
-    "axes.titlesize": 7,
-    "axes.labelsize": 7,
-    "xtick.labelsize": 6.5,
-    "ytick.labelsize": 6.5,
-    "legend.fontsize": 6.5,
+    "font.size": 8,
+    "axes.titlesize": 8,
+    "axes.labelsize": 8,
+    "xtick.labelsize": 7,
+    "ytick.labelsize": 7,
+    "legend.fontsize": 7,
     "legend.frameon": False,
     "axes.linewidth": 0.5,
     "xtick.major.width": 0.5,

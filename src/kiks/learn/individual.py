@@ -35,7 +35,7 @@ def individual_of(
     if not count:
         raise ParameterError(f"the evolution in {str(saved.path)!r} must have a generation, but it has none yet.")
     number = check_count("generation", generation, 1, count) - 1
-    found = _task_of(saved, identity, task)
+    found = task_of(saved, identity, task)
     arrays = saved.generation(number, identity)
     fitness = arrays["values"][: identity.population, 0]
     order = (-fitness).argsort(kind="stable")
@@ -45,7 +45,14 @@ def individual_of(
     return replace(known, algorithm=identity.algorithm, seed=identity.seed), candidate
 
 
-def _task_of(folder: Folder, identity: Identity, given: Task | None) -> Task:
+def task_of(folder: Folder, identity: Identity, given: Task | None = None) -> Task:
+    """Return the task of the evolution in a folder, with its controllers.
+
+    Args:
+        folder: The folder.
+        identity: Its identity.
+        given: The task, for one that was made in Python; looked up if left out.
+    """
     name, file = identity.task, identity.task_file
     where = f"the task {shown(name)} of the evolution in {str(folder.path)!r}"
     if given is not None:
@@ -63,8 +70,10 @@ def _task_of(folder: Folder, identity: Identity, given: Task | None) -> Task:
             f"{where} must be given, for it was made in Python. Give a Python file in which `task` is this task: "
             "--task FILE."
         )
-    if task.controller.name != identity.controller:
-        task = task.with_changes(controller=Champion.load(folder.champion_file()).controller)
+    if " and ".join(side.controller.name for side in task.sides) != identity.controller:
+        first, *others = (Champion.load(folder.champion_file(side)).controller for side in identity.sides)
+        against = task.against and replace(task.against, controller=others[0])
+        task = task.with_changes(controller=first, against=against)
     if names := differing(identity.task_digest, task.digest(), ("algorithm",)):
         raise ParameterError(
             f"{where} must be the one that was evolved, but it differs now in: {names}. Give a file with the earlier "

@@ -1,28 +1,92 @@
-"""The pictures of an evolution, and of the results of several. They need Matplotlib."""
+"""The pictures of an evolution, and of the results of several. They need Matplotlib.
+
+A panel is as wide as a column of a journal, and its texts have 7 to 8 points there. Legends stand outside the axes.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import functools
+from collections.abc import Callable, Mapping, Sequence
+from itertools import cycle
+from os.path import commonpath
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 import numpy as np
 
-from kiks.export.figures import save_figure
+from kiks.errors import counted
+from kiks.export.figures import COLUMN_MM, COLUMN_STYLE, MM_IN_AN_INCH, save_figure
 from kiks.learn.archive import Archive
 from kiks.learn.champion import Champion
 from kiks.learn.evolution import Evolution
 from kiks.learn.exam import PASS_SHARE
 from kiks.learn.finals import Tournament
-from kiks.learn.results import Baselines, Result, curves, passed_count
-from kiks.learn.statistics import mean_interval
+from kiks.learn.results import Baselines, Result, curves, of_sides, passed_count, solved_of, title_of
+from kiks.learn.statistics import Comparison, mean_interval, survival
 from kiks.learn.task import Axis
 
-CHAMPION_MARK: dict[str, Any] = {"color": "tab:red", "markersize": 12, "markeredgecolor": "white"}
+COLUMN_INCHES, PANEL_INCHES = COLUMN_MM / MM_IN_AN_INCH, 64 / MM_IN_AN_INCH
+"""Width of a panel, that of a column, and its height [inches]."""
+
+COLUMNS = 2
+"""Panels side by side; more stand below."""
+
+DOTS_PER_INCH = 220
+"""Of a picture in pixels."""
+
+PAIRS_MAX, BANDS_MAX = 3, 3
+"""Most pairs of groups whose p a caption lists, and most groups whose intervals overlap in a panel."""
+
+CAPTION_POINTS, CAPTION_CHARACTERS = 7.0, 66
+"""Size of the caption, and how many of its characters are as wide as a column."""
+
+LEGEND_POINTS = 27.0
+"""How far below the axes a legend begins, under the label of the axis."""
+
+CHAMPION_MARK: dict[str, Any] = {"color": "tab:red", "markersize": 9, "markeredgecolor": "white"}
 """How the champion is drawn."""
 
-SIDE_COLOURS, GROUP_COLOURS = ("tab:red", "tab:blue"), ("tab:blue", "tab:orange")
-"""Colours of two sides in the tournament, and of two groups of evolutions."""
+SIDE_COLOURS = ("tab:red", "tab:blue")
+"""Colours of two sides in the tournament."""
+
+COLOURS, DASHES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000"), ("-", "--", "-.", ":")
+"""Colours of groups of evolutions, which the colour-blind can tell apart (Okabe and Ito 2008), and their lines."""
+
+
+def in_style(draw: Callable[..., Any]) -> Callable[..., Any]:
+    """Let a function draw in the style of all figures of evolutions."""
+
+    @functools.wraps(draw)
+    def drawn(*given: Any, **named: Any) -> Any:
+        from matplotlib import rc_context
+
+        with rc_context(COLUMN_STYLE):
+            return draw(*given, **named)
+
+    return drawn
+
+
+def panels(count: int) -> tuple[Any, list[Any]]:
+    """Return a figure and the axes of its panels."""
+    from matplotlib.figure import Figure
+
+    columns = min(count, COLUMNS)
+    rows = -(-count // columns)
+    figure = Figure(figsize=(columns * COLUMN_INCHES, rows * PANEL_INCHES), layout="constrained")
+    axes = list(figure.subplots(rows, columns, squeeze=False).ravel())
+    for spare in axes[count:]:
+        spare.remove()
+    return figure, axes[:count]
+
+
+def legend_below(axes: Any) -> None:
+    """Put the legend of axes below their label."""
+    from matplotlib.transforms import ScaledTranslation
+
+    lower = ScaledTranslation(0.0, -LEGEND_POINTS / 72.0, axes.figure.dpi_scale_trans)
+    place: dict[str, Any] = {"bbox_to_anchor": (0.5, 0.0), "bbox_transform": axes.transAxes + lower}
+    axes.legend(loc="upper center", borderaxespad=0.0, ncols=2, **place)
 
 
 def save_plot(evolution: Evolution, path: str | Path, baselines: Baselines | None = None) -> None:
@@ -30,21 +94,19 @@ def save_plot(evolution: Evolution, path: str | Path, baselines: Baselines | Non
 
     Args:
         evolution: The evolution.
-        path: File of the picture.
+        path: File of the picture: .png, .svg or .pdf.
         baselines: Its baselines, drawn as lines.
     """
-    save_figure(figure_of_evolution(evolution, baselines), path)
+    save_figure(figure_of_evolution(evolution, baselines), path, DOTS_PER_INCH)
 
 
+@in_style
 def figure_of_evolution(evolution: Evolution, baselines: Baselines | None = None) -> Any:
     """Return the figure of `save_plot`, a `matplotlib.figure.Figure`."""
-    from matplotlib.figure import Figure
-
     sides, archives = evolution.task.sides, evolution.archives
     has_front = len(evolution.task.objectives) > 1 and not evolution.task.against
-    count = len(sides) + len(archives) + has_front
-    figure = Figure(figsize=(6.4 if count == 1 else 6.0 * count, 4.4), layout="constrained")
-    axes = iter(figure.subplots(1, count, squeeze=False)[0])
+    figure, drawn = panels(len(sides) + len(archives) + has_front)
+    axes = iter(drawn)
     for side in range(len(sides)):
         _draw_fitness(next(axes), evolution, side, baselines)
     for archive, champion in zip(archives, evolution.champions, strict=False):
@@ -54,12 +116,11 @@ def figure_of_evolution(evolution: Evolution, baselines: Baselines | None = None
     return figure
 
 
+@in_style
 def figure_of_archive(archive: Archive) -> Any:
     """Return a figure of an archive, a `matplotlib.figure.Figure`."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(6.4, 4.4), layout="constrained")
-    _draw_archive(figure, figure.subplots(), archive, archive.champion)
+    figure, (axes,) = panels(1)
+    _draw_archive(figure, axes, archive, archive.champion)
     return figure
 
 
@@ -71,24 +132,24 @@ def _draw_fitness(axes: Any, evolution: Evolution, side: int, baselines: Baselin
     axes.fill_between(numbers, low, high, color="tab:blue", alpha=0.25, linewidth=0, label="middle half")
     axes.plot(numbers, median, color="tab:blue", label="median")
     axes.plot(numbers, best, color="tab:green", linewidth=1, label="best of the generation")
-    name, against = evolution.task.name, ""
+    name = evolution.task.name
     if evolution.task.against:
-        name, against = evolution.task.sides[side].name, " against the opponents of the time"
+        name = f"{evolution.task.sides[side].name} against opponents of the time"
     else:
         champions = [each.champion_fitness for each in generations]
         axes.plot(numbers, champions, color="tab:red", drawstyle="steps-post", label="champion, on trial")
-    if evolution.finals is not None:
-        axes.plot(len(generations), evolution.champion.fitness, "*", **CHAMPION_MARK, label="champion, in the finals")
     if baselines is not None:
         _draw_baselines(axes, baselines)
     title = f"{name}: {evolution.name}, seed {evolution.seed}"
-    axes.set(xlabel="generation", ylabel=f"fitness{against}", title=title)
+    if evolution.finals is not None:  # their worlds are others than those of the trials: no point of the curve
+        title += f"; {evolution.champion.fitness:.3g} in the finals"
+    axes.set(xlabel="generation", ylabel="fitness", title=title)
     axes.grid(alpha=0.3)
-    axes.legend(loc="best", fontsize="small")
+    legend_below(axes)
 
 
 def _draw_baselines(axes: Any, baselines: Baselines) -> None:
-    axes.axhline(baselines.random, color="tab:gray", linestyle="--", linewidth=1, label="random controllers, median")
+    axes.axhline(baselines.random, color="tab:gray", linestyle="--", linewidth=1, label="random, median")
     axes.axhline(baselines.standing, color="tab:gray", linestyle=":", linewidth=1, label="standing still")
 
 
@@ -114,7 +175,7 @@ def _draw_archive(figure: Any, axes: Any, archive: Archive, champion: Champion) 
     axes.plot(*place, "*", **CHAMPION_MARK, label="champion")
     title = f"{len(archive.elites)} of {archive.cell_count} cells, QD score {archive.qd_score:.4g}"
     axes.set(xlabel=across.measure, ylabel=up.measure, title=title)
-    axes.legend(loc="best", fontsize="small")
+    legend_below(axes)
     figure.colorbar(image, ax=axes, label="fitness")
 
 
@@ -142,27 +203,31 @@ def _cell(axis: Axis) -> float:
 
 def save_tournament_plot(tournament: Tournament, path: str | Path) -> None:
     """Draw the fitness of the first side in all pairs of champions as grey squares, and both sides' means."""
-    from matplotlib.figure import Figure
+    save_figure(figure_of_tournament(tournament), path, DOTS_PER_INCH)
 
-    figure = Figure(figsize=(12.0, 4.8), layout="constrained")
-    squares, curves = figure.subplots(1, 2)
+
+@in_style
+def figure_of_tournament(tournament: Tournament) -> Any:
+    """Return the figure of `save_tournament_plot`, a `matplotlib.figure.Figure`."""
+    figure, (squares, lines) = panels(2)
     (first, second), generations = tournament.sides, tournament.generations
     half = 0.5 * (generations[-1] - generations[0]) / max(len(generations) - 1, 1) or 0.5
     extent = (generations[0] - half, generations[-1] + half) * 2
     image = squares.imshow(
         tournament.scores[0], origin="lower", extent=extent, interpolation="nearest", cmap="gray", aspect="equal"
     )
-    title = "champions of all generations against each other"
+    title = "champions of all generations"
     squares.set(xlabel=f"generation of the {second}", ylabel=f"generation of the {first}", title=title)
     figure.colorbar(image, ax=squares, label=f"fitness of the {first}")
     for side, name in enumerate(tournament.sides):
         best, means = tournament.best[side], tournament.means[side]
-        curves.plot(generations, means, color=SIDE_COLOURS[side], label=name)
-        curves.plot([best], [means.max()], "o", color=SIDE_COLOURS[side], label=f"best {name}: generation {best}")
-    curves.set(xlabel="generation of the champion", ylabel="mean fitness against all champions")
-    curves.grid(alpha=0.3)
-    curves.legend(loc="best", fontsize="small")
-    save_figure(figure, path)
+        lines.plot(generations, means, color=SIDE_COLOURS[side], label=name)
+        lines.plot([best], [means.max()], "o", color=SIDE_COLOURS[side], label=f"best: generation {best}")
+    title = "each against all champions of the other side"
+    lines.set(xlabel="generation of the champion", ylabel="mean fitness", title=title)
+    lines.grid()
+    legend_below(lines)
+    return figure
 
 
 # ---- several evolutions ----
@@ -189,51 +254,170 @@ def draw_generations(
     axes.set(xlabel="generation", ylabel="fitness", xlim=(1, max(2, numbers[-1])))
 
 
-def save_results_plot(groups: Mapping[str, Sequence[Result]], path: str | Path) -> None:
-    """Draw one or two groups of evolutions of a task.
+def save_results_plot(
+    groups: Mapping[str, Sequence[Result]],
+    path: str | Path,
+    tested: Mapping[str, Comparison] | None = None,
+    meetings: Mapping[str, Mapping[str, Sequence[float]]] | None = None,
+) -> None:
+    """Draw groups of evolutions of a task.
 
-    On the left stand median and quartiles of the champions' fitness over evaluations, on the right the share of the
-    exam's starts that each champion solved.
+    Panels show median and quartiles of the champions' fitness over evaluations; the share of the exam's starts that
+    each champion solved; and the share of evolutions that have solved the task, over evaluations. Of co-evolutions they
+    show both sides, in the tournaments of their own evolutions and against strangers.
 
     Args:
         groups: The groups by their names.
-        path: File of the picture.
+        path: File of the picture: .png, .svg or .pdf.
+        tested: What tests say about them, by what is compared; for the caption.
+        meetings: Of co-evolutions, the mean fitness of each champion against strangers, by the side and the group.
     """
-    from matplotlib.figure import Figure
+    save_figure(figure_of_results(groups, tested or {}, meetings or {}), path, DOTS_PER_INCH)
 
-    results = [each for group in groups.values() for each in group]
-    has_exam = all(each.exam is not None for each in results)
-    figure = Figure(figsize=(12.0 if has_exam else 6.4, 4.4), layout="constrained")
-    axes = figure.subplots(1, 1 + has_exam, squeeze=False)[0]
-    for (name, group), colour in zip(groups.items(), GROUP_COLOURS, strict=False):
-        _draw_curves(axes[0], name, group, colour)
-    first = results[0]
-    if first.baselines is not None:
-        _draw_baselines(axes[0], first.baselines)
-    axes[0].set(xlabel="evaluations", ylabel="fitness of the champion", title=first.task)
-    axes[0].grid(alpha=0.3)
-    axes[0].legend(loc="best", fontsize="small")
+
+@in_style
+def figure_of_results(
+    groups: Mapping[str, Sequence[Result]],
+    tested: Mapping[str, Comparison],
+    meetings: Mapping[str, Mapping[str, Sequence[float]]],
+) -> Any:
+    """Return the figure of `save_results_plot`, a `matplotlib.figure.Figure`."""
+    short = _short_names(list(groups))
+    looks = {name: {"color": c, "linestyle": d} for name, c, d in zip(groups, cycle(COLOURS), _dashes(), strict=False)}
+    sides = of_sides(groups)
+    has_exam = all(solved_of(group) is not None for group in groups.values())
+    figure, drawn = panels(len(sides) + len(meetings) + 2 * has_exam)
+    axes, lines = iter(drawn), ["Lines of fitness are medians, bands quartiles of evolutions."]
+    for side, named in sides.items():
+        _draw_curves(next(axes), side, named, looks)
+    for side, of_side in meetings.items():
+        _draw_shares(place := next(axes), of_side, looks)
+        place.set(ylabel=f"fitness of the {side}, mean", xlabel="champions against strangers", xticks=[])
     if has_exam:
-        _draw_exams(axes[1], groups)
-    save_figure(figure, path)
+        _draw_exams(next(axes), groups, looks)
+        _draw_solved(next(axes), groups, looks)
+        band = ", bands intervals of 95 % (log-log)" if len(groups) <= BANDS_MAX else ""
+        lines.append(
+            "Dots are champions, bars medians, with intervals of 95 % by Wilson's method for those that passed. "
+            f"Evolutions that have passed: by Kaplan and Meier's method{band}; a + ended without."
+        )
+    lines += [_caption(name, comparison, short) for name, comparison in tested.items()]
+    width = min(len(drawn), COLUMNS)
+    caption = "\n".join(fill(line, width * CAPTION_CHARACTERS) for line in lines)
+    figure.supxlabel(caption, x=0.01, ha="left", fontsize=CAPTION_POINTS)
+    labels = [f"{short[name]} ({counted(len(group), 'run')})" for name, group in groups.items()]
+    columns = max(1, min(len(labels), width * CAPTION_CHARACTERS // (max(map(len, labels)) + 6)))
+    handles = [drawn[0].plot([], [], **look)[0] for look in looks.values()]
+    figure.legend(handles, labels, loc="outside upper left", ncols=columns)
+    _add_inches(figure, -(-len(labels) // columns) * 0.16 + (caption.count("\n") + 1) * 0.125)
+    return figure
 
 
-def _draw_curves(axes: Any, name: str, results: Sequence[Result], colour: str) -> None:
-    evaluations, fitness = curves(results)
-    low, median, high = np.percentile(fitness, (25, 50, 75), axis=0)
-    axes.fill_between(evaluations, low, high, step="post", color=colour, alpha=0.25, linewidth=0)
-    seconds = float(np.median([each.seconds for each in results]))
-    label = f"{name}: median and quartiles of {len(results)}, {evaluations[-1]:.0f} evaluations, {seconds:.0f} s"
-    axes.plot(evaluations, median, color=colour, drawstyle="steps-post", label=label)
+def _dashes() -> Any:
+    return (dash for dash in cycle(DASHES) for _ in COLOURS)
 
 
-def _draw_exams(axes: Any, groups: Mapping[str, Sequence[Result]]) -> None:
-    labels: list[str] = []
-    for (name, group), colour in zip(groups.items(), GROUP_COLOURS, strict=False):
-        shares = sorted((each.exam.share for each in group if each.exam is not None), reverse=True)
-        places = np.arange(len(shares)) + len(labels)
-        axes.bar(places, shares, color=colour, label=f"{name}: {passed_count(group)} of {len(group)} solved the exam")
-        labels += [""] * (len(shares) + 1)
-    axes.axhline(PASS_SHARE, color="tab:gray", linestyle="--", linewidth=1)
-    axes.set(ylim=(0, 1), xticks=[], xlabel="champions", ylabel="share of the exam's starts solved")
-    axes.legend(loc="lower left", fontsize="small")
+def _add_inches(figure: Any, height: float) -> None:
+    """Make a figure higher, for what stands above and below its panels."""
+    figure.set_figheight(figure.get_figheight() + height)
+
+
+def _short_names(names: Sequence[str]) -> dict[str, str]:
+    """Return names without the folder that they have in common, and not too long for a legend."""
+    parts = [Path(name).parts for name in names]
+    same = len(Path(commonpath(names)).parts) if len({Path(name).is_absolute() for name in names}) == 1 else 0
+    texts = [str(Path(*part[same:])) if len(names) > 1 and len(part) > same else part[-1] for part in parts]
+    return {
+        name: text if len(text) <= CAPTION_CHARACTERS - 16 else f"...{text[16 - CAPTION_CHARACTERS :]}"
+        for name, text in zip(names, texts, strict=True)
+    }
+
+
+def _caption(name: str, comparison: Comparison, short: Mapping[str, str]) -> str:
+    """Return a sentence for a figure's caption: what tests say about groups, and by which method."""
+    said = []
+    if (omnibus := comparison.omnibus) is not None:
+        said.append(f"all {omnibus.method}: {_p(omnibus.p)}")
+    for method in dict.fromkeys(pair.test.method for pair in comparison.pairs):
+        pairs = [pair for pair in comparison.pairs if pair.test.method == method]
+        of_pairs = [
+            f"{short[pair.first]} - {short[pair.second]} {_p(pair.p)}"
+            + ("" if pair.a is None else f", A = {pair.a:.2f}")
+            for pair in pairs
+        ]
+        if len(comparison.pairs) > PAIRS_MAX:
+            ps = [pair.p for pair in pairs]
+            of_pairs = [f"{counted(len(pairs), 'pair')}, {_p(min(ps))} to {_p(max(ps))}"]
+        corrected = f", corrected by {comparison.correction}'s method" if comparison.correction else ""
+        said.append(f"{method}{corrected}: {'; '.join(of_pairs)}")
+    return f"{title_of(name)}: {'. '.join(said)}."
+
+
+def _p(p: float) -> str:
+    return "p < 0.001" if p < 0.001 else f"p = {p:.2g}"
+
+
+def _draw_curves(axes: Any, side: str, groups: Mapping[str, Sequence[Result]], looks: Mapping[str, Any]) -> None:
+    for name, group in groups.items():
+        evaluations, fitness = curves(group)
+        low, median, high = np.percentile(fitness, (25, 50, 75), axis=0)
+        band: dict[str, Any] = {"color": looks[name]["color"], "alpha": 0.2, "linewidth": 0, "step": "post"}
+        axes.fill_between(evaluations, low, high, **band)
+        axes.plot(evaluations, median, drawstyle="steps-post", **looks[name])
+    first = next(iter(groups.values()))[0]
+    title = f"{first.task}: {side} in its own tournament" if side else f"{first.task}: champion on trial"
+    axes.set(xlabel="evaluations", ylabel="fitness", title=title)
+    axes.grid(alpha=0.3)
+    if first.baselines is not None:
+        _draw_baselines(axes, first.baselines)
+        legend_below(axes)
+
+
+def _draw_shares(axes: Any, samples: Mapping[str, Sequence[float]], looks: Mapping[str, Any]) -> None:
+    """Draw samples as points side by side: equal values stand next to each other; a bar is the median."""
+    width = 0.7 / max(max(map(len, samples.values())), 8)
+    for place, (name, sample) in enumerate(samples.items()):
+        values, counts = np.unique(np.round(sample, 3), return_counts=True)
+        for value, count in zip(values, counts, strict=True):
+            across = place + width * (np.arange(count) - (count - 1) / 2)
+            axes.plot(across, [value] * count, "o", color=looks[name]["color"], markersize=2.5)
+        axes.plot([place - 0.38, place + 0.38], [np.median(sample)] * 2, color=looks[name]["color"], linewidth=0.8)
+    axes.set(xlim=(-0.6, len(samples) - 0.4))
+    axes.grid(axis="y", alpha=0.3)
+
+
+def _draw_exams(axes: Any, groups: Mapping[str, Sequence[Result]], looks: Mapping[str, Any]) -> None:
+    from kiks.learn.statistics import wilson_interval
+
+    shares = {name: [each.exam.share for each in group if each.exam is not None] for name, group in groups.items()}
+    _draw_shares(axes, shares, looks)
+    axes.axhline(PASS_SHARE, color="tab:gray", linestyle="--", linewidth=0.8)
+    passed = [passed_count(group) or 0 for group in groups.values()]
+    ends = [wilson_interval(count, len(group)) for count, group in zip(passed, groups.values(), strict=True)]
+    labels = [
+        f"{count}/{len(group)}\n{100 * low:.0f}-{100 * high:.0f} %"
+        for count, group, (low, high) in zip(passed, groups.values(), ends, strict=True)
+    ]
+    axes.set(ylim=(-0.03, 1.03), ylabel="share of the exam's starts", xlabel="champions that passed", title="exam")
+    axes.set_xticks(range(len(labels)), labels)
+
+
+def _draw_solved(axes: Any, groups: Mapping[str, Sequence[Result]], looks: Mapping[str, Any]) -> None:
+    """Draw the share of evolutions that have passed the exam over evaluations, by Kaplan and Meier."""
+    end = max(each.evaluation_count for group in groups.values() for each in group)
+    for name, group in groups.items():
+        solved = solved_of(group)
+        assert solved is not None
+        curve, colour = survival(solved), looks[name]["color"]
+        if len(groups) <= BANDS_MAX:
+            band: dict[str, Any] = {"color": colour, "alpha": 0.15, "linewidth": 0, "step": "post"}
+            axes.fill_between(curve.evaluations, curve.low, curve.high, **band)
+        steps, shares = curve.evaluations, curve.share
+        if all(solved.is_solved):
+            steps, shares = np.append(steps, end), np.append(shares, 1.0)
+        axes.plot(steps, shares, drawstyle="steps-post", **looks[name])
+        ends = sorted(count for count, is_solved in zip(*solved, strict=True) if not is_solved)
+        heights = curve.share[np.searchsorted(curve.evaluations, ends, side="right") - 1]
+        axes.plot(ends, heights, "+", color=colour, markersize=5)
+    axes.set(ylim=(-0.03, 1.03), xlabel="evaluations", ylabel="share of evolutions", title="exam passed so far")
+    axes.grid(alpha=0.3)

@@ -1,14 +1,11 @@
-"""Results of finished evolutions, one for each seed, and what two groups of them say about each other.
-
-Sources: Mann and Whitney (1947) for U; Vargha and Delaney (2000), section 5, for the effect size A and its names.
-"""
+"""Results of finished evolutions, one for each seed, and groups of them that are compared."""
 
 from __future__ import annotations
 
 import json
 import logging
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -21,9 +18,10 @@ from kiks.errors import ParameterError
 from kiks.learn import seeds
 from kiks.learn.evolution import Evolution
 from kiks.learn.evolution_log import IDENTITY, TRIALS, Digest, Folder, check_alike
-from kiks.learn.exam import PASS_SHARE, imperfect_robots
+from kiks.learn.exam import PASS_SHARE, Exam, imperfect_robots
 from kiks.learn.fingerprint import tell_unseen
 from kiks.learn.seeds import seed_for
+from kiks.learn.statistics import Solved, bootstrap_interval, wilson_interval
 from kiks.learn.task import Task
 from kiks.model.atomic_files import path_of, replace_file
 from kiks.model.data_file import TEXT_MAX, Number, Text, Whole, check, parse_json, read_file, record
@@ -34,9 +32,6 @@ Floats = NDArray[np.float64]
 
 RESULT, SUMMARY = "result.json", "summary.json"
 """Names in the folder of an evolution, and in that of several."""
-
-EFFECTS = ((0.06, "negligible"), (0.14, "small"), (0.21, "medium"), (0.5, "large"))
-"""Names of effect sizes: largest |A - 0.5|, and the name."""
 
 RANDOM_COUNT = 40
 """Number of random controllers: as many as the first generation has by default."""
@@ -83,6 +78,23 @@ class ExamScore:
 
 
 @record
+class SideScore:
+    """What the second side of an evolution has reached, as `Result` says it of the first.
+
+    Attributes:
+        side: Name of the side.
+        fitness: As that of `Result`.
+        generation: As that of `Result`.
+        champion_fitness: As that of `Result`.
+    """
+
+    side: Text
+    fitness: Number
+    generation: _Count
+    champion_fitness: Annotated[tuple[Number, ...], Field(min_length=1, max_length=_GENERATIONS_MAX)]
+
+
+@record
 class Result:
     """The result of a finished evolution, a file in its folder.
 
@@ -95,15 +107,20 @@ class Result:
         population: Number of candidates in a generation.
         seed: The seed.
         kiks: Version of KiKS.
-        fitness: Fitness of the champion; of two sides that of the first, its mean in the tournament.
+        fitness: Fitness of the champion; of two sides that of the first, its mean against all champions of the other
+            side of its own evolution.
         generation: The generation that found it.
         seconds: Time of the evolution with its finals [s of the wall clock].
         generations: Number of generations.
-        evaluations: Number of evaluations until the end of each generation that has a champion, and of the finals, if
-            there were any [step]. The first generation has none, because no rival was tried, unless it is the only one.
-        champion_fitness: Fitness of the champion then [step].
+        evaluations: Number of evaluations until the end of each generation that has a champion [step]. The first
+            generation has none, because no rival was tried, unless it is the only one.
+        champion_fitness: Fitness of the champion then, on trial [step]; of two sides, in the tournament.
+        finals: Number of evaluations of the finals.
         baselines: Its baselines; None of two sides, whose fitness is relative.
         exam: The exam; None if the task has none.
+        solved: Number of evaluations after which the champion first passed the exam; None if none did.
+        side: Name of the first of two sides.
+        against: The second side.
     """
 
     result: Literal[1]
@@ -120,8 +137,17 @@ class Result:
     generations: _Count
     evaluations: Annotated[tuple[_Count, ...], Field(min_length=1, max_length=_GENERATIONS_MAX)]
     champion_fitness: Annotated[tuple[Number, ...], Field(min_length=1, max_length=_GENERATIONS_MAX)]
+    finals: _Count = 0
     baselines: Baselines | None = None
     exam: ExamScore | None = None
+    solved: _Count | None = None
+    side: Text = ""
+    against: SideScore | None = None
+
+    @property
+    def evaluation_count(self) -> int:
+        """Number of all evaluations, with those of the finals."""
+        return self.evaluations[-1] + self.finals
 
     def __post_init__(self) -> None:
         if len(self.evaluations) != len(self.champion_fitness):
@@ -136,9 +162,18 @@ class Result:
 
 
 def result_of(evolution: Evolution) -> Result:
-    """Return the result of an evolution: this examines its champion and measures baselines."""
+    """Return the result of an evolution: this examines its champions and measures baselines."""
     task, champion = evolution.task, evolution.champion
-    score = None
+    generations, finals, tournament = evolution.generations, evolution.finals, evolution.tournament
+    evaluations, fitness = np.cumsum([each.evaluations for each in generations]), [champion.fitness]
+    final_count, side, against = 0 if finals is None else len(finals.values), "", None
+    if tournament is not None:
+        evaluations, fitness = evaluations[tournament.generations - 1], tournament.means[0].tolist()
+        means, (side, other) = tournament.means[1], tournament.sides
+        against = SideScore(other, float(means.max()), tournament.best[1], tuple(means.tolist()))
+    elif len(generations) > 1:
+        evaluations, fitness = evaluations[1:], [each.champion_fitness for each in generations[1:]]
+    score = solved = None
     if task.exam is not None:
         own = task.exam.examine(champion, robots=task.robots)
         imperfect = task.exam.examine(champion, robots=task.robots, kinds=imperfect_robots(champion)).solved
@@ -149,21 +184,15 @@ def result_of(evolution: Evolution) -> Result:
             imperfect_starts=len(imperfect),
             text=str(own)[:TEXT_MAX],
         )
-    generations, finals, tournament = evolution.generations, evolution.finals, evolution.tournament
-    evaluations, fitness = np.cumsum([each.evaluations for each in generations]), [champion.fitness]
-    if tournament is not None:
-        evaluations, fitness = evaluations[tournament.generations - 1], tournament.means[0].tolist()
-    elif len(generations) > 1:
-        evaluations, fitness = evaluations[1:], [each.champion_fitness for each in generations[1:]]
-    if finals is not None:
-        evaluations = np.append(evaluations, evaluations[-1] + len(finals.values))
-        fitness.append(champion.fitness)
+        solved = _first_solved(evolution, task.exam)
+        if solved is None and score.is_passed:
+            solved = int(evaluations[-1]) + final_count
     return Result(
         result=1,
         task=task.name,
         task_digest=task.digest(),
         algorithm=evolution.name,
-        controller=" and ".join(side.controller.name for side in task.sides),
+        controller=" and ".join(each.controller.name for each in task.sides),
         population=evolution.population,
         seed=evolution.seed,
         kiks=__version__,
@@ -173,9 +202,26 @@ def result_of(evolution: Evolution) -> Result:
         generations=len(generations),
         evaluations=tuple(evaluations.tolist()),
         champion_fitness=tuple(fitness),
+        finals=final_count,
         baselines=None if task.against else baselines_of(task, evolution.seed),
         exam=score,
+        solved=solved,
+        side=side,
+        against=against,
     )
+
+
+def _first_solved(evolution: Evolution, exam: Exam) -> int | None:
+    """Return the number of evaluations after which a champion, on trial, first passed the exam; None if none did."""
+    known, evaluations = -np.inf, 0
+    for each in evolution.generations:
+        evaluations += each.evaluations
+        if each.champion_fitness > known:  # the rival on trial has become the champion
+            known, rival = each.champion_fitness, each.candidates[each.population]
+            champion = replace(evolution.champion, parameters=tuple(rival.tolist()))
+            if exam.examine(champion, robots=evolution.task.robots).is_passed:
+                return evaluations
+    return None
 
 
 def baselines_of(task: Task, seed: int) -> Baselines:
@@ -212,8 +258,8 @@ def seed_folder(folder: Path, seed: int) -> Path:
     return folder / f"seed-{seed}"
 
 
-def load_results(folder: str | Path) -> list[Result]:
-    """Return the results of the evolutions in a folder of `kiks evolve --seeds`, by seed, or of the one in a folder."""
+def evolutions_in(folder: str | Path) -> list[Path]:
+    """Return the folders of the evolutions in a folder of `kiks evolve --seeds`, or the folder of a single one."""
     path = path_of(folder, "folder")
     homes = [path] if (path / IDENTITY).exists() else [each.parent for each in path.glob(f"seed-*/{IDENTITY}")]
     if not homes:
@@ -221,8 +267,13 @@ def load_results(folder: str | Path) -> list[Result]:
             f"{str(path)!r} must be a folder of `kiks evolve`, but it holds no evolution. Name one with {IDENTITY}, or "
             "one of kiks evolve --seeds."
         )
-    results = []
-    for home in homes:
+    return sorted(homes)
+
+
+def load_results(folder: str | Path) -> list[Result]:
+    """Return the results of the evolutions in a folder of `kiks evolve --seeds`, by seed, or of the one in a folder."""
+    path, results = path_of(folder, "folder"), []
+    for home in evolutions_in(path):
         result = load_result(home)
         if result is None:
             raise ParameterError(
@@ -236,15 +287,37 @@ def load_results(folder: str | Path) -> list[Result]:
     return results
 
 
-def comparable(first: Sequence[Result], second: Sequence[Result]) -> list[list[Result]]:
-    """Return two groups of the same task, with the same KiKS; without their exams if these differ."""
-    one, other = first[0], second[0]
-    check_alike(one, other, ("task", "kiks"), "evolutions that are compared", "Compare two of one task.", _FREE)
+def comparable(groups: Mapping[str, Sequence[Result]]) -> dict[str, list[Result]]:
+    """Return groups of the same task, with the same KiKS; without their exams if these differ."""
+    (one, *_), *others = groups.values()
+    for other, *_ in others:
+        advice = "Compare evolutions of one task."
+        check_alike(one, other, ("task", "kiks"), "evolutions that are compared", advice, _FREE)
     tell_unseen(one.task_digest, "Fitness is compared")
-    is_alike = one.task_digest.get("exam") == other.task_digest.get("exam")
+    is_alike = all(other.task_digest.get("exam") == one.task_digest.get("exam") for other, *_ in others)
     if not is_alike:
         logging.getLogger("kiks.learn").warning("The exams differ, so they are left out.")
-    return [[each if is_alike else replace(each, exam=None) for each in group] for group in (first, second)]
+    return {
+        name: [each if is_alike else replace(each, exam=None, solved=None) for each in group]
+        for name, group in groups.items()
+    }
+
+
+def of_sides(groups: Mapping[str, Sequence[Result]]) -> dict[str, dict[str, list[Result]]]:
+    """Return groups of evolutions by the names of their sides: of two, the results of each side; of one, the groups."""
+    first = next(iter(groups.values()))[0]
+    named = {first.side: {name: list(group) for name, group in groups.items()}}
+    if first.against is not None:
+        second = {name: [_second(each) for each in group] for name, group in groups.items()}
+        named[first.against.side] = second
+    return named
+
+
+def _second(result: Result) -> Result:
+    score = result.against
+    assert score is not None
+    reached = {name: getattr(score, name) for name in ("fitness", "generation", "champion_fitness")}
+    return replace(result, **reached)
 
 
 def save_summary(results: Sequence[Result], folder: Path) -> None:
@@ -255,18 +328,34 @@ def save_summary(results: Sequence[Result], folder: Path) -> None:
 def summary_of(results: Sequence[Result]) -> dict[str, Any]:
     """Return the results of several evolutions without their curves, and what they have in common."""
     low, median, high = quartiles(results)
+    fitness = [each.fitness for each in results]
     summary: dict[str, Any] = {"median_fitness": median, "quartiles_fitness": [low, high]}
+    summary["median_fitness_interval"] = bootstrap_interval(np.median, fitness)
     if (passed := passed_count(results)) is not None:
-        summary["exams_passed"] = passed
-    summary["evolutions"] = [
-        {name: value for name, value in asdict(each).items() if name not in ("evaluations", "champion_fitness")}
-        | {"evaluations": each.evaluations[-1]}
-        for each in results
-    ]
+        summary |= {"exams_passed": passed, "exams_passed_interval": wilson_interval(passed, len(results))}
+    summary["evolutions"] = evolutions = []
+    for each in results:
+        known = asdict(each) | {"evaluations": each.evaluation_count}
+        for score in (known, known["against"] or {}):
+            score.pop("champion_fitness", None)
+        evolutions.append(known)
     return summary
 
 
-# ---- statistics ----
+# ---- figures of several ----
+
+
+TITLES = {
+    "fitness": "Fitness",
+    "exam": "Share of the exam's starts solved",
+    "solved": "Evaluations until the exam was first passed",
+}
+"""What is compared of evolutions of one side."""
+
+
+def title_of(name: str) -> str:
+    """Return what is compared in plain words: a key of `TITLES`, or a side of co-evolutions."""
+    return TITLES.get(name, f"Fitness of the {name} against strangers")
 
 
 def quartiles(results: Sequence[Result]) -> tuple[float, float, float]:
@@ -281,40 +370,12 @@ def passed_count(results: Sequence[Result]) -> int | None:
     return None if None in exams else sum(each.is_passed for each in exams if each is not None)
 
 
-@dataclass(frozen=True)
-class Difference:
-    """What the Mann-Whitney test says about two samples.
-
-    Attributes:
-        u: U of the first sample.
-        p: Two-sided p.
-        a: Vargha and Delaney's A: the probability that one of the first sample exceeds one of the second, ties half.
-    """
-
-    u: float
-    p: float
-    a: float
-
-    @property
-    def effect(self) -> str:
-        """The name of the effect size."""
-        return next(name for least, name in EFFECTS if abs(self.a - 0.5) < least or least == EFFECTS[-1][0])
-
-
-def difference(first: Sequence[float], second: Sequence[float]) -> Difference:
-    """Return what the Mann-Whitney test says about two samples.
-
-    Example:
-        >>> found = difference([3.0, 4.0, 5.0], [1.0, 2.0, 3.0])
-        >>> found.u, round(found.a, 2), found.effect
-        (8.5, 0.94, 'large')
-    """
-    from scipy.stats import mannwhitneyu
-
-    if len({*first, *second}) == 1:
-        return Difference(len(first) * len(second) / 2, 1.0, 0.5)
-    found = mannwhitneyu(first, second, alternative="two-sided")
-    return Difference(float(found.statistic), float(found.pvalue), float(found.statistic) / (len(first) * len(second)))
+def solved_of(results: Sequence[Result]) -> Solved | None:
+    """Return when evolutions solved their task; None if there was no exam."""
+    if any(each.exam is None for each in results):
+        return None
+    ends = [each.evaluation_count if each.solved is None else each.solved for each in results]
+    return Solved(tuple(ends), tuple(each.solved is not None for each in results))
 
 
 def curves(results: Sequence[Result]) -> tuple[Floats, Floats]:
