@@ -53,7 +53,7 @@ COLUMN_STYLE: dict[Any, Any] = {
     "axes.spines.top": False,
     "axes.spines.right": False,
 }
-"""How a figure for a column looks: texts of 7 points, thin lines."""
+"""How a figure for a column looks: texts of 7 and 8 points, thin lines."""
 
 TITLE_CHARACTERS = 52
 """Most characters of a line of a title."""
