@@ -194,7 +194,7 @@ def _draw_front(axes: Any, evolution: Evolution) -> None:
     less = [" (less is better)" if name.startswith("-") else "" for name in evolution.task.objectives[:2]]
     axes.set(xlabel=names[0] + less[0], ylabel=names[1] + less[1], title="objectives")
     axes.grid(alpha=0.3)
-    axes.legend(loc="best", fontsize="small")
+    legend_below(axes)
 
 
 def _cell(axis: Axis) -> float:
