@@ -31,6 +31,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -42,6 +43,7 @@ import kiks
 from calibration import calibration_loops_per_s, report
 from kiks.batch.initial_state import random_starts
 from kiks.model.arena_objects import Ball
+from kiks.model.walls import Zone
 
 PINS = (
     *("kheperax==0.2.0", "jax==0.4.30", "jaxlib==0.4.30", "qdax==0.4.0", "flax==0.8.5", "brax==0.10.5"),
@@ -57,6 +59,12 @@ MAZE = (
     *((0.355, 0.0, 0.525, 0.185), (0.25, 0.5, 0.75, 0.215), (1.0, 0.25, 0.435, 0.55), (0.0, 0.8, 0.0, 1.0)),
 )
 """Its walls inside (Kheperax 0.2.0, `maze_maps`, "standard")."""
+
+
+ZONES = tuple(Zone(disc_mm=(100 * k, 100 * k), radius_mm=60, brightness=20 * k) for k in range(11))
+"""Zones of a floor that robots read."""
+
+vehicle_on_floor = kiks.controller(senses=("proximity", "floor"))(vehicle.function)
 
 
 def box(size_mm: int, body_count: int = 0) -> kiks.Arena:
@@ -171,6 +179,7 @@ def main() -> None:
             "full": rate(worlds(arena, count, response="thesis"), seconds),
             "reflection": rate(worlds(arena, count), seconds),
             "fast": rate(worlds(arena, count, response="fast"), seconds),
+            "floor": rate(worlds(replace(arena, zones=ZONES), count), seconds, vehicle_on_floor),
             "link": rate(worlds(arena, count, timing=kiks.Timing(0.1, 9600)), 2 * seconds),
             "bodies10": rate(worlds(box(1000, 10), 64), seconds / 2),
             "swarm10": crowd("10_1m"),
@@ -183,6 +192,7 @@ def main() -> None:
     rows += [
         (f"batch.{name}_over_full", found[name] / full, "times") for name in ("fast", "bodies10", "swarm10", "swarm100")
     ]
+    rows.append(("batch.floor_over_reflection", found["floor"] / found["reflection"], "times"))
     rows.append(("batch.swarm1000_costs", found["swarm100"] / found["swarm1000"], "times a robot among 100"))
 
     if arguments.kheperax is not None:

@@ -45,9 +45,10 @@ def arena() -> kiks.Arena:
     drawn = kiks.Arena.from_array(walls)
     from dataclasses import replace
 
-    from kiks.model.arena import Cylinder, Lamp
+    from kiks.model.arena import Cylinder, Lamp, Zone
 
-    return replace(drawn, cylinders=(Cylinder(300, 300),), lamps=(Lamp(100, 300),))
+    zones = tuple(Zone(disc_mm=(60 * k, 320), radius_mm=25, brightness=30 * k) for k in range(9))
+    return replace(drawn, cylinders=(Cylinder(300, 300),), lamps=(Lamp(100, 300),), zones=zones)
 
 
 def wanderer(senses: Any) -> kiks.Controller:
@@ -81,9 +82,9 @@ def driven(controller: kiks.Controller, parameters: Any, seed: int, period_s: fl
     return loops, hashes[-1]
 
 
-ALONE: list[tuple[AnySense, ...]] = [("positions",), ("speeds",), ("barrier",), (Compass.heading,)]
+ALONE: list[tuple[AnySense, ...]] = [("positions",), ("speeds",), ("barrier",), ("floor",), (Compass.heading,)]
 TOGETHER: list[tuple[AnySense, ...]] = [
-    ("proximity", "positions", Compass.heading, "camera"),
+    ("proximity", "positions", Compass.heading, "camera", "floor"),
     ("speeds", "barrier", "ambient", "proximity", "positions"),
 ]
 

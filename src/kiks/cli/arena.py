@@ -157,6 +157,8 @@ def info(
             f"{name}s": [each._asdict() for each in getattr(place, f"{name}s")] for name in ("lamp", "ball", "cylinder")
         },
         "walls": [each.table() for each in place.walls],
+        "zones": [each.table() for each in place.zones],
+        "floor_span": None if place.shades is None else [int(place.shades.min()), int(place.shades.max())],
     }
     tell_results(context, found, _lines_of(place, robot_mm, found))
 
@@ -190,8 +192,12 @@ def _lines_of(place: Arena, robot_mm: float, found: dict[str, Any]) -> Iterator[
         label = f"Ball {number}" if is_ball else f"Cylinder {number - len(place.balls)}"
         size = f"radius {body.radius_mm:g} mm, brightness {body.brightness}"
         yield f"{label}: {_at(body.x_mm, body.y_mm)}, {size}"
-    for number, wall in enumerate(place.walls, start=1):
-        yield f"Wall {number}: {', '.join(f'{name} = {toml(value)}' for name, value in wall.table().items())}"
+    for shapes in (place.walls, place.zones):
+        for number, shape in enumerate(shapes, start=1):
+            table = ", ".join(f"{name} = {toml(value)}" for name, value in shape.table().items())
+            yield f"{shape.label.capitalize()} {number}: {table}"
+    if (span := found["floor_span"]) is not None:
+        yield f"Floor: brightness {span[0]} to {span[1]}"
 
 
 def _at(x_mm: float, y_mm: float) -> str:

@@ -60,7 +60,7 @@ class World:
     turret: Annotated[
         list[str] | None,
         typer.Option(
-            help="k213, gripper, radio, io or battle, for all robots; with a number, gripper=2, for that one."
+            help="k213, gripper, radio, io, battle or floor, for all robots; with a number, gripper=2, for that one."
         ),
     ] = None
     seed: SeedOrOwn = None

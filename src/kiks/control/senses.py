@@ -22,6 +22,7 @@ from kiks.engine.physics.gripper import BARRIER_BROKEN, find_between
 from kiks.engine.physics.motor import SPEED_MAX, counter
 from kiks.engine.scene import open_scene
 from kiks.engine.sensing.ambient import sense_ambient
+from kiks.engine.sensing.floor import COUNTS, sense_floor
 from kiks.engine.sensing.proximity import make_readers, sense_linked
 from kiks.engine.state import PIXEL_COUNT
 from kiks.errors import ParameterError, nearest, shown
@@ -204,7 +205,14 @@ def barrier(view: Any, readings: Any) -> None:
     readings[0] = BARRIER_BROKEN if find_between(view.scene, view.world, view.robot) >= 0 else 0
 
 
-SENSES = {each.name: each for each in (proximity, ambient, camera, positions, speeds, barrier)}
+@sense(command="T,31,F", most=COUNTS, turret="floor")
+def floor(view: Any, readings: Any) -> None:
+    """Read the brightness of the floor under the robot's middle."""
+    noisy = view.is_noisy
+    readings[0] = sense_floor(view.scene, view.world, view.robot, view.tick_count, view.time_ns, noisy, 0.0, 0.0, 0)
+
+
+SENSES = {each.name: each for each in (proximity, ambient, camera, positions, speeds, barrier, floor)}
 """The senses that have names."""
 
 AnySense: TypeAlias = str | Sense

@@ -47,7 +47,11 @@ _ARRAYS: dict[str, tuple[Any, int]] = {
     "networks": (NETWORKS, 1),
     "lamps": (_NUMBER, 3),
     "seeds": (_INTEGER, 1),
+    "floor": (_BYTE, 2),
 }
+
+ALL_WHITE = np.full((1, 1), 255, np.uint8)
+"""A floor of one brightness."""
 
 MEETING = "meeting"
 """The part of the engine that a lone robot without a gripper does not need."""
@@ -75,7 +79,8 @@ open_scene = opener(OPEN_SCENE)
 * walls: the walls as rays see them (`kiks.engine.sensing.rays.Walls`);
 * networks: a record of `kiks.engine.sensing.thesis_networks.NETWORKS`, or none if no response needs it;
 * lamps: x [mm], y [mm], power [W] and 1 for on or 0 for off, float64 [world, lamp, 4];
-* seeds: seeds of the worlds, int64 [world].
+* seeds: seeds of the worlds, int64 [world];
+* floor: brightness of the floor, uint8 [rows, columns] without a border; a single cell if it is the same everywhere.
 """
 
 
@@ -141,7 +146,8 @@ class Scene:
 
     def _take_walls(self, arena: Arena) -> None:
         clearance, rooms, brightness, leaps, faces, cell_mm, pad = walls_of(arena)
-        self._keep(clearance=clearance, rooms=rooms, brightness=brightness, leaps=leaps, faces=faces)
+        floor = ALL_WHITE if arena.shades is None else arena.shades
+        self._keep(clearance=clearance, rooms=rooms, brightness=brightness, leaps=leaps, faces=faces, floor=floor)
         self.record["cell_mm"], self.record["pad"] = cell_mm, pad
 
     def set_lamps(self, lamps: NDArray[np.float64]) -> None:

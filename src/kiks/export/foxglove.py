@@ -14,7 +14,7 @@ import numpy as np
 from mcap.writer import CompressionType, Writer
 
 from kiks.export.looks import Colour, body_colour, robot_colour
-from kiks.export.sheet import coarse_walls
+from kiks.export.sheet import coarse_cells
 from kiks.model.arena import Arena
 from kiks.model.atomic_files import ending_of, writing
 from kiks.recording.events import EventReader
@@ -113,7 +113,7 @@ def _time(time_ns: int) -> dict[str, int]:
 
 def _walls(arena: Arena, time_ns: int) -> dict[str, Any]:
     """Return the walls as a grid of brightness: 0 for the floor."""
-    cells, cell_mm = coarse_walls(arena, CELLS_MAX)
+    cells, cell_mm = coarse_cells(arena.brightness, arena.mm_per_cell, CELLS_MAX)
     columns, cell_m = cells.shape[1], cell_mm / 1000
     return {
         "timestamp": _time(time_ns),

@@ -189,6 +189,7 @@ def describe_scene(sim: Simulation, scene: int, names: Sequence[str] | None = No
             "width_mm": float(arena.width_mm),
             "height_mm": float(arena.height_mm),
             "mm_per_cell": float(arena.mm_per_cell),
+            "has_floor": arena.shades is not None,
         },
         "light": light_scale(next(iter(sim.specs), None))._asdict(),
         "robots": [
@@ -257,5 +258,11 @@ def _shape(shape: Shape) -> dict[str, Any]:
 
 
 def arena_picture(arena: Arena) -> bytes:
-    """Return the walls of an arena as a PNG with one pixel per cell, its grey the brightness; 0 is floor."""
-    return encode_picture(arena.brightness, compress_level=3)  # large uniform areas compress well even so
+    """Return the walls of an arena as a PNG with one pixel per cell, its grey the brightness; 0 is floor.
+
+    With a floor that is not white, that is the red of the pixels, and their green the brightness of the floor.
+    """
+    raster = arena.brightness
+    if arena.shades is not None:
+        raster = np.stack([raster, arena.shades, arena.shades], axis=-1)
+    return encode_picture(raster, compress_level=3)  # large uniform areas compress well even so

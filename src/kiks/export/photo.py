@@ -14,7 +14,7 @@ from kiks.export.film import SIZE, checked_follow, checked_size
 from kiks.export.kinds import KINDS
 from kiks.export.looks import Colour
 from kiks.export.pictures import save_image
-from kiks.export.sheet import FLOOR
+from kiks.export.sheet import FLOOR, darkness
 from kiks.export.space import VIEW_DEG, Solid, camera_places, things, walls
 from kiks.model.atomic_files import check_writable, ending_of
 from kiks.model.checks import check_count
@@ -91,7 +91,11 @@ class _Scene:
         light = {"type": "area", "radiance": {"type": "rgb", "value": CEILING}}
         self._add("rectangle", to_world=ceiling, emitter=light)
         floor = here.translate((*middle, 0.0)).scale((*middle, 1.0))
-        self._add("rectangle", to_world=floor, bsdf=_matt(FLOOR))
+        paint = _matt(FLOOR)
+        if arena.shades is not None:
+            colours = (1.0 - darkness(arena.shades))[..., None] * np.array(FLOOR)
+            paint = {"type": "diffuse", "reflectance": self._bitmap(colours.astype(np.uint8))}
+        self._add("rectangle", to_world=floor, bsdf=paint)
         for x_mm, y_mm, power_w, is_on in moment.saved.lamps.tolist():
             self._add_lamp(x_mm, y_mm, power_w, is_on=bool(is_on))
         for boxes in walls(arena).values():

@@ -31,6 +31,9 @@ FINER = 2
 LAMP_MM = 18.0
 """How far the drawing of a lamp reaches [mm]."""
 
+DARKEST = 0.4
+"""How bright a black floor is drawn, as a share of a white one."""
+
 LIGHT_SHARE = 0.6
 """Opacity of the strongest light on the floor."""
 
@@ -87,17 +90,24 @@ def ground_picture(arena: Arena, lamps: NDArray[np.float64], spec: RobotSpec | N
         )
         floor = Image.new("RGB", opacity.size, FLOOR)
         floor.paste(LAMPLIGHT, mask=opacity)
+    if arena.shades is not None:
+        floor = (1.0 - darkness(np.flipud(arena.shades)))[..., None] * np.asarray(floor)
     colours = np.where((cells == 0)[..., None], np.asarray(floor), shade[..., None])
     return Image.fromarray(colours.astype(np.uint8), "RGB").resize(size, Image.Resampling.LANCZOS)
 
 
-def coarse_walls(arena: Arena, side_max: int) -> tuple[NDArray[np.uint8], float]:
-    """Return the brightness of walls in at most so many cells a side, the most of each, and a cell's size [mm]."""
-    walls, step = arena.brightness, max(-(-max(arena.brightness.shape) // side_max), 1)
-    rows, columns = (-(-side // step) for side in walls.shape)
-    padded = np.zeros((rows * step, columns * step), walls.dtype)
-    padded[: walls.shape[0], : walls.shape[1]] = walls
-    return padded.reshape(rows, step, columns, step).max(axis=(1, 3)), arena.mm_per_cell * step
+def darkness(brightness: NDArray[Any]) -> NDArray[np.float64]:
+    """Return how much darker the floor is drawn than a white one, a share of it: black is lighter than a black wall."""
+    return (1.0 - DARKEST) * (1.0 - brightness / 255.0)
+
+
+def coarse_cells(raster: NDArray[np.uint8], mm_per_cell: float, side_max: int) -> tuple[NDArray[np.uint8], float]:
+    """Return a raster in at most so many cells a side, the most of each, and a cell's size [mm]."""
+    step = max(-(-max(raster.shape) // side_max), 1)
+    rows, columns = (-(-side // step) for side in raster.shape)
+    padded = np.zeros((rows * step, columns * step), raster.dtype)
+    padded[: raster.shape[0], : raster.shape[1]] = raster
+    return padded.reshape(rows, step, columns, step).max(axis=(1, 3)), mm_per_cell * step
 
 
 @lru_cache(64)

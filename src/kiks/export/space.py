@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from kiks.engine.state import BALL
 from kiks.export.looks import Colour, body_colour, robot_colour
-from kiks.export.sheet import INK, coarse_walls, wall_grey
+from kiks.export.sheet import INK, coarse_cells, wall_grey
 from kiks.export.stage import Canvas, Pixels
 from kiks.model.arena import Arena
 from kiks.model.robot import Body
@@ -132,7 +132,7 @@ def _top(body: Body, index: int) -> Pixels:
 
 def walls(arena: Arena) -> dict[Colour, list[Solid]]:
     """Return boxes that make the walls of an arena, by their colour."""
-    cells, cell_mm = coarse_walls(arena, CELLS_MAX)
+    cells, cell_mm = coarse_cells(arena.brightness, arena.mm_per_cell, CELLS_MAX)
     rows = len(cells)
     found: dict[Colour, list[Solid]] = {}
     growing: dict[tuple[int, int, int], int] = {}  # left, right and brightness of runs that go on, and their first row

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from kiks.export.light import light_map
 from kiks.export.looks import LAMPLIGHT, Colour
-from kiks.export.sheet import FLOOR, LIGHT_SHARE, Place, coarse_walls, mixed, wall_grey
+from kiks.export.sheet import FLOOR, LIGHT_SHARE, Place, coarse_cells, darkness, mixed, wall_grey
 from kiks.model.arena import Arena
 from kiks.model.robot import RobotSpec
 
@@ -24,8 +24,8 @@ DOTS_PER_INCH = 160
 UNIT_POINTS = 0.2
 """A pixel of a sheet on paper [points]: a picture fills the width of a page."""
 
-_WALL_CELLS_MAX, _LIGHT_STEPS = 2000, 24
-"""Most cells along a side of the walls that are outlined, and levels of light."""
+_WALL_CELLS_MAX, _LIGHT_STEPS, _SHADES_MAX = 2000, 24, 16
+"""Most cells along a side of the walls that are outlined, levels of light, and most shades of the floor."""
 
 _PARTS = {"l": "left", "m": "center", "r": "right"}
 
@@ -71,10 +71,20 @@ class VectorPen:
             for share in np.linspace(0.0, 1.0, _LIGHT_STEPS)[1:].tolist():
                 colour = mixed(FLOOR, LAMPLIGHT, LIGHT_SHARE * share)
                 self._fill(np.flipud(light), share, arena.width_mm / light.shape[1], 0.5, colour)
-        cells, cell_mm = coarse_walls(arena, _WALL_CELLS_MAX)
+        if arena.shades is not None:
+            self._darken(*coarse_cells(arena.shades, arena.mm_per_cell, _WALL_CELLS_MAX))
+        cells, cell_mm = coarse_cells(arena.brightness, arena.mm_per_cell, _WALL_CELLS_MAX)
         cells = np.pad(cells, 1)  # a wall at the edge has an outline there, too
         for brightness in np.unique(cells[cells > 0]).tolist():
             self._fill(cells >= brightness, 0.5, cell_mm, -0.5, (wall_grey(brightness),) * 3)
+
+    def _darken(self, shades: NDArray[Any], cell_mm: float) -> None:
+        """Darken the floor where it is not white."""
+        if len(np.unique(shades)) > _SHADES_MAX:
+            shades = np.rint(shades / 255 * _SHADES_MAX) * (255 / _SHADES_MAX)
+        dark = np.pad(darkness(shades), 1)
+        for share in np.unique(dark[dark > 0]).tolist():
+            self._fill(dark == share, 0.5, cell_mm, -0.5, (0, 0, 0, round(255 * share)))
 
     def _fill(self, cells: Any, level: float, cell_mm: float, first: float, colour: Colour) -> None:
         """Fill the area above a level; the middle of the first cell is so many cells from the lower left corner."""

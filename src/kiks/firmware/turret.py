@@ -97,6 +97,12 @@ class Site(Protocol):
     def ray(self, angle_rad: float = 0.0) -> Met:
         """Return what is in a direction, counter-clockwise from ahead."""
 
+    def floor(self, ahead_mm: float = 0.0, left_mm: float = 0.0, index: int = 0) -> int:
+        """Return the reading of a floor sensor at a place of the robot: 0 on black to 1023 on white, with noise.
+
+        Sensors with another `index` have noise of their own.
+        """
+
     def random(self, index: int = 0, time_ns: int | None = None) -> float:
         """Return a number in [0, 1) that belongs to this seed, robot, turret, time (the present one) and index."""
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field, fields, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -31,9 +32,9 @@ from kiks.model.raster import (
 )
 from kiks.model.room import draw_room
 from kiks.model.wall_tables import WallTables, tables_of
-from kiks.model.walls import Wall, painted
+from kiks.model.walls import AnyShape, Wall, Zone, painted
 
-__all__ = ["MAX_CELLS", "PAD", "SIZE_MIN_MM", "Arena", "Ball", "Cylinder", "Lamp", "LampSwitch", "Pose", "Wall"]
+__all__ = ["MAX_CELLS", "PAD", "SIZE_MIN_MM", "Arena", "Ball", "Cylinder", "Lamp", "LampSwitch", "Pose", "Wall", "Zone"]
 
 _KINDS = (
     ("starts", "start", Pose),
@@ -62,12 +63,16 @@ class Arena:
         starts: Starts of robots, each on floor.
         lamps: Lamps, each inside the raster.
         lamp_switches: When lamps are switched on or off in the course of a run.
+        floor: The brightness of the floor: uint8 [row, column] as `ground`, 0 black to 255 white; white all over if
+            None. Only floor sensors see it (the page "Turrets").
+        zones: Zones over that: lines, boxes and discs, the later ones over the earlier ones.
         balls: Balls, each centre on floor.
         cylinders: Cylinders, each centre on floor.
         walls: Walls over the picture: lines, boxes and discs, the later ones over the earlier ones.
 
     Attributes:
         brightness: The picture with these walls, as sensors see it: uint8 [row, column], row 0 at the bottom.
+        shades: The floor with these zones, as floor sensors see it: uint8 [row, column]; None if it is white.
 
     Example:
         >>> arena = Arena.box(400, 300)
@@ -86,7 +91,10 @@ class Arena:
     cylinders: tuple[Cylinder, ...] = ()
     walls: tuple[Wall, ...] = ()
     lamp_switches: tuple[LampSwitch, ...] = ()
+    floor: npt.NDArray[np.uint8] | None = None
+    zones: tuple[Zone, ...] = ()
     brightness: npt.NDArray[np.uint8] = field(init=False)
+    shades: npt.NDArray[np.uint8] | None = field(init=False)
     _tables: WallTables = field(init=False)
 
     def __post_init__(self) -> None:
@@ -103,16 +111,15 @@ class Arena:
                 f"mm_per_cell must be at most 1, but it was {shown(self.mm_per_cell)}. "
                 "Arena.from_array cuts coarser pixels into cells."
             )
-        if given.flags.writeable or given.base is not None or not given.flags.c_contiguous:
-            given = given.copy(order="C")
-            given.setflags(write=False)
-        walls = _checked_walls(self.walls)
+        given = _read_only(given)
+        walls = _checked_shapes("walls", Wall, self.walls)
         raster = painted(given, self.mm_per_cell, walls)
         if raster.all():
             raise ArenaError(
                 f"Arena {shown(self.name)} must have floor, but every cell is wall. Black (0) is floor and all else "
                 "wall: invert the picture if it was drawn the other way round."
             )
+        self._take_floor(given)
         object.__setattr__(self, "ground", given)
         object.__setattr__(self, "walls", walls)
         object.__setattr__(self, "brightness", raster)
@@ -125,10 +132,33 @@ class Arena:
             entries = checked_places(label, kind, getattr(self, name), raster, self.mm_per_cell)
             object.__setattr__(self, name, entries)
 
+    def _take_floor(self, ground: npt.NDArray[np.uint8]) -> None:
+        """Check the floor, and paint its zones."""
+        floor, zones = self.floor, _checked_shapes("zones", Zone, self.zones)
+        if floor is not None:
+            if not isinstance(floor, np.ndarray) or floor.dtype != np.uint8:
+                raise ParameterError(
+                    f"floor must be a uint8 array [row, column] or None, but it was {_described(floor)}. "
+                    "Convert it, for instance with array.astype(np.uint8)."
+                )
+            if floor.shape != ground.shape:
+                found = " x ".join(map(str, floor.shape[::-1]))
+                raise ArenaError(
+                    f"the floor must have as many cells as the walls, {ground.shape[1]} x {ground.shape[0]}, but it "
+                    f"has {found}. Draw it in the size of the arena."
+                )
+            floor = _read_only(floor)
+        shades = floor
+        if zones:
+            shades = painted(_white(ground.shape) if floor is None else floor, self.mm_per_cell, zones)
+        for name, value in (("floor", floor), ("zones", zones), ("shades", shades)):
+            object.__setattr__(self, name, value)
+
     def __repr__(self) -> str:
         counts = [(len(getattr(self, name)), label) for name, label, _ in _KINDS]
-        counts.append((len(self.walls), "wall"))
+        counts += [(len(self.walls), "wall"), (len(self.zones), "zone")]
         held = "".join(f", {counted(count, label)}" for count, label in counts if count)
+        held += ", a floor" if self.floor is not None else ""
         return f"<Arena {shown(self.name)}: {self.width_mm:g} x {self.height_mm:g} mm{held}>"
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -473,12 +503,29 @@ class Arena:
         return Pose(x_mm, y_mm, math.pi / 2)
 
 
-def _checked_walls(walls: Any) -> tuple[Wall, ...]:
-    found = tuple(walls) if isinstance(walls, Iterable) else (walls,)
+def _checked_shapes(name: str, kind: type[AnyShape], shapes: Any) -> tuple[AnyShape, ...]:
+    found = tuple(shapes) if isinstance(shapes, Iterable) else (shapes,)
     for each in found:
-        if not isinstance(each, Wall):
-            raise ParameterError(f"walls must be a list of Wall, but it has {shown(each)}. Give Wall(line_mm=...).")
+        if not isinstance(each, kind):
+            raise ParameterError(
+                f"{name} must be a list of {kind.__name__}, but it has {shown(each)}. "
+                f"Give {kind.__name__}(line_mm=...)."
+            )
     return found
+
+
+def _read_only(cells: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
+    """Return cells that nobody can change: themselves, or a copy."""
+    if cells.flags.writeable or cells.base is not None or not cells.flags.c_contiguous:
+        cells = cells.copy(order="C")
+        cells.setflags(write=False)
+    return cells
+
+
+@lru_cache(4)
+def _white(shape: tuple[int, int]) -> npt.NDArray[np.uint8]:
+    """Return a white floor, which arenas of one size share."""
+    return _read_only(np.full(shape, 255, np.uint8))
 
 
 def _described(value: object) -> str:

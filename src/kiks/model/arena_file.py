@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
+import numpy.typing as npt
 from pydantic import Field
 
 from kiks.errors import ArenaError, KiksError, ParameterError
@@ -31,7 +32,7 @@ from kiks.model.box import PartMm, SideMm
 from kiks.model.data_file import Coordinate, Number, Point, Rule, Switch, Text, check, parse_toml, read_file, record
 from kiks.model.picture import encode_picture, read_picture
 from kiks.model.raster import MM_PER_PIXEL_MAX, MM_PER_PIXEL_MIN
-from kiks.model.walls import WALLS_MAX, Wall
+from kiks.model.walls import WALLS_MAX, Wall, Zone
 
 MIDDLE = 128
 """Grey from which on an inverted picture is floor."""
@@ -92,6 +93,7 @@ LampSwitches = Annotated[
 ]
 Balls = Annotated[tuple[BallEntry, ...], Field(max_length=THINGS_MAX, description="Head each with [[ball]].")]
 WallShapes = Annotated[tuple[Wall, ...], Field(max_length=WALLS_MAX, description="Head each with [[wall]].")]
+Zones = Annotated[tuple[Zone, ...], Field(max_length=WALLS_MAX, description="Head each with [[zone]].")]
 Cylinders = Annotated[
     tuple[CylinderEntry, ...], Field(max_length=THINGS_MAX, description="Head each with [[cylinder]].")
 ]
@@ -136,6 +138,8 @@ class ArenaFile(Walls):
     ball: Balls = ()
     cylinder: Cylinders = ()
     wall: WallShapes = ()
+    floor: Annotated[Text, Field(description="A picture of the floor, as large as the walls.")] | None = None
+    zone: Zones = ()
 
     def __post_init__(self) -> None:
         if self.picture is not None:
@@ -166,18 +170,39 @@ def _decode(data: bytes, what: str, name: str, folder: Path | None) -> Arena:
     file = check(ArenaFile, parse_toml(data, what, error=ArenaError), what, error=ArenaError)
     try:
         arena = file.box() if file.picture is None else _picture_arena(file, folder)
-        return replace(arena, name=name if file.name is None else file.name, **places_of(file))
+        floor = None
+        if file.floor is not None:
+            mm_per_pixel = file.mm_per_pixel or 1.0
+            floor = floor_of(_picture_beside(folder, file.floor, "floor", mm_per_pixel), mm_per_pixel, arena)
+        return replace(arena, name=name if file.name is None else file.name, floor=floor, **places_of(file))
     except KiksError as error:
         raise ArenaError(f"{what}: {error}") from None
 
 
-def _picture_arena(file: ArenaFile, folder: Path | None) -> Arena:
-    if folder is None or file.picture is None:
+def _picture_beside(folder: Path | None, name: str, key: str, mm_per_pixel: float) -> npt.NDArray[np.uint8]:
+    if folder is None:
         raise ArenaError(
-            "an arena that comes alone must have no picture beside it, but it names one. Open that picture instead."
+            f"an arena that comes alone must have no {key} beside it, but it names one. Make a project of it, which "
+            "holds its pictures."
         )
+    return read_picture(within(folder, name, key), mm_per_pixel)
+
+
+def floor_of(picture: npt.NDArray[np.uint8], mm_per_pixel: float, arena: Arena) -> npt.NDArray[np.uint8]:
+    """Return the floor of an arena from its picture, uint8 [row, column] with row 0 on top."""
+    step = round(mm_per_pixel / arena.mm_per_cell)
+    rows, columns = (side // step for side in arena.ground.shape)
+    if picture.shape != (rows, columns):
+        raise ArenaError(
+            f"the picture of the floor must be as large as the arena, {columns} x {rows} pixels of {mm_per_pixel:g} "
+            f"mm, but it has {picture.shape[1]} x {picture.shape[0]}. Draw it in that size."
+        )
+    return np.flipud(picture).repeat(step, axis=0).repeat(step, axis=1)
+
+
+def _picture_arena(file: ArenaFile, folder: Path | None) -> Arena:
     mm_per_pixel = file.mm_per_pixel or 1.0
-    brightness = read_picture(within(folder, file.picture, "picture"), mm_per_pixel)
+    brightness = _picture_beside(folder, file.picture or "", "picture", mm_per_pixel)
     if file.invert:
         # White is often 254, and edges are smoothed.
         brightness = np.where(brightness < MIDDLE, 255 - brightness, 0).astype(np.uint8)
@@ -185,7 +210,7 @@ def _picture_arena(file: ArenaFile, folder: Path | None) -> Arena:
 
 
 def places_of(file: Any) -> dict[str, Any]:
-    """Return the starts, lamps, their switches, balls, cylinders and walls of a file, for `dataclasses.replace`."""
+    """Return what stands in the arena of a file, with its walls and zones, for `dataclasses.replace`."""
 
     def at(kind: Callable[..., Any], entries: Iterable[Any], *names: str) -> tuple[Any, ...]:
         return tuple(kind(*each.at_mm, *(getattr(each, name) for name in names)) for each in entries)
@@ -199,18 +224,26 @@ def places_of(file: Any) -> dict[str, Any]:
         "balls": at(Ball, file.ball, *body),
         "cylinders": at(Cylinder, file.cylinder, *body),
         "walls": file.wall,
+        "zones": file.zone,
     }
 
 
 def save_arena(arena: Arena, path: str | Path) -> None:
-    """Write an arena as a TOML file and, beside it, a PNG of the same name; existing files are replaced."""
+    """Write an arena as a TOML file and, beside it, a PNG of the same name; existing files are replaced.
+
+    A picture of the floor has the same name with `_floor`.
+    """
     path = path_of(path)
     if path.suffix.lower() != ".toml":
         raise ParameterError(f"path must end in '.toml', but it was {str(path)!r}. The picture goes beside it as .png.")
     picture = path.with_suffix(".png")
     keys = {"picture": picture.name, "mm_per_pixel": arena.mm_per_cell, "name": arena.name}
+    files: dict[str | Path, bytes | str] = {picture: encode_picture(arena.ground)}
+    if arena.floor is not None:
+        floor = path.with_name(f"{path.stem}_floor.png")
+        keys["floor"], files[floor] = floor.name, encode_picture(arena.floor)
     lines = [*(f"{name} = {toml(value)}" for name, value in keys.items()), *place_lines(arena)]
-    replace_files({picture: encode_picture(arena.ground), path: "\n".join(lines) + "\n"}, "an arena")
+    replace_files(files | {path: "\n".join(lines) + "\n"}, "an arena")
 
 
 def place_lines(arena: Arena) -> list[str]:
@@ -228,8 +261,8 @@ def place_lines(arena: Arena) -> list[str]:
             entry(label, place, **dict(zip(place._fields[2:], place[2:], strict=True)))
     for switch in arena.lamp_switches:
         lines += ["", "[[lamp_switch]]", *(f"{name} = {toml(value)}" for name, value in vars(switch).items())]
-    for wall in arena.walls:
-        lines += ["", "[[wall]]", *(f"{name} = {toml(value)}" for name, value in wall.table().items())]
+    for shape in (*arena.walls, *arena.zones):
+        lines += ["", f"[[{shape.label}]]", *(f"{name} = {toml(value)}" for name, value in shape.table().items())]
     return lines
 
 

@@ -61,7 +61,9 @@ def decode_kad(data: bytes, name: str = "arena", what: str = "The arena file") -
         )
     try:
         raster = _raster(_row(found["walls"]))
-        things = {label: _entries(label, kind, count, found) for label, (kind, count) in _THINGS.items()}
+        things: dict[str, Any] = {
+            label: _entries(label, kind, count, found) for label, (kind, count) in _THINGS.items()
+        }
         return Arena(raster, 1.0, name, **things)
     except KiksError as error:
         raise ArenaError(f"{what}: {error}") from None

@@ -78,19 +78,18 @@ _KEPT_BYTES_MAX = 4 << 20
 
 
 def encode_picture(brightness: npt.NDArray[np.uint8], *, compress_level: int = 6) -> bytes:
-    """Return the PNG of a raster, uint8 [row, column] with row 0 at the bottom."""
-    rows, columns = brightness.shape
+    """Return the PNG of a raster, uint8 [row, column] or [row, column, colour] with row 0 at the bottom."""
     data = np.ascontiguousarray(brightness).tobytes()
     # Worlds in one arena differ in seed and start: their walls are packed once.
     encode = _encoded if len(data) <= _KEPT_BYTES_MAX else _encoded.__wrapped__
-    return encode(data, rows, columns, compress_level)
+    return encode(data, brightness.shape, compress_level)
 
 
 @lru_cache(8)
-def _encoded(data: bytes, rows: int, columns: int, compress_level: int) -> bytes:
+def _encoded(data: bytes, shape: tuple[int, ...], compress_level: int) -> bytes:
     from PIL import Image
 
-    brightness = np.frombuffer(data, np.uint8).reshape(rows, columns)
+    brightness = np.frombuffer(data, np.uint8).reshape(shape)
     file = BytesIO()
     Image.fromarray(np.flipud(brightness)).save(file, "PNG", compress_level=compress_level)
     return file.getvalue()

@@ -13,6 +13,8 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import AfterValidator, Field, InstanceOf
 
 from kiks.errors import ArenaError, KiksError, ParameterError, counted, nearest, shown
@@ -26,6 +28,8 @@ from kiks.model.arena_file import (
     Starts,
     Walls,
     WallShapes,
+    Zones,
+    floor_of,
     load_arena,
     place_lines,
     places_of,
@@ -260,18 +264,22 @@ class Project:
             lines.append(f"size_mm = [{box.width_mm}, {box.height_mm}]")
             lines += [f"{name} = {getattr(box, name)}" for name in ("wall_mm", "rounded_mm", "brightness")]
         else:
-            text = b64encode(encode_picture(raster)).decode()
-            rows = "\n".join(text[start : start + _LINE] for start in range(0, len(text), _LINE))
-            lines += [f"mm_per_cell = {mm_per_cell!r}", f"png = '''\n{rows}\n'''"]
+            lines += [f"mm_per_cell = {mm_per_cell!r}", f"png = {_packed(raster)}"]
+        if self.arena.floor is not None:
+            lines.append(f"floor = {_packed(self.arena.floor)}")
         return ("\n".join(lines) + "\n").encode("utf-8", errors="replace")
+
+
+_PNG = Annotated[str, Rule("a PNG file in base64")]
 
 
 @record
 class ProjectWalls(Walls):
-    """The walls of a project: a PNG in base64, or a box in whole millimetres."""
+    """The walls of a project: a PNG in base64, or a box in whole millimetres; and its floor, another PNG."""
 
-    png: Annotated[str, Rule("a PNG file in base64")] | None = None
+    png: _PNG | None = None
     mm_per_cell: Pitch | None = None
+    floor: _PNG | None = None
 
     def __post_init__(self) -> None:
         if self.png is not None:
@@ -281,14 +289,29 @@ class ProjectWalls(Walls):
 
     def arena(self) -> Arena:
         """Return the walls as an arena."""
-        if self.png is None:
-            return self.box()
-        try:
-            data = b64decode("".join(self.png.split()), validate=True)
-        except ValueError as error:
-            raise ArenaError(f"png must be a PNG file in base64, but: {error}. Save the project again.") from None
         mm_per_cell = self.mm_per_cell or 1.0
-        return Arena.from_array(decode_picture(data, mm_per_cell, "png"), mm_per_pixel=mm_per_cell)
+        if self.png is None:
+            arena = self.box()
+        else:
+            arena = Arena.from_array(_unpacked(self.png, "png", mm_per_cell), mm_per_pixel=mm_per_cell)
+        if self.floor is None:
+            return arena
+        return replace(arena, floor=floor_of(_unpacked(self.floor, "floor", mm_per_cell), mm_per_cell, arena))
+
+
+def _packed(raster: NDArray[np.uint8]) -> str:
+    """Return a picture as it stands in a file: a PNG in base64."""
+    text = b64encode(encode_picture(raster)).decode()
+    rows = "\n".join(text[start : start + _LINE] for start in range(0, len(text), _LINE))
+    return f"'''\n{rows}\n'''"
+
+
+def _unpacked(text: str, name: str, mm_per_cell: float) -> NDArray[np.uint8]:
+    try:
+        data = b64decode("".join(text.split()), validate=True)
+    except ValueError as error:
+        raise ArenaError(f"{name} must be a PNG file in base64, but: {error}. Save the project again.") from None
+    return decode_picture(data, mm_per_cell, name)
 
 
 @record
@@ -316,6 +339,7 @@ class ProjectFile:
     ball: Balls = ()
     cylinder: Cylinders = ()
     wall: WallShapes = ()
+    zone: Zones = ()
     walls: ProjectWalls = ProjectWalls()
 
 

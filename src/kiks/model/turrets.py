@@ -8,6 +8,7 @@ TURRETS = {
     "radio": "kiks.firmware.radio.Radio",
     "io": "kiks.firmware.general_io.GeneralIO",
     "battle": "kiks.firmware.battle.Battle",
+    "floor": "kiks.firmware.floor.Floor",
 }
 """For the name of each in files and commands the class that is its firmware (the page "Turrets").
 

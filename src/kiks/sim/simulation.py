@@ -429,7 +429,8 @@ class Simulation:
 
         Args:
             robot: Its number.
-            turret: 'k213' (the linear camera), 'gripper', 'radio', 'io' (General I/O), 'battle', or one of your own.
+            turret: 'k213' (the linear camera), 'gripper', 'radio', 'io' (General I/O), 'battle', 'floor' (a floor
+                sensor), or one of your own.
 
         Returns:
             The turret, which 'io' and some of your own are set and read by.

@@ -11,6 +11,7 @@ from pydantic import Field
 
 from kiks.engine.physics.gripper import find_object
 from kiks.engine.scalar_math import uniform
+from kiks.engine.sensing.floor import read_floor
 from kiks.engine.sensing.range_finder import probe
 from kiks.engine.state import MEMORY_COUNT
 from kiks.errors import ParameterError, nearest, shown
@@ -19,7 +20,7 @@ from kiks.firmware.k213 import K213
 from kiks.firmware.khepera import Firmware
 from kiks.firmware.radio import Radio, deliver
 from kiks.firmware.turret import AnyTurret, Met, Turret
-from kiks.model.checks import check_count, check_heading
+from kiks.model.checks import check_count, check_heading, check_number
 from kiks.model.data_file import Rule, Whole, check, record
 from kiks.model.robot import RobotSpec
 from kiks.model.turrets import TURRETS
@@ -166,6 +167,14 @@ class _RobotSite:
             return Met(distance_mm, brightness, robot=disc + 1)
         body: Any = world.state.bodies[0, disc - world.robot_count]
         return Met(distance_mm, brightness, body=int(body["number"]))
+
+    def floor(self, ahead_mm: float = 0.0, left_mm: float = 0.0, index: int = 0) -> int:
+        world = self._world
+        with world.lock:
+            self._sync()
+            ahead_mm, left_mm = (check_number("a place", each, -1e3, 1e3) for each in (ahead_mm, left_mm))
+            given = world.state.tick_count, world.now_ns, True, ahead_mm, left_mm, index
+            return int(read_floor(world.scene, self._index, *given))
 
     def random(self, index: int = 0, time_ns: int | None = None) -> float:
         time_ns = self._world.now_ns if time_ns is None else time_ns

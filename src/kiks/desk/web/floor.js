@@ -4,6 +4,8 @@ import { LAMPLIGHT, rgba, wallGrey } from "./colours.js";
 import { lightMap } from "./light_map.js";
 
 const SHADE_CELLS_MM = 4;
+/** How much darker a black floor is drawn than a white one, a share of it. */
+const DARKNESS = 0.6;
 /** From this scale on, the fine grid is drawn [pixels/mm], and cells of the raster show their edges. */
 const FINE_GRID_SCALE = 1.6;
 
@@ -11,6 +13,7 @@ export class Floor {
   constructor() {
     this.raster = null;
     this._walls = null;
+    this._zones = null;
     this._light = null;
     this._light_key = "";
   }
@@ -18,6 +21,7 @@ export class Floor {
   setRaster(raster, colours) {
     this.raster = raster;
     this._walls = raster ? paintWalls(raster, colours) : null;
+    this._zones = raster?.shades ? paintZones(raster) : null;
     this._light_key = "";
   }
 
@@ -43,6 +47,10 @@ export class Floor {
     if (isLight && this._light) {
       context.imageSmoothingEnabled = true;
       context.drawImage(this._light, left, top, width, height);
+    }
+    if (this._zones) {
+      context.imageSmoothingEnabled = viewport.scale * this.raster.mm_per_cell < 4;
+      context.drawImage(this._zones, left, top, width, height);
     }
     if (isGrid) this._grid(context, viewport, { left, top, right, bottom }, isFromTop, colours);
     context.imageSmoothingEnabled = viewport.scale * this.raster.mm_per_cell < 4;
@@ -77,6 +85,17 @@ export class Floor {
     if (viewport.scale >= FINE_GRID_SCALE) draw(10, colours.gridFine);
     if (viewport.scale >= 0.08) draw(100, colours.gridCoarse);
   }
+}
+
+/** Return a canvas with a pixel per cell that makes the floor darker where it is not white. */
+function paintZones({ shades, columns, rows }) {
+  const canvas = document.createElement("canvas");
+  canvas.width = columns;
+  canvas.height = rows;
+  const context = canvas.getContext("2d"), picture = context.createImageData(columns, rows);
+  for (let k = 0; k < shades.length; k++) picture.data[4 * k + 3] = DARKNESS * (255 - shades[k]);
+  context.putImageData(picture, 0, 0);
+  return canvas;
 }
 
 /** Return a canvas with a pixel per cell: walls with their edges, and a shade on the floor below and to the right

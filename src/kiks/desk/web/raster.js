@@ -1,7 +1,8 @@
 /* The arena's raster: brightness of each cell (0 floor, 1 black wall to 255 white wall), row 0 on top, read from its
-   picture. */
+   picture; and the brightness of the floor, if it is not white all over. */
 
-/** Read the raster of a scene's arena: {columns, rows, cells: Uint8Array, mm_per_cell, width_mm, height_mm}. */
+/** Read the raster of a scene's arena: {columns, rows, cells: Uint8Array, shades: Uint8Array or null, mm_per_cell,
+    width_mm, height_mm}. */
 export async function loadRaster(arena) {
   const picture = new Image();
   picture.src = arena.picture;
@@ -13,8 +14,9 @@ export async function loadRaster(arena) {
   const pixels = context.getImageData(0, 0, columns, rows).data;
   const cells = new Uint8Array(columns * rows);
   for (let k = 0; k < cells.length; k++) cells[k] = pixels[4 * k];
+  const shades = arena.has_floor ? cells.map((_, k) => pixels[4 * k + 1]) : null;
   return {
-    columns, rows, cells, mm_per_cell: arena.mm_per_cell,
+    columns, rows, cells, shades, mm_per_cell: arena.mm_per_cell,
     width_mm: columns * arena.mm_per_cell, height_mm: rows * arena.mm_per_cell,
   };
 }

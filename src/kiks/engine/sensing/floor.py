@@ -1,0 +1,92 @@
+"""The floor below a robot: what an infrared sensor under its base reads.
+
+Model: the reading follows the brightness of a spot, a disc whose cells count by how much of them lies within it. No
+manual tells the spot, the scale or the noise of such a sensor: they are ours.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from kiks.engine.compiling import entry, inlined, kernel
+from kiks.engine.numbers import sin_cos, uniform
+from kiks.engine.scene import open_scene
+from kiks.engine.sensing.proximity import pose_at
+
+STREAM_FLOOR = 6
+
+SPOT_MM = 3.0
+"""Radius of the spot that a sensor sees [mm]."""
+
+COUNTS = 1023.0
+"""Reading on white: ten bits, as all readings of the robot (khepera-protocol.md 8.4); black is 0."""
+
+NOISE_COUNTS = 10.0
+"""Largest error of a reading, of which all are equally likely."""
+
+_WHOLE = 1024.0  # a cell within the spot counts as much
+
+
+@inlined
+def spot_brightness(floor: Any, cell_mm: Any, x_mm: Any, y_mm: Any) -> Any:
+    """Return the mean brightness of a spot, 0 to 255.
+
+    A cell counts by the share of its width that lies within the spot, on the line through both centres. The sums are
+    of whole numbers, so they depend on no order, and a floor of one brightness has it everywhere.
+    """
+    if floor.size == 1:
+        return 1.0 * floor[0, 0]
+    column, row, radius = x_mm / cell_mm - 0.5, y_mm / cell_mm - 0.5, SPOT_MM / cell_mm
+    reach = radius + 0.5
+    total, weights = np.int64(0), np.int64(0)
+    for j in range(math.ceil(row - reach), math.floor(row + reach) + 1):
+        for i in range(math.ceil(column - reach), math.floor(column + reach) + 1):
+            apart = math.sqrt((i - column) * (i - column) + (j - row) * (j - row))
+            weight = np.int64(_WHOLE * min(max(0.0, reach - apart), 1.0) + 0.5)
+            # Beyond the arena the floor goes on as at its edge.
+            cell = floor[min(max(0, j), floor.shape[0] - 1), min(max(0, i), floor.shape[1] - 1)]
+            total += weight * np.int64(cell)
+            weights += weight
+    return total / weights
+
+
+@kernel
+def sense_floor(
+    scene: Any, world: Any, robot: Any, tick_count: Any, time_ns: Any, is_noisy: Any, ahead: Any, left: Any, index: Any
+) -> Any:
+    """Return the reading of a floor sensor at a time.
+
+    Args:
+        scene: The scene (`kiks.engine.scene.open_scene`).
+        world: Index of the world.
+        robot: Index of the robot.
+        tick_count: Ticks done.
+        time_ns: Time of the reading [ns].
+        is_noisy: False for the expected reading, without rounding.
+        ahead: How far ahead of the robot's middle the sensor looks [mm].
+        left: How far to the left of it [mm].
+        index: Number of the sensor on its robot: each has noise of its own.
+    """
+    state = scene.robots[world, robot]
+    x, y, heading = pose_at(state, tick_count, time_ns)
+    if ahead != 0.0 or left != 0.0:
+        sine, cosine = sin_cos(heading)
+        x, y = x + ahead * cosine - left * sine, y + ahead * sine + left * cosine
+    counts = spot_brightness(scene.floor, scene.walls.cell_mm, x, y) * (COUNTS / 255.0)
+    if not is_noisy:
+        return counts
+    if scene.kinds[state.kind].is_noisy != 0:
+        chance = uniform(scene.seeds[world], 0, robot, STREAM_FLOOR, time_ns, index)
+        counts += NOISE_COUNTS * (2.0 * chance - 1.0)
+    return min(max(0.0, math.floor(counts + 0.5)), COUNTS)
+
+
+@entry
+def read_floor(
+    scene: Any, robot: Any, tick_count: Any, time_ns: Any, is_noisy: Any, ahead: Any, left: Any, index: Any
+) -> Any:
+    """Call `sense_floor` for the first world of a scene."""
+    return sense_floor(open_scene(scene[0]), 0, robot, tick_count, time_ns, is_noisy, ahead, left, index)
