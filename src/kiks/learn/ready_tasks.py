@@ -195,7 +195,7 @@ STAY_S = 30.0
 """Time at the end of the exam for which it must be there without a break [s]."""
 
 
-LIGHT_ROOMS = 12
+LIGHT_ROOMS = 18
 """Number of rooms for training. In three of them, robots learn to search these; in others, they bounce to and fro."""
 
 
