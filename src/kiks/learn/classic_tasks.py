@@ -6,9 +6,12 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kiks.batch.loop_timing import Timing
 from kiks.control import controllers, measures
@@ -17,7 +20,10 @@ from kiks.control.measures import FULL_COUNT, FULL_SPEED_MM_S, ROAMING_S, mean, 
 from kiks.engine.compiling import kernel
 from kiks.learn.ready_tasks import Floats, Values, ready
 from kiks.learn.task import Task
+from kiks.model.arena import Arena
+from kiks.model.robot import RobotSpec, specs_of
 from kiks.model.shipped import shipped_arena
+from kiks.model.walls import Wall
 
 
 def mean_of_first(values: Values) -> Floats:
@@ -91,4 +97,81 @@ def floreano_mondada_1994(shuttling: bool = False) -> Task:
         generations=100,
         population=80,
         about="drive fast and straight through a looping corridor (1994)",
+    )
+
+
+# ---- Jakobi, Husbands and Harvey 1995 ----
+
+
+def progress_straight(notes: NDArray[np.float64]) -> Floats:
+    """Return V (1 - sqrt(D)) of the notes of `exploration`."""
+    steps = np.maximum(notes[..., 1], 1.0)
+    straight: Floats = notes[..., 0] / steps * (1.0 - np.sqrt(np.abs(notes[..., 4]) / steps))
+    return straight
+
+
+@measure(notes=5, result=progress_straight)
+def exploration(moment: Any, notes: Any) -> None:
+    """V (1 - sqrt(D)): how fast it gets about, and does not turn to one side.
+
+    V is how fast it gets away from where it was two seconds ago, as in `roaming`; D half of how much the speeds of the
+    wheels differ, with its sign, on average over the trial.
+    """
+    notes[0] += min(moved_lately_mm(moment, notes) / (ROAMING_S * FULL_SPEED_MM_S), 1.0)
+    notes[1] += 1.0
+    notes[4] += 0.5 * (share_of_full(moment.wheels[0]) - share_of_full(moment.wheels[1]))
+
+
+def with_noise(spec: RobotSpec, factor: float) -> RobotSpec:
+    """Return a robot whose proximity sensors have so many times their noise, up to 99 %.
+
+    Example:
+        >>> with_noise(RobotSpec.load("khepera"), 2.0).proximity.noise_small
+        0.5
+    """
+    noise = spec.proximity
+    return spec.with_changes(
+        proximity__noise_small=min(factor * noise.noise_small, 0.99),
+        proximity__noise_large=min(factor * noise.noise_large, 0.99),
+        proximity__jitter_counts=tuple(factor * each for each in noise.jitter_counts),
+    )
+
+
+@cache
+def room_with_pillars() -> Arena:
+    """Return the room of Jakobi, Husbands and Harvey (1995): 50 cm, four pillars; where they stand is our own."""
+    places = ((150, 160), (360, 140), (140, 360), (370, 370))
+    pillars = tuple(Wall(disc_mm=place, radius_mm=40) for place in places)
+    return replace(Arena.box(520, 520), name="pillars of 1995", walls=pillars)
+
+
+@ready
+def jakobi_husbands_harvey_1995(noise: float = 1.0, robot: str | RobotSpec = "khepera") -> Task:
+    """The task to avoid obstacles with sensors of more or less noise (Jakobi, Husbands and Harvey 1995).
+
+    Args:
+        noise: What the noise of the proximity sensors is multiplied by.
+        robot: Kind of robot, whose noise is multiplied.
+
+    Example:
+        >>> import kiks
+        >>> task = kiks.tasks.jakobi_husbands_harvey_1995(noise=2.0)
+        >>> task.worlds, task.robot.proximity.noise_large
+        (2, 0.2)
+    """
+    (spec,) = specs_of(robot, 1, None)
+    return Task(
+        f"jakobi_husbands_harvey_1995_{noise:g}",
+        (room_with_pillars(),),
+        controllers.ctrnn(neurons=6),
+        (exploration, measures.roaming, measures.contacts, measures.path_mm),
+        fitness=mean_of_first,
+        robot=with_noise(spec, noise),
+        seconds=20.0,
+        worlds=2,
+        algorithm=AlgorithmName.GA.value,
+        generations=16,
+        population=64,
+        spread=1.0,
+        about="avoid pillars, with none, the observed or double the noise (1995)",
     )

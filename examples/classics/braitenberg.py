@@ -1,0 +1,65 @@
+"""Braitenberg vehicles: the weights that K-Team and Webots ship, and vehicles 2a, 2b, 3a and 3b at a lamp."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+import kiks
+from kiks.batch.initial_state import random_starts
+from kiks.export.figures import column_figure, draw_paths
+from kiks.learn.braitenberg import VEHICLES, vehicle
+from kiks.learn.classics import Finding, command, path_of
+from kiks.model.arena_objects import Lamp, Pose
+from kiks.model.shipped import shipped_arena
+
+LAMP = (400.0, 400.0)
+PLACES = [Pose(150, 200, 0.0), Pose(150, 600, 0.0), Pose(650, 250, math.pi), Pose(650, 550, math.pi)]
+DARK_ROOM = replace(kiks.Arena.box(800, 800, wall_mm=0), lamps=(Lamp(*LAMP, 10.0),))
+TITLES = {
+    "k-team": "K-Team",
+    "webots": "Webots",
+    "2a": "2a, fear",
+    "2b": "2b, aggression",
+    "3a": "3a, love",
+    "3b": "3b, exploration",
+}
+STUCK = 0.1  # of `roaming`: a robot that gets away more slowly than 8 mm/s stays where it is
+
+
+def main(out: Path = Path("braitenberg.pdf"), starts: int = 200, seconds: float = 60.0) -> list[Finding]:
+    """Drive six vehicles, draw their paths, and say where they end."""
+    room = shipped_arena("training/pillars")
+    findings = []
+    free = kiks.Batch(kiks.Arena.box(3000, 3000), 1, seed=1)
+    begins = random_starts(room, starts, seed=1, robots=1)
+    crowd = kiks.Batch(room, starts, seed=1, starts=begins)
+    places = [replace(room, starts=(Pose(*pose),)) for pose in begins[:2, 0].tolist()]
+    measures = [kiks.measures.contacts, kiks.measures.roaming, kiks.measures.speed_pulses]
+    with column_figure(out, 128, nrows=3, ncols=2) as panels:
+        for name, axes in zip(VEHICLES, panels.flat):
+            driver = vehicle(name)
+            axes.set_title(TITLES[name])
+            if name[0] in "23":
+                paths = [path_of(driver, 25.0, arena=replace(DARK_ROOM, starts=(place,)), seed=1) for place in PLACES]
+                draw_paths(axes, DARK_ROOM, paths)
+                from_lamp = [np.hypot(*(path[:, :2] - LAMP).T) for path in paths]
+                nearest, last = ([pick(each) for each in from_lamp] for pick in (min, lambda each: each[-1]))
+                text = f"{min(nearest):.0f} to {max(nearest):.0f}; at the end {min(last):.0f} to {max(last):.0f}"
+                findings.append(Finding(f"{name}: nearest to the lamp [mm]", "", text))
+                continue
+            draw_paths(axes, room, [path_of(driver, seconds, arena=place, seed=1) for place in places])
+            (speed,) = free.run(driver.controller, driver.parameters, seconds=5, measures=measures).values[0, :, 2]
+            values = crowd.run(driver.controller, driver.parameters, seconds=seconds, measures=measures).values[:, 0]
+            known = {"k-team": "112 (computed)", "webots": "7.5 (computed); here eight times as fast"}[name]
+            findings += [
+                Finding(f"{name}: speed in free space [mm/s]", known, float(8.0 * speed), 0),
+                Finding(f"{name}: contacts in {seconds:.0f} s", "", f"{values[:, 0].mean():.1f} on average"),
+                Finding(f"{name}: stays in one place", "", f"{(values[:, 1] < STUCK).sum()} of {starts} starts"),
+            ]
+    return findings
+
+
+if __name__ == "__main__":
+    command(main)
