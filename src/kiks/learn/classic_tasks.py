@@ -169,7 +169,7 @@ def jakobi_husbands_harvey_1995(noise: float = 1.0, robot: str | RobotSpec = "kh
         robot=with_noise(spec, noise),
         seconds=20.0,
         worlds=2,
-        algorithm=AlgorithmName.GA.value,
+        algorithm="ga",
         generations=16,
         population=64,
         spread=1.0,
