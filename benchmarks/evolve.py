@@ -43,6 +43,7 @@ import kiks
 from batch import kheperax_python
 from calibration import report
 from kiks.batch.initial_state import random_starts
+from kiks.errors import KiksError
 from kiks.learn.statistics import wilson_interval
 from kiks.model.arena import Ball
 from kiks.model.ranges import numbers_of
@@ -96,7 +97,10 @@ def seeds_of(text: str) -> list[int]:
     """Return the seeds of a number, a list or a range."""
     if text.isdigit():
         return list(range(1, int(text) + 1))
-    return [int(seed) for seed in numbers_of(text.replace("-", ".."), "--seeds", step=1)]
+    try:
+        return [int(seed) for seed in numbers_of(text.replace("-", ".."), "seeds", step=1)]
+    except KiksError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
 
 
 def coevolutions(seeds: list[int]) -> Iterator[Row]:

@@ -85,7 +85,7 @@ it senses the thing, and 3 mm more before its command acts.
 
 
 AVOID_S = 40.0
-"""Time in each world [s]: in half of it, many a robot does not reach the dead end where it would stay for ever."""
+"""Time in each world [s]. After half of it in twice as many worlds, some champions stay in a dead end for ever."""
 
 
 def avoid_fitness(values: Values) -> Floats:
@@ -200,7 +200,7 @@ STAY_S = 30.0
 
 
 LIGHT_ROOMS = 18
-"""Number of rooms for training. In three of them, robots learn to search these; in others, they bounce to and fro."""
+"""Number of rooms for training. After three fixed ones, some champions bounce to and fro in others for ever."""
 
 
 def light_fitness(values: Values) -> Floats:
