@@ -279,3 +279,58 @@ def test_what_a_measure_needs_must_be_sensed() -> None:
 def test_arguments_out_of_range(make: Any, message: str) -> None:
     with pytest.raises(kiks.ParameterError, match=message):
         make()
+
+
+# ---- several values ----
+
+
+@pytest.mark.parametrize("points", [1, 7, 30])
+def test_a_trajectory_is_the_last_pose_of_each_interval(points: int) -> None:
+    way = kiks.measures.trajectory(seconds=15, points=points)
+    trace = Trace(kiks.measures.final_x_mm, way)
+    assert len(way.value_names) == len(trace.values) - 1 == 3 * points
+    ways = trace.values[1:].reshape(points, 3, WORLDS)
+    assert (ways[-1, 0] == trace.values[0]).all()
+    for k in range(points):
+        ends_s = 15.0 * (k + 1) / points
+        for world in range(WORLDS):
+            times_s = trace.times_s[world]
+            step = np.flatnonzero((times_s < ends_s) | (k == points - 1)).max()
+            assert (ways[k, :2, world] == trace.places_mm[world, step]).all()
+
+
+def test_a_trial_that_has_ended_stays_where_it_was() -> None:
+    ahead = [5.0, 5.0] + [0.0] * 16
+    given = {"measures": [kiks.measures.trajectory(seconds=4, points=8)], "seconds": 2}
+    ways = kiks.Batch(arena(), worlds=2, seed=1).run(kiks.controllers.linear(), ahead, **given).values
+    ways = ways.reshape(2, 8, 3)
+    assert (ways[:, 4:] == ways[:, 3:4]).all()
+    assert (ways[:, 2] != ways[:, 3]).any()
+
+
+def test_what_describes_a_way_has_a_name_for_each_number() -> None:
+    describe = kiks.measures.trajectory(
+        seconds=15, points=5, describe=lambda ways: ways[..., :2].max(axis=-2), names=["right_mm", "top_mm"]
+    )
+    trace = Trace(kiks.measures.trajectory(seconds=15, points=5), describe)
+    ways = trace.values[:15].reshape(5, 3, WORLDS)
+    assert (trace.values[15:] == ways[:, :2].max(axis=0)).all()
+    with pytest.raises(kiks.ParameterError, match="names must be given with describe"):
+        kiks.measures.trajectory(seconds=1, names=["a"])
+    short = kiks.measures.trajectory(seconds=15, describe=lambda ways: ways[..., 0, :1], names=["a", "b"])
+    with pytest.raises(kiks.ParameterError, match="the named values for each world and robot"):
+        Trace(short)
+
+
+def test_a_task_describes_behaviours_with_several_values_of_a_measure() -> None:
+    way = kiks.measures.trajectory(
+        seconds=1, points=4, describe=lambda ways: ways[..., -1, :2], names=["last_x_mm", "last_y_mm"]
+    )
+    task = kiks.tasks.avoid(seconds=1, worlds=3)
+    task = task.with_changes(
+        measures=(*task.measures, way),
+        axes=(kiks.Axis("last_x_mm", 0, 1000), kiks.Axis("last_y_mm", 0, 1000)),
+    )
+    evolution = kiks.Evolution(task, "map-elites:cells=20", seed=1, population=8)
+    champion = evolution.run(generations=2)
+    assert {"last_x_mm", "last_y_mm"} < set(champion.measures)

@@ -231,7 +231,7 @@ class Batch:
         functions = [*driving.controllers, *driving.parts, *watching.measures]
         callbacks = deciders, watching.watchers, watching.until_note
         self._on_all_cores(worlds, (0, UNLIMITED, until_ns), callbacks, functions)
-        names = tuple(each.name for each in measures)
+        names = tuple(name for each in measures for name in each.value_names)
         return Rollouts(watching.values(worlds.notes), worlds.steps.copy(), names)
 
     # ---- step by step ----

@@ -64,8 +64,8 @@ class MeasureSlots:
         return np.array([*zip(addresses, self._ends[:-1], self._ends[1:], strict=True)], np.int64).reshape(-1, 3)
 
     def values(self, notes: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the values of the measures for notes [world, robot, note], float64 [world, robot, measure]."""
-        values = np.zeros((*notes.shape[:2], self._value_count))
-        for k, (begin, end) in enumerate(pairwise(self._ends[: self._value_count + 1])):
-            values[:, :, k] = self.measures[k].value(notes[:, :, begin:end])
-        return values
+        """Return the values of the measures for notes [world, robot, note], float64 [world, robot, value]."""
+        values = [np.zeros((*notes.shape[:2], 0))]
+        for each, (begin, end) in zip(self.measures, pairwise(self._ends[: self._value_count + 1]), strict=False):
+            values.append(each.value(notes[:, :, begin:end]).reshape(*notes.shape[:2], -1))
+        return np.concatenate(values, axis=2)

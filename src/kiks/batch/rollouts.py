@@ -21,9 +21,9 @@ class Rollouts:
     deviation, the minimum and the maximum over all robots.
 
     Attributes:
-        values: Values of the measures, float64 [world, robot, measure].
+        values: Values of the measures, float64 [world, robot, value].
         step_counts: Number of control steps, int64 [world].
-        measures: Names of the measures.
+        measures: Names of the values: of the measures, or of those that a measure has several of.
 
     Example:
         >>> print(Rollouts(np.array([[[120.5]], [[80.25]]]), np.array([10, 10]), ("path_mm",)))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from kiks.control.compiled_function import Compiled, decorator, explained
 from kiks.control.senses import AnySense, check_senses
 from kiks.errors import ParameterError, shown
-from kiks.model.checks import check_count
+from kiks.model.checks import check_count, check_kind
 
 Moment: Any = namedtuple(
     "Moment",
@@ -67,8 +67,10 @@ class Measure(Compiled):
         function: The function; see `Moment` for what it sees.
         notes: Numbers that it keeps for each robot, zeros at the start.
         result: From the notes at the end, float64 [..., note], to the values, float64 [...]; the first if left out.
+            With `names`, to several values, float64 [..., value].
         senses: The senses that must come first in `moment.sensors`, as for `kiks.Controller`; controllers with others
             are rejected.
+        names: Names of its values, if it has several.
 
     Example:
         >>> import kiks
@@ -89,8 +91,10 @@ class Measure(Compiled):
         notes: int = 1,
         result: Result = first_note,
         senses: AnySense | Sequence[AnySense] = (),
+        names: Sequence[str] = (),
     ) -> None:
         super().__init__(function)
+        self.own_names = tuple(check_kind("each of names", each, str) for each in names)
         self.note_count = check_count("notes", notes, least=1)
         if not callable(result):
             raise ParameterError(f"result must be a function from notes to values, but it was {shown(result)}.")
@@ -111,8 +115,21 @@ class Measure(Compiled):
         """
         return {"notes": self.note_count}
 
+    @property
+    def value_names(self) -> tuple[str, ...]:
+        """Names of its values: its own name, if it has one value.
+
+        Example:
+            >>> import kiks
+            >>> kiks.measures.path_mm.value_names
+            ('path_mm',)
+        """
+        return self.own_names or (self.name,)
+
     def value(self, notes: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the values of all worlds and robots, float64 [world, robot], for their notes [world, robot, note].
+        """Return the values of all worlds and robots for their notes [world, robot, note].
+
+        They are float64 [world, robot], or, of a measure with several values, [world, robot, value].
 
         Example:
             >>> import numpy as np
@@ -124,11 +141,12 @@ class Measure(Compiled):
             values: NDArray[np.float64] = np.asarray(self.result(notes.copy()))
         except Exception as error:
             raise explained(error, [self]) from None
-        if values.dtype.kind not in "biuf" or values.shape != notes.shape[:-1]:
-            shape = notes.shape[:-1]
+        shape = (*notes.shape[:-1], *((len(self.own_names),) if self.own_names else ()))
+        if values.dtype.kind not in "biuf" or values.shape != shape:
             found = f"of shape {values.shape}" if values.dtype.kind in "biuf" else "no numbers"
+            each = "the named values" if self.own_names else "a value"
             raise ParameterError(
-                f"the result of the measure {self.name!r} must be of shape {shape}, a value for each world and "
+                f"the result of the measure {self.name!r} must be of shape {shape}, {each} for each world and "
                 f"robot, but it was {found}. Work along the last axis, as notes[..., 0] does."
             )
         return values

@@ -7,11 +7,12 @@ with arguments is a function that returns it, the same one for the same argument
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
 from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
 from kiks.control.arguments import made_once
 from kiks.control.measure import Measure, measure
@@ -19,7 +20,7 @@ from kiks.engine.compiling import kernel
 from kiks.errors import ParameterError
 from kiks.model.arena import Arena
 from kiks.model.checks import check_kind, check_number
-from kiks.model.data_file import Number, OneOf
+from kiks.model.data_file import Number, OneOf, Text, Whole, as_list
 
 __all__ = [
     "avoidance",
@@ -47,6 +48,7 @@ __all__ = [
     "spread_mm",
     "straightness",
     "touching_share",
+    "trajectory",
     "turned_pulses",
     "wall_following",
 ]
@@ -55,6 +57,11 @@ __all__ = [
 def __dir__() -> list[str]:
     return __all__
 
+
+Positive = Annotated[Number, Field(gt=0, le=1e6)]
+Points = Annotated[Whole, Field(ge=1, le=10_000)]
+Description = Callable[[NDArray[np.float64]], NDArray[np.float64]]
+Names = Annotated[tuple[Text, ...], BeforeValidator(as_list), Field(max_length=10_000)]
 
 FULL_SPEED = 10.0
 """Speed that counts as 1 [pulses/10 ms]: 80 mm/s, at which Floreano and Mondada's robot drove at most."""
@@ -327,6 +334,60 @@ def beside_wall_share(side: Side = "left", *, counts: Counts = 50.0) -> Measure:
 
 
 # ---- where ----
+
+
+@made_once
+def trajectory(
+    *, seconds: Positive, points: Points = 10, describe: Description | None = None, names: Names = ()
+) -> Measure:
+    """The way of a robot: its pose at equal intervals, the last at the end. It has several values.
+
+    Without `describe`, they are x_mm_1, y_mm_1, heading_rad_1, x_mm_2 and so on. A trial that has ended earlier stays
+    where it ended. A task takes means of them over its worlds, so that a way needs worlds that are alike.
+
+    Args:
+        seconds: Time of a trial [s].
+        points: Number of poses.
+        describe: From ways, float64 [..., point, 3], to several numbers about each, float64 [..., number].
+        names: Names of these numbers.
+
+    Example:
+        >>> import kiks
+        >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 1, seed=1)
+        >>> arc = [0.5, 0.4] + [0.0] * 16
+        >>> way = kiks.measures.trajectory(seconds=2, points=4)
+        >>> rollouts = batch.run(kiks.controllers.linear(), arc, seconds=2, measures=[way])
+        >>> rollouts.values.reshape(4, 3)[:, :2].round()
+        array([[257., 260.],
+               [258., 279.],
+               [259., 297.],
+               [259., 316.]])
+        >>> middle = kiks.measures.trajectory(
+        ...     seconds=2, describe=lambda ways: ways[..., :2].mean(axis=-2), names=["middle_x_mm", "middle_y_mm"]
+        ... )
+        >>> middle.value_names
+        ('middle_x_mm', 'middle_y_mm')
+    """
+    if (describe is None) != (not names):
+        raise ParameterError("names must be given with describe, and not without it. Give one for each number.")
+    if not names:
+        names = tuple(f"{name}_{k}" for k in range(1, points + 1) for name in ("x_mm", "y_mm", "heading_rad"))
+    per_second, last = points / seconds, points - 1
+
+    def result(notes: NDArray[np.float64]) -> NDArray[np.float64]:
+        ways = notes[..., 1:].reshape(*notes.shape[:-1], points, 3)
+        latest = np.minimum(np.arange(points), np.maximum(notes[..., :1].astype(np.int64) - 1, 0))
+        ways = np.take_along_axis(ways, latest[..., None], axis=-2)
+        return ways.reshape(*notes.shape[:-1], -1) if describe is None else describe(ways)
+
+    @measure(notes=1 + 3 * points, result=result, names=names)
+    def trajectory(moment: Any, notes: Any) -> None:
+        latest = min(int(moment.time_s * per_second), last)
+        for k in range(min(int(notes[0]), latest), latest + 1):
+            notes[1 + 3 * k], notes[2 + 3 * k], notes[3 + 3 * k] = moment.x_mm, moment.y_mm, moment.heading_rad
+        notes[0] = latest + 1.0
+
+    return trajectory
 
 
 @measure

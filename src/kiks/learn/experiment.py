@@ -45,8 +45,8 @@ class Experiment:
 
     @property
     def measure_names(self) -> tuple[str, ...]:
-        """Names of the measures."""
-        return tuple(each.name for each in self.measures)
+        """Names of the values of the measures."""
+        return tuple(name for each in self.measures for name in each.value_names)
 
     def with_changes(self, **changes: Any) -> Self:
         """Return a copy with some arguments changed."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+from collections.abc import Sequence
 from dataclasses import field, fields, replace
 from functools import cached_property, lru_cache
 from typing import Annotated, Any
@@ -16,6 +17,7 @@ from kiks.batch.loop_timing import Timing
 from kiks.control.controller import Controller
 from kiks.control.controllers import SPEED_LIMIT
 from kiks.control.measure import Measure
+from kiks.control.measures import trajectory
 from kiks.errors import ParameterError, counted, shown
 from kiks.learn.algorithm_name import AlgorithmName, parts_of
 from kiks.learn.champion import Champion
@@ -511,14 +513,54 @@ class Task(Experiment):
         return np.concatenate([np.empty((0, len(self.value_names))), *values])
 
     def _evaluate(self, candidates: Floats, seeds: Integers, threads: int | None, seconds: float) -> Floats:
-        count, starts, (turns, timings) = len(candidates), self.start_poses(seeds), self._turns(seeds)
+        measured = self._measured(candidates, seeds, threads, seconds, self.measures)
+        values = []
+        for side, part in zip(self.sides, np.split(measured, [self.robots], axis=1), strict=False):
+            means = part.mean(axis=1).reshape(len(candidates), self.worlds, -1)
+            values += [fitness_of(side.fitness, self.measure_names, means), means.mean(axis=1)]
+        return np.column_stack(values)
+
+    def ways(self, candidates: Floats, seeds: Integers, points: int, threads: int | None = None) -> Floats:
+        """Return where the robots of candidates drive in their evaluation.
+
+        Args:
+            candidates: Parameters [candidate, parameter].
+            seeds: A seed for each [candidate]: of its worlds and its starts.
+            points: Number of poses, at equal intervals, the last at the end.
+            threads: Number of threads; the number of cores if left out.
+
+        Returns:
+            x_mm, y_mm and heading_rad, float64 [candidate, world, robot, point, 3].
+
+        Example:
+            >>> import numpy as np
+            >>> import kiks
+            >>> task = kiks.tasks.avoid(seconds=1, worlds=3)
+            >>> task.ways(np.zeros((2, 18)), np.zeros(2, np.int64), points=5).shape
+            (2, 3, 1, 5, 3)
+        """
+        candidates, seeds = check_candidates(candidates, seeds)
+        way = trajectory(seconds=self.seconds, points=points)
+        measured = self._measured(candidates, seeds, threads, self.seconds, [way])
+        return measured.reshape(len(candidates), self.worlds, -1, points, 3)
+
+    def _measured(
+        self,
+        candidates: Floats,
+        seeds: Integers,
+        threads: int | None,
+        seconds: float,
+        measures: Sequence[Measure],
+    ) -> Floats:
+        """Return what measures see, float64 [candidate and world, robot, value]."""
+        starts, (turns, timings) = self.start_poses(seeds), self._turns(seeds)
         drawn = {seed: self.arenas_of(seed) for seed in dict.fromkeys(seeds.tolist())}
         arenas = [arena for seed in seeds.tolist() for arena in drawn[seed]]
         world_seeds = (seeds[:, None] + np.arange(self.worlds)).ravel()
         given = self.parameters_of(np.repeat(candidates, self.worlds, axis=0))
         robots = [side.specs for side in self.sides for _ in range(side.robots)]
         is_one_kind = len({spec for specs in robots for spec in specs}) == 1
-        measured = np.zeros((len(turns), len(robots), len(self.measures)))
+        measured = np.zeros((len(turns), len(robots), sum(len(each.value_names) for each in measures)))
         for number in np.unique(timings).tolist():
             here = np.flatnonzero(timings == number)
             each = [tuple(specs[turn % len(specs)] for specs in robots) for turn in turns[here].tolist()]
@@ -534,12 +576,8 @@ class Task(Experiment):
             )
             parameters = [part[here] for part in given]
             ends: dict[str, Any] = {"seconds": seconds, "until": self.until}
-            measured[here] = batch.run(self.controllers, parameters, measures=self.measures, **ends).values
-        values = []
-        for side, part in zip(self.sides, np.split(measured, [self.robots], axis=1), strict=False):
-            means = part.mean(axis=1).reshape(count, self.worlds, len(self.measures))
-            values += [fitness_of(side.fitness, self.measure_names, means), means.mean(axis=1)]
-        return np.column_stack(values)
+            measured[here] = batch.run(self.controllers, parameters, measures=measures, **ends).values
+        return measured
 
     def _turns(self, seeds: Integers) -> tuple[Integers, Integers]:
         """Return the turn of each world's kinds of robots and the number of its timing, int64 [world].
