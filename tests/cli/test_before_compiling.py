@@ -72,6 +72,7 @@ evolve none.py
 evolve avoid --algorithm none
 evolve avoid --controller none
 champion none.toml out
+ghosts none out.png
 compare none none2
 replay none.mcap
 replay none.mcap --check

@@ -17,6 +17,7 @@ from kiks.cli.evolve import evolve
 from kiks.cli.examples import DemoCommand, examples
 from kiks.cli.export import export
 from kiks.cli.fit import fit
+from kiks.cli.ghosts import ghosts
 from kiks.cli.grade import grade
 from kiks.cli.host import host
 from kiks.cli.matlab import matlab
@@ -60,6 +61,7 @@ for _command in (
     examples,
     evolve,
     champion,
+    ghosts,
     sweep,
     tournament,
     compare,

@@ -16,7 +16,7 @@ from kiks.export.kinds import ENDINGS, KINDS, kind_of, options_of
 from kiks.export.kinds import export as write_export
 
 
-def _size(value: str | None) -> Any:
+def picture_size(value: str | None) -> Any:
     """Return width and height of 1280x720."""
     if value is None:
         return None
@@ -41,7 +41,8 @@ def export(
         str | None, typer.Option(help=f"{', '.join(KINDS)}; by the ending if left out, a picture of a .png.")
     ] = None,
     size: Annotated[
-        str | None, typer.Option(help="Film, photo: width and height [pixels]; 1280x720 if left out.", callback=_size)
+        str | None,
+        typer.Option(help="Film, photo: width and height [pixels]; 1280x720 if left out.", callback=picture_size),
     ] = None,
     fps: Annotated[int | None, typer.Option(help="Film: pictures per second; 25 if left out.")] = None,
     speed: Annotated[

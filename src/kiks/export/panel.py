@@ -65,7 +65,7 @@ class Panel:
 
         time = f"{s_from_ns(moment.time_ns):.1f} s"
         if not self.width:
-            _draw_clock_alone(picture, time, self._scale)
+            draw_sign(picture, time, self._scale)
             return
         image = self._paper.copy()
         self._pen = ImageDraw.Draw(image)
@@ -138,13 +138,13 @@ def _bar(sensor: int) -> tuple[float, float]:
     return _LEFT + sensor * step + 2, _LEFT + (sensor + 1) * step - 2
 
 
-def _draw_clock_alone(picture: Pixels, time: str, scale: float) -> None:
-    """Draw the clock into the lower left corner of a picture."""
+def draw_sign(picture: Pixels, text: str, scale: float) -> None:
+    """Draw a line, such as the time, into the lower left corner of a picture."""
     from PIL import Image, ImageDraw
 
     letters = font(18 * scale)
-    _, _, right, bottom = letters.getbbox(time)
+    _, _, right, bottom = letters.getbbox(text)
     height, width = min(round(bottom) + 6, picture.shape[0]), min(round(right) + 10, picture.shape[1])
     image = Image.new("RGB", (width, height), _PAPER)
-    ImageDraw.Draw(image).text((5, height / 2), time, fill=INK, font=letters, anchor="lm")
+    ImageDraw.Draw(image).text((5, height / 2), text, fill=INK, font=letters, anchor="lm")
     picture[-height:, :width] = np.asarray(image)

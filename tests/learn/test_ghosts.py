@@ -1,0 +1,83 @@
+"""Whole generations as ghosts: each candidate drives as in its evaluation, and all are seen in one arena."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tests.learn.small import small
+from typer.testing import CliRunner
+
+import kiks
+from kiks import ParameterError
+from kiks.cli import app
+from kiks.learn.individual import ghosts_of
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    home = tmp_path_factory.mktemp("runs") / "small"
+    kiks.Evolution(kiks.tasks.avoid(), "ga", seed=2, population=5, folder=home).run(generations=2)
+    return home
+
+
+def test_ghosts_drive_as_individuals_do_on_the_wire(folder: Path) -> None:
+    from kiks.learn.individual import individual_of
+
+    for generation, scene in zip((1, 2), ghosts_of(folder, [1, 2], world=4), strict=True):
+        assert len(scene.ways) == 5
+        for rank in (1, 4):
+            champion, _ = individual_of(folder, generation, rank=rank, world=4)
+            sim, ports = champion.simulation()
+            assert sim.pose(1) == pytest.approx(tuple(scene.ways[rank - 1, 0]))
+            assert sim.arena.name == scene.arena.name
+            assert champion.world is not None
+            assert champion.world.seconds is not None
+            champion.drive(ports, seconds=champion.world.seconds)
+            # The last pose is that of the last control step, shortly before the end.
+            away_mm = np.hypot(*(scene.ways[rank - 1, -1, :2] - np.array(sim.pose(1)[:2])))
+            assert away_mm < 10.0
+        assert f"generation {generation}" in scene.title
+
+
+def test_ways_end_where_measures_say(folder: Path) -> None:
+    task = small(measures=(kiks.measures.final_x_mm, kiks.measures.final_y_mm), axes=(), fitness=None)
+    candidates = kiks.controllers.random_parameters(task.controller, 3, seed=1)
+    seeds = np.arange(3)
+    ways, values = task.ways(candidates, seeds, points=9), task.evaluate(candidates, seeds)
+    assert ways.shape == (3, task.worlds, 1, 9, 3)
+    np.testing.assert_allclose(ways[:, :, 0, -1, :2].mean(axis=1), values[:, 1:])
+
+
+def test_a_picture_and_a_film_show_generations(folder: Path, tmp_path: Path) -> None:
+    from PIL import Image
+
+    words = ["ghosts", str(folder), "--size", "160x120"]
+    done = CliRunner().invoke(app, [*words, str(tmp_path / "ghosts.png")])
+    assert done.exit_code == 0, done.output
+    with Image.open(tmp_path / "ghosts.png") as opened:
+        picture = np.asarray(opened)
+    assert picture.shape == (120, 160, 3)
+    assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 100
+    done = CliRunner().invoke(app, [*words, str(tmp_path / "ghosts.webp"), "--speed", "20", "--fps", "5"])
+    assert done.exit_code == 0, done.output
+    assert "generation 1 " in done.output
+    assert "generation 2 " in done.output
+    with Image.open(tmp_path / "ghosts.webp") as film:
+        assert getattr(film, "n_frames", 1) > 10
+
+
+def test_what_cannot_be_shown_is_refused_in_one_line(folder: Path, tmp_path: Path) -> None:
+    with pytest.raises(ParameterError, match="generation must be a whole number from 1 to 2"):
+        ghosts_of(folder, [3])
+    with pytest.raises(ParameterError, match="world must be"):
+        ghosts_of(folder, [1], world=1000)
+    failed = CliRunner().invoke(app, ["ghosts", str(folder), str(tmp_path / "a.png"), "--generations", "1,x"])
+    assert "--generations must be numbers such as 1,20,60" in str(failed.exception)
+    task = kiks.tasks.pursuit(seconds=1)
+    kiks.Evolution(task, seed=1, population=4, opponents=2, folder=tmp_path / "two").run(generations=1)
+    with pytest.raises(ParameterError, match="must have one side and a generation for ghosts"):
+        ghosts_of(tmp_path / "two", [1], task=task)
