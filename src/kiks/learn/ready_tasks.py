@@ -303,6 +303,7 @@ def gather() -> Task:
         axes=(Axis("closeness", 0, 1), Axis("path_mm", 0, 15_000)),
         # Larger parameters saturate the wheels by the camera's sixteen greys alone.
         spread=1.0,
+        generations=80,
         exam=Exam(
             training(*(f"cylinders_{k}" for k in range(100, 104))),
             (measures.largest_group(GROUP_MM),),
