@@ -2,7 +2,7 @@
 
 Run: python benchmarks/evolve.py [--json] [--seeds 101-120] [--task NAME ...] [--kheperax FOLDER]. For each seed the
 task is evolved with its own algorithm, population and number of generations, and its champion takes the exam
-(`kiks.Exam`): twenty starts, with the timing of a line of 9600 baud, in arenas where it was not trained, but for the
+(`kiks.Exam`): twenty starts, with the timing of its serial line, in arenas where it was not trained, but for the
 maze. The seeds are a range, a list such as 3,7 or 1-5,9, or a number such as 5 for those from 1 to 5. What is known is
 printed at once.
 
