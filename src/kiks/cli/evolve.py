@@ -272,7 +272,9 @@ def _controller(kind: str, task: Task) -> Controller:
             f"--controller must be one of {', '.join(KINDS)}, but it was {shown(kind)}.{nearest(kind, KINDS)}"
         )
     own = task.controller
-    recipe: dict[str, Any] = {"kind": kind, "senses": list(own.senses), "speed_limit": task.speed_limit}
+    recipe: dict[str, Any] = {"kind": kind, "speed_limit": task.speed_limit}
+    if kind != "collector":  # which has its own
+        recipe["senses"] = list(own.senses)
     if kind == "ctrnn":
         recipe["period_s"] = task.timings[0].period_s
     return from_recipe(recipe)

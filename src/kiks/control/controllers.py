@@ -41,6 +41,7 @@ from kiks.control.neural_nets import (
 )
 from kiks.control.recipes import FunctionRecipe, find, relative_to
 from kiks.control.senses import check_senses, reading_count, recipes_for
+from kiks.engine.compiling import kernel
 from kiks.engine.numbers import tanh
 from kiks.engine.simd.stack_arrays import stack_floats
 from kiks.errors import ParameterError, shown
@@ -48,6 +49,7 @@ from kiks.model.checks import check_count, check_kind
 from kiks.model.data_file import Number, OneOf, Rule, Switch, Whole, adapter, check
 
 __all__ = [
+    "collector",
     "ctrnn",
     "elman",
     "from_recipe",
@@ -88,6 +90,9 @@ else:
     Layers = Annotated[tuple[Units, ...], Field(max_length=LAYERS_MAX, description="One for each hidden layer.")]
 SpeedLimit = Annotated[Number, Field(ge=0, le=127, description="Speed of an output of 1 [pulses/10 ms].")]
 
+WITH_GRIPPER: dict[str, Any] = {"senses": ("proximity", "barrier"), "actuators": ("wheels", "gripper")}
+"""Senses and actuators of kinds that do not let their users choose senses."""
+
 Made = tuple[Any, int, int]
 """The function of a controller, how many numbers it remembers, and how many parameters it has."""
 
@@ -108,7 +113,8 @@ def kind(function: Callable[_Arguments, Made]) -> Callable[_Arguments, Controlle
         del values["kind"]
         decide, memory, parameters = declared(**values)
         decide.__name__ = decide.__qualname__ = name
-        made = Controller(decide, senses=given.senses, memory=memory, parameters=parameters)
+        parts = {"senses": given.senses} if hasattr(given, "senses") else WITH_GRIPPER
+        made = Controller(decide, memory=memory, parameters=parameters, **parts)
         made.recipe = adapter(arguments).dump_python(given, mode="json")
         return made
 
@@ -263,6 +269,120 @@ def ctrnn(
             wheels[wheel] = speed_limit * tanh(0.5 * (memory[wheel] + GAIN * parameters[bias_first + wheel]))
 
     return decide, neurons, neurons_first + neurons * neurons
+
+
+PICK_UP = ((2, -4.0, 255.0, 0.0), (5, 0.0, 255.0, 0.0), (4, 0.0, 255.0, 1.0), (5, 0.0, 127.0, 1.0))
+"""Picking up: for so many steps, speed [pulses/10 ms], arm and jaws. It backs off, lowers the arm, grips and lifts."""
+
+RELEASE = ((3, 0.0, 190.0, 1.0), (2, 0.0, 190.0, 0.0), (3, 0.0, 127.0, 0.0))
+"""Releasing, likewise: it holds the arm out, opens the jaws, and lifts the arm."""
+
+COLLECTOR_INPUTS, COLLECTOR_OUTPUTS, COLLECTOR_UNITS = 7, 4, 4
+"""Six proximity sensors and the light barrier; two wheels, picking up and releasing; hidden units."""
+
+Architecture = Annotated[str, OneOf(("feed_forward", "hidden", "elman", "designed", "emergent"))]
+
+
+@kernel
+def steps_of(phases: Any) -> Any:
+    """Return how many steps a macro takes."""
+    count = 0
+    for phase in phases:
+        count += phase[0]
+    return count
+
+
+@kernel
+def follow_macro(phases: Any, step: Any, wheels: Any) -> Any:
+    """Write the outputs of a step of a macro, from 0."""
+    for count, speed, arm, jaws in phases:
+        if 0 <= step < count:
+            wheels[0], wheels[1], wheels[2], wheels[3] = speed, speed, arm, jaws
+        step -= count
+
+
+@kind
+def collector(*, architecture: Architecture = "feed_forward", speed_limit: SpeedLimit = SPEED_LIMIT) -> Made:
+    """Return a network with a gripper, in one of the five architectures of Nolfi (1997).
+
+    Its inputs are the six sensors at the front and the sides and the light barrier. Its outputs are logistic: the speed
+    of each wheel, from backwards to ahead, and two triggers. A trigger above a half, and above the other, starts a
+    macro, during which the network rests: picking up (`PICK_UP`) while the barrier is free, releasing (`RELEASE`) while
+    it is not. The controller keeps the clock of the macro in its memory.
+
+    Parameters: of `feed_forward`, a layer [1 + 7, 4]; of `hidden`, [1 + 7, 4] and [1 + 4, 4]; of `elman`, whose hidden
+    units feed back to themselves, [1 + 7 + 4, 4] and [1 + 4, 4]; of `designed`, a layer for an empty gripper and one
+    for a full one; of `emergent`, two layers of outputs and two of selectors: for each output, the layer whose selector
+    is higher decides.
+
+    Args:
+        architecture: 'feed_forward', 'hidden', 'elman', 'designed' or 'emergent'.
+        speed_limit: The highest speed [pulses/10 ms].
+
+    Example:
+        >>> import kiks
+        >>> [kiks.controllers.collector(architecture=each).parameter_count for each in ("hidden", "emergent")]
+        [52, 128]
+    """
+    layer = layer_size(COLLECTOR_INPUTS, COLLECTOR_OUTPUTS)
+    hidden = {"hidden": COLLECTOR_UNITS, "elman": COLLECTOR_UNITS}.get(architecture, 0)
+    context = COLLECTOR_UNITS if architecture == "elman" else 0
+    input_count = COLLECTOR_INPUTS + context
+    hidden_size = layer_size(input_count, hidden)
+    is_designed, is_emergent = architecture == "designed", architecture == "emergent"
+    picking, releasing = steps_of.py_func(PICK_UP), steps_of.py_func(RELEASE)
+
+    def decide(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
+        if memory[0] > 0.0:
+            follow_macro(PICK_UP, picking - np.int64(memory[0]), wheels)
+            memory[0] -= 1.0
+            return
+        if memory[1] > 0.0:
+            follow_macro(RELEASE, releasing - np.int64(memory[1]), wheels)
+            memory[1] -= 1.0
+            return
+        inputs, outputs = stack_floats(input_count), stack_floats(COLLECTOR_OUTPUTS)
+        for k in range(6):
+            inputs[k] = sensors[k] / 1023.0
+        is_full = sensors[8] > 0.0
+        inputs[6] = 1.0 if is_full else 0.0
+        if hidden > 0:
+            units = stack_floats(hidden)
+            for k in range(context):
+                inputs[COLLECTOR_INPUTS + k] = memory[2 + k]
+            do_layer(inputs, input_count, parameters, 0, units, hidden)
+            for k in range(hidden):
+                units[k] = logistic(units[k])
+                if k < context:
+                    memory[2 + k] = units[k]
+            do_layer(units, hidden, parameters, hidden_size, outputs, COLLECTOR_OUTPUTS)
+        elif is_emergent:
+            others, selectors, rivals = stack_floats(4), stack_floats(4), stack_floats(4)
+            do_layer(inputs, input_count, parameters, 0, outputs, COLLECTOR_OUTPUTS)
+            do_layer(inputs, input_count, parameters, layer, others, COLLECTOR_OUTPUTS)
+            do_layer(inputs, input_count, parameters, 2 * layer, selectors, COLLECTOR_OUTPUTS)
+            do_layer(inputs, input_count, parameters, 3 * layer, rivals, COLLECTOR_OUTPUTS)
+            for k in range(COLLECTOR_OUTPUTS):
+                if rivals[k] > selectors[k]:
+                    outputs[k] = others[k]
+        else:
+            first = layer if is_designed and is_full else 0
+            do_layer(inputs, input_count, parameters, first, outputs, COLLECTOR_OUTPUTS)
+        for wheel in range(2):
+            wheels[wheel] = speed_limit * (2.0 * logistic(outputs[wheel]) - 1.0)
+        wheels[2], wheels[3] = 127.0, 1.0 if is_full else 0.0
+        is_picking = outputs[2] > max(0.0, outputs[3])
+        is_releasing = outputs[3] > max(0.0, outputs[2])
+        if is_picking and not is_full:
+            follow_macro(PICK_UP, 0, wheels)
+            memory[0] = picking - 1.0
+        elif is_releasing and is_full:
+            follow_macro(RELEASE, 0, wheels)
+            memory[1] = releasing - 1.0
+
+    sizes = {"hidden": hidden_size + layer_size(hidden, 4), "designed": 2 * layer, "emergent": 4 * layer}
+    sizes["elman"] = sizes["hidden"]
+    return decide, 2 + context, sizes.get(architecture, layer)
 
 
 @kind

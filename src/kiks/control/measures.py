@@ -47,6 +47,7 @@ __all__ = [
     "speed_pulses",
     "spread_mm",
     "straightness",
+    "taken_out",
     "touching_share",
     "trajectory",
     "turned_pulses",
@@ -760,6 +761,27 @@ def spread_mm(moment: Any, notes: Any) -> None:
 
 
 # ---- what they are made of ----
+
+
+@measure
+def taken_out(moment: Any, notes: Any) -> None:
+    """Number of balls and cylinders that grippers have dropped beyond the edge of the arena.
+
+    Example:
+        >>> import kiks
+        >>> kiks.measures.taken_out
+        <Measure 'taken_out'>
+    """
+    notes[0] = count_out(moment.bodies)
+
+
+@kernel
+def count_out(bodies: Any) -> Any:
+    """Return how many bodies have left the arena."""
+    count = 0.0
+    for row in range(bodies.shape[0]):
+        count += bodies[row].is_lifted != 0 and bodies[row].holder == 0
+    return count
 
 
 @kernel

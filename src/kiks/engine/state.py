@@ -121,7 +121,10 @@ BODY = np.dtype(
         ("brightness", "i4"),
         ("what", "i4"),
         ("holder", "i4"),  # number of the robot whose gripper holds it, from 1; 0 for none
-        ("is_lifted", "i4"),  # above the floor, without collisions and invisible to sensors
+        (
+            "is_lifted",
+            "i4",
+        ),  # without collisions and invisible to sensors: above the floor, or outside if none holds it
         ("hold_ahead_mm", "f8"),  # the place at which it is held, relative to the holder
         ("hold_aside_mm", "f8"),
     ],

@@ -18,9 +18,11 @@ from kiks.control import controllers, measures
 from kiks.control.measure import measure
 from kiks.control.measures import FULL_COUNT, FULL_SPEED_MM_S, ROAMING_S, mean, moved_lately_mm, share_of_full
 from kiks.engine.compiling import kernel
+from kiks.engine.numbers import sin_cos
+from kiks.learn.exam import Exam
 from kiks.learn.ready_tasks import Floats, Values, ready
 from kiks.learn.task import Task
-from kiks.model.arena import Arena
+from kiks.model.arena import Arena, Cylinder
 from kiks.model.robot import RobotSpec, specs_of
 from kiks.model.shipped import shipped_arena
 from kiks.model.walls import Wall
@@ -174,4 +176,100 @@ def jakobi_husbands_harvey_1995(noise: float = 1.0, robot: str | RobotSpec = "kh
         population=64,
         spread=1.0,
         about="avoid pillars, with none, the observed or double the noise (1995)",
+    )
+
+
+# ---- Nolfi 1996, 1997 ----
+
+COLLECTED_COUNT = 5
+"""Cylinders of the arena."""
+
+SEEN_SHARE, HELD_SHARE = 0.1, 0.4
+"""What facing a cylinder, and holding one, count beside one that is outside (our own guess)."""
+
+FACED_STEPS = 20.0
+"""Steps before a cylinder that count fully."""
+
+
+@measure(notes=4)
+def collecting(moment: Any, notes: Any) -> None:
+    """Cylinders outside; and since the last one, whether another was held, and for how long one was between the jaws.
+
+    A cylinder that is picked up and put down again counts as held once.
+    """
+    out = measures.count_out(moment.bodies)
+    if out > notes[1]:
+        notes[1], notes[2], notes[3] = out, 0.0, 0.0
+    sine, cosine = sin_cos(moment.heading_rad)
+    for row in range(moment.bodies.shape[0]):
+        body = moment.bodies[row]
+        if body.holder == moment.robot + 1:
+            notes[2] = 1.0
+        elif body.is_lifted == 0:
+            dx, dy = body.x_mm - moment.x_mm, body.y_mm - moment.y_mm
+            ahead, aside = dx * cosine + dy * sine, abs(dy * cosine - dx * sine)
+            if 27.5 < ahead < 65.0 and aside < 15.0:
+                notes[3] = min(notes[3] + 1.0 / FACED_STEPS, 1.0)
+    notes[0] = max(notes[0], out + HELD_SHARE * notes[2] + SEEN_SHARE * max(notes[2], notes[3]))
+
+
+@measure(notes=2)
+def picked_up(moment: Any, notes: Any) -> None:
+    """Number of times that the robot has gripped a cylinder."""
+    is_held = 0.0
+    for row in range(moment.bodies.shape[0]):
+        is_held = max(is_held, 1.0 * (moment.bodies[row].holder == moment.robot + 1))
+    notes[0] += max(is_held - notes[1], 0.0)
+    notes[1] = is_held
+
+
+def all_out(values: Values) -> NDArray[np.bool_]:
+    """Return in which starts all cylinders are outside."""
+    solved: NDArray[np.bool_] = values["taken_out"] >= COLLECTED_COUNT
+    return solved
+
+
+def collecting_arenas(count: int, *, seed: int) -> tuple[Arena, ...]:
+    """Return arenas of 60 x 35 cm with five cylinders at random places, clear of each other and of the walls."""
+    rng, arenas = np.random.default_rng(seed), list[Arena]()
+    for number in range(count):
+        places: list[tuple[float, float]] = []
+        while len(places) < COLLECTED_COUNT:
+            x_mm, y_mm = rng.uniform((62.0, 62.0), (542.0, 292.0)).tolist()
+            if all(math.hypot(x_mm - x, y_mm - y) > 75.0 for x, y in places):
+                places.append((x_mm, y_mm))
+        cylinders = tuple(Cylinder(x, y, radius_mm=11.5) for x, y in places)
+        arenas.append(replace(Arena.box(604, 354, wall_mm=2), name=f"collecting {number + 1}", cylinders=cylinders))
+    return tuple(arenas)
+
+
+@ready
+def nolfi_1997(architecture: str = "emergent") -> Task:
+    """The task to carry five cylinders out of an arena with the gripper (Nolfi 1996, 1997).
+
+    A robot that opens its jaws while the cylinder is beyond the edge of the arena has dropped it outside.
+
+    Args:
+        architecture: Of `kiks.controllers.collector`: 'feed_forward', 'hidden', 'elman', 'designed' or 'emergent'.
+
+    Example:
+        >>> import kiks
+        >>> kiks.tasks.nolfi_1997().parameter_count
+        128
+    """
+    return Task(
+        f"nolfi_1997_{architecture}",
+        collecting_arenas(60, seed=1),
+        controllers.collector(architecture=architecture),
+        (collecting, measures.taken_out, picked_up, measures.contacts),
+        fitness=mean_of_first,
+        seconds=20.0,
+        worlds=4,
+        timing=Timing(period_s=0.1, baud=38_400),
+        generations=60,
+        population=32,
+        exam=Exam(
+            collecting_arenas(10, seed=2), (measures.taken_out,), all_out, "carried all cylinders out", seconds=120.0
+        ),
+        about="carry cylinders out of the arena with the gripper (1996, 1997)",
     )

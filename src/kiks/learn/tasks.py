@@ -14,7 +14,7 @@ from kiks.control.controller import Controller
 from kiks.control.controllers import Recipe, controller_of
 from kiks.control.recipes import module_in
 from kiks.errors import KiksError, ParameterError, nearest, shown
-from kiks.learn.classic_tasks import floreano_mondada_1994, jakobi_husbands_harvey_1995
+from kiks.learn.classic_tasks import floreano_mondada_1994, jakobi_husbands_harvey_1995, nolfi_1997
 from kiks.learn.ready_tasks import TASKS, avoid, disperse, follow, football, gather, light, maze, pursuit
 from kiks.learn.task import WORLDS_MAX, Seconds, Task
 from kiks.model.arena import Arena
@@ -35,6 +35,7 @@ __all__ = [
     "light",
     "load",
     "maze",
+    "nolfi_1997",
     "pursuit",
 ]
 

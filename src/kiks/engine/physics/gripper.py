@@ -13,7 +13,8 @@ fits between them, and no other gripper holds it. The jaws then move it to their
 
 On the floor, the held body and the robot are one rigid body (`kiks.engine.physics.grasp`). A lifted body is a disc in
 front of the robot that collides with nothing and that no sensor sees. It comes down only where the floor is free;
-elsewhere the arm stays above the floor and open jaws wait. So no body ends inside another.
+elsewhere the arm stays above the floor and open jaws wait. So no body ends inside another. If the jaws open when its
+centre is beyond the edge of the arena, it falls outside: it stays where it is, as if lifted by nobody, for good.
 """
 
 from __future__ import annotations
@@ -214,13 +215,22 @@ def is_in_its_place(scene: Any, world: Any, row: Any) -> Any:
 
 @kernel
 def put_down(scene: Any, world: Any, row: Any) -> Any:
-    """Let a held body go, at rest; return False if the floor is not free."""
+    """Let a held body go, at rest; return False if the floor is not free. Beyond the edge it leaves the arena."""
     body = scene.bodies[world, row]
-    if body.is_lifted != 0 and not is_free(scene, world, row):
+    is_out = body.is_lifted != 0 and is_beyond(scene.ground, body.x_mm, body.y_mm)
+    if body.is_lifted != 0 and not is_out and not is_free(scene, world, row):
         return False
-    body.holder = body.is_lifted = 0
+    body.holder, body.is_lifted = 0, is_out
     body.velocity_x = body.velocity_y = 0.0
     return True
+
+
+@kernel
+def is_beyond(ground: Any, x_mm: Any, y_mm: Any) -> Any:
+    """Return whether a place is beyond the edge of the arena."""
+    rows, columns = ground.clearance.shape
+    width_mm, height_mm = (columns - 2 * ground.pad) * ground.cell_mm, (rows - 2 * ground.pad) * ground.cell_mm
+    return x_mm < 0.0 or x_mm > width_mm or y_mm < 0.0 or y_mm > height_mm
 
 
 @kernel
