@@ -70,6 +70,25 @@ def test_a_picture_and_a_film_show_generations(folder: Path, tmp_path: Path) -> 
         assert getattr(film, "n_frames", 1) > 10
 
 
+def test_the_frames_of_a_page_have_the_poses_of_all_generations(folder: Path, tmp_path: Path) -> None:
+    from kiks.export.frames import HEAD, ROBOT
+    from kiks.export.ghost_frames import GhostFrames
+
+    scenes = ghosts_of(folder, [1, 2])
+    frames = GhostFrames(scenes)
+    heads = [np.frombuffer(each, HEAD, 1)[0] for each in frames.frames]
+    assert [int(each["scene"]) for each in heads] == sorted([0, 1] * (len(heads) // 2))
+    assert {int(each["robot_count"]) for each in heads} == {5}
+    for frame, ways in ((frames.frames[0], scenes[0].ways), (frames.frames[len(heads) // 2], scenes[1].ways)):
+        poses = np.frombuffer(frame, ROBOT, 5, HEAD.itemsize)["pose"]
+        np.testing.assert_allclose(poses, ways[:, 0], atol=1e-3)
+    done = CliRunner().invoke(app, ["ghosts", str(folder), str(tmp_path / "ghosts.html")])
+    assert done.exit_code == 0, done.output
+    page = (tmp_path / "ghosts.html").read_text("utf-8")
+    assert page.count("generation 1 ") == page.count("generation 2 ") == 1
+    assert "SECTION" not in page
+
+
 def test_what_cannot_be_shown_is_refused_in_one_line(folder: Path, tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match="generation must be a whole number from 1 to 2"):
         ghosts_of(folder, [3])

@@ -10,10 +10,10 @@ import typer
 from kiks.cli.engine_start import ready_batch
 from kiks.cli.export import picture_size
 from kiks.cli.options import progress_bar
-from kiks.cli.outputs import output
+from kiks.cli.outputs import leave_out, output
 from kiks.errors import ParameterError, shown
 
-ENDINGS = (".mp4", ".gif", ".webp", ".png")
+ENDINGS = (".mp4", ".gif", ".webp", ".png", ".html")
 
 SHOWN = 5
 """Number of generations that are shown if nobody says which: at equal intervals."""
@@ -30,8 +30,14 @@ def _numbers(value: str | None) -> Any:
 
 
 def ghosts(
+    context: typer.Context,
     folder: Annotated[Path, typer.Argument(help="The folder of an evolution of one controller, which may run.")],
-    out: Annotated[Path, typer.Argument(help=f"The film or picture: {', '.join(ENDINGS)}.", callback=output(*ENDINGS))],
+    out: Annotated[
+        Path,
+        typer.Argument(
+            help=f"The film, picture, or page with a player: {', '.join(ENDINGS)}.", callback=output(*ENDINGS)
+        ),
+    ],
     generations: Annotated[
         str | None,
         typer.Option(
@@ -58,6 +64,7 @@ def ghosts(
     """
     import numpy as np
 
+    from kiks.export.ghost_frames import save_ghost_page
     from kiks.export.ghosts import save_ghosts
     from kiks.learn import tasks
     from kiks.learn.evolution_log import Folder
@@ -68,12 +75,16 @@ def ghosts(
     if chosen is None:
         count = max(Folder(folder).generation_count(), 1)
         chosen = np.unique(np.linspace(1, count, SHOWN).round().astype(int)).tolist()
-    if out.suffix == ENDINGS[-1]:
+    if out.suffix == ".png":
         chosen = chosen[-1:]
     ready_batch()
     scenes = ghosts_of(folder, chosen, world=world, task=given)
     options = {name: value for name, value in (("size", size), ("fps", fps), ("speed", speed)) if value is not None}
-    with progress_bar(out.name) as show:
-        save_ghosts(scenes, out, on_progress=show, **options)  # type: ignore[arg-type] # checked there
+    if out.suffix == ".html":
+        leave_out(context, "of a page", "size", "fps", "speed")
+        save_ghost_page(scenes, out)
+    else:
+        with progress_bar(out.name) as show:
+            save_ghosts(scenes, out, on_progress=show, **options)  # type: ignore[arg-type] # checked there
     for scene in scenes:
         typer.echo(scene.title)

@@ -60,7 +60,7 @@ class RunFrames:
         self.replay = Replay(log, log.begin_ns)
         self._take()
         self.begin_ns, self.end_ns = begin_ns, end_ns = log.begin_ns, log.end_ns
-        self.period_ns = _period_ns(end_ns - begin_ns, len(self.frames[0]))
+        self.period_ns = fitting_period_ns(end_ns - begin_ns, len(self.frames[0]))
         for time_ns in range(begin_ns + self.period_ns, end_ns, self.period_ns):
             self.replay.sim.advance_to(time_ns)
             self._take()
@@ -126,11 +126,11 @@ class RunFrames:
         return base64.b64encode(b"".join([*parts, packer.flush()])).decode()
 
 
-def _period_ns(duration_ns: int, frame_bytes: int) -> int:
+def fitting_period_ns(duration_ns: int, frame_bytes: int) -> int:
     """Return the shortest period [ns] with which all frames of a run have room.
 
     Example:
-        >>> _period_ns(300 * 10**9, 272), _period_ns(3600 * 10**9, 272)
+        >>> fitting_period_ns(300 * 10**9, 272), fitting_period_ns(3600 * 10**9, 272)
         (40000000, 80000000)
     """
     period_ns = PERIOD_NS

@@ -145,6 +145,7 @@ export class TopView {
       if (show.contacts && robot.isTouching) this._drawTouch(context, x, y, scene.robots[index].radius_mm * scale);
       context.save();
       context.transform(scale * cosine, -scale * sine, -scale * sine, -scale * cosine, x, y);
+      context.globalAlpha = scene.robots[index].opacity ?? 1;
       paintRobot(context, this._looks[index], robot, scale, this._isDark);
       context.restore();
     });
