@@ -84,10 +84,6 @@ it senses the thing, and 3 mm more before its command acts.
 """
 
 
-AVOID_S = 40.0
-"""Time in each world [s]. After half of it in twice as many worlds, some champions stay in a dead end for ever."""
-
-
 def avoid_fitness(values: Values) -> Floats:
     """Return the fitness of `avoid`: that of Floreano and Mondada (1994) times `roaming`."""
     return without_contacts(cautious_mean(values["avoidance"] * values["roaming"]), values)
@@ -109,10 +105,10 @@ def avoid() -> Task:
         controllers.linear(speed_limit=AVOID_SPEED_LIMIT),
         (measures.avoidance, measures.roaming, measures.contacts, measures.path_mm, measures.straightness),
         fitness=avoid_fitness,
-        seconds=AVOID_S,
-        worlds=6,
+        seconds=20.0,
+        worlds=12,
         timing=Timing(period_s=AVOID_PERIOD_S),
-        axes=(Axis("path_mm", 0, 2000), Axis("straightness", 0, 1)),
+        axes=(Axis("path_mm", 0, 1000), Axis("straightness", 0, 1)),
         exam=Exam(
             training("unseen", "rooms"),
             (measures.contacts, measures.roaming),
