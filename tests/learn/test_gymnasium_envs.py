@@ -82,7 +82,7 @@ def test_the_error_names_a_missing_package(missing: str, module: str) -> None:
     assert "pip install 'kiks[learn]'" in found.stderr
 
 
-@pytest.mark.parametrize("name", ["kiks/Avoid-v0", "kiks/Maze-v0", "kiks/Light-v0", "kiks/Football-v0"])
+@pytest.mark.parametrize("name", IDS)
 def test_single_and_vector_environments_have_the_same_episodes(name: str) -> None:
     many = gymnasium.make_vec(name, num_envs=9, max_episode_steps=7, threads=2)
     assert isinstance(many, KheperaVectorEnv)
@@ -90,6 +90,8 @@ def test_single_and_vector_environments_have_the_same_episodes(name: str) -> Non
     single = gymnasium.make(name, max_episode_steps=7)
     world = 4
     seen, _ = many.reset(seed=10)
+    for other in range(9):
+        np.testing.assert_array_equal(single.reset(seed=10 + other)[0], seen[other])
     expected, _ = single.reset(seed=10 + world)
     is_done = False
     for action in actions:

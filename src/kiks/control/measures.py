@@ -202,8 +202,7 @@ def roaming(moment: Any, notes: Any) -> None:
         >>> round(rollouts.values.item(), 2)
         0.17
     """
-    away_mm = moved_lately_mm(moment, notes)
-    notes[0] += min(away_mm / (ROAMING_S * FULL_SPEED_MM_S), 1.0)
+    notes[0] += roaming_share(moment, notes)
     notes[1] += 1.0
 
 
@@ -258,12 +257,7 @@ def avoidance(moment: Any, notes: Any) -> None:
         >>> round(rollouts.values.item(), 2)
         0.5
     """
-    highest = 0.0
-    for k in range(8):
-        highest = max(highest, moment.sensors[k])
-    left, right = share_of_full(moment.wheels[0]), share_of_full(moment.wheels[1])
-    straight = 1.0 - np.sqrt(0.5 * abs(left - right))
-    notes[0] += max(0.5 * (left + right), 0.0) * straight * (1.0 - min(highest / FULL_COUNT, 1.0))
+    notes[0] += freely_ahead(moment)
     notes[1] += 1.0
 
 
@@ -804,6 +798,23 @@ def moved_lately_mm(moment: Any, notes: Any) -> Any:
     notes[2] += share * (moment.x_mm - notes[2])
     notes[3] += share * (moment.y_mm - notes[3])
     return distance_mm(moment, notes[2], notes[3])
+
+
+@kernel
+def roaming_share(moment: Any, notes: Any) -> Any:
+    """Return how fast the robot gets away from where it was, 1 for 80 mm/s, as in `roaming`; notes 2 and 3 as there."""
+    return min(moved_lately_mm(moment, notes) / (ROAMING_S * FULL_SPEED_MM_S), 1.0)
+
+
+@kernel
+def freely_ahead(moment: Any) -> Any:
+    """Return how fast, how straight and how far from everything the robot drives, from 0 to 1, as in `avoidance`."""
+    highest = 0.0
+    for k in range(8):
+        highest = max(highest, moment.sensors[k])
+    left, right = share_of_full(moment.wheels[0]), share_of_full(moment.wheels[1])
+    straight = 1.0 - np.sqrt(0.5 * abs(left - right))
+    return max(0.5 * (left + right), 0.0) * straight * (1.0 - min(highest / FULL_COUNT, 1.0))
 
 
 @kernel

@@ -12,7 +12,15 @@ from numpy.typing import NDArray
 
 from kiks.control.controllers import linear
 from kiks.control.measure import Measure, measure
-from kiks.control.measures import avoidance, light_approach, near_light_share, nearest_lamp_mm, wall_following
+from kiks.control.measures import (
+    freely_ahead,
+    light_approach,
+    mean,
+    near_light_share,
+    nearest_lamp_mm,
+    roaming_share,
+    wall_following,
+)
 from kiks.errors import ParameterError, nearest, shown
 from kiks.learn import football as game
 from kiks.learn import ready_tasks
@@ -21,10 +29,20 @@ from kiks.model.arena import Arena, Cylinder, Pose
 from kiks.model.checks import check_kind, check_number
 
 CONTACT_COST = 5.0
-"""What a contact takes off the reward of `Follow`: as much as half a second of following at best."""
+"""What a contact takes off the rewards of `Avoid` and `Follow`: half a second of following at best is worth as much."""
 
 ARRIVED_MM = 60.0
 """Distance to a lamp at which a robot has arrived [mm]; nearer, most light comes from above."""
+
+
+@measure(notes=4, result=mean, senses=("proximity",))
+def exploring(moment: Any, notes: Any) -> None:
+    """Mean of the products of `avoidance` and `roaming` of a step: fast, straight, far from everything, and elsewhere.
+
+    A robot that shuttles between two places or drives in circles gets little, unlike in `avoidance` alone.
+    """
+    notes[0] += freely_ahead(moment) * roaming_share(moment, notes)
+    notes[1] += 1.0
 
 
 @measure(notes=2)
@@ -75,8 +93,8 @@ def without_contacts(reward: Measure, cost: float = CONTACT_COST) -> Measure:
 
 
 def avoid() -> Task:
-    """Drive fast and straight, far from everything."""
-    return Task("Avoid", ready_tasks.training("pillars"), linear(), (avoidance,), reward=avoidance)
+    """Drive fast and straight, explore, and touch nothing: the task `avoid`."""
+    return ready_tasks.avoid(name="Avoid", reward=without_contacts(exploring))
 
 
 def follow() -> Task:
