@@ -126,3 +126,39 @@ def test_shuttling_earns_only_where_speed_is_counted_without_its_sign() -> None:
         values[shuttling] = float(task.evaluate(back_and_forth, np.array([1]), 1)[0, 0])
     assert values[True] > 0.5
     assert values[False] < 0.1
+
+
+# ---- Floreano and Nolfi 1997 ----
+
+
+def test_the_predator_sees_the_prey_in_five_sectors() -> None:
+    """With weights from one unit of vision to one wheel alone, that wheel turns where the prey is in its sector."""
+    from kiks.learn.classic_tasks import predator
+
+    white = [225.0 * (1 - 0.41 * ((k - 7.875) / 7.875) ** 2) for k in range(16)]
+    for dark, unit in ((0, 0), (3, 0), (4, 1), (7, 2), (9, 2), (12, 3), (13, 4), (15, 4)):
+        greys = [0.55 * grey if k == dark else 0.9 * grey for k, grey in enumerate(white)]
+        turning = []
+        for tried in range(5):
+            parameters, wheels = np.zeros(30), np.zeros(2)
+            parameters[2 * (8 + tried)] = 10.0
+            predator(np.array([0.0] * 8 + greys), np.zeros(2), parameters, wheels)
+            turning.append(wheels[0] > 9.9)
+            assert abs(wheels[1]) < 1e-9
+        assert turning == [tried == unit for tried in range(5)], dark
+
+
+def test_a_pursuit_ends_with_the_contact() -> None:
+    """A predator drives at a prey that stands: t is when they touch, and both fitnesses follow from it."""
+    room = replace(kiks.Arena.box(470, 470), starts=(Pose(120, 235, 0.0), Pose(320, 235, 0.0)))
+    task = kiks.tasks.floreano_nolfi_1997(arenas=(room,), starts="arena")
+    pair = np.zeros((2, 50))
+    pair[0, 26:30] = [10.0, 0.0, 0.0, 10.0]  # the outputs keep themselves: 80 mm/s ahead, once there is a half
+    values = task.evaluate(pair, np.array([1, 1]), 1)
+    chased, left = ({name: row[k] for k, name in enumerate(task.value_names)} for row in values)
+    assert left["prey_fitness"] == 1.0
+    assert left["predator_fitness"] == 0.0
+    assert chased["prey_lasted_steps"] == pytest.approx((200 - 57) / 80 / 0.1, abs=4)
+    assert chased["prey_fitness"] == chased["prey_lasted_steps"] / 500
+    assert chased["predator_fitness"] == pytest.approx(1.0 - chased["prey_fitness"])
+    assert chased["predator_path_mm"] < 160

@@ -41,6 +41,16 @@ def test_keys_left_out_keep_the_values_of_the_ready_made_task(folder: Path) -> N
     assert task.controller is base.controller
 
 
+def test_the_second_side_has_a_controller_of_its_own(folder: Path) -> None:
+    task = load(folder, 'base = "pursuit"\n[against]\nkind = "gru"\nunits = 2\n')
+    base = kiks.tasks.pursuit()
+    assert task.against is not None
+    assert task.against.controller is kiks.controllers.gru(units=2)
+    assert task.controller is base.controller
+    with pytest.raises(kiks.ParameterError, match="against must be left out, because 'avoid' has one side"):
+        load(folder, 'base = "avoid"\n[against]\nkind = "gru"\n')
+
+
 def test_all_keys(folder: Path) -> None:
     (folder / "my.toml").write_bytes((Path(kiks.__file__).parent / "model/robots/khepera.toml").read_bytes())
     task = load(

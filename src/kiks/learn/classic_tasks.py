@@ -15,13 +15,34 @@ from numpy.typing import NDArray
 
 from kiks.batch.loop_timing import Timing
 from kiks.control import controllers, measures
+from kiks.control.controller import controller
 from kiks.control.measure import measure
-from kiks.control.measures import FULL_COUNT, FULL_SPEED_MM_S, ROAMING_S, mean, moved_lately_mm, share_of_full
+from kiks.control.measures import (
+    FULL_COUNT,
+    FULL_SPEED_MM_S,
+    ROAMING_S,
+    distance_mm,
+    mean,
+    moved_lately_mm,
+    share_of_full,
+)
+from kiks.control.neural_nets import logistic
 from kiks.engine.compiling import kernel
 from kiks.engine.numbers import sin_cos
+from kiks.engine.simd.stack_arrays import stack_floats
 from kiks.learn.exam import Exam
-from kiks.learn.ready_tasks import Floats, Values, ready
-from kiks.learn.task import Task
+from kiks.learn.ready_tasks import (
+    CAMERA_BAUD,
+    CAUGHT_MM,
+    PREDATOR_SPEED,
+    PREY_SPEED,
+    PURSUIT_APART_MM,
+    PURSUIT_MM,
+    Floats,
+    Values,
+    ready,
+)
+from kiks.learn.task import Side, Task
 from kiks.model.arena import Arena, Cylinder
 from kiks.model.robot import RobotSpec, specs_of
 from kiks.model.shipped import shipped_arena
@@ -272,4 +293,131 @@ def nolfi_1997(architecture: str = "emergent") -> Task:
             collecting_arenas(10, seed=2), (measures.taken_out,), all_out, "carried all cylinders out", seconds=120.0
         ),
         about="carry cylinders out of the arena with the gripper (1996, 1997)",
+    )
+
+
+# ---- Floreano and Nolfi 1997 ----
+
+RACE_S, RACE_STEPS = 50.0, 500
+"""A trial lasts for 500 cycles of 100 ms, or until predator and prey touch."""
+
+WHITE, FALL, MIDDLE, DARK_SHARE = 225.0, 0.41, 7.875, 0.75
+"""Grey of a white wall in the middle of the camera's picture; the share by which it is less at its border; the middle
+of the sixteen greys; and the share of white below which a grey is dark. A Khepera's body has half of the wall's grey.
+"""
+
+VISION_UNITS, GREYS = 5, 16
+"""Units of the predator's vision, of 7.2 degrees each, and greys that they divide among them."""
+
+PREDATOR_INPUTS, PREY_INPUTS = 13, 8
+"""Inputs of the networks."""
+
+
+@kernel
+def perceptron(inputs: Any, memory: Any, parameters: Any, wheels: Any) -> None:
+    """Set both wheels from inputs and the last outputs; weights without biases [input or output, wheel]."""
+    count = inputs.shape[0]
+    for wheel in range(2):
+        total = 0.0
+        for number in range(count):
+            total += inputs[number] * parameters[2 * number + wheel]
+        for number in range(2):
+            total += memory[number] * parameters[2 * (count + number) + wheel]
+        wheels[wheel] = logistic(total)
+    for wheel in range(2):
+        memory[wheel] = wheels[wheel]
+
+
+@controller(parameters=30, memory=2, senses=("proximity", "camera"))
+def predator(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
+    """Drive by proximity and by five units of vision, each 1 if something dark is in its sector; 80 mm/s at most."""
+    inputs = stack_floats(PREDATOR_INPUTS)
+    for number in range(8):
+        inputs[number] = sensors[number] / FULL_COUNT
+    for unit in range(VISION_UNITS):
+        inputs[8 + unit] = 0.0
+    for grey in range(GREYS):
+        aside = (grey - MIDDLE) / MIDDLE
+        if sensors[8 + grey] < DARK_SHARE * WHITE * (1.0 - FALL * aside * aside):
+            inputs[8 + grey * VISION_UNITS // GREYS] = 1.0
+    perceptron(inputs, memory, parameters, wheels)
+    for wheel in range(2):
+        wheels[wheel] = PREDATOR_SPEED * (2.0 * wheels[wheel] - 1.0)
+
+
+@controller(parameters=20, memory=2)
+def prey(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
+    """Drive by proximity, 160 mm/s at most."""
+    inputs = stack_floats(PREY_INPUTS)
+    for number in range(8):
+        inputs[number] = sensors[number] / FULL_COUNT
+    perceptron(inputs, memory, parameters, wheels)
+    for wheel in range(2):
+        wheels[wheel] = PREY_SPEED * (2.0 * wheels[wheel] - 1.0)
+
+
+@measure
+def caught(moment: Any, notes: Any) -> None:
+    """1 from the contact of predator and prey on."""
+    if is_caught(moment):
+        notes[0] = 1.0
+
+
+@measure
+def lasted_steps(moment: Any, notes: Any) -> None:
+    """Number of cycles before the contact."""
+    if not is_caught(moment):
+        notes[0] += 1.0
+
+
+@kernel
+def is_caught(moment: Any) -> Any:
+    """Return whether another robot touches it."""
+    for other in range(moment.poses.shape[0]):
+        is_near = distance_mm(moment, moment.poses[other, 0], moment.poses[other, 1]) <= CAUGHT_MM
+        if other != moment.robot and is_near:
+            return True
+    return False
+
+
+def lasted(values: Values) -> Floats:
+    """Return t / 500, the prey's fitness."""
+    share: Floats = values["lasted_steps"].mean(axis=1) / RACE_STEPS
+    return share
+
+
+def caught_early(values: Values) -> Floats:
+    """Return 1 - t / 500, the predator's fitness."""
+    return 1.0 - lasted(values)
+
+
+@ready
+def floreano_nolfi_1997() -> Task:
+    """The task of a predator and a prey that is twice as fast (Floreano and Nolfi 1997).
+
+    Networks, genes and selection are those of the papers: weights of five bits, without biases, the best fifth has five
+    children each.
+
+    Example:
+        >>> import kiks
+        >>> task = kiks.tasks.floreano_nolfi_1997()
+        >>> [side.parameter_count for side in task.sides], task.population, task.seconds
+        ([30, 20], 100, 50.0)
+    """
+    return Task(
+        "floreano_nolfi_1997",
+        (Arena.box(PURSUIT_MM, PURSUIT_MM),),
+        predator,
+        (lasted_steps, measures.path_mm, measures.contacts),
+        fitness=caught_early,
+        side="predator",
+        against=Side("prey", prey, lasted),
+        seconds=RACE_S,
+        until=caught,
+        apart_mm=PURSUIT_APART_MM,
+        timing=Timing(baud=CAMERA_BAUD),
+        algorithm="sga",
+        generations=100,
+        population=100,
+        about="predator and prey of five bits a synapse (1997)",
     )

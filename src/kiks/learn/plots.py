@@ -210,15 +210,8 @@ def save_tournament_plot(tournament: Tournament, path: str | Path) -> None:
 def figure_of_tournament(tournament: Tournament) -> Any:
     """Return the figure of `save_tournament_plot`, a `matplotlib.figure.Figure`."""
     figure, (squares, lines) = panels(2)
-    (first, second), generations = tournament.sides, tournament.generations
-    half = 0.5 * (generations[-1] - generations[0]) / max(len(generations) - 1, 1) or 0.5
-    extent = (generations[0] - half, generations[-1] + half) * 2
-    image = squares.imshow(
-        tournament.scores[0], origin="lower", extent=extent, interpolation="nearest", cmap="gray", aspect="equal"
-    )
-    title = "champions of all generations"
-    squares.set(xlabel=f"generation of the {second}", ylabel=f"generation of the {first}", title=title)
-    figure.colorbar(image, ax=squares, label=f"fitness of the {first}")
+    generations = tournament.generations
+    draw_squares(squares, tournament)
     for side, name in enumerate(tournament.sides):
         best, means = tournament.best[side], tournament.means[side]
         lines.plot(generations, means, color=SIDE_COLOURS[side], label=name)
@@ -228,6 +221,24 @@ def figure_of_tournament(tournament: Tournament) -> Any:
     lines.grid()
     legend_below(lines)
     return figure
+
+
+def draw_squares(axes: Any, tournament: Tournament) -> None:
+    """Draw the fitness of the first side in all pairs of champions as grey squares.
+
+    Args:
+        axes: The axes.
+        tournament: The tournament.
+    """
+    (first, second), generations = tournament.sides, tournament.generations
+    half = 0.5 * (generations[-1] - generations[0]) / max(len(generations) - 1, 1) or 0.5
+    extent = (generations[0] - half, generations[-1] + half) * 2
+    image = axes.imshow(
+        tournament.scores[0], origin="lower", extent=extent, interpolation="nearest", cmap="gray", aspect="equal"
+    )
+    title = "champions of all generations"
+    axes.set(xlabel=f"generation of the {second}", ylabel=f"generation of the {first}", title=title)
+    axes.figure.colorbar(image, ax=axes, label=f"fitness of the {first}")
 
 
 # ---- several evolutions ----

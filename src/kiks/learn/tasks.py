@@ -14,7 +14,12 @@ from kiks.control.controller import Controller
 from kiks.control.controllers import Recipe, controller_of
 from kiks.control.recipes import module_in
 from kiks.errors import KiksError, ParameterError, nearest, shown
-from kiks.learn.classic_tasks import floreano_mondada_1994, jakobi_husbands_harvey_1995, nolfi_1997
+from kiks.learn.classic_tasks import (
+    floreano_mondada_1994,
+    floreano_nolfi_1997,
+    jakobi_husbands_harvey_1995,
+    nolfi_1997,
+)
 from kiks.learn.ready_tasks import TASKS, avoid, disperse, follow, football, gather, light, maze, pursuit
 from kiks.learn.task import WORLDS_MAX, Seconds, Task
 from kiks.model.arena import Arena
@@ -28,6 +33,7 @@ __all__ = [
     "avoid",
     "disperse",
     "floreano_mondada_1994",
+    "floreano_nolfi_1997",
     "follow",
     "football",
     "gather",
@@ -82,6 +88,7 @@ class TaskFile:
     think_ms: Annotated[Milliseconds, Field(description="Thinking time before each command.")] | None = None
     baud: Annotated[Whole, Field(ge=0, le=10_000_000, description="Bits per second; 0 for no line.")] | None = None
     controller: Annotated[Recipe, Field(description="The controller to evolve.")] | None = None
+    against: Annotated[Recipe, Field(description="Of two sides, the controller of the second.")] | None = None
 
 
 def load(name: str | Path, controller: Controller | None = None) -> Task:
@@ -155,4 +162,10 @@ def _task_of(given: TaskFile, path: Path, controller: Controller | None) -> Task
         controller = controller_of(given.controller, folder)
     if controller is not None:
         changes["controller"] = controller
+    if given.against is not None:
+        if base.against is None:
+            raise ParameterError(
+                f"against must be left out, because {shown(given.base)} has one side, but it was given."
+            )
+        changes["against"] = replace(base.against, controller=controller_of(given.against, folder))
     return replace(base, name=given.name or path.stem, file=str(path.absolute()), **changes)
