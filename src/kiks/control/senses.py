@@ -208,8 +208,8 @@ def barrier(view: Any, readings: Any) -> None:
 @sense(command="T,31,F", most=COUNTS, turret="floor")
 def floor(view: Any, readings: Any) -> None:
     """Read the brightness of the floor under the robot's middle."""
-    noisy = view.is_noisy
-    readings[0] = sense_floor(view.scene, view.world, view.robot, view.tick_count, view.time_ns, noisy, 0.0, 0.0, 0)
+    place = view.x_mm, view.y_mm
+    readings[0] = sense_floor(view.scene, view.world, view.robot, *place, view.time_ns, view.is_noisy, 0)
 
 
 SENSES = {each.name: each for each in (proximity, ambient, camera, positions, speeds, barrier, floor)}

@@ -26,9 +26,9 @@ from kiks.control.measures import (
     moved_lately_mm,
     share_of_full,
 )
-from kiks.control.neural_nets import logistic
+from kiks.control.neural_nets import do_layer, layer_size, logistic
 from kiks.engine.compiling import kernel
-from kiks.engine.numbers import sin_cos
+from kiks.engine.numbers import sin_cos, tanh
 from kiks.engine.simd.stack_arrays import stack_floats
 from kiks.learn.exam import Exam
 from kiks.learn.ready_tasks import (
@@ -420,4 +420,132 @@ def floreano_nolfi_1997() -> Task:
         generations=100,
         population=100,
         about="predator and prey of five bits a synapse (1997)",
+    )
+
+
+# ---- Floreano and Mondada 1996 ----
+
+FULL_ACTIONS, LIFE_ACTIONS, ACTION_S = 50.0, 150, 0.38
+"""Actions for which a full battery lasts, most actions of a life, and the time of each [s]."""
+
+HIDDEN, CONTEXT, USED = 5, 0, 5
+"""Hidden units of the homing network; where its memory holds them, and what the battery has lost, a share of it."""
+
+_INPUTS = 8 + 2 + 1 + 1
+_FED = _INPUTS + HIDDEN
+_WHEELS_FIRST = layer_size(_FED, HIDDEN)
+_AMBIENT, FLOOR = 8, 16
+_FRONT, _BACK = 2, 6  # of the two ambient light sensors that it uses
+_BLACK = 512.0  # below this reading of the floor sensor it stands on the charging zone
+
+
+@kernel
+def charge_lost(lost: Any, floor: Any) -> Any:
+    """Return the share of the battery that is lost after one more action: none on the charging zone."""
+    return 0.0 if floor < _BLACK else min(lost + 1.0 / FULL_ACTIONS, 1.0)
+
+
+@controller(senses=("proximity", "ambient", "floor"), memory=HIDDEN + 1, parameters=102)
+def homing_network(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
+    """Drive by hidden units that feed back to themselves; one of their inputs is the battery, which is counted here.
+
+    Inputs: eight of proximity, two of ambient light, the floor, the battery; then the last hidden units. Parameters:
+    5 biases of hidden units, a matrix [17, 5], 2 biases of wheels, a matrix [5, 2].
+    """
+    memory[USED] = charge_lost(memory[USED], sensors[FLOOR])
+    inputs, hidden, outputs = stack_floats(_FED), stack_floats(HIDDEN), stack_floats(2)
+    for k in range(8):
+        inputs[k] = sensors[k] / 1023.0
+    inputs[8] = (500.0 - sensors[_AMBIENT + _FRONT]) / 500.0
+    inputs[9] = (500.0 - sensors[_AMBIENT + _BACK]) / 500.0
+    inputs[10] = sensors[FLOOR] / 1023.0
+    inputs[11] = 1.0 - memory[USED]
+    for k in range(HIDDEN):
+        inputs[_INPUTS + k] = memory[CONTEXT + k]
+    do_layer(inputs, _FED, parameters, 0, hidden, HIDDEN)
+    for k in range(HIDDEN):
+        memory[CONTEXT + k] = tanh(hidden[k])
+    do_layer(memory, HIDDEN, parameters, _WHEELS_FIRST, outputs, 2)
+    for wheel in range(2):
+        wheels[wheel] = controllers.SPEED_LIMIT * tanh(outputs[wheel])
+
+
+@measure(notes=2, senses=("proximity", "ambient", "floor"))
+def battery_empty(moment: Any, notes: Any) -> None:
+    """1 once the battery is empty, which ends a life."""
+    notes[1] = charge_lost(notes[1], moment.sensors[FLOOR])
+    if notes[1] >= 1.0 - 1e-9:
+        notes[0] = 1.0
+
+
+@kernel
+def clear_off_zone(moment: Any) -> Any:
+    """Return (1 - i) as a share of a life's actions; 0 on the charging zone."""
+    highest = 0.0
+    for k in range(8):
+        highest = max(highest, moment.sensors[k])
+    is_off = moment.sensors[FLOOR] >= _BLACK
+    return (1.0 - min(highest / FULL_COUNT, 1.0)) / LIFE_ACTIONS if is_off else 0.0
+
+
+@measure(senses=("proximity", "ambient", "floor"))
+def homing(moment: Any, notes: Any) -> None:
+    """Sum of V (1 - i) over a life, divided by its most actions; nothing is counted on the charging zone.
+
+    V and i are those of `navigation`. Battery, lamp and zone are not in it: a robot that charges lives longer.
+    """
+    speed = 0.5 * (abs(share_of_full(moment.wheels[0])) + abs(share_of_full(moment.wheels[1])))
+    notes[0] += speed * clear_off_zone(moment)
+
+
+@measure(notes=4, senses=("proximity", "ambient", "floor"))
+def homing_gained(moment: Any, notes: Any) -> None:
+    """The same with the V of `navigation_gained`."""
+    away_mm = moved_lately_mm(moment, notes)
+    notes[0] += min(away_mm / (ROAMING_S * FULL_SPEED_MM_S), 1.0) * clear_off_zone(moment)
+    notes[1] += 1.0
+
+
+@measure(notes=2, senses=("proximity", "ambient", "floor"))
+def charges(moment: Any, notes: Any) -> None:
+    """How often it has come to the charging zone."""
+    is_there = moment.sensors[FLOOR] < _BLACK
+    if is_there and notes[1] == 0.0:
+        notes[0] += 1.0
+    notes[1] = 1.0 if is_there else 0.0
+
+
+@measure
+def actions(moment: Any, notes: Any) -> None:
+    """Number of actions."""
+    notes[0] += 1.0
+
+
+@ready
+def floreano_mondada_1996(shuttling: bool = False) -> Task:
+    """The task to come back to a charging zone before a battery is empty (Floreano and Mondada 1996).
+
+    Args:
+        shuttling: Whether V counts the speeds of the wheels without their signs, as for `floreano_mondada_1994`.
+
+    Example:
+        >>> import kiks
+        >>> task = kiks.tasks.floreano_mondada_1996()
+        >>> task.parameter_count, task.timings[0].period_s, task.seconds
+        (102, 0.38, 57.0)
+    """
+    return Task(
+        "floreano_mondada_1996" + ("_shuttling" if shuttling else ""),
+        (shipped_arena("classics/floreano_mondada_1996"),),
+        homing_network,
+        (homing if shuttling else homing_gained, actions, charges, measures.path_mm, measures.contacts),
+        fitness=mean_of_first,
+        seconds=LIFE_ACTIONS * ACTION_S,
+        timing=Timing(period_s=ACTION_S),
+        spread=HALF_UNIT_SPREAD,
+        algorithm="sga:bits=0,selection=roulette,crossover=0.1,mutation=0.2",
+        generations=240,
+        population=100,
+        until=battery_empty,
+        about="come back to a charging zone before the battery is empty (1996)",
     )

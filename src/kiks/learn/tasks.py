@@ -16,6 +16,7 @@ from kiks.control.recipes import module_in
 from kiks.errors import KiksError, ParameterError, nearest, shown
 from kiks.learn.classic_tasks import (
     floreano_mondada_1994,
+    floreano_mondada_1996,
     floreano_nolfi_1997,
     jakobi_husbands_harvey_1995,
     nolfi_1997,
@@ -33,6 +34,7 @@ __all__ = [
     "avoid",
     "disperse",
     "floreano_mondada_1994",
+    "floreano_mondada_1996",
     "floreano_nolfi_1997",
     "follow",
     "football",

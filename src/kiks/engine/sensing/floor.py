@@ -41,9 +41,19 @@ def spot_brightness(floor: Any, cell_mm: Any, x_mm: Any, y_mm: Any) -> Any:
         return 1.0 * floor[0, 0]
     column, row, radius = x_mm / cell_mm - 0.5, y_mm / cell_mm - 0.5, SPOT_MM / cell_mm
     reach = radius + 0.5
+    low, high = math.ceil(row - reach), math.floor(row + reach) + 1
+    left, right = math.ceil(column - reach), math.floor(column + reach) + 1
+    if low >= 0 and left >= 0 and high <= floor.shape[0] and right <= floor.shape[1]:
+        # Mostly no edge is near: that is quickly seen.
+        first, differ = floor[low, left], np.uint8(0)
+        for j in range(low, high):
+            for i in range(left, right):
+                differ |= floor[j, i] ^ first
+        if differ == 0:
+            return 1.0 * first
     total, weights = np.int64(0), np.int64(0)
-    for j in range(math.ceil(row - reach), math.floor(row + reach) + 1):
-        for i in range(math.ceil(column - reach), math.floor(column + reach) + 1):
+    for j in range(low, high):
+        for i in range(left, right):
             apart = math.sqrt((i - column) * (i - column) + (j - row) * (j - row))
             weight = np.int64(_WHOLE * min(max(0.0, reach - apart), 1.0) + 0.5)
             # Beyond the arena the floor goes on as at its edge.
@@ -54,31 +64,23 @@ def spot_brightness(floor: Any, cell_mm: Any, x_mm: Any, y_mm: Any) -> Any:
 
 
 @kernel
-def sense_floor(
-    scene: Any, world: Any, robot: Any, tick_count: Any, time_ns: Any, is_noisy: Any, ahead: Any, left: Any, index: Any
-) -> Any:
-    """Return the reading of a floor sensor at a time.
+def sense_floor(scene: Any, world: Any, robot: Any, x: Any, y: Any, time_ns: Any, is_noisy: Any, index: Any) -> Any:
+    """Return the reading of a floor sensor at a place and a time.
 
     Args:
         scene: The scene (`kiks.engine.scene.open_scene`).
         world: Index of the world.
         robot: Index of the robot.
-        tick_count: Ticks done.
+        x: Where it looks [mm].
+        y: As above.
         time_ns: Time of the reading [ns].
         is_noisy: False for the expected reading, without rounding.
-        ahead: How far ahead of the robot's middle the sensor looks [mm].
-        left: How far to the left of it [mm].
         index: Number of the sensor on its robot: each has noise of its own.
     """
-    state = scene.robots[world, robot]
-    x, y, heading = pose_at(state, tick_count, time_ns)
-    if ahead != 0.0 or left != 0.0:
-        sine, cosine = sin_cos(heading)
-        x, y = x + ahead * cosine - left * sine, y + ahead * sine + left * cosine
     counts = spot_brightness(scene.floor, scene.walls.cell_mm, x, y) * (COUNTS / 255.0)
     if not is_noisy:
         return counts
-    if scene.kinds[state.kind].is_noisy != 0:
+    if scene.kinds[scene.robots[world, robot].kind].is_noisy != 0:
         chance = uniform(scene.seeds[world], 0, robot, STREAM_FLOOR, time_ns, index)
         counts += NOISE_COUNTS * (2.0 * chance - 1.0)
     return min(max(0.0, math.floor(counts + 0.5)), COUNTS)
@@ -88,5 +90,10 @@ def sense_floor(
 def read_floor(
     scene: Any, robot: Any, tick_count: Any, time_ns: Any, is_noisy: Any, ahead: Any, left: Any, index: Any
 ) -> Any:
-    """Call `sense_floor` for the first world of a scene."""
-    return sense_floor(open_scene(scene[0]), 0, robot, tick_count, time_ns, is_noisy, ahead, left, index)
+    """Call `sense_floor` for the first world of a scene, and a place ahead and to the left of a robot's middle [mm]."""
+    scene = open_scene(scene[0])
+    x, y, heading = pose_at(scene.robots[0, robot], tick_count, time_ns)
+    if ahead != 0.0 or left != 0.0:
+        sine, cosine = sin_cos(heading)
+        x, y = x + ahead * cosine - left * sine, y + ahead * sine + left * cosine
+    return sense_floor(scene, 0, robot, x, y, time_ns, is_noisy, index)
