@@ -73,7 +73,7 @@ def main(
         paths.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal", title="before, one of each")
         clusters.axhline(0, color="0.8", linewidth=0.5, zorder=0)
         clusters.axvline(0, color="0.8", linewidth=0.5, zorder=0)
-        clusters.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal", title="ends: before (open), after")
+        clusters.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal", title="ends; open: before")
         clusters.set_box_aspect(1)
         clusters.margins(0.15)
         paths.set_box_aspect(1)

@@ -107,7 +107,7 @@ class TurretPart(Compiled):
 
     def __init__(self, function: Callable[..., Any], command: str, turret: Any) -> None:
         super().__init__(function)
-        if is_trusted(function):
+        if self._stands_in_module:
             self.kernel = entry(function)
         if not isinstance(command, str) or not command.isascii() or not command.isprintable() or not command:
             raise ParameterError(f"command must be a line such as 'E' or 'T,24,C', but it was {shown(command)}.")
@@ -115,12 +115,17 @@ class TurretPart(Compiled):
         self.turret = turret
         self.recipe = recipe_of(function)
 
+    @property
+    def _stands_in_module(self) -> bool:
+        """Whether it is a function of KiKS's own with one meaning: code on disk does not tell closures apart."""
+        return is_trusted(self.function) and self.function.__closure__ is None
+
     def __set_name__(self, owner: type, name: str) -> None:
         self.turret = owner
 
     def __reduce__(self) -> Any:
-        if is_trusted(self.function):
-            return self.name  # in its module
+        if self._stands_in_module:
+            return self.name
         # The turret's class has this part: each is made before the other is known.
         if not isinstance(self.turret, type):
             return super().__reduce__()

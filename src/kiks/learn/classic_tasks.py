@@ -27,6 +27,7 @@ from kiks.control.measures import (
     share_of_full,
 )
 from kiks.control.neural_nets import do_layer, layer_size, logistic
+from kiks.control.senses import Sense
 from kiks.engine.compiling import kernel
 from kiks.engine.numbers import sin_cos, tanh
 from kiks.engine.simd.stack_arrays import stack_floats
@@ -42,9 +43,10 @@ from kiks.learn.ready_tasks import (
     Values,
     ready,
 )
+from kiks.learn.sampled import sampled_proximity
 from kiks.learn.task import Side, Task
 from kiks.model.arena import Arena, Cylinder
-from kiks.model.robot import RobotSpec, specs_of
+from kiks.model.robot import SENSOR_COUNT, RobotSpec, specs_of
 from kiks.model.shipped import shipped_arena
 from kiks.model.walls import Wall
 
@@ -85,7 +87,7 @@ def navigation_gained(moment: Any, notes: Any) -> None:
 def straight_and_clear(moment: Any) -> Any:
     """Return (1 - sqrt(dv)) (1 - i)."""
     highest = 0.0
-    for k in range(8):
+    for k in range(min(SENSOR_COUNT, moment.sensors.shape[0])):
         highest = max(highest, moment.sensors[k])
     differ = 0.5 * abs(share_of_full(moment.wheels[0]) - share_of_full(moment.wheels[1]))
     return (1.0 - np.sqrt(differ)) * (1.0 - min(highest / FULL_COUNT, 1.0))
@@ -548,4 +550,59 @@ def floreano_mondada_1996(shuttling: bool = False) -> Task:
         population=100,
         until=battery_empty,
         about="come back to a charging zone before the battery is empty (1996)",
+    )
+
+
+# ---- Miglino, Lund and Nolfi 1995 ----
+
+ROUND_MM, ROUND_PLACES = 27.0, ((190.0, 130.0), (430.0, 110.0), (330.0, 250.0))
+"""Radius of the obstacles, and their places, which are our own [mm]."""
+
+
+@cache
+def box_with_obstacles() -> Arena:
+    """Return the box of Miglino, Lund and Nolfi (1995): 60 x 35 cm with a few round obstacles."""
+    discs = tuple(Wall(disc_mm=place, radius_mm=ROUND_MM) for place in ROUND_PLACES)
+    return replace(Arena.box(620, 370), name="obstacles of 1995", walls=discs)
+
+
+@measure(notes=4, result=mean)
+def navigation_seen(moment: Any, notes: Any) -> None:
+    """As `navigation_gained`, for controllers whose first sense stands for proximity."""
+    away_mm = moved_lately_mm(moment, notes)
+    notes[0] += min(away_mm / (ROAMING_S * FULL_SPEED_MM_S), 1.0) * straight_and_clear(moment)
+    notes[1] += 1.0
+
+
+@cache
+def sampled_sense(noise: str) -> Sense:
+    """Return the sense that reads tables in that box; the same object for the same noise."""
+    return sampled_proximity(box_with_obstacles(), ROUND_PLACES, ROUND_MM, noise)
+
+
+@ready
+def miglino_lund_nolfi_1995(sampled: str = "") -> Task:
+    """The task to navigate among round obstacles, with sensors from tables or whole ones (Miglino, Lund, Nolfi 1995).
+
+    Args:
+        sampled: 'none', 'uniform' or 'conservative', the noise of sensors that read tables of samples; left out, the
+            sensors of KiKS as they are.
+
+    Example:
+        >>> import kiks
+        >>> kiks.tasks.miglino_lund_nolfi_1995(sampled="uniform").controller
+        <Controller 'mlp': sampled; 22 parameters>
+    """
+    seen = sampled_sense(sampled) if sampled else "proximity"
+    return Task(
+        "miglino_lund_nolfi_1995" + (f"_{sampled}" if sampled else ""),
+        (box_with_obstacles(),),
+        controllers.mlp(hidden=(), feedback=True, senses=(seen,)),
+        (navigation_seen, measures.roaming, measures.contacts, measures.path_mm),
+        fitness=mean_of_first,
+        seconds=24.0,
+        algorithm="sga:bits=8,limit=5,parents=0.2,crossover=0,mutation=0.01",
+        generations=200,
+        population=100,
+        about="navigate among round obstacles, sensors sampled or whole (1995)",
     )

@@ -19,6 +19,7 @@ from kiks.learn.classic_tasks import (
     floreano_mondada_1996,
     floreano_nolfi_1997,
     jakobi_husbands_harvey_1995,
+    miglino_lund_nolfi_1995,
     nolfi_1997,
 )
 from kiks.learn.ready_tasks import TASKS, avoid, disperse, follow, football, gather, light, maze, pursuit
@@ -43,6 +44,7 @@ __all__ = [
     "light",
     "load",
     "maze",
+    "miglino_lund_nolfi_1995",
     "nolfi_1997",
     "pursuit",
 ]
