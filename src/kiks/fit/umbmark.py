@@ -56,9 +56,9 @@ def square_test(clockwise_mm: ArrayLike, counter_mm: ArrayLike, *, side_mm: floa
         track_mm: The track that the robot believes to have [mm].
 
     Example:
-        >>> test = square_test([[10.0, 10.0]], [[-10.0, 10.0]], side_mm=500, track_mm=53)
-        >>> round(test.alpha_deg, 3), round(test.track_mm, 2)
-        (0.0, 53.0)
+        >>> test = square_test([[-10.0, -10.0]], [[-10.0, 10.0]], side_mm=500, track_mm=53)
+        >>> round(test.alpha_deg, 3), round(test.track_mm, 2), test.ratio
+        (0.573, 53.34, 1.0)
     """
     check_number("side_mm", side_mm, 1.0, 1e6)
     check_number("track_mm", track_mm, 1.0, 1e5)
