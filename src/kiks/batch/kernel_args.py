@@ -13,7 +13,7 @@ Worlds: Any = namedtuple(
 """What the loop knows of all worlds of a batch.
 
 * line: the serial lines (`kiks.batch.loop_timing.Line`);
-* senses: the senses (`kiks.control.senses.rows_of`), int64 [sense, 6];
+* senses: the senses (`kiks.control.senses.rows_of`), int64 [sense, 7];
 * sense_counts: how many of these each robot has, int64 [robot];
 * has_camera: whether each robot has a camera, bool [robot];
 * ticks: ticks done, int64 [world];

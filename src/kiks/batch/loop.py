@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from kiks.batch.callbacks import call_decider, call_measure
-from kiks.batch.loop_timing import LENGTHS, acts_at, answer_length, digits_of, order_length
+from kiks.batch.loop_timing import LENGTHS, acts_at, answer_length, digits_of, order_length, short_answer_length
 from kiks.control.actuators import call_actuator, whole_value
 from kiks.control.controller import whole_speed
 from kiks.control.measure import Moment
@@ -57,18 +57,22 @@ def sense(scene: Any, worlds: Any, bunch: Any, is_on: Any, times_ns: Any, reader
     first = 0
     for place in range(worlds.senses.shape[0]):
         address, size, ask_length = worlds.senses[place, 0], worlds.senses[place, 1], worlds.senses[place, 2]
+        needs_all = worlds.senses[place, 6] != 0
         for k in range(numbers.shape[0]):
             if is_on[k]:
                 times_ns[k] = acts_at(line, worlds.sensed_ns[numbers[k]], ask_length)
-        pass_to(scene, worlds, bunch, times_ns)
-        show_tracks(scene, bunch)
+        # Without a line, all senses are read at one instant, and see the same tracks.
+        has_moved = pass_to(scene, worlds, bunch, times_ns)
+        if place == 0 or has_moved:
+            show_tracks(scene, bunch)
         count = 0
         for k in range(numbers.shape[0]):
             for robot in range(worlds.sensors.shape[1] if is_on[k] else 0):
                 if place >= worlds.sense_counts[robot]:
                     continue
                 if address != IN_PACKETS:
-                    show_robot(scene, bunch, k, robot)
+                    if needs_all:
+                        show_robot(scene, bunch, k, robot)
                     ticks, time_ns = bunch.ticks[k], times_ns[k]
                     read_sense(scene, worlds, place, numbers[k], robot, ticks, time_ns, first)
                     continue
@@ -101,7 +105,8 @@ def read_proximity(scene: Any, worlds: Any, place: Any, first: Any, readers: Any
         readings = worlds.sensors[readers.worlds[k], readers.robots[k], first : first + SENSOR_COUNT]
         for sensor in range(SENSOR_COUNT):
             readings[sensor] = counts[k, sensor]
-        note_reply(worlds, place, readers.worlds[k], readers.times_ns[k], counts[k])
+        length = short_answer_length(worlds.senses[place, 3], counts[k])
+        note_reply(worlds, readers.worlds[k], readers.times_ns[k], length)
 
 
 @kernel
@@ -112,13 +117,13 @@ def read_sense(
     row = worlds.senses[place]
     readings = worlds.sensors[world, robot, first : first + row[1]]
     call_sense(row[0], (view_of(scene, world, robot, tick_count, time_ns, True, row[4], row[5]), readings))
-    note_reply(worlds, place, world, time_ns, readings)
+    note_reply(worlds, world, time_ns, answer_length(row[3], readings))
 
 
 @inlined
-def note_reply(worlds: Any, place: Any, world: Any, time_ns: Any, readings: Any) -> Any:
-    """Note when the reply has arrived to a command that acted at a time."""
-    heard_ns = time_ns + answer_length(worlds.senses[place, 3], readings) * worlds.line.character_ns
+def note_reply(worlds: Any, world: Any, time_ns: Any, length: Any) -> Any:
+    """Note when the reply has arrived to a command that acted at a time, of so many characters."""
+    heard_ns = time_ns + length * worlds.line.character_ns
     worlds.sensed_ns[world] = max(worlds.sensed_ns[world], heard_ns)
 
 
@@ -150,12 +155,17 @@ def take_pictures(scene: Any, worlds: Any, bunch: Any, times_ns: Any) -> Any:
 
 @kernel
 def pass_to(scene: Any, worlds: Any, bunch: Any, times_ns: Any) -> Any:
-    """Let time pass in each world of a bunch: do the ticks that have begun, and take the pictures that are due."""
+    """Let time pass in each world of a bunch: do the ticks that have begun, and take the pictures that are due.
+
+    Returns:
+        Whether ticks were done after the last picture.
+    """
     if worlds.has_camera.any():
         take_pictures(scene, worlds, bunch, times_ns)
-    tick_to(scene, bunch, times_ns)
+    has_moved = tick_to(scene, bunch, times_ns)
     if worlds.switch_ticks.shape[1] > 0:
         switch_lamps(scene, worlds, bunch)
+    return has_moved
 
 
 @kernel
@@ -173,7 +183,7 @@ def switch_lamps(scene: Any, worlds: Any, bunch: Any) -> Any:
 
 @kernel
 def tick_to(scene: Any, bunch: Any, times_ns: Any) -> Any:
-    """Do the ticks that have begun before the time of each world of a bunch."""
+    """Do the ticks that have begun before the time of each world of a bunch; return whether there were any."""
     until = stack_integers(LANES)[: times_ns.shape[0]]
     is_any = False
     for k in range(times_ns.shape[0]):
@@ -181,6 +191,7 @@ def tick_to(scene: Any, bunch: Any, times_ns: Any) -> Any:
         is_any = is_any or until[k] > bunch.ticks[k]
     if is_any:
         advance_bunch(scene, bunch, until)
+    return is_any
 
 
 @spliced

@@ -90,6 +90,15 @@ def answer_length(head: Any, readings: Any) -> Any:
 
 
 @kernel
+def short_answer_length(head: Any, readings: Any) -> Any:
+    """Return what `answer_length` does for readings of at most four digits, which are counted side by side."""
+    length = head + readings.shape[0]
+    for k in range(readings.shape[0]):
+        length += digit_count(np.int64(readings[k]))
+    return length
+
+
+@kernel
 def digits_of(number: Any) -> Any:
     """Return the number of characters of any whole number, with its sign."""
     whole = np.int64(number)

@@ -215,6 +215,9 @@ def floor(view: Any, readings: Any) -> None:
 SENSES = {each.name: each for each in (proximity, ambient, camera, positions, speeds, barrier, floor)}
 """The senses that have names."""
 
+_OF_PLACES = (ambient, camera, barrier, floor)
+"""Of what moves in robots, these see no more than where they are."""
+
 AnySense: TypeAlias = str | Sense
 """A sense of `SENSES` by its name, or one of a user's own."""
 
@@ -263,14 +266,16 @@ def check_senses(senses: AnySense | Sequence[AnySense]) -> tuple[AnySense, ...]:
 
 @functools.lru_cache(maxsize=256)
 def rows_of(senses: tuple[AnySense, ...]) -> NDArray[np.int64]:
-    """Return what the loop of a batch knows of senses, int64 [sense, 6].
+    """Return what the loop of a batch knows of senses, int64 [sense, 7].
 
     These are where it calls each, `IN_PACKETS` for proximity; the number of its readings; that of the characters of its
-    request, and of its reply but for commas and numbers; and where the numbers of its turret begin and end.
+    request, and of its reply but for commas and numbers; where the numbers of its turret begin and end; and 1 if it
+    may see more of what moves in a robot than where it is.
     """
     parts = [sense_of(each) for each in senses]
     rows = []
     for each, (begin, end) in zip(parts, memory_of(parts), strict=True):
         address = IN_PACKETS if each is proximity else each.address
-        rows.append((address, each.size, len(each.request), len(each.head) + 2, begin, end))
-    return np.array(rows, np.int64).reshape(-1, 6)
+        lengths = len(each.request), len(each.head) + 2
+        rows.append((address, each.size, *lengths, begin, end, int(each not in _OF_PLACES)))
+    return np.array(rows, np.int64).reshape(-1, 7)

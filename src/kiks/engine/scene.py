@@ -19,6 +19,7 @@ from kiks.engine.compiling import entry, make_ready
 from kiks.engine.grid import CROWD, NEIGHBOURS, PAIRS_PER_DISC, SIGHT_SLACK_MM, Grid, enter_all, squares_of
 from kiks.engine.parameters import PARAMETERS
 from kiks.engine.physics.contact import Ground
+from kiks.engine.sensing.floor_spots import plains_of
 from kiks.engine.sensing.rays import Walls, walls_of
 from kiks.engine.sensing.thesis_networks import NETWORKS
 from kiks.engine.simd.addresses import ArrayRecord, address_field, address_of_array, opener
@@ -48,6 +49,7 @@ _ARRAYS: dict[str, tuple[Any, int]] = {
     "lamps": (_NUMBER, 3),
     "seeds": (_INTEGER, 1),
     "floor": (_BYTE, 2),
+    "plains": (_SMALL, 2),
 }
 
 ALL_WHITE = np.full((1, 1), 255, np.uint8)
@@ -80,7 +82,8 @@ open_scene = opener(OPEN_SCENE)
 * networks: a record of `kiks.engine.sensing.thesis_networks.NETWORKS`, or none if no response needs it;
 * lamps: x [mm], y [mm], power [W] and 1 for on or 0 for off, float64 [world, lamp, 4];
 * seeds: seeds of the worlds, int64 [world];
-* floor: brightness of the floor, uint8 [rows, columns] without a border; a single cell if it is the same everywhere.
+* floor: brightness of the floor, uint8 [rows, columns] without a border; a single cell if it is the same everywhere;
+* plains: the brightness where a floor sensor sees no other (`kiks.engine.sensing.floor_spots.plains_of`).
 """
 
 
@@ -147,7 +150,9 @@ class Scene:
     def _take_walls(self, arena: Arena) -> None:
         clearance, rooms, brightness, leaps, faces, cell_mm, pad = walls_of(arena)
         floor = ALL_WHITE if arena.shades is None else arena.shades
-        self._keep(clearance=clearance, rooms=rooms, brightness=brightness, leaps=leaps, faces=faces, floor=floor)
+        plains = plains_of(floor, arena.mm_per_cell)
+        self._keep(clearance=clearance, rooms=rooms, brightness=brightness, leaps=leaps, faces=faces)
+        self._keep(floor=floor, plains=plains)
         self.record["cell_mm"], self.record["pad"] = cell_mm, pad
 
     def set_lamps(self, lamps: NDArray[np.float64]) -> None:

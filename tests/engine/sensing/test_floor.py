@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 import kiks
-from kiks.engine.sensing.floor import COUNTS, NOISE_COUNTS, SPOT_MM, read_floor
+from kiks.engine.sensing.floor import COUNTS, NOISE_COUNTS, read_floor
+from kiks.engine.sensing.floor_spots import SPOT_MM, plains_of
 from kiks.firmware.turret import Turret
 from kiks.model.arena import Arena, Zone
 from kiks.recording.replay import check_recording
@@ -46,6 +47,21 @@ def test_the_reading_is_the_mean_of_a_spot(cell_mm: float) -> None:
     for x_mm, y_mm in rng.uniform(35, 85, (40, 2)).tolist():
         mean = slow_mean(floor, cell_mm, x_mm, y_mm) * COUNTS / 255
         assert expected(sim, x_mm, y_mm) == pytest.approx(mean, abs=0.02 * COUNTS)
+
+
+@pytest.mark.parametrize("cell_mm", [0.4, 0.7, 1.0])
+def test_a_spot_on_a_plain_sees_one_brightness(cell_mm: float) -> None:
+    rng = np.random.default_rng(6)
+    floor = np.kron(rng.integers(0, 3, (5, 6), np.uint8), np.ones((25, 25), np.uint8))
+    plains = plains_of(floor, cell_mm)
+    wide = np.pad(floor, 40, mode="edge")
+    for row, column in np.ndindex(plains.shape):
+        # A spot whose middle is in this cell sees none but these.
+        reach = 40 - math.floor(SPOT_MM / cell_mm + 1)
+        seen = wide[row + reach : row + 81 - reach, column + reach : column + 81 - reach]
+        assert plains[row, column] == (floor[row, column] if (seen == floor[row, column]).all() else -1)
+    assert (plains >= 0).mean() > 0.2
+    assert (plains < 0).mean() > 0.2
 
 
 def test_a_floor_of_one_brightness_reads_the_same_everywhere() -> None:

@@ -14,12 +14,11 @@ import numpy as np
 from kiks.engine.compiling import entry, inlined, kernel
 from kiks.engine.numbers import sin_cos, uniform
 from kiks.engine.scene import open_scene
+from kiks.engine.sensing.floor_spots import SPOT_MM
 from kiks.engine.sensing.proximity import pose_at
+from kiks.engine.sensing.rays import cell_at
 
 STREAM_FLOOR = 6
-
-SPOT_MM = 3.0
-"""Radius of the spot that a sensor sees [mm]."""
 
 COUNTS = 1023.0
 """Reading on white: ten bits, as all readings of the robot (khepera-protocol.md 8.4); black is 0."""
@@ -31,26 +30,19 @@ _WHOLE = 1024.0  # a cell within the spot counts as much
 
 
 @inlined
-def spot_brightness(floor: Any, cell_mm: Any, x_mm: Any, y_mm: Any) -> Any:
+def spot_brightness(floor: Any, plains: Any, cell_mm: Any, x_mm: Any, y_mm: Any) -> Any:
     """Return the mean brightness of a spot, 0 to 255.
 
     A cell counts by the share of its width that lies within the spot, on the line through both centres. The sums are
     of whole numbers, so they depend on no order, and a floor of one brightness has it everywhere.
     """
-    if floor.size == 1:
-        return 1.0 * floor[0, 0]
+    middle, level = cell_at(plains, x_mm / cell_mm, y_mm / cell_mm)
+    if plains[level, middle] >= 0:
+        return 1.0 * plains[level, middle]
     column, row, radius = x_mm / cell_mm - 0.5, y_mm / cell_mm - 0.5, SPOT_MM / cell_mm
     reach = radius + 0.5
     low, high = math.ceil(row - reach), math.floor(row + reach) + 1
     left, right = math.ceil(column - reach), math.floor(column + reach) + 1
-    if low >= 0 and left >= 0 and high <= floor.shape[0] and right <= floor.shape[1]:
-        # Mostly no edge is near: that is quickly seen.
-        first, differ = floor[low, left], np.uint8(0)
-        for j in range(low, high):
-            for i in range(left, right):
-                differ |= floor[j, i] ^ first
-        if differ == 0:
-            return 1.0 * first
     total, weights = np.int64(0), np.int64(0)
     for j in range(low, high):
         for i in range(left, right):
@@ -77,7 +69,7 @@ def sense_floor(scene: Any, world: Any, robot: Any, x: Any, y: Any, time_ns: Any
         is_noisy: False for the expected reading, without rounding.
         index: Number of the sensor on its robot: each has noise of its own.
     """
-    counts = spot_brightness(scene.floor, scene.walls.cell_mm, x, y) * (COUNTS / 255.0)
+    counts = spot_brightness(scene.floor, scene.plains, scene.walls.cell_mm, x, y) * (COUNTS / 255.0)
     if not is_noisy:
         return counts
     if scene.kinds[scene.robots[world, robot].kind].is_noisy != 0:
