@@ -333,8 +333,7 @@ NO_RESULTS = {
     ("desk", "folder"),
     ("champion", "folder"),
     ("ghosts", "folder"),
-    ("compare", "first"),
-    ("compare", "second"),
+    ("compare", "folders"),
     ("info", "file"),
     ("replay", "file"),
     ("export", "files"),
@@ -371,6 +370,7 @@ RESULTS = {
     ("sweep", "out"): ("sweep", "--out", "PLACE", WANDER),
     ("sweep", "picture"): ("sweep", "--picture", "PLACE", WANDER),
     ("maze", "out"): ("arena", "maze", "PLACE"),
+    ("room", "out"): ("arena", "room", "PLACE"),
     ("new", "out"): ("arena", "new", "--width-mm", "200", "--height-mm", "200", "PLACE"),
 }
 """Paths that are written, and how a command is asked to."""

@@ -1,4 +1,4 @@
-"""Ready tasks of the classic papers of evolutionary robotics; the page "Classics" says what of each is known.
+"""Ready tasks of classic papers; the page "Classics of evolutionary robotics" says what of each is known.
 
 `examples/classics` has a script for each paper, which makes its figure.
 """
