@@ -54,6 +54,16 @@ def test_standing_still_earns_nothing() -> None:
     assert not task.evaluate(still, np.arange(20), threads=1)[:, 0].any()
 
 
+def test_light_trains_from_starts_behind_walls_and_far_from_the_lamp() -> None:
+    for arena in kiks.tasks.light().arenas:
+        lamp = arena.lamps[0]
+        assert arena.starts
+        assert all(math.dist(start[:2], (lamp.x_mm, lamp.y_mm)) >= ready_tasks.FROM_LIGHT_MM for start in arena.starts)
+        x_mm, y_mm, _ = arena.starts[-1]
+        ray_mm = np.linspace((x_mm, y_mm), (lamp.x_mm, lamp.y_mm), 2000).tolist()
+        assert any(arena.clearance_at_mm(*place) <= 0 for place in ray_mm)
+
+
 def test_the_exam_starts_far_from_the_lamp_where_no_sensor_sees_it() -> None:
     arena = shipped_arena("training/lit_unseen")
     lamp = arena.lamps[0]

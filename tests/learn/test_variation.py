@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
 import kiks
+from kiks.model.arena import Pose
 from kiks.model.family import family
 
 KHEPERA = kiks.RobotSpec.load("khepera")
@@ -84,6 +86,22 @@ def test_each_generation_draws_others_of_many_arenas() -> None:
             rollouts = batch.run(task.controller, parameters, seconds=1.0, measures=[kiks.measures.path_mm])
             paths.append(rollouts.values.item())
         assert together[seed][task.value_names.index("path_mm")] == pytest.approx(np.mean(paths), rel=1e-12)
+
+
+def test_where_arenas_are_drawn_a_lone_robot_draws_its_start_too() -> None:
+    places = [[Pose(60.0 + 10.0 * k, 100.0 + number, 0.1 * k) for k in range(4)] for number in range(5)]
+    arenas = [replace(arena, starts=tuple(own)) for arena, own in zip(many(5), places, strict=True)]
+    task, seen = task_of(arenas=arenas, worlds=3, starts="arena"), set()
+    for seed in range(40):
+        starts = task.start_poses(np.array([seed, 7, seed]))
+        assert starts.shape == (9, 1, 3)
+        assert (starts[:3] == starts[6:]).all()
+        for arena, start in zip(task.arenas_of(seed), starts[:3, 0].tolist(), strict=True):
+            assert tuple(start) in arena.starts
+            seen.add(tuple(start))
+    assert seen == {tuple(pose) for own in places for pose in own}
+    assert task_of(arenas=arenas[:3], worlds=3, starts="arena").start_poses(np.array([1])) is None
+    assert task_of(arenas=arenas, worlds=3, robots=2, starts="arena").start_poses(np.array([1])) is None
 
 
 def test_many_arenas_need_no_multiple_of_worlds() -> None:

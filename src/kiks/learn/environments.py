@@ -31,6 +31,9 @@ from kiks.model.checks import check_kind, check_number
 CONTACT_COST = 5.0
 """What a contact takes off the rewards of `Avoid` and `Follow`: half a second of following at best is worth as much."""
 
+LIT_ROOMS = 18
+"""Number of rooms of `Light`."""
+
 ARRIVED_MM = 60.0
 """Distance to a lamp at which a robot has arrived [mm]; nearer, most light comes from above."""
 
@@ -103,8 +106,8 @@ def follow() -> Task:
 
 
 def light() -> Task:
-    """Go to a lamp and stay there: the task `light`."""
-    return ready_tasks.light(name="Light", reward=light_approach)
+    """Go to a lamp and stay there: the task `light`, from random places in smaller rooms, where most see the lamp."""
+    return ready_tasks.light(name="Light", arenas=ready_tasks.rooms(LIT_ROOMS), starts="random", reward=light_approach)
 
 
 def gather() -> Task:

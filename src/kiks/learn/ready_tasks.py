@@ -13,12 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kiks.batch.initial_state import random_starts
 from kiks.batch.loop_timing import Timing
 from kiks.control import controllers, measures
 from kiks.control.controller import Controller
 from kiks.learn import football as game
 from kiks.learn.exam import Exam
-from kiks.learn.experiment import cautious_mean
+from kiks.learn.experiment import CLEAR_MM, cautious_mean
 from kiks.learn.task import Axis, Side, Task
 from kiks.model.arena import Arena, Pose
 from kiks.model.shipped import shipped_arena
@@ -40,6 +41,9 @@ CONTACT_COST = 3.0
 
 CONTACTS_COUNTED = 3.0
 """Largest number of contacts of a world that counts: a stuck robot has hundreds."""
+
+PLACES = 200
+"""Places of a room among which its dark starts are found."""
 
 
 def ready(make: Callable[..., Task]) -> Callable[..., Task]:
@@ -72,6 +76,35 @@ def training(*names: str) -> tuple[Arena, ...]:
 def rooms(count: int, **sizes: int) -> tuple[Arena, ...]:
     """Return random rooms, the same objects each time; `sizes` are arguments of `kiks.Arena.room`."""
     return tuple(Arena.room(seed=seed, **sizes) for seed in range(count))
+
+
+@cache
+def dark_rooms(count: int, starts: int, far_mm: float, **sizes: int) -> tuple[Arena, ...]:
+    """Return random rooms with a lamp, the same objects each time, whose starts are in the dark and far from the lamp.
+
+    Args:
+        count: Number of rooms.
+        starts: Most starts of a room.
+        far_mm: Least distance of a start from the lamp [mm].
+        sizes: Arguments of `kiks.Arena.room`.
+    """
+    return tuple(replace(room, starts=dark_places(room, far_mm)[:starts]) for room in rooms(count, **sizes))
+
+
+def dark_places(room: Arena, far_mm: float) -> tuple[Pose, ...]:
+    """Return those of `PLACES` random places that are far from the lamp of a room, and behind something."""
+    found: list[Pose] = []
+    (lamp,) = room.lamps
+    along = np.linspace(0, 1, round(math.hypot(room.width_mm, room.height_mm) / room.mm_per_cell))
+    for x_mm, y_mm, heading_rad in random_starts(room, PLACES, seed=0, clear_mm=CLEAR_MM).tolist():
+        across_mm, up_mm = lamp.x_mm - x_mm, lamp.y_mm - y_mm
+        columns, rows = (
+            ((place_mm + along * way_mm) / room.mm_per_cell).astype(int)
+            for place_mm, way_mm in ((x_mm, across_mm), (y_mm, up_mm))
+        )
+        if math.hypot(across_mm, up_mm) >= far_mm and room.brightness[rows, columns].any():
+            found.append(Pose(x_mm, y_mm, heading_rad))
+    return tuple(found)
 
 
 # ---- avoid ----
@@ -195,8 +228,12 @@ STAY_S = 30.0
 """Time at the end of the exam for which it must be there without a break [s]."""
 
 
-LIGHT_ROOMS = 18
-"""Number of rooms for training. After three fixed ones, some champions bounce to and fro in others for ever."""
+LIGHT_ROOMS, LIGHT_STARTS, FROM_LIGHT_MM = 24, 12, 800.0
+"""Number of rooms for training, of starts in each, and their least distance from the lamp [mm].
+
+After three fixed rooms, some champions bounce to and fro in others for ever. At most random places the robot sees the
+lamp: then its light is all that candidates learn to follow, and not to search in the dark.
+"""
 
 
 def light_fitness(values: Values) -> Floats:
@@ -225,7 +262,7 @@ def light() -> Task:
     default = controllers.mlp(hidden=(4,), senses=("proximity", "ambient"), speed_limit=LIGHT_SPEED_LIMIT)
     return Task(
         "light",
-        rooms(LIGHT_ROOMS),
+        dark_rooms(LIGHT_ROOMS, LIGHT_STARTS, FROM_LIGHT_MM, width_mm=1500, height_mm=1200, walls=8),
         default,
         (
             measures.light_approach,
@@ -237,6 +274,7 @@ def light() -> Task:
         fitness=light_fitness,
         seconds=60.0,
         worlds=6,
+        starts="arena",
         axes=(Axis("light_mm", 0, 600), Axis("path_mm", 0, 4000)),
         exam=Exam(
             training("lit_unseen"),

@@ -179,7 +179,8 @@ class Task(Experiment):
         apart_mm: Least distance between the edges of two robots at a random start [mm].
         timing: Timing of the control loop; that of a program on a line of 9600 baud if left out. Or several, which
             the worlds take in turn like the robots.
-        starts: 'random' for free places anywhere, or 'arena' for the starts of the arena.
+        starts: 'random' for free places anywhere, or 'arena' for the starts of the arena. If generations draw arenas, a
+            lone robot takes a start that is drawn from those of its arena.
         spread: Standard deviation of each parameter in the first generation.
         algorithm: The algorithm of an evolution, unless the user says otherwise.
         generations: How many generations an evolution has, unless the user says otherwise.
@@ -386,7 +387,7 @@ class Task(Experiment):
     def start_poses(self, seeds: Integers) -> Floats | None:
         """Return the starts of candidates with such seeds, float64 [candidate and world, robot, 3].
 
-        They are the same for the same seed; None for those of the arena.
+        They are the same for the same seed; None for those that the arena gives all seeds.
 
         Example:
             >>> import numpy as np
@@ -396,7 +397,7 @@ class Task(Experiment):
             (6, 1, 3)
         """
         if self.starts == "arena":
-            return None
+            return self._drawn_starts(seeds) if self._draws_starts else None
         radius_mm = max(spec.body.radius_mm for side in self.sides for spec in side.specs)
         given: dict[str, Any] = {"robots": len(self.controllers), "radius_mm": radius_mm, "apart_mm": self.apart_mm}
         poses: dict[int, Floats] = {}
@@ -408,6 +409,19 @@ class Task(Experiment):
             else:
                 poses[seed] = self.random_starts(seed, **given)
         return np.concatenate([poses[seed] for seed in seeds.tolist()])
+
+    @property
+    def _draws_starts(self) -> bool:
+        is_lone = self.robots == 1 and self.against is None
+        return self.draws_arenas and is_lone and all(arena.starts for arena in self.arenas)
+
+    def _drawn_starts(self, seeds: Integers) -> Floats:
+        """Return a start of each world's arena for candidates with such seeds, float64 [candidate and world, 1, 3]."""
+        poses: dict[int, list[Pose]] = {}
+        for seed in dict.fromkeys(seeds.tolist()):
+            rng = np.random.default_rng((seed, len(self.arenas), 1))
+            poses[seed] = [arena.starts[rng.integers(len(arena.starts))] for arena in self.arenas_of(seed)]
+        return np.array([poses[seed] for seed in seeds.tolist()]).reshape(-1, 1, 3)
 
     def world(self) -> Project:
         """Return the world in which its champions are shown: that of their exam, or of training if there is none.
