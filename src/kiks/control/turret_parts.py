@@ -14,7 +14,7 @@ from kiks.control.compiled_function import Compiled
 from kiks.control.recipes import recipe_of
 from kiks.engine.compiling import address_of, entry, inlined
 from kiks.engine.scene import OPEN_SCENE
-from kiks.engine.sensing.proximity import pose_at
+from kiks.engine.sensing.proximity import lone_pose_at
 from kiks.engine.state import BODY, ROBOT
 from kiks.errors import ParameterError, shown
 
@@ -74,7 +74,7 @@ def view_of(
 ) -> Any:
     """Return what a sense sees of a robot at a time; its turret remembers the numbers from `first` up to `end`."""
     state = scene.robots[world, robot]
-    x_mm, y_mm, heading_rad = pose_at(state, tick_count, time_ns)
+    x_mm, y_mm, heading_rad = lone_pose_at(state, tick_count, time_ns)
     return View(
         robot,
         x_mm,

@@ -10,11 +10,13 @@ import numpy as np
 import pytest
 
 import kiks
+from kiks.control.senses import SENSES
 from kiks.engine.sensing.floor import COUNTS, NOISE_COUNTS, read_floor
 from kiks.engine.sensing.floor_spots import SPOT_MM, plains_of
 from kiks.firmware.turret import Turret
 from kiks.model.arena import Arena, Zone
 from kiks.recording.replay import check_recording
+from kiks.units import TICK_NS
 
 ANGLES = np.linspace(0.0, 2 * math.pi, 97)[:-1]
 
@@ -107,6 +109,25 @@ def test_noise_is_fair_and_the_robots_own() -> None:
     assert abs(np.corrcoef(found.T)[0, 1]) < 0.1
     quiet = kiks.Simulation(sim.arena, robot=kiks.RobotSpec.load("khepera").without_noise())
     assert len({read_floor(quiet.world.scene, 0, 0, k, True, 0.0, 0.0, 0) for k in range(100)}) == 1
+
+
+def test_a_sense_sees_the_same_place_at_the_end_of_a_tick() -> None:
+    floor = np.random.default_rng(7).integers(0, 256, (300, 300), np.uint8)
+    sim = world(floor)
+    sim.place(1, 150.3, 141.7, 0.7)
+    sim.fit(1, "floor")
+    kiks.Khepera(sim.port(1)).set_speed(5, 9)
+    sense, scene = SENSES["floor"], sim.world.scene
+    found = set()
+    for _ in range(40):
+        sim.run(0.01)
+        sim.world.tick_to(sim.world.now_ns)
+        ticks = int(sim.world.state.tick_count)
+        for time_ns in (ticks * TICK_NS, ticks * TICK_NS - 3_000_000):
+            there = read_floor(scene, 0, ticks, time_ns, False, 0.0, 0.0, 0)
+            assert sense.look(scene, 0, ticks, time_ns, is_noisy=False)[0] == there
+            found.add(there)
+    assert len(found) > 40
 
 
 class Lines(Turret):

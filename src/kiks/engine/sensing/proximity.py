@@ -39,7 +39,7 @@ from kiks.engine.simd.rasters import pick
 from kiks.engine.simd.stack_arrays import stack_floats, stack_integers, stack_narrow
 from kiks.model.raster import ROOM_CELLS
 from kiks.model.robot import SENSOR_COUNT
-from kiks.units import SENSOR_ROUND_NS, SENSOR_SLOT_NS
+from kiks.units import SENSOR_ROUND_NS, SENSOR_SLOT_NS, TICK_NS
 
 STREAM_PROXIMITY = 2
 """Random stream of the noise; each purpose has a number of its own."""
@@ -108,6 +108,19 @@ def pose_at(robot: Any, tick_count: Any, time_ns: Any) -> Any:
     """Return x, y and heading at a time at most 20 ms before the end of the last tick."""
     ticks_ago, back = moment_of(tick_count, time_ns)
     return pose_between(robot, ticks_ago, 1.0 - back)
+
+
+@kernel
+def lone_pose_at(robot: Any, tick_count: Any, time_ns: Any) -> Any:
+    """Return what `pose_at` does, to the bit, for one time: at the end of the last tick no arc is to be followed."""
+    if time_ns != tick_count * TICK_NS:
+        return pose_at(robot, tick_count, time_ns)
+    trail = robot.trail
+    return (
+        trail[0, 0] + (robot.x_mm - trail[0, 0]),
+        trail[0, 1] + (robot.y_mm - trail[0, 1]),
+        trail[0, 2] + (robot.heading_rad - trail[0, 2]),
+    )
 
 
 @kernel
