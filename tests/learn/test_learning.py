@@ -115,15 +115,25 @@ def test_a_tiny_training_improves_the_reward(pgpe: Any) -> None:
     assert after > 1.0
 
 
-def test_the_policy_that_learns_is_the_one_that_drives(pgpe: Any) -> None:
-    rng = np.random.default_rng(3)
-    weights, share = rng.normal(size=(5, pgpe.INPUTS, 2)), 0.06
+def test_a_poor_attempt_is_followed_by_another(
+    pgpe: Any, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(pgpe, "EPISODE_S", 1.0)
+    pgpe.learn("Follow", seed=1, generations=2, pairs=2)
+    # Nobody follows walls after two generations: each attempt but the last one ends after half of them.
+    assert capsys.readouterr().out.count("begin again") == pgpe.ATTEMPTS["Follow"] - 1
+
+
+@pytest.mark.parametrize("name", ["Avoid", "Follow"])
+def test_the_policy_that_learns_is_the_one_that_drives(pgpe: Any, name: str) -> None:
+    rng, used = np.random.default_rng(3), pgpe.USED[name]
+    weights, share = rng.normal(size=(5, used, 2)), 0.06
     act, memory, wheels = pgpe.acting(weights, share), np.zeros((5, pgpe.tracing.memory_count)), np.zeros((5, 2))
     for _ in range(20):
         counts = rng.integers(0, 1024, (5, 8)).astype(float)
         actions = act(counts / 1023)
         for world in range(5):
-            parameters = np.array([8.0, share, *weights[world].ravel()])
+            parameters = np.array([8.0, share, *weights[world].ravel(), *[0.0] * (2 * (pgpe.INPUTS - used))])
             pgpe.tracing(counts[world], memory[world], parameters, wheels[world])
         np.testing.assert_allclose(wheels / 8.0, actions, rtol=0, atol=1e-12)
         assert actions.std() > 0.1
