@@ -14,7 +14,7 @@ import numpy as np
 from kiks.engine.compiling import entry, inlined, kernel
 from kiks.engine.numbers import sin_cos, uniform
 from kiks.engine.scene import open_scene
-from kiks.engine.sensing.floor_spots import SPOT_MM
+from kiks.engine.sensing.floor_spots import BLOCK, SPOT_MM
 from kiks.engine.sensing.proximity import pose_at
 from kiks.engine.sensing.rays import cell_at
 
@@ -36,7 +36,7 @@ def spot_brightness(floor: Any, plains: Any, cell_mm: Any, x_mm: Any, y_mm: Any)
     A cell counts by the share of its width that lies within the spot, on the line through both centres. The sums are
     of whole numbers, so they depend on no order, and a floor of one brightness has it everywhere.
     """
-    middle, level = cell_at(plains, x_mm / cell_mm, y_mm / cell_mm)
+    middle, level = cell_at(plains, x_mm / cell_mm * (1.0 / BLOCK), y_mm / cell_mm * (1.0 / BLOCK))
     if plains[level, middle] >= 0:
         return 1.0 * plains[level, middle]
     column, row, radius = x_mm / cell_mm - 0.5, y_mm / cell_mm - 0.5, SPOT_MM / cell_mm
