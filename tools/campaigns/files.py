@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from click import Command
 from tools.campaigns import recordings
 from tools.campaigns.hostile import BYTES_MAX, mutated, mutated_text
 from tools.campaigns.runner import SECRET, Campaign, Play
@@ -28,6 +29,7 @@ from tools.campaigns.strange import (
     strange_png,
 )
 from tools.sensors.models import thesis
+from typer import Context
 
 import kiks
 from kiks.cli.compare import compare
@@ -188,7 +190,7 @@ def _result(path: Path) -> None:
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_bytes(data)
     with redirect_stdout(io.StringIO()):
-        compare(path.parent, folder, path.parent / "compared.png")
+        compare(Context(Command("compare")), [path.parent, folder], path.parent / "compared.png")
 
 
 def _contest(path: Path) -> None:

@@ -353,9 +353,9 @@ def trajectory(
         >>> way = kiks.measures.trajectory(seconds=2, points=4)
         >>> rollouts = batch.run(kiks.controllers.linear(), arc, seconds=2, measures=[way])
         >>> rollouts.values.reshape(4, 3)[:, :2].round()
-        array([[257., 260.],
-               [258., 279.],
-               [259., 297.],
+        array([[250., 263.],
+               [252., 280.],
+               [255., 298.],
                [259., 316.]])
         >>> middle = kiks.measures.trajectory(
         ...     seconds=2, describe=lambda ways: ways[..., :2].mean(axis=-2), names=["middle_x_mm", "middle_y_mm"]

@@ -97,7 +97,7 @@ def vehicle(name: str) -> Champion:
         >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
         >>> _ = vehicle("k-team").drive(sim.port(1), seconds=2)
         >>> round(sim.travelled_mm(1))
-        156
+        210
     """
     if name not in VEHICLES:
         raise ParameterError(

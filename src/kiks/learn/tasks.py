@@ -108,7 +108,7 @@ def load(name: str | Path, controller: Controller | None = None) -> Task:
     Example:
         >>> import kiks
         >>> kiks.tasks.load("maze").seconds
-        70.0
+        180.0
     """
     name = str(path_of(name, "the name of a task"))
     if name in TASKS:
