@@ -354,7 +354,7 @@ def test_nothing_overlaps_and_nothing_is_lost(seed: int) -> None:
         bodies = sim.bodies()
         on_floor = bodies[bodies["is_lifted"] == 0]
         assert len(bodies) == count
-        # What nobody holds up was dropped beyond the edge.
+        # A lifted body without a holder was dropped beyond the edge.
         out = bodies[(bodies["is_lifted"] != 0) & (bodies["holder"] == 0)]
         across, up = (np.abs(out[name] - mm / 2) - mm / 2 for name, mm in zip(("x_mm", "y_mm"), size, strict=True))
         assert (np.maximum(across, up) >= 0).all()

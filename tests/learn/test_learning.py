@@ -120,7 +120,7 @@ def test_a_poor_attempt_is_followed_by_another(
 ) -> None:
     monkeypatch.setattr(pgpe, "EPISODE_S", 1.0)
     pgpe.learn("Follow", seed=1, generations=2, pairs=2)
-    # Nobody follows walls after two generations: each attempt but the last one ends after half of them.
+    # No policy follows walls after two generations, so each attempt but the last one ends after half of them.
     assert capsys.readouterr().out.count("begin again") == pgpe.ATTEMPTS["Follow"] - 1
 
 

@@ -251,7 +251,7 @@ def test_the_result_of_an_evolution(tmp_path: Path) -> None:
     assert result.seconds == evolution.finals.seconds > evolution.generations[-1].seconds
     assert result.fitness == evolution.champion.fitness
     assert result.champion_fitness == tuple(each.champion_fitness for each in evolution.generations[1:])
-    assert result.solved is None  # after a second nobody gets around
+    assert result.solved is None  # no robot gets around in a second
     assert result.exam is not None
     assert (result.exam.starts, result.exam.imperfect_starts) == (20, 200)
     evolution.run(generations=4)

@@ -16,7 +16,7 @@ from kiks.errors import ParameterError, shown
 ENDINGS = (".mp4", ".gif", ".webp", ".png", ".html")
 
 SHOWN = 5
-"""Number of generations that are shown if nobody says which: at equal intervals."""
+"""Number of generations that are shown unless some are named: at equal intervals."""
 
 
 def _numbers(value: str | None) -> Any:

@@ -195,7 +195,7 @@ class Ga:
 
 
 class Sga:
-    """A simple genetic algorithm: selection, one-point crossover, mutation, and nobody survives.
+    """A simple genetic algorithm: selection, one-point crossover, mutation; the children replace all parents.
 
     Bits of a parameter are a binary number, the highest first. Real numbers begin, and mutate, evenly spread with the
     deviation of the first generation; they have no bounds. Fitness is scaled linearly before a roulette wheel turns, so

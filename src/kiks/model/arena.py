@@ -515,7 +515,7 @@ def _checked_shapes(name: str, kind: type[AnyShape], shapes: Any) -> tuple[AnySh
 
 
 def _read_only(cells: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
-    """Return cells that nobody can change: themselves, or a copy."""
+    """Return cells read-only: themselves, or a copy."""
     if cells.flags.writeable or cells.base is not None or not cells.flags.c_contiguous:
         cells = cells.copy(order="C")
         cells.setflags(write=False)

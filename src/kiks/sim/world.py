@@ -187,7 +187,8 @@ class World:
             state.tick_count = until
             step.advance(self.scene, begin, until - begin)
             if until >= self._from_tick:
-                self._switch_lamps(begin)
+                if until >= self._switch_tick:
+                    self._switch_lamps(begin)
                 self._look()
 
     def watch(self, watcher: Watcher) -> None:

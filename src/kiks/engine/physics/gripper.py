@@ -14,7 +14,7 @@ fits between them, and no other gripper holds it. The jaws then move it to their
 On the floor, the held body and the robot are one rigid body (`kiks.engine.physics.grasp`). A lifted body is a disc in
 front of the robot that collides with nothing and that no sensor sees. It comes down only where the floor is free;
 elsewhere the arm stays above the floor and open jaws wait. So no body ends inside another. If the jaws open when its
-centre is beyond the edge of the arena, it falls outside: it stays where it is, as if lifted by nobody, for good.
+centre is beyond the edge of the arena, it falls outside: it stays where it is for good, lifted and without a holder.
 """
 
 from __future__ import annotations
