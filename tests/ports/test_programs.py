@@ -7,6 +7,7 @@ import select
 import signal
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -22,7 +23,7 @@ import kiks as package
 from kiks.cli.options import parse_words
 from kiks.errors import LinkError, ParameterError
 from kiks.ports.port_names import PortNames
-from kiks.ports.program_process import Command
+from kiks.ports.program_process import Command, OwnChild
 from kiks.ports.programs import Programs
 from kiks.script.runner import run_here
 
@@ -204,6 +205,26 @@ def test_hanging_program_is_dropped(tmp_path: Path, caplog: pytest.LogCaptureFix
         "program 1 (hangs.py) must act within 1 s while others wait, but it did not: it is disconnected. "
         "--patience gives it more time."
     ]
+
+
+def test_dropped_program_that_ends_late_is_not_called_running(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    send, has_ended = OwnChild.signal, threading.Event()
+
+    def send_late(self: OwnChild, number: int) -> None:
+        threading.Thread(target=lambda: has_ended.wait(GUARD_S) and send(self, number)).start()
+
+    monkeypatch.setattr(OwnChild, "signal", send_late)
+    programs = Programs(
+        fresh(2),
+        [Command(Path(write(tmp_path, "hangs.py", HANGS)), []), Command(Path(DRIVE), ["COM1", "20", "3", "3"])],
+        say=lambda text: has_ended.set() if "drive.py" in text else None,
+        patience_s=1,
+        when_silent="drop",
+    )
+    assert programs.run() == 137
+    assert len(program_warnings(caplog)) == 1
 
 
 def test_flooding_program_does_not_delay_others(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:

@@ -97,7 +97,7 @@ class Handle(SocketParticipant):
     def state(self) -> str:
         """Its state: 'running', 'stopping', 'stopped', 'silenced', or how it has ended."""
         if self.is_running:
-            return "stopping" if self.is_stopped else "running"
+            return "stopping" if self.is_stopped or self.is_silenced else "running"
         if self.is_stopped:
             return "stopped"
         return "silenced" if self.is_silenced else f"ended {self.how}"
@@ -580,7 +580,7 @@ class Programs:
         while self._unreported:
             handle = self._unreported.pop(0)
             self._say(f"{handle.name} {'was stopped' if handle.is_stopped else f'has ended {handle.how}'}.")
-            left = [other for other in self.handles if other.is_running and other.is_here]
+            left = [other for other in self.handles if other.is_here and other.state == "running"]
             if left and not any(other.is_waited_for for other in left):
                 names = ", ".join(other.name for other in left)
                 _log.warning("%s, which the world does not wait for, still runs. Ctrl-C ends it.", names)
