@@ -121,7 +121,6 @@ def floreano_mondada_1994(shuttling: bool = False) -> Task:
         algorithm="sga:bits=0,selection=roulette,crossover=0.1,mutation=0.2",
         generations=100,
         population=80,
-        about="drive fast and straight through a looping corridor (1994)",
     )
 
 
@@ -198,7 +197,6 @@ def jakobi_husbands_harvey_1995(noise: float = 1.0, robot: str | RobotSpec = "kh
         generations=16,
         population=64,
         spread=1.0,
-        about="avoid pillars, with none, the observed or double the noise (1995)",
     )
 
 
@@ -294,7 +292,6 @@ def nolfi_1997(architecture: str = "emergent") -> Task:
         exam=Exam(
             collecting_arenas(10, seed=2), (measures.taken_out,), all_out, "carried all cylinders out", seconds=120.0
         ),
-        about="carry cylinders out of the arena with the gripper (1996, 1997)",
     )
 
 
@@ -395,7 +392,7 @@ def caught_early(values: Values) -> Floats:
 
 @ready
 def floreano_nolfi_1997() -> Task:
-    """The task of a predator and a prey that is twice as fast (Floreano and Nolfi 1997).
+    """The task to catch, or to escape, with networks of five bits a synapse (Floreano and Nolfi 1997).
 
     Networks, genes and selection are those of the papers: weights of five bits, without biases, the best fifth has five
     children each.
@@ -421,7 +418,6 @@ def floreano_nolfi_1997() -> Task:
         algorithm="sga",
         generations=100,
         population=100,
-        about="predator and prey of five bits a synapse (1997)",
     )
 
 
@@ -549,7 +545,6 @@ def floreano_mondada_1996(shuttling: bool = False) -> Task:
         generations=240,
         population=100,
         until=battery_empty,
-        about="come back to a charging zone before the battery is empty (1996)",
     )
 
 
@@ -604,5 +599,4 @@ def miglino_lund_nolfi_1995(sampled: str = "") -> Task:
         algorithm="sga:bits=8,limit=5,parents=0.2,crossover=0,mutation=0.01",
         generations=200,
         population=100,
-        about="navigate among round obstacles, sensors sampled or whole (1995)",
     )

@@ -47,7 +47,7 @@ BATCH_WORLDS_MAX = 20_000
 SECONDS_MIN, SECONDS_MAX = 1e-3, 1e6
 """Shortest and longest time for which candidates drive [s]."""
 
-_UNCOUNTED = {"name", "side", "reward", "about", "file", "algorithm", "population", "generations"}
+_UNCOUNTED = {"name", "side", "reward", "file", "algorithm", "population", "generations"}
 """Arguments on which no value depends."""
 
 Seconds = Annotated[Number, Field(ge=SECONDS_MIN, le=SECONDS_MAX)]
@@ -190,7 +190,6 @@ class Task(Experiment):
             in a step is the reward of that step. Evolutions do not use it.
         until: A measure that ends the trial of a world before `seconds` are over, and an episode of the environment:
             no further control step begins there once its first note is above zero for one of its robots.
-        about: A description in one line.
         file: The user's file that defines it.
 
     Example:
@@ -230,7 +229,6 @@ class Task(Experiment):
     exam: Annotated[Exam | None, Field(description="kiks.Exam(arenas, measures, solved) makes one.")] = None
     reward: Watched | None = None
     until: Watched | None = None
-    about: Text = ""
     file: str = ""
 
     # Functions cannot be compared: a task equals itself only.

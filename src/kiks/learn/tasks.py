@@ -69,7 +69,6 @@ class TaskFile:
     task: Annotated[Literal[1], Field(description="Version of the format.")]
     base: Annotated[str, OneOf(tuple(TASKS)), Field(description="The ready-made task: what is measured, and fitness.")]
     name: Name | None = None
-    about: Annotated[Text, Field(description="A description in one line.")] | None = None
     seconds: Annotated[Seconds, Field(description="Time for which a candidate drives in each world.")] | None = None
     worlds: (
         Annotated[Whole, Field(ge=1, le=WORLDS_MAX, description="Worlds of a candidate: n times the arenas, or fewer.")]
@@ -141,9 +140,7 @@ def _load_task_file(path: Path, controller: Controller | None) -> Task:
 def _task_of(given: TaskFile, path: Path, controller: Controller | None) -> Task:
     folder, base = path.parent, TASKS[given.base]()
     changes: dict[str, Any] = {
-        name: value
-        for name in ("about", "seconds", "worlds", "robots", "starts")
-        if (value := getattr(given, name)) is not None
+        name: value for name in ("seconds", "worlds", "robots", "starts") if (value := getattr(given, name)) is not None
     }
     if given.arenas is not None:
         changes["arenas"] = tuple(Arena.load(inside(folder, each, "arenas")) for each in given.arenas)
