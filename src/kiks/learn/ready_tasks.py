@@ -278,6 +278,8 @@ def light() -> Task:
         worlds=6,
         starts="arena",
         axes=(Axis("light_mm", 0, 600), Axis("path_mm", 0, 4000)),
+        # Fitness rises late: first candidates must learn to search, then to stay.
+        generations=70,
         exam=Exam(
             training("lit_unseen"),
             (measures.light_stay_s(AT_LAMP_MM),),
