@@ -80,7 +80,7 @@ def test_champions_run_and_are_shown(folder: Path, tmp_path: Path) -> None:
 def test_the_tasks_are_listed() -> None:
     listed = kiks("evolve", "--list").output
     assert "touch nothing" in listed
-    assert "predator and prey" in listed
+    assert "a predator and a prey" in listed
 
 
 @at_length

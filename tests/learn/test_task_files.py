@@ -36,7 +36,7 @@ def test_keys_left_out_keep_the_values_of_the_ready_made_task(folder: Path) -> N
     base = kiks.tasks.load("light")
     task = load(folder, 'base = "light"\n')
     assert task.name == "mine"
-    for name in ("measures", "fitness", "seconds", "worlds", "axes", "robot", "robots", "timing", "starts", "about"):
+    for name in ("measures", "fitness", "seconds", "worlds", "axes", "robot", "robots", "timing", "starts"):
         assert getattr(task, name) == getattr(base, name), name
     assert task.controller is base.controller
 
@@ -55,12 +55,12 @@ def test_all_keys(folder: Path) -> None:
     (folder / "my.toml").write_bytes((Path(kiks.__file__).parent / "model/robots/khepera.toml").read_bytes())
     task = load(
         folder,
-        'base = "avoid"\nname = "in a room"\nabout = "x"\nseconds = 2\nworlds = 4\n'
+        'base = "avoid"\nname = "in a room"\nseconds = 2\nworlds = 4\n'
         'arenas = ["room.toml", "hall.toml"]\n'
         'exam = "hall.toml"\nrobot = "my.toml"\nrobots = 1\nstarts = "arena"\nperiod_ms = 50\nthink_ms = 2.5\n'
         'baud = 38400\n[controller]\nkind = "gru"\nunits = 2\n',
     )
-    assert (task.name, task.about, task.seconds, task.worlds, task.starts) == ("in a room", "x", 2.0, 4, "arena")
+    assert (task.name, task.seconds, task.worlds, task.starts) == ("in a room", 2.0, 4, "arena")
     assert [arena.width_mm for arena in task.arenas] == [400, 500]
     assert task.exam is not None
     assert [arena.width_mm for arena in task.exam.arenas] == [500]

@@ -467,8 +467,8 @@ def maze_fitness(values: Values) -> Floats:
 def maze() -> Task:
     """The task to reach the goal of Kheperax's maze.
 
-    The direct path is a dead end: the way leads away from the goal first. So an algorithm that follows fitness ends behind the first wall, and the
-    default is MAP-Elites, which looks for ways to all places.
+    The direct path is a dead end: the way leads away from the goal first. So an algorithm that follows fitness ends
+    behind the first wall, and the default is MAP-Elites, which looks for ways to all places.
 
     Example:
         >>> import kiks
@@ -580,9 +580,9 @@ def football_fitness(values: Values) -> Floats:
 def football() -> Task:
     """The task to play football, one against one.
 
-    The pitch is that of `kiks demo soccer`. Both have proximity sensors and the camera K213. Half of the fitness are goals, 1 for one of its own and -1 for one
-    of the other side; half is the mean place of the ball, from 1 at the goal line of the other side to -1 at its own.
-    What one side gains, the other loses. A game ends with the first goal.
+    The pitch is that of `kiks demo soccer`. Both have proximity sensors and the camera K213. Half of the fitness are
+    goals, 1 for one of its own and -1 for one of the other side; half is the mean place of the ball, from 1 at the goal
+    line of the other side to -1 at its own. What one side gains, the other loses. A game ends with the first goal.
 
     Example:
         >>> import kiks

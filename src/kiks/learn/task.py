@@ -394,32 +394,29 @@ class Task(Experiment):
             >>> task.start_poses(np.array([1, 2])).shape
             (6, 1, 3)
         """
-        if self.starts == "arena":
-            return self._drawn_starts(seeds) if self._draws_starts else None
-        radius_mm = max(spec.body.radius_mm for side in self.sides for spec in side.specs)
-        given: dict[str, Any] = {"robots": len(self.controllers), "radius_mm": radius_mm, "apart_mm": self.apart_mm}
-        poses: dict[int, Floats] = {}
-        for seed in dict.fromkeys(seeds.tolist()):
-            if self.draws_arenas:
-                each = enumerate(self.arenas_of(seed))
-                own = [random_starts(arena, 1, seed=seed + k, clear_mm=CLEAR_MM, **given) for k, arena in each]
-                poses[seed] = np.concatenate(own)
-            else:
-                poses[seed] = self.random_starts(seed, **given)
+        if self.starts == "arena" and not self._draws_starts:
+            return None
+        poses = {seed: self._starts_of(seed) for seed in dict.fromkeys(seeds.tolist())}
         return np.concatenate([poses[seed] for seed in seeds.tolist()])
 
     @property
     def _draws_starts(self) -> bool:
+        """Whether a lone robot takes a start that is drawn from those of its arena, which is drawn itself."""
         is_lone = self.robots == 1 and self.against is None
         return self.draws_arenas and is_lone and all(arena.starts for arena in self.arenas)
 
-    def _drawn_starts(self, seeds: Integers) -> Floats:
-        """Return a start of each world's arena for candidates with such seeds, float64 [candidate and world, 1, 3]."""
-        poses: dict[int, list[Pose]] = {}
-        for seed in dict.fromkeys(seeds.tolist()):
+    def _starts_of(self, seed: int) -> Floats:
+        """Return the starts of a candidate with a seed, float64 [world, robot, 3]."""
+        if self.starts == "arena":
             rng = np.random.default_rng((seed, len(self.arenas), 1))
-            poses[seed] = [arena.starts[rng.integers(len(arena.starts))] for arena in self.arenas_of(seed)]
-        return np.array([poses[seed] for seed in seeds.tolist()]).reshape(-1, 1, 3)
+            drawn = [arena.starts[rng.integers(len(arena.starts))] for arena in self.arenas_of(seed)]
+            return np.array(drawn).reshape(-1, 1, 3)
+        radius_mm = max(spec.body.radius_mm for side in self.sides for spec in side.specs)
+        given: dict[str, Any] = {"robots": len(self.controllers), "radius_mm": radius_mm, "apart_mm": self.apart_mm}
+        if not self.draws_arenas:
+            return self.random_starts(seed, **given)
+        each = enumerate(self.arenas_of(seed))
+        return np.concatenate([random_starts(arena, 1, seed=seed + k, clear_mm=CLEAR_MM, **given) for k, arena in each])
 
     def world(self) -> Project:
         """Return the world in which its champions are shown: that of their exam, or of training if there is none.
