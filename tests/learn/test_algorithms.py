@@ -26,6 +26,7 @@ VARIANTS = [
     *(str(name) for name in AlgorithmName),
     "cma:separable=true,restarts=bipop",
     "cma:active=false,restarts=ipop",
+    "cma:starts=3,race=2",
     "ga:mutation=0.2,rivals=5",
     "sga:bits=0,selection=roulette,crossover=0.1,mutation=0.2",
     "neat:add_neuron=0.4",
@@ -83,6 +84,40 @@ def test_strategies_that_begin_again_fill_whole_generations() -> None:
         sizes.append(algorithm._strategy.popsize)
     assert {6, 12} <= set(sizes)
     assert all(size % 6 == 0 for size in sizes)
+
+
+def hills(candidates: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the height of candidates: a wide hill at -3, of height 1, and a narrow one at 3, of height 2."""
+    height: NDArray[np.float64] = np.maximum(
+        np.exp(-((candidates + 3.0) ** 2).sum(axis=1) / 20.0),
+        2.0 * np.exp(-((candidates - 3.0) ** 2).sum(axis=1) / 8.0),
+    )
+    return height
+
+
+def test_the_best_of_several_strategies_goes_on() -> None:
+    def final(text: str, seed: int) -> float:
+        algorithm = made(text, seed=seed, count=2)
+        for _ in range(60):
+            candidates = algorithm.ask()
+            algorithm.tell(hills(candidates), np.zeros((len(candidates), 0)))
+        return float(hills(algorithm.favourite()[None])[0])
+
+    alone, racing = ([final(text, seed) > 1.5 for seed in range(20)] for text in ("cma", "cma:starts=6,race=5"))
+    assert 0 < sum(alone) < sum(racing)
+    assert sum(racing) >= 18
+
+
+def test_strategies_of_a_race_take_turns_until_the_best_goes_on() -> None:
+    algorithm = made("cma:starts=3,race=4", count=2)
+    asked = []
+    for generation in range(16):
+        candidates = algorithm.ask()
+        asked.append(id(algorithm._strategy))
+        algorithm.tell(np.full(len(candidates), float(generation % 3 == 1)), np.zeros((len(candidates), 0)))
+    assert asked[:12] == asked[:3] * 4
+    assert len(set(asked)) == 3
+    assert set(asked[12:]) == {asked[1]}
 
 
 # ---- bits ----

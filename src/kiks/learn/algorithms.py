@@ -91,16 +91,27 @@ class Cma:
             active: Whether bad candidates count, too, against their directions.
             restarts: Where a strategy begins again that finds nothing any more: 'ipop' each time with twice as many
                 candidates, 'bipop' with many or few of them in turn, 'none' nowhere.
+            starts: How many strategies begin, which take turns; the best one goes on alone.
+            race: Number of generations that each of them has before.
         """
 
         separable: Switch = False
         active: Switch = True
         restarts: Annotated[str, OneOf(("none", "ipop", "bipop"))] = "none"
+        starts: Annotated[Whole, Field(ge=1, le=100)] = 1
+        race: Annotated[Whole, Field(ge=1, le=10_000)] = 15
+
+    JUDGED = 5
+    """Number of last generations by which the strategies of a race are judged: each has worlds of its own."""
 
     def __init__(self, setting: Setting, options: Options) -> None:
         self._setting, self._options, self._rng = setting, options, np.random.default_rng(setting.seed)
         self._doublings, self._used = 0, {False: 0, True: 0}  # evaluations of large strategies, and of small ones
-        self._begin(np.zeros(setting.parameter_count), setting.spread, 1)
+        self._racing: list[tuple[Any, list[float]]] = []  # those that wait for their turn, and how well they did
+        for _ in range(options.starts):
+            self._begin(np.zeros(setting.parameter_count), setting.spread, 1)
+            self._racing.append((self._strategy, []))
+        self._strategy, self._fitness = self._racing.pop(0)
 
     def _begin(self, mean: Floats, spread: float, generations: int, *, is_small: bool = False) -> None:
         """Begin a strategy whose candidates fill so many generations."""
@@ -132,8 +143,20 @@ class Cma:
         if len(self._costs) == len(self._candidates):
             self._strategy.tell(self._candidates, self._costs)
             self._candidates, self._costs = [], []
-            if self._options.restarts != "none" and self._strategy.stop():
+            if self._racing:
+                self._take_turns(fitness)
+            elif self._options.restarts != "none" and self._strategy.stop():
                 self._begin_again()
+
+    def _take_turns(self, fitness: Floats) -> None:
+        """Let the next strategy go on, or the best one alone if each has had its generations."""
+        self._fitness.append(float(np.sort(fitness)[len(fitness) // 2 :].mean()))
+        self._racing.append((self._strategy, self._fitness))
+        if all(len(told) == self._options.race for _, told in self._racing):
+            best = max(self._racing, key=lambda each: np.mean(each[1][-self.JUDGED :]))
+            (self._strategy, _), self._racing = best, []
+        else:
+            self._strategy, self._fitness = self._racing.pop(0)
 
     def _begin_again(self) -> None:
         rng, spread = self._rng, self._setting.spread
