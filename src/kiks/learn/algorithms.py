@@ -107,6 +107,7 @@ class Cma:
     def __init__(self, setting: Setting, options: Options) -> None:
         self._setting, self._options, self._rng = setting, options, np.random.default_rng(setting.seed)
         self._doublings, self._used = 0, {False: 0, True: 0}  # evaluations of large strategies, and of small ones
+        self._strategy: Any
         self._racing: list[tuple[Any, list[float]]] = []  # those that wait for their turn, and how well they did
         for _ in range(options.starts):
             self._begin(np.zeros(setting.parameter_count), setting.spread, 1)
@@ -124,7 +125,7 @@ class Cma:
             "CMA_diagonal": self._options.separable,
             "CMA_active": self._options.active,
         }
-        self._strategy: Any = library("cma").CMAEvolutionStrategy(mean, spread, options)
+        self._strategy = library("cma").CMAEvolutionStrategy(mean, spread, options)
         self._candidates: list[Floats] = []
         self._costs: list[float] = []
         self._is_small = is_small
