@@ -235,6 +235,11 @@ def test_arguments_change_timing_and_response() -> None:
     assert 0.03 < slow.step(np.zeros(2, np.float32))[4]["time_s"] < 0.09
 
 
+def gripping() -> kiks.Task:
+    task = kiks.tasks.nolfi_1997()
+    return task.with_changes(reward=task.measures[0])
+
+
 @pytest.mark.parametrize(
     ("make", "message"),
     [
@@ -242,6 +247,7 @@ def test_arguments_change_timing_and_response() -> None:
         (lambda: KheperaEnv("Avoid", arena=1), "Did you mean 'arenas'"),
         (lambda: KheperaEnv("Avoid", render_mode="human"), "rgb_array"),
         (lambda: KheperaEnv(kiks.tasks.avoid()), "must be a task of one side with a reward, but 'avoid' is not"),
+        (lambda: KheperaEnv(gripping()), "must command wheels alone, but that of 'nolfi_1997.*' commands arm and jaws"),
         (lambda: KheperaEnv("Avoid", starts="here"), "starts must be"),
         (lambda: KheperaEnv("Avoid", reward=3), "must be a kiks.Measure"),
         (lambda: without_contacts(kiks.measures.path_mm, -1), "cost must be from 0 to 1e6, but it was -1"),

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from kiks.control.actuators import orders_of
 from kiks.control.controllers import linear
 from kiks.control.measure import Measure, measure
 from kiks.control.measures import (
@@ -164,5 +165,11 @@ def environment_of(task: str | Task) -> Task:
         raise ParameterError(
             f"an environment must be a task of one side with a reward, but {shown(task.name)} is not. Give it a "
             "measure: task.with_changes(reward=measure)."
+        )
+    if orders := orders_of(task.controller.actuators):
+        names = " and ".join(order.name for order in orders)
+        raise ParameterError(
+            f"the controller of an environment must command wheels alone, but that of {shown(task.name)} commands "
+            f"{names}, too. Evolve it, or give the task another controller."
         )
     return task
