@@ -6,6 +6,7 @@ a word for each run: its name, program and arguments, as a shell has them.
 
 import os
 import shlex
+import signal
 import sys
 import tempfile
 from pathlib import Path
@@ -17,6 +18,8 @@ folder, at_once = Path(sys.argv[1]), int(sys.argv[2])
 middle = sys.argv.index("--")
 options, runs = sys.argv[3:middle], sys.argv[middle + 1 :]
 compile_everything()
+# A shell lets what it starts in the background ignore Ctrl-C, and a program that sends itself one would never end.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def run(name, *words):
