@@ -34,11 +34,16 @@ FIRST_PICTURE = "() => window.kiksDesk?.stats().frames_drawn > 3 && kiksDesk.pos
 
 STILL = """() => {
     const moving = document.getAnimations().filter(
-        (one) => one.playState === "running" && one.animationName !== "desk-fade");
+        (one) => one.playState === "running" && one.animationName !== "desk-fade"
+            && Number.isFinite(one.effect.getComputedTiming().endTime));
     for (const one of moving) one.finish();
-    return moving.length === 0;
+    return moving.length === 0 && !document.querySelector("[class*='-enter-'], [class*='-leave-']");
 }"""
-"""Ends what moves or fades, and says whether all stood still already; the hint waits for half a minute."""
+"""Ends what moves or fades, and says whether all stood still already.
+
+What blinks for ever, as the caret does, and the hint, which waits for half a minute, may go on. Vue marks what appears
+or goes with these classes, from a frame before anything moves.
+"""
 
 OUT_OF_REACH = """() => {
     const roles = ["button", "tab", "slider", "checkbox", "switch", "radio"].map((role) => `[role=${role}]`);
