@@ -46,7 +46,7 @@ from kiks.batch.initial_state import random_starts
 from kiks.errors import KiksError
 from kiks.learn.statistics import wilson_interval
 from kiks.model.arena import Ball
-from kiks.model.ranges import numbers_of
+from kiks.model.ranges import seeds_in
 
 ARENAS = Path(__file__).parent.parent / "examples" / "arenas"
 TASKS = ("avoid", "follow", "light", "gather", "maze")
@@ -98,7 +98,7 @@ def seeds_of(text: str) -> list[int]:
     if text.isdigit():
         return list(range(1, int(text) + 1))
     try:
-        return [int(seed) for seed in numbers_of(text.replace("-", ".."), "seeds", step=1)]
+        return seeds_in(text)
     except KiksError as error:
         raise argparse.ArgumentTypeError(str(error)) from None
 

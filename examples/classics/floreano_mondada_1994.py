@@ -6,8 +6,9 @@ import numpy as np
 
 import kiks
 from kiks.export.figures import column_figure, draw_paths
-from kiks.learn.classics import Finding, command, evolved, path_of, seeds_in
+from kiks.learn.classics import Finding, command, evolved, path_of
 from kiks.learn.plots import draw_generations
+from kiks.model.ranges import seeds_in
 
 DRIVE_S = 120.0
 SHUTTLING = 0.1  # of `roaming`: a robot that gets away more slowly than 8 mm/s stays where it is

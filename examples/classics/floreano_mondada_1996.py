@@ -21,8 +21,9 @@ from kiks.learn.classic_tasks import (
     battery_empty,
     charges,
 )
-from kiks.learn.classics import Finding, command, evolved, seeds_in
+from kiks.learn.classics import Finding, command, evolved
 from kiks.learn.plots import draw_generations
+from kiks.model.ranges import seeds_in
 
 LIVES = 32
 FRESH_SEED = 1_000_000  # of these lives; evolutions do not come near it

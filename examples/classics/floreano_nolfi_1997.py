@@ -6,9 +6,10 @@ import numpy as np
 
 import kiks
 from kiks.export.figures import column_figure
-from kiks.learn.classics import Finding, command, evolved, seeds_in
+from kiks.learn.classics import Finding, command, evolved
 from kiks.learn.plots import SIDE_COLOURS, draw_generations, draw_squares, legend_below
 from kiks.learn.statistics import mean_interval
+from kiks.model.ranges import seeds_in
 
 FIFTH = 5
 

@@ -7,10 +7,11 @@ import numpy as np
 
 import kiks
 from kiks.export.figures import column_figure, draw_paths
-from kiks.learn.classics import Finding, command, evolved, path_of, seeds_in
+from kiks.learn.classics import Finding, command, evolved, path_of
 from kiks.learn.statistics import mean_interval
 from kiks.model.arena import Pose
 from kiks.model.family import family
+from kiks.model.ranges import seeds_in
 
 NOISES = {0.0: "none", 1.0: "observed", 2.0: "double"}
 BEHAVIOUR = {0.0: "4.0", 1.0: "6.0", 2.0: "4.8"}  # the authors' own ratings, 0 to 10

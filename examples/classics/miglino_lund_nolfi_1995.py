@@ -7,9 +7,10 @@ import numpy as np
 
 import kiks
 from kiks.export.figures import column_figure
-from kiks.learn.classics import Finding, command, evolved, seeds_in
+from kiks.learn.classics import Finding, command, evolved
 from kiks.learn.sampled import NOISES
 from kiks.learn.statistics import mean_interval
+from kiks.model.ranges import seeds_in
 
 TESTS = 10**6 + np.arange(20)  # seeds of the starts of a test
 

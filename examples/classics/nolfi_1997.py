@@ -6,8 +6,9 @@ import numpy as np
 
 import kiks
 from kiks.export.figures import column_figure, draw_paths
-from kiks.learn.classics import Finding, command, evolved, path_of, seeds_in
+from kiks.learn.classics import Finding, command, evolved, path_of
 from kiks.learn.statistics import compare, mean_interval
+from kiks.model.ranges import seeds_in
 
 ARCHITECTURES = {
     "feed_forward": "A feed-forward",

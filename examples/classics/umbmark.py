@@ -8,7 +8,8 @@ import numpy as np
 import kiks
 from kiks.export.figures import column_figure
 from kiks.fit.umbmark import square_test
-from kiks.learn.classics import Finding, command, seeds_in
+from kiks.learn.classics import Finding, command
+from kiks.model.ranges import seeds_in
 
 SIDE_MM, PULSE_MM = 500.0, 0.08
 BELIEVED_MM = 53.0  # the track that the program begins with

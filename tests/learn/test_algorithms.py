@@ -113,8 +113,9 @@ def test_strategies_of_a_race_take_turns_until_the_best_goes_on() -> None:
     asked = []
     for generation in range(16):
         candidates = algorithm.ask()
-        asked.append(id(algorithm._strategy))
+        asked.append(id(strategy := algorithm._strategy))
         algorithm.tell(np.full(len(candidates), float(generation % 3 == 1)), np.zeros((len(candidates), 0)))
+        assert np.array_equal(algorithm.favourite(), strategy.mean)  # of the one that has just learned
     assert asked[:12] == asked[:3] * 4
     assert len(set(asked)) == 3
     assert set(asked[12:]) == {asked[1]}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from kiks.errors import ParameterError
-from kiks.model.ranges import numbers_of
+from kiks.model.ranges import numbers_of, seeds_in
 from kiks.trials.sweep import Axes, Sweep, Tried
 from kiks.trials.trial import CRASHED, RUNNING, Outcome, ProgramEnd
 
@@ -77,6 +77,13 @@ def test_cases_are_each_value_with_each_of_the_others() -> None:
 def test_a_range_that_is_none_is_an_error(text: str) -> None:
     with pytest.raises(ParameterError, match="--think must be numbers or rising ranges, but one was"):
         numbers_of(text, "--think")
+
+
+def test_seeds_are_whole_numbers_and_ranges() -> None:
+    assert seeds_in("1-3, 7") == seeds_in("7,1..3") == [1, 2, 3, 7]
+    for wrong in ("", "3-1", "a", "1-", "-1", "0-5000", "1.5"):
+        with pytest.raises(ParameterError, match="seeds must be"):
+            seeds_in(wrong)
 
 
 def test_a_range_has_no_more_numbers_than_a_file_may_list() -> None:

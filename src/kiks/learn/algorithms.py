@@ -107,6 +107,7 @@ class Cma:
     def __init__(self, setting: Setting, options: Options) -> None:
         self._setting, self._options, self._rng = setting, options, np.random.default_rng(setting.seed)
         self._doublings, self._used = 0, {False: 0, True: 0}  # evaluations of large strategies, and of small ones
+        self._mean = np.zeros(setting.parameter_count)
         self._strategy: Any
         self._racing: list[tuple[Any, list[float]]] = []  # those that wait for their turn, and how well they did
         for _ in range(options.starts):
@@ -143,7 +144,7 @@ class Cma:
         self._used[self._is_small] += len(fitness)
         if len(self._costs) == len(self._candidates):
             self._strategy.tell(self._candidates, self._costs)
-            self._candidates, self._costs = [], []
+            self._candidates, self._costs, self._mean = [], [], np.array(self._strategy.mean)
             if self._racing:
                 self._take_turns(fitness)
             elif self._options.restarts != "none" and self._strategy.stop():
@@ -171,8 +172,9 @@ class Cma:
         self._begin(mean, spread, round(generations), is_small=is_small)
 
     def favourite(self) -> Floats:
-        """Return the mean of the distribution."""
-        return np.array(self._strategy.mean)
+        """Return the mean of the distribution that has learned last."""
+        mean: Floats = self._mean.copy()
+        return mean
 
 
 class Ga:

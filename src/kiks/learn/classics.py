@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kiks.errors import KiksError, ParameterError, shown
+from kiks.errors import KiksError
 from kiks.learn.algorithms import Algorithm
 from kiks.learn.champion import Champion
 from kiks.learn.evolution import Evolution
@@ -18,9 +18,6 @@ from kiks.learn.statistics import mean_interval
 from kiks.learn.task import Task
 
 Floats = NDArray[np.float64]
-
-SEEDS_MAX = 1000
-"""Most seeds of a script."""
 
 
 class Finding(NamedTuple):
@@ -64,25 +61,6 @@ def table_of(findings: Sequence[Finding]) -> str:
     rows = [("what", "known of the paper", "here"), *((each.what, each.known, each.text) for each in findings)]
     first, second = (max(len(row[column]) for row in rows) for column in range(2))
     return "\n".join(f"{row[0]:{first}}  {row[1]:{second}}  {row[2]}" for row in rows)
-
-
-def seeds_in(text: str) -> list[int]:
-    """Return the seeds that a text names.
-
-    Example:
-        >>> seeds_in("1-3,7")
-        [1, 2, 3, 7]
-    """
-    seeds: list[int] = []
-    for part in text.split(","):
-        first, dash, last = (word.strip() for word in part.partition("-"))
-        ends = [first, last] if dash else [first, first]
-        if not all(end.isascii() and end.isdigit() and len(end) < 10 for end in ends) or int(ends[0]) > int(ends[1]):
-            raise ParameterError(f"seeds must be like 1-10 or 1,4,7, but they were {shown(text)}.")
-        if int(ends[1]) - int(ends[0]) + len(seeds) >= SEEDS_MAX:
-            raise ParameterError(f"seeds must be at most {SEEDS_MAX}, but they were {shown(text)}.")
-        seeds += range(int(ends[0]), int(ends[1]) + 1)
-    return seeds
 
 
 def evolved(

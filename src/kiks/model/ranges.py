@@ -49,6 +49,19 @@ def numbers_of(text: str, name: str, *, step: float | None = None) -> tuple[floa
     return tuple(int(value) if isinstance(value, float) and value.is_integer() else value for value in sorted(found))
 
 
+def seeds_in(text: str) -> list[int]:
+    """Return the seeds of a list of whole numbers and ranges, rising, each once.
+
+    Example:
+        >>> seeds_in("1-3,7")
+        [1, 2, 3, 7]
+    """
+    numbers = numbers_of(text.replace("-", ".."), "seeds", step=1)
+    if not all(isinstance(number, int) for number in numbers):
+        raise ParameterError(f"seeds must be whole numbers, but they were {shown(text)}. Examples: 1-10; 1,4,7.")
+    return [int(number) for number in numbers]
+
+
 def _number(word: str) -> float:
     """Return a number; a whole one keeps all its digits."""
     return int(word) if word.strip().isdigit() and len(word) <= 20 else float(word)
