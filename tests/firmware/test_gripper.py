@@ -275,6 +275,24 @@ def test_opened_in_the_air_it_drops_the_load_in_front() -> None:
     assert place_of(sim) == pytest.approx((300 + TOUCHING_MM + 1, 300), abs=0.01)
 
 
+def test_what_fell_beyond_the_edge_is_neither_seen_nor_gripped_again() -> None:
+    sim = kiks.Simulation(kiks.Arena.box(604, 354, wall_mm=2), seed=1)
+    sim.add_cylinder(550, 177)
+    sim.place(1, 550 - TOUCHING_MM - 1, 177, 0.0)
+    sim.fit(1, "gripper")
+    closed(sim)
+    act(sim, "E,150", 0.6)
+    sim.place(1, 604 - RIM_MM - 3, 177, 0.0)
+    act(sim, "D,0", 0.6)
+    where = place_of(sim)
+    assert where[0] > 604.0
+    closed(sim)
+    assert ask(sim, "G") == [0]
+    assert held_by(sim) == 0
+    assert ask(sim, "H,0") == [0]
+    assert place_of(sim) == where
+
+
 def test_hands_take_things_out_of_the_jaws() -> None:
     sim = holding()
     sim.move_body(1, 600, 400)

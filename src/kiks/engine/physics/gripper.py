@@ -172,10 +172,11 @@ def from_robot(robot: Any, body: Any) -> Any:
 
 @kernel
 def is_between_jaws(robot: Any, parameters: Any, body: Any) -> Any:
-    """Return whether the centre of a body would be between a robot's jaws with the arm down."""
+    """Return whether a body that nobody holds is in the arena, its centre between a robot's jaws if the arm is down."""
     ahead, aside = from_robot(robot, body)
     begin = parameters.radius_mm
-    return begin <= ahead <= begin + JAW_LENGTH_MM and abs(aside) <= half_gap_mm(robot.jaws)
+    is_loose = body.holder == 0 and body.is_lifted == 0
+    return is_loose and begin <= ahead <= begin + JAW_LENGTH_MM and abs(aside) <= half_gap_mm(robot.jaws)
 
 
 @kernel
@@ -185,7 +186,7 @@ def grip(scene: Any, world: Any, number: Any, half_gap_before: Any) -> Any:
     robot = robots[world, number]
     for row in range(bodies.shape[1]):
         body = bodies[world, row]
-        if body.holder != 0 or not is_between_jaws(robot, kinds[robot.kind], body):
+        if not is_between_jaws(robot, kinds[robot.kind], body):
             continue
         ahead, aside = from_robot(robot, body)
         # It may have come nearer to a jaw in the last tick, too.
@@ -259,8 +260,7 @@ def find_between(scene: Any, world: Any, number: Any) -> Any:
         body = bodies[world, row]
         if body.holder == number + 1:
             return row
-        is_there = robot.arm >= ARM_DOWN and body.holder == 0 and is_between_jaws(robot, kinds[robot.kind], body)
-        if is_there and found < 0:
+        if robot.arm >= ARM_DOWN and found < 0 and is_between_jaws(robot, kinds[robot.kind], body):
             found = row
     return found
 
