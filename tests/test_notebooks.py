@@ -171,7 +171,7 @@ def test_what_has_several_arenas_shows_them_side_by_side() -> None:
 
 
 def test_an_evolution_shows_what_it_has_found() -> None:
-    evolution: Any = kiks.Evolution(kiks.tasks.avoid(seconds=1, worlds=3), "map-elites", seed=1, population=8)
+    evolution: Any = kiks.Evolution(kiks.tasks.avoid(seconds=1, worlds=4), "map-elites", seed=1, population=8)
     archive: Any = evolution.archive
     assert evolution._repr_mimebundle_() == archive._repr_mimebundle_() == ({}, {})
     evolution.run(generations=2)

@@ -21,7 +21,7 @@ pytestmark = pytest.mark.slow
 
 TASK = """
 import kiks
-task = kiks.tasks.avoid(seconds=1.0, worlds=3)
+task = kiks.tasks.avoid(seconds=1.0, worlds=4)
 """
 
 

@@ -326,7 +326,7 @@ def test_a_task_describes_behaviours_with_several_values_of_a_measure() -> None:
     way = kiks.measures.trajectory(
         seconds=1, points=4, describe=lambda ways: ways[..., -1, :2], names=["last_x_mm", "last_y_mm"]
     )
-    task = kiks.tasks.avoid(seconds=1, worlds=3)
+    task = kiks.tasks.avoid(seconds=1, worlds=4)
     task = task.with_changes(
         measures=(*task.measures, way),
         axes=(kiks.Axis("last_x_mm", 0, 1000), kiks.Axis("last_y_mm", 0, 1000)),

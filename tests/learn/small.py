@@ -9,7 +9,7 @@ import kiks
 
 def small(**changes: Any) -> kiks.Task:
     """Return a task that takes 10 ms to evaluate."""
-    return kiks.tasks.avoid(**{"seconds": 1.0, "worlds": 3} | changes)
+    return kiks.tasks.avoid(**{"seconds": 1.0, "worlds": 4} | changes)
 
 
 @kiks.controller(parameters=2)

@@ -50,7 +50,7 @@ KILLED = """
 import sys, kiks
 def report(evolution):
     print(len(evolution.generations), flush=True)
-task = kiks.tasks.avoid(seconds=1.0, worlds=3)
+task = kiks.tasks.avoid(seconds=1.0, worlds=4)
 evolution = kiks.Evolution(task, "cma", population=8, seed=3, folder=sys.argv[1])
 evolution.run(generations=10**6, each=report)
 """
@@ -295,8 +295,8 @@ def test_files_without_a_task_are_errors(tmp_path: Path) -> None:
 
 
 def test_wrong_tasks_are_errors() -> None:
-    with pytest.raises(ParameterError, match="worlds must be a multiple of the number of arenas, 3"):
-        small(worlds=4)
+    with pytest.raises(ParameterError, match="worlds must be a multiple of the number of arenas, 4"):
+        small(worlds=6)
     with pytest.raises(ParameterError, match="an axis must name one of"):
         small(axes=(kiks.Axis("nothing", 0, 1),))
     task = small(fitness=lambda values: values["contacts"])

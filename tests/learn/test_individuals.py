@@ -51,7 +51,7 @@ def hashes(task: kiks.Task, parameters: Any, seed: int, monkeypatch: pytest.Monk
 
 
 TASKS = {
-    "random starts": lambda: kiks.tasks.avoid(seconds=2.0, worlds=6),
+    "random starts": lambda: kiks.tasks.avoid(seconds=2.0, worlds=8),
     "with things": lambda: kiks.tasks.gather(seconds=2.0, worlds=8),
     "with a lamp": lambda: kiks.tasks.light(seconds=2.0, worlds=3),
     "many arenas": lambda: kiks.tasks.avoid(
@@ -59,9 +59,9 @@ TASKS = {
     ),
     "starts of the arena": lambda: kiks.tasks.maze(seconds=2.0),
     "two robots": lambda: kiks.tasks.gather(seconds=2.0, worlds=8, robots=2),
-    "a short period": lambda: kiks.tasks.avoid(seconds=1.23, worlds=3, timing=kiks.Timing(0.05, 38400, 0.0025)),
+    "a short period": lambda: kiks.tasks.avoid(seconds=1.23, worlds=4, timing=kiks.Timing(0.05, 38400, 0.0025)),
     "families": lambda: kiks.tasks.avoid(
-        seconds=2.0, worlds=6, robot=family(KHEPERA, 4, seed=1), timing=[kiks.Timing(), kiks.Timing(0.05, 38400)]
+        seconds=2.0, worlds=8, robot=family(KHEPERA, 4, seed=1), timing=[kiks.Timing(), kiks.Timing(0.05, 38400)]
     ),
 }
 
@@ -93,7 +93,7 @@ def test_a_demonstration_is_the_world_of_the_evaluation(
 
 def test_generations_need_no_rival_on_trial(tmp_path: Path) -> None:
     """All candidates fall into one cell of the map, and its elite is tried once."""
-    task = kiks.tasks.avoid(seconds=1.0, worlds=3)
+    task = kiks.tasks.avoid(seconds=1.0, worlds=4)
     evolution = kiks.Evolution(task, "map-elites", seed=3, population=6, folder=tmp_path)
     for _ in range(4):
         evolution.tell(np.zeros((len(evolution.ask()), len(task.value_names))))
@@ -116,14 +116,14 @@ def test_the_task_is_found_again(tmp_path: Path) -> None:
 
 
 def test_a_task_that_cannot_be_found_is_an_error(tmp_path: Path) -> None:
-    evolved(kiks.tasks.avoid(seconds=1.0, worlds=3), tmp_path / "changed")
+    evolved(kiks.tasks.avoid(seconds=1.0, worlds=4), tmp_path / "changed")
     with pytest.raises(ParameterError, match="must be the one that was evolved, but it differs now"):
         individual_of(tmp_path / "changed", 1)
-    evolved(kiks.tasks.avoid(name="mine", seconds=1.0, worlds=3), tmp_path / "own")
+    evolved(kiks.tasks.avoid(name="mine", seconds=1.0, worlds=4), tmp_path / "own")
     with pytest.raises(ParameterError, match=r"'mine' .* must be given, for it was made in Python.*--task FILE"):
         individual_of(tmp_path / "own", 1)
     file = tmp_path / "quick.py"
-    file.write_text("import kiks\ntask = kiks.tasks.avoid(seconds=1.0, worlds=3)\n")
+    file.write_text("import kiks\ntask = kiks.tasks.avoid(seconds=1.0, worlds=4)\n")
     evolved(kiks.tasks.load(file), tmp_path / "file")
     with pytest.raises(ParameterError, match=r"quick.py' is a Python file. Give it: --task FILE"):
         individual_of(tmp_path / "file", 1)
@@ -135,12 +135,12 @@ def test_a_task_that_cannot_be_found_is_an_error(tmp_path: Path) -> None:
 
 
 def test_numbers_out_of_range_are_errors(tmp_path: Path) -> None:
-    task = kiks.tasks.avoid(seconds=1.0, worlds=3)
+    task = kiks.tasks.avoid(seconds=1.0, worlds=4)
     evolved(task, tmp_path)
     for given, message in (
         ({"generation": 4}, "generation must be a whole number from 1 to 3"),
         ({"generation": 1, "rank": 7}, "rank must be a whole number from 1 to 6"),
-        ({"generation": 1, "world": 3}, "world must be a whole number from 0 to 2"),
+        ({"generation": 1, "world": 4}, "world must be a whole number from 0 to 3"),
     ):
         with pytest.raises(ParameterError, match=message):
             individual_of(tmp_path, task=task, **given)

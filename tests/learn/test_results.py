@@ -235,7 +235,7 @@ def test_pictures_are_of_the_kind_that_their_name_says(ending: str, begin: bytes
 
 @pytest.mark.slow
 def test_the_result_of_an_evolution(tmp_path: Path) -> None:
-    evolution = kiks.Evolution(kiks.tasks.avoid(seconds=1.0, worlds=3), "ga", population=8, folder=tmp_path)
+    evolution = kiks.Evolution(kiks.tasks.avoid(seconds=1.0, worlds=4), "ga", population=8, folder=tmp_path)
     with pytest.raises(ParameterError, match="before there is a champion"):
         result_of(evolution)
     evolution.run(generations=1)

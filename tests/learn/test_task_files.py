@@ -92,7 +92,7 @@ def test_the_digest_depends_on_what_the_file_says_and_on_the_files_that_it_names
         ("", "base must be given"),
         ('base = "avoyd"', "base must be .* Did you mean 'avoid'"),
         ('base = "avoid"\nworld = 3', "Did you mean 'worlds'"),
-        ('base = "avoid"\nworlds = 4', "worlds must be a multiple of the number of arenas, 3"),
+        ('base = "avoid"\nworlds = 6', "worlds must be a multiple of the number of arenas, 4"),
         ('base = "avoid"\nseconds = nan', "seconds must be a finite number, but it was nan"),
         ('base = "avoid"\nname = "../../out"', "name must be a text of 1 to 60 letters"),
         ('base = "avoid"\narenas = []', "arenas must have at least 1 item"),

@@ -259,7 +259,7 @@ def _controller() -> Any:
 
 @cache
 def _task() -> Any:
-    return kiks.tasks.avoid(seconds=0.5, worlds=3, controller=_controller())
+    return kiks.tasks.avoid(seconds=0.5, worlds=4, controller=_controller())
 
 
 def _control(rng: random.Random) -> Subject:

@@ -219,7 +219,7 @@ def _no_descriptors(rng: random.Random) -> None:
 
 _EVOLVE = """
 import sys, kiks
-task = kiks.tasks.avoid(seconds=1.0, worlds=3)
+task = kiks.tasks.avoid(seconds=1.0, worlds=4)
 evolution = kiks.Evolution(task, "ga", population=8, seed=3, folder=sys.argv[1])
 evolution.run(generations=10**6, each=lambda each: print(len(each.generations), flush=True))
 """
@@ -234,7 +234,7 @@ def _kill_evolution(rng: random.Random) -> None:
                 told = int([process.stdout.readline() for _ in range(rng.randint(1, 5))][-1])
                 time.sleep(rng.uniform(0.0, 0.1))
                 process.kill()
-            task = kiks.tasks.avoid(seconds=1.0, worlds=3)
+            task = kiks.tasks.avoid(seconds=1.0, worlds=4)
             again = kiks.Evolution(task, "ga", population=8, seed=3, folder=folder)
             if len(again.generations) < told:
                 raise Broken("lost", f"{told} generations were told, {len(again.generations)} are there", "evolution")

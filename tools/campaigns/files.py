@@ -262,7 +262,7 @@ def _npz(**arrays: Any) -> bytes:
 
 @cache
 def _task() -> kiks.Task:
-    return kiks.tasks.avoid(seconds=1.0, worlds=3)
+    return kiks.tasks.avoid(seconds=1.0, worlds=4)
 
 
 @cache

@@ -73,7 +73,7 @@ class Archive:
 
     Example:
         >>> import kiks
-        >>> task = kiks.tasks.avoid(seconds=1, worlds=3)
+        >>> task = kiks.tasks.avoid(seconds=1, worlds=4)
         >>> evolution = kiks.Evolution(task, "map-elites", seed=1, population=8)
         >>> _ = evolution.run(generations=2)
         >>> archive = evolution.archive
@@ -138,7 +138,7 @@ class Archive:
 
         Example:
             >>> import kiks
-            >>> evolution = kiks.Evolution(kiks.tasks.avoid(seconds=1, worlds=3), "map-elites", seed=1, population=8)
+            >>> evolution = kiks.Evolution(kiks.tasks.avoid(seconds=1, worlds=4), "map-elites", seed=1, population=8)
             >>> _ = evolution.run(generations=2)
             >>> archive = evolution.archive
             >>> len(archive.elites) > 1
@@ -151,7 +151,7 @@ class Archive:
 
         Example:
             >>> import kiks
-            >>> evolution = kiks.Evolution(kiks.tasks.avoid(seconds=1, worlds=3), "map-elites", seed=1, population=8)
+            >>> evolution = kiks.Evolution(kiks.tasks.avoid(seconds=1, worlds=4), "map-elites", seed=1, population=8)
             >>> _ = evolution.run(generations=2)
             >>> archive = evolution.archive
             >>> first, second, *_ = archive.best_first()
@@ -168,7 +168,7 @@ class Archive:
 
         Example:
             >>> import kiks
-            >>> evolution = kiks.Evolution(kiks.tasks.avoid(seconds=1, worlds=3), "map-elites", seed=1, population=8)
+            >>> evolution = kiks.Evolution(kiks.tasks.avoid(seconds=1, worlds=4), "map-elites", seed=1, population=8)
             >>> _ = evolution.run(generations=2)
             >>> archive = evolution.archive
             >>> elite = archive.elite_at(100, 0.5)  # path_mm, straightness
@@ -191,7 +191,7 @@ class Archive:
 
         Example:
             >>> import kiks
-            >>> evolution = kiks.Evolution(kiks.tasks.avoid(seconds=1, worlds=3), "map-elites", seed=1, population=8)
+            >>> evolution = kiks.Evolution(kiks.tasks.avoid(seconds=1, worlds=4), "map-elites", seed=1, population=8)
             >>> _ = evolution.run(generations=2)
             >>> archive = evolution.archive
             >>> archive.champion_of(archive.best_first()[0]).task
@@ -211,7 +211,7 @@ class Archive:
 
         Example:
             >>> import kiks
-            >>> evolution = kiks.Evolution(kiks.tasks.avoid(seconds=1, worlds=3), "map-elites", seed=1, population=8)
+            >>> evolution = kiks.Evolution(kiks.tasks.avoid(seconds=1, worlds=4), "map-elites", seed=1, population=8)
             >>> _ = evolution.run(generations=2)
             >>> archive = evolution.archive
             >>> archive.champion_at(100, 0.5).task
@@ -227,7 +227,7 @@ class Archive:
 
         Example:
             >>> import kiks
-            >>> evolution = kiks.Evolution(kiks.tasks.avoid(seconds=1, worlds=3), "map-elites", seed=1, population=8)
+            >>> evolution = kiks.Evolution(kiks.tasks.avoid(seconds=1, worlds=4), "map-elites", seed=1, population=8)
             >>> _ = evolution.run(generations=2)
             >>> archive = evolution.archive
             >>> 0 < archive.coverage < 1
@@ -241,7 +241,7 @@ class Archive:
 
         Example:
             >>> import kiks
-            >>> evolution = kiks.Evolution(kiks.tasks.avoid(seconds=1, worlds=3), "map-elites", seed=1, population=8)
+            >>> evolution = kiks.Evolution(kiks.tasks.avoid(seconds=1, worlds=4), "map-elites", seed=1, population=8)
             >>> _ = evolution.run(generations=2)
             >>> archive = evolution.archive
             >>> archive.qd_score > 0
@@ -254,7 +254,7 @@ class Archive:
 
         Example:
             >>> import kiks
-            >>> evolution = kiks.Evolution(kiks.tasks.avoid(seconds=1, worlds=3), "map-elites", seed=1, population=8)
+            >>> evolution = kiks.Evolution(kiks.tasks.avoid(seconds=1, worlds=4), "map-elites", seed=1, population=8)
             >>> _ = evolution.run(generations=2)
             >>> archive = evolution.archive
             >>> archive.heat_map().shape
@@ -274,7 +274,7 @@ class Archive:
             >>> import tempfile
             >>> from pathlib import Path
             >>> import kiks
-            >>> task = kiks.tasks.avoid(seconds=1, worlds=3)
+            >>> task = kiks.tasks.avoid(seconds=1, worlds=4)
             >>> evolution = kiks.Evolution(task, "map-elites", seed=1, population=8)
             >>> _ = evolution.run(generations=2)
             >>> folder = tempfile.mkdtemp()
@@ -303,7 +303,7 @@ class Archive:
         Example:
             >>> import tempfile
             >>> import kiks
-            >>> task = kiks.tasks.avoid(seconds=1, worlds=3)
+            >>> task = kiks.tasks.avoid(seconds=1, worlds=4)
             >>> evolution = kiks.Evolution(task, "map-elites", seed=1, population=8)
             >>> _ = evolution.run(generations=2)
             >>> folder = tempfile.mkdtemp()

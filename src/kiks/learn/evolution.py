@@ -164,7 +164,7 @@ class Evolution:
 
         Example:
             >>> import kiks
-            >>> task = kiks.tasks.avoid(seconds=1, worlds=3)
+            >>> task = kiks.tasks.avoid(seconds=1, worlds=4)
             >>> evolution = kiks.Evolution(task, "map-elites", seed=1, population=8)
             >>> _ = evolution.run(generations=2)
             >>> evolution.archive
@@ -422,7 +422,7 @@ class Evolution:
 
         Example:
             >>> import kiks
-            >>> task = kiks.tasks.avoid(seconds=1, worlds=3)
+            >>> task = kiks.tasks.avoid(seconds=1, worlds=4)
             >>> evolution = kiks.Evolution(task, "ga", seed=1, population=8)
             >>> for _ in range(2):
             ...     evolution.tell(task.evaluate(evolution.ask(), evolution.seeds))
@@ -488,7 +488,7 @@ class Evolution:
             >>> import tempfile
             >>> from pathlib import Path
             >>> import kiks
-            >>> task = kiks.tasks.avoid(seconds=1, worlds=3)
+            >>> task = kiks.tasks.avoid(seconds=1, worlds=4)
             >>> folder = Path(tempfile.mkdtemp())
             >>> evolution = kiks.Evolution(task, "ga", seed=1, population=8, folder=folder)
             >>> evolution.tell(task.evaluate(evolution.ask(), evolution.seeds))
@@ -513,7 +513,7 @@ class Evolution:
 
         Example:
             >>> import kiks
-            >>> task = kiks.tasks.avoid(seconds=1, worlds=3)
+            >>> task = kiks.tasks.avoid(seconds=1, worlds=4)
             >>> evolution = kiks.Evolution(task, "ga", seed=1, population=8)
             >>> _ = evolution.run(generations=2)
             >>> list(evolution.figures)
@@ -548,7 +548,7 @@ class Evolution:
 
         Example:
             >>> import kiks
-            >>> task = kiks.tasks.avoid(seconds=1, worlds=3)
+            >>> task = kiks.tasks.avoid(seconds=1, worlds=4)
             >>> evolution = kiks.Evolution(task, "ga", seed=1, population=8)
             >>> _ = evolution.run(generations=2)
             >>> evolution.champions == (evolution.champion,)
@@ -586,7 +586,7 @@ class Evolution:
 
         Example:
             >>> import kiks
-            >>> task = kiks.tasks.avoid(seconds=1, worlds=3)
+            >>> task = kiks.tasks.avoid(seconds=1, worlds=4)
             >>> evolution = kiks.Evolution(task, "ga", seed=1, population=8)
             >>> _ = evolution.run(generations=2)
             >>> evolution.champion_of(generation=1).generation
@@ -617,7 +617,7 @@ class Evolution:
 
         Example:
             >>> import kiks
-            >>> task = kiks.tasks.avoid(seconds=1, worlds=3, objectives=["path_mm", "-contacts"])
+            >>> task = kiks.tasks.avoid(seconds=1, worlds=4, objectives=["path_mm", "-contacts"])
             >>> evolution = kiks.Evolution(task, "nsga2", seed=1, population=8)
             >>> _ = evolution.run(generations=2)
             >>> longest, *others = evolution.front

@@ -289,7 +289,7 @@ class Task(Experiment):
 
         Example:
             >>> import kiks
-            >>> task = kiks.tasks.avoid(seconds=1, worlds=3)
+            >>> task = kiks.tasks.avoid(seconds=1, worlds=4)
             >>> task.timings
             (Timing(period_s=0.06, baud=9600, think_s=0.0),)
         """
@@ -314,7 +314,7 @@ class Task(Experiment):
 
         Example:
             >>> import kiks
-            >>> task = kiks.tasks.avoid(seconds=1, worlds=3)
+            >>> task = kiks.tasks.avoid(seconds=1, worlds=4)
             >>> task.controllers
             [<Controller 'linear': proximity; 18 parameters>]
         """
@@ -340,7 +340,7 @@ class Task(Experiment):
             >>> import kiks
             >>> task = kiks.tasks.avoid()
             >>> task.driven_s
-            240.0
+            320.0
         """
         return float(self.worlds * len(self.controllers) * self.seconds)
 
@@ -350,7 +350,7 @@ class Task(Experiment):
         Example:
             >>> import numpy as np
             >>> import kiks
-            >>> task = kiks.tasks.avoid(seconds=1, worlds=3)
+            >>> task = kiks.tasks.avoid(seconds=1, worlds=4)
             >>> [each.shape for each in task.parameters_of(np.zeros((5, 18)))]
             [(5, 18)]
         """
@@ -390,9 +390,9 @@ class Task(Experiment):
         Example:
             >>> import numpy as np
             >>> import kiks
-            >>> task = kiks.tasks.avoid(seconds=1, worlds=3)
+            >>> task = kiks.tasks.avoid(seconds=1, worlds=4)
             >>> task.start_poses(np.array([1, 2])).shape
-            (6, 1, 3)
+            (8, 1, 3)
         """
         if self.starts == "arena" and not self._draws_starts:
             return None
@@ -445,7 +445,7 @@ class Task(Experiment):
         Example:
             >>> import numpy as np
             >>> import kiks
-            >>> task = kiks.tasks.avoid(seconds=1, worlds=3)
+            >>> task = kiks.tasks.avoid(seconds=1, worlds=4)
             >>> task.individual(np.array([0.5, 0.5] + [0.0] * 16), seed=1, world=2)
             <Champion of 'avoid': <Controller 'linear': proximity; 18 parameters>, fitness 0>
         """
@@ -473,7 +473,7 @@ class Task(Experiment):
 
         Example:
             >>> import kiks
-            >>> task = kiks.tasks.avoid(seconds=1, worlds=3)
+            >>> task = kiks.tasks.avoid(seconds=1, worlds=4)
             >>> list(task.digest())[:3]
             ['arenas', 'controller', 'measures']
         """
@@ -544,9 +544,9 @@ class Task(Experiment):
         Example:
             >>> import numpy as np
             >>> import kiks
-            >>> task = kiks.tasks.avoid(seconds=1, worlds=3)
+            >>> task = kiks.tasks.avoid(seconds=1, worlds=4)
             >>> task.ways(np.zeros((2, 18)), np.zeros(2, np.int64), points=5).shape
-            (2, 3, 1, 5, 3)
+            (2, 4, 1, 5, 3)
         """
         candidates, seeds = check_candidates(candidates, seeds)
         way = trajectory(seconds=self.seconds, points=points)
