@@ -79,6 +79,15 @@ def test_a_controller_inside_a_function_cannot_be_named() -> None:
         kiks.controllers.recipe_for(inner)
 
 
+def test_a_sense_inside_a_function_cannot_be_named() -> None:
+    @kiks.sense(command="N", readings=8, most=1023)
+    def inner(view: Any, readings: Any) -> None:
+        readings[:] = 0.0
+
+    with pytest.raises(kiks.ParameterError, match=r"senses must be defined at the top of a module or file.* of inner"):
+        kiks.controllers.recipe_for(kiks.controllers.linear(senses=(inner,)))
+
+
 @pytest.mark.parametrize(
     ("recipe", "message"),
     [

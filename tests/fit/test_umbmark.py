@@ -48,3 +48,5 @@ def test_it_gives_the_published_constants_of_a_larger_robot() -> None:
 def test_squares_must_be_there() -> None:
     with pytest.raises(ParameterError, match="clockwise_mm must have the end of one square"):
         square_test(np.empty((0, 2)), [[1.0, 1.0]], side_mm=500.0, track_mm=53.0)
+    with pytest.raises(ParameterError, match="ends must lie nearer to the start of squares of 500 mm"):
+        square_test([[-1e6, 0.0]], [[-1e6, 0.0]], side_mm=500.0, track_mm=53.0)

@@ -12,6 +12,8 @@ from typer.testing import CliRunner
 import kiks
 from kiks import ParameterError
 from kiks.cli import app
+from kiks.export.ghost_frames import save_ghost_page
+from kiks.export.ghosts import save_ghosts
 from kiks.learn.individual import ghosts_of
 
 pytestmark = pytest.mark.slow
@@ -100,3 +102,9 @@ def test_what_cannot_be_shown_is_refused_in_one_line(folder: Path, tmp_path: Pat
     kiks.Evolution(task, seed=1, population=4, opponents=2, folder=tmp_path / "two").run(generations=1)
     with pytest.raises(ParameterError, match="must have one side and a generation for ghosts"):
         ghosts_of(tmp_path / "two", [1], task=task)
+
+
+def test_no_generation_is_an_error(tmp_path: Path) -> None:
+    for save, name in ((save_ghosts, "ghosts.png"), (save_ghosts, "ghosts.gif"), (save_ghost_page, "ghosts.html")):
+        with pytest.raises(ParameterError, match="ghosts must be of one generation at least"):
+            save([], tmp_path / name)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import copy
 import math
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -64,8 +66,37 @@ def test_kinds_of_noise_differ_and_repeat() -> None:
         assert (seen(sense, BOX, pose) == read[noise]).all()
     assert (read["uniform"] != read["none"]).any()
     assert (read["conservative"] != read["none"]).any()
-    with pytest.raises(kiks.KiksError, match="noise must be"):
-        sampled_proximity(BOX, [], 27.0, "much")
+
+
+@pytest.mark.parametrize("noise", ["uniform", "conservative"])
+def test_a_look_without_noise_is_free_of_it(noise: str) -> None:
+    sense, quiet = (sampled_proximity(BOX, [(310.0, 185.0)], 27.0, kind) for kind in (noise, "none"))
+    sim = kiks.Simulation(BOX, seed=1)
+    looks = [
+        each.look(sim.world.scene, 0, 0, time_ns, is_noisy=False) for each in (sense, quiet) for time_ns in (0, 10**9)
+    ]
+    assert all((look == looks[-1]).all() for look in looks)
+
+
+@pytest.mark.parametrize(
+    ("obstacles", "radius_mm", "noise", "message"),
+    [
+        ([], 27.0, "much", "noise must be"),
+        ([], math.nan, "none", "radius_mm must be"),
+        ([(1.0, 2.0, 3.0)], 27.0, "none", "obstacles must"),
+        ("ab", 27.0, "none", "obstacles must"),
+    ],
+)
+def test_wrong_arguments_are_errors(obstacles: Any, radius_mm: float, noise: str, message: str) -> None:
+    with pytest.raises(kiks.ParameterError, match=message):
+        sampled_proximity(BOX, obstacles, radius_mm, noise)
+
+
+def test_in_a_file_the_sensors_of_the_robot_stand_for_the_tables(tmp_path: Path) -> None:
+    sense = sampled_proximity(BOX, [], 27.0)
+    linear = kiks.controllers.linear(senses=(sense,))
+    kiks.Champion(linear, [0.1] * 18).save(tmp_path / "champion.toml")
+    assert kiks.Champion.load(tmp_path / "champion.toml").controller is kiks.controllers.linear()
 
 
 def test_nothing_near_is_nothing_read() -> None:

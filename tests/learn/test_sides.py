@@ -15,7 +15,7 @@ import kiks
 from kiks import ParameterError
 from kiks.cli.evolve import winners_of
 from kiks.client.drive import Driver
-from kiks.learn.cross_tournament import MEETINGS, hold_cross_tournament
+from kiks.learn.cross_tournament import MEETINGS, hold_cross_tournament, mean_over_groups
 from kiks.learn.finals import Tournament, latin_square
 from kiks.learn.fingerprint import differing
 from kiks.learn.plots import save_tournament_plot
@@ -305,3 +305,13 @@ def test_strangers_meet_from_the_same_starts(tmp_path: Path, monkeypatch: pytest
     np.testing.assert_allclose([*met["prey"]["one"], *met["prey"]["other"]], prey)
     with pytest.raises(ParameterError, match="two evolutions or more, but it has one"):
         hold_cross_tournament({"one": homes[:1]})
+
+
+def test_equal_predators_are_equal_although_the_preys_of_one_group_are_slower() -> None:
+    of_group, preys = np.array(["a", "a", "a", "b", "b"]), np.array([0.2, 0.3, 0.4, 0.8, 0.9])
+    scores = np.where(np.eye(5), np.nan, preys)
+    expected = [(a + 0.85) / 2 for a in (0.35, 0.3, 0.25)] + [(0.3 + b) / 2 for b in (0.9, 0.8)]
+    np.testing.assert_allclose(mean_over_groups(scores, of_group), expected)
+    assert np.mean(expected[:3]) == pytest.approx(np.mean(expected[3:]))
+    lone = mean_over_groups(scores[2:, 2:][:2, :2], of_group[2:4])  # each has no stranger but the other
+    np.testing.assert_allclose(lone, [0.8, 0.4])

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 import pytest
@@ -35,9 +37,9 @@ def test_wilsons_interval_is_that_of_newcombe(count: int, total: int, known: tup
     assert wilson_interval(count, total) == pytest.approx(known, abs=5e-5)
 
 
-@pytest.mark.parametrize(("count", "total"), [(3, 2), (-1, 2), (0, 0)])
-def test_a_share_is_of_something(count: int, total: int) -> None:
-    with pytest.raises(ParameterError, match=f"from 0 to total.* were {count} and {total}"):
+@pytest.mark.parametrize(("count", "total"), [(3, 2), (-1, 2), (0, 0), (1.5, 3)])
+def test_a_share_is_of_something(count: Any, total: int) -> None:
+    with pytest.raises(ParameterError, match=r"(count|total) must be a whole number"):
         wilson_interval(count, total)
 
 
@@ -84,6 +86,8 @@ def test_a_counts_pairs() -> None:
         ([2.0] * 5, [1.0] * 5, 1.0, "large"),
         ([0.0] * 5, [1.0] * 5, 0.0, "large"),
         ([1.0, 2.0, 2.0, 2.0, 3.0], [1.0, 2.0, 2.0, 2.0, 2.0], 0.58, "small"),
+        ([1.0] * 71 + [-1.0] * 29, [0.0], 0.71, "large"),
+        ([1.0] * 29 + [-1.0] * 71, [0.0], 0.29, "large"),
     ],
 )
 def test_effects_have_names(first: list[float], second: list[float], a: float, effect: str) -> None:
@@ -91,6 +95,29 @@ def test_effects_have_names(first: list[float], second: list[float], a: float, e
     assert found.a == pytest.approx(a)
     assert found.effect == effect
     assert found.test.method == MANN_WHITNEY
+
+
+@pytest.mark.parametrize("bad", [[1.0, float("nan")], [], ["a"], [[1.0]]])
+def test_a_sample_without_values_or_with_others_than_numbers_is_an_error(bad: Any) -> None:
+    good = [1.0, 2.0]
+    for wrong in (
+        lambda: compare({"a": good, "b": bad}),
+        lambda: compare({"a": good, "b": good, "c": bad}),
+        lambda: mann_whitney(bad, good),
+        lambda: bootstrap_interval(np.median, bad),
+        lambda: survival(Solved(bad, (True,) * len(bad))),
+    ):
+        with pytest.raises(ParameterError, match="a sample must"):
+            wrong()
+    with pytest.raises(ParameterError, match="p must be from 0 to 1"):
+        holm([0.5, float("nan")])
+
+
+def test_large_samples_take_little_memory() -> None:
+    tracemalloc.start()
+    compare({"a": np.arange(120.0).tolist(), "b": np.arange(120.0).tolist()})
+    assert tracemalloc.get_traced_memory()[1] < 100e6
+    tracemalloc.stop()
 
 
 def test_all_settings_together_and_each_two() -> None:

@@ -40,7 +40,7 @@ from kiks.control.neural_nets import (
     senses_as_inputs,
 )
 from kiks.control.recipes import FunctionRecipe, find, relative_to
-from kiks.control.senses import check_senses, reading_count, recipes_for
+from kiks.control.senses import check_senses, named, reading_count, recipes_for
 from kiks.engine.compiling import kernel
 from kiks.engine.numbers import tanh
 from kiks.engine.simd.stack_arrays import stack_floats
@@ -657,8 +657,12 @@ def recipe_for(controller: Controller, folder: str | Path = ".") -> dict[str, An
     if controller.recipe is None:
         raise ParameterError(
             f"the controller {shown(controller.name)} must be defined at the top of a module or file to be found "
-            "again, but "
-            "it was defined inside another function or typed into a console."
+            "again, but it was defined inside another function or typed into a console."
+        )
+    if None in controller.recipe.get("senses", ()):
+        raise ParameterError(
+            "senses must be defined at the top of a module or file to be found again, but one of "
+            f"{named(controller.senses)} was defined inside another function or typed into a console."
         )
     return relative_to(controller.recipe, folder)
 

@@ -21,6 +21,7 @@ from kiks.errors import ParameterError
 from kiks.model.arena import Arena
 from kiks.model.checks import check_kind, check_number
 from kiks.model.data_file import Number, OneOf, Text, Whole, as_list
+from kiks.model.robot import SENSOR_COUNT
 
 __all__ = [
     "avoidance",
@@ -335,7 +336,7 @@ def beside_wall_share(side: Side = "left", *, counts: Counts = 50.0) -> Measure:
 def trajectory(
     *, seconds: Positive, points: Points = 10, describe: Description | None = None, names: Names = ()
 ) -> Measure:
-    """The way of a robot: its pose at equal intervals, the last at the end. It has several values.
+    """The way of a robot: its pose at the last control step of each of equal intervals. It has several values.
 
     Without `describe`, they are x_mm_1, y_mm_1, heading_rad_1, x_mm_2 and so on. A trial that has ended earlier stays
     where it ended. A task takes means of them over its worlds, so that a way needs worlds that are alike.
@@ -809,12 +810,29 @@ def roaming_share(moment: Any, notes: Any) -> Any:
 @kernel
 def freely_ahead(moment: Any) -> Any:
     """Return how fast, how straight and how far from everything the robot drives, from 0 to 1, as in `avoidance`."""
+    ahead = 0.5 * (share_of_full(moment.wheels[0]) + share_of_full(moment.wheels[1]))
+    return max(ahead, 0.0) * straight_share(moment) * clear_share(moment)
+
+
+@kernel
+def straight_share(moment: Any) -> Any:
+    """Return 1 less the root of half of how much the speeds of the wheels differ, with their signs, as shares."""
+    return 1.0 - np.sqrt(0.5 * abs(share_of_full(moment.wheels[0]) - share_of_full(moment.wheels[1])))
+
+
+@kernel
+def clear_share(moment: Any) -> Any:
+    """Return 1 less the highest proximity, as a share; proximity is the first sense of the controller."""
     highest = 0.0
-    for k in range(8):
+    for k in range(min(SENSOR_COUNT, moment.sensors.shape[0])):
         highest = max(highest, moment.sensors[k])
-    left, right = share_of_full(moment.wheels[0]), share_of_full(moment.wheels[1])
-    straight = 1.0 - np.sqrt(0.5 * abs(left - right))
-    return max(0.5 * (left + right), 0.0) * straight * (1.0 - min(highest / FULL_COUNT, 1.0))
+    return 1.0 - min(highest / FULL_COUNT, 1.0)
+
+
+@kernel
+def wheels_share(moment: Any) -> Any:
+    """Return the mean speed of both wheels without their signs, as a share of `FULL_SPEED`."""
+    return 0.5 * (abs(share_of_full(moment.wheels[0])) + abs(share_of_full(moment.wheels[1])))
 
 
 @kernel

@@ -63,7 +63,8 @@ class Sense(TurretPart):
         command: As above, as all others.
         turret: The turret: a name, a class, or None.
         address: Where a batch calls it.
-        recipe: The table that finds it again, of JSON values; None for one that cannot be imported.
+        recipe: The table that finds it again, of JSON values, or the name of one that stands for it; None for one that
+            cannot be imported.
 
     Example:
         >>> import kiks

@@ -100,7 +100,8 @@ class TurretPart(Compiled):
         turret: The turret that answers it, a name or a class; the class that it is defined in sets it.
 
     Attributes:
-        recipe: The table that finds it again, of JSON values; None for one that cannot be imported.
+        recipe: The table that finds it again, of JSON values, or the name of one that stands for it; None for one that
+            cannot be imported.
     """
 
     argument_types: tuple[Any, ...]
@@ -113,7 +114,7 @@ class TurretPart(Compiled):
             raise ParameterError(f"command must be a line such as 'E' or 'T,24,C', but it was {shown(command)}.")
         self.command = command
         self.turret = turret
-        self.recipe = recipe_of(function)
+        self.recipe: dict[str, Any] | str | None = recipe_of(function)
 
     @property
     def _stands_in_module(self) -> bool:

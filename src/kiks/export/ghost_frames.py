@@ -14,7 +14,7 @@ from markupsafe import Markup, escape
 from kiks.engine.parameters import RAY_COUNT
 from kiks.export.frames import HEAD, NO_HIT, ROBOT, VERSION, arena_picture, describe_scene, describe_shapes
 from kiks.export.frames import KIND as FRAME_KIND
-from kiks.export.ghosts import GHOST_SHARE, Ghosts
+from kiks.export.ghosts import GHOST_SHARE, Ghosts, check_scenes
 from kiks.export.page import page_template, player_script, player_style, player_values
 from kiks.export.run_frames import RunFrames, fitting_period_ns
 from kiks.model.arena import Arena, Pose
@@ -92,6 +92,7 @@ STYLE = """
 
 def save_ghost_page(generations: Sequence[Ghosts], path: str | Path) -> None:
     """Write a page with a player of generations, whose slider leads from one to the next."""
+    check_scenes(generations)
     frames = GhostFrames(generations)
     begins_s = np.cumsum([0.0, *(each.seconds for each in generations)])
     listed = "".join(

@@ -59,7 +59,7 @@ class Ghosts(NamedTuple):
         arena: Their arena.
         spec: Their kind of robot.
         ways: x_mm, y_mm and heading_rad at equal intervals, float64 [ghost, point, 3]; the best ghost first.
-        seconds: Time from the first point to the last [s].
+        seconds: Time of a trial [s].
         title: What they are.
     """
 
@@ -68,6 +68,12 @@ class Ghosts(NamedTuple):
     ways: NDArray[np.float64]
     seconds: float
     title: str
+
+
+def check_scenes(scenes: Sequence[Ghosts]) -> None:
+    """Raise an error if there is no generation."""
+    if not scenes:
+        raise ParameterError("ghosts must be of one generation at least, but there was none.")
 
 
 def save_ghosts(
@@ -92,6 +98,7 @@ def save_ghosts(
     Returns:
         The number of pictures.
     """
+    check_scenes(scenes)
     ending = ending_of(path, "ghosts", ENDINGS)
     width, height = checked_size(size)
     if ending == PICTURE:

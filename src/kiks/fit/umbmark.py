@@ -19,6 +19,9 @@ from kiks.errors import ParameterError
 from kiks.model.array_checks import check_numbers
 from kiks.model.checks import check_number
 
+ANGLE_MAX = np.pi / 4
+"""Largest angle by which a turn or a leg may be off: beyond, ends are in other units than the sides."""
+
 
 @dataclass(frozen=True)
 class SquareTest:
@@ -73,6 +76,11 @@ def square_test(clockwise_mm: ArrayLike, counter_mm: ArrayLike, *, side_mm: floa
         errors_mm.append(float(np.hypot(*centre)))
     alpha = (across[0] + across[1]) / (-4.0 * side_mm)
     beta = (across[0] - across[1]) / (-4.0 * side_mm)
+    if max(abs(alpha), abs(beta)) > ANGLE_MAX:
+        raise ParameterError(
+            f"ends must lie nearer to the start of squares of {side_mm:g} mm, but their means across were "
+            f"{across[0]:g} and {across[1]:g} mm. Give all lengths in millimetres."
+        )
     radius_mm = np.inf if beta == 0.0 else 0.5 * side_mm / np.sin(0.5 * beta)
     track = track_mm * 0.5 * np.pi / (0.5 * np.pi - alpha)
     # (R + b / 2) / (R - b / 2), written so that straight legs need no case of their own

@@ -99,7 +99,7 @@ def vehicle(name: str) -> Champion:
         >>> round(sim.travelled_mm(1))
         210
     """
-    if name not in VEHICLES:
+    if not isinstance(name, str) or name not in VEHICLES:
         raise ParameterError(
             f"name must be one of {', '.join(VEHICLES)}, but it was {shown(name)}.{nearest(str(name), VEHICLES)}"
         )

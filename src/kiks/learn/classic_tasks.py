@@ -8,10 +8,11 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from functools import cache
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from kiks.batch.loop_timing import Timing
 from kiks.control import controllers, measures
@@ -19,12 +20,13 @@ from kiks.control.controller import controller
 from kiks.control.measure import measure
 from kiks.control.measures import (
     FULL_COUNT,
-    FULL_SPEED_MM_S,
-    ROAMING_S,
+    clear_share,
     distance_mm,
     mean,
-    moved_lately_mm,
+    roaming_share,
     share_of_full,
+    straight_share,
+    wheels_share,
 )
 from kiks.control.neural_nets import do_layer, layer_size, logistic
 from kiks.control.senses import Sense
@@ -43,10 +45,11 @@ from kiks.learn.ready_tasks import (
     Values,
     ready,
 )
-from kiks.learn.sampled import sampled_proximity
+from kiks.learn.sampled import NOISES, sampled_proximity
 from kiks.learn.task import Side, Task
 from kiks.model.arena import Arena, Cylinder
-from kiks.model.robot import SENSOR_COUNT, RobotSpec, specs_of
+from kiks.model.data_file import Number, OneOf, Rule, Switch, Text
+from kiks.model.robot import RobotSpec, specs_of
 from kiks.model.shipped import shipped_arena
 from kiks.model.walls import Wall
 
@@ -70,31 +73,25 @@ def navigation(moment: Any, notes: Any) -> None:
     V is the mean of both wheels' speeds without their signs, dv half of how much they differ with their signs, i the
     highest proximity: each from 0 to 1. The measure `avoidance` differs: there driving back earns nothing.
     """
-    speed = 0.5 * (abs(share_of_full(moment.wheels[0])) + abs(share_of_full(moment.wheels[1])))
-    notes[0] += speed * straight_and_clear(moment)
+    notes[0] += wheels_share(moment) * (straight_share(moment) * clear_share(moment))
     notes[1] += 1.0
 
 
 @measure(notes=4, result=mean, senses=("proximity",))
 def navigation_gained(moment: Any, notes: Any) -> None:
     """The same with another V: the speed at which it gets away from where it was two seconds ago, as in `roaming`."""
-    away_mm = moved_lately_mm(moment, notes)
-    notes[0] += min(away_mm / (ROAMING_S * FULL_SPEED_MM_S), 1.0) * straight_and_clear(moment)
-    notes[1] += 1.0
+    add_gained(moment, notes)
 
 
 @kernel
-def straight_and_clear(moment: Any) -> Any:
-    """Return (1 - sqrt(dv)) (1 - i)."""
-    highest = 0.0
-    for k in range(min(SENSOR_COUNT, moment.sensors.shape[0])):
-        highest = max(highest, moment.sensors[k])
-    differ = 0.5 * abs(share_of_full(moment.wheels[0]) - share_of_full(moment.wheels[1]))
-    return (1.0 - np.sqrt(differ)) * (1.0 - min(highest / FULL_COUNT, 1.0))
+def add_gained(moment: Any, notes: Any) -> Any:
+    """Add one step of `navigation_gained`."""
+    notes[0] += roaming_share(moment, notes) * (straight_share(moment) * clear_share(moment))
+    notes[1] += 1.0
 
 
 @ready
-def floreano_mondada_1994(shuttling: bool = False) -> Task:
+def floreano_mondada_1994(shuttling: Switch = False) -> Task:
     """The task to navigate in a looping corridor (Floreano and Mondada 1994).
 
     Args:
@@ -141,7 +138,7 @@ def exploration(moment: Any, notes: Any) -> None:
     V is how fast it gets away from where it was two seconds ago, as in `roaming`; D half of how much the speeds of the
     wheels differ, with its sign, on average over the trial.
     """
-    notes[0] += min(moved_lately_mm(moment, notes) / (ROAMING_S * FULL_SPEED_MM_S), 1.0)
+    notes[0] += roaming_share(moment, notes)
     notes[1] += 1.0
     notes[4] += 0.5 * (share_of_full(moment.wheels[0]) - share_of_full(moment.wheels[1]))
 
@@ -169,8 +166,12 @@ def room_with_pillars() -> Arena:
     return replace(Arena.box(520, 520), name="pillars of 1995", walls=pillars)
 
 
+Noise = Annotated[Number, Field(ge=0, le=100)]
+RobotKind = Annotated[Text | RobotSpec, Rule("the name of a robot, a robot file or a kiks.RobotSpec")]
+
+
 @ready
-def jakobi_husbands_harvey_1995(noise: float = 1.0, robot: str | RobotSpec = "khepera") -> Task:
+def jakobi_husbands_harvey_1995(noise: Noise = 1.0, robot: RobotKind = "khepera") -> Task:
     """The task to avoid obstacles with sensors of more or less noise (Jakobi, Husbands and Harvey 1995).
 
     Args:
@@ -208,8 +209,8 @@ COLLECTED_COUNT = 5
 SEEN_SHARE, HELD_SHARE = 0.1, 0.4
 """What facing a cylinder, and holding one, count beside one that is outside (our own guess)."""
 
-FACED_STEPS = 20.0
-"""Steps before a cylinder that count fully."""
+FACED_STEPS, FACED_MM, ASIDE_MM = 20.0, (27.5, 65.0), 15.0
+"""Steps before a cylinder that count fully, and where it then is: ahead from, to, and aside at most [mm]."""
 
 
 @measure(notes=4)
@@ -229,7 +230,7 @@ def collecting(moment: Any, notes: Any) -> None:
         elif body.is_lifted == 0:
             dx, dy = body.x_mm - moment.x_mm, body.y_mm - moment.y_mm
             ahead, aside = dx * cosine + dy * sine, abs(dy * cosine - dx * sine)
-            if 27.5 < ahead < 65.0 and aside < 15.0:
+            if FACED_MM[0] < ahead < FACED_MM[1] and aside < ASIDE_MM:
                 notes[3] = min(notes[3] + 1.0 / FACED_STEPS, 1.0)
     notes[0] = max(notes[0], out + HELD_SHARE * notes[2] + SEEN_SHARE * max(notes[2], notes[3]))
 
@@ -395,7 +396,7 @@ def floreano_nolfi_1997() -> Task:
     """The task to catch, or to escape, with networks of five bits a synapse (Floreano and Nolfi 1997).
 
     Networks, genes and selection are those of the papers: weights of five bits, without biases, the best fifth has five
-    children each.
+    children each. Fitness counts shares of 500 cycles, also in trials of another length.
 
     Example:
         >>> import kiks
@@ -453,10 +454,10 @@ def homing_network(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> N
     memory[USED] = charge_lost(memory[USED], sensors[FLOOR])
     inputs, hidden, outputs = stack_floats(_FED), stack_floats(HIDDEN), stack_floats(2)
     for k in range(8):
-        inputs[k] = sensors[k] / 1023.0
+        inputs[k] = sensors[k] / FULL_COUNT
     inputs[8] = (500.0 - sensors[_AMBIENT + _FRONT]) / 500.0
     inputs[9] = (500.0 - sensors[_AMBIENT + _BACK]) / 500.0
-    inputs[10] = sensors[FLOOR] / 1023.0
+    inputs[10] = sensors[FLOOR] / FULL_COUNT
     inputs[11] = 1.0 - memory[USED]
     for k in range(HIDDEN):
         inputs[_INPUTS + k] = memory[CONTEXT + k]
@@ -479,11 +480,7 @@ def battery_empty(moment: Any, notes: Any) -> None:
 @kernel
 def clear_off_zone(moment: Any) -> Any:
     """Return (1 - i) as a share of a life's actions; 0 on the charging zone."""
-    highest = 0.0
-    for k in range(8):
-        highest = max(highest, moment.sensors[k])
-    is_off = moment.sensors[FLOOR] >= _BLACK
-    return (1.0 - min(highest / FULL_COUNT, 1.0)) / LIFE_ACTIONS if is_off else 0.0
+    return clear_share(moment) / LIFE_ACTIONS if moment.sensors[FLOOR] >= _BLACK else 0.0
 
 
 @measure(senses=("proximity", "ambient", "floor"))
@@ -492,15 +489,13 @@ def homing(moment: Any, notes: Any) -> None:
 
     V and i are those of `navigation`. Battery, lamp and zone are not in it: a robot that charges lives longer.
     """
-    speed = 0.5 * (abs(share_of_full(moment.wheels[0])) + abs(share_of_full(moment.wheels[1])))
-    notes[0] += speed * clear_off_zone(moment)
+    notes[0] += wheels_share(moment) * clear_off_zone(moment)
 
 
 @measure(notes=4, senses=("proximity", "ambient", "floor"))
 def homing_gained(moment: Any, notes: Any) -> None:
     """The same with the V of `navigation_gained`."""
-    away_mm = moved_lately_mm(moment, notes)
-    notes[0] += min(away_mm / (ROAMING_S * FULL_SPEED_MM_S), 1.0) * clear_off_zone(moment)
+    notes[0] += roaming_share(moment, notes) * clear_off_zone(moment)
     notes[1] += 1.0
 
 
@@ -520,7 +515,7 @@ def actions(moment: Any, notes: Any) -> None:
 
 
 @ready
-def floreano_mondada_1996(shuttling: bool = False) -> Task:
+def floreano_mondada_1996(shuttling: Switch = False) -> Task:
     """The task to come back to a charging zone before a battery is empty (Floreano and Mondada 1996).
 
     Args:
@@ -564,9 +559,7 @@ def box_with_obstacles() -> Arena:
 @measure(notes=4, result=mean)
 def navigation_seen(moment: Any, notes: Any) -> None:
     """As `navigation_gained`, for controllers whose first sense stands for proximity."""
-    away_mm = moved_lately_mm(moment, notes)
-    notes[0] += min(away_mm / (ROAMING_S * FULL_SPEED_MM_S), 1.0) * straight_and_clear(moment)
-    notes[1] += 1.0
+    add_gained(moment, notes)
 
 
 @cache
@@ -575,8 +568,11 @@ def sampled_sense(noise: str) -> Sense:
     return sampled_proximity(box_with_obstacles(), ROUND_PLACES, ROUND_MM, noise)
 
 
+Sampled = Annotated[str, OneOf(("", *NOISES))]
+
+
 @ready
-def miglino_lund_nolfi_1995(sampled: str = "") -> Task:
+def miglino_lund_nolfi_1995(sampled: Sampled = "") -> Task:
     """The task to navigate among round obstacles, with sensors from tables or whole ones (Miglino, Lund, Nolfi 1995).
 
     Args:

@@ -2,7 +2,8 @@
 
 The fitness of two sides is relative: a predator that catches each prey of its own evolution may have met slow ones. So
 co-evolutions are compared by how their champions do against strangers: each meets the champions of all other evolutions
-that are compared, from the same starts.
+that are compared, from the same starts. Each group of opponents counts alike, so that groups of two evolutions or more
+meet the same mixture; a lone evolution has no strangers in its own group.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from concurrent.futures import Executor
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kiks.errors import ParameterError
 from kiks.learn import seeds
@@ -65,8 +67,21 @@ def hold_cross_tournament(
             means = values.reshape(len(pairs), MEETINGS, 2, -1)[:, :, :, 0].mean(axis=1)
             for (row, column), (of_first, of_second) in zip(pairs, means, strict=True):
                 scores[:, row, column] = of_first, of_second
-    means_of = np.nanmean(scores[0], axis=1), np.nanmean(scores[1], axis=0)
+    means_of = (mean_over_groups(each, of_group) for each in (scores[0], scores[1].T))
     return {
         side: {name: means[of_group == name].tolist() for name in groups}
         for side, means in zip(sides, means_of, strict=True)
     }
+
+
+def mean_over_groups(scores: Floats, of_group: NDArray[np.str_]) -> Floats:
+    """Return the mean over groups of a champion's mean score against their strangers, float64 [champion].
+
+    Args:
+        scores: Score of each champion against each opponent, float64 [champion, opponent]; NaN if it is no stranger.
+        of_group: Name of the group of each opponent [opponent].
+    """
+    known = np.ma.masked_invalid(scores)
+    of_groups = [known[:, of_group == name].mean(axis=1) for name in dict.fromkeys(of_group.tolist())]
+    means: Floats = np.ma.stack(of_groups).mean(axis=0).filled(np.nan)
+    return means

@@ -5,12 +5,14 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from kiks.control.actuators import orders_of
+from kiks.control.arguments import made_once
 from kiks.control.controllers import linear
 from kiks.control.measure import Measure, measure
 from kiks.control.measures import (
@@ -27,7 +29,7 @@ from kiks.learn import football as game
 from kiks.learn import ready_tasks
 from kiks.learn.task import Task
 from kiks.model.arena import Arena, Cylinder, Pose
-from kiks.model.checks import check_kind, check_number
+from kiks.model.data_file import Number
 
 CONTACT_COST = 5.0
 """What a contact takes off the rewards of `Avoid` and `Follow`: half a second of following at best is worth as much."""
@@ -73,16 +75,18 @@ def drawn_together(moment: Any, notes: Any) -> None:
     notes[1] = total_mm
 
 
-@functools.lru_cache(maxsize=256)
-def without_contacts(reward: Measure, cost: float = CONTACT_COST) -> Measure:
+Reward = Annotated[Measure, Field(description="Write @kiks.measure over the function.")]
+Cost = Annotated[Number, Field(ge=0, le=1e6)]
+
+
+@made_once
+def without_contacts(reward: Reward, cost: Cost = CONTACT_COST) -> Measure:
     """Return a reward that falls by a cost with each contact; the same measure for the same arguments.
 
     Args:
         reward: A measure; the gain of its first note is the reward.
         cost: What a contact takes off.
     """
-    check_kind("reward", reward, Measure, "Write @kiks.measure over the function.")
-    cost = check_number("cost", cost, 0, 1e6)
     watch, result = reward.kernel, reward.result
 
     def value(notes: NDArray[np.float64]) -> NDArray[np.float64]:

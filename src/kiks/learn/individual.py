@@ -87,14 +87,9 @@ def ghosts_of(
         shown_by = found.individual(candidates[0], seed, world)
         (spec,) = specs_of(shown_by.robot, 1, None)
         assert shown_by.world is not None
-        arena = shown_by.world.arena
-        starts = [(each.x_mm, each.y_mm, each.heading_rad) for each in arena.starts]
-        if len(starts) == ways.shape[1]:
-            first = np.broadcast_to(np.array(starts)[:, None], (*ways.shape[:2], 1, 3))
-            ways = np.concatenate([first, ways], axis=2)
         ways = ways.reshape(-1, *ways.shape[2:])
         title = f"{found.name}   generation {generation}   best fitness {fitness.max():.3g}"
-        scenes.append(Ghosts(arena, spec, ways, found.seconds, title))
+        scenes.append(Ghosts(shown_by.world.arena, spec, ways, found.seconds, title))
     return scenes
 
 

@@ -335,7 +335,7 @@ def _add_inches(figure: Any, height: float) -> None:
 
 def _short_names(names: Sequence[str]) -> dict[str, str]:
     """Return names without the folder that they have in common, and not too long for a legend."""
-    parts = [Path(name).parts for name in names]
+    parts = [Path(name).parts or (name,) for name in names]
     same = len(Path(commonpath(names)).parts) if len({Path(name).is_absolute() for name in names}) == 1 else 0
     texts = [str(Path(*part[same:])) if len(names) > 1 and len(part) > same else part[-1] for part in parts]
     return {

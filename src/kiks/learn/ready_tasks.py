@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from kiks.batch.initial_state import random_starts
 from kiks.batch.loop_timing import Timing
 from kiks.control import controllers, measures
+from kiks.control.arguments import record_of
 from kiks.control.controller import Controller
 from kiks.learn import football as game
 from kiks.learn.exam import Exam
@@ -47,12 +48,16 @@ PLACES = 200
 
 
 def ready(make: Callable[..., Task]) -> Callable[..., Task]:
-    """Add a function that returns a task to `TASKS`; it then takes another controller and other arguments of `Task`."""
-    own = inspect.signature(make).parameters
+    """Add a function that returns a task to `TASKS`; it then takes another controller and other arguments of `Task`.
+
+    The annotations of its own arguments check them.
+    """
+    names, arguments = inspect.signature(make).parameters, record_of(make)
 
     @functools.wraps(make)
     def changed(controller: Controller | None = None, **changes: Any) -> Task:
-        task = make(**{name: changes.pop(name) for name in own if name in changes})
+        own = arguments(**{name: changes.pop(name) for name in names if name in changes})
+        task = make(**vars(own))
         return replace(task, **changes if controller is None else {"controller": controller, **changes})
 
     del vars(changed)["__wrapped__"]  # its signature is that of `changed`
@@ -60,7 +65,7 @@ def ready(make: Callable[..., Task]) -> Callable[..., Task]:
     return changed
 
 
-def without_contacts(fitness: Floats, values: Values, cost: float = CONTACT_COST) -> Floats:
+def reduced_by_contacts(fitness: Floats, values: Values, cost: float = CONTACT_COST) -> Floats:
     """Return fitness reduced by contacts, but not below zero: driving with contacts beats standing still."""
     contacts = np.minimum(values["contacts"], CONTACTS_COUNTED).mean(axis=1)
     reduced: Floats = fitness / (1 + cost * contacts)
@@ -119,7 +124,7 @@ it senses the thing, and 3 mm more before its command acts.
 
 def avoid_fitness(values: Values) -> Floats:
     """Return the fitness of `avoid`: that of Floreano and Mondada (1994) times `roaming`."""
-    return without_contacts(cautious_mean(values["avoidance"] * values["roaming"]), values)
+    return reduced_by_contacts(cautious_mean(values["avoidance"] * values["roaming"]), values)
 
 
 @ready
@@ -246,7 +251,7 @@ lamp: then its light is all that candidates learn to follow, and not to search i
 def light_fitness(values: Values) -> Floats:
     """Return the fitness of `light`: the share of the way that was made, more if it ends at the lamp; 0 of standing."""
     scores = values["light_approach"] * (1 + values["near_light_share"])
-    return without_contacts(cautious_mean(scores), values, LIGHT_CONTACT_COST)
+    return reduced_by_contacts(cautious_mean(scores), values, LIGHT_CONTACT_COST)
 
 
 def light_solved(values: Values) -> NDArray[np.bool_]:

@@ -21,12 +21,14 @@ from kiks.engine.compiling import kernel
 from kiks.engine.numbers import at_instant, draw, sin_cos, stream_of
 from kiks.errors import ParameterError, shown
 from kiks.model.arena import Arena
+from kiks.model.array_checks import check_numbers
+from kiks.model.checks import check_number
 from kiks.model.robot import SENSOR_COUNT, RobotSpec
 from kiks.model.walls import Wall
 from kiks.sim.simulation import Simulation
 
 NOISES = ("none", "uniform", "conservative")
-"""Kinds of noise: none; of each reading; as if the robot stood a little elsewhere."""
+"""Kinds of noise: none; of each reading; as if each object stood a little elsewhere."""
 
 ANGLES, GAPS, FIRST_MM, STEP_MM = 180, 20, 5.0, 2.0
 """Headings, 2 degrees apart, and gaps of a table, and the first gap and the step from one to the next [mm]."""
@@ -41,8 +43,8 @@ _ROOM_MM = 400.0
 
 
 @cache
-def sampled_table(radius_mm: float, robot: str = "khepera") -> NDArray[np.float64]:
-    """Return what a robot reads beside a round obstacle, or beside a straight wall if the radius is infinite.
+def sampled_table(radius_mm: float) -> NDArray[np.float64]:
+    """Return what a Khepera reads beside a round obstacle, or beside a straight wall if the radius is infinite.
 
     Returns:
         Expected counts, float64 [gap, angle, sensor]; angles are the direction to the object less the robot's heading,
@@ -52,7 +54,7 @@ def sampled_table(radius_mm: float, robot: str = "khepera") -> NDArray[np.float6
         >>> sampled_table(math.inf).shape
         (20, 180, 8)
     """
-    spec = RobotSpec.load(robot)
+    spec = RobotSpec.load("khepera")
     edge_mm = _ROOM_MM - 10.0
     arena = Arena.box(int(_ROOM_MM), int(_ROOM_MM))
     if math.isfinite(radius_mm):
@@ -91,10 +93,10 @@ def sampled_proximity(
     noise: str = "none",
     wall_mm: float = 10.0,
 ) -> Sense:
-    """Return a sense that reads tables in place of rays, in a box with round obstacles of one size.
+    """Return a sense of a Khepera that reads tables in place of rays, in a box with round obstacles of one size.
 
     It stands for proximity in a batch. On a line the command reads the robot's own sensors, so that a controller that
-    has evolved with it drives there, or with the sense 'proximity', as it is.
+    has evolved with it drives there as it is; saved in a file, it has the sense 'proximity' in its place.
 
     Args:
         arena: The box.
@@ -109,8 +111,9 @@ def sampled_proximity(
     """
     if noise not in NOISES:
         raise ParameterError(f"noise must be one of {', '.join(NOISES)}, but it was {shown(noise)}.")
-    of_wall, of_disc = sampled_table(math.inf), sampled_table(float(radius_mm))
-    discs = np.array(obstacles, np.float64).reshape(-1, 2)
+    radius_mm = check_number("radius_mm", radius_mm, 1, 0.25 * _ROOM_MM)
+    discs = check_numbers("obstacles", obstacles, (None, 2)) if len(obstacles) else np.zeros((0, 2))
+    of_wall, of_disc = sampled_table(math.inf), sampled_table(radius_mm)
     disc_count = len(discs)
     right_mm, upper_mm = arena.width_mm - wall_mm, arena.height_mm - wall_mm
     body_mm = RobotSpec.load("khepera").body.radius_mm
@@ -118,6 +121,7 @@ def sampled_proximity(
     angle_steps = ANGLES / (2.0 * math.pi)
 
     def sampled(view: Any, readings: Any) -> None:
+        noise_share = 1.0 if view.is_noisy else 0.0
         instant = at_instant(stream_of(view.scene.seeds[view.world], 0, view.robot, STREAM_SAMPLED), view.time_ns)
         sine, cosine = sin_cos(view.heading_rad)
         for k in range(SENSOR_COUNT):
@@ -136,11 +140,11 @@ def sampled_proximity(
                 x_mm, y_mm = discs[thing - 4, 0] - view.x_mm, discs[thing - 4, 1] - view.y_mm
                 inside_mm = radius_mm
             gap_mm = np.sqrt(x_mm * x_mm + y_mm * y_mm) - inside_mm - body_mm
-            row = (gap_mm - FIRST_MM) / STEP_MM + shift * (2.0 * draw(instant, 20 + 2 * thing) - 1.0)
+            row = (gap_mm - FIRST_MM) / STEP_MM + noise_share * shift * (2.0 * draw(instant, 20 + 2 * thing) - 1.0)
             if row > GAPS - 0.5:
                 continue
             turned = rough_angle(cosine * y_mm - sine * x_mm, cosine * x_mm + sine * y_mm) * angle_steps
-            turned += shift * (2.0 * draw(instant, 21 + 2 * thing) - 1.0)
+            turned += noise_share * shift * (2.0 * draw(instant, 21 + 2 * thing) - 1.0)
             column = int(np.floor(turned + 0.5)) % ANGLES
             gap = min(max(int(np.floor(row + 0.5)), 0), GAPS - 1)
             for k in range(SENSOR_COUNT):
@@ -148,8 +152,9 @@ def sampled_proximity(
         for k in range(SENSOR_COUNT):
             count = min(readings[k], FULL_COUNTS)
             if is_uniform:
-                count += UNIFORM_COUNTS * (2.0 * draw(instant, k) - 1.0)
+                count += noise_share * UNIFORM_COUNTS * (2.0 * draw(instant, k) - 1.0)
             readings[k] = np.floor(min(max(count, 0.0), FULL_COUNTS) + 0.5)
 
     made: Sense = sense(command="N", readings=SENSOR_COUNT, most=FULL_COUNTS)(sampled)
+    made.recipe = "proximity"  # what reads the same command stands for it in files
     return made

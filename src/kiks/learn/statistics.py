@@ -9,6 +9,7 @@ unsolved, and Mantel (1966) for the log-rank test of two of them. SciPy calculat
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -19,6 +20,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from kiks.errors import ParameterError
+from kiks.model.array_checks import check_numbers
+from kiks.model.checks import check_count, check_number
 
 Floats = NDArray[np.float64]
 
@@ -27,6 +30,9 @@ CONFIDENCE = 0.95
 
 RESAMPLES = 9999
 """Number of samples of a bootstrap."""
+
+PAIRS_AT_ONCE = 1_000_000
+"""Most pairs of values that a bootstrap compares at once, which bounds its memory."""
 
 EFFECTS = ((0.06, "negligible"), (0.14, "small"), (0.21, "medium"), (0.5, "large"))
 """Names of effect sizes: largest |A - 0.5|, and the name."""
@@ -57,8 +63,8 @@ def wilson_interval(count: int, total: int) -> Interval:
     """
     from scipy.stats import binomtest
 
-    if not 0 <= count <= total or total < 1:
-        raise ParameterError(f"count must be from 0 to total, and total at least 1, but they were {count} and {total}.")
+    total = check_count("total", total, 1)
+    count = check_count("count", count, 0, total)
     interval = binomtest(count, total).proportion_ci(CONFIDENCE, "wilson")
     return Interval(float(interval.low), float(interval.high))
 
@@ -76,7 +82,9 @@ def mean_interval(values: ArrayLike, axis: int = 0) -> tuple[Floats, Floats, Flo
     """
     from scipy.stats import t
 
-    numbers = np.asarray(values, np.float64)
+    numbers = check_numbers("values", values)
+    if not numbers.size:
+        raise ParameterError("values must be at least one number, but there were none.")
     count, mean = numbers.shape[axis], numbers.mean(axis=axis)
     if count < 2:
         return mean, mean, mean
@@ -99,17 +107,27 @@ def bootstrap_interval(statistic: Callable[..., Any], *samples: Sequence[float])
     """
     from scipy.stats import bootstrap
 
-    if min(map(len, samples)) < 2:
+    checked = [_sample(each) for each in samples]
+    if min(map(len, checked)) < 2:
         return None
     given: dict[str, Any] = {"n_resamples": RESAMPLES, "confidence_level": CONFIDENCE, "vectorized": True}
     found = bootstrap(
-        tuple(map(np.asarray, samples)),
+        checked,
         statistic,
+        batch=max(1, PAIRS_AT_ONCE // math.prod(map(len, checked))),
         method="percentile",
         random_state=np.random.default_rng(0),
         **given,
     ).confidence_interval
     return Interval(float(found.low), float(found.high))
+
+
+def _sample(values: Sequence[float]) -> Floats:
+    """Return a sample as an array, float64 [value]."""
+    sample = check_numbers("a sample", values, (None,))
+    if not len(sample):
+        raise ParameterError("a sample must have at least one value, but it had none.")
+    return sample
 
 
 # ---- tests ----
@@ -156,7 +174,7 @@ class Pair:
         """The name of the effect size; empty if there is none."""
         if self.a is None:
             return ""
-        away = abs(self.a - 0.5)
+        away = round(abs(self.a - 0.5), 9)  # so that A and 1 - A have one name
         return next(name for least, name in EFFECTS if away < least or least == EFFECTS[-1][0])
 
 
@@ -212,7 +230,7 @@ def mann_whitney(first: Sequence[float], second: Sequence[float]) -> Finding:
     """
     from scipy.stats import mannwhitneyu
 
-    values = [*first, *second]
+    values = [*_sample(first), *_sample(second)]
     if len(set(values)) == 1:
         return Finding(MANN_WHITNEY, len(first) * len(second) / 2, 1.0)
     has_ties, is_small = len(set(values)) < len(values), max(len(first), len(second)) <= EXACT_MAX
@@ -234,6 +252,7 @@ def holm(ps: Sequence[float]) -> list[float]:
         >>> holm([0.01, 0.04, 0.03])
         [0.03, 0.06, 0.06]
     """
+    ps = [check_number("p", p, 0, 1) for p in ps]
     corrected, least = [0.0] * len(ps), 0.0
     for rank, number in enumerate(sorted(range(len(ps)), key=ps.__getitem__)):
         least = max(least, min((len(ps) - rank) * ps[number], 1.0))
@@ -323,5 +342,5 @@ def compare_solved(groups: Mapping[str, Solved]) -> Comparison:
 def _censored(solved: Solved) -> Any:
     from scipy.stats import CensoredData
 
-    evaluations, is_solved = np.array(solved.evaluations, np.float64), np.array(solved.is_solved)
+    evaluations, is_solved = _sample(solved.evaluations), np.array(solved.is_solved, np.bool_)
     return CensoredData.right_censored(evaluations, ~is_solved)

@@ -535,7 +535,7 @@ class Task(Experiment):
         Args:
             candidates: Parameters [candidate, parameter].
             seeds: A seed for each [candidate]: of its worlds and its starts.
-            points: Number of poses, at equal intervals, the last at the end.
+            points: Number of poses, at the last control step of each of as many equal intervals.
             threads: Number of threads; the number of cores if left out.
 
         Returns:

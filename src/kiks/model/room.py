@@ -1,8 +1,8 @@
 """Random rooms with walls, pillars and lamps, for training where no two generations need be alike.
 
 Every place of a room can be reached: each wall either begins at the frame or stands free, and keeps `GAP_MM` from all
-else. The same seed gives the same room on every computer: all lengths are whole millimetres, and no function of an
-angle is taken.
+else, where the frame counts from its outer edge. The same seed gives the same room on every computer: all lengths are
+whole millimetres, and no function of an angle is taken.
 """
 
 from __future__ import annotations
