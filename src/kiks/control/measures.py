@@ -755,19 +755,22 @@ def spread_mm(moment: Any, notes: Any) -> None:
     notes[0] = np.sqrt(squares)
 
 
-# ---- what they are made of ----
-
-
 @measure
 def taken_out(moment: Any, notes: Any) -> None:
     """Number of balls and cylinders that grippers have dropped beyond the edge of the arena.
 
     Example:
         >>> import kiks
-        >>> kiks.measures.taken_out
-        <Measure 'taken_out'>
+        >>> task = kiks.tasks.nolfi_1997()
+        >>> batch = kiks.Batch(task.arenas[0], 1, seed=1)
+        >>> still = [0.0] * task.parameter_count
+        >>> batch.run(task.controller, still, seconds=1, measures=[kiks.measures.taken_out]).values.item()
+        0.0
     """
     notes[0] = count_out(moment.bodies)
+
+
+# ---- what they are made of ----
 
 
 @kernel

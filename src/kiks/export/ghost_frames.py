@@ -91,7 +91,12 @@ STYLE = """
 
 
 def save_ghost_page(generations: Sequence[Ghosts], path: str | Path) -> None:
-    """Write a page with a player of generations, whose slider leads from one to the next."""
+    """Write a page with a player of generations, whose slider leads from one to the next.
+
+    Args:
+        generations: The generations.
+        path: The page, .html.
+    """
     check_scenes(generations)
     frames = GhostFrames(generations)
     begins_s = np.cumsum([0.0, *(each.seconds for each in generations)])

@@ -38,7 +38,7 @@ LEAST_ROAMING = 0.2
 """Mean `roaming` from which on a robot gets around: 16 mm/s away from where it was two seconds ago."""
 
 CONTACT_COST = 3.0
-"""Fitness is divided by 1 plus this times the mean number of contacts per world; in `follow`, for each world."""
+"""Fitness is divided by 1 plus this times the mean number of contacts per world; in `follow`, in each world."""
 
 CONTACTS_COUNTED = 3.0
 """Largest number of contacts of a world that counts: a stuck robot has hundreds."""
@@ -243,8 +243,8 @@ STAY_S = 30.0
 LIGHT_ROOMS, LIGHT_STARTS, FROM_LIGHT_MM = 24, 12, 800.0
 """Number of rooms for training, of starts in each, and their least distance from the lamp [mm].
 
-After three fixed rooms, some champions bounce to and fro in others for ever. At most random places the robot sees the
-lamp: then its light is all that candidates learn to follow, and not to search in the dark.
+Champions of few rooms bounce to and fro in others for ever. At most random places the robot sees the lamp: then its
+light is all that candidates learn to follow, and not to search in the dark.
 """
 
 
@@ -495,7 +495,7 @@ def maze() -> Task:
         controllers.mlp(hidden=(8,), speed_limit=MAZE_SPEED_LIMIT),
         (goal_mm, measures.final_x_mm, measures.final_y_mm, measures.turned_pulses),
         fitness=maze_fitness,
-        # As long as a start of the exam: champions that had 70 s had found the way, but often needed longer.
+        # As long as a start of the exam: robots that find the way in a shorter trial often reach the goal too late.
         seconds=180.0,
         axes=(Axis("final_x_mm", 0, MAZE_SIDE_MM, 32), Axis("final_y_mm", 0, MAZE_SIDE_MM, 32)),
         starts="arena",

@@ -56,6 +56,10 @@ class Interval(NamedTuple):
 def wilson_interval(count: int, total: int) -> Interval:
     """Return Wilson's interval, of 95 %, for the share that a count is of a total.
 
+    Args:
+        count: The count.
+        total: The total, at least 1.
+
     Example:
         >>> low, high = wilson_interval(8, 10)
         >>> round(low, 3), round(high, 3)
@@ -196,6 +200,9 @@ class Comparison:
 def compare(samples: Mapping[str, Sequence[float]]) -> Comparison:
     """Return what tests say about samples, by their names: each two, and all together if there are more.
 
+    Args:
+        samples: Values of each setting by its name, such as the fitness of the champion of each seed.
+
     Example:
         >>> (pair,) = compare({"cma": [3.0, 4.0, 5.0], "ga": [1.0, 2.0, 2.5]}).pairs
         >>> pair.test.method, round(pair.p, 3), pair.a, pair.effect
@@ -300,6 +307,9 @@ class Survival(NamedTuple):
 def survival(solved: Solved) -> Survival:
     """Return the share of evolutions that have solved their task, over evaluations.
 
+    Args:
+        solved: When they did.
+
     Example:
         >>> found = survival(Solved((100, 200, 200, 400), (True, True, False, True)))
         >>> found.evaluations.tolist(), found.share.tolist()
@@ -318,6 +328,9 @@ def survival(solved: Solved) -> Survival:
 
 def compare_solved(groups: Mapping[str, Solved]) -> Comparison:
     """Return what the log-rank test says about when settings solved a task: each two, corrected by Holm's method.
+
+    Args:
+        groups: When evolutions of each setting did, by its name.
 
     Example:
         >>> early, late = Solved((10, 20, 30), (True,) * 3), Solved((40, 50, 60), (True, True, False))

@@ -34,9 +34,10 @@ class TensorBoardLog:
         ParameterError: If TensorBoard is not installed.
 
     Example:
-        >>> from kiks.learn.tensorboard_log import TensorBoardLog
-        >>> callable(TensorBoardLog)
-        True
+        >>> import kiks
+        >>> evolution = kiks.Evolution(kiks.tasks.avoid(seconds=1, worlds=4), seed=1, population=4)
+        >>> with TensorBoardLog("runs/curves") as log:  # doctest: +SKIP
+        ...     evolution.run(generations=3, each=log)
     """
 
     def __init__(self, folder: str | Path) -> None:

@@ -189,7 +189,7 @@ def _picture_beside(folder: Path | None, name: str, key: str, mm_per_pixel: floa
 
 
 def floor_of(picture: npt.NDArray[np.uint8], mm_per_pixel: float, arena: Arena) -> npt.NDArray[np.uint8]:
-    """Return the floor of an arena from its picture, uint8 [row, column] with row 0 on top."""
+    """Return the floor of an arena, row 0 below, from its picture, row 0 on top, both uint8 [row, column]."""
     step = round(mm_per_pixel / arena.mm_per_cell)
     rows, columns = (side // step for side in arena.ground.shape)
     if picture.shape != (rows, columns):
