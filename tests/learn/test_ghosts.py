@@ -69,7 +69,7 @@ def test_a_picture_and_a_film_show_generations(folder: Path, tmp_path: Path) -> 
     assert "generation 1 " in done.output
     assert "generation 2 " in done.output
     with Image.open(tmp_path / "ghosts.webp") as film:
-        assert getattr(film, "n_frames", 1) > 10
+        assert getattr(film, "n_frames", 1) > 6
 
 
 def test_the_frames_of_a_page_have_the_poses_of_all_generations(folder: Path, tmp_path: Path) -> None:

@@ -340,7 +340,7 @@ class Task(Experiment):
             >>> import kiks
             >>> task = kiks.tasks.avoid()
             >>> task.driven_s
-            320.0
+            192.0
         """
         return float(self.worlds * len(self.controllers) * self.seconds)
 
