@@ -206,9 +206,10 @@ class InitialState:
 
     def fit(self, state: State, worlds: NDArray[np.int64], turrets: Sequence[tuple[Any, ...]]) -> None:
         """Put turrets on the robots of worlds that have been reset: of each robot, names and classes."""
-        for robot, its in enumerate(turrets):
+        for its in dict.fromkeys(turrets):
+            carriers = [robot for robot, carried in enumerate(turrets) if carried == its]
             for name, value in self._fitted(its).items():
-                state.robots[name][worlds, robot] = value
+                state.robots[name][np.ix_(worlds, carriers)] = value
 
     def _fitted(self, turrets: tuple[Any, ...]) -> dict[str, Any]:
         """Return what some turrets write into the record of a robot, by field, when they are fitted."""

@@ -49,8 +49,9 @@ class RobotControllers:
             )
         for each in self.controllers:
             check_kind("controller", each, Controller, "Write @kiks.controller over the function.")
-        self.senses = max((each.senses for each in self.controllers), key=len)
-        for each in self.controllers:
+        different = dict.fromkeys(self.controllers)  # a swarm has a thousand robots, and one controller
+        self.senses = max((each.senses for each in different), key=len)
+        for each in different:
             if each.senses != self.senses[: len(each.senses)]:
                 raise ParameterError(
                     f"the senses of one controller must come first among those of the one that has the most, but "
@@ -67,19 +68,20 @@ class RobotControllers:
             self.parameter_counts = (self.parameters.shape[2],) * robot_count
         sense_counts = [len(each.senses) for each in self.controllers]
         self.common_senses, self.sense_counts = self.senses[: min(sense_counts)], np.array(sense_counts, np.int64)
-        self.turrets = [turrets_of(each.parts) for each in self.controllers]
-        orders = [orders_of(each.actuators) for each in self.controllers]
-        self.orders = max(orders, key=len)
-        self.order_counts = np.array([len(each) for each in orders], np.int64)
+        turrets = {each: turrets_of(each.parts) for each in different}
+        self.turrets = [turrets[each] for each in self.controllers]
+        orders = {each: orders_of(each.actuators) for each in different}
+        self.orders = max(orders.values(), key=len)
+        self.order_counts = np.array([len(orders[each]) for each in self.controllers], np.int64)
         self.parts = (*map(sense_of, self.senses), *self.orders)
         places = dict(zip(self.parts, memory_of(self.parts), strict=True))
-        for each, its in zip(self.controllers, orders, strict=True):
+        for each, its in orders.items():
             if its != self.orders[: len(its)] or [places[part] for part in each.parts] != memory_of(each.parts):
                 raise ParameterError(
                     "the actuators of one controller must come first among those of the one that has the most, on the "
                     f"same turrets, but those of {shown(each.name)} do not. Let all robots have the same."
                 )
-        self.memory_count = max(each.memory_count for each in self.controllers)
+        self.memory_count = max(each.memory_count for each in different)
 
     @property
     def names(self) -> str:
