@@ -207,7 +207,7 @@ class InitialState:
     def fit(self, state: State, worlds: NDArray[np.int64], turrets: Sequence[tuple[Any, ...]]) -> None:
         """Put turrets on the robots of worlds that have been reset: of each robot, names and classes."""
         for its in dict.fromkeys(turrets):
-            carriers = [robot for robot, carried in enumerate(turrets) if carried == its]
+            carriers = np.flatnonzero([carried == its for carried in turrets])
             for name, value in self._fitted(its).items():
                 state.robots[name][np.ix_(worlds, carriers)] = value
 
