@@ -37,9 +37,17 @@ def test_wilsons_interval_is_that_of_newcombe(count: int, total: int, known: tup
     assert wilson_interval(count, total) == pytest.approx(known, abs=5e-5)
 
 
-@pytest.mark.parametrize(("count", "total"), [(3, 2), (-1, 2), (0, 0), (1.5, 3)])
-def test_a_share_is_of_something(count: Any, total: int) -> None:
-    with pytest.raises(ParameterError, match=r"(count|total) must be a whole number"):
+@pytest.mark.parametrize(
+    ("count", "total", "message"),
+    [
+        (3, 2, "count must be a whole number from 0 to 2, but it was 3"),
+        (-1, 2, "count must be a whole number from 0 to 2, but it was -1"),
+        (1.5, 3, "count must be a whole number from 0 to 3, but it was 1.5"),
+        (0, 0, "total must be a whole number from 1 to .*, but it was 0"),
+    ],
+)
+def test_a_share_is_of_something(count: Any, total: int, message: str) -> None:
+    with pytest.raises(ParameterError, match=message):
         wilson_interval(count, total)
 
 

@@ -86,7 +86,7 @@ class RobotControllers:
     @property
     def names(self) -> str:
         """Names of the controllers, for messages."""
-        return ", ".join(dict.fromkeys(repr(each.name) for each in self.controllers))
+        return ", ".join(dict.fromkeys(repr(each.name) for each in dict.fromkeys(self.controllers)))
 
 
 def _parameters_of_all(

@@ -27,7 +27,7 @@ from kiks.control.measures import (
 from kiks.errors import ParameterError, nearest, shown
 from kiks.learn import football as game
 from kiks.learn import ready_tasks
-from kiks.learn.task import Task
+from kiks.learn.task import Task, Watched
 from kiks.model.arena import Arena, Cylinder, Pose
 from kiks.model.data_file import Number
 
@@ -75,12 +75,11 @@ def drawn_together(moment: Any, notes: Any) -> None:
     notes[1] = total_mm
 
 
-Reward = Annotated[Measure, Field(description="Write @kiks.measure over the function.")]
 Cost = Annotated[Number, Field(ge=0, le=1e6)]
 
 
 @made_once
-def without_contacts(reward: Reward, cost: Cost = CONTACT_COST) -> Measure:
+def without_contacts(reward: Watched, cost: Cost = CONTACT_COST) -> Measure:
     """Return a reward that falls by a cost with each contact; the same measure for the same arguments.
 
     Args:

@@ -172,7 +172,7 @@ def from_robot(robot: Any, body: Any) -> Any:
 
 @kernel
 def is_between_jaws(robot: Any, parameters: Any, body: Any) -> Any:
-    """Return whether a body that nobody holds is in the arena, its centre between a robot's jaws if the arm is down."""
+    """Return whether a loose body in the arena has its centre where a robot's jaws are when the arm is down."""
     ahead, aside = from_robot(robot, body)
     begin = parameters.radius_mm
     is_loose = body.holder == 0 and body.is_lifted == 0
