@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import os
 import shlex
-import signal
 import sys
+import tempfile
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
 from tests.at_length import AT_LENGTH, share
+from tests.surroundings import settle
 
 # Programs to be run as processes, not modules to be imported.
 collect_ignore_glob = ["programs/*", "exercises/solutions/*"]
@@ -20,8 +22,11 @@ def pytest_configure(config: pytest.Config) -> None:
     is_repeatable = config.option.hypothesis_seed is None
     settings.register_profile("kiks", deadline=None, derandomize=is_repeatable, max_examples=share(30, 100))
     settings.load_profile("kiks")
-    # A shell that starts something in the background has it ignore Ctrl-C, and all that this starts: tests send it.
-    signal.signal(signal.SIGINT, signal.default_int_handler)
+    settle()
+    # Links and sessions of this process are no other's, such as of a server that a person runs.
+    runtime = tempfile.TemporaryDirectory(prefix="kiks-tests-", ignore_cleanup_errors=True)
+    os.environ["XDG_RUNTIME_DIR"] = runtime.name
+    config.add_cleanup(runtime.cleanup)
     if not hasattr(config, "workerinput") and not config.option.collectonly:
         from kiks.cli.engine_start import compile_all
         from kiks.engine.code_cache import is_compiled

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import re
 import shlex
@@ -11,10 +12,7 @@ import tomllib
 from pathlib import Path
 from typing import NamedTuple, get_args
 
-import jsonschema
 from tests import forked
-
-from kiks.cli.schema import FileKind, schema_of
 
 ROOT = Path(__file__).parents[1]
 
@@ -39,6 +37,7 @@ class Block(NamedTuple):
     reason: str | None
 
 
+@functools.cache
 def blocks(page: Path) -> list[Block]:
     """Return the blocks of a page, but not the directives of the site, which `make docs` reads."""
     text = page.read_text(encoding="utf-8")
@@ -121,6 +120,10 @@ class Reader:
 
     def do_toml(self, code: str) -> None:
         """Check a file, or a part of one, by the schemas; what must be in it may be in another part."""
+        import jsonschema
+
+        from kiks.cli.schema import FileKind, schema_of
+
         validators = [jsonschema.Draft202012Validator(schema_of(kind)) for kind in get_args(FileKind)]
         found = [
             [error.message for error in each.iter_errors(tomllib.loads(code)) if error.validator != "required"]

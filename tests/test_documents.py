@@ -3,21 +3,21 @@
 from __future__ import annotations
 
 import ast
+import functools
 import re
 import shlex
 import shutil
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-import typer.main
 from tests import forked
 from tests.at_length import cases
 from tests.documents import ROOT, Reader, blocks
 from tests.matlab.octave import OCTAVE
 
 import kiks
-from kiks.cli import app
 
 pytestmark = pytest.mark.slow
 
@@ -27,9 +27,10 @@ MADE = {ROOT / line for line in (ROOT / ".gitignore").read_text().splitlines() i
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md"]
 PAGES += [page for page in sorted((ROOT / "docs").rglob("*.md")) if not MADE & {page, *page.parents}]
 
-COMMANDS = {command.name or command.callback.__name__ for command in app.registered_commands if command.callback} | {
-    group.name for group in app.registered_groups
-}
+
+@functools.cache
+def text_of(page: Path) -> str:
+    return page.read_text(encoding="utf-8")
 
 
 def name(page: Path) -> str:
@@ -51,7 +52,7 @@ WITH_BLOCKS = sorted((page for page in READ if blocks(page)), key=lambda page: n
 
 @pytest.mark.parametrize("page", cases(WITH_BLOCKS, len(WITH_BLOCKS) - len(AT_LENGTH)), ids=name)
 def test_pages_do_what_they_show(page: Path, tmp_path: Path) -> None:
-    text = page.read_text(encoding="utf-8")
+    text = text_of(page)
     if OCTAVE is None and re.search(r"^octave|^```(octave|matlab)", text, flags=re.MULTILINE):
         pytest.skip("octave-cli is not here: apt-get install octave")
     # Some pages tell how to get the examples; the others are read beside them.
@@ -60,15 +61,19 @@ def test_pages_do_what_they_show(page: Path, tmp_path: Path) -> None:
     Reader(tmp_path, is_short=page.parent.name != "tutorials").read(page)
 
 
-@pytest.mark.parametrize("page", READ, ids=name)
-def test_each_block_runs_or_says_why_not(page: Path) -> None:
-    for block in blocks(page):
-        assert block.reason or hasattr(Reader, f"do_{block.language}"), (
-            f"{page.name}: a block of {block.language!r} wants a reader in tests/documents.py, or the line "
-            f"<!-- not run: REASON --> before it:\n{block.code}"
-        )
-    reasons = re.findall("^ *<!-- not run", page.read_text(encoding="utf-8"), flags=re.MULTILINE)
-    assert len(reasons) == sum(block.reason is not None for block in blocks(page)), "a reason without its block"
+def test_each_block_runs_or_says_why_not() -> None:
+    wrong = []
+    for page in READ:
+        for block in blocks(page):
+            if not (block.reason or hasattr(Reader, f"do_{block.language}")):
+                wrong.append(
+                    f"{page.name}: a block of {block.language!r} wants a reader in tests/documents.py, or the line "
+                    f"<!-- not run: REASON --> before it:\n{block.code}"
+                )
+        reasons = re.findall("^ *<!-- not run", text_of(page), flags=re.MULTILINE)
+        if len(reasons) != sum(block.reason is not None for block in blocks(page)):
+            wrong.append(f"{page.name}: a reason without its block")
+    assert not wrong, "\n".join(wrong)
 
 
 def test_the_first_program_keeps_clear_of_the_walls() -> None:
@@ -79,37 +84,44 @@ def test_the_first_program_keeps_clear_of_the_walls() -> None:
     assert int(found[1]) > 1000
 
 
-@pytest.mark.parametrize("page", PAGES, ids=name)
-def test_links_lead_somewhere(page: Path) -> None:
-    for target in re.findall(r"\]\(([^)#]+)[^)]*\)", page.read_text(encoding="utf-8")):
-        if "://" not in target:
-            there = (page.parent / target).resolve()
-            assert there.exists() or MADE & {there, *there.parents}, f"{page.name} points to {target}"
+def test_links_lead_somewhere() -> None:
+    wrong = []
+    for page in PAGES:
+        for target, section in re.findall(r"\]\(([^)#\s]*)#?([^)\s]*)[^)]*\)", text_of(page)):
+            there = (page.parent / target).resolve() if target else page
+            if "://" in target:
+                continue
+            if not there.exists():
+                if section or not MADE & {there, *there.parents}:
+                    wrong.append(f"{page.name} points to {target}")
+            elif section:
+                heads = re.findall(r"^#+ (.*)", text_of(there), flags=re.MULTILINE)
+                if section not in {re.sub(r"[^\w -]", "", head.lower()).replace(" ", "-") for head in heads}:
+                    wrong.append(f"{page.name} points to {target}#{section}")
+    assert not wrong, "\n".join(wrong)
 
 
-@pytest.mark.parametrize("page", PAGES, ids=name)
-def test_tables_have_a_head_and_equal_rows(page: Path) -> None:
-    text = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL)
-    for table in re.findall(r"(?:^\|.*\n)+", text, flags=re.MULTILINE):
-        head, rule, *rows = table.splitlines()
-        assert re.fullmatch(r"(\|:?-+:?)+\|", rule), f"{page.name}: the table that begins {head!r} has no head"
-        for row in (head, *rows):
-            count = len(re.findall(r"(?<!\\)\|", row))
-            assert count == rule.count("|"), f"{page.name}: {row!r} has {count - 1} columns"
+def test_tables_have_a_head_and_equal_rows() -> None:
+    wrong = []
+    for page in PAGES:
+        text = re.sub(r"^```.*?^```", "", text_of(page), flags=re.MULTILINE | re.DOTALL)
+        for table in re.findall(r"(?:^\|.*\n)+", text, flags=re.MULTILINE):
+            head, rule, *rows = table.splitlines()
+            if not re.fullmatch(r"(\|:?-+:?)+\|", rule):
+                wrong.append(f"{page.name}: the table that begins {head!r} has no head")
+            for row in (head, *rows):
+                count = len(re.findall(r"(?<!\\)\|", row))
+                if count != rule.count("|"):
+                    wrong.append(f"{page.name}: {row!r} has {count - 1} columns")
+    assert not wrong, "\n".join(wrong)
 
 
-@pytest.mark.parametrize("page", PAGES, ids=name)
-def test_links_to_sections_lead_somewhere(page: Path) -> None:
-    for target, section in re.findall(r"\]\(([^)#\s]*)#([^)\s]+)\)", page.read_text(encoding="utf-8")):
-        if "://" not in target:
-            there = (page.parent / target if target else page).read_text(encoding="utf-8")
-            heads = re.findall(r"^#+ (.*)", there, flags=re.MULTILINE)
-            names = {re.sub(r"[^\w -]", "", head.lower()).replace(" ", "-") for head in heads}
-            assert section in names, f"{page.name} points to {target}#{section}"
+def wrong_options(words: list[str]) -> Iterator[str]:
+    """Yield each option that a command does not have; what stands after a program is the program's."""
+    import typer.main
 
+    from kiks.cli import app
 
-def check_options(words: list[str]) -> None:
-    """Fail unless a command has the options it is called with; what stands after a program is the program's."""
     command: Any = typer.main.get_command(app)
     while hasattr(command, "commands") and words and words[0] in command.commands:
         command = command.commands[words.pop(0)]
@@ -118,51 +130,66 @@ def check_options(words: list[str]) -> None:
     for word in words:
         if not is_open and word.endswith(".py"):
             return
-        if word.startswith("-") and not word.startswith("---"):
-            assert word.partition("=")[0] in known, f"kiks {command.name} {word}"
+        if word.startswith("-") and not word.startswith("---") and word.partition("=")[0] not in known:
+            yield f"kiks {command.name} {word}"
 
 
-def check_commands(text: str) -> None:
-    """Fail unless the commands of all lines exist, with their options."""
+@functools.cache
+def commands() -> set[str | None]:
+    from kiks.cli import app
+
+    named = {command.name or command.callback.__name__ for command in app.registered_commands if command.callback}
+    return named | {group.name for group in app.registered_groups}
+
+
+def wrong_commands(text: str) -> Iterator[str]:
+    """Yield each line whose command does not exist, and each option that it does not have."""
     for line in re.findall(r"^(?: *Example: )?(kiks [a-z].*)", text, flags=re.MULTILINE):
         words = shlex.split(line, comments=True)[1:]
-        assert words[0] in COMMANDS, line
-        check_options(words)
+        if words[0] in commands():
+            yield from wrong_options(words)
+        else:
+            yield line
 
 
 def test_commands_in_docstrings_exist() -> None:
+    wrong = []
     for folder in (ROOT / "examples", ROOT / "src" / "kiks" / "cli"):
         for path in folder.rglob("*.py"):
             for each in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
                 if isinstance(each, ast.Module | ast.FunctionDef):
-                    check_commands(ast.get_docstring(each) or "")
+                    wrong += [f"{path}: {line}" for line in wrong_commands(ast.get_docstring(each) or "")]
+    assert not wrong, "\n".join(wrong)
 
 
-@pytest.mark.parametrize("page", PAGES, ids=name)
-def test_commands_and_targets_exist(page: Path) -> None:
-    text = page.read_text(encoding="utf-8")
-    shell = "".join(block.code for block in blocks(page) if block.language == "sh")
+def test_commands_targets_and_paths_exist() -> None:
+    wrong = []
     targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), flags=re.MULTILINE))
-    assert set(re.findall(r"\bmake ([a-z-]+)\b", shell)) <= targets
-    check_commands(shell)
-    # Paths that a page names in code must exist.
-    for path in re.findall(r"\b(?:examples|docs|benchmarks|tests|src)/[\w./-]+\.\w+", text):
-        assert (ROOT / path).exists(), f"{page.name} names {path}"
+    for page in PAGES:
+        shell = "".join(block.code for block in blocks(page) if block.language == "sh")
+        used = set(re.findall(r"\bmake ([a-z-]+)\b", shell))
+        paths = re.findall(r"\b(?:examples|docs|benchmarks|tests|src)/[\w./-]+\.\w+", text_of(page))
+        missing = [*(used - targets), *wrong_commands(shell), *(path for path in paths if not (ROOT / path).exists())]
+        wrong += [f"{page.name} names {each}" for each in missing]
+    assert not wrong, "\n".join(wrong)
 
 
 def test_what_is_installed_names_pages_by_titles_that_exist() -> None:
     # There is no `docs` beside it. The site makes links of the titles in docstrings (docs/conf.py).
-    titles = {re.findall("^# (.+)", page.read_text(encoding="utf-8"), flags=re.MULTILINE)[0] for page in PAGES}
+    titles = {re.findall("^# (.+)", text_of(page), flags=re.MULTILINE)[0] for page in PAGES}
+    wrong = []
     for folder in ("src", "matlab", "examples"):
         for path in (ROOT / folder).rglob("*"):
             if path.suffix in (".py", ".m", ".toml", ".kiks", ".md", ".js", ".html", ".c", ".java"):
                 text = path.read_text(encoding="utf-8")
-                assert "docs/" not in text, path
-                assert set(re.findall(r'\bpage "([A-Z][^"{]+)"', text)) <= titles, path
+                missing = set(re.findall(r'\bpage "([A-Z][^"{]+)"', text)) - titles
+                missing |= {"docs/"} if "docs/" in text else set()
+                wrong += [f"{path} names {each}" for each in missing]
+    assert not wrong, "\n".join(wrong)
 
 
 def test_the_python_reference_has_every_public_name() -> None:
-    text = "".join(page.read_text(encoding="utf-8") for page in (ROOT / "docs/reference").glob("*.md"))
+    text = "".join(text_of(page) for page in (ROOT / "docs/reference").glob("*.md"))
     found = set(re.findall(r"^\.\. auto(?:class|function|data|module):: ([\w.]+)$", text, flags=re.MULTILINE))
     names = set(kiks.__all__) - {"__version__", "controllers", "measures", "tasks"}
     assert names | set(dir(kiks.measures)) | {"kiks.controllers", "kiks.measures", "kiks.tasks"} <= found

@@ -266,10 +266,11 @@ def test_who_hears_each_signal_may_have_any_number_of_them() -> None:
 
 
 NOTES = """
-import signal, sys
+import os, signal, sys
 from kiks.ending import end_at_once
 end_at_once()
-signal.signal(signal.SIGTERM, lambda number, frame: print("noted", flush=True))
+# Not `print`, in the middle of which the signal may come.
+signal.signal(signal.SIGTERM, lambda number, frame: os.write(1, b"noted\n"))
 print("ready", flush=True)
 print(sys.stdin.read())
 """

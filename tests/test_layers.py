@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -55,65 +56,61 @@ def layer(path: Path) -> str:
     return path.relative_to(ROOT).parts[0].removesuffix(".py")
 
 
-def imports(path: Path) -> set[str]:
-    names = set()
+@functools.cache
+def imports(path: Path) -> list[tuple[str, frozenset[str]]]:
+    """Return each module that a file imports, at the top, in functions or for types alone, and the names out of it."""
+    found = []
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
-            names |= {alias.name for alias in node.names}
+            found += [(alias.name, frozenset[str]()) for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and node.module:
-            names.add(node.module)
-            names |= {f"{node.module}.{alias.name}" for alias in node.names}
-    return names
+            found.append((node.module, frozenset(f"{node.module}.{alias.name}" for alias in node.names)))
+    return found
 
 
-@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
-def test_imports_point_down(path: Path) -> None:
-    here = layer(path)
-    if here in ("__init__", "__main__"):
-        return
-    assert here in LAYERS, f"{path} lies in no layer: give it a place in LAYERS and in docs/explanation/design.md"
-    for name in imports(path):
-        parts = name.split(".")
-        if parts[0] != "kiks" or len(parts) < 2 or parts[1] not in LAYERS:
+def test_imports_point_down() -> None:
+    wrong = []
+    for path in SOURCES:
+        here = layer(path)
+        if here in ("__init__", "__main__"):
             continue
-        there = parts[1]
-        assert LAYERS.index(there) <= LAYERS.index(here), f"{path} imports {name}"
+        if here not in LAYERS:
+            wrong.append(f"{path} lies in no layer: give it a place in LAYERS and in docs/explanation/design.md")
+            continue
+        above = set(LAYERS[LAYERS.index(here) + 1 :])
+        for name in {name for start, names in imports(path) for name in (start, *names)}:
+            if name.startswith("kiks.") and name.split(".")[1] in above:
+                wrong.append(f"{path} imports {name}")
+    assert not wrong, "\n".join(wrong)
 
 
-@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
-def test_clocks_and_chance_come_from_outside(path: Path) -> None:
-    here = layer(path)
-    roots = {name.split(".")[0] for name in imports(path)}
-    if path.name == "chance.py":
-        return  # of programs and libraries that draw from Python's own library, with a seed from outside
-    assert not roots & (RANDOM - {"secrets"} if here in MAY_HAVE_SECRETS else RANDOM), (
-        f"{path}: random numbers are counter-based (engine/numbers.py)"
-    )
-    if here not in MAY_SEE_THE_WALL_CLOCK:
-        assert not roots & CLOCKS, f"{path} must not see the wall clock"
+def test_clocks_and_chance_come_from_outside() -> None:
+    wrong = []
+    for path in SOURCES:
+        here = layer(path)
+        roots = {start.split(".")[0] for start, _ in imports(path)}
+        if path.name == "chance.py":
+            continue  # of programs and libraries that draw from Python's own library, with a seed from outside
+        if roots & (RANDOM - {"secrets"} if here in MAY_HAVE_SECRETS else RANDOM):
+            wrong.append(f"{path}: random numbers are counter-based (engine/numbers.py)")
+        if here not in MAY_SEE_THE_WALL_CLOCK and roots & CLOCKS:
+            wrong.append(f"{path} must not see the wall clock")
+    assert not wrong, "\n".join(wrong)
 
 
 def module(path: Path) -> str:
     return ".".join(("kiks", *path.relative_to(ROOT).with_suffix("").parts)).removesuffix(".__init__")
 
 
-def modules_needed(path: Path, modules: set[str]) -> set[str]:
-    """Return the modules of KiKS that a file imports: at the top, in functions, or for types alone."""
-    needed = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.Import):
-            needed |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.module:
-            # What a package is asked for is a module in it, or a name of its own.
-            full = {f"{node.module}.{alias.name}" for alias in node.names}
-            needed |= full & modules or {node.module}
-    return needed & modules - {module(path)}
-
-
 def test_no_files_import_each_other() -> None:
     modules = {module(path): path for path in SOURCES}
+    needed = {}
+    for here, path in modules.items():
+        # What a package is asked for is a module in it, or a name of its own.
+        names = {name for start, names in imports(path) for name in (names & modules.keys() or {start})}
+        needed[here] = names & modules.keys() - {here}
     try:
-        TopologicalSorter({name: modules_needed(path, set(modules)) for name, path in modules.items()}).prepare()
+        TopologicalSorter(needed).prepare()
     except CycleError as error:
         pytest.fail(f"imports must lead downwards, but these files form a cycle: {' -> '.join(error.args[1])}")
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import builtins
 import dataclasses
+import functools
 import importlib
 import inspect
 import re
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,42 +15,13 @@ import pytest
 from tests import forked
 
 import kiks.errors
-from kiks.learn.gymnasium_envs import KheperaEnv, KheperaVectorEnv
-from kiks.learn.pettingzoo_env import KheperaTeam
 
-MODULES = {"controllers": kiks.controllers, "measures": kiks.measures, "tasks": kiks.tasks}
+MODULES = ("controllers", "measures", "tasks")
 CONSTANTS = {"__version__", "tasks.TASKS"}
 """Names of values, which have no docstring of their own."""
 
-NAMES = {name: getattr(kiks, name) for name in kiks.__all__ if name not in MODULES} | {
-    f"{module}.{name}": getattr(there, name) for module, there in MODULES.items() for name in dir(there)
-}
-NAMES |= {each.__name__: each for each in (KheperaEnv, KheperaVectorEnv, KheperaTeam)}
-
 UNITS = {"mm": "mm", "s": "s", "rad": "rad", "deg": "degrees?|deg", "ms": "ms", "w": "W", "baud": "bit/s"}
 """For the end of an argument's name its unit as texts have it."""
-
-
-def callables() -> Iterator[tuple[str, Any]]:
-    """Yield public functions, and the public methods and properties of public classes."""
-    for name, each in NAMES.items():
-        if inspect.isfunction(each):
-            yield name, each
-        elif inspect.isclass(each):
-            for member, found in vars(each).items():
-                inner = found.fget if isinstance(found, property) else getattr(found, "__func__", found)
-                if not member.startswith("_") and inspect.isfunction(inner):
-                    yield f"{name}.{member}", inner
-
-
-CALLABLES = dict(callables())
-
-
-@pytest.mark.parametrize("name", sorted((NAMES | CALLABLES).keys() - CONSTANTS))
-def test_every_name_has_an_example(name: str) -> None:
-    # `--doctest-modules` runs them.
-    assert ">>> " in ((NAMES | CALLABLES)[name].__doc__ or ""), name
-
 
 ARRAY = re.compile(r"NDArray|ArrayLike|Floats|Integers")
 """What the annotation of an array contains."""
@@ -58,39 +29,68 @@ ARRAY = re.compile(r"NDArray|ArrayLike|Floats|Integers")
 SHAPE = re.compile(r"\[[\w ,.+]+\]")
 
 
-def sections_of(name: str) -> dict[str, str]:
+@functools.cache
+def public() -> dict[str, Any]:
+    """Return all public names with their objects, and the public methods and properties of public classes."""
+    from kiks.learn.gymnasium_envs import KheperaEnv, KheperaVectorEnv
+    from kiks.learn.pettingzoo_env import KheperaTeam
+
+    names = {name: getattr(kiks, name) for name in kiks.__all__ if name not in MODULES}
+    for module in MODULES:
+        names |= {f"{module}.{name}": getattr(getattr(kiks, module), name) for name in dir(getattr(kiks, module))}
+    names |= {each.__name__: each for each in (KheperaEnv, KheperaVectorEnv, KheperaTeam)}
+    for name, each in list(names.items()):
+        for member, found in vars(each).items() if inspect.isclass(each) else ():
+            inner = found.fget if isinstance(found, property) else getattr(found, "__func__", found)
+            if not member.startswith("_") and inspect.isfunction(inner):
+                names[f"{name}.{member}"] = inner
+    return names
+
+
+def sections_of(each: Any) -> dict[str, str]:
     """Return the parts of a docstring by their headings; what stands before the first has the heading ''."""
-    text = "\n:\n" + inspect.cleandoc((NAMES | CALLABLES)[name].__doc__ or "")
+    text = "\n:\n" + inspect.cleandoc(each.__doc__ or "")
     return dict(re.findall(r"^([A-Z]\w+|):\n((?:.*\n?)*?)(?=^[A-Z]\w+:\n|\Z)", text, flags=re.MULTILINE))
 
 
-def entries_of(section: str) -> dict[str, str]:
-    return dict(re.findall(r"^    \*{0,2}(\w+): (.*(?:\n {5,}.*)*)", section, flags=re.MULTILINE))
+def entries_of(sections: dict[str, str], *headings: str) -> dict[str, str]:
+    text = "\n".join(sections.get(heading, "") for heading in headings)
+    return dict(re.findall(r"^    \*{0,2}(\w+): (.*(?:\n {5,}.*)*)", text, flags=re.MULTILINE))
 
 
-@pytest.mark.parametrize("name", sorted(NAMES.keys() | CALLABLES.keys()))
-def test_arrays_have_shapes(name: str) -> None:
-    each, sections = (NAMES | CALLABLES)[name], sections_of(name)
-    explained = entries_of(sections.get("Args", "")) | entries_of(sections.get("Attributes", ""))
-    is_record = dataclasses.is_dataclass(each)
-    annotations = getattr(each.__init__ if inspect.isclass(each) and not is_record else each, "__annotations__", {})
-    for argument, annotation in annotations.items():
-        if ARRAY.search(str(annotation)):
+def test_every_name_has_an_example() -> None:
+    # `--doctest-modules` runs them.
+    without = {name for name, each in public().items() if ">>> " not in (each.__doc__ or "")} ^ CONSTANTS
+    assert not without, "\n".join(without)
+
+
+def test_arrays_have_shapes() -> None:
+    without = []
+    for name, each in public().items():
+        sections = sections_of(each)
+        explained = entries_of(sections, "Args", "Attributes")
+        is_record = dataclasses.is_dataclass(each)
+        annotations = getattr(each.__init__ if inspect.isclass(each) and not is_record else each, "__annotations__", {})
+        for argument, annotation in annotations.items():
             # A docstring without sections describes arguments and result in its text.
             meaning = sections.get("Returns") if argument == "return" else explained.get(argument)
-            assert SHAPE.search(meaning or sections[""]), f"{name}: {argument}"
+            if ARRAY.search(str(annotation)) and not SHAPE.search(meaning or sections[""]):
+                without.append(f"{name}: {argument}")
+    assert not without, "\n".join(without)
 
 
-@pytest.mark.parametrize("name", sorted(NAMES.keys() | CALLABLES.keys()))
-def test_quantities_have_units_and_errors_exist(name: str) -> None:
-    sections = sections_of(name)
-    quantities = entries_of(sections.get("Args", "")) | entries_of(sections.get("Attributes", ""))
-    for argument, meaning in quantities.items():
-        unit = UNITS.get(argument.rpartition("_")[2])
-        if unit and "_" in argument:
-            assert re.search(rf"\[({unit})[\];,]|\[[^\]]*\b({unit})\b", meaning), f"{name}: {argument}: {meaning}"
-    for error in entries_of(sections.get("Raises", "")):
-        assert hasattr(kiks.errors, error) or hasattr(builtins, error), f"{name}: {error}"
+def test_quantities_have_units_and_errors_exist() -> None:
+    wrong = []
+    for name, each in public().items():
+        sections = sections_of(each)
+        for argument, meaning in entries_of(sections, "Args", "Attributes").items():
+            unit = UNITS.get(argument.rpartition("_")[2]) if "_" in argument else None
+            if unit and not re.search(rf"\[({unit})[\];,]|\[[^\]]*\b({unit})\b", meaning):
+                wrong.append(f"{name}: {argument}: no unit in {meaning!r}")
+        for error in entries_of(sections, "Raises"):
+            if not (hasattr(kiks.errors, error) or hasattr(builtins, error)):
+                wrong.append(f"{name}: no {error}")
+    assert not wrong, "\n".join(wrong)
 
 
 @pytest.mark.parametrize("name", MODULES)
@@ -98,9 +98,9 @@ def test_a_module_of_names_can_be_imported(name: str) -> None:
     found = forked.run(
         code=f"import kiks.{name}; from kiks.{name} import *; print(dir(kiks.{name})); kiks.{name}.wrong"
     )
-    assert found.stdout == f"{dir(MODULES[name])}\n"
+    assert found.stdout == f"{dir(getattr(kiks, name))}\n"
     assert "has no attribute 'wrong'" in found.stderr
-    assert importlib.import_module(f"kiks.{name}") is MODULES[name]
+    assert importlib.import_module(f"kiks.{name}") is getattr(kiks, name)
 
 
 def test_a_misspelled_name_gets_a_hint() -> None:
