@@ -171,9 +171,17 @@ def _version() -> str:
 
 
 def digest_of(module: str) -> str:
-    """Return a digest of the sources that the kernels of a module are compiled from; of all for a module of others."""
+    """Return a digest of the sources that the kernels of a module are compiled from.
+
+    For a module of others, these are its own source and those of all kernels.
+    """
     digests = _digests()
-    return digests.get(module) or _digest(repr(digests).encode())[:16].decode()
+    if module in digests:
+        return digests[module]
+    source = b""
+    with _IfAllowed():
+        source = Path(getattr(sys.modules.get(module), "__file__", None) or os.devnull).read_bytes()
+    return _digest(repr(digests).encode() + source)[:16].decode()
 
 
 @functools.cache

@@ -93,7 +93,9 @@ def dark_rooms(count: int, starts: int, far_mm: float, **sizes: int) -> tuple[Ar
         far_mm: Least distance of a start from the lamp [mm].
         sizes: Arguments of `kiks.Arena.room`.
     """
-    return tuple(replace(room, starts=dark_places(room, far_mm)[:starts]) for room in rooms(count, **sizes))
+    # The room whose places are looked at is not kept: its tables take 10 MB.
+    drawn = (Arena.room(seed=seed, **sizes) for seed in range(count))
+    return tuple(replace(room, starts=dark_places(room, far_mm)[:starts]) for room in drawn)
 
 
 def dark_places(room: Arena, far_mm: float) -> tuple[Pose, ...]:
