@@ -43,6 +43,7 @@ SCRIPTS = [
     # ---- reads: one timeout for the whole ----
     Script(ASK + "said = port.read(7)", 0.9),
     Script(ASK + "said = port.read()", 0.3),
+    Script(ASK + "port.timeout = None; said = port.read(7), port.timeout", 0.9),
     Script(ASK + "port.timeout = 0.55; said = port.read(7), port.timeout", 0.55),
     Script(ASK + "port.timeout = 0.55; said = port.read(7), port.read(7)", 1.1),
     Script(ASK + "sleep(1.05); port.timeout = 0; said = port.read(3), port.read(9), port.read(9)", 1.05),
@@ -56,6 +57,11 @@ SCRIPTS = [
     Script(
         ASK + "import io; port.timeout = 1.05; said = io.BufferedRWPair(port, port).read(7), port.is_open",
         1.05,
+        SETTINGS,
+    ),
+    Script(
+        ASK + "import io; port.timeout = 0.55; said = io.TextIOWrapper(io.BufferedRWPair(port, port, 1)).readline()",
+        1.1,
         SETTINGS,
     ),
     # ---- lines: each character has the timeout anew ----
@@ -90,6 +96,9 @@ SCRIPTS = [
     Script(SLOW + "port.timeout = 1.35; said = list(port.iread_until())", 3.55),
     # ---- what has arrived ----
     Script(ASK + "sleep(0.55); said = port.in_waiting", 0.55),
+    Script(
+        ASK + "said = 0\nwhile said < 7:\n    sleep(0.02)\n    while port.in_waiting: said += len(port.read())", 0.9
+    ),
     Script(ASK + "sleep(0.55); port.reset_input_buffer(); said = port.in_waiting, port.read(4)", 0.9),
     Script(ASK + "sleep(0.55); port.flushInput(); said = port.inWaiting(), port.read(4)", 0.9),
     Script(ASK + "sleep(1.05); port.close(); port.open(); port.timeout = 0; said = port.read(7)", 1.05),
@@ -143,6 +152,9 @@ SCRIPTS = [
     Script("said = port.getCTS(), port.getDSR(), port.getRI(), port.getCD()"),
     Script(
         "port.rts = port.dtr = False; said = port.rts, port.dtr\nport.setRTS(); port.setDTR(); said = said, port.rts"
+    ),
+    Script(
+        "port.close(); port.dtr = port.rts = False; port.open(); said = port.dtr, port.rts; port.send_break(0.1)", 0.25
     ),
     Script("port.break_condition = True; said = port.break_condition; port.break_condition = False"),
     Script("said = port.send_break()", 0.1),

@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 from tests import forked
 from tests.at_length import at_length, share
+from tests.script.conftest import programs_of
 
 pytestmark = pytest.mark.slow
 
@@ -406,19 +407,11 @@ print(datetime.datetime.now(zoneinfo.ZoneInfo("Europe/Berlin")).isoformat(timesp
 """
 """A program for each package, and behind ">" what it says; lines with a "~" depend on the seed alone."""
 
-PROGRAMS = dict(each.split("\n", 1) for each in TEXT.split("\n=== ")[1:])
+PROGRAMS = programs_of(TEXT)
 
-KEPT = {
-    "asyncio",
-    "logging",
-    "multiprocessing locks",
-    "pydantic",
-    "random",
-    "signal",
-    "socket",
-    "sqlite3",
-    "subprocess",
-}
+KEPT = set(
+    re.split(", ", "asyncio, logging, multiprocessing locks, pydantic, random, signal, socket, sqlite3, subprocess")
+)
 """One for each mechanism: a loop of events, files, locks, code in C that looks at the clock, chance, signals, sockets,
 other programs. `make interpreters` and `make test-all` run all."""
 
@@ -430,8 +423,8 @@ TWICE = share({"random", "sqlite3"}, set(PROGRAMS))
 def test_package_lives_in_simulated_time(name: str, tmp_path: Path) -> None:
     if find_spec(name.split()[0].partition(".")[0]) is None:
         pytest.skip(f"{name.split()[0]} is not installed")
-    lines = PROGRAMS[name].splitlines(keepends=True)
-    (tmp_path / "program.py").write_text("".join(line for line in lines if not line.startswith("> ")))
+    program, expected = PROGRAMS[name]
+    (tmp_path / "program.py").write_text(program)
 
     def run() -> tuple[str, str]:
         """Return what the program, and KiKS beside it, has said, and KiKS's last lines, with the state."""
@@ -440,9 +433,7 @@ def test_package_lives_in_simulated_time(name: str, tmp_path: Path) -> None:
         return done.stdout + told, ending
 
     said, ending = run()
-    assert re.sub(r"^~.*\n", "", said, flags=re.MULTILINE) == "".join(
-        line[2:] for line in lines if line.startswith("> ")
-    )
+    assert re.sub(r"^~.*\n", "", said, flags=re.MULTILINE) == expected
     assert re.search("state [0-9a-f]{16}\n", ending)
     if name in TWICE:
         assert run() == (said, ending)
