@@ -84,9 +84,14 @@ def fresh(robots: int = 1, *, thinking: str = "none") -> Simulation:
     return Simulation(BOX, robots=robots, seed=7, thinking=thinking)
 
 
-def open_plain(path: str) -> int:
+@contextmanager
+def opened(path: str) -> Iterator[int]:
     """Open a port as a program does that leaves the terminal's settings as they are."""
-    return os.open(path, os.O_RDWR | os.O_NOCTTY)
+    port = os.open(path, os.O_RDWR | os.O_NOCTTY)
+    try:
+        yield port
+    finally:
+        os.close(port)
 
 
 def read_line(port: int) -> bytes:
@@ -104,11 +109,14 @@ def ask(port: int, command: bytes) -> bytes:
     return read_line(port)
 
 
+def called(*words: str | Path, **options: Any) -> subprocess.CompletedProcess[str]:
+    """Run a command to its end, and keep what it says."""
+    pipes = {"capture_output": True, "text": True, "timeout": GUARD_S, "check": False}
+    return subprocess.run(words, **{**pipes, **options})
+
+
 def run_python(program: str | Path, *arguments: str) -> str:
     """Run a client in its own process; return what it prints."""
-    source = ["-c", program] if isinstance(program, str) else [str(program)]
-    done = subprocess.run(
-        [sys.executable, *source, *arguments], capture_output=True, text=True, timeout=GUARD_S, check=False
-    )
+    done = called(sys.executable, *(["-c", program] if isinstance(program, str) else [program]), *arguments)
     assert done.returncode == 0, done.stderr
     return done.stdout

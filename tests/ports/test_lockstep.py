@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import select
 import socket
 import threading
 from collections.abc import Iterator, Sequence
@@ -38,14 +39,7 @@ class Client:
         return self.lines.readline()
 
     def has_no_reply(self) -> bool:
-        self.socket.setblocking(False)
-        try:
-            self.socket.recv(1, socket.MSG_PEEK)
-        except BlockingIOError:
-            return True
-        finally:
-            self.socket.settimeout(GUARD_S)
-        return False
+        return not select.select([self.socket], [], [], 0)[0]
 
     def hang_up(self) -> None:
         self.socket.shutdown(socket.SHUT_RDWR)

@@ -13,11 +13,12 @@ from typing import Any
 
 import pytest
 from tests.namespaces import needs_sandbox
+from tests.ports.helpers import printed, write
 from tests.served import PROGRAMS, fresh
 
 from kiks.errors import KiksError
 from kiks.ports.program_process import Command
-from kiks.ports.programs import Handle, Programs
+from kiks.ports.programs import Programs
 from kiks.ports.sandbox import Limits, Sandbox
 
 pytestmark = [
@@ -70,18 +71,6 @@ while True: pass
 }
 
 
-def write(folder: Path, text: str) -> Command:
-    folder.mkdir(exist_ok=True)
-    program = folder / "program.py"
-    program.write_text(text)
-    return Command(program)
-
-
-def printed(handle: Handle) -> list[str]:
-    assert handle.output is not None
-    return [line.text for line in handle.output.since(0)[1]]
-
-
 def run(command: Command, sandbox: Sandbox | None, **options: Any) -> tuple[str, int, list[str]]:
     """Run a program alone in a world; return state, exit code and output."""
     sim = fresh()
@@ -92,7 +81,7 @@ def run(command: Command, sandbox: Sandbox | None, **options: Any) -> tuple[str,
 
 @pytest.fixture(scope="module")
 def good(tmp_path_factory: pytest.TempPathFactory) -> Command:
-    return write(tmp_path_factory.mktemp("good"), GOOD)
+    return write(tmp_path_factory.mktemp("good") / "program.py", GOOD)
 
 
 @pytest.fixture(scope="module")
@@ -125,7 +114,7 @@ def test_hostile_program_is_stopped_and_named_and_no_other_one_notices(
     beside: Sandbox,
     tmp_path: Path,
 ) -> None:
-    hostile = write(tmp_path / "hostile", BEGIN + text)
+    hostile = write(tmp_path / "hostile" / "program.py", BEGIN + text)
     with Sandbox([tmp_path / "hostile"], limits=LIMITS) as sandbox:
         programs = Programs(
             fresh(2),
@@ -141,7 +130,7 @@ def test_hostile_program_is_stopped_and_named_and_no_other_one_notices(
         assert (second.reason, second.code) == ("", 0)
         assert printed(second) == usual_second
         # The next program finds a sandbox as if nothing had been.
-        write(tmp_path / "hostile", GOOD)
+        write(tmp_path / "hostile" / "program.py", GOOD)
         assert run(hostile, sandbox) == usual
 
 
@@ -230,14 +219,12 @@ def test_program_reaches_no_file_network_or_neighbour(
         local.listen()
         told = [str(secret), str(neighbour), tcp.getsockname(), udp.getsockname(), abstract, victim.pid]
         # A plain Python: what KiKS itself refuses to programs in simulated time is not what is tested here.
-        write(tmp_path / "prowler", PROWLER)
-        plain = tmp_path / "prowler" / "plain.py"
-        plain.write_text(PLAIN)
+        write(tmp_path / "prowler" / "program.py", PROWLER)
+        plain = write(tmp_path / "prowler" / "plain.py", PLAIN, json.dumps(told))
         with Sandbox([tmp_path / "prowler"], limits=Limits(files_mb=8)) as sandbox:
-            _, code, lines = run(Command(plain, [json.dumps(told)]), sandbox)
+            _, code, lines = run(plain, sandbox)
             before = sandbox._processes
-            plain.write_text(GOOD)
-            assert run(Command(plain), sandbox) == usual
+            assert run(write(plain.program, GOOD), sandbox) == usual
             assert sandbox._processes is before, "its warm process lives on"
         for each in (tcp, udp, local):
             each.setblocking(False)
@@ -269,7 +256,7 @@ sys.exit(int(sys.argv[1]))
 
 @pytest.mark.parametrize("is_trusted", [False, True], ids=["sandbox", "trusted"])
 def test_program_is_the_same_as_in_a_process_of_its_own(is_trusted: bool, tmp_path: Path) -> None:
-    looks = Command(write(tmp_path / "looks", LOOKS).program, ["7", "x"])
+    looks = write(tmp_path / "looks" / "program.py", LOOKS, "7", "x")
     with Sandbox([tmp_path / "looks", PROGRAMS], is_trusted=is_trusted) as sandbox:
         for command in (looks, looks, Command(PROGRAMS / "wander.py"), Command(PROGRAMS / "any_port.py", ["3"])):
             assert run(command, sandbox) == run(command, None)
@@ -282,7 +269,8 @@ def test_program_is_the_same_as_in_a_process_of_its_own(is_trusted: bool, tmp_pa
 
 def test_each_start_finds_an_empty_working_folder_with_the_files_of_the_program(tmp_path: Path) -> None:
     command = write(
-        tmp_path / "first", "import os\nprint(sorted(os.listdir()))\nopen('left', 'w')\nopen('/tmp/left', 'w')"
+        tmp_path / "first" / "program.py",
+        "import os\nprint(sorted(os.listdir()))\nopen('left', 'w')\nopen('/tmp/left', 'w')",
     )
     (tmp_path / "first" / "map.txt").write_text("here")
     with Sandbox([tmp_path / "first"]) as sandbox:
@@ -309,8 +297,8 @@ def test_without_bubblewrap_one_line_says_what_to_do(
 
 
 def test_trusted_program_has_limits_as_well(usual: tuple[str, int, list[str]], tmp_path: Path) -> None:
-    hostile = write(tmp_path / "hostile", BEGIN + "while True: pass")
+    hostile = write(tmp_path / "hostile" / "program.py", BEGIN + "while True: pass")
     with Sandbox(limits=LIMITS, is_trusted=True) as sandbox:
         assert run(hostile, sandbox)[1] == 137
-        write(tmp_path / "hostile", GOOD)
+        write(tmp_path / "hostile" / "program.py", GOOD)
         assert run(hostile, sandbox) == usual

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.ports.helpers import printed, wheels, write
 from tests.served import GUARD_S, PROGRAMS, fresh
 
 from kiks.clock.gate import Gate
@@ -18,7 +19,7 @@ from kiks.clock.patience import Patience
 from kiks.errors import KiksError, ParameterError
 from kiks.ports import programs as module
 from kiks.ports.program_process import OUTPUT_LIMIT, Command
-from kiks.ports.programs import Handle, Programs
+from kiks.ports.programs import Programs
 from kiks.sim.simulation import Simulation
 
 pytestmark = pytest.mark.slow
@@ -97,21 +98,6 @@ def driven(sim: Simulation, commands: Sequence[Command] = (), **options: Any) ->
         run.end()
 
 
-def command(folder: Path, text: str) -> Command:
-    path = folder / "program.py"
-    path.write_text(text)
-    return Command(path)
-
-
-def printed(handle: Handle) -> list[str]:
-    assert handle.output is not None
-    return [line.text for line in handle.output.since(0)[1]]
-
-
-def wheels(sim: Simulation, robot: int = 1) -> list[int]:
-    return sim.world.state.robots["speed_setpoint"][0, robot - 1].tolist()
-
-
 def test_programs_that_begin_together_give_the_run_of_kiks_run() -> None:
     alone, watched = fresh(2), fresh(2)
     assert Programs(alone, [DRIVE, SLEEPER]).run() == 0
@@ -124,7 +110,9 @@ def test_programs_that_begin_together_give_the_run_of_kiks_run() -> None:
 def test_program_joins_at_the_present_time(tmp_path: Path) -> None:
     sim = fresh(2)
     sim.run(5)
-    first = command(tmp_path, "import time\nprint(time.monotonic())\ntime.sleep(3)\nprint(time.monotonic())\n")
+    first = write(
+        tmp_path / "program.py", "import time\nprint(time.monotonic())\ntime.sleep(3)\nprint(time.monotonic())\n"
+    )
     with driven(sim) as run:
         assert not run.programs.drive
         handle = run.programs.start(first, robot=2)
@@ -149,7 +137,7 @@ def test_robot_of_a_stopped_program_stands_still_and_is_free(
     sim = fresh()
     gate = PausedGate(sim)
     with driven(sim) as run:
-        handle = run.programs.start(command(tmp_path, text))
+        handle = run.programs.start(write(tmp_path / "program.py", text))
         run.wait_for(lambda: printed(handle) == ["b'd\\r\\n'"])
         assert wheels(sim) == [5, 5]
         with pytest.raises(ParameterError, match=r"robot 1 must be free .* but program 1 \(program.py\) has it"):
@@ -178,7 +166,7 @@ def test_child_processes_end_with_their_program(tmp_path: Path) -> None:
         "while True: pass\n"
     )
     with driven(fresh()) as run:
-        handle = run.programs.start(command(tmp_path, text))
+        handle = run.programs.start(write(tmp_path / "program.py", text))
         run.wait_for(lambda: printed(handle))
         child = os.pidfd_open(int(printed(handle)[0]))
         run.programs.stop(handle)
@@ -189,7 +177,7 @@ def test_child_processes_end_with_their_program(tmp_path: Path) -> None:
 
 def test_endless_output_is_limited_and_does_not_delay_others(tmp_path: Path) -> None:
     sim = fresh(2)
-    floods = command(tmp_path, "number = 0\nwhile True:\n    print('x' * 3000, number)\n    number += 1\n")
+    floods = write(tmp_path / "program.py", "number = 0\nwhile True:\n    print('x' * 3000, number)\n    number += 1\n")
     with driven(sim) as run:
         handle = run.programs.start(floods)
         other = run.programs.start(DRIVE, robot=2)
@@ -205,7 +193,7 @@ def test_endless_output_is_limited_and_does_not_delay_others(tmp_path: Path) -> 
 def test_output_and_errors_are_distinguished(tmp_path: Path) -> None:
     text = "import sys\nprint('grün')\nsys.stdout.write('no end')\n1 / 0\n"
     with driven(fresh()) as run:
-        handle = run.programs.start(command(tmp_path, text))
+        handle = run.programs.start(write(tmp_path / "program.py", text))
         run.wait_for(lambda: not handle.is_running)
         assert handle.output is not None
         lines = handle.output.since(0)[1]
