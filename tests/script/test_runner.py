@@ -10,7 +10,8 @@ import textwrap
 from pathlib import Path
 
 import pytest
-from tests.guard import GUARD_S
+from tests import forked
+from tests.script import seen
 from tests.script.conftest import Run
 
 from kiks.script import watchdog
@@ -139,17 +140,11 @@ def test_programs_that_list_ports_find_them(run: Run) -> None:
 @pytest.mark.parametrize(
     ("text", "must"),
     [
-        (
-            "import socket\nsocket.create_connection(('127.0.0.1', 9))",
-            "talk to its robots alone, but it used the net",
-        ),
+        ("import socket\nsocket.create_connection(('127.0.0.1', 9))", "talk to its robots alone, but it used the net"),
         ("import socket\nsocket.getaddrinfo('example.org', 80)", "talk to its robots alone"),
         ("import subprocess, sys\nsubprocess.run([sys.executable, '-c', ''])", "start no process of Python by itself"),
         ("import os\nos.system('python3 -c 1')", "start no process of Python by itself"),
-        (
-            "import multiprocessing as m\nm.Process(target=print).start()",
-            "start no process of Python by itself",
-        ),
+        ("import multiprocessing as m\nm.Process(target=print).start()", "start no process of Python by itself"),
         ("import os\nos.fork()", "be one process, but it started one more by fork"),
         ("import os\nos.open('/dev/ttyUSB0', os.O_RDWR)", "open a serial port by pyserial, but it opened /dev/ttyUSB0"),
         ("import ctypes\nfor _ in range(100): ctypes.CDLL(None).usleep(20000)", "wait by time.sleep, a lock or a port"),
@@ -174,34 +169,18 @@ def test_program_that_leaves_simulated_time_ends_with_one_line(
     assert ran.err.count("\n") == 1
 
 
-SPINS = "is_done = False\nwhile not is_done:\n    pass\n"
-
-ADVICE = "If it computes, that is right; if it waits for something, end it (Ctrl-C, or Stop on the desk) and put"
-
-
-def test_loop_that_asks_for_nothing_is_told(tmp_path: Path) -> None:
-    (tmp_path / "endless.py").write_text(OPEN + "port.write(b'D,4,4\\n')\nport.readline()\n" + SPINS)
-    words = watching("endless.py", "SPINNING_S = 5.")
-    with subprocess.Popen(words, stderr=subprocess.PIPE, text=True, cwd=tmp_path) as process:
-        assert process.stderr is not None
-        said = process.stderr.readline()
-        process.terminate()
+def test_loop_that_asks_for_nothing_is_told(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(watchdog, "SPINNING_S", 0.5)
+    monkeypatch.setattr(watchdog, "tell", (told := []).append)
+    monkeypatch.setattr(seen, "trace", told)
+    asks = f"{OPEN}port.write(b'D,4,4\\n')\nport.readline()\n"
+    assert run(f"{asks}from tests.script import seen\nwhile not seen.trace:\n    pass\n").code == 0
     assert re.fullmatch(
-        r"kiks: line [67] of endless.py has computed for \d s without waiting for a time or a robot. "
-        rf"{re.escape(ADVICE)} "
-        r"time.sleep\(0.01\) into the loop.\n",
-        said,
+        r"line [67] of program.py has computed for \d s without waiting for a time or a robot. If it computes, that is "
+        r"right; if it waits for something, end it \(Ctrl-C, or Stop on the desk\) and put time.sleep\(0.01\) into the "
+        r"loop.",
+        *told,
     )
-
-
-def watching(program: str, patience: str) -> list[str]:
-    """Return the command that runs a program under a watchdog with less patience."""
-    script = (
-        "import sys\nfrom pathlib import Path\nfrom kiks.script import watchdog\n"
-        "from kiks.script.runner import run_here\nfrom kiks.sim.simulation import Simulation\n"
-        f"watchdog.{patience}\nsys.exit(run_here(Simulation(), Path({program!r}), [], {{}}))\n"
-    )
-    return [sys.executable, "-c", script]
 
 
 @pytest.mark.parametrize(
@@ -258,8 +237,12 @@ def test_a_wait_in_code_in_c_ends_the_process_that_it_never_leaves(tmp_path: Pat
         "import ctypes\nsignals, found = ctypes.create_string_buffer(128), ctypes.c_int()\n"
         "ctypes.CDLL(None).sigwait(signals, ctypes.byref(found))\n"
     )
-    words = watching("waits.py", "GRACE_S = 0.1")
-    done = subprocess.run(words, capture_output=True, text=True, cwd=tmp_path, timeout=GUARD_S, check=False)
+    code = (
+        "import sys\nfrom pathlib import Path\nfrom kiks.script import watchdog\n"
+        "from kiks.script.runner import run_here\nfrom kiks.sim.simulation import Simulation\n"
+        "watchdog.GRACE_S = 0.1\nsys.exit(run_here(Simulation(), Path('waits.py'), [], {}))\n"
+    )
+    done = forked.run(code=code, cwd=tmp_path)
     assert done.returncode == 1
     assert re.fullmatch(r"kiks: .*it waited by itself \(waits.py, line 3\)\. Run it on kiks serve.*\n", done.stderr)
 
