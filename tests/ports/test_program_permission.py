@@ -84,27 +84,21 @@ def start_from_panel(desk: Desk, project: Project) -> None:
 WAYS: tuple[Callable[[Desk, Project], None], ...] = (upload, restart, draw, start_from_panel)
 
 
-@pytest.mark.parametrize("way", WAYS)
-def test_desk_without_permission_starts_no_program(way: Callable[[Desk, Project], None], tmp_path: Path) -> None:
-    _, trace = program(tmp_path)
-    with desk_of(tmp_path, may_run_programs=False) as desk:
-        way(desk, project_with("x.py", trace))
-        assert not desk.programs.handles
-        _, news = desk.news.since(0)
-        assert way is start_from_panel or news[0].startswith(
-            "A program was left out: 'x.py' must be started at the terminal"
-        )
-    assert not trace.exists()
-
-
 @pytest.mark.slow
+@pytest.mark.parametrize("may", [False, True], ids=["without", "with"])
 @pytest.mark.parametrize("way", WAYS)
-def test_desk_with_permission_starts_the_program(way: Callable[[Desk, Project], None], tmp_path: Path) -> None:
+def test_desk_starts_programs_with_permission_only(
+    way: Callable[[Desk, Project], None], may: bool, tmp_path: Path
+) -> None:
     _, trace = program(tmp_path)
-    with desk_of(tmp_path, may_run_programs=True) as desk:
+    with desk_of(tmp_path, may_run_programs=may) as desk:
         way(desk, project_with("x.py", trace))
+        assert may or not desk.programs.handles
+        _, news = desk.news.since(0)
+        left_out = "A program was left out: 'x.py' must be started at the terminal"
+        assert may or way is start_from_panel or news[0].startswith(left_out)
         wait_for_programs(desk)
-    assert trace.exists()
+    assert trace.exists() == may
 
 
 @pytest.mark.slow
