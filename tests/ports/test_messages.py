@@ -15,16 +15,7 @@ from tests.served import fresh
 
 from kiks.clock.serial_timing import BACKLOG_LIMIT
 from kiks.model.checks import CLOCK_END_NS
-from kiks.ports.messages import (
-    REQUEST_BYTES_MAX,
-    Answer,
-    Inbox,
-    Kind,
-    ProtocolError,
-    Request,
-    checked_request,
-    packed,
-)
+from kiks.ports.messages import REQUEST_BYTES_MAX, Answer, Inbox, Kind, ProtocolError, Request, checked_request, packed
 from kiks.ports.participant import BURST_MAX
 from kiks.ports.programs import Programs
 from kiks.ports.socket_participant import QUEUE_MAX, SocketParticipant
