@@ -200,15 +200,6 @@ def test_dragged_things_slide_along_obstacles() -> None:
     assert sim.pose(1)[:2] == (x_mm, y_mm)
 
 
-def test_drag_of_a_removed_thing_ends() -> None:
-    sim = world()
-    drags = Drags(sim)
-    drags.grab("a", "body", len(sim.bodies()) - 1)
-    sim.remove_body(len(sim.bodies()))
-    drags.move("a", 100, 100)
-    assert drags.are_empty
-
-
 def test_several_drags_of_all_kinds() -> None:
     sim = world()
     drags = Drags(sim)
@@ -225,6 +216,10 @@ def test_several_drags_of_all_kinds() -> None:
         with pytest.raises(ParameterError, match="a hand "):
             drags.grab("a", what, index)
     assert drags.are_empty
+    drags.grab("a", "body", len(sim.bodies()) - 1)
+    sim.remove_body(len(sim.bodies()))
+    drags.move("a", 100, 100)
+    assert drags.are_empty, "a thing that is removed is let go"
 
 
 def test_dragged_robot_stays_while_its_wheels_turn() -> None:

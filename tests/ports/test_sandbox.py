@@ -46,6 +46,14 @@ port.write(b"N\\n")
 port.readline()
 """
 
+SENDS = """
+for each in os.listdir("/proc/self/fd"):
+    if int(each) > 2:
+        try: os.write(int(each), DATA)
+        except OSError: pass
+while True: pass
+"""
+
 HOSTILE = {
     # Python's own fork is refused already, as a program in simulated time is one process. The pause spares the other
     # tests: where they run as the superuser, only the sandbox counts processes.
@@ -54,20 +62,8 @@ HOSTILE = {
     "computed for 0.5 s without using its robot": "while True: pass",
     "waited for 1.5 s without using its robot": 'os.execv("/bin/sleep", ["sleep", "100"])',
     "printed more than 0.5 MB": "while True: os.write(1, b'x' * 4095 + b'\\n')",
-    "sent a message of 4294967295 bytes to the world": """
-for each in os.listdir("/proc/self/fd"):
-    if int(each) > 2:
-        try: os.write(int(each), b"\\xff" * 1000)
-        except OSError: pass
-while True: pass
-""",
-    "sent something to the world that is no message": """
-for each in os.listdir("/proc/self/fd"):
-    if int(each) > 2:
-        try: os.write(int(each), b"\\x02\\0\\0\\0\\x01\\x02")
-        except OSError: pass
-while True: pass
-""",
+    "sent a message of 4294967295 bytes to the world": SENDS.replace("DATA", r'b"\xff" * 1000'),
+    "sent something to the world that is no message": SENDS.replace("DATA", r'b"\x02\0\0\0\x01\x02"'),
 }
 
 

@@ -6,13 +6,14 @@ import os
 import select
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
 from tests.ports.helpers import printed, wheels, write
-from tests.served import GUARD_S, PROGRAMS, fresh
+from tests.served import GUARD_S, PROGRAMS, Rounds, fresh
 
 from kiks.clock.gate import Gate
 from kiks.clock.patience import Patience
@@ -60,42 +61,24 @@ class PausedGate(Gate):
         super()._sleep(seconds)
 
 
-class Driven:
+class Driven(Rounds):
     """Programs whose rounds run in a thread."""
 
     def __init__(self, programs: Programs) -> None:
+        super().__init__(self._drive)
         self.programs = programs
         programs.begin()
-        self._is_over = False
-        self._round = threading.Condition()
-        self._thread = threading.Thread(target=self._drive, daemon=True)
-        self._thread.start()
 
-    def _drive(self) -> None:
-        while not self._is_over:
+    def _drive(self, until: Callable[[], bool]) -> None:
+        while not until():
             self.programs.round(0.01)
-            with self._round:
-                self._round.notify_all()
-
-    def wait_for(self, fact: Callable[[], object]) -> None:
-        """Wait until a condition holds, checked after each round."""
-        with self._round:
-            assert self._round.wait_for(fact, GUARD_S), "it did not happen in time"
-
-    def end(self) -> None:
-        self._is_over = True
-        self._thread.join(GUARD_S)
-        assert not self._thread.is_alive()
-        self.programs.close()
 
 
 @contextmanager
 def driven(sim: Simulation, commands: Sequence[Command] = (), **options: Any) -> Iterator[Driven]:
     run = Driven(Programs(sim, commands, keeps_output=True, **{"patience_s": GUARD_S, **options}))
-    try:
+    with closing(run.programs), run.going_on():
         yield run
-    finally:
-        run.end()
 
 
 def test_programs_that_begin_together_give_the_run_of_kiks_run() -> None:
@@ -208,12 +191,8 @@ def test_output_and_errors_are_distinguished(tmp_path: Path) -> None:
 def test_patience_does_not_run_out_while_the_world_is_paused(tmp_path: Path) -> None:
     sim = fresh(2)
     gate = PausedGate(sim)
-    wall_ns = [0]
-
-    def patience(seconds: float) -> Patience:
-        return Patience(seconds, wall_ns=lambda: wall_ns[0])
-
-    with driven(sim, [DRIVE, SLEEPER], patience_s=1e-3, new_patience=patience) as run:
+    new_patience = partial(Patience, wall_ns=lambda: 0)
+    with driven(sim, [DRIVE, SLEEPER], patience_s=1e-3, new_patience=new_patience) as run:
         run.wait_for(lambda: sim.now_ns > 0)
         gate.hold()
         gate.go_on()

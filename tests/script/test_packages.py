@@ -215,31 +215,6 @@ except pydantic.ValidationError:
 > {"taken":"2000-01-01T00:00:00" 1999-12-31
 > 2000-01-02 00:00:00
 > future
-=== queue
-import queue, sched, threading, time
-items = queue.Queue(maxsize=1)
-def feed():
-    for number in range(3):
-        items.put(number)
-        time.sleep(1)
-threading.Thread(target=feed).start()
-print([items.get(timeout=5) for _ in range(3)], round(time.monotonic(), 2))
-try:
-    items.get(timeout=2)
-except queue.Empty:
-    print("empty", round(time.monotonic(), 2))
-simple = queue.SimpleQueue()
-threading.Timer(1, simple.put, ["late"]).start()
-print(simple.get(), round(time.monotonic(), 2))
-plan = sched.scheduler()
-plan.enter(2, 1, print, ("planned",))
-plan.run()
-print(round(time.monotonic(), 2))
-> [0, 1, 2] 2.0
-> empty 4.0
-> late 5.0
-> planned
-> 7.0
 === random
 import os, random, secrets, tempfile, uuid
 generators = random.Random(), random.SystemRandom()
@@ -331,14 +306,9 @@ with socket.create_connection(server.server_address, timeout=3) as client, clien
         client.recv(1)
     except TimeoutError:
         print("timeout", at())
-left, right = socket.socket(socket.AF_INET, socket.SOCK_DGRAM), socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-left.bind(("127.0.0.1", 0))
-threading.Timer(1, right.sendto, [b"datagram", left.getsockname()]).start()
-print(left.recvfrom(100)[0], at())
 > ONE 1.0
 > TWO 2.0
 > timeout 2.5
-> b'datagram' 3.5
 === sqlite3
 import sqlite3, time
 time.sleep(100)

@@ -99,6 +99,22 @@ print(time.strftime('%Y-%m-%d', time.gmtime()))
 > {7}
 > True True
 > 2000-01-01
+=== queues wait for room and for what is put in
+import queue
+items, simple = queue.Queue(maxsize=1), queue.SimpleQueue()
+def feed():
+    for number in range(3):
+        items.put(number)
+        time.sleep(1)
+threading.Thread(target=feed).start()
+print([items.get(timeout=5) for _ in range(3)], time.monotonic())
+try: items.get(timeout=2)
+except queue.Empty: print("empty", time.monotonic())
+threading.Timer(1, simple.put, ["late"]).start()
+print(simple.get(), time.monotonic())
+> [0, 1, 2] 2.0
+> empty 4.0
+> late 5.0
 === other programs take no simulated time
 import subprocess
 sleeper = subprocess.Popen(['sleep', '0.05'])
@@ -149,13 +165,13 @@ peer = server.accept()[0]
 print(peer.recv(9))
 a, b = (socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(2))
 a.bind(('127.0.0.1', 0))
-b.sendto(b'q', a.getsockname())
+threading.Timer(1, b.sendto, (b'q', a.getsockname())).start()
 data, sender = a.recvfrom(9)
 a.sendto(data.upper(), sender)
-print(b.recv(9))
+print(b.recv(9), time.monotonic())
 for each in (server, peer, a, b): each.close()
 > b'hello'
-> b'Q'
+> b'Q' 1.0
 === what epoll tells only once is told
 r, w = os.pipe()
 poll = select.epoll()
@@ -215,19 +231,28 @@ except TypeError as error:
     print(error, time.monotonic())
 > b'' 3.0
 > 'NoneType' object cannot be interpreted as an integer 6.0
-=== ports are in their folder
+=== ports are listed and are in their folder
 import glob, stat
 from pathlib import Path
+from serial.tools import list_ports
+def named(paths): return sorted(str(path) for path in paths if "ttyUSB" in str(path))
+print([info.device for info in list_ports.comports()], [info.vid for info in list_ports.grep('USB')])
+print(glob.glob("/dev/ttyUSB*"), named(Path("/dev").glob("ttyUSB*")), named(os.listdir("/dev")))
 print(glob.glob("/dev/ttyUSB0"), list(glob.iglob("/dev/ttyUSB0")), os.access("/dev/ttyUSB0", os.R_OK | os.W_OK))
-print(stat.S_ISCHR(os.stat("/dev/ttyUSB0").st_mode), Path("/dev/ttyUSB77").exists())
-print(glob.glob("/dev/ttyUSB*"), [str(path) for path in Path("/dev").glob("ttyUSB*")])
-print([name for name in os.listdir("/dev") if "ttyUSB" in name], Path("/dev/ttyUSB0").is_char_device())
+print(stat.S_ISCHR(os.stat("/dev/ttyUSB0").st_mode), Path("/dev/ttyUSB0").is_char_device())
+print([os.path.exists(f"/dev/ttyUSB{number}") for number in (1, 2, 77)], Path("/dev/ttyUSB77").exists())
 print([(entry.path, entry.is_file()) for entry in os.scandir("/dev") if "ttyUSB" in entry.name])
+for number in range(5):
+    try: print(serial.Serial(f'COM{number}').name)
+    except serial.SerialException: pass
+> ['/dev/ttyUSB0', '/dev/ttyUSB1'] [1027, 1027]
+> ['/dev/ttyUSB0', '/dev/ttyUSB1'] ['/dev/ttyUSB0', '/dev/ttyUSB1'] ['ttyUSB0', 'ttyUSB1']
 > ['/dev/ttyUSB0'] ['/dev/ttyUSB0'] True
-> True False
-> ['/dev/ttyUSB0'] ['/dev/ttyUSB0']
-> ['ttyUSB0'] True
-> [('/dev/ttyUSB0', False)]
+> True True
+> [True, False, False] False
+> [('/dev/ttyUSB0', False), ('/dev/ttyUSB1', False)]
+> COM0
+> COM1
 === files are as old as the clock says
 import shutil
 from pathlib import Path
@@ -270,5 +295,5 @@ PROGRAMS = programs_of(TEXT)
 @pytest.mark.parametrize("claim", PROGRAMS)
 def test_program_prints(claim: str, run: Run) -> None:
     program, printed = PROGRAMS[claim]
-    ran = run(IMPORTS + program)
+    ran = run(IMPORTS + program, robots=2)
     assert (ran.code, ran.out) == (0, printed), ran.err

@@ -111,29 +111,6 @@ def test_alarm_without_a_handler_ends_the_program(run: Run) -> None:
     assert (ran.code, ran.time_s) == (128 + signal.SIGALRM, 2.0)
 
 
-# ---- ports ----
-
-
-def test_programs_that_list_ports_find_them(run: Run) -> None:
-    text = """
-        import glob, os, serial
-        from serial.tools import list_ports
-        print([info.device for info in list_ports.comports()], [info.vid for info in list_ports.grep('USB')])
-        print(glob.glob('/dev/ttyUSB*'), os.path.exists('/dev/ttyUSB1'), os.path.exists('/dev/ttyUSB2'))
-        found = []
-        for number in range(5):
-            try:
-                serial.Serial(f'COM{number}').close()
-                found.append(number)
-            except serial.SerialException:
-                pass
-        print(found)
-    """
-    assert run(text, robots=2).out == (
-        "['/dev/ttyUSB0', '/dev/ttyUSB1'] [1027, 1027]\n['/dev/ttyUSB0', '/dev/ttyUSB1'] True False\n[0, 1]\n"
-    )
-
-
 # ---- what simulated time does not reach ----
 
 
