@@ -46,6 +46,9 @@ NOT_IN_MEMORY = set(NAMES.split())
 Answer = tuple[object, float]
 """What a program has said, and how long it took [s]."""
 
+THINKING_NS = 1_000_000
+"""From a command to its reply."""
+
 BUFFER = 4096
 """Characters in the buffer of a serial driver."""
 
@@ -122,7 +125,7 @@ class Driver:
             self._sent_ns += CHARACTER_NS
             self._command += bytes([code])
             if code == ord("\n"):
-                self._replied_ns = max(self._replied_ns, self._sent_ns)
+                self._replied_ns = max(self._replied_ns, self._sent_ns + THINKING_NS)
                 for character in REPLIES.get(self._command[:1], b""):
                     self._replied_ns += CHARACTER_NS
                     self._arriving.append((self._replied_ns, character))

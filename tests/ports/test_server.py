@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import IO
 
 import pytest
+from tests.at_length import cases
 from tests.ports.helpers import WallClock, ask_socket, connect, live, warnings
 from tests.served import GUARD_S, PROGRAMS, Served, ask, fresh, opened, read_line, run_python, served
 
@@ -195,10 +196,9 @@ def serving(*words: str, ending: int = signal.SIGINT) -> Iterator[IO[str]]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("ending", [signal.SIGTERM, signal.SIGINT])
-def test_serve_command(tmp_path: Path, ending: signal.Signals) -> None:
+def test_serve_command(tmp_path: Path) -> None:
     link = str(tmp_path / "robot")
-    with serving("--thinking", "none", "--link", link, ending=ending) as told:
+    with serving("--thinking", "none", "--link", link, ending=signal.SIGTERM) as told:
         assert told.readline() == f"  serial port  {link}\n"
         assert told.readline().startswith("  TCP          socket://127.0.0.1:")
         assert told.readline().startswith("The world waits for each command. Repeatable to the bit")
@@ -207,7 +207,7 @@ def test_serve_command(tmp_path: Path, ending: signal.Signals) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("option", [[], ["--by-character"]])
+@pytest.mark.parametrize("option", cases([["--by-character"], []]))
 def test_serve_command_says_how_replies_come_over_tcp(option: list[str]) -> None:
     # So slowly that the rest of a reply that comes by character is a minute away.
     with serving("--no-pty", "--speed", "0.01" if option else "100", *option) as told:

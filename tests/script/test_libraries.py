@@ -100,7 +100,8 @@ root.after(9, root.destroy)
 root.mainloop()
 """)
 
-CURSES = """
+ON_TERMINAL = programs_of("""
+=== curses
 import curses, time
 def main(screen):
     times = []
@@ -121,13 +122,11 @@ def main(screen):
     assert screen.getkey() == 'k'
     return times
 print(curses.wrapper(main))
-"""
-
-KEYBOARD = """
+=== keyboard
 import threading, time
 threading.Thread(target=time.sleep, args=(5,)).start()
 input('Enter stops the robot. ')
-"""
+""")
 
 
 @pytest.fixture(scope="module")
@@ -164,22 +163,22 @@ def test_program_with_windows(claim: str, tmp_path: Path, screen: dict[str, str]
         assert forked.run("run", "program.py", cwd=tmp_path, env=screen).stderr == done.stderr, "nor is it repeatable"
 
 
-def on_terminal(folder: Path, text: str) -> tuple[int, str]:
+def on_terminal(folder: Path, name: str) -> tuple[int, str]:
     """Run a program on a terminal without keyboard input; return its exit code, and what it and KiKS have said."""
-    (folder / "program.py").write_text(text)
+    (folder / "program.py").write_text(ON_TERMINAL[name][0])
     words = [*forked.kiks_command(), "run", str(folder / "program.py")]
     done = called(sys.executable, PROGRAMS / "on_terminal.py", *words)
     return done.returncode, done.stdout
 
 
 def test_waits_of_curses_are_simulated(tmp_path: Path) -> None:
-    code, said = on_terminal(tmp_path, CURSES)
+    code, said = on_terminal(tmp_path, "curses")
     assert code == 0
     assert said.startswith("[0.25, 0.5, 1.0]\n")
 
 
 def test_thread_that_waits_for_a_person_ends_the_program(tmp_path: Path) -> None:
-    code, said = on_terminal(tmp_path, KEYBOARD)
+    code, said = on_terminal(tmp_path, "keyboard")
     assert code == 1
     words = "kiks: a program in simulated time must not wait for the keyboard while other threads drive a"
     assert said.startswith(words)

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 from tests import forked
 from tests.script import seen
-from tests.script.conftest import Run
+from tests.script.conftest import Run, programs_of
 
 from kiks.script import watchdog
 
@@ -160,36 +160,50 @@ def test_loop_that_asks_for_nothing_is_told(run: Run, monkeypatch: pytest.Monkey
     )
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        """
-        import threading, time
-        is_done = False
-        def work():
-            global is_done
-            time.sleep(1)
-            is_done = True
-        threading.Thread(target=work).start()
-        while not is_done:
-            pass
-        """,
-        """
-        import threading, time
-        def spin():
-            while True:
-                pass
-        threading.Thread(target=spin, daemon=True).start()
-        time.sleep(1)
-        """,
-    ],
-    ids=["others wait for a time", "others have not had their turn"],
-)
+KEEPS = programs_of("""
+=== others wait for a time
+import threading, time
+is_done = False
+def work():
+    global is_done
+    time.sleep(1)
+    is_done = True
+threading.Thread(target=work).start()
+while not is_done:
+    pass
+=== others have not had their turn
+import threading, time
+def spin():
+    while True:
+        pass
+threading.Thread(target=spin, daemon=True).start()
+time.sleep(1)
+""")
+
+COMPUTES = programs_of("""
+=== others are ready
+import threading
+def count():
+    number = 0
+    while number < 5_000_000:
+        number += 1
+threading.Thread(target=count, daemon=True).start()
+print("on")
+=== others wait for it
+import threading
+numbers = []
+thread = threading.Thread(target=lambda: numbers.append(sum(k * k for k in range(3_000_000))))
+thread.start()
+thread.join()
+""")
+
+
+@pytest.mark.parametrize("when", KEEPS)
 def test_loop_that_keeps_others_from_going_on_ends_with_one_line(
-    text: str, run: Run, monkeypatch: pytest.MonkeyPatch
+    when: str, run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(watchdog, "SPINNING_S", 0.5)
-    ran = run(text)
+    ran = run(KEEPS[when][0])
     assert ran.code == 1
     told, end = ran.err.splitlines()
     assert "of program.py has computed for" in told
@@ -224,31 +238,10 @@ def test_a_wait_in_code_in_c_ends_the_process_that_it_never_leaves(tmp_path: Pat
     assert re.fullmatch(r"kiks: .*it waited by itself \(waits.py, line 3\)\. Run it on kiks serve.*\n", done.stderr)
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        """
-        import threading
-        def count():
-            number = 0
-            while number < 5_000_000:
-                number += 1
-        threading.Thread(target=count, daemon=True).start()
-        print("on")
-        """,
-        """
-        import threading
-        numbers = []
-        thread = threading.Thread(target=lambda: numbers.append(sum(k * k for k in range(3_000_000))))
-        thread.start()
-        thread.join()
-        """,
-    ],
-    ids=["others are ready", "others wait for it"],
-)
-def test_thread_may_compute_from_its_first_moment(text: str, run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("when", COMPUTES)
+def test_thread_may_compute_from_its_first_moment(when: str, run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(watchdog, "SPINNING_S", 0.05)
-    assert run(text).code == 0
+    assert run(COMPUTES[when][0]).code == 0
 
 
 # ---- errors of the program ----
