@@ -67,10 +67,10 @@ HOSTILE = {
 }
 
 
-def run(command: Command, sandbox: Sandbox | None, **options: Any) -> tuple[str, int, list[str]]:
-    """Run a program alone in a world; return state, exit code and output."""
-    sim = fresh()
-    programs = Programs(sim, [command], keeps_output=True, when_silent="wait", sandbox=sandbox, **options)
+def run(command: Command, sandbox: Sandbox | None, robot: int = 1, **options: Any) -> tuple[str, int, list[str]]:
+    """Run a program alone in a world, for its last robot; return state, exit code and output."""
+    sim, commands = fresh(robot), [*[None] * (robot - 1), command]
+    programs = Programs(sim, commands, keeps_output=True, when_silent="wait", sandbox=sandbox, **options)
     code = programs.run()
     return sim.state_hash(), code, printed(programs.handles[0])
 
@@ -89,9 +89,7 @@ def usual(good: Command) -> tuple[str, int, list[str]]:
 @pytest.fixture(scope="module")
 def usual_second(good: Command) -> list[str]:
     """What the good program prints that drives robot 2."""
-    programs = Programs(fresh(2), [None, good], keeps_output=True)
-    programs.run()
-    return printed(programs.handles[0])
+    return run(good, None, robot=2)[2]
 
 
 @pytest.fixture(scope="module")

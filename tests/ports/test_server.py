@@ -13,7 +13,7 @@ from typing import IO
 import pytest
 from tests.at_length import cases
 from tests.ports.helpers import WallClock, ask_socket, connect, live, warnings
-from tests.served import GUARD_S, PROGRAMS, Served, ask, fresh, opened, read_line, run_python, served
+from tests.served import GUARD_S, PROGRAMS, ask, fresh, opened, read_line, run_python, served
 
 from kiks.clock.pace import Pace
 from kiks.clock.serial_timing import BACKLOG_LIMIT
@@ -24,35 +24,26 @@ from kiks.ports.tcp import TcpEndpoint
 from kiks.units import NS_PER_S, character_ns
 
 
-def play(link: str, run: Served, commands: list[bytes], how: str) -> tuple[str, int, list[bytes]]:
-    replies = []
-    with opened(link) as port:
-        for command in commands:
-            for piece in [command] if how == "lines" else [bytes([byte]) for byte in command]:
-                os.write(port, piece)
-                if how == "bytes":
-                    run.wait_rounds(1)
-            replies.append(read_line(port))
-    run.wait_free()
-    return run.sim.state_hash(), run.sim.now_ns, replies
-
-
 @pytest.mark.parametrize("end", [b"\n", b"\r", b"\r\n"])
 @pytest.mark.parametrize("thinking", ["none", "fixed:3.5"])
 def test_lockstep_does_not_depend_on_how_bytes_are_split(tmp_path: Path, end: bytes, thinking: str) -> None:
     commands = [command + end for command in (b"D,9,7", b"N", b"D,-2", b"N", b"x", b"N")]
-    runs = []
-    for how in ("lines", "bytes"):
-        link = str(tmp_path / how)
-        with served([PtyEndpoint(link)], thinking=thinking) as run:
-            runs.append(play(link, run, commands, how))
     memory = fresh(thinking=thinking)
-    port = memory.port(1)
-    replies = []
+    port, replies = memory.port(1), []
     for command in commands:
         port.write(command)
         replies.append(port.readline())
-    assert runs[0] == runs[1] == (memory.state_hash(), memory.now_ns, replies)
+    for size in (10, 1):
+        link = str(tmp_path / str(size))
+        with served([PtyEndpoint(link)], thinking=thinking) as run:
+            with opened(link) as end_of_line:
+                for command, reply in zip(commands, replies, strict=True):
+                    for start in range(0, len(command), size):
+                        os.write(end_of_line, command[start : start + size])
+                        run.wait_rounds(1)
+                    assert read_line(end_of_line) == reply
+            run.wait_free()
+            assert (run.sim.state_hash(), run.sim.now_ns) == (memory.state_hash(), memory.now_ns)
 
 
 def test_lockstep_drops_a_line_without_end_as_the_robot_does(tmp_path: Path) -> None:

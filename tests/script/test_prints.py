@@ -142,9 +142,13 @@ for look in (lambda: a.recv(9), lambda: os.read(r, 9)):
     while True:
         try: print(look()); break
         except BlockingIOError: pass
+before = time.monotonic_ns()
+threading.Timer(1, b.send, (b'z',)).start()
+print(select.select([a, r], [], [], 0.5), select.select([a, r], [], [])[0] == [a], time.monotonic_ns() - before)
 a.close(); b.close()
 > b'x'
 > b'y'
+> ([], [], []) True 1000000000
 === much goes through a pipe and a socket
 r, w = os.pipe()
 a, b = socket.socketpair()

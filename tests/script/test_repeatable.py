@@ -16,15 +16,16 @@ from kiks.engine import code_cache
 pytestmark = pytest.mark.slow
 
 WANDER = """
-import random, time, uuid
-import serial
+import numpy as np, os, random, secrets, serial, time, uuid
 port = serial.Serial("/dev/ttyUSB0", 9600, timeout=1)
 for _ in range(5):
     port.write(b"D,%d,%d\\n" % (random.randint(-5, 5), random.randint(-5, 5)))
     port.readline()
     time.sleep(0.3)
 port.write(b"H\\n")
-print(port.readline(), list({"left", "right", "front", "back"}), uuid.uuid4())
+print([port.readline(), random.random(), str(uuid.uuid4()), os.urandom(3), secrets.token_hex(4), np.random.rand(),
+       np.random.default_rng().random(), random.Random().random(), random.SystemRandom().random(), random.random()],
+      list({"left", "right", "front", "back", "none"}))
 """
 
 
@@ -53,16 +54,8 @@ def test_a_kernel_is_compiled_while_a_program_runs(is_there: bool, tmp_path: Pat
     assert list((tmp_path / "cache").rglob(name))
 
 
-DRAWS = """
-import numpy as np, os, random, secrets, uuid
-print([random.random(), str(uuid.uuid4()), os.urandom(3), secrets.token_hex(4), np.random.rand(),
-       np.random.default_rng().random(), random.Random().random(), random.SystemRandom().random(), random.random()],
-      list({"left", "right", "front", "back", "none"}))
-"""
-
-
 def test_chance_follows_from_the_seed(tmp_path: Path) -> None:
-    (tmp_path / "draws.py").write_text(DRAWS)
+    (tmp_path / "wander.py").write_text(WANDER)
 
     def said(*words: str) -> list[str]:
         """Return what each program says, without its label."""
@@ -70,8 +63,8 @@ def test_chance_follows_from_the_seed(tmp_path: Path) -> None:
         assert code == 0, told
         return [line.partition("| ")[2] or line for line in lines]
 
-    (alone,), (other,) = said("draws.py"), said("--seed", "1", "draws.py")
-    first, second = said("draws.py", "draws.py")
+    (alone,), (other,) = said("wander.py"), said("--seed", "1", "wander.py")
+    first, second = said("wander.py", "wander.py")
     assert alone == first
     assert len({each.partition("]")[0] for each in (alone, second, other)}) == 3
     assert len({each.partition("]")[2] for each in (alone, second, other)}) == 1
