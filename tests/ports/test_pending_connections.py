@@ -7,7 +7,7 @@ import select
 import socket
 import threading
 from collections.abc import Iterator
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack, closing, suppress
 
 import pytest
 from tests.served import GUARD_S
@@ -43,9 +43,8 @@ class Served:
 
 @pytest.fixture
 def served() -> Iterator[Served]:
-    each = Served()
-    yield each
-    each.close()
+    with closing(Served()) as each:
+        yield each
 
 
 def wait_for_end(client: socket.socket) -> None:
@@ -75,10 +74,8 @@ def test_token_may_come_in_pieces_and_the_bytes_after_it_are_kept(served: Served
 
 
 def test_silent_connection_is_closed_after_its_patience() -> None:
-    served = Served(patience_s=0.05)
-    with served.connect(b"a") as silent:
+    with closing(Served(patience_s=0.05)) as served, served.connect(b"a") as silent:
         wait_for_end(silent)
-    served.close()
 
 
 def test_pending_connections_are_limited_and_the_oldest_is_closed(served: Served) -> None:
