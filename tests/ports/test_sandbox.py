@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.at_length import share
 from tests.namespaces import needs_sandbox
 from tests.ports.helpers import printed, write
 from tests.served import PROGRAMS, fresh
@@ -67,7 +68,11 @@ HOSTILE = {
 }
 
 
-def run(command: Command, sandbox: Sandbox | None, robot: int = 1, **options: Any) -> tuple[str, int, list[str]]:
+End = tuple[str, int, list[str]]
+"""State of the world, exit code and output of a program."""
+
+
+def run(command: Command, sandbox: Sandbox | None, robot: int = 1, **options: Any) -> End:
     """Run a program alone in a world, for its last robot; return state, exit code and output."""
     sim, commands = fresh(robot), [*[None] * (robot - 1), command]
     programs = Programs(sim, commands, keeps_output=True, when_silent="wait", sandbox=sandbox, **options)
@@ -81,7 +86,7 @@ def good(tmp_path_factory: pytest.TempPathFactory) -> Command:
 
 
 @pytest.fixture(scope="module")
-def usual(good: Command) -> tuple[str, int, list[str]]:
+def usual(good: Command) -> End:
     """What comes of the good program outside of a sandbox."""
     return run(good, None)
 
@@ -98,34 +103,34 @@ def beside(good: Command) -> Iterator[Sandbox]:
         yield sandbox
 
 
+@pytest.fixture(scope="module")
+def around_hostile(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, Sandbox]]:
+    """Where hostile programs are written, and the sandbox in which they run one after the other."""
+    path = tmp_path_factory.mktemp("hostile") / "program.py"
+    with Sandbox([path.parent], limits=LIMITS) as sandbox:
+        yield path, sandbox
+
+
 @pytest.mark.parametrize(("reason", "text"), HOSTILE.items(), ids=HOSTILE)
 def test_hostile_program_is_stopped_and_named_and_no_other_one_notices(
     reason: str,
     text: str,
     good: Command,
-    usual: tuple[str, int, list[str]],
+    usual: End,
     usual_second: list[str],
     beside: Sandbox,
-    tmp_path: Path,
+    around_hostile: tuple[Path, Sandbox],
 ) -> None:
-    hostile = write(tmp_path / "hostile" / "program.py", BEGIN + text)
-    with Sandbox([tmp_path / "hostile"], limits=LIMITS) as sandbox:
-        programs = Programs(
-            fresh(2),
-            [hostile, good],
-            keeps_output=True,
-            when_silent="wait",
-            are_apart=True,
-            sandbox={1: sandbox, 2: beside},
-        )
-        programs.run()
-        first, second = programs.handles
-        assert (first.reason, first.how) == (reason, f"because it {reason}")
-        assert (second.reason, second.code) == ("", 0)
-        assert printed(second) == usual_second
-        # The next program finds a sandbox as if nothing had been.
-        write(tmp_path / "hostile" / "program.py", GOOD)
-        assert run(hostile, sandbox) == usual
+    path, sandbox = around_hostile
+    sandboxes, options = {1: sandbox, 2: beside}, {"keeps_output": True, "when_silent": "wait", "are_apart": True}
+    programs = Programs(fresh(2), [write(path, BEGIN + text), good], sandbox=sandboxes, **options)
+    programs.run()
+    first, second = programs.handles
+    assert (first.reason, first.how) == (reason, f"because it {reason}")
+    assert (second.reason, second.code) == ("", 0)
+    assert printed(second) == usual_second
+    # The next program finds a sandbox as if nothing had been.
+    assert run(write(path, GOOD), sandbox) == usual
 
 
 PLAIN = """
@@ -194,9 +199,7 @@ print("environment", sorted(os.environ))
 """
 
 
-def test_program_reaches_no_file_network_or_neighbour(
-    good: Command, usual: tuple[str, int, list[str]], tmp_path: Path
-) -> None:
+def test_program_reaches_no_file_network_or_neighbour(good: Command, usual: End, tmp_path: Path) -> None:
     secret, neighbour = tmp_path / "home" / "secret", tmp_path / "neighbour" / "program.py"
     for each in (secret, neighbour):
         each.parent.mkdir()
@@ -248,17 +251,26 @@ sys.exit(int(sys.argv[1]))
 """
 
 
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[Command, str, End]]:
+    """Programs, how each thinks, and what comes of it in a process of its own."""
+    folder = tmp_path_factory.mktemp("looks")
+    (folder.parent / "times").write_text("7000000\n" * 40)
+    looks = write(folder / "program.py", LOOKS, "7", "x")
+    runs = [(looks, "none"), (looks, f"replay:{folder.parent / 'times'}")]
+    runs.append((Command(PROGRAMS / "any_port.py", ["3"]), "none"))
+    runs += share([], [(Command(PROGRAMS / "wander.py"), "none")])
+    return [(command, thinking, run(command, None, thinking=thinking)) for command, thinking in runs]
+
+
 @pytest.mark.parametrize("is_trusted", [False, True], ids=["sandbox", "trusted"])
-def test_program_is_the_same_as_in_a_process_of_its_own(is_trusted: bool, tmp_path: Path) -> None:
-    looks = write(tmp_path / "looks" / "program.py", LOOKS, "7", "x")
-    with Sandbox([tmp_path / "looks", PROGRAMS], is_trusted=is_trusted) as sandbox:
-        for command in (looks, looks, Command(PROGRAMS / "wander.py"), Command(PROGRAMS / "any_port.py", ["3"])):
-            assert run(command, sandbox) == run(command, None)
-        times = tmp_path / "times"
-        times.write_text("7000000\n" * 40)
-        replayed = run(looks, sandbox, thinking=f"replay:{times}")
-        assert replayed == run(looks, None, thinking=f"replay:{times}")
-        assert replayed[0] != run(looks, None)[0]
+def test_program_is_the_same_as_in_a_process_of_its_own(
+    is_trusted: bool, alone: list[tuple[Command, str, End]]
+) -> None:
+    with Sandbox([alone[0][0].program.parent, PROGRAMS], is_trusted=is_trusted) as sandbox:
+        for command, thinking, end in (*alone, alone[0]):
+            assert run(command, sandbox, thinking=thinking) == end
+    assert alone[0][2][0] != alone[1][2][0]
 
 
 def test_each_start_finds_an_empty_working_folder_with_the_files_of_the_program(tmp_path: Path) -> None:
@@ -290,7 +302,7 @@ def test_without_bubblewrap_one_line_says_what_to_do(
     assert "--trusted" in str(caught.value)
 
 
-def test_trusted_program_has_limits_as_well(usual: tuple[str, int, list[str]], tmp_path: Path) -> None:
+def test_trusted_program_has_limits_as_well(usual: End, tmp_path: Path) -> None:
     hostile = write(tmp_path / "hostile" / "program.py", BEGIN + "while True: pass")
     with Sandbox(limits=LIMITS, is_trusted=True) as sandbox:
         assert run(hostile, sandbox)[1] == 137
