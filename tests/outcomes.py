@@ -27,13 +27,9 @@ def random_programs() -> list[Any]:
     """Return programs of several threads."""
     drawn: list[Any] = []
 
-    @settings(
-        max_examples=COUNT,
-        derandomize=True,
-        database=None,
-        phases=[Phase.generate],
-        suppress_health_check=[HealthCheck.too_slow],
-    )
+    quiet = [HealthCheck.too_slow]
+
+    @settings(max_examples=COUNT, derandomize=True, database=None, phases=[Phase.generate], suppress_health_check=quiet)
     @given(PROGRAMS)
     def draw(program: list[Any]) -> None:
         drawn.append(program)

@@ -31,9 +31,6 @@ class WallClock:
     def __call__(self) -> int:
         return self.time_ns
 
-    def pass_s(self, time_s: float) -> None:
-        self.pass_ns(round(time_s * NS_PER_S))
-
     def pass_ns(self, time_ns: int) -> None:
         self.time_ns += time_ns
 
@@ -55,7 +52,7 @@ def wheels(sim: Simulation, robot: int = 1) -> list[int]:
 
 def write(path: Path, text: str, *arguments: str) -> Command:
     """Write a program, in a folder that need not be there; return its command."""
-    path.parent.mkdir(exist_ok=True)
+    path.parent.mkdir(exist_ok=True, parents=True)
     path.write_text(text)
     return Command(path, list(arguments))
 

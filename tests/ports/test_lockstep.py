@@ -21,6 +21,7 @@ from kiks.errors import ParameterError
 from kiks.ports.endpoint import READ_SIZE, Endpoint
 from kiks.ports.server import Server
 from kiks.ports.tcp import TcpEndpoint
+from kiks.units import NS_PER_S
 
 
 class Client:
@@ -71,7 +72,7 @@ def clients(count: int = 2, come: Sequence[int] | None = None, **options: Any) -
 
         def later(seconds: float) -> None:
             run.wait_rounds(3)
-            wall.pass_s(seconds)
+            wall.pass_ns(round(seconds * NS_PER_S))
             run.wait_rounds(3)
 
         run.join, run.later = join, later

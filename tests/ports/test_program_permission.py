@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from tests.ports.helpers import write
 
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.scripts import EXAMPLES
@@ -29,10 +30,7 @@ def desk_of(folder: Path, *, may_run_programs: bool, granted: tuple[Command | No
 
 def program(folder: Path, name: str = "x.py") -> tuple[Path, Path]:
     """Write a program that creates a file; return the paths of both."""
-    path = folder / name
-    path.parent.mkdir(exist_ok=True, parents=True)
-    path.write_text(TRACE)
-    return path, folder / "trace"
+    return write(folder / name, TRACE).program, folder / "trace"
 
 
 def project_with(path: str, trace: Path) -> Project:

@@ -22,11 +22,7 @@ from kiks.ports.program_process import Command
 from kiks.ports.programs import Programs
 from kiks.ports.sandbox import Limits, Sandbox
 
-pytestmark = [
-    # Each test starts processes.
-    pytest.mark.slow,
-    needs_sandbox,
-]
+pytestmark = [pytest.mark.slow, needs_sandbox]
 
 LIMITS = Limits(memory_mb=150, processes=8, computing_s=0.5, waiting_s=1.5, output_mb=0.5, files_mb=8)
 

@@ -25,10 +25,8 @@ from kiks.sim.simulation import Simulation
 
 pytestmark = pytest.mark.slow
 
-DRIVE, SLEEPER = (
-    Command(PROGRAMS / f"{name}.py", words)
-    for name, words in (("drive", ["COM1", "40", "3", "7"]), ("sleeper", ["12"]))
-)
+DRIVE = Command(PROGRAMS / "drive.py", ["COM1", "40", "3", "7"])
+SLEEPER = Command(PROGRAMS / "sleeper.py", ["12"])
 
 FOR_EVER = """
 import serial
@@ -164,8 +162,7 @@ def test_endless_output_is_limited_and_does_not_delay_others(tmp_path: Path) -> 
     with driven(sim) as run:
         handle = run.programs.start(floods)
         other = run.programs.start(DRIVE, robot=2)
-        assert handle.output is not None
-        output = handle.output
+        output: Any = handle.output
         run.wait_for(lambda: not other.is_running and output.count > 3 * OUTPUT_LIMIT)
         first, lines = output.since(0)
         assert first > 0
@@ -178,8 +175,8 @@ def test_output_and_errors_are_distinguished(tmp_path: Path) -> None:
     with driven(fresh()) as run:
         handle = run.programs.start(write(tmp_path / "program.py", text))
         run.wait_for(lambda: not handle.is_running)
-        assert handle.output is not None
-        lines = handle.output.since(0)[1]
+        output: Any = handle.output
+        lines = output.since(0)[1]
         assert [line.text for line in lines if not line.is_error] == ["grün", "no end"]
         errors = [line.text for line in lines if line.is_error]
         assert errors[0] == "Traceback (most recent call last):"

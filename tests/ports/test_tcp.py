@@ -14,7 +14,7 @@ from kiks.clock.serial_timing import OUTPUT_LIMIT
 from kiks.errors import LinkError, ParameterError
 from kiks.ports.rfc2217 import Rfc2217Endpoint
 from kiks.ports.tcp import TcpChannel, TcpEndpoint
-from kiks.units import character_ns
+from kiks.units import NS_PER_S, character_ns
 
 
 def test_live_reply_comes_with_its_last_character_and_those_of_several_commands_one_by_one() -> None:
@@ -63,7 +63,7 @@ def test_live_reply_of_a_client_that_hangs_up_in_its_middle_reaches_no_other_cli
         with connect(endpoint) as client:
             client.sendall(b"H\n")
             run.wait_for(lambda: run.sim.wires[0].pending)
-            wall.pass_s(1)
+            wall.pass_ns(NS_PER_S)
             assert client.recv(4096) == b"h,0,0\r\n"
 
 

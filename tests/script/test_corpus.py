@@ -23,8 +23,7 @@ import pytest
 from tests import forked
 from tests.at_length import at_length, share
 from tests.cli.test_cli import KIKS
-from tests.guard import GUARD_S
-from tests.served import PROGRAMS
+from tests.served import GUARD_S, PROGRAMS, called
 
 pytestmark = pytest.mark.slow
 
@@ -130,9 +129,7 @@ def served(folder: Path, robots: int) -> Iterator[list[str]]:
 
 def run_real(name: str, port: str) -> str:
     """Run a program by Python alone, with pyserial itself; return what it said, errors, too."""
-    pipes = {"stdin": subprocess.DEVNULL, "capture_output": True, "text": True}
-    command = [sys.executable, CORPUS[name], port]
-    done = subprocess.run(command, env=ENVIRONMENT, timeout=GUARD_S, check=False, **pipes)
+    done = called(sys.executable, CORPUS[name], port, env=ENVIRONMENT, stdin=subprocess.DEVNULL)
     return done.stdout + (f"exit code {done.returncode}: {done.stderr}" if done.returncode else "")
 
 
