@@ -23,7 +23,7 @@ from kiks.script.runner import run_here
 
 @pytest.fixture
 def sim() -> kiks.Simulation:
-    return kiks.Simulation(kiks.Arena.box(2000, 2000), seed=2)
+    return kiks.Simulation(kiks.Arena.box(600, 600), seed=2)
 
 
 class Silent:
@@ -250,10 +250,10 @@ REFUSED: list[tuple[Callable[[kiks.Simulation], object], str]] = [
         for robots in (-1, 1001, 1.5, "2")
     ),
     (lambda _: kiks.Simulation("maze.png"), r"arena must be a kiks.Arena, but it was 'maze.png'. Give kiks.Arena.load"),
-    (lambda sim: sim.place(1, 20, 500, 0), r"at \(20, 500\) mm a wall is 17.5 mm inside it"),
-    (lambda sim: sim.place(1, -500, 500, 0), "must be free"),
-    (lambda sim: sim.place(1, 5000, 0, 0), r"at \(5000, 0\) mm it is outside of the arena. The arena is 2000 x"),
-    (lambda sim: sim.place(1, math.nan, 500, 0), "x_mm must be a finite number"),
+    (lambda sim: sim.place(1, 20, 300, 0), r"at \(20, 300\) mm a wall is 17.5 mm inside it"),
+    (lambda sim: sim.place(1, -500, 300, 0), "must be free"),
+    (lambda sim: sim.place(1, 5000, 0, 0), r"at \(5000, 0\) mm it is outside of the arena. The arena is 600 x"),
+    (lambda sim: sim.place(1, math.nan, 300, 0), "x_mm must be a finite number"),
     (lambda sim: sim.pose(2), "This simulation has robot 1"),
     (lambda sim: sim.run(-1), "Time never runs backwards"),
     (lambda sim: sim.run("5"), r"seconds must be a number from 0 to 1e9, but it was '5'.$"),
@@ -261,11 +261,11 @@ REFUSED: list[tuple[Callable[[kiks.Simulation], object], str]] = [
 
 
 def test_a_simulation_checks_its_arguments(sim: kiks.Simulation) -> None:
-    sim.place(1, 500.0, 400.0, math.pi / 3)
+    sim.place(1, 300.0, 400.0, math.pi / 3)
     for call, words in REFUSED:
         with pytest.raises(kiks.ParameterError, match=words):
             call(sim)
-        assert sim.pose(1) == (500.0, 400.0, math.pi / 3)
+        assert sim.pose(1) == (300.0, 400.0, math.pi / 3)
 
 
 @pytest.mark.parametrize("least", [0, 1024], ids=["small", "large"])
