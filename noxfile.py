@@ -24,6 +24,9 @@ TESTED_WITH = (
     *("pytest", "pytest-timeout", "pytest-xdist"),
 )
 OUTCOMES = ("-m", "tests.outcomes")
+PYTEST = ("-m", "pytest", "-n", str(1 + (os.cpu_count() or 1)), "--dist", "worksteal")
+PACKAGES, ALL = "tests/script/test_packages.py", {"KIKS_AT_LENGTH": "1"}
+"""`make test` runs few of the programs with packages; here, all of them run."""
 
 nox.options.default_venv_backend = "uv|venv"
 nox.options.reuse_venv = "yes"
@@ -71,8 +74,14 @@ def tests(session: nox.Session) -> None:
             f"{changed[0]!r} and {len(changed) - 1} more must do the same under Python {'.'.join(OWN)} and "
             f"{session.python}, but did not. Compare {own} and {other}."
         )
-    pytest = ("python", "-m", "pytest", "-n", str(1 + (os.cpu_count() or 1)), "--dist", "worksteal")
     # What programs do is compared above.
-    compared = [f"--ignore=tests/script/test_{name}.py" for name in ("corpus", "threads")]
-    session.run(*pytest, *compared, "tests/script", "tests/client")
-    session.run(*pytest, "-m", "not slow", "tests/ports", "tests/cli")
+    left_out = [f"--ignore=tests/script/test_{name}.py" for name in ("corpus", "threads", "packages")]
+    session.run("python", *PYTEST, *left_out, "tests/script", "tests/client")
+    session.run("python", *PYTEST, PACKAGES, env=ALL)
+    session.run("python", *PYTEST, "-m", "not slow", "tests/ports", "tests/cli")
+
+
+@nox.session(python=False)
+def packages(session: nox.Session) -> None:
+    """Test all programs with packages under the interpreter that runs this, too."""
+    session.run(sys.executable, *PYTEST, PACKAGES, env=ALL)

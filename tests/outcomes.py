@@ -8,15 +8,14 @@ from __future__ import annotations
 
 import gc
 import json
-import subprocess
+import signal
 import sys
-import tempfile
 from pathlib import Path
 from typing import Any
 
 from hypothesis import HealthCheck, Phase, given, settings
-from tests.cli.test_cli import KIKS
-from tests.script.test_corpus import run_alone
+from tests import forked
+from tests.script.test_corpus import CORPUS, run_alone
 from tests.script.test_threads import PROGRAMS, run_threads
 
 COUNT = 200
@@ -28,13 +27,9 @@ def random_programs() -> list[Any]:
     """Return programs of several threads."""
     drawn: list[Any] = []
 
-    @settings(
-        max_examples=COUNT,
-        derandomize=True,
-        database=None,
-        phases=[Phase.generate],
-        suppress_health_check=[HealthCheck.too_slow],
-    )
+    quiet = [HealthCheck.too_slow]
+
+    @settings(max_examples=COUNT, derandomize=True, database=None, phases=[Phase.generate], suppress_health_check=quiet)
     @given(PROGRAMS)
     def draw(program: list[Any]) -> None:
         drawn.append(program)
@@ -46,15 +41,17 @@ def random_programs() -> list[Any]:
 
 
 def main(path: str, other: str = "") -> None:
+    # As in tests/conftest.py: programs here send themselves Ctrl-C.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     if other:
         programs = [json.loads(name) for name in json.loads(Path(other).read_text()) if name.startswith("[")]
     else:
         programs = random_programs()
     outcomes: dict[str, Any] = {json.dumps(program): run_threads(program) for program in programs}
-    demonstration = subprocess.run([*KIKS, *DEMONSTRATION], capture_output=True, text=True, check=True)
+    demonstration = forked.run(*DEMONSTRATION)
+    assert demonstration.returncode == 0, demonstration.stderr
     outcomes[" ".join(DEMONSTRATION)] = demonstration.stdout.partition("state ")[2]
-    with tempfile.TemporaryDirectory() as folder:
-        outcomes |= run_alone(Path(folder), again=())[0]
+    outcomes |= {name: run_alone(name) for name in CORPUS}
     Path(path).write_text(json.dumps(outcomes, indent=1))
 
 

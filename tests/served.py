@@ -8,7 +8,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -23,16 +23,14 @@ BOX = Arena.box(600, 600)
 PROGRAMS = Path(__file__).parent / "programs"
 
 
-class Served:
-    """A server that runs, and a way to wait for what it does."""
+class Rounds:
+    """Rounds in a thread, and a way to wait for what they do."""
 
-    def __init__(self, server: Server) -> None:
-        self.server = server
-        self.sim = server.sim
+    def __init__(self, work: Callable[[Callable[[], bool]], object]) -> None:
         self.rounds = 0
         self._is_over = False
         self._round = threading.Condition()
-        self._thread = threading.Thread(target=server.serve, args=(self._until,), daemon=True)
+        self._thread = threading.Thread(target=work, args=(self._until,), daemon=True)
 
     def _until(self) -> bool:
         with self._round:
@@ -40,10 +38,30 @@ class Served:
             self._round.notify_all()
         return self._is_over
 
+    @contextmanager
+    def going_on(self) -> Iterator[None]:
+        """Let the rounds go on until the block ends."""
+        self._thread.start()
+        try:
+            yield
+        finally:
+            self._is_over = True
+            self._thread.join(GUARD_S)
+            assert not self._thread.is_alive()
+
     def wait_for(self, fact: Callable[[], object]) -> None:
-        """Wait until something is so, looked at after each round of the server."""
+        """Wait until a condition holds, checked after each round."""
         with self._round:
-            assert self._round.wait_for(fact, GUARD_S), "the server did not do it in time"
+            assert self._round.wait_for(fact, GUARD_S), "it did not happen in time"
+
+
+class Served(Rounds):
+    """A server that runs, and a way to wait for what it does."""
+
+    def __init__(self, server: Server) -> None:
+        super().__init__(server.serve)
+        self.server = server
+        self.sim = server.sim
 
     def wait_rounds(self, count: int) -> None:
         """Wait until the server has looked at everything a few times more."""
@@ -70,13 +88,8 @@ def served(
     """Serve endpoints, of robot 1 if nothing else is said, until the block ends."""
     ways = endpoints if isinstance(endpoints, Mapping) else {1: endpoints}
     run = Served(Server(fresh(len(ways)) if sim is None else sim, ways, thinking=thinking, **options))
-    run._thread.start()
-    try:
+    with closing(run.server), run.going_on():
         yield run
-    finally:
-        run._is_over = True
-        run._thread.join(GUARD_S)
-        run.server.close()
 
 
 def fresh(robots: int = 1, *, thinking: str = "none") -> Simulation:
@@ -84,9 +97,14 @@ def fresh(robots: int = 1, *, thinking: str = "none") -> Simulation:
     return Simulation(BOX, robots=robots, seed=7, thinking=thinking)
 
 
-def open_plain(path: str) -> int:
+@contextmanager
+def opened(path: str) -> Iterator[int]:
     """Open a port as a program does that leaves the terminal's settings as they are."""
-    return os.open(path, os.O_RDWR | os.O_NOCTTY)
+    port = os.open(path, os.O_RDWR | os.O_NOCTTY)
+    try:
+        yield port
+    finally:
+        os.close(port)
 
 
 def read_line(port: int) -> bytes:
@@ -104,11 +122,14 @@ def ask(port: int, command: bytes) -> bytes:
     return read_line(port)
 
 
+def called(*words: str | Path, **options: Any) -> subprocess.CompletedProcess[str]:
+    """Run a command to its end, and keep what it says."""
+    pipes = {"capture_output": True, "text": True, "timeout": GUARD_S, "check": False}
+    return subprocess.run(words, **{**pipes, **options})
+
+
 def run_python(program: str | Path, *arguments: str) -> str:
     """Run a client in its own process; return what it prints."""
-    source = ["-c", program] if isinstance(program, str) else [str(program)]
-    done = subprocess.run(
-        [sys.executable, *source, *arguments], capture_output=True, text=True, timeout=GUARD_S, check=False
-    )
+    done = called(sys.executable, *(["-c", program] if isinstance(program, str) else [program]), *arguments)
     assert done.returncode == 0, done.stderr
     return done.stdout

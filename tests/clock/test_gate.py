@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import pytest
 from tests.guard import GUARD_S
+from tests.ports.helpers import WallClock
 
 import kiks
 from kiks.clock.gate import LAG_NS, SLICE_NS, Gate
@@ -19,25 +20,15 @@ from kiks.model.arena import Pose
 from kiks.sim.drag import Drags
 
 
-class Wall:
-    """A wall clock that only sleeping moves."""
-
-    def __init__(self) -> None:
-        self.now_ns = 0
-
-    def __call__(self) -> int:
-        return self.now_ns
-
-
 class QuickGate(Gate):
-    """A gate that sleeps by its own clock."""
+    """A gate whose wall clock moves only when it sleeps."""
 
-    def __init__(self, lock: threading.RLock, speed: float | None, wall: Wall) -> None:
-        self.wall = wall
-        super().__init__(lock, speed=speed, wall_ns=wall)
+    def __init__(self, lock: threading.RLock, speed: float | None) -> None:
+        self.passed_ns = 0
+        super().__init__(lock, speed=speed, wall_ns=lambda: self.passed_ns)
 
     def _sleep(self, seconds: float) -> None:
-        self.wall.now_ns += round(seconds * 1e9) + 1
+        self.passed_ns += round(seconds * 1e9) + 1
 
 
 def course(sim: kiks.Simulation) -> str:
@@ -68,7 +59,7 @@ def driving(sim: kiks.Simulation, seconds: float) -> Iterator[threading.Thread]:
 @pytest.mark.parametrize("speed", [None, 1000.0])
 def test_gate_changes_nothing(speed: float | None) -> None:
     alone, watched = kiks.Simulation(seed=3), kiks.Simulation(seed=3)
-    watched.loop.gate = QuickGate(watched.lock, speed, Wall())
+    watched.loop.gate = QuickGate(watched.lock, speed)
     looks = 0
 
     def look() -> None:
@@ -84,26 +75,24 @@ def test_gate_changes_nothing(speed: float | None) -> None:
 
 
 def test_time_keeps_the_pace() -> None:
-    wall = Wall()
-    gate = QuickGate(threading.RLock(), 2.0, wall)
+    gate = QuickGate(threading.RLock(), 2.0)
     now_ns = 0
     while now_ns < 10**9:
         next_ns = gate.admit(now_ns, 10**9)
         assert next_ns - now_ns <= 2 * SLICE_NS
         now_ns = next_ns
-    assert wall.now_ns == pytest.approx(5e8, rel=1e-3)
+    assert gate.passed_ns == pytest.approx(5e8, rel=1e-3)
 
 
 def test_thinking_time_is_not_caught_up() -> None:
-    wall = Wall()
-    gate = QuickGate(threading.RLock(), 1.0, wall)
+    gate = QuickGate(threading.RLock(), 1.0)
     now_ns = gate.admit(0, 10**12)
-    wall.now_ns += 100 * LAG_NS
-    begin_ns = wall.now_ns
+    gate.passed_ns += 100 * LAG_NS
+    begin_ns = gate.passed_ns
     for _ in range(10):
         now_ns = gate.admit(now_ns, 10**12)
     assert now_ns == 11 * SLICE_NS
-    assert wall.now_ns - begin_ns == pytest.approx(9 * SLICE_NS, rel=1e-3)
+    assert gate.passed_ns - begin_ns == pytest.approx(9 * SLICE_NS, rel=1e-3)
 
 
 def test_pause_step_and_go_on() -> None:
@@ -141,33 +130,32 @@ def test_requests_run_at_once_or_in_the_thread_that_moves_the_world() -> None:
 
 
 def test_waiting_at_the_gate_does_not_use_up_patience() -> None:
-    wall = Wall()
-    gate = QuickGate(threading.RLock(), 0.1, wall)
+    gate = QuickGate(threading.RLock(), 0.1)
     before_ns = gate.wall_ns()
     patience = gate.patience(1.0)
     patience.left_s()
     now_ns = 0
     while now_ns < 10**8:
         now_ns = gate.admit(now_ns, 10**8)
-    assert wall.now_ns > 5 * 10**8
-    assert gate.wall_ns() - before_ns < wall.now_ns / 2
+    assert gate.passed_ns > 5 * 10**8
+    assert gate.wall_ns() - before_ns < gate.passed_ns / 2
     assert patience.left_s() > 0.5
 
 
 def test_pace_changes_without_a_jump() -> None:
-    wall = Wall()
+    wall = WallClock()
     pace = Pace(2.0, wall_ns=wall)
     pace.start(0)
-    wall.now_ns += 100
+    wall.time_ns += 100
     pace.set_speed(0.5, pace.now_ns())
-    wall.now_ns += 100
+    wall.time_ns += 100
     assert pace.now_ns() == 250
     pace.hold(250)
-    wall.now_ns += 1000
+    wall.time_ns += 1000
     assert pace.now_ns() == 250
     assert pace.wall_wait_s(300) == float("inf")
     pace.go_on()
-    wall.now_ns += 100
+    wall.time_ns += 100
     assert pace.now_ns() == 300
     with pytest.raises(ParameterError, match="speed must be a number from"):
         pace.set_speed(0, 0)
@@ -200,15 +188,6 @@ def test_dragged_things_slide_along_obstacles() -> None:
     assert sim.pose(1)[:2] == (x_mm, y_mm)
 
 
-def test_drag_of_a_removed_thing_ends() -> None:
-    sim = world()
-    drags = Drags(sim)
-    drags.grab("a", "body", len(sim.bodies()) - 1)
-    sim.remove_body(len(sim.bodies()))
-    drags.move("a", 100, 100)
-    assert drags.are_empty
-
-
 def test_several_drags_of_all_kinds() -> None:
     sim = world()
     drags = Drags(sim)
@@ -225,6 +204,10 @@ def test_several_drags_of_all_kinds() -> None:
         with pytest.raises(ParameterError, match="a hand "):
             drags.grab("a", what, index)
     assert drags.are_empty
+    drags.grab("a", "body", len(sim.bodies()) - 1)
+    sim.remove_body(len(sim.bodies()))
+    drags.move("a", 100, 100)
+    assert drags.are_empty, "a thing that is removed is let go"
 
 
 def test_dragged_robot_stays_while_its_wheels_turn() -> None:

@@ -7,11 +7,18 @@ import resource
 import socket
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
 
 import pytest
-from tests.served import GUARD_S
+from tests.served import GUARD_S, Served, served
 
+from kiks.clock.pace import Pace
+from kiks.ports.endpoint import Endpoint
+from kiks.ports.program_process import Command
+from kiks.ports.programs import Handle
 from kiks.ports.tcp import TcpEndpoint
+from kiks.sim.simulation import Simulation
 from kiks.units import NS_PER_S
 
 
@@ -24,9 +31,6 @@ class WallClock:
     def __call__(self) -> int:
         return self.time_ns
 
-    def pass_s(self, time_s: float) -> None:
-        self.pass_ns(round(time_s * NS_PER_S))
-
     def pass_ns(self, time_ns: int) -> None:
         self.time_ns += time_ns
 
@@ -35,8 +39,34 @@ def warnings(caplog: pytest.LogCaptureFixture) -> list[str]:
     return [record.getMessage() for record in caplog.records if record.levelname == "WARNING"]
 
 
+def printed(handle: Handle) -> list[str]:
+    """Return what a program has printed."""
+    assert handle.output is not None
+    return [line.text for line in handle.output.since(0)[1]]
+
+
+def wheels(sim: Simulation, robot: int = 1) -> list[int]:
+    """Return the speeds that a robot has been told."""
+    return sim.world.state.robots["speed_setpoint"][0, robot - 1].tolist()
+
+
+def write(path: Path, text: str, *arguments: str) -> Command:
+    """Write a program, in a folder that need not be there; return its command."""
+    path.parent.mkdir(exist_ok=True, parents=True)
+    path.write_text(text)
+    return Command(path, list(arguments))
+
+
 def connect(endpoint: TcpEndpoint) -> socket.socket:
     return socket.create_connection(("127.0.0.1", endpoint.port), timeout=GUARD_S)
+
+
+@contextmanager
+def live(endpoint: Endpoint | None = None, speed: float = 1.0) -> Iterator[tuple[Served, Any, WallClock]]:
+    """Serve robot 1, over TCP if nothing else is said, to the pace of a wall clock that a test sets."""
+    wall, endpoint = WallClock(), TcpEndpoint(0) if endpoint is None else endpoint
+    with served([endpoint], thinking="live", pace=Pace(speed, wall_ns=wall)) as run:
+        yield run, endpoint, wall
 
 
 def ask_socket(client: socket.socket, command: bytes) -> bytes:

@@ -43,6 +43,7 @@ SCRIPTS = [
     # ---- reads: one timeout for the whole ----
     Script(ASK + "said = port.read(7)", 0.9),
     Script(ASK + "said = port.read()", 0.3),
+    Script(ASK + "port.timeout = None; said = port.read(7), port.timeout", 0.9),
     Script(ASK + "port.timeout = 0.55; said = port.read(7), port.timeout", 0.55),
     Script(ASK + "port.timeout = 0.55; said = port.read(7), port.read(7)", 1.1),
     Script(ASK + "sleep(1.05); port.timeout = 0; said = port.read(3), port.read(9), port.read(9)", 1.05),
@@ -58,8 +59,11 @@ SCRIPTS = [
         1.05,
         SETTINGS,
     ),
-    Script("port.read(None)"),
-    Script("port.read('3')"),
+    Script(
+        ASK + "import io; port.timeout = 0.55; said = io.TextIOWrapper(io.BufferedRWPair(port, port, 1)).readline()",
+        1.1,
+        SETTINGS,
+    ),
     # ---- lines: each character has the timeout anew ----
     Script(ASK + "port.timeout = 0.25; said = port.readline()", 0.25),
     Script(ASK + "port.timeout = 0.35; said = port.readline()", 0.9),
@@ -79,7 +83,6 @@ SCRIPTS = [
         1.3,
         SETTINGS,
     ),
-    Script("port.readline(2.5)"),
     # ---- terminators: pyserial looks at one timeout after each character ----
     Script(ASK + "port.timeout = 0.55; said = port.read_until(b'\\r')", 0.6),
     Script(ASK + "port.timeout = 0.85; said = port.read_until(b'\\r')", 0.8),
@@ -91,9 +94,11 @@ SCRIPTS = [
     Script(ASK + "sleep(0.65); port.timeout = 0.45; said = port.read_until(b'x')", 1.35),
     Script(ASK + "sleep(1.05); port.timeout = 0; said = port.read_until(), port.read_until()", 1.05),
     Script(SLOW + "port.timeout = 1.35; said = list(port.iread_until())", 3.55),
-    Script("port.read_until(None)"),
     # ---- what has arrived ----
     Script(ASK + "sleep(0.55); said = port.in_waiting", 0.55),
+    Script(
+        ASK + "said = 0\nwhile said < 7:\n    sleep(0.02)\n    while port.in_waiting: said += len(port.read())", 0.9
+    ),
     Script(ASK + "sleep(0.55); port.reset_input_buffer(); said = port.in_waiting, port.read(4)", 0.9),
     Script(ASK + "sleep(0.55); port.flushInput(); said = port.inWaiting(), port.read(4)", 0.9),
     Script(ASK + "sleep(1.05); port.close(); port.open(); port.timeout = 0; said = port.read(7)", 1.05),
@@ -103,9 +108,6 @@ SCRIPTS = [
     ),
     Script("said = port.writelines([b'H', b'\\n']), port.read(7)", 0.9),
     Script("said = port.write(b''), port.out_waiting"),
-    Script("port.write('H\\n')"),
-    Script("port.write(None)"),
-    Script("port.write([300])"),
     Script("port.write(b'H\\n' * 5); said = port.out_waiting; sleep(0.25); said = said, port.out_waiting", 0.25),
     Script("port.write(b'H\\n' * 5); port.flush(); said = port.out_waiting, port.in_waiting", 1.0),
     # (pyserial waits until the driver would take one more.)
@@ -136,23 +138,11 @@ SCRIPTS = [
     Script("port.bytesize, port.parity, port.stopbits = 7, 'E', 2; said = port.bytesize, port.parity, port.stopbits"),
     Script("port.xonxoff = port.rtscts = port.dsrdtr = True; said = port.xonxoff, port.rtscts, port.dsrdtr"),
     Script("port.inter_byte_timeout = 0.1; said = port.interCharTimeout"),
-    Script("port.inter_byte_timeout = 26"),
-    Script("port.timeout = -1"),
-    Script("port.timeout = 'x'"),
-    Script("port.write_timeout = -1"),
-    Script("port.bytesize = 9"),
-    Script("port.parity = 'X'"),
-    Script("port.stopbits = 3"),
-    Script("port.baudrate = -1"),
-    Script("port.baudrate = None"),
-    Script("port.baudrate = 'x'"),
     Script(
         "port.baudrate = '300'; said = port.baudrate; port.baudrate = 9600.5; said = said, port.baudrate", 0, SETTINGS
     ),
     Script("import serial.rs485; port.rs485_mode = serial.rs485.RS485Settings()"),
     Script("port.rs485_mode = None; said = port.rs485_mode"),
-    Script("port.port = 3"),
-    Script("port.open()"),
     Script("port.exclusive = True; said = port.exclusive; port.exclusive = False; said = said, port.exclusive"),
     Script("port.exclusive = True; type(port)(port.port, exclusive=True)", 0, DESCRIPTOR),
     Script("port.exclusive = True; port.close(); said = type(port)(port.port, exclusive=True).is_open", 0, DESCRIPTOR),
@@ -162,6 +152,9 @@ SCRIPTS = [
     Script("said = port.getCTS(), port.getDSR(), port.getRI(), port.getCD()"),
     Script(
         "port.rts = port.dtr = False; said = port.rts, port.dtr\nport.setRTS(); port.setDTR(); said = said, port.rts"
+    ),
+    Script(
+        "port.close(); port.dtr = port.rts = False; port.open(); said = port.dtr, port.rts; port.send_break(0.1)", 0.25
     ),
     Script("port.break_condition = True; said = port.break_condition; port.break_condition = False"),
     Script("said = port.send_break()", 0.1),
@@ -178,28 +171,35 @@ SCRIPTS = [
     Script("port.setPort(port.port); said = port.is_open, port.write(b'H\\n'), port.read(7)", 0.9),
     Script("with port as same: same.write(b'H\\n'); said = same.read(7)\nsaid = said, port.is_open, port.closed", 0.9),
     Script("port.close()\nwith port: said = port.is_open\nport.close(); said = said, port.is_open, port.closed"),
-    Script("port.seek(0)"),
-    Script("port.tell()"),
-    Script("port.truncate()"),
     Script("import warnings; warnings.simplefilter('error'); port.nonblocking()"),
     Script("said = port.fileno() == port.fd, port.fd > 2, isinstance(port, serial.Serial)", 0, DESCRIPTOR),
-    Script("serial.Serial().open()"),
-    Script("serial.Serial(baudrate='x')"),
-    Script("serial.Serial(colour=1)"),
 ]
 
-CLOSED = re.split(
-    r"\s{2,}",
-    """
+
+def listed(text: str) -> list[str]:
+    """Return what is separated by two blanks at least, or by the end of a line."""
+    return re.split(r"\s{2,}", text.strip())
+
+
+WRONG = listed("""
+    port.read(None)  port.read('3')  port.readline(2.5)  port.read_until(None)  port.write('H\\n')
+    port.write(None)  port.write([300])  port.inter_byte_timeout = 26  port.timeout = -1  port.timeout = 'x'
+    port.write_timeout = -1  port.bytesize = 9  port.parity = 'X'  port.stopbits = 3  port.baudrate = -1
+    port.baudrate = None  port.baudrate = 'x'  port.port = 3  port.open()  port.seek(0)  port.tell()
+    port.truncate()  serial.Serial().open()  serial.Serial(baudrate='x')  serial.Serial(colour=1)
+""")
+"""What ends with an exception, although the port is open."""
+
+CLOSED = listed("""
     close()  read()  read(None)  readline()  readlines()  read_until()  read_all()  readinto(bytearray(3))
     write(b'H')  write('H')  flush()  in_waiting  out_waiting  reset_input_buffer()  reset_output_buffer()
     flushOutput()  cancel_read()  cancel_write()  send_break()  cts  dsr  ri  cd  set_low_latency_mode(True)
     set_input_flow_control()  set_output_flow_control()  fileno()  fd  __setattr__('timeout', 1)
     __setattr__('baudrate', 300)  __setattr__('rts', False)  __next__()  __iter__() is port  isatty()
-    """.strip(),
-)
+""")
 """What is asked of a port that is closed, and of one that has never been open."""
 
+SCRIPTS += map(Script, WRONG)
 SCRIPTS += [
     Script(
         f"port.close(); {port}said = port.{what}", 0, SETTINGS if what in ("fd", "__setattr__('baudrate', 300)") else ""

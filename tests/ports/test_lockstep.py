@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import select
 import socket
-import threading
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from tests.at_length import cases
 from tests.ports.helpers import WallClock, warnings
-from tests.served import GUARD_S, Served, fresh, served
+from tests.served import GUARD_S, fresh, served
 
 from kiks.clock.pace import Pace
 from kiks.clock.patience import Patience
@@ -21,6 +21,7 @@ from kiks.errors import ParameterError
 from kiks.ports.endpoint import READ_SIZE, Endpoint
 from kiks.ports.server import Server
 from kiks.ports.tcp import TcpEndpoint
+from kiks.units import NS_PER_S
 
 
 class Client:
@@ -38,14 +39,7 @@ class Client:
         return self.lines.readline()
 
     def has_no_reply(self) -> bool:
-        self.socket.setblocking(False)
-        try:
-            self.socket.recv(1, socket.MSG_PEEK)
-        except BlockingIOError:
-            return True
-        finally:
-            self.socket.settimeout(GUARD_S)
-        return False
+        return not select.select([self.socket], [], [], 0)[0]
 
     def hang_up(self) -> None:
         self.socket.shutdown(socket.SHUT_RDWR)
@@ -57,19 +51,17 @@ class Client:
 
 
 @contextmanager
-def clients(
-    count: int = 2, come: Sequence[int] | None = None, **options: Any
-) -> Iterator[tuple[Served, list[Client], WallClock]]:
+def clients(count: int = 2, come: Sequence[int] | None = None, **options: Any) -> Iterator[tuple[Any, list[Client]]]:
     """Serve each robot over TCP, with a wall clock that stands still, to clients of some robots, by default of all.
 
-    `join` of the server lets another client come to a robot.
+    `join` of the server lets another client come to a robot, `later` lets a time pass.
     """
     wall = WallClock()
     if options.get("thinking") == "live":
         options["pace"] = Pace(wall_ns=wall)
     ways = {robot: [TcpEndpoint(0)] for robot in range(1, count + 1)}
     with ExitStack() as stack:
-        run = stack.enter_context(served(ways, new_patience=partial(Patience, wall_ns=wall), **options))
+        run: Any = stack.enter_context(served(ways, new_patience=partial(Patience, wall_ns=wall), **options))
 
         def join(robot: int, first: bytes = b"") -> Client:
             client = Client(ways[robot][0])
@@ -78,8 +70,13 @@ def clients(
             run.wait_held(robot)
             return client
 
-        run.join = join
-        yield run, [join(robot) for robot in (ways if come is None else come)], wall
+        def later(seconds: float) -> None:
+            run.wait_rounds(3)
+            wall.pass_ns(round(seconds * NS_PER_S))
+            run.wait_rounds(3)
+
+        run.join, run.later = join, later
+        yield run, [join(robot) for robot in (ways if come is None else come)]
 
 
 # ---- repeatability ----
@@ -91,7 +88,7 @@ def test_order_in_real_time_does_not_matter(thinking: str) -> None:
     ends = set()
     for order in ((0, 1), (1, 0)):
         for leaving in ((0, 1), (1, 0)):
-            with clients(thinking=thinking) as (run, programs, _):
+            with clients(thinking=thinking) as (run, programs):
                 for command in (b"D,5,5\n", b"N\n", b"D,1,-3\r\n", b"\n\nO\n", b"K\n"):
                     for index in order:
                         programs[index].send(command)
@@ -111,7 +108,7 @@ def test_order_in_real_time_does_not_matter(thinking: str) -> None:
 
 
 def test_world_waits_for_a_program_that_thinks() -> None:
-    with clients(thinking="fixed:1") as (run, (one, two), _):
+    with clients(thinking="fixed:1") as (run, (one, two)):
         one.send(b"H\n")
         run.wait_rounds(5)
         assert one.has_no_reply()
@@ -121,7 +118,7 @@ def test_world_waits_for_a_program_that_thinks() -> None:
 
 
 def test_later_programs_begin_together_again() -> None:
-    with clients() as (run, programs, _):
+    with clients() as (run, programs):
         for program in programs:
             program.send(b"D,3,3\n")
         for index, program in enumerate(programs):
@@ -141,17 +138,16 @@ def test_later_programs_begin_together_again() -> None:
 
 
 def test_world_begins_without_a_missing_program_after_a_warning(caplog: pytest.LogCaptureFixture) -> None:
-    with clients(3, come=[1]) as (run, (one,), wall):
+    with clients(3, come=[1]) as (run, (one,)):
         one.send(b"H\n")
         run.wait_rounds(3)
         assert not warnings(caplog)
-        wall.pass_s(1.5)
-        run.wait_rounds(3)
+        run.later(1.5)
         assert warnings(caplog) == [
             "the world begins when 3 programs are there. Missing: that of robot 2 or 3. It waits 8 s more."
         ]
         assert one.has_no_reply()
-        wall.pass_s(9)
+        run.later(9)
         assert one.lines.readline() == b"h,0,0\r\n"
         assert warnings(caplog)[1:] == [
             "the world has begun without that of robot 2 or 3, which did not come within 10 s. A program that "
@@ -163,15 +159,13 @@ def test_world_begins_without_a_missing_program_after_a_warning(caplog: pytest.L
 
 
 def test_policy_wait_has_no_time_limit_for_a_missing_program(caplog: pytest.LogCaptureFixture) -> None:
-    with clients(come=[1], when_silent="wait") as (run, (one,), wall):
+    with clients(come=[1], when_silent="wait") as (run, (one,)):
         one.send(b"H\n")
-        wall.pass_s(1.5)
-        run.wait_rounds(3)
+        run.later(1.5)
         assert warnings(caplog) == [
             "the world begins when 2 programs are there. Missing: that of robot 2. It waits until all are there."
         ]
-        wall.pass_s(1000)
-        run.wait_rounds(3)
+        run.later(1000)
         assert one.has_no_reply()
         assert run.join(2).ask(b"B\n").startswith(b"b,")
         assert one.lines.readline() == b"h,0,0\r\n"
@@ -179,7 +173,7 @@ def test_policy_wait_has_no_time_limit_for_a_missing_program(caplog: pytest.LogC
 
 
 def test_program_that_disconnects_before_the_start_does_not_count() -> None:
-    with clients(come=[]) as (run, _, _):
+    with clients(come=[]) as (run, _):
         for _ in range(2):
             run.join(1).hang_up()
             run.wait_free(1)
@@ -190,7 +184,7 @@ def test_program_that_disconnects_before_the_start_does_not_count() -> None:
 
 
 def test_remaining_commands_act_before_the_next_client() -> None:
-    with clients() as (run, (one, two), _):
+    with clients() as (run, (one, two)):
         one.send(b"G,1,2\nN\nG,3,4\nG,5")
         run.wait_rounds(3)
         one.hang_up()
@@ -207,18 +201,16 @@ def test_remaining_commands_act_before_the_next_client() -> None:
 
 
 def test_fewer_programs_than_robots_may_begin() -> None:
-    with clients(come=[2], programs=1) as (_, (one,), _):
+    with clients(come=[2], programs=1) as (_, (one,)):
         assert one.ask(b"H\n") == b"h,0,0\r\n"
 
 
 def test_silent_program_is_ignored_until_it_reconnects(caplog: pytest.LogCaptureFixture) -> None:
-    with clients() as (run, (one, mute), wall):
+    with clients() as (run, (one, mute)):
         one.send(b"H\n")
-        run.wait_rounds(3)
-        wall.pass_s(1.9)
-        run.wait_rounds(3)
+        run.later(1.9)
         assert one.has_no_reply()
-        wall.pass_s(0.2)
+        run.later(0.2)
         assert one.lines.readline() == b"h,0,0\r\n"
         for _ in range(50):
             assert one.ask(b"N\n").startswith(b"n,")
@@ -242,12 +234,10 @@ def test_silent_program_is_ignored_until_it_reconnects(caplog: pytest.LogCapture
 
 
 def test_policy_wait_waits_for_a_silent_program_with_a_warning(caplog: pytest.LogCaptureFixture) -> None:
-    with clients(when_silent="wait", patience_s=5) as (run, (one, mute), wall):
+    with clients(when_silent="wait", patience_s=5) as (run, (one, mute)):
         one.send(b"H\n")
         for _ in range(3):
-            run.wait_rounds(3)
-            wall.pass_s(5.5)
-        run.wait_rounds(3)
+            run.later(5.5)
         assert one.has_no_reply()
         assert warnings(caplog) == [
             "the world waits for the client of robot 2: it has done nothing for 5.5 s while others wait. Continue it, "
@@ -258,10 +248,9 @@ def test_policy_wait_waits_for_a_silent_program_with_a_warning(caplog: pytest.Lo
 
 
 def test_silent_program_is_dropped(caplog: pytest.LogCaptureFixture) -> None:
-    with clients(when_silent="drop") as (run, (one, mute), wall):
+    with clients(when_silent="drop") as (run, (one, mute)):
         one.send(b"H\n")
-        run.wait_rounds(3)
-        wall.pass_s(2.5)
+        run.later(2.5)
         assert one.lines.readline() == b"h,0,0\r\n"
         assert mute.lines.readline() == b""
         assert one.ask(b"H\n") == b"h,0,0\r\n"
@@ -273,14 +262,12 @@ def test_silent_program_is_dropped(caplog: pytest.LogCaptureFixture) -> None:
 
 
 def test_program_with_four_ports_costs_one_patience() -> None:
-    with clients(4) as (run, ports, wall):
+    with clients(4) as (run, ports):
         ports[0].send(b"H\n")
-        run.wait_rounds(3)
-        wall.pass_s(2)
+        run.later(2)
         assert ports[0].lines.readline() == b"h,0,0\r\n"
         ports[1].send(b"H\n")
-        run.wait_rounds(3)
-        wall.pass_s(0.2)
+        run.later(0.2)
         assert ports[1].lines.readline() == b"h,0,0\r\n"
         # The clock stands still: no patience is needed from here on.
         for _ in range(10):
@@ -291,55 +278,35 @@ def test_program_with_four_ports_costs_one_patience() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("thinking", ["none", "live"])
 def test_dead_client_does_not_delay_others(thinking: str, caplog: pytest.LogCaptureFixture) -> None:
-    with clients(thinking=thinking) as (run, (one, dying), wall):
+    with clients(thinking=thinking) as (run, (one, dying)):
         dying.send(b"L,0,1\nH")
         one.send(b"H\n")
-        run.wait_rounds(3)
-        wall.pass_s(1)
+        run.later(1)
         assert one.lines.readline() == b"h,0,0\r\n"
         dying.socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, b"\1\0\0\0\0\0\0\0")
         dying.close()
         run.wait_free(2)
         for _ in range(20):
             one.send(b"H\n")
-            run.wait_rounds(3)
-            wall.pass_s(0.1)
+            run.later(0.1)
             assert one.lines.readline() == b"h,0,0\r\n"
         assert run.sim.world.state.robots["led"][0, 1, 0] == 1
         assert not warnings(caplog)
-
-
-@contextmanager
-def flooding(client: Client, data: bytes) -> Iterator[list[int]]:
-    """Send the same data repeatedly and never read; yield a list whose one item is the number of characters sent."""
-    sent, is_over = [0], threading.Event()
-
-    def send() -> None:
-        with suppress(OSError):
-            while not is_over.is_set():
-                sent[0] += client.socket.send(data * (READ_SIZE // len(data)))
-
-    thread = threading.Thread(target=send)
-    thread.start()
-    try:
-        yield sent
-    finally:
-        is_over.set()
-        client.socket.shutdown(socket.SHUT_RDWR)
-        thread.join(GUARD_S)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("thinking", ["none", "live"])
 @pytest.mark.parametrize("data", [b"H\n", b"x", b"\n", b"\r\n"])
 def test_flooding_client_does_not_delay_others(thinking: str, data: bytes, caplog: pytest.LogCaptureFixture) -> None:
-    with clients(thinking=thinking) as (run, (one, flooder), wall), flooding(flooder, data) as sent:
-        exchanges = 0
-        while exchanges < 40 or sent[0] < 4 * BACKLOG_LIMIT:
+    with clients(thinking=thinking) as (run, (one, flooder)):
+        flooder.socket.setblocking(False)
+        exchanges = sent = 0
+        while exchanges < 40 or sent < 4 * BACKLOG_LIMIT:
+            with suppress(BlockingIOError):
+                sent += flooder.socket.send(data * (READ_SIZE // len(data)))
             one.send(b"N\n")
             if thinking == "live":
-                run.wait_rounds(3)
-                wall.pass_s(0.1)
+                run.later(0.1)
             assert one.lines.readline().startswith(b"n,")
             exchanges += 1
         run.wait_for(lambda: warnings(caplog))

@@ -1,10 +1,12 @@
-"""The port in memory: the bytes and times that a program sees."""
+"""The port in memory, and simulated ports by name: the bytes and times that a program sees."""
 
 from __future__ import annotations
 
 import threading
+from pathlib import Path
 
 import pytest
+import serial
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.at_length import share
@@ -12,6 +14,8 @@ from tests.at_length import share
 import kiks
 from kiks.clock.serial_timing import OUTPUT_LIMIT
 from kiks.units import character_ns
+
+ARENAS = Path(__file__).parents[2] / "examples" / "arenas"
 
 
 def test_exchange_takes_the_time_of_its_characters_plus_one_millisecond() -> None:
@@ -134,3 +138,44 @@ def test_two_threads_may_drive_at_the_same_time() -> None:
     for thread in threads:
         thread.join()
     assert sim.time_s > 1
+
+
+# ---- by name ----
+
+
+def test_number_alone_means_the_newest_simulation() -> None:
+    older, newer = kiks.Simulation(), kiks.Simulation()
+    for url, sim in (("kiks://1", newer), (older.url(1), older)):
+        port = serial.serial_for_url(url, timeout=1)
+        port.write(b"L,0,1\n")
+        port.readline()
+        port.close()
+        assert sim.time_s > 0
+
+
+def test_options_create_a_simulation() -> None:
+    url = f"kiks://2?arena={ARENAS / 'maze.toml'}&robots=2&seed=7&thinking=fixed:1&robot=khepera_ii"
+    with serial.serial_for_url(url, timeout=1) as port:
+        port.write(b"B\n")
+        assert port.readline() == b"b,6.01,6.01\r\n"
+
+
+@pytest.mark.parametrize(
+    ("url", "words"),
+    [
+        ("kiks://", "must be named like 'kiks://1'"),
+        ("kiks://one", "must be named like 'kiks://1'"),
+        ("kiks://9", "names robot 9 and the simulation has robot 1 only"),
+        ("kiks://nowhere/1", "a simulation's name must be one that is alive"),
+        ("kiks://1?sead=3", "Did you mean 'seed'"),
+        ("kiks://1?seed=x", "must be a whole number, but it was 'x'"),
+        ("kiks://1?arena=/no/where.toml", "/no/where.toml"),
+        ("kiks://1?robot=kephera", "Did you mean 'khepera'"),
+    ],
+)
+def test_errors_explain_bad_names(url: str, words: str) -> None:
+    sim = kiks.Simulation()
+    with pytest.raises(serial.SerialException) as caught:
+        serial.serial_for_url(url)
+    assert words in str(caught.value)
+    assert sim.robot_count == 1

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import contextlib
 import socket
 import struct
 from collections.abc import Iterator
+from contextlib import ExitStack, closing, contextmanager, suppress
 
 import msgpack
 import pytest
@@ -15,16 +15,7 @@ from tests.served import fresh
 
 from kiks.clock.serial_timing import BACKLOG_LIMIT
 from kiks.model.checks import CLOCK_END_NS
-from kiks.ports.messages import (
-    REQUEST_BYTES_MAX,
-    Answer,
-    Inbox,
-    Kind,
-    ProtocolError,
-    Request,
-    checked_request,
-    packed,
-)
+from kiks.ports.messages import REQUEST_BYTES_MAX, Answer, Inbox, Kind, ProtocolError, Request, checked_request, packed
 from kiks.ports.participant import BURST_MAX
 from kiks.ports.programs import Programs
 from kiks.ports.socket_participant import QUEUE_MAX, SocketParticipant
@@ -116,7 +107,7 @@ def test_requests_do_not_depend_on_how_their_bytes_are_cut(requests: list[Reques
 def test_what_is_no_request_is_refused_and_nothing_else_happens(fields: object, at: int, value: object) -> None:
     if isinstance(fields, tuple):
         fields = tuple(value if index == at else field for index, field in enumerate(fields))
-    with contextlib.suppress(ProtocolError):
+    with suppress(ProtocolError):
         request = checked_request(fields)
         assert max(request.at_ns, request.thought_ns) <= CLOCK_END_NS
         packed(tuple(request))
@@ -144,17 +135,13 @@ def test_length_and_form_of_a_message_are_checked_before_it_takes_memory(data: b
         Inbox(REQUEST_BYTES_MAX).take(data)
 
 
-@contextlib.contextmanager
+@contextmanager
 def two_in_a_match() -> Iterator[tuple[Programs, Elsewhere, Elsewhere]]:
     """Yield a world of two robots with a program for each, which must not take the other's."""
-    programs = Programs(fresh(2), are_apart=True)
-    both = [Elsewhere(programs, robot) for robot in (1, 2)]
-    try:
-        yield programs, both[0], both[1]
-    finally:
-        for program in both:
-            program.close()
-        programs.close()
+    with ExitStack() as stack:
+        programs = stack.enter_context(closing(Programs(fresh(2), are_apart=True)))
+        one, two = (stack.enter_context(closing(Elsewhere(programs, robot))) for robot in (1, 2))
+        yield programs, one, two
 
 
 @given(st.lists(BREACHES, max_size=12))

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import os
 import socket
-import subprocess
 import sys
 from contextlib import ExitStack, suppress
 from pathlib import Path
 
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import given
 from hypothesis import strategies as st
-from tests.ports.helpers import WallClock, ask_socket, connect, no_descriptors, warnings
-from tests.served import GUARD_S, open_plain, read_line, served
+from tests.at_length import cases
+from tests.ports.helpers import WallClock, ask_socket, connect, live, no_descriptors, warnings, wheels
+from tests.served import GUARD_S, ask, called, opened, served
 
 from kiks.clock.pace import Pace
 from kiks.clock.serial_timing import BACKLOG_LIMIT
@@ -55,9 +55,8 @@ def test_a_page_in_a_browser_drives_no_robot(
 ) -> None:
     endpoint = kind(0)
     form = b"POST / HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 18\r\n\r\nD,10,10\nG,7,7\n\n\n"
-    with served(
-        [endpoint], thinking=thinking, **({"pace": Pace(wall_ns=WallClock())} if thinking == "live" else {})
-    ) as run:
+    options = {"pace": Pace(wall_ns=WallClock())} if thinking == "live" else {}
+    with served([endpoint], thinking=thinking, **options) as run:
         for pieces in ([form], [form[:3], form[3:20], form[20:]], [b"GET /" + b"D" * 9999 + form[6:]]):
             with connect(endpoint) as browser, suppress(OSError):
                 for piece in pieces:
@@ -66,8 +65,7 @@ def test_a_page_in_a_browser_drives_no_robot(
                 while browser.recv(100):
                     pass
             run.wait_free()
-        robot = run.sim.world.state.robots[0, 0]
-        assert robot["speed_setpoint"].tolist() == [0, 0]
+        assert wheels(run.sim) == [0, 0]
         assert not run.sim.wires[0].pending
         if kind is TcpEndpoint and thinking == "none":
             with connect(endpoint) as client:
@@ -81,12 +79,9 @@ def test_a_page_in_a_browser_drives_no_robot(
 # ---- floods ----
 
 
-@settings(max_examples=6)
-@given(command=st.sampled_from([b"N\n", b"H\n", b"D,5,5\n", b"B\n"]))
-@example(command=b"N\n")
+@pytest.mark.parametrize("command", cases([b"N\n", b"D,5,5\n", b"H\n", b"B\n"], 2))
 def test_flood_delays_the_next_client_by_two_seconds_at_most(command: bytes) -> None:
-    wall, endpoint = WallClock(), TcpEndpoint(0)
-    with served([endpoint], thinking="live", pace=Pace(wall_ns=wall)) as run:
+    with live() as (run, endpoint, wall):
         line = run.sim.wires[0].line
         with connect(endpoint) as flooder:
             flooder.sendall(command * (BACKLOG_LIMIT // len(command)))
@@ -100,29 +95,24 @@ def test_flood_delays_the_next_client_by_two_seconds_at_most(command: bytes) -> 
             run.wait_held()
             client.sendall(b"E\n")
             run.wait_for(lambda: run.sim.wires[0].firmware.receiver is not None and run.sim.wires[0].pending)
-            run.wait_rounds(2)
-            for _ in range(100):
+            client.setblocking(False)
+            reply = b""
+            while not reply and run.sim.now_ns - gone_ns < 5 * NS_PER_S:
                 wall.pass_ns(NS_PER_S // 20)
                 run.wait_rounds(2)
-                client.setblocking(False)
-                try:
+                with suppress(BlockingIOError):
                     reply = client.recv(100)
-                    break
-                except BlockingIOError:
-                    continue
             assert reply.startswith(b"e,")
             assert run.sim.now_ns - gone_ns <= LEFT_BEHIND_NS + NS_PER_S // 5
 
 
 def test_dropped_commands_of_a_flood_are_logged(caplog: pytest.LogCaptureFixture) -> None:
-    endpoint = TcpEndpoint(0)
-    with served([endpoint], thinking="live", pace=Pace(wall_ns=WallClock())) as run:
+    with live() as (run, endpoint, _):
         with connect(endpoint) as flooder:
             flooder.sendall(b"D,1,1\n" * 600)
             run.wait_for(lambda: len(run.sim.wires[0].pending) == 600)
         run.wait_free()
-        left_count = len(run.sim.wires[0].pending)
-        assert 0 < left_count < 600
+        assert 0 < len(run.sim.wires[0].pending) < 600
     assert warnings(caplog) == [
         "the client of robot 1 has gone, but its commands were more than 2 s ahead of the robot: the rest of them is "
         "dropped. Read a line after each command."
@@ -130,8 +120,7 @@ def test_dropped_commands_of_a_flood_are_logged(caplog: pytest.LogCaptureFixture
 
 
 def test_unread_flood_is_dropped_with_its_client(caplog: pytest.LogCaptureFixture) -> None:
-    endpoint = TcpEndpoint(0)
-    with served([endpoint], thinking="live", pace=Pace(wall_ns=WallClock())) as run:
+    with live() as (run, endpoint, _):
         flooder = connect(endpoint)
         flooder.setblocking(False)
         flood = b"D,1,1\n" * (BACKLOG_LIMIT * 20)
@@ -145,41 +134,36 @@ def test_unread_flood_is_dropped_with_its_client(caplog: pytest.LogCaptureFixtur
 
 
 def test_rejected_client_does_not_shorten_a_flood() -> None:
-    wall, endpoint = WallClock(), TcpEndpoint(0)
-    with served([endpoint], thinking="live", pace=Pace(wall_ns=wall)) as run, connect(endpoint) as flooder:
-        count = BACKLOG_LIMIT
-        flooder.sendall(b"D,1,1\n" * count + b"D,3,4\n")
+    with live() as (run, endpoint, wall), connect(endpoint) as flooder:
+        flooder.sendall(b"D,1,1\n" * BACKLOG_LIMIT + b"D,3,4\n")
         run.wait_for(lambda: run.sim.wires[0].line.sending_until_ns > BACKLOG_LIMIT * NS_PER_S // 1000)
         with connect(endpoint) as other:
             assert other.recv(1) == b""
-        while run.sim.world.state.robots[0, 0]["speed_setpoint"].tolist() != [3, 4]:
+        while wheels(run.sim) != [3, 4]:
             wall.pass_ns(NS_PER_S)
             run.wait_rounds(2)
-            assert run.sim.now_ns < 2 * 6 * count * NS_PER_S // 960
+            assert run.sim.now_ns < 2 * 6 * BACKLOG_LIMIT * NS_PER_S // 960
 
 
 def test_remaining_commands_of_two_seconds_all_act() -> None:
-    wall, endpoint = WallClock(), TcpEndpoint(0)
-    with served([endpoint], thinking="live", pace=Pace(wall_ns=wall)) as run:
+    with live() as (run, endpoint, wall):
         with connect(endpoint) as client:
             client.sendall(b"D,1,1\n" * 100 + b"D,3,4\n")
             run.wait_for(lambda: len(run.sim.wires[0].pending) == 101)
         run.wait_free()
         wall.pass_ns(2 * NS_PER_S)
-        run.wait_for(lambda: run.sim.world.state.robots[0, 0]["speed_setpoint"].tolist() == [3, 4])
+        run.wait_for(lambda: wheels(run.sim) == [3, 4])
 
 
 def test_lockstep_logs_how_long_the_next_client_waits(caplog: pytest.LogCaptureFixture) -> None:
     ways = {1: [TcpEndpoint(0)], 2: [TcpEndpoint(0)]}
-    with served(ways, when_silent="wait") as run:
-        flooder, other = connect(ways[1][0]), connect(ways[2][0])
+    with served(ways, when_silent="wait") as run, connect(ways[1][0]) as flooder, connect(ways[2][0]):
         run.wait_held(1)
         run.wait_held(2)
         flooder.sendall(b"N\n" * 1000)
         run.wait_rounds(5)
         flooder.close()
         run.wait_for(lambda: warnings(caplog))
-        other.close()
     (warning,) = [text for text in warnings(caplog) if "left" in text]
     assert warning.startswith("the client of robot 1 has gone and left 99")
     assert "the next client may come after that, at most" in warning
@@ -213,17 +197,14 @@ def test_clients_wait_without_descriptors_and_the_server_goes_on(caplog: pytest.
 def test_pty_is_renewed_without_descriptors(tmp_path: Path) -> None:
     link = f"{tmp_path}/robot"
     with served([PtyEndpoint(link)]) as run:
-        port = open_plain(link)
-        os.write(port, b"H\n")
-        assert read_line(port) == b"h,0,0\r\n"
-        with no_descriptors() as taken:
-            os.close(port)
-            taken.append(os.open(os.devnull, os.O_RDONLY))
-            run.wait_free()
-        port = open_plain(link)
-        os.write(port, b"H\n")
-        assert read_line(port) == b"h,0,0\r\n"
-        os.close(port)
+        with ExitStack() as stack:
+            assert ask(stack.enter_context(opened(link)), b"H\n") == b"h,0,0\r\n"
+            with no_descriptors() as taken:
+                stack.close()
+                taken.append(os.open(os.devnull, os.O_RDONLY))
+                run.wait_free()
+        with opened(link) as port:
+            assert ask(port, b"H\n") == b"h,0,0\r\n"
 
 
 @pytest.mark.parametrize("what", ["a serial port", "a TCP port"])
@@ -236,9 +217,7 @@ def test_error_explains_why_a_port_cannot_be_opened(what: str, tmp_path: Path) -
 @pytest.mark.slow
 def test_too_few_descriptors_for_all_robots_give_one_line(tmp_path: Path) -> None:
     words = f"{sys.executable} -m kiks serve --robots 40 --tcp 0 --link {tmp_path}/robot"
-    done = subprocess.run(
-        ["bash", "-c", f"ulimit -n 100; exec {words}"], capture_output=True, text=True, timeout=120, check=False
-    )
+    done = called("bash", "-c", f"ulimit -n 100; exec {words}")
     assert done.returncode == 2
     (line,) = done.stderr.splitlines()
     assert "this process may have 100" in line

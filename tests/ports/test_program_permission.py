@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import closing, nullcontext
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from tests.ports.helpers import write
 
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.scripts import EXAMPLES
@@ -21,29 +22,15 @@ from kiks.sim.from_project import simulation_of
 TRACE = "import sys, pathlib; pathlib.Path(sys.argv[1]).touch()"
 
 
-@contextmanager
-def desk_of(folder: Path, *, may_run_programs: bool, granted: tuple[Command | None, ...] = ()) -> Iterator[Desk]:
+def desk_of(folder: Path, *, may_run_programs: bool, granted: tuple[Command | None, ...] = ()) -> closing[Desk]:
     project = Project(Arena.box(300, 300))
-    desk = Desk(
-        simulation_of(project, folder),
-        project=project,
-        folder=folder,
-        owns_world=True,
-        may_run_programs=may_run_programs,
-        commands=granted,
-    )
-    try:
-        yield desk
-    finally:
-        desk.close()
+    options = {"owns_world": True, "may_run_programs": may_run_programs, "commands": granted}
+    return closing(Desk(simulation_of(project, folder), project=project, folder=folder, **options))
 
 
 def program(folder: Path, name: str = "x.py") -> tuple[Path, Path]:
     """Write a program that creates a file; return the paths of both."""
-    path = folder / name
-    path.parent.mkdir(exist_ok=True, parents=True)
-    path.write_text(TRACE)
-    return path, folder / "trace"
+    return write(folder / name, TRACE).program, folder / "trace"
 
 
 def project_with(path: str, trace: Path) -> Project:
@@ -74,37 +61,29 @@ def start_from_panel(desk: Desk, project: Project) -> None:
     (robot,) = project.robots
     assert robot.program is not None
     command = Command(desk.folder / robot.program, list(robot.arguments))
-    if desk.may_run_programs:
+    refused = pytest.raises(ParameterError, match="must be started at the terminal of this desk")
+    with nullcontext() if desk.may_run_programs else refused:
         desk.programs.start(command)
-    else:
-        with pytest.raises(ParameterError, match="must be started at the terminal of this desk"):
-            desk.programs.start(command)
 
 
 WAYS: tuple[Callable[[Desk, Project], None], ...] = (upload, restart, draw, start_from_panel)
 
 
-@pytest.mark.parametrize("way", WAYS)
-def test_desk_without_permission_starts_no_program(way: Callable[[Desk, Project], None], tmp_path: Path) -> None:
-    _, trace = program(tmp_path)
-    with desk_of(tmp_path, may_run_programs=False) as desk:
-        way(desk, project_with("x.py", trace))
-        assert not desk.programs.handles
-        _, news = desk.news.since(0)
-        assert way is start_from_panel or news[0].startswith(
-            "A program was left out: 'x.py' must be started at the terminal"
-        )
-    assert not trace.exists()
-
-
 @pytest.mark.slow
+@pytest.mark.parametrize("may", [False, True], ids=["without", "with"])
 @pytest.mark.parametrize("way", WAYS)
-def test_desk_with_permission_starts_the_program(way: Callable[[Desk, Project], None], tmp_path: Path) -> None:
+def test_desk_starts_programs_with_permission_only(
+    way: Callable[[Desk, Project], None], may: bool, tmp_path: Path
+) -> None:
     _, trace = program(tmp_path)
-    with desk_of(tmp_path, may_run_programs=True) as desk:
+    with desk_of(tmp_path, may_run_programs=may) as desk:
         way(desk, project_with("x.py", trace))
+        assert may or not desk.programs.handles
+        _, news = desk.news.since(0)
+        left_out = "A program was left out: 'x.py' must be started at the terminal"
+        assert may or way is start_from_panel or news[0].startswith(left_out)
         wait_for_programs(desk)
-    assert trace.exists()
+    assert trace.exists() == may
 
 
 @pytest.mark.slow

@@ -114,17 +114,15 @@ def _one_step_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(program_scheduler, "STEPS", 1)
 
 
+def scheduler_of(world: Any, expected: int, wall_ns: Callable[[], int], **options: Any) -> ProgramScheduler:
+    log, patience = logging.getLogger("kiks.test"), partial(Patience, wall_ns=wall_ns)
+    return ProgramScheduler(world, expected=expected, missing=str, log=log, new_patience=patience, **options)
+
+
 def run(programs: Sequence[Steps], choose: Choose) -> Log:
     """Run programs; return all events, and the time at which the world ends."""
     world: Any = FakeWorld()
-    scheduler = ProgramScheduler(
-        world,
-        expected=len(programs),
-        missing=lambda: "",
-        log=logging.getLogger("kiks.test"),
-        when_silent="wait",
-        new_patience=partial(Patience, wall_ns=lambda: 0),
-    )
+    scheduler = scheduler_of(world, len(programs), lambda: 0, when_silent="wait")
     fakes = [FakeProgram(rank, steps, world, scheduler) for rank, steps in enumerate(programs, 1)]
     for fake in fakes:
         scheduler.join(fake)
@@ -159,13 +157,7 @@ def test_any_order_gives_the_same_run(programs: Sequence[Steps], orders: Sequenc
 def test_a_program_that_is_silent_again_is_reported_once(caplog: pytest.LogCaptureFixture) -> None:
     world: Any = FakeWorld()
     wall_ns = [0]
-    scheduler = ProgramScheduler(
-        world,
-        expected=2,
-        missing=lambda: "",
-        log=logging.getLogger("kiks.test"),
-        new_patience=partial(Patience, wall_ns=lambda: wall_ns[0]),
-    )
+    scheduler = scheduler_of(world, 2, lambda: wall_ns[0])
     busy, mute = (FakeProgram(rank, [(10, 10)] * 20, world, scheduler) for rank in (1, 2))
     mute.advice = "Close its port."
     for fake in (busy, mute):

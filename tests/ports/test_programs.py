@@ -58,7 +58,7 @@ def run(commands: Sequence[Sequence[str]], **options: Any) -> tuple[str, int, in
     sim = fresh(len(commands))
     ends: list[str] = []
     every = [Command(Path(program), arguments) for program, *arguments in commands]
-    programs = Programs(sim, every, say=ends.append, **{"patience_s": GUARD_S, **options})
+    programs = Programs(sim, every, **{"say": ends.append, "patience_s": GUARD_S, **options})
     code = programs.run()
     return sim.state_hash(), sim.now_ns, code, sorted(ends), programs.doubt
 
@@ -87,18 +87,14 @@ def started(*words: str) -> Iterator[tuple[subprocess.Popen[bytes], IO[bytes], I
 # ---- repeatability ----
 
 
-@pytest.mark.parametrize("thinking", ["none", "fixed:2.5"])
-@pytest.mark.parametrize(
-    "words",
-    [
-        (WANDER,),
-        (SLEEPER, "8"),
-        (WATCHER, "2"),
-        (DRIVE, "COM1", "9", "3", "5"),
-        *((ANY, str(seed)) for seed in range(6)),
-    ],
-    ids=lambda words: f"{Path(words[0]).stem} {' '.join(words[1:])}",
+ALONE = (
+    *((WANDER,), (ANY, "0"), (ANY, "1"), (SLEEPER, "8"), (WATCHER, "2"), (DRIVE, "COM1", "9", "3", "5")),
+    *((ANY, str(seed)) for seed in range(2, 6)),
 )
+
+
+@pytest.mark.parametrize("thinking", ["none", "fixed:2.5"])
+@pytest.mark.parametrize("words", cases([(words,) for words in ALONE], 3), ids=lambda words: Path(" ".join(words)).name)
 def test_program_gives_the_same_run_in_its_own_process_and_in_this_one(
     words: tuple[str, ...], thinking: str, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -195,19 +191,7 @@ def test_warning_names_the_hanging_program(tmp_path: Path) -> None:
     assert told == b"kiks: program 1 (hangs.py), which the world does not wait for, still runs. Ctrl-C ends it.\n"
 
 
-def test_hanging_program_is_dropped(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    hangs = write(tmp_path, "hangs.py", HANGS)
-    _, _, code, ends, doubt = run([[hangs], [DRIVE, "COM1", "20", "3", "3"]], patience_s=1, when_silent="drop")
-    assert code == 137
-    assert ends == ["program 1 (hangs.py) has ended by signal 9.", "program 2 (drive.py) has ended with exit code 0."]
-    assert doubt
-    assert program_warnings(caplog) == [
-        "program 1 (hangs.py) must act within 1 s while others wait, but it did not: it is disconnected. "
-        "--patience gives it more time."
-    ]
-
-
-def test_dropped_program_that_ends_late_is_not_called_running(
+def test_hanging_program_is_dropped_and_is_not_called_running_if_it_ends_late(
     tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     send, has_ended = OwnChild.signal, threading.Event()
@@ -216,15 +200,23 @@ def test_dropped_program_that_ends_late_is_not_called_running(
         threading.Thread(target=lambda: has_ended.wait(GUARD_S) and send(self, number)).start()
 
     monkeypatch.setattr(OwnChild, "signal", send_late)
-    programs = Programs(
-        fresh(2),
-        [Command(Path(write(tmp_path, "hangs.py", HANGS)), []), Command(Path(DRIVE), ["COM1", "20", "3", "3"])],
-        say=lambda text: has_ended.set() if "drive.py" in text else None,
-        patience_s=1,
-        when_silent="drop",
-    )
-    assert programs.run() == 137
-    assert len(program_warnings(caplog)) == 1
+    ends: list[str] = []
+
+    def say(text: str) -> None:
+        ends.append(text)
+        if "drive.py" in text:
+            has_ended.set()
+
+    hangs = write(tmp_path, "hangs.py", HANGS)
+    options = {"patience_s": 1, "when_silent": "drop", "say": say}
+    _, _, code, _, doubt = run([[hangs], [DRIVE, "COM1", "20", "3", "3"]], **options)
+    assert code == 137
+    assert ends == ["program 2 (drive.py) has ended with exit code 0.", "program 1 (hangs.py) has ended by signal 9."]
+    assert doubt
+    assert program_warnings(caplog) == [
+        "program 1 (hangs.py) must act within 1 s while others wait, but it did not: it is disconnected. "
+        "--patience gives it more time."
+    ]
 
 
 def test_flooding_program_does_not_delay_others(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:

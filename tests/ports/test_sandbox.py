@@ -12,19 +12,17 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.at_length import share
 from tests.namespaces import needs_sandbox
+from tests.ports.helpers import printed, write
 from tests.served import PROGRAMS, fresh
 
 from kiks.errors import KiksError
 from kiks.ports.program_process import Command
-from kiks.ports.programs import Handle, Programs
+from kiks.ports.programs import Programs
 from kiks.ports.sandbox import Limits, Sandbox
 
-pytestmark = [
-    # Each test starts processes.
-    pytest.mark.slow,
-    needs_sandbox,
-]
+pytestmark = [pytest.mark.slow, needs_sandbox]
 
 LIMITS = Limits(memory_mb=150, processes=8, computing_s=0.5, waiting_s=1.5, output_mb=0.5, files_mb=8)
 
@@ -45,6 +43,14 @@ port.write(b"N\\n")
 port.readline()
 """
 
+SENDS = """
+for each in os.listdir("/proc/self/fd"):
+    if int(each) > 2:
+        try: os.write(int(each), DATA)
+        except OSError: pass
+while True: pass
+"""
+
 HOSTILE = {
     # Python's own fork is refused already, as a program in simulated time is one process. The pause spares the other
     # tests: where they run as the superuser, only the sandbox counts processes.
@@ -53,50 +59,30 @@ HOSTILE = {
     "computed for 0.5 s without using its robot": "while True: pass",
     "waited for 1.5 s without using its robot": 'os.execv("/bin/sleep", ["sleep", "100"])',
     "printed more than 0.5 MB": "while True: os.write(1, b'x' * 4095 + b'\\n')",
-    "sent a message of 4294967295 bytes to the world": """
-for each in os.listdir("/proc/self/fd"):
-    if int(each) > 2:
-        try: os.write(int(each), b"\\xff" * 1000)
-        except OSError: pass
-while True: pass
-""",
-    "sent something to the world that is no message": """
-for each in os.listdir("/proc/self/fd"):
-    if int(each) > 2:
-        try: os.write(int(each), b"\\x02\\0\\0\\0\\x01\\x02")
-        except OSError: pass
-while True: pass
-""",
+    "sent a message of 4294967295 bytes to the world": SENDS.replace("DATA", r'b"\xff" * 1000'),
+    "sent something to the world that is no message": SENDS.replace("DATA", r'b"\x02\0\0\0\x01\x02"'),
 }
 
 
-def write(folder: Path, text: str) -> Command:
-    folder.mkdir(exist_ok=True)
-    program = folder / "program.py"
-    program.write_text(text)
-    return Command(program)
+End = tuple[str, int, list[str]]
+"""State of the world, exit code and output of a program."""
 
 
-def printed(handle: Handle) -> list[str]:
-    assert handle.output is not None
-    return [line.text for line in handle.output.since(0)[1]]
-
-
-def run(command: Command, sandbox: Sandbox | None, **options: Any) -> tuple[str, int, list[str]]:
-    """Run a program alone in a world; return state, exit code and output."""
-    sim = fresh()
-    programs = Programs(sim, [command], keeps_output=True, when_silent="wait", sandbox=sandbox, **options)
+def run(command: Command, sandbox: Sandbox | None, robot: int = 1, **options: Any) -> End:
+    """Run a program alone in a world, for its last robot; return state, exit code and output."""
+    sim, commands = fresh(robot), [*[None] * (robot - 1), command]
+    programs = Programs(sim, commands, keeps_output=True, when_silent="wait", sandbox=sandbox, **options)
     code = programs.run()
     return sim.state_hash(), code, printed(programs.handles[0])
 
 
 @pytest.fixture(scope="module")
 def good(tmp_path_factory: pytest.TempPathFactory) -> Command:
-    return write(tmp_path_factory.mktemp("good"), GOOD)
+    return write(tmp_path_factory.mktemp("good") / "program.py", GOOD)
 
 
 @pytest.fixture(scope="module")
-def usual(good: Command) -> tuple[str, int, list[str]]:
+def usual(good: Command) -> End:
     """What comes of the good program outside of a sandbox."""
     return run(good, None)
 
@@ -104,9 +90,7 @@ def usual(good: Command) -> tuple[str, int, list[str]]:
 @pytest.fixture(scope="module")
 def usual_second(good: Command) -> list[str]:
     """What the good program prints that drives robot 2."""
-    programs = Programs(fresh(2), [None, good], keeps_output=True)
-    programs.run()
-    return printed(programs.handles[0])
+    return run(good, None, robot=2)[2]
 
 
 @pytest.fixture(scope="module")
@@ -115,34 +99,34 @@ def beside(good: Command) -> Iterator[Sandbox]:
         yield sandbox
 
 
+@pytest.fixture(scope="module")
+def around_hostile(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Path, Sandbox]]:
+    """Where hostile programs are written, and the sandbox in which they run one after the other."""
+    path = tmp_path_factory.mktemp("hostile") / "program.py"
+    with Sandbox([path.parent], limits=LIMITS) as sandbox:
+        yield path, sandbox
+
+
 @pytest.mark.parametrize(("reason", "text"), HOSTILE.items(), ids=HOSTILE)
 def test_hostile_program_is_stopped_and_named_and_no_other_one_notices(
     reason: str,
     text: str,
     good: Command,
-    usual: tuple[str, int, list[str]],
+    usual: End,
     usual_second: list[str],
     beside: Sandbox,
-    tmp_path: Path,
+    around_hostile: tuple[Path, Sandbox],
 ) -> None:
-    hostile = write(tmp_path / "hostile", BEGIN + text)
-    with Sandbox([tmp_path / "hostile"], limits=LIMITS) as sandbox:
-        programs = Programs(
-            fresh(2),
-            [hostile, good],
-            keeps_output=True,
-            when_silent="wait",
-            are_apart=True,
-            sandbox={1: sandbox, 2: beside},
-        )
-        programs.run()
-        first, second = programs.handles
-        assert (first.reason, first.how) == (reason, f"because it {reason}")
-        assert (second.reason, second.code) == ("", 0)
-        assert printed(second) == usual_second
-        # The next program finds a sandbox as if nothing had been.
-        write(tmp_path / "hostile", GOOD)
-        assert run(hostile, sandbox) == usual
+    path, sandbox = around_hostile
+    sandboxes, options = {1: sandbox, 2: beside}, {"keeps_output": True, "when_silent": "wait", "are_apart": True}
+    programs = Programs(fresh(2), [write(path, BEGIN + text), good], sandbox=sandboxes, **options)
+    programs.run()
+    first, second = programs.handles
+    assert (first.reason, first.how) == (reason, f"because it {reason}")
+    assert (second.reason, second.code) == ("", 0)
+    assert printed(second) == usual_second
+    # The next program finds a sandbox as if nothing had been.
+    assert run(write(path, GOOD), sandbox) == usual
 
 
 PLAIN = """
@@ -211,9 +195,7 @@ print("environment", sorted(os.environ))
 """
 
 
-def test_program_reaches_no_file_network_or_neighbour(
-    good: Command, usual: tuple[str, int, list[str]], tmp_path: Path
-) -> None:
+def test_program_reaches_no_file_network_or_neighbour(good: Command, usual: End, tmp_path: Path) -> None:
     secret, neighbour = tmp_path / "home" / "secret", tmp_path / "neighbour" / "program.py"
     for each in (secret, neighbour):
         each.parent.mkdir()
@@ -230,14 +212,12 @@ def test_program_reaches_no_file_network_or_neighbour(
         local.listen()
         told = [str(secret), str(neighbour), tcp.getsockname(), udp.getsockname(), abstract, victim.pid]
         # A plain Python: what KiKS itself refuses to programs in simulated time is not what is tested here.
-        write(tmp_path / "prowler", PROWLER)
-        plain = tmp_path / "prowler" / "plain.py"
-        plain.write_text(PLAIN)
+        write(tmp_path / "prowler" / "program.py", PROWLER)
+        plain = write(tmp_path / "prowler" / "plain.py", PLAIN, json.dumps(told))
         with Sandbox([tmp_path / "prowler"], limits=Limits(files_mb=8)) as sandbox:
-            _, code, lines = run(Command(plain, [json.dumps(told)]), sandbox)
+            _, code, lines = run(plain, sandbox)
             before = sandbox._processes
-            plain.write_text(GOOD)
-            assert run(Command(plain), sandbox) == usual
+            assert run(write(plain.program, GOOD), sandbox) == usual
             assert sandbox._processes is before, "its warm process lives on"
         for each in (tcp, udp, local):
             each.setblocking(False)
@@ -267,22 +247,32 @@ sys.exit(int(sys.argv[1]))
 """
 
 
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[Command, str, End]]:
+    """Programs, how each thinks, and what comes of it in a process of its own."""
+    folder = tmp_path_factory.mktemp("looks")
+    (folder.parent / "times").write_text("7000000\n" * 40)
+    looks = write(folder / "program.py", LOOKS, "7", "x")
+    runs = [(looks, "none"), (looks, f"replay:{folder.parent / 'times'}")]
+    runs.append((Command(PROGRAMS / "any_port.py", ["3"]), "none"))
+    runs += share([], [(Command(PROGRAMS / "wander.py"), "none")])
+    return [(command, thinking, run(command, None, thinking=thinking)) for command, thinking in runs]
+
+
 @pytest.mark.parametrize("is_trusted", [False, True], ids=["sandbox", "trusted"])
-def test_program_is_the_same_as_in_a_process_of_its_own(is_trusted: bool, tmp_path: Path) -> None:
-    looks = Command(write(tmp_path / "looks", LOOKS).program, ["7", "x"])
-    with Sandbox([tmp_path / "looks", PROGRAMS], is_trusted=is_trusted) as sandbox:
-        for command in (looks, looks, Command(PROGRAMS / "wander.py"), Command(PROGRAMS / "any_port.py", ["3"])):
-            assert run(command, sandbox) == run(command, None)
-        times = tmp_path / "times"
-        times.write_text("7000000\n" * 40)
-        replayed = run(looks, sandbox, thinking=f"replay:{times}")
-        assert replayed == run(looks, None, thinking=f"replay:{times}")
-        assert replayed[0] != run(looks, None)[0]
+def test_program_is_the_same_as_in_a_process_of_its_own(
+    is_trusted: bool, alone: list[tuple[Command, str, End]]
+) -> None:
+    with Sandbox([alone[0][0].program.parent, PROGRAMS], is_trusted=is_trusted) as sandbox:
+        for command, thinking, end in (*alone, alone[0]):
+            assert run(command, sandbox, thinking=thinking) == end
+    assert alone[0][2][0] != alone[1][2][0]
 
 
 def test_each_start_finds_an_empty_working_folder_with_the_files_of_the_program(tmp_path: Path) -> None:
     command = write(
-        tmp_path / "first", "import os\nprint(sorted(os.listdir()))\nopen('left', 'w')\nopen('/tmp/left', 'w')"
+        tmp_path / "first" / "program.py",
+        "import os\nprint(sorted(os.listdir()))\nopen('left', 'w')\nopen('/tmp/left', 'w')",
     )
     (tmp_path / "first" / "map.txt").write_text("here")
     with Sandbox([tmp_path / "first"]) as sandbox:
@@ -308,9 +298,9 @@ def test_without_bubblewrap_one_line_says_what_to_do(
     assert "--trusted" in str(caught.value)
 
 
-def test_trusted_program_has_limits_as_well(usual: tuple[str, int, list[str]], tmp_path: Path) -> None:
-    hostile = write(tmp_path / "hostile", BEGIN + "while True: pass")
+def test_trusted_program_has_limits_as_well(usual: End, tmp_path: Path) -> None:
+    hostile = write(tmp_path / "hostile" / "program.py", BEGIN + "while True: pass")
     with Sandbox(limits=LIMITS, is_trusted=True) as sandbox:
         assert run(hostile, sandbox)[1] == 137
-        write(tmp_path / "hostile", GOOD)
+        write(tmp_path / "hostile" / "program.py", GOOD)
         assert run(hostile, sandbox) == usual

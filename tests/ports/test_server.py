@@ -5,11 +5,15 @@ import signal
 import socket
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from typing import IO
 
 import pytest
-from tests.ports.helpers import WallClock, warnings
-from tests.served import GUARD_S, PROGRAMS, Served, ask, fresh, open_plain, read_line, run_python, served
+from tests.at_length import cases
+from tests.ports.helpers import WallClock, ask_socket, connect, live, warnings
+from tests.served import GUARD_S, PROGRAMS, ask, fresh, opened, read_line, run_python, served
 
 from kiks.clock.pace import Pace
 from kiks.clock.serial_timing import BACKLOG_LIMIT
@@ -20,54 +24,41 @@ from kiks.ports.tcp import TcpEndpoint
 from kiks.units import NS_PER_S, character_ns
 
 
-def play(link: str, run: Served, commands: list[bytes], how: str) -> tuple[str, int, list[bytes]]:
-    port = open_plain(link)
-    replies = []
-    for command in commands:
-        for piece in [command] if how == "lines" else [bytes([byte]) for byte in command]:
-            os.write(port, piece)
-            if how == "bytes":
-                run.wait_rounds(1)
-        replies.append(read_line(port))
-    os.close(port)
-    run.wait_free()
-    return run.sim.state_hash(), run.sim.now_ns, replies
-
-
 @pytest.mark.parametrize("end", [b"\n", b"\r", b"\r\n"])
 @pytest.mark.parametrize("thinking", ["none", "fixed:3.5"])
 def test_lockstep_does_not_depend_on_how_bytes_are_split(tmp_path: Path, end: bytes, thinking: str) -> None:
     commands = [command + end for command in (b"D,9,7", b"N", b"D,-2", b"N", b"x", b"N")]
-    runs = []
-    for how in ("lines", "bytes"):
-        link = str(tmp_path / how)
-        with served([PtyEndpoint(link)], thinking=thinking) as run:
-            runs.append(play(link, run, commands, how))
     memory = fresh(thinking=thinking)
-    port = memory.port(1)
-    replies = []
+    port, replies = memory.port(1), []
     for command in commands:
         port.write(command)
         replies.append(port.readline())
-    assert runs[0] == runs[1] == (memory.state_hash(), memory.now_ns, replies)
+    for size in (10, 1):
+        link = str(tmp_path / str(size))
+        with served([PtyEndpoint(link)], thinking=thinking) as run:
+            with opened(link) as end_of_line:
+                for command, reply in zip(commands, replies, strict=True):
+                    for start in range(0, len(command), size):
+                        os.write(end_of_line, command[start : start + size])
+                        run.wait_rounds(1)
+                    assert read_line(end_of_line) == reply
+            run.wait_free()
+            assert (run.sim.state_hash(), run.sim.now_ns) == (memory.state_hash(), memory.now_ns)
 
 
 def test_lockstep_drops_a_line_without_end_as_the_robot_does(tmp_path: Path) -> None:
     link = str(tmp_path / "robot")
-    with served([PtyEndpoint(link)]) as run:
-        port = open_plain(link)
+    with served([PtyEndpoint(link)]) as run, opened(link) as port:
         for _ in range(3 * BACKLOG_LIMIT // 1024):
             os.write(port, b"x" * 1024)
             run.wait_rounds(1)
         assert ask(port, b"\n") == b"Command not found\r\n"
         assert ask(port, b"H\n") == b"h,0,0\r\n"
-        os.close(port)
 
 
 def test_live_reply_arrives_on_time(tmp_path: Path) -> None:
-    link, wall = str(tmp_path / "robot"), WallClock()
-    with served([PtyEndpoint(link)], thinking="live", pace=Pace(2.0, wall_ns=wall)) as run:
-        port = open_plain(link)
+    link = str(tmp_path / "robot")
+    with live(PtyEndpoint(link), 2.0) as (run, _, wall), opened(link) as port:
         os.write(port, b"H\n")
         run.wait_held()
         run.wait_rounds(3)
@@ -83,12 +74,10 @@ def test_live_reply_arrives_on_time(tmp_path: Path) -> None:
         os.set_blocking(port, True)
         assert read_line(port) == b"0\r\n"
         assert run.sim.now_ns == 2 * (begun_ns + NS_PER_S // 10)
-        os.close(port)
 
 
 def test_live_world_runs_without_a_client() -> None:
-    wall = WallClock()
-    with served([TcpEndpoint(0)], thinking="live", pace=Pace(wall_ns=wall)) as run:
+    with live() as (run, _, wall):
         run.wait_rounds(1)
         wall.pass_ns(NS_PER_S)
         run.wait_for(lambda: run.sim.now_ns == NS_PER_S)
@@ -110,8 +99,7 @@ def test_ctrl_c_ends_the_server_between_two_rounds(monkeypatch: pytest.MonkeyPat
             epoll.unregister(descriptor)
 
     monkeypatch.setattr(server._selector, "_selector", Interrupted())
-    with socket.create_connection(("127.0.0.1", endpoint.port)):
-        pass
+    connect(endpoint).close()
     with pytest.raises(KeyboardInterrupt):
         server.serve(until=lambda: next(rounds) == 999)
     assert server.sim.wires[0].holder is None
@@ -120,10 +108,10 @@ def test_ctrl_c_ends_the_server_between_two_rounds(monkeypatch: pytest.MonkeyPat
 
 def test_one_client_of_several_endpoints_has_the_robot(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     link, tcp = str(tmp_path / "robot"), TcpEndpoint(0)
-    with served([PtyEndpoint(link), tcp]) as run:
-        client = socket.create_connection(("127.0.0.1", tcp.port), timeout=GUARD_S)
+    with served([PtyEndpoint(link), tcp]) as run, ExitStack() as stack:
+        client = stack.enter_context(connect(tcp))
         run.wait_held()
-        port = open_plain(link)
+        port = stack.enter_context(opened(link))
         for _ in range(2):
             os.write(port, b"G,1,1\n")
             run.wait_for(lambda: caplog.records)
@@ -131,10 +119,7 @@ def test_one_client_of_several_endpoints_has_the_robot(tmp_path: Path, caplog: p
         client.close()
         run.wait_free()
         assert ask(port, b"H\n") == b"h,0,0\r\n"
-        second = socket.create_connection(("127.0.0.1", tcp.port), timeout=GUARD_S)
-        assert second.recv(1) == b""
-        second.close()
-        os.close(port)
+        assert stack.enter_context(connect(tcp)).recv(1) == b""
     assert warnings(caplog) == [
         f"robot 1 must have one client at a time, but another came to {came} while the client of {has} has it. "
         "Close that one first."
@@ -145,10 +130,8 @@ def test_one_client_of_several_endpoints_has_the_robot(tmp_path: Path, caplog: p
 def test_client_of_a_robot_in_use_is_rejected(caplog: pytest.LogCaptureFixture) -> None:
     sim, tcp = fresh(), TcpEndpoint(0)
     sim.wires[0].holder = "a program in this process"
-    with served([tcp], sim=sim):
-        client = socket.create_connection(("127.0.0.1", tcp.port), timeout=GUARD_S)
+    with served([tcp], sim=sim), connect(tcp) as client:
         assert client.recv(1) == b""
-        client.close()
     assert "while a program in this process has it" in caplog.text
     assert sim.wires[0].holder == "a program in this process"
 
@@ -156,16 +139,12 @@ def test_client_of_a_robot_in_use_is_rejected(caplog: pytest.LogCaptureFixture) 
 def test_dropped_clients_are_disconnected_and_others_may_come() -> None:
     tcp = TcpEndpoint(0)
     with served([tcp]) as run:
-        client = socket.create_connection(("127.0.0.1", tcp.port), timeout=GUARD_S)
-        client.sendall(b"E\n")
-        assert client.recv(1) == b"e"
-        run.server.drop_clients()
-        while client.recv(100):
-            pass
-        client.close()
-        with socket.create_connection(("127.0.0.1", tcp.port), timeout=GUARD_S) as another:
-            another.sendall(b"E\n")
-            assert another.recv(1) == b"e"
+        with connect(tcp) as client:
+            assert ask_socket(client, b"E\n") == b"e,0,0\r\n"
+            run.server.drop_clients()
+            assert client.recv(100) == b""
+        with connect(tcp) as another:
+            assert ask_socket(another, b"E\n") == b"e,0,0\r\n"
 
 
 def test_lag_is_logged_once(caplog: pytest.LogCaptureFixture) -> None:
@@ -193,38 +172,39 @@ def test_arguments_are_checked() -> None:
             Server(fresh(), {1: []}, speed=speed)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("ending", [signal.SIGTERM, signal.SIGINT])
-def test_serve_command(tmp_path: Path, ending: signal.Signals) -> None:
-    link = str(tmp_path / "robot")
-    command = [sys.executable, "-m", "kiks", "serve", "--thinking", "none", "--link", link, "--tcp", "0"]
+@contextmanager
+def serving(*words: str, ending: int = signal.SIGINT) -> Iterator[IO[str]]:
+    """Start `kiks serve`; yield what it prints, and end it by a signal."""
+    command = [sys.executable, "-m", "kiks", "serve", "--tcp", "0", *words]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         assert process.stdout.readline() == "Robot 1\n"
-        assert process.stdout.readline() == f"  serial port  {link}\n"
-        assert process.stdout.readline().startswith("  TCP          socket://127.0.0.1:")
-        assert process.stdout.readline().startswith("The world waits for each command. Repeatable to the bit")
-        assert run_python(PROGRAMS / "course.py", link).startswith("h,")
+        yield process.stdout
         process.send_signal(ending)
-        assert process.stdout.readline().startswith("Stopped after ")
-        assert process.wait(GUARD_S) == 0
+        told, _ = process.communicate(timeout=GUARD_S)
+        assert process.returncode == 0
+        assert "Stopped after " in told
+
+
+@pytest.mark.slow
+def test_serve_command(tmp_path: Path) -> None:
+    link = str(tmp_path / "robot")
+    with serving("--thinking", "none", "--link", link, ending=signal.SIGTERM) as told:
+        assert told.readline() == f"  serial port  {link}\n"
+        assert told.readline().startswith("  TCP          socket://127.0.0.1:")
+        assert told.readline().startswith("The world waits for each command. Repeatable to the bit")
+        assert run_python(PROGRAMS / "course.py", link).startswith("h,")
     assert not os.path.lexists(link)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("option", [[], ["--by-character"]])
+@pytest.mark.parametrize("option", cases([["--by-character"], []]))
 def test_serve_command_says_how_replies_come_over_tcp(option: list[str]) -> None:
     # So slowly that the rest of a reply that comes by character is a minute away.
-    speed = "0.01" if option else "100"
-    command = [sys.executable, "-m", "kiks", "serve", "--no-pty", "--tcp", "0", "--speed", speed, *option]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
-        assert process.stdout is not None
-        assert process.stdout.readline() == "Robot 1\n"
-        port = int(process.stdout.readline().rpartition(":")[2])
-        with socket.create_connection(("127.0.0.1", port), timeout=GUARD_S) as client:
+    with serving("--no-pty", "--speed", "0.01" if option else "100", *option) as told:
+        address = ("127.0.0.1", int(told.readline().rpartition(":")[2]))
+        with socket.create_connection(address, timeout=GUARD_S) as client:
             client.sendall(b"help\n")
             reply = client.recv(4096)
-        process.send_signal(signal.SIGINT)
-        assert process.wait(GUARD_S) == 0
     assert reply.startswith(b"h")
     assert reply.endswith(b"starting them\r\n") == (not option)

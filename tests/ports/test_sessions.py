@@ -2,64 +2,53 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 import pytest
 import serial
 from tests import forked
+from tests.at_length import at_length
 from tests.served import GUARD_S, PROGRAMS, fresh, run_python, served
-from tests.session_player import Pieces, Session, play, sessions, simulation
+from tests.session_player import FOLDER, Pieces, load, play, simulation
 
 from kiks.ports.pty import PtyEndpoint
 from kiks.ports.rfc2217 import Rfc2217Endpoint
 from kiks.ports.tcp import TcpEndpoint
-from kiks.sim.simulation import Simulation
 
-# Each session is played over five kinds of ports; tests/firmware/test_sessions.py plays them in memory.
+# Each session is played over four kinds of ports; tests/firmware/test_sessions.py plays them in memory.
 pytestmark = pytest.mark.slow
 
-
-@contextmanager
-def by_name(sim: Simulation, folder: Path) -> Iterator[Any]:
-    with serial.serial_for_url(sim.url(1), 9600, timeout=GUARD_S) as port:
-        yield port
-
-
-@contextmanager
-def over_pty(sim: Simulation, folder: Path) -> Iterator[Any]:
-    endpoint = PtyEndpoint(folder / "khepera")
-    with served([endpoint], sim=sim), serial.Serial(str(folder / "khepera"), 9600, timeout=GUARD_S) as port:
-        yield port
+KINDS: dict[str, Any] = {"": PtyEndpoint, "socket://": TcpEndpoint, "rfc2217://": Rfc2217Endpoint, "kiks://": None}
+WAYS = list(product(KINDS, ("lines", "one write")))
+CASES = [
+    pytest.param(
+        path, *way, id=f"{path.stem} {' '.join(way)}", marks=() if (row - column) % len(WAYS) == 0 else at_length
+    )
+    for row, path in enumerate(sorted(FOLDER.glob("*.txt")))
+    for column, way in enumerate(WAYS)
+]
+"""`make test` plays each session in one way, and in each way some session."""
 
 
-@contextmanager
-def over_tcp(sim: Simulation, folder: Path) -> Iterator[Any]:
-    endpoint = TcpEndpoint(0)
-    with served([endpoint], sim=sim), serial.serial_for_url(f"socket://{endpoint.name}", timeout=GUARD_S) as port:
-        yield port
-
-
-@contextmanager
-def over_rfc2217(sim: Simulation, folder: Path) -> Iterator[Any]:
-    endpoint = Rfc2217Endpoint(0)
-    with served([endpoint], sim=sim), serial.serial_for_url(f"rfc2217://{endpoint.name}", timeout=GUARD_S) as port:
-        yield port
-
-
-@pytest.mark.parametrize("pieces", ["lines", "one write"])
-@pytest.mark.parametrize("way", [by_name, over_pty, over_tcp, over_rfc2217], ids=lambda way: way.__name__)
-@pytest.mark.parametrize("session", sessions(), ids=lambda session: session.name)
-def test_session(session: Session, way: Callable[..., Any], pieces: Pieces, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("path", "scheme", "pieces"), CASES)
+def test_session(path: Path, scheme: str, pieces: Pieces, tmp_path: Path) -> None:
+    session = load(path)
     sim = simulation(session)
 
     def wait(seconds: float) -> None:
         with sim.lock:
             sim.run(seconds)
 
-    with way(sim, tmp_path) as port:
+    with ExitStack() as stack:
+        url = sim.url(1)
+        if kind := KINDS[scheme]:
+            endpoint = kind(tmp_path / "khepera" if kind is PtyEndpoint else 0)
+            stack.enter_context(served([endpoint], sim=sim))
+            url = f"{scheme}{endpoint.name}"
+        port = stack.enter_context(serial.serial_for_url(url, 9600, timeout=GUARD_S))
         play(port, session, wait=wait, pieces=pieces)
 
 

@@ -6,27 +6,27 @@ import os
 import select
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.served import GUARD_S, PROGRAMS, fresh
+from tests.ports.helpers import printed, wheels, write
+from tests.served import GUARD_S, PROGRAMS, Rounds, fresh
 
 from kiks.clock.gate import Gate
 from kiks.clock.patience import Patience
 from kiks.errors import KiksError, ParameterError
 from kiks.ports import programs as module
 from kiks.ports.program_process import OUTPUT_LIMIT, Command
-from kiks.ports.programs import Handle, Programs
+from kiks.ports.programs import Programs
 from kiks.sim.simulation import Simulation
 
 pytestmark = pytest.mark.slow
 
-DRIVE, SLEEPER = (
-    Command(PROGRAMS / f"{name}.py", words)
-    for name, words in (("drive", ["COM1", "40", "3", "7"]), ("sleeper", ["12"]))
-)
+DRIVE = Command(PROGRAMS / "drive.py", ["COM1", "40", "3", "7"])
+SLEEPER = Command(PROGRAMS / "sleeper.py", ["12"])
 
 FOR_EVER = """
 import serial
@@ -59,57 +59,24 @@ class PausedGate(Gate):
         super()._sleep(seconds)
 
 
-class Driven:
+class Driven(Rounds):
     """Programs whose rounds run in a thread."""
 
     def __init__(self, programs: Programs) -> None:
+        super().__init__(self._drive)
         self.programs = programs
         programs.begin()
-        self._is_over = False
-        self._round = threading.Condition()
-        self._thread = threading.Thread(target=self._drive, daemon=True)
-        self._thread.start()
 
-    def _drive(self) -> None:
-        while not self._is_over:
+    def _drive(self, until: Callable[[], bool]) -> None:
+        while not until():
             self.programs.round(0.01)
-            with self._round:
-                self._round.notify_all()
-
-    def wait_for(self, fact: Callable[[], object]) -> None:
-        """Wait until a condition holds, checked after each round."""
-        with self._round:
-            assert self._round.wait_for(fact, GUARD_S), "it did not happen in time"
-
-    def end(self) -> None:
-        self._is_over = True
-        self._thread.join(GUARD_S)
-        assert not self._thread.is_alive()
-        self.programs.close()
 
 
 @contextmanager
 def driven(sim: Simulation, commands: Sequence[Command] = (), **options: Any) -> Iterator[Driven]:
     run = Driven(Programs(sim, commands, keeps_output=True, **{"patience_s": GUARD_S, **options}))
-    try:
+    with closing(run.programs), run.going_on():
         yield run
-    finally:
-        run.end()
-
-
-def command(folder: Path, text: str) -> Command:
-    path = folder / "program.py"
-    path.write_text(text)
-    return Command(path)
-
-
-def printed(handle: Handle) -> list[str]:
-    assert handle.output is not None
-    return [line.text for line in handle.output.since(0)[1]]
-
-
-def wheels(sim: Simulation, robot: int = 1) -> list[int]:
-    return sim.world.state.robots["speed_setpoint"][0, robot - 1].tolist()
 
 
 def test_programs_that_begin_together_give_the_run_of_kiks_run() -> None:
@@ -124,7 +91,9 @@ def test_programs_that_begin_together_give_the_run_of_kiks_run() -> None:
 def test_program_joins_at_the_present_time(tmp_path: Path) -> None:
     sim = fresh(2)
     sim.run(5)
-    first = command(tmp_path, "import time\nprint(time.monotonic())\ntime.sleep(3)\nprint(time.monotonic())\n")
+    first = write(
+        tmp_path / "program.py", "import time\nprint(time.monotonic())\ntime.sleep(3)\nprint(time.monotonic())\n"
+    )
     with driven(sim) as run:
         assert not run.programs.drive
         handle = run.programs.start(first, robot=2)
@@ -149,7 +118,7 @@ def test_robot_of_a_stopped_program_stands_still_and_is_free(
     sim = fresh()
     gate = PausedGate(sim)
     with driven(sim) as run:
-        handle = run.programs.start(command(tmp_path, text))
+        handle = run.programs.start(write(tmp_path / "program.py", text))
         run.wait_for(lambda: printed(handle) == ["b'd\\r\\n'"])
         assert wheels(sim) == [5, 5]
         with pytest.raises(ParameterError, match=r"robot 1 must be free .* but program 1 \(program.py\) has it"):
@@ -178,7 +147,7 @@ def test_child_processes_end_with_their_program(tmp_path: Path) -> None:
         "while True: pass\n"
     )
     with driven(fresh()) as run:
-        handle = run.programs.start(command(tmp_path, text))
+        handle = run.programs.start(write(tmp_path / "program.py", text))
         run.wait_for(lambda: printed(handle))
         child = os.pidfd_open(int(printed(handle)[0]))
         run.programs.stop(handle)
@@ -189,12 +158,11 @@ def test_child_processes_end_with_their_program(tmp_path: Path) -> None:
 
 def test_endless_output_is_limited_and_does_not_delay_others(tmp_path: Path) -> None:
     sim = fresh(2)
-    floods = command(tmp_path, "number = 0\nwhile True:\n    print('x' * 3000, number)\n    number += 1\n")
+    floods = write(tmp_path / "program.py", "number = 0\nwhile True:\n    print('x' * 3000, number)\n    number += 1\n")
     with driven(sim) as run:
         handle = run.programs.start(floods)
         other = run.programs.start(DRIVE, robot=2)
-        assert handle.output is not None
-        output = handle.output
+        output: Any = handle.output
         run.wait_for(lambda: not other.is_running and output.count > 3 * OUTPUT_LIMIT)
         first, lines = output.since(0)
         assert first > 0
@@ -205,10 +173,10 @@ def test_endless_output_is_limited_and_does_not_delay_others(tmp_path: Path) -> 
 def test_output_and_errors_are_distinguished(tmp_path: Path) -> None:
     text = "import sys\nprint('grün')\nsys.stdout.write('no end')\n1 / 0\n"
     with driven(fresh()) as run:
-        handle = run.programs.start(command(tmp_path, text))
+        handle = run.programs.start(write(tmp_path / "program.py", text))
         run.wait_for(lambda: not handle.is_running)
-        assert handle.output is not None
-        lines = handle.output.since(0)[1]
+        output: Any = handle.output
+        lines = output.since(0)[1]
         assert [line.text for line in lines if not line.is_error] == ["grün", "no end"]
         errors = [line.text for line in lines if line.is_error]
         assert errors[0] == "Traceback (most recent call last):"
@@ -220,12 +188,8 @@ def test_output_and_errors_are_distinguished(tmp_path: Path) -> None:
 def test_patience_does_not_run_out_while_the_world_is_paused(tmp_path: Path) -> None:
     sim = fresh(2)
     gate = PausedGate(sim)
-    wall_ns = [0]
-
-    def patience(seconds: float) -> Patience:
-        return Patience(seconds, wall_ns=lambda: wall_ns[0])
-
-    with driven(sim, [DRIVE, SLEEPER], patience_s=1e-3, new_patience=patience) as run:
+    new_patience = partial(Patience, wall_ns=lambda: 0)
+    with driven(sim, [DRIVE, SLEEPER], patience_s=1e-3, new_patience=new_patience) as run:
         run.wait_for(lambda: sim.now_ns > 0)
         gate.hold()
         gate.go_on()

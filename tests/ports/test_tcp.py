@@ -1,22 +1,24 @@
 from __future__ import annotations
 
 import socket
+from collections.abc import Callable
+from functools import partial
+from typing import Any
 
 import pytest
-from tests.ports.helpers import WallClock, ask_socket, connect, warnings
+import serial
+from tests.ports.helpers import ask_socket, connect, live, warnings
 from tests.served import GUARD_S, served
 
-from kiks.clock.pace import Pace
 from kiks.clock.serial_timing import OUTPUT_LIMIT
 from kiks.errors import LinkError, ParameterError
 from kiks.ports.rfc2217 import Rfc2217Endpoint
 from kiks.ports.tcp import TcpChannel, TcpEndpoint
-from kiks.units import character_ns
+from kiks.units import NS_PER_S, character_ns
 
 
 def test_live_reply_comes_with_its_last_character_and_those_of_several_commands_one_by_one() -> None:
-    wall, endpoint = WallClock(), TcpEndpoint(0)
-    with served([endpoint], thinking="live", pace=Pace(wall_ns=wall)) as run, connect(endpoint) as client:
+    with live() as (run, endpoint, wall), connect(endpoint) as client:
         client.sendall(b"H\nE\n")
         run.wait_for(lambda: run.sim.wires[0].pending)
         # Two characters, 1 ms in the robot, and seven characters of each reply.
@@ -35,11 +37,9 @@ def test_live_reply_comes_with_its_last_character_and_those_of_several_commands_
             run.wait_rounds(3)
 
 
-@pytest.mark.parametrize("kind", ["by character", "RFC 2217"])
-def test_live_characters_come_one_by_one_where_a_client_expects_a_serial_line(kind: str) -> None:
-    wall = WallClock()
-    endpoint = Rfc2217Endpoint(0) if kind == "RFC 2217" else TcpEndpoint(0, by_character=True)
-    with served([endpoint], thinking="live", pace=Pace(wall_ns=wall)) as run, connect(endpoint) as client:
+@pytest.mark.parametrize("kind", [partial(TcpEndpoint, by_character=True), Rfc2217Endpoint])
+def test_live_characters_come_one_by_one_where_a_client_expects_a_serial_line(kind: Callable[[int], Any]) -> None:
+    with live(kind(0)) as (run, endpoint, wall), connect(endpoint) as client:
         client.sendall(b"H\n")
         run.wait_for(lambda: run.sim.wires[0].pending)
         wall.pass_ns(6 * character_ns(9600) + 1_000_000)
@@ -53,8 +53,7 @@ def test_live_characters_come_one_by_one_where_a_client_expects_a_serial_line(ki
 
 
 def test_live_reply_of_a_client_that_hangs_up_in_its_middle_reaches_no_other_client() -> None:
-    wall, endpoint = WallClock(), TcpEndpoint(0)
-    with served([endpoint], thinking="live", pace=Pace(wall_ns=wall)) as run:
+    with live() as (run, endpoint, wall):
         with connect(endpoint) as client:
             client.sendall(b"N\n")
             run.wait_for(lambda: run.sim.wires[0].pending)
@@ -64,7 +63,7 @@ def test_live_reply_of_a_client_that_hangs_up_in_its_middle_reaches_no_other_cli
         with connect(endpoint) as client:
             client.sendall(b"H\n")
             run.wait_for(lambda: run.sim.wires[0].pending)
-            wall.pass_s(1)
+            wall.pass_ns(NS_PER_S)
             assert client.recv(4096) == b"h,0,0\r\n"
 
 
@@ -91,20 +90,15 @@ def test_unread_output_is_limited_and_logged(caplog: pytest.LogCaptureFixture) -
 
 def test_client_that_does_not_read_gets_all_its_replies_later() -> None:
     ways = {1: [TcpEndpoint(0)], 2: [TcpEndpoint(0)]}
-    with served(ways) as run:
-        mute, other = connect(ways[1][0]), connect(ways[2][0])
+    with served(ways) as run, connect(ways[1][0]) as mute, connect(ways[2][0]) as other:
         mute.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2048)
         mute.sendall(b"N\n" * 3000)
         assert ask_socket(other, b"H\n") == b"h,0,0\r\n"
         mute.sendall(b"H\n")
-        replies = mute.makefile("rb")
-        for _ in range(3000):
-            assert replies.readline().startswith(b"n,")
-        assert replies.readline() == b"h,0,0\r\n"
+        with mute.makefile("rb") as replies:
+            assert {replies.readline()[:2] for _ in range(3000)} == {b"n,"}
+            assert replies.readline() == b"h,0,0\r\n"
         assert run.sim.wires[0].line.lost_count == 0
-        replies.close()
-        mute.close()
-        other.close()
 
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "192.168.1.5", "::", "example.com"])
@@ -122,3 +116,40 @@ def test_port_must_be_valid_and_free() -> None:
     endpoint.close()
     with pytest.raises(ParameterError, match=r"port must be a whole number from 0 to 65535, but it was 65536"):
         TcpEndpoint(65536)
+
+
+# ---- RFC 2217 ----
+
+
+def test_speed_purge_and_control_lines() -> None:
+    endpoint = Rfc2217Endpoint(0)
+    with served([endpoint]) as run:
+        port = serial.serial_for_url(f"rfc2217://{endpoint.name}", baudrate=19200, timeout=GUARD_S)
+        assert run.sim.wires[0].line.baud == 19200
+        port.write(b"H\n")
+        assert port.readline() == b"h,0,0\r\n"
+        port.baudrate = 38400
+        port.dtr = False
+        port.rts = False
+        port.stopbits = 2
+        port.reset_input_buffer()
+        port.reset_output_buffer()
+        assert (port.cts, port.dsr, port.cd, port.ri) == (True, True, True, False)
+        port.write(b"H\xff\n")  # a character that telnet escapes
+        assert port.readline() == b"Command not found\r\n"
+        assert run.sim.wires[0].line.baud == 38400
+        port.close()
+        run.wait_free()
+
+
+@pytest.mark.parametrize("nonsense", [b"\xff\xf0", b"\xff\xfa\x2c\x01\xff\xf0", b"\xff\xfa" + b"x" * 10_000])
+def test_client_that_violates_the_protocol_is_disconnected(nonsense: bytes) -> None:
+    endpoint = Rfc2217Endpoint(0)
+    with served([endpoint]) as run:
+        with connect(endpoint) as client:
+            run.wait_held()
+            client.sendall(nonsense)
+            run.wait_free()
+        with serial.serial_for_url(f"rfc2217://{endpoint.name}", timeout=GUARD_S) as port:
+            port.write(b"H\n")
+            assert port.readline() == b"h,0,0\r\n"

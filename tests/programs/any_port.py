@@ -10,47 +10,34 @@ chance = random.Random(int(sys.argv[1]))
 port = serial.Serial("/dev/ttyS3", 9600, timeout=0.5)
 
 
-def write() -> None:
-    commands = [b"N\n", b"D,%d,2\n" % chance.randrange(9), b"H\r\n", b"\n", b"K", b"serial 38400\n", b"serial 9600\n"]
-    port.write(b"".join(chance.choices(commands, k=chance.choice((1, 1, 2, 30)))))
+COMMANDS = (b"N\n", b"D,3,2\n", b"D,8,2\n", b"H\r\n", b"\n", b"K", b"serial 38400\n", b"serial 9600\n")
 
 
-def flood() -> None:
-    port.write(b"x" * chance.choice((100, 5000, 9000)))
+def some(*values):
+    return chance.choice(values)
 
 
 def read() -> None:
-    port.timeout = chance.choice((0, 0.001, 0.02, 0.5))
+    port.timeout = some(0, 0.001, 0.02, 0.5)
     print(port.read(chance.randrange(40)))
 
 
 def read_line() -> None:
-    port.timeout = chance.choice((0, 0.003, 0.2))
+    port.timeout = some(0, 0.003, 0.2)
     print(port.readline(), port.read_until(b",", chance.randrange(1, 9)))
 
 
-def look() -> None:
-    print(port.in_waiting, time.time(), time.monotonic_ns())
-
-
-def rest() -> None:
-    time.sleep(chance.choice((0, 1e-6, 0.003, 0.3)))
-
-
-def reset() -> None:
-    chance.choice((port.flush, port.reset_input_buffer))()
-
-
-def change() -> None:
-    port.baudrate = chance.choice((9600, 19200, 115200))
-
-
-def hang_up() -> None:
-    port.close()
-    port.open()
-
-
-WHAT = {write: 6, read: 5, read_line: 5, look: 6, rest: 2, reset: 1, change: 1, hang_up: 0.3, flood: 0.3}
+WHAT = {
+    lambda: port.write(b"".join(chance.choices(COMMANDS, k=some(1, 1, 2, 30)))): 6,
+    read: 5,
+    read_line: 5,
+    lambda: print(port.in_waiting, time.time(), time.monotonic_ns()): 6,
+    lambda: time.sleep(some(0, 1e-6, 0.003, 0.3)): 2,
+    lambda: some(port.flush, port.reset_input_buffer)(): 1,
+    lambda: setattr(port, "baudrate", some(9600, 19200, 115200)): 1,
+    lambda: (port.close(), port.open()): 0.3,
+    lambda: port.write(b"x" * some(100, 5000, 9000)): 0.3,
+}
 for what in chance.choices(list(WHAT), list(WHAT.values()), k=300):
     what()
 time.sleep(20)

@@ -29,6 +29,16 @@ class Ran(NamedTuple):
 Run = Callable[..., Ran]
 
 
+def programs_of(text: str) -> dict[str, tuple[str, str]]:
+    """Return programs by their names, which follow "===", each with what it must print, which follows ">"."""
+    programs = {}
+    for each in text.split("\n=== ")[1:]:
+        name, *lines = each.rstrip("\n").splitlines()
+        said = [line[2:] for line in lines if line[:1] == ">"]
+        programs[name] = "\n".join(line for line in lines if line[:1] != ">"), "".join(f"{line}\n" for line in said)
+    return programs
+
+
 @pytest.fixture
 def run(tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Run:
     """Return what runs the text of a program as `program.py` in an empty folder."""

@@ -40,20 +40,11 @@ class Thread:
 
 
 @dataclass(eq=False)
-class Lock:
-    is_locked: bool = False
-    waiters: list[Thread] = field(default_factory=list)
+class Meeting:
+    """A lock, a queue or an event: whether it is locked or set, what is in it, and which threads wait for it."""
 
-
-@dataclass(eq=False)
-class Queue:
+    is_on: bool = False
     items: deque[int] = field(default_factory=deque)
-    waiters: list[Thread] = field(default_factory=list)
-
-
-@dataclass(eq=False)
-class Event:
-    is_set: bool = False
     waiters: list[Thread] = field(default_factory=list)
 
 
@@ -66,10 +57,9 @@ class Oracle:
         self.ready: deque[Thread] = deque()
         self.threads: list[Thread] = []
         self.count = 0
-        self.locks = [Lock() for _ in range(3)]
-        self.queues = [Queue() for _ in range(2)]
-        self.events = [Event() for _ in range(2)]
-        self.lines = [Lock() for _ in range(sim.robot_count)]
+        self.locks, self.queues, self.events, self.lines = (
+            [Meeting() for _ in range(count)] for count in (3, 2, 2, sim.robot_count)
+        )
         main = Thread(self.main(program))
         self.threads.append(main)
         self.ready.append(main)
@@ -115,12 +105,8 @@ class Oracle:
                 break
             sim.advance_to(event_ns)
         sim.advance_to(end_ns)
-        due = [thread for thread in waiting if thread.wait and thread.wait.until_ns == end_ns]
-        due += [
-            thread
-            for thread in readers
-            if thread not in due and thread.wait and self.reply_ns(thread.wait.robot) == end_ns
-        ]
+        due = {thread for thread in waiting if thread.wait and thread.wait.until_ns == end_ns}
+        due |= {thread for thread in readers if thread.wait and self.reply_ns(thread.wait.robot) == end_ns}
         for thread in sorted(due, key=lambda thread: thread.order):
             if thread.wait and thread.wait.queue is not None:
                 thread.wait.queue.remove(thread)
@@ -137,14 +123,11 @@ class Oracle:
     def main(self, program: list[Steps]) -> Generator[Wait, Any, None]:
         started = []
         for number, steps in enumerate(program[1:], 1):
-            thread = Thread(self.thread(number, steps))
-            has_begun: list[Thread] = []
+            started.append(thread := Thread(self.thread(number, steps)))
             self.threads.append(thread)
             self.ready.append(thread)
-            thread.joiners = []
-            started.append(thread)
-            self.begun = has_begun
-            yield Wait(queue=has_begun)
+            self.begun: list[Thread] = []
+            yield Wait(queue=self.begun)
         yield from self.steps(0, program[0])
         for thread in started:
             if not thread.is_over:
@@ -166,17 +149,17 @@ class Oracle:
     def sleep(self, _number: int, ms: int) -> Generator[Wait, Any, None]:
         yield Wait(self.until(ms))
 
-    def take(self, lock: Lock, ms: int | None) -> Generator[Wait, Any, bool]:
-        if not lock.is_locked:
-            lock.is_locked = True
+    def take(self, lock: Meeting, ms: int | None) -> Generator[Wait, Any, bool]:
+        if not lock.is_on:
+            lock.is_on = True
             return True
         return (yield Wait(self.until(ms), lock.waiters))
 
-    def give(self, lock: Lock) -> None:
+    def give(self, lock: Meeting) -> None:
         if lock.waiters:
             self.wake(lock.waiters.pop(0))
         else:
-            lock.is_locked = False
+            lock.is_on = False
 
     def lock(self, number: int, index: int, ms: int, steps: Steps) -> Generator[Wait, Any, bool]:
         lock = self.locks[index]
@@ -205,18 +188,18 @@ class Oracle:
 
     def set(self, _number: int, index: int) -> Generator[Wait, Any, None]:
         event = self.events[index]
-        event.is_set = True
+        event.is_on = True
         while event.waiters:
             self.wake(event.waiters.pop(0))
         yield from ()
 
     def clear(self, _number: int, index: int) -> Generator[Wait, Any, None]:
-        self.events[index].is_set = False
+        self.events[index].is_on = False
         yield from ()
 
     def wait(self, _number: int, index: int, ms: int) -> Generator[Wait, Any, bool]:
         event = self.events[index]
-        return True if event.is_set else (yield Wait(self.until(ms), event.waiters))
+        return True if event.is_on else (yield Wait(self.until(ms), event.waiters))
 
     def ask(self, _number: int, robot: int, command: str) -> Generator[Wait, Any, str]:
         line = self.lines[robot - 1]

@@ -12,41 +12,42 @@ import serial
 from tests.script import seen
 
 
-def do(number, kind, *rest):
-    if kind == "sleep":
-        time.sleep(rest[0] / 1000)
-    elif kind == "lock":
-        index, ms, steps = rest
-        if not locks[index].acquire(timeout=ms / 1000):
-            return False
-        run(number, steps)
-        locks[index].release()
-        return True
-    elif kind == "put":
-        queues[rest[0]].put(rest[1])
-    elif kind == "get":
-        try:
-            return queues[rest[0]].get(timeout=rest[1] / 1000)
-        except queue.Empty:
-            return None
-    elif kind == "set":
-        events[rest[0]].set()
-    elif kind == "clear":
-        events[rest[0]].clear()
-    elif kind == "wait":
-        return events[rest[0]].wait(rest[1] / 1000)
-    elif kind == "ask":
-        robot, command = rest
-        with lines[robot - 1]:
-            ports[robot - 1].write(command.encode())
-            return ports[robot - 1].readline().decode()
-    return None
+def lock(number, index, ms, steps):
+    if not locks[index].acquire(timeout=ms / 1000):
+        return False
+    run(number, steps)
+    locks[index].release()
+    return True
+
+
+def get(number, index, ms):
+    try:
+        return queues[index].get(timeout=ms / 1000)
+    except queue.Empty:
+        return None
+
+
+def ask(number, robot, command):
+    with lines[robot - 1]:
+        ports[robot - 1].write(command.encode())
+        return ports[robot - 1].readline().decode()
+
+
+DO = {
+    "sleep": lambda number, ms: time.sleep(ms / 1000),
+    "lock": lock,
+    "put": lambda number, index, item: queues[index].put(item),
+    "get": get,
+    "set": lambda number, index: events[index].set(),
+    "clear": lambda number, index: events[index].clear(),
+    "wait": lambda number, index, ms: events[index].wait(ms / 1000),
+    "ask": ask,
+}
 
 
 def run(number, steps):
-    for step in steps:
-        result = do(number, *step)
-        seen.note(number, [step[0], result])
+    for kind, *rest in steps:
+        seen.note(number, [kind, DO[kind](number, *rest)])
 
 
 if __name__ == "__main__":

@@ -12,92 +12,75 @@ import shlex
 import signal
 import subprocess
 import sys
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
+from itertools import takewhile
 from pathlib import Path
 from subprocess import PIPE
 
 import pytest
+from tests import forked
 from tests.at_length import at_length, share
 from tests.cli.test_cli import KIKS
-from tests.guard import GUARD_S
-from tests.served import PROGRAMS
+from tests.served import GUARD_S, PROGRAMS, called
 
 pytestmark = pytest.mark.slow
 
 CORPUS = {path.stem: str(path) for path in sorted((PROGRAMS / "corpus").glob("*.py"))}
-EACH_ALONE, INTO_FILE = (str(PROGRAMS / f"{name}.py") for name in ("each_alone", "into_file"))
+INTO_FILE = str(PROGRAMS / "into_file.py")
 
 AGAIN = set(share(["reader_thread", *list(CORPUS)[::3]], list(CORPUS)))
 """Programs that run alone a second time."""
 
 AT_ONCE = 2
-"""Simulated runs at the same time: one a core."""
-IN_REAL_TIME = 6
-"""Programs at the same time that live in real time: they mostly wait."""
+"""Worlds at the same time."""
 ATTEMPTS_IN_REAL_TIME = 3
 """A computer that is busy for a moment delays programs that live in real time, so these may try again."""
-GROUP = 13
-"""Programs that share a world: so many begin together within the time in which the world waits for them."""
 SEED = "3"
 WIDE = "size_mm = [1500, 1500]\n" + "".join(
     f"[[start]]\nat_mm = [{150 + 200 * (number % 7)}, {100 + 180 * (number // 7)}]\nheading_deg = 0\n"
-    for number in range(49)
+    for number in range(14)
 )
 """An arena in which no robot meets another one, or a wall."""
 
 ENVIRONMENT = {**os.environ, "PYTHONUNBUFFERED": "1"}
 
-Runs = dict[str, tuple[str, str]]
-"""What each program has printed, and its errors with the lines of KiKS."""
 
-
-def run_alone(folder: Path, again: Collection[str]) -> tuple[Runs, Runs]:
-    """Run each program by `kiks run`, some twice; return what it said each time, with the state at its end."""
-    runs = {f"{name}.{time}": name for name in CORPUS for time in (1, 2) if time == 1 or name in again}
-    words = [shlex.join([run, CORPUS[name]]) for run, name in runs.items()]
-    command = [sys.executable, EACH_ALONE, str(folder), str(AT_ONCE), "--seed", SEED, "--", *words]
-    subprocess.run(command, env=ENVIRONMENT, timeout=280, check=True, stdin=subprocess.DEVNULL)
-    first, second = (
-        {name: tuple((folder / f"{name}.{time}.{kind}").read_text() for kind in ("out", "err")) for name in names}
-        for time, names in ((1, CORPUS), (2, again))
-    )
-    return first, second
+def run_alone(name: str) -> tuple[str, str]:
+    """Return what a program prints under `kiks run`, and its errors with the lines of KiKS."""
+    done = forked.run("run", "--seed", SEED, CORPUS[name])
+    return done.stdout, done.stderr
 
 
 @pytest.fixture(scope="module")
-def alone(tmp_path_factory: pytest.TempPathFactory) -> tuple[Runs, Runs]:
-    return run_alone(tmp_path_factory.mktemp("alone"), AGAIN)
+def alone() -> dict[str, str]:
+    """What each program prints that runs alone."""
+    with ThreadPoolExecutor(AT_ONCE) as pool:
+        return {name: out for name, (out, _) in zip(CORPUS, pool.map(run_alone, CORPUS), strict=True)}
 
 
-def printed(run: Runs) -> dict[str, str]:
-    """Return what the programs have printed."""
-    return {name: out for name, (out, _) in run.items()}
-
-
-def test_each_program_does_the_same_again(alone: tuple[Runs, Runs]) -> None:
-    first, second = alone
-    assert second == {name: first[name] for name in second}
-    for name, (out, errors) in first.items():
-        assert re.search(rf"^kiks: \d+\.\d{{3}} s simulated, seed {SEED}, state [0-9a-f]{{16}}\n\Z", errors, re.M), name
-        assert "Traceback" not in out + errors, name
+@pytest.mark.parametrize("name", CORPUS)
+def test_program_does_the_same_again(name: str) -> None:
+    out, errors = run_alone(name)
+    assert re.search(rf"^kiks: \d+\.\d{{3}} s simulated, seed {SEED}, state [0-9a-f]{{16}}\n\Z", errors, re.M)
+    assert "Traceback" not in out + errors
+    assert name not in AGAIN or run_alone(name) == (out, errors)
 
 
 # ---- together, and on the desk ----
 
 
-def run_together(names: Sequence[str], folder: Path, *, on_desk: bool) -> tuple[dict[str, str], str]:
-    """Run programs in one world; return what each of them printed, and the line with the state at the end."""
+def run_together(folder: Path, *, on_desk: bool) -> tuple[dict[str, str], str]:
+    """Run all programs in one world; return what each of them printed, and the line with the state at the end."""
     folder.mkdir()
     (folder / "wide.toml").write_text(WIDE)
-    words = [shlex.join([INTO_FILE, str(folder / name), CORPUS[name]]) for name in names]
+    words = [shlex.join([INTO_FILE, str(folder / name), CORPUS[name]]) for name in CORPUS]
     options = ["--arena", str(folder / "wide.toml"), "--seed", SEED, "--when-silent", "wait"]
     command = [*KIKS, "run", *(["--desk", "--no-wait"] if on_desk else []), *options, *words]
-    pipes = {"stdout": PIPE, "stderr": subprocess.STDOUT, "stdin": subprocess.DEVNULL}
-    env = {**ENVIRONMENT, "BROWSER": "true"}
-    told = []
-    with subprocess.Popen(command, cwd=folder, env=env, text=True, start_new_session=True, **pipes) as process:
+    pipes = {"stdout": PIPE, "stderr": subprocess.STDOUT, "stdin": subprocess.DEVNULL, "text": True}
+    env, told = {**ENVIRONMENT, "BROWSER": "true"}, []
+    with subprocess.Popen(command, cwd=folder, env=env, start_new_session=True, **pipes) as process:
         assert process.stdout is not None
         try:
             for line in process.stdout:
@@ -110,85 +93,51 @@ def run_together(names: Sequence[str], folder: Path, *, on_desk: bool) -> tuple[
     text = "".join(told)
     assert process.returncode == 0, text
     (end,) = [line for line in told if "s simulated" in line]
-    return {name: (folder / name).read_text() for name in names}, end
+    return {name: (folder / name).read_text() for name in CORPUS}, end
 
 
 @at_length
-def test_programs_do_the_same_on_the_desk(alone: tuple[Runs, Runs], tmp_path: Path) -> None:
-    names = list(CORPUS)
-    groups = [names[start : start + GROUP] for start in range(0, len(names), GROUP)]
+def test_programs_do_the_same_on_the_desk(alone: dict[str, str], tmp_path: Path) -> None:
     with ThreadPoolExecutor(AT_ONCE) as pool:
-        on_desk = [
-            pool.submit(run_together, group, tmp_path / str(number), on_desk=True)
-            for number, group in enumerate(groups)
-        ]
-        without = pool.submit(run_together, groups[0], tmp_path / "without", on_desk=False)
-    said: dict[str, str] = {}
-    for job in on_desk:
-        said |= job.result()[0]
-    assert said == {name: alone[0][name][0] for name in names}
-    assert on_desk[0].result()[1] == without.result()[1]
-    assert "state" in without.result()[1]
+        jobs = [pool.submit(run_together, tmp_path / str(on_desk), on_desk=on_desk) for on_desk in (True, False)]
+    (said, end), without = (job.result() for job in jobs)
+    assert said == alone
+    assert (said, end) == without
+    assert "state" in end
 
 
 # ---- in real time ----
 
 
 @contextmanager
-def served(folder: Path, robots: int) -> Iterator[list[dict[str, str]]]:
-    """Serve robots in real time; yield the names of each one's ports: by kind, `serial port` or `RFC 2217`."""
+def served(folder: Path, robots: int) -> Iterator[list[str]]:
+    """Serve robots in real time; yield their serial ports."""
+    folder.mkdir()
     (folder / "wide.toml").write_text(WIDE)
-    options = ["--arena", str(folder / "wide.toml"), "--seed", SEED, "--tcp", "0", "--rfc2217", "0"]
-    command = [*KIKS, "serve", "--robots", str(robots), "--link", str(folder / "ttyUSB"), *options]
-    with subprocess.Popen(
-        command, stdout=PIPE, stderr=subprocess.DEVNULL, env={**os.environ, "PYTHONUNBUFFERED": "1"}, text=True
-    ) as process:
+    options = ["--arena", str(folder / "wide.toml"), "--seed", SEED, "--robots", str(robots)]
+    command = [*KIKS, "serve", *options, "--link", str(folder / "ttyUSB")]
+    with subprocess.Popen(command, stdout=PIPE, stderr=subprocess.DEVNULL, env=ENVIRONMENT, text=True) as process:
         assert process.stdout is not None
-        ports: list[dict[str, str]] = []
-        for line in process.stdout:
-            if line.startswith("Robot "):
-                ports.append({})
-            elif line.startswith("  "):
-                kind, name = re.split(r"\s{2,}", line.strip())
-                ports[-1][kind] = name
-            else:
-                break
+        lines = iter(process.stdout.readline, "")
+        ports = [line.split()[-1] for line in takewhile(lambda line: line.startswith(("Robot ", "  ")), lines)]
         try:
-            yield ports
+            yield ports[1::2]
         finally:
             process.send_signal(signal.SIGINT)
             process.communicate(timeout=GUARD_S)
 
 
-def run_real(name: str, ports: Mapping[str, str]) -> str:
+def run_real(name: str, port: str) -> str:
     """Run a program by Python alone, with pyserial itself; return what it said, errors, too."""
-    # A pseudo terminal has no lines for DTR and RTS.
-    command = [sys.executable, CORPUS[name], ports["RFC 2217" if name == "control_lines" else "serial port"]]
-    done = subprocess.run(
-        command,
-        env=ENVIRONMENT,
-        timeout=GUARD_S,
-        check=False,
-        text=True,
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-    )
+    done = called(sys.executable, CORPUS[name], port, env=ENVIRONMENT, stdin=subprocess.DEVNULL)
     return done.stdout + (f"exit code {done.returncode}: {done.stderr}" if done.returncode else "")
 
 
-def run_all_real(names: Sequence[str], folder: Path) -> dict[str, str]:
-    """Run programs in real time, each on a robot of its own; return what each of them said."""
-    folder.mkdir()
-    with served(folder, len(names)) as ports, ThreadPoolExecutor(IN_REAL_TIME) as pool:
-        jobs = {name: pool.submit(run_real, name, port) for name, port in zip(names, ports, strict=True)}
-    return {name: job.result() for name, job in jobs.items()}
-
-
 @at_length
-def test_programs_do_the_same_in_real_time(alone: tuple[Runs, Runs], tmp_path: Path) -> None:
-    expected = printed(alone[0])
+def test_programs_do_the_same_in_real_time(alone: dict[str, str], tmp_path: Path) -> None:
     said: dict[str, str] = {}
     for attempt in range(ATTEMPTS_IN_REAL_TIME):
-        if late := [name for name in CORPUS if said.get(name) != expected[name]]:
-            said |= run_all_real(late, tmp_path / str(attempt))
-    assert said == expected
+        if late := [name for name in CORPUS if said.get(name) != alone[name]]:
+            with served(tmp_path / str(attempt), len(late)) as ports, ThreadPoolExecutor(len(late)) as pool:
+                said |= zip(late, pool.map(run_real, late, ports), strict=True)
+    assert said == alone

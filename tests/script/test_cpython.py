@@ -9,7 +9,6 @@ import pickle
 import queue
 import re
 import signal
-import subprocess
 import sys
 import threading
 import time
@@ -21,10 +20,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tests import forked
+from tests.at_length import cases
 from tests.cli.test_cli import KIKS
-from tests.guard import GUARD_S
 from tests.script.conftest import Run
-from tests.served import PROGRAMS
+from tests.served import GUARD_S, PROGRAMS, called
 
 from kiks.errors import KiksError
 from kiks.script import cpython, patching
@@ -191,6 +191,7 @@ def test_garbage_is_collected_while_functions_change() -> None:
     owner = sys.getrefcount(time)
     threshold = gc.get_threshold()
     gc.set_threshold(1, 1, 1)
+    gc.freeze()  # what else is in this process need not be looked at
     try:
         for number in range(200):
             with changed(time.time, lambda number=number: number), changed(time.ctime, lambda: [time.time()]):
@@ -198,6 +199,7 @@ def test_garbage_is_collected_while_functions_change() -> None:
                 gc.collect(number % 3)
             assert time.time() > 1
     finally:
+        gc.unfreeze()
         gc.set_threshold(*threshold)
     assert sys.getrefcount(time) == owner
     # All of them shared one pair.
@@ -283,22 +285,20 @@ port.me = port
 """
 
 
-@pytest.mark.parametrize("options", [(), ("-X", "dev")])
+@pytest.mark.parametrize("options", cases([((),), (("-X", "dev"),)]))
 def test_what_a_program_leaves_is_collected_in_silence(options: tuple[str, ...], tmp_path: Path) -> None:
     (tmp_path / "left.py").write_text(LEFT)
     words = [sys.executable, *options, "-W", "ignore", *KIKS[1:], "run", "--robots", "4", "left.py"]
-    done = subprocess.run(words, capture_output=True, text=True, cwd=tmp_path, timeout=GUARD_S, check=False)
+    done = called(*words, cwd=tmp_path)
     assert (done.returncode, done.stdout) == (0, "b'h,0,0\\r\\n'\n" * 3)
     assert [line for line in done.stderr.splitlines() if not line.startswith("kiks: ")] == []
 
 
-def test_wrong_arguments_get_pythons_own_words(tmp_path: Path) -> None:
+def test_wrong_arguments_get_pythons_own_words() -> None:
     program = str(PROGRAMS / "wrong_arguments.py")
-    by_python, by_kiks = (
-        subprocess.run([*words, program], capture_output=True, text=True, timeout=GUARD_S, check=True).stdout
-        for words in ([sys.executable, "-W", "ignore"], [sys.executable, "-W", "ignore", *KIKS[1:], "run"])
-    )
-    assert by_kiks.splitlines() == by_python.splitlines()
+    by_python, by_kiks = called(sys.executable, "-W", "ignore", program), forked.run("run", program)
+    assert by_python.returncode == by_kiks.returncode == 0
+    assert by_kiks.stdout.splitlines() == by_python.stdout.splitlines()
 
 
 # ---- interpreters ----
@@ -330,26 +330,23 @@ def test_an_interpreter_that_is_not_known_gets_one_line(
     )
 
 
-NAMES = [(number, name) for number, (_, names) in enumerate(cpython._private_names()) for name in names]
-
-
-@pytest.mark.parametrize(("number", "name"), NAMES)
-def test_each_name_that_is_needed_is_checked(number: int, name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_each_name_that_is_needed_is_checked(monkeypatch: pytest.MonkeyPatch) -> None:
     owners = list(cpython._private_names())
-    assert hasattr(owners[number][0], name)
-    owners[number] = (object(), (f"{name}_of_another_version",))
-    monkeypatch.setattr(cpython, "_private_names", lambda: owners)
-    with pytest.raises(KiksError, match=f"where object has no {name}_of_another_version"):
-        check_interpreter()
+    for number, (owner, names) in enumerate(owners):
+        for name in names:
+            assert hasattr(owner, name)
+            lacking = [*owners[:number], (object(), (f"{name}_of_another_version",)), *owners[number + 1 :]]
+            monkeypatch.setattr(cpython, "_private_names", lambda lacking=lacking: lacking)
+            with pytest.raises(KiksError, match=f"where object has no {name}_of_another_version"):
+                check_interpreter()
 
 
 def test_commands_end_with_the_line(tmp_path: Path) -> None:
     (tmp_path / "program.py").write_text("")
-    script = (
+    code = (
         "import runpy, sys, kiks.__main__\ndel runpy._run_module_as_main\n"
         "sys.argv = ['kiks', 'run', 'program.py']\nkiks.__main__.main()\n"
     )
-    words = [sys.executable, "-c", script]
-    done = subprocess.run(words, capture_output=True, text=True, cwd=tmp_path, timeout=GUARD_S, check=False)
+    done = forked.run(code=code, cwd=tmp_path)
     assert done.returncode == 1
     assert re.fullmatch(r"kiks: a program in simulated time must run under .* where runpy has no .*\n", done.stderr)

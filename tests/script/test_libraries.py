@@ -6,19 +6,19 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from tests.at_length import at_length
-from tests.cli.test_cli import KIKS
-from tests.guard import GUARD_S
-from tests.served import PROGRAMS
+from tests import forked
+from tests.at_length import cases
+from tests.script.conftest import programs_of
+from tests.served import PROGRAMS, called
 
 pytestmark = pytest.mark.slow
 
-
-TK = """
+IN_WINDOWS = programs_of("""
+=== windows of Tk live in simulated time
 import threading, time, tkinter
 def note(what): print(what, round(time.monotonic(), 3))
 root = tkinter.Tk()
@@ -46,20 +46,15 @@ note('window')
 root.after(250, root.destroy)
 tkinter.mainloop()
 note('over')
-"""
-
-TK_SAYS = """\
-first 0.1
-second 0.3
-from a thread 0.5
-quit 1.0
-variable 1.5
-slept 2.0
-window 2.25
-over 2.5
-"""
-
-PYGAME = """
+> first 0.1
+> second 0.3
+> from a thread 0.5
+> quit 1.0
+> variable 1.5
+> slept 2.0
+> window 2.25
+> over 2.5
+=== clocks of pygame are simulated
 import pygame, time
 pygame.init()
 pygame.display.set_mode((64, 64))
@@ -75,11 +70,38 @@ while len(rings) < 3:
     if pygame.event.wait().type == kind:
         rings.append(pygame.time.get_ticks() - start)
 print(rings, pygame.event.wait(500).type == pygame.NOEVENT, pygame.time.get_ticks() - start)
-"""
+> 1200 25 300
+> [1700, 1900, 2100] True 2600
+=== plots pause in simulated time
+import matplotlib, time
+matplotlib.use("TkAgg")
+import matplotlib.pyplot as plt
+from matplotlib.animation import FuncAnimation
+figure, axes = plt.subplots()
+for _ in range(4):
+    plt.pause(0.25)
+print(round(time.monotonic(), 1))
+frames = []
+def draw(number):
+    frames.append(number)
+    if len(frames) == 10:
+        plt.close(figure)
+    return []
+animation = FuncAnimation(figure, draw, interval=100, cache_frame_data=False)
+plt.show()
+print(len(frames), 1.9 < time.monotonic() < 2.2)
+> 1.0
+> 10 True
+=== an error in a call of Tk is told and no more
+import tkinter
+root = tkinter.Tk()
+root.after(1, lambda: 1 / 0)
+root.after(9, root.destroy)
+root.mainloop()
+""")
 
-PYGAME_SAYS = "1200 25 300\n[1700, 1900, 2100] True 2600\n"
-
-CURSES = """
+ON_TERMINAL = programs_of("""
+=== curses
 import curses, time
 def main(screen):
     times = []
@@ -100,33 +122,11 @@ def main(screen):
     assert screen.getkey() == 'k'
     return times
 print(curses.wrapper(main))
-"""
-
-PLOT = """
-import matplotlib, time
-matplotlib.use("TkAgg")
-import matplotlib.pyplot as plt
-from matplotlib.animation import FuncAnimation
-figure, axes = plt.subplots()
-for _ in range(4):
-    plt.pause(0.25)
-print(round(time.monotonic(), 1))
-frames = []
-def draw(number):
-    frames.append(number)
-    if len(frames) == 10:
-        plt.close(figure)
-    return []
-animation = FuncAnimation(figure, draw, interval=100, cache_frame_data=False)
-plt.show()
-print(len(frames), 1.9 < time.monotonic() < 2.2)
-"""
-
-KEYBOARD = """
+=== keyboard
 import threading, time
 threading.Thread(target=time.sleep, args=(5,)).start()
 input('Enter stops the robot. ')
-"""
+""")
 
 
 @pytest.fixture(scope="module")
@@ -141,68 +141,41 @@ def screen() -> Iterator[dict[str, str]]:
         try:
             with open(ours) as told:
                 number = told.readline().strip()
-            yield {**os.environ, "DISPLAY": f":{number}", "SDL_AUDIODRIVER": "dummy"}
+            sdl = {"SDL_AUDIODRIVER": "dummy", "SDL_VIDEODRIVER": "dummy", "PYGAME_HIDE_SUPPORT_PROMPT": "1"}
+            yield {"DISPLAY": f":{number}", **sdl}
         finally:
             process.terminate()
 
 
-def run(folder: Path, text: str, environment: Mapping[str, str] | None = None, *before: str) -> tuple[int, str, str]:
-    """Run a program by `kiks run`; return its exit code, and what it and KiKS have said."""
-    path = folder / "program.py"
-    path.write_text(text)
-    done = subprocess.run(
-        [*before, *KIKS, "run", str(path)],
-        env=environment,
-        capture_output=True,
-        text=True,
-        timeout=GUARD_S,
-        check=False,
-    )
-    return done.returncode, done.stdout, done.stderr
+@pytest.mark.parametrize("claim", cases(IN_WINDOWS, 2))
+def test_program_with_windows(claim: str, tmp_path: Path, screen: dict[str, str]) -> None:
+    program, printed = IN_WINDOWS[claim]
+    (tmp_path / "program.py").write_text(program)
+    done = forked.run("run", "program.py", cwd=tmp_path, env=screen)
+    assert (done.returncode, done.stdout) == (0, printed), done.stderr
+    assert ("Exception in Tkinter callback" in done.stderr) == ("error" in claim)
+    if "windows" in claim:
+        assert forked.run("run", "program.py", cwd=tmp_path, env=screen).stderr == done.stderr, "nor is it repeatable"
 
 
-def on_terminal(folder: Path, text: str) -> tuple[int, str]:
-    """Run a program on a terminal without keyboard input."""
-    return run(folder, text, None, sys.executable, str(PROGRAMS / "on_terminal.py"))[:2]
-
-
-def test_windows_of_tk_live_in_simulated_time(tmp_path: Path, screen: dict[str, str]) -> None:
-    code, said, told = run(tmp_path, TK, screen)
-    assert (code, said) == (0, TK_SAYS)
-    assert told.endswith(run(tmp_path, TK, screen)[2].splitlines()[-1] + "\n")
-
-
-@at_length
-def test_error_in_a_call_of_tk_is_told_and_no_more(tmp_path: Path, screen: dict[str, str]) -> None:
-    begin = "import tkinter\nroot = tkinter.Tk()\n"
-    fails = f"{begin}root.after(1, lambda: 1 / 0)\nroot.after(9, root.destroy)\nroot.mainloop()\n"
-    code, _, told = run(tmp_path, fails, screen)
-    assert code == 0
-    assert "Exception in Tkinter callback" in told
-
-
-def test_clocks_of_pygame_are_simulated(tmp_path: Path, screen: dict[str, str]) -> None:
-    code, said, _ = run(tmp_path, PYGAME, {**screen, "SDL_VIDEODRIVER": "dummy", "PYGAME_HIDE_SUPPORT_PROMPT": "1"})
-    assert (code, said) == (0, PYGAME_SAYS)
+def on_terminal(folder: Path, name: str) -> tuple[int, str]:
+    """Run a program on a terminal without keyboard input; return its exit code, and what it and KiKS have said."""
+    (folder / "program.py").write_text(ON_TERMINAL[name][0])
+    words = [*forked.kiks_command(), "run", str(folder / "program.py")]
+    done = called(sys.executable, PROGRAMS / "on_terminal.py", *words)
+    return done.returncode, done.stdout
 
 
 def test_waits_of_curses_are_simulated(tmp_path: Path) -> None:
-    code, said = on_terminal(tmp_path, CURSES)
+    code, said = on_terminal(tmp_path, "curses")
     assert code == 0
     assert said.startswith("[0.25, 0.5, 1.0]\n")
 
 
-@at_length
-def test_plots_pause_in_simulated_time(tmp_path: Path, screen: dict[str, str]) -> None:
-    code, said, told = run(tmp_path, PLOT, screen)
-    assert (code, said) == (0, "1.0\n10 True\n"), told
-
-
 def test_thread_that_waits_for_a_person_ends_the_program(tmp_path: Path) -> None:
-    code, said = on_terminal(tmp_path, KEYBOARD)
+    code, said = on_terminal(tmp_path, "keyboard")
     assert code == 1
-    assert said.startswith(
-        "kiks: a program in simulated time must not wait for the keyboard while other threads drive a"
-    )
-    code, said, _ = run(tmp_path, KEYBOARD)
-    assert (code, said) == (1, "Enter stops the robot. ")
+    words = "kiks: a program in simulated time must not wait for the keyboard while other threads drive a"
+    assert said.startswith(words)
+    done = forked.run("run", str(tmp_path / "program.py"))
+    assert (done.returncode, done.stdout) == (1, "Enter stops the robot. ")

@@ -10,7 +10,8 @@ import zipfile
 from pathlib import Path
 
 import pytest
-from tests.served import GUARD_S
+from tests import forked
+from tests.served import called
 
 PROGRAM = """
 import dataclasses, inspect, multiprocessing, os, pickle, runpy, sys, typing
@@ -78,22 +79,17 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def run(home: Path, *words: str) -> subprocess.CompletedProcess[str]:
-    environment = {**os.environ, "PYTHONDONTWRITEBYTECODE": "1"}
-    return subprocess.run(
-        [sys.executable, *words],
-        cwd=home,
-        env=environment,
-        capture_output=True,
-        text=True,
-        timeout=GUARD_S,
-        check=False,
-    )
+    return called(sys.executable, *words, cwd=home, env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1"})
+
+
+def run_kiks(home: Path, *words: str) -> subprocess.CompletedProcess[str]:
+    return forked.run("run", "--seed", "3", *words, cwd=home)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("words", WAYS, ids=" ".join)
 def test_a_program_starts_as_under_python(home: Path, words: list[str]) -> None:
-    python, kiks = run(home, *words), run(home, "-m", "kiks", "run", "--seed", "3", *words)
+    python, kiks = run(home, *words), run_kiks(home, *words)
     assert python.returncode == kiks.returncode == 0, kiks.stderr
     assert kiks.stdout == python.stdout
     assert "seed 3" in kiks.stderr
@@ -115,7 +111,7 @@ def test_programs_that_share_a_world_start_as_under_python(home: Path) -> None:
     "words", [["fails.py"], ["slip.py"], ["-m", "package.relative"], ["-m", "package.slip"]], ids=" ".join
 )
 def test_an_error_has_the_trace_that_python_prints(home: Path, words: list[str]) -> None:
-    python, kiks = run(home, *words), run(home, "-m", "kiks", "run", *words)
+    python, kiks = run(home, *words), run_kiks(home, *words)
     assert python.returncode == kiks.returncode == 1
     assert kiks.stdout == python.stdout
     assert re.sub("(?m)^kiks: .*\n", "", kiks.stderr) == re.sub('(?m)^  File "<frozen runpy>".*\n', "", python.stderr)
@@ -147,6 +143,6 @@ def test_an_open_file_in_a_cycle_with_its_functions_loses_nothing(home: Path) ->
     """Python clears the globals before it looks for garbage, and so the file is flushed before it is closed."""
     (home / "open.py").write_text("import sys\nf = open(sys.argv[1], 'w')\nf.write('all')\ndef file(): return f\n")
     for words in (["open.py", "alone.txt"], ["open.py shared.txt", "open.py other.txt"]):
-        kiks = run(home, "-m", "kiks", "run", *words)
+        kiks = run_kiks(home, *words)
         assert kiks.returncode == 0, kiks.stderr
     assert [(home / f"{name}.txt").read_text() for name in ("alone", "shared", "other")] == ["all"] * 3

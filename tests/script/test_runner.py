@@ -10,8 +10,9 @@ import textwrap
 from pathlib import Path
 
 import pytest
-from tests.guard import GUARD_S
-from tests.script.conftest import Run
+from tests import forked
+from tests.script import seen
+from tests.script.conftest import Run, programs_of
 
 from kiks.script import watchdog
 
@@ -43,7 +44,7 @@ def test_thread_that_only_polls_yields(run: Run, loop: str) -> None:
         lock.acquire()
         def work():
             global done
-            time.sleep(3)
+            time.sleep(0.5)
             done = True
             event.set()
             lock.release()
@@ -53,7 +54,7 @@ def test_thread_that_only_polls_yields(run: Run, loop: str) -> None:
         {loop}
     """)
     assert ran.code == 0
-    assert 3.0 <= ran.time_s < 3.01
+    assert 0.5 <= ran.time_s < 0.51
 
 
 @pytest.mark.parametrize(
@@ -87,58 +88,6 @@ def test_a_child_process_from_before_the_program_holds_none_of_its_pipes(run: Ru
     assert "wait for ever: MainThread for files" in ran.err
 
 
-def test_main_thread_waits_for_all_threads_except_daemons(run: Run) -> None:
-    ran = run("""
-        import atexit, threading, time
-        atexit.register(lambda: print('last', time.monotonic()))
-        def tick():
-            while True:
-                time.sleep(1)
-        threading.Thread(target=tick, daemon=True).start()
-        threading.Timer(2.5, print, ['timer']).start()
-        print('main')
-    """)
-    assert (ran.code, ran.time_s, ran.out) == (0, 2.5, "main\ntimer\nlast 2.5\n")
-
-
-def test_locals_identities_and_names_are_those_of_each_thread(run: Run) -> None:
-    ran = run("""
-        import threading, time
-        own = threading.local()
-        def work(number):
-            own.number = number
-            time.sleep(1)
-            thread = threading.current_thread()
-            print(own.number, thread.name, threading.get_ident() == thread.ident)
-        for number in range(2):
-            threading.Thread(target=work, args=(number,), name=f't{number}').start()
-        print(threading.current_thread() is threading.main_thread(), hasattr(own, 'number'))
-    """)
-    assert (ran.code, ran.time_s, ran.out) == (0, 1.0, "True False\n0 t0 True\n1 t1 True\n")
-
-
-def test_each_thread_has_its_own_event_loop(run: Run) -> None:
-    ran = run("""
-        import asyncio, threading, time
-        async def work():
-            me = asyncio.current_task()
-            for _ in range(3):
-                await asyncio.sleep(0.1)
-                time.sleep(0.05)
-                assert asyncio.current_task() is me
-        async def main():
-            threads = [threading.Thread(target=lambda: asyncio.run(work())) for _ in range(2)]
-            for thread in threads: thread.start()
-            me = asyncio.current_task()
-            time.sleep(0.02)
-            assert asyncio.current_task() is me
-            await asyncio.sleep(1)
-            print([thread.is_alive() for thread in threads])
-        asyncio.run(main())
-    """)
-    assert (ran.code, ran.time_s, ran.out) == (0, 1.02, "[False, False]\n")
-
-
 def test_thinking_of_threads_is_charged(run: Run) -> None:
     counted = """
         import queue, serial, threading
@@ -157,110 +106,9 @@ def test_thinking_of_threads_is_charged(run: Run) -> None:
 # ---- clocks, signals, files ----
 
 
-def test_every_clock_tells_the_robots_time(run: Run) -> None:
-    ran = run("""
-        import datetime, sched, time, timeit
-        clocks = [time.time, time.monotonic, time.perf_counter, time.process_time, time.thread_time,
-                  timeit.default_timer,
-                  lambda: time.clock_gettime(time.CLOCK_MONOTONIC), lambda: time.time_ns() / 1e9,
-                  lambda: datetime.datetime.now().timestamp(), lambda: datetime.datetime.now(datetime.UTC).timestamp(),
-                  lambda: time.mktime(time.localtime())]
-        before = [clock() for clock in clocks]
-        scheduler = sched.scheduler()
-        scheduler.enter(7, 1, lambda: None)
-        scheduler.run()
-        print({round(clock() - start) for clock, start in zip(clocks, before)})
-        print(isinstance(datetime.datetime.now(), datetime.datetime), datetime.date.today().year in (1999, 2000))
-        print(time.strftime('%Y-%m-%d', time.gmtime()))
-    """)
-    assert (ran.code, ran.out) == (0, "{7}\nTrue True\n2000-01-01\n")
-
-
 def test_alarm_without_a_handler_ends_the_program(run: Run) -> None:
     ran = run("import signal, time\nsignal.signal(14, signal.SIG_DFL)\nsignal.alarm(2)\ntime.sleep(10)\n")
     assert (ran.code, ran.time_s) == (128 + signal.SIGALRM, 2.0)
-
-
-WAITS = {
-    "select": "wait = lambda: select.select([port], [], [], 0.5)[0] == [port]",
-    "poll": "poll = select.poll()\npoll.register(port, select.POLLIN)\nwait = lambda: bool(poll.poll(500))",
-    "epoll": "poll = select.epoll()\npoll.register(port.fileno(), select.EPOLLIN)\nwait = lambda: bool(poll.poll(0.5))",
-    "selectors": "any = selectors.DefaultSelector()\nany.register(port, 1)\nwait = lambda: bool(any.select(0.5))",
-}
-
-
-@pytest.mark.parametrize("wait", WAITS)
-def test_file_waits_end_when_a_character_comes_or_the_time_is_over(run: Run, wait: str) -> None:
-    text = f"{OPEN}import os, select, selectors\n{WAITS[wait]}\n" + textwrap.dedent("""
-        import time
-        print(wait(), time.monotonic())
-        port.write(b'H\\n')
-        line = b''
-        while not line.endswith(b'\\n'):
-            assert wait()
-            line += os.read(port.fileno(), 100)
-        print(line, 0.505 < time.monotonic() < 0.52)
-    """)
-    ran = run(text)
-    assert (ran.code, ran.out) == (0, "False 0.5\nb'h,0,0\\r\\n' True\n")
-
-
-# ---- ports ----
-
-
-def test_programs_that_list_ports_find_them(run: Run) -> None:
-    text = """
-        import glob, os, serial
-        from serial.tools import list_ports
-        print([info.device for info in list_ports.comports()], [info.vid for info in list_ports.grep('USB')])
-        print(glob.glob('/dev/ttyUSB*'), os.path.exists('/dev/ttyUSB1'), os.path.exists('/dev/ttyUSB2'))
-        found = []
-        for number in range(5):
-            try:
-                serial.Serial(f'COM{number}').close()
-                found.append(number)
-            except serial.SerialException:
-                pass
-        print(found)
-    """
-    assert run(text, robots=2).out == (
-        "['/dev/ttyUSB0', '/dev/ttyUSB1'] [1027, 1027]\n['/dev/ttyUSB0', '/dev/ttyUSB1'] True False\n[0, 1]\n"
-    )
-
-
-def test_port_may_be_opened_twice_unless_exclusively(run: Run) -> None:
-    ran = run("""
-        import serial
-        first = serial.Serial('COM1', timeout=1)
-        second = serial.Serial('COM1', timeout=1)
-        first.write(b'H\\n')
-        print(second.readline())
-        second.close()
-        first.write(b'G,3,4\\nH\\n')
-        print(first.readline(), first.readline())
-        third = serial.Serial('COM1', exclusive=True)
-        try:
-            serial.Serial('COM1', exclusive=True)
-        except serial.SerialException as error:
-            print('exclusive' in str(error))
-    """)
-    assert (ran.code, ran.out) == (0, "b'h,0,0\\r\\n'\nb'g\\r\\n' b'h,3,4\\r\\n'\nTrue\n")
-
-
-def test_read_is_called_off_by_another_thread(run: Run) -> None:
-    ran = run(f"""
-        {OPEN.replace(chr(10), ";")}
-        import threading, time
-        port.timeout = None
-        threading.Timer(3, port.cancel_read).start()
-        print(port.read(5), time.monotonic())
-        threading.Timer(3, port.close).start()
-        try:
-            port.read(5)
-        except TypeError as error:
-            print(error, time.monotonic())
-    """)
-    assert (ran.code, ran.out) == (0, "b'' 3.0\n'NoneType' object cannot be interpreted as an integer 6.0\n")
 
 
 # ---- what simulated time does not reach ----
@@ -269,17 +117,11 @@ def test_read_is_called_off_by_another_thread(run: Run) -> None:
 @pytest.mark.parametrize(
     ("text", "must"),
     [
-        (
-            "import socket\nsocket.create_connection(('127.0.0.1', 9))",
-            "talk to its robots alone, but it used the net",
-        ),
+        ("import socket\nsocket.create_connection(('127.0.0.1', 9))", "talk to its robots alone, but it used the net"),
         ("import socket\nsocket.getaddrinfo('example.org', 80)", "talk to its robots alone"),
         ("import subprocess, sys\nsubprocess.run([sys.executable, '-c', ''])", "start no process of Python by itself"),
         ("import os\nos.system('python3 -c 1')", "start no process of Python by itself"),
-        (
-            "import multiprocessing as m\nm.Process(target=print).start()",
-            "start no process of Python by itself",
-        ),
+        ("import multiprocessing as m\nm.Process(target=print).start()", "start no process of Python by itself"),
         ("import os\nos.fork()", "be one process, but it started one more by fork"),
         ("import os\nos.open('/dev/ttyUSB0', os.O_RDWR)", "open a serial port by pyserial, but it opened /dev/ttyUSB0"),
         ("import ctypes\nfor _ in range(100): ctypes.CDLL(None).usleep(20000)", "wait by time.sleep, a lock or a port"),
@@ -304,66 +146,64 @@ def test_program_that_leaves_simulated_time_ends_with_one_line(
     assert ran.err.count("\n") == 1
 
 
-SPINS = "is_done = False\nwhile not is_done:\n    pass\n"
-
-ADVICE = "If it computes, that is right; if it waits for something, end it (Ctrl-C, or Stop on the desk) and put"
-
-
-def test_loop_that_asks_for_nothing_is_told(tmp_path: Path) -> None:
-    (tmp_path / "endless.py").write_text(OPEN + "port.write(b'D,4,4\\n')\nport.readline()\n" + SPINS)
-    words = watching("endless.py", "SPINNING_S = 5.")
-    with subprocess.Popen(words, stderr=subprocess.PIPE, text=True, cwd=tmp_path) as process:
-        assert process.stderr is not None
-        said = process.stderr.readline()
-        process.terminate()
+def test_loop_that_asks_for_nothing_is_told(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(watchdog, "SPINNING_S", 0.5)
+    monkeypatch.setattr(watchdog, "tell", (told := []).append)
+    monkeypatch.setattr(seen, "trace", told)
+    asks = f"{OPEN}port.write(b'D,4,4\\n')\nport.readline()\n"
+    assert run(f"{asks}from tests.script import seen\nwhile not seen.trace:\n    pass\n").code == 0
     assert re.fullmatch(
-        r"kiks: line [67] of endless.py has computed for \d s without waiting for a time or a robot. "
-        rf"{re.escape(ADVICE)} "
-        r"time.sleep\(0.01\) into the loop.\n",
-        said,
+        r"line [67] of program.py has computed for \d s without waiting for a time or a robot. If it computes, that is "
+        r"right; if it waits for something, end it \(Ctrl-C, or Stop on the desk\) and put time.sleep\(0.01\) into the "
+        r"loop.",
+        *told,
     )
 
 
-def watching(program: str, patience: str) -> list[str]:
-    """Return the command that runs a program under a watchdog with less patience."""
-    script = (
-        "import sys\nfrom pathlib import Path\nfrom kiks.script import watchdog\n"
-        "from kiks.script.runner import run_here\nfrom kiks.sim.simulation import Simulation\n"
-        f"watchdog.{patience}\nsys.exit(run_here(Simulation(), Path({program!r}), [], {{}}))\n"
-    )
-    return [sys.executable, "-c", script]
+KEEPS = programs_of("""
+=== others wait for a time
+import threading, time
+is_done = False
+def work():
+    global is_done
+    time.sleep(1)
+    is_done = True
+threading.Thread(target=work).start()
+while not is_done:
+    pass
+=== others have not had their turn
+import threading, time
+def spin():
+    while True:
+        pass
+threading.Thread(target=spin, daemon=True).start()
+time.sleep(1)
+""")
+
+COMPUTES = programs_of("""
+=== others are ready
+import threading
+def count():
+    number = 0
+    while number < 5_000_000:
+        number += 1
+threading.Thread(target=count, daemon=True).start()
+print("on")
+=== others wait for it
+import threading
+numbers = []
+thread = threading.Thread(target=lambda: numbers.append(sum(k * k for k in range(3_000_000))))
+thread.start()
+thread.join()
+""")
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        """
-        import threading, time
-        is_done = False
-        def work():
-            global is_done
-            time.sleep(1)
-            is_done = True
-        threading.Thread(target=work).start()
-        while not is_done:
-            pass
-        """,
-        """
-        import threading, time
-        def spin():
-            while True:
-                pass
-        threading.Thread(target=spin, daemon=True).start()
-        time.sleep(1)
-        """,
-    ],
-    ids=["others wait for a time", "others have not had their turn"],
-)
+@pytest.mark.parametrize("when", KEEPS)
 def test_loop_that_keeps_others_from_going_on_ends_with_one_line(
-    text: str, run: Run, monkeypatch: pytest.MonkeyPatch
+    when: str, run: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(watchdog, "SPINNING_S", 0.5)
-    ran = run(text)
+    ran = run(KEEPS[when][0])
     assert ran.code == 1
     told, end = ran.err.splitlines()
     assert "of program.py has computed for" in told
@@ -373,11 +213,11 @@ def test_loop_that_keeps_others_from_going_on_ends_with_one_line(
 
 
 def test_what_kiks_computes_is_not_told(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(watchdog, "SPINNING_S", 0.1)
+    monkeypatch.setattr(watchdog, "SPINNING_S", 0.02)
     ran = run("""
         import threading, time
-        threading.Thread(target=time.sleep, args=(3e6,), daemon=True).start()
-        time.sleep(2e5)
+        threading.Thread(target=time.sleep, args=(3e5,), daemon=True).start()
+        time.sleep(4e4)
     """)
     assert (ran.code, ran.err) == (0, "")
 
@@ -388,34 +228,65 @@ def test_a_wait_in_code_in_c_ends_the_process_that_it_never_leaves(tmp_path: Pat
         "import ctypes\nsignals, found = ctypes.create_string_buffer(128), ctypes.c_int()\n"
         "ctypes.CDLL(None).sigwait(signals, ctypes.byref(found))\n"
     )
-    words = watching("waits.py", "GRACE_S = 0.1")
-    done = subprocess.run(words, capture_output=True, text=True, cwd=tmp_path, timeout=GUARD_S, check=False)
+    code = (
+        "import sys\nfrom pathlib import Path\nfrom kiks.script import watchdog\n"
+        "from kiks.script.runner import run_here\nfrom kiks.sim.simulation import Simulation\n"
+        "watchdog.GRACE_S = 0.1\nsys.exit(run_here(Simulation(), Path('waits.py'), [], {}))\n"
+    )
+    done = forked.run(code=code, cwd=tmp_path)
     assert done.returncode == 1
     assert re.fullmatch(r"kiks: .*it waited by itself \(waits.py, line 3\)\. Run it on kiks serve.*\n", done.stderr)
 
 
-@pytest.mark.parametrize(
-    "text",
-    [
-        """
-        import threading
-        def count():
-            number = 0
-            while number < 5_000_000:
-                number += 1
-        threading.Thread(target=count, daemon=True).start()
-        print("on")
-        """,
-        """
-        import threading
-        numbers = []
-        thread = threading.Thread(target=lambda: numbers.append(sum(k * k for k in range(3_000_000))))
-        thread.start()
-        thread.join()
-        """,
-    ],
-    ids=["others are ready", "others wait for it"],
-)
-def test_thread_may_compute_from_its_first_moment(text: str, run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("when", COMPUTES)
+def test_thread_may_compute_from_its_first_moment(when: str, run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(watchdog, "SPINNING_S", 0.05)
-    assert run(text).code == 0
+    assert run(COMPUTES[when][0]).code == 0
+
+
+# ---- errors of the program ----
+
+CHAIN = """
+import serial, sys, threading
+port = serial.Serial('COM1')
+port.close()
+def lose():
+    try:
+        port.write(b'H')
+    except serial.SerialException as error:
+        raise RuntimeError('lost') from error
+thread = threading.Thread(target=lose, name='careless')
+thread.start()
+thread.join()
+threading.Thread(target=sys.exit, args=(3,)).start()
+lose()
+"""
+
+
+def test_errors_are_told_with_their_causes_and_without_kiks(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    # As the library of the command line does, which shows frames of its own.
+    monkeypatch.setattr(sys, "excepthook", lambda *_: print("wrong"))
+    code, _, _, _, told = run(CHAIN)
+    assert code == 1
+    assert told.startswith("Exception in thread careless:\nTraceback (most recent call last):\n")
+    assert told.count("PortNotOpenError: ") == told.count("direct cause") == told.count("RuntimeError: lost\n") == 2
+    assert "protocol_kiks" not in told
+    assert "runner.py" not in told
+    assert told.count("File") == 7
+
+
+def test_hook_of_the_program_hears_its_error(run: Run) -> None:
+    hook = "def hook(kind, error, trace): print('stopped:', error)\n"
+    ran = run(f"import sys\n{hook}sys.excepthook = hook\nraise ValueError('too near')\n")
+    assert (ran.code, ran.out, ran.err) == (1, "stopped: too near\n", "")
+
+
+ENDS = "import atexit\natexit.register(print, 'first')\n@atexit.register\ndef last(): raise SystemExit(5)\n"
+
+
+def test_any_end_is_told_as_python_does(run: Run) -> None:
+    code, _, _, out, told = run(f"{ENDS}import asyncio\nraise asyncio.CancelledError('early')\n")
+    assert (code, out) == (1, "first\n")
+    assert told.startswith("Traceback (most recent call last):\n")
+    assert "CancelledError: early\nException ignored in atexit callback" in told
+    assert "thread_scheduler" not in told

@@ -10,13 +10,12 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from tests.at_length import share
 from tests.script import seen
+from tests.script.conftest import BOX
 from tests.script.oracle import Oracle, Trace
 
-from kiks.model.arena import Arena
 from kiks.script.runner import run_here
 from kiks.sim.simulation import Simulation
 
-BOX = Arena.box(200, 200)
 STEPS = Path(__file__).with_name("steps.py")
 TIMES_MS = st.sampled_from([1, 2, 5, 8, 30])
 PLAIN = st.one_of(
@@ -48,7 +47,7 @@ def run_threads(program: list[Any]) -> tuple[Trace, str]:
 
 @pytest.mark.slow
 @given(PROGRAMS)
-@settings(max_examples=share(60, 200), derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=share(40, 200), derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 def test_threads_do_what_a_plain_simulation_says(program: list[Any]) -> None:
     oracle = Oracle(world(), program)
     assert run_threads(program) == (oracle.trace, oracle.sim.state_hash())

@@ -1,4 +1,4 @@
-"""A watchdog by signals, as under Unix: `alarm` stops a read that would last for ever, `setitimer` beats time."""
+"""A watchdog by signals, as under Unix: `alarm` stops a read that would last for ever."""
 
 import signal
 import sys
@@ -14,7 +14,6 @@ def on_alarm(signum, frame):
     raise Overtime(signal.Signals(signum).name)
 
 
-ticks = []
 port = serial.Serial(sys.argv[1] if len(sys.argv) > 1 else "/dev/ttyS0", 19200)
 
 port.write(b"D,4,4\n")
@@ -29,14 +28,6 @@ except Overtime as reason:
     print("gave up after", reason)
 print("left of the alarm:", signal.alarm(0))
 
-signal.signal(signal.SIGALRM, lambda *_: ticks.append(len(ticks)))
-signal.setitimer(signal.ITIMER_REAL, 0.1, 0.1)
-replies = 0
-while len(ticks) < 8:
-    port.write(b"N\n")
-    replies += port.readline().startswith(b"n,")
-signal.setitimer(signal.ITIMER_REAL, 0)
-print("ticks:", len(ticks), "asked meanwhile:", replies > 8)
 port.write(b"D,0,0\n")
 print(port.readline())
 port.close()

@@ -24,17 +24,12 @@ def stop(reason):
 atexit.register(stop, reason="as always")
 
 
-def main():
-    port.write(b"D,6,6\n")
-    port.readline()
-    end = time.time() + 1
-    while True:
-        port.write(b"H\n")
-        left, right = map(int, port.readline().decode().strip().split(",")[1:])
-        if time.time() > end:
-            print("on its way:", left > 300 and right > 300)
-            sys.exit(0)
-
-
-if __name__ == "__main__":
-    main()
+port.write(b"D,6,6\n")
+port.readline()
+end = time.time() + 1
+while True:
+    port.write(b"H\n")
+    left, right = map(int, port.readline().decode().strip().split(",")[1:])
+    if time.time() > end:
+        print("on its way:", left > 300 and right > 300)
+        sys.exit(0)
