@@ -11,12 +11,13 @@ import signal
 import stat
 import tempfile
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
 import numba
 import pytest
+from tests.at_length import share
 from tests.model.test_atomic_files import full_disk
 from tests.stranger import STRANGER, as_stranger, needs_root
 
@@ -42,6 +43,16 @@ def files(folder: Path) -> list[Path]:
     return sorted(folder.rglob("*.code"))
 
 
+@pytest.fixture(scope="module")
+def compiled(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A cache with the function's machine code, compiled once for the tests that begin with it."""
+    folder = tmp_path_factory.mktemp("compiled")
+    with pytest.MonkeyPatch.context() as context:
+        context.setenv("NUMBA_CACHE_DIR", str(folder))
+        call()
+    return folder
+
+
 @pytest.fixture(autouse=True)
 def _fresh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
@@ -49,6 +60,24 @@ def _fresh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
     code_cache.tell.cache_clear()
     monkeypatch.setattr(compiling, "_LINES", {})
+
+
+@pytest.fixture
+def kept(compiled: Path, tmp_path: Path, _fresh: None) -> Path:
+    """Return the file with the function's machine code in the user's cache."""
+    shutil.copytree(compiled, tmp_path / "cache")
+    (file,) = files(tmp_path)
+    return file
+
+
+@pytest.fixture
+def another_version(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Be another version of Numba."""
+    with monkeypatch.context() as context:
+        context.setattr(numba, "__version__", "0.0")
+        code_cache._version.cache_clear()
+        yield
+    code_cache._version.cache_clear()
 
 
 def test_the_second_call_comes_from_the_disk(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
@@ -88,45 +117,44 @@ class Bomb:
         return os.mkdir, (os.environ["KIKS_TEST_BOMB"],)
 
 
-def damages() -> list[Damage]:
-    whole: list[Damage] = [
-        lambda data: b"\n" + data,
-        lambda data: data * 2,
-        lambda data: bytes(1000),
-        lambda data: b"1 2",
-    ]
-    return whole + [cut(share) for share in (0, 0.001, 0.1, 0.5, 0.999)] + [flipped(seed) for seed in range(20)]
+DAMAGES: list[Damage] = [
+    lambda data: b"\n" + data,
+    lambda data: data * 2,
+    lambda data: bytes(1000),
+    lambda data: b"1 2",
+    *(cut(part) for part in (0, 0.001, 0.1, 0.5, 0.999)),
+    *(flipped(seed) for seed in range(share(4, 20))),
+]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("number", range(len(damages())))
-def test_a_damaged_file_is_thrown_away(number: int, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    call()
-    (file,) = files(tmp_path)
-    file.write_bytes(damages()[number](file.read_bytes()))
-    assert not call()
-    assert [record.getMessage().split(" in ")[0] for record in caplog.records] == ["Damaged files"]
-    assert call()
-    assert len(files(tmp_path)) == 1
+def test_a_damaged_file_is_thrown_away(kept: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    whole = kept.read_bytes()
+    for damage in DAMAGES:
+        kept.write_bytes(damage(whole))
+        caplog.clear()
+        code_cache.tell.cache_clear()
+        assert not call()
+        assert [record.getMessage().split(" in ")[0] for record in caplog.records] == ["Damaged files"]
+        assert call()
+        assert files(tmp_path) == [kept]
 
 
 @pytest.mark.parametrize("rights", [0o620, 0o602, 0o600])
 def test_code_in_files_that_others_can_write_is_not_run(
-    rights: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+    rights: int, kept: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    call()
-    (file,) = files(tmp_path)
     monkeypatch.setenv("KIKS_TEST_BOMB", str(tmp_path / "bombed"))
     key, payload = pickle.dumps(Bomb()), pickle.dumps(Bomb())
     head = [code_cache._FORMAT, b"%d" % len(key), code_cache._digest(key), code_cache._digest(payload)]
-    file.write_bytes(b" ".join(head) + b"\n" + key + payload)
-    file.chmod(rights)
+    kept.write_bytes(b" ".join(head) + b"\n" + key + payload)
+    kept.chmod(rights)
     if rights == 0o600:
         # All that tells it from a file of ours is whose it is.
-        here = file.stat().st_uid
+        here = kept.stat().st_uid
         monkeypatch.setattr(code_cache, "_user", lambda: here + 1)
         if here == 0:
-            os.chown(file, 4321, -1)
+            os.chown(kept, 4321, -1)
     assert not call()
     assert not (tmp_path / "bombed").exists()
     assert "files that you alone can write" in caplog.text
@@ -135,10 +163,6 @@ def test_code_in_files_that_others_can_write_is_not_run(
 
 OTHER = 4321
 """A user who is neither root nor the one who acts."""
-
-
-def acting_as(user: int) -> AbstractContextManager[None]:
-    return as_stranger() if user else nullcontext()
 
 
 @pytest.fixture
@@ -162,14 +186,15 @@ def test_code_in_a_folder_of_another_user_is_not_run(
     caplog: pytest.LogCaptureFixture,
 ) -> None:
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(open_folder / cache))
-    with acting_as(user):
+    acting = as_stranger if user else nullcontext
+    with acting():
         assert [call(), call()] == [False, True]
     (file,) = files(open_folder)
     assert file.stat().st_uid == user
     caplog.clear()
     file.parents[level].chmod(0o755)
     os.chown(file.parents[level], OTHER, -1)
-    with acting_as(user):
+    with acting():
         assert not call()
     assert "files that you alone can write" in caplog.text
     assert file.exists()
@@ -193,38 +218,38 @@ class LateError(Exception):
     pass
 
 
-@pytest.mark.parametrize("error", [TimeoutError("time is up"), ValueError("late"), LateError()], ids=repr)
 @pytest.mark.parametrize(
     ("owner", "name"),
     [(os, "fstat"), (code_cache, "_digest"), (pickle, "loads"), (code_cache._Result, "_rebuild"), (os, "fsync")],
 )
 def test_what_a_signal_raises_while_code_is_loaded_or_kept_goes_on(
-    owner: Any, name: str, error: Exception, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: Any
+    owner: Any, name: str, kept: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: Any
 ) -> None:
-    is_loaded = name != "fsync"
-    if is_loaded:
-        call()
-    real = getattr(owner, name)
+    is_loaded, real = name != "fsync", getattr(owner, name)
 
     def reach(*args: Any, **words: Any) -> Any:
         signal.raise_signal(signal.SIGALRM)
         return real(*args, **words)
 
-    def end(*_: object) -> None:
-        raise error
+    for error in (TimeoutError("time is up"), ValueError("late"), LateError()):
 
-    before = signal.signal(signal.SIGALRM, end)
-    try:
-        with monkeypatch.context() as context:
-            context.setattr(owner, name, reach)
-            with pytest.raises(type(error)) as caught:
-                call()
-    finally:
-        signal.signal(signal.SIGALRM, before)
-    assert caught.value is error
-    assert not caplog.records
-    assert len(files(tmp_path)) == is_loaded
-    assert call() == is_loaded
+        def end(*_: object, error: Exception = error) -> None:
+            raise error
+
+        if not is_loaded:
+            kept.unlink(missing_ok=True)
+        before = signal.signal(signal.SIGALRM, end)
+        try:
+            with monkeypatch.context() as context:
+                context.setattr(owner, name, reach)
+                with pytest.raises(type(error)) as caught:
+                    call()
+        finally:
+            signal.signal(signal.SIGALRM, before)
+        assert caught.value is error
+        assert not caplog.records
+        assert len(files(tmp_path)) == is_loaded
+        assert call() == is_loaded
 
 
 def test_concurrent_writes_of_programs_are_all_kept() -> None:
@@ -251,9 +276,9 @@ KERNELS = {
 }
 
 
-@pytest.mark.parametrize(
-    ("module", "old", "new", "changed"),
-    [
+def test_a_change_concerns_what_is_compiled_from_it() -> None:
+    before = code_cache._syntax(KERNELS)
+    for module, old, new, changed in (
         ("engine.f", b"A number", b"A sum", ""),
         ("engine.f", b"a + X", b"a + X  # a comment", ""),
         ("engine.f", b"a + X", b"X + a", "f g entries"),
@@ -264,15 +289,12 @@ KERNELS = {
         ("units", b"Y = 2", b"Y = 3", "f g entries"),
         ("units", b"Z = 3", b"Z = 4", "motor"),
         ("units", b"Z = 3", b"Z = 3\ndef g(): pass", ""),
-    ],
-)
-def test_a_change_concerns_what_is_compiled_from_it(module: str, old: bytes, new: bytes, changed: str) -> None:
-    name = f"kiks.{module}"
-    assert old in KERNELS[name]
-    before, after = code_cache._syntax(KERNELS), code_cache._syntax(KERNELS | {name: KERNELS[name].replace(old, new)})
-    assert {each for each in before if before[each] != after[each]} == {
-        f"kiks.engine.{each}" for each in changed.split()
-    }
+    ):
+        name = f"kiks.{module}"
+        assert old in KERNELS[name]
+        after = code_cache._syntax(KERNELS | {name: KERNELS[name].replace(old, new)})
+        differ = {each for each in before if before[each] != after[each]}
+        assert differ == {f"kiks.engine.{each}" for each in changed.split()}
 
 
 def test_the_camera_is_no_part_of_the_motors() -> None:
@@ -313,13 +335,9 @@ def test_kernels_in_a_file_have_names_of_their_own() -> None:
         assert len(names) == len(set(names))
 
 
-def test_another_version_has_a_folder_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
-    call()
-    monkeypatch.setattr(numba, "__version__", "0.0")
-    code_cache._version.cache_clear()
+@pytest.mark.usefixtures("kept", "another_version")
+def test_another_version_has_a_folder_of_its_own() -> None:
     assert not is_compiled("double_of")
-    monkeypatch.undo()
-    code_cache._version.cache_clear()
 
 
 @pytest.mark.parametrize("home", ["/proc/none", "/dev/null/none", f"/tmp/{'n' * 300}"])
@@ -335,14 +353,12 @@ def test_without_a_home_it_is_among_temporary_files(
     assert stat.S_IMODE(folder.stat().st_mode) == 0o700
 
 
-def test_a_folder_that_others_can_write_to_is_not_used(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    call()
-    (file,) = files(tmp_path)
-    file.unlink()
-    file.parent.chmod(0o777)
+def test_a_folder_that_others_can_write_to_is_not_used(kept: Path, caplog: pytest.LogCaptureFixture) -> None:
+    kept.unlink()
+    kept.parent.chmod(0o777)
     assert [call(), call()] == [False, True]
     assert "(others may write there)" in caplog.text
-    assert not file.exists()
+    assert not kept.exists()
 
 
 def test_on_a_full_disk_the_run_goes_on(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
@@ -355,36 +371,25 @@ def test_on_a_full_disk_the_run_goes_on(tmp_path: Path, caplog: pytest.LogCaptur
 
 
 @pytest.fixture
-def shipped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def shipped(kept: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Return a file with machine code, as a wheel brings it; the user's cache is empty."""
-    call()
-    (file,) = files(tmp_path)
     monkeypatch.setattr(code_cache, "SHIPPED", tmp_path / "compiled")
     (tmp_path / "compiled").mkdir()
-    return Path(shutil.move(file.parent, tmp_path / "compiled")) / file.name
-
-
-def own_files(tmp_path: Path) -> list[Path]:
-    return files(tmp_path / "cache")
+    return Path(shutil.move(kept.parent, tmp_path / "compiled")) / kept.name
 
 
 def test_what_a_wheel_brings_is_used(shipped: Path, tmp_path: Path) -> None:
     assert is_compiled("double_of")
     assert call()
-    assert own_files(tmp_path) == []
+    assert files(tmp_path / "cache") == []
     assert [call(0.5), call(0.5)] == [False, True]
     assert files(shipped.parent) == [shipped]
 
 
-def test_what_a_wheel_brings_for_another_version_is_quietly_ignored(
-    shipped: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    with monkeypatch.context() as context:
-        context.setattr(numba, "__version__", "0.0")
-        code_cache._version.cache_clear()
-        assert not is_compiled("double_of")
-        assert [call(), call()] == [False, True]
-    code_cache._version.cache_clear()
+@pytest.mark.usefixtures("shipped", "another_version")
+def test_what_a_wheel_brings_for_another_version_is_quietly_ignored(caplog: pytest.LogCaptureFixture) -> None:
+    assert not is_compiled("double_of")
+    assert [call(), call()] == [False, True]
     assert not caplog.records
 
 

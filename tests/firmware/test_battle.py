@@ -25,17 +25,15 @@ def ask(sim: kiks.Simulation, order: str, robot: int = 1) -> list[int]:
     return [int(word) for word in reply.split(",")[3:]]
 
 
-@pytest.mark.parametrize(
-    ("heading_deg", "distance_mm"), [(0, 462), (90, 262), (180, 262), (270, 262), (-90, 262), (720, 462)]
-)
-def test_it_knows_where_it_is(heading_deg: float, distance_mm: int) -> None:
+def test_it_knows_where_it_is() -> None:
     sim = a_simulation(1, (1,))
-    sim.place(1, 300.7, 299.6, math.radians(heading_deg))
-    x_mm, y_mm, angle, ahead_mm, percent, points, hits = ask(sim, "S")
-    # 300.7 mm from the left is in KiKS's column 301, 600 - 299.6 from the top in its row 300 (kiks-behaviour.md, 0).
-    assert (x_mm, y_mm, angle) == (301, 300, heading_deg % 360)
-    assert ahead_mm == pytest.approx(distance_mm, abs=2)
-    assert (percent, points, hits) == (100, 27, 0)
+    for heading_deg, distance_mm in ((0, 462), (90, 262), (180, 262), (270, 262), (-90, 262), (720, 462)):
+        sim.place(1, 300.7, 299.6, math.radians(heading_deg))
+        x_mm, y_mm, angle, ahead_mm, percent, points, hits = ask(sim, "S")
+        # 300.7 mm from the left is in KiKS column 301, 600 - 299.6 from the top in row 300 (kiks-behaviour.md, 0).
+        assert (x_mm, y_mm, angle) == (301, 300, heading_deg % 360)
+        assert ahead_mm == pytest.approx(distance_mm, abs=2)
+        assert (percent, points, hits) == (100, 27, 0)
 
 
 def test_a_shot_costs_and_a_hit_hurts() -> None:
@@ -70,36 +68,30 @@ def test_energy_comes_back_a_point_a_second() -> None:
     assert ask(sim, "S")[4:6] == [100, 27]
 
 
-@pytest.mark.parametrize("what", ["wall", "ball", "robot without the turret", "lifted"])
-def test_things_stop_a_shot(what: str) -> None:
+@pytest.mark.parametrize(
+    ("what", "target", "distance_mm"),
+    [("wall", -1, 62), ("ball", -1, 140), ("robot without the turret", 3, 145), ("lifted", 2, 445)],
+)
+def test_things_stop_a_shot(what: str, target: int, distance_mm: int) -> None:
     sim = a_simulation(3)
-    sim.place(1, 100, 300, 0.0)
+    sim.place(1, 100, 300, math.pi if what == "wall" else 0.0)
     sim.place(2, 600, 300, 0.0)
-    if what == "wall":
-        sim.place(1, 100, 300, math.pi)
-    elif what == "robot without the turret":
+    if what == "robot without the turret":
         sim.place(3, 300, 300, 0.0)
-    else:
+    elif what != "wall":
         sim.add_ball(300, 300)
         sim.world.state.bodies["is_lifted"] = what == "lifted"
         sim.world.rebuild_scene()
-    target, distance_mm = ask(sim, "F")
-    assert target == {"wall": -1, "ball": -1, "robot without the turret": 3, "lifted": 2}[what]
-    assert distance_mm == {"wall": 62, "ball": 140, "robot without the turret": 145, "lifted": 445}[what]
+    assert ask(sim, "F") == [target, distance_mm]
     assert ask(sim, "S", 2)[6] == (1 if what == "lifted" else 0)
 
 
-def test_nose_to_nose_the_distance_is_nought() -> None:
+def test_nose_to_nose_the_distance_is_nought_and_energy_stands_in_the_state() -> None:
     sim = a_simulation()
     sim.place(1, 100, 300, 0.0)
     sim.place(2, 155.001, 300, 0.0)
-    assert ask(sim, "F") == [2, 0]
-
-
-def test_energy_stands_in_the_state() -> None:
-    sim = a_simulation()
     snapshot = sim.world.state.snapshot()
-    ask(sim, "F")
+    assert ask(sim, "F") == [2, 0]
     assert sim.state_hash() != snapshot.hash()
     sim.world.state.restore(snapshot)
     assert ask(sim, "S")[5] == 27

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import logging
 import re
-import subprocess
-import sys
+import runpy
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -63,19 +62,17 @@ def test_records_have_no_gaps() -> None:
         assert sum(record[name].itemsize for name in record.names or ()) == record.itemsize
 
 
-def test_tables_are_complete_and_say_what_orders_do() -> None:
-    sim = kiks.Simulation()
+def test_tables_are_complete_and_each_order_has_a_transcript_and_a_line_in_the_documents() -> None:
+    sim = kiks.Simulation(robots=2)
     for name in TURRETS:
-        turret = sim.fit(1, name)
-        assert (set(turret.orders) if turret.number >= 0 else set()) == {
-            letter.decode() for letter in ORDERS.get(turret.number, {})
-        }
+        turret = sim.fit(2, name)
+        known = {letter.decode() for letter in ORDERS.get(turret.number, {})}
+        assert (set(turret.orders) if turret.number >= 0 else set()) == known
         for letter, (count, act) in turret.orders.items():
             assert count >= 0
             assert (act.__doc__ or "").startswith(f"{letter}: ")
-
-
-def test_every_order_has_a_transcript_and_a_line_in_the_documents() -> None:
+    assert execute(sim, "net") == "No intelligent turret"
+    assert [line.split(", ")[1] for line in execute(sim, "net", 2).splitlines()] == ["ID 1", "ID 2", "ID 4", "ID 99"]
     sent = "".join(path.read_text(encoding="ascii") for path in FOLDER.glob("*.txt"))
     page = (ROOT / "docs" / "howto" / "turrets.md").read_text(encoding="utf-8")
     for number, orders in ORDERS.items():
@@ -87,34 +84,23 @@ def test_every_order_has_a_transcript_and_a_line_in_the_documents() -> None:
 
 def test_all_of_them_can_be_drawn() -> None:
     sim = kiks.Simulation()
-    before = {}
-    for name in TURRETS:
-        before[name] = sim.fit(1, name)
+    fitted = {name: sim.fit(1, name) for name in TURRETS}
     digest = sim.state_hash()
-    for turret in before.values():
-        shapes = turret.shapes()
-        assert shapes
-        for shape in shapes:
+    for turret in fitted.values():
+        assert turret.shapes()
+        for shape in turret.shapes():
             assert isinstance(shape, Shape)
             assert re.fullmatch("#[0-9a-f]{6}", shape.colour)
             assert (len(shape.points) == 1) == (shape.radius_mm > 0)
             assert all(abs(mm) < 100 for point in shape.points for mm in point)
     assert sim.state_hash() == digest
-    down, up = [], []
-    for arm, into in ((255, down), (127, up)):
+    farthest = []
+    for arm in (255, 127):
         execute(sim, f"T,1,E,{arm}")
         sim.run(1.1)
         sim.sync()
-        into += [max(x for x, _ in shape.points) for shape in before["gripper"].shapes()]
-    assert min(down) > 60 > 0 > max(up)
-
-
-def test_what_a_turret_adds_is_in_net_and_in_no_other_robot() -> None:
-    sim = kiks.Simulation(robots=2)
-    for name in TURRETS:
-        sim.fit(2, name)
-    assert execute(sim, "net") == "No intelligent turret"
-    assert [line.split(", ")[1] for line in execute(sim, "net", 2).splitlines()] == ["ID 1", "ID 2", "ID 4", "ID 99"]
+        farthest.append([max(x for x, _ in shape.points) for shape in fitted["gripper"].shapes()])
+    assert min(farthest[0]) > 60 > 0 > max(farthest[1])
 
 
 def test_general_io_is_wired_to_the_outside() -> None:
@@ -141,27 +127,24 @@ def test_general_io_is_wired_to_the_outside() -> None:
     assert io.inputs == 0b1000_0100
 
 
-@pytest.mark.parametrize(
-    ("call", "words"),
-    [
-        (lambda io: setattr(io, "inputs", 256), "inputs must be a whole number from 0 to 255, but it was 256"),
-        (lambda io: setattr(io, "inputs", 1.5), "inputs must be a whole number from 0 to 255, but it was 1.5"),
-        (lambda io: io.set_input(8, True), "wire must be a whole number from 0 to 7, but it was 8"),
-        (lambda io: io.set_analog(2, 1.0), "channel must be a whole number from 3 to 5, but it was 2"),
-        (lambda io: io.set_analog(3, float("nan")), "volts must be a finite number, but it was nan"),
-        (lambda io: io.set_analog(3, "1"), "volts must be a finite number, but it was '1'"),
-    ],
-)
-def test_general_io_minds_its_numbers(call: Any, words: str) -> None:
-    with pytest.raises(kiks.ParameterError, match=words):
-        call(kiks.Simulation().fit(1, "io"))
+def test_general_io_minds_its_numbers() -> None:
+    io: Any = kiks.Simulation().fit(1, "io")
+    for call, words in (
+        (lambda: setattr(io, "inputs", 256), "inputs must be a whole number from 0 to 255, but it was 256"),
+        (lambda: setattr(io, "inputs", 1.5), "inputs must be a whole number from 0 to 255, but it was 1.5"),
+        (lambda: io.set_input(8, True), "wire must be a whole number from 0 to 7, but it was 8"),
+        (lambda: io.set_analog(2, 1.0), "channel must be a whole number from 3 to 5, but it was 2"),
+        (lambda: io.set_analog(3, float("nan")), "volts must be a finite number, but it was nan"),
+        (lambda: io.set_analog(3, "1"), "volts must be a finite number, but it was '1'"),
+    ):
+        with pytest.raises(kiks.ParameterError, match=words):
+            call()
 
 
-@pytest.mark.slow
-def test_the_example_runs() -> None:
+def test_the_example_runs(capsys: pytest.CaptureFixture[str]) -> None:
     path = ROOT / "examples" / "turrets" / "compass.py"
-    done = subprocess.run([sys.executable, str(path)], capture_output=True, text=True, check=True)
-    assert re.fullmatch(r"heading 30\nturned by 8\d\n", done.stdout)
+    runpy.run_path(str(path), run_name="__main__")
+    assert re.fullmatch(r"heading 30\nturned by 8\d\n", capsys.readouterr().out)
     assert len(path.read_text(encoding="utf-8").splitlines()) < 60
 
 
@@ -248,9 +231,9 @@ def a_turret(**changes: Any) -> Turret:
     return type("Odd", (Counter,), changes)()
 
 
-@pytest.mark.parametrize(
-    ("turret", "words"),
-    [
+def test_what_is_no_turret_is_refused_and_nothing_is_fitted_twice() -> None:
+    sim = kiks.Simulation()
+    for turret, words in (
         ("griper", "turret must be one of 'k213', .* but it was 'griper'. Did you mean 'gripper'"),
         (7, "turret must be a name or a kiks.firmware.turret.Turret, but it was 7"),
         (Counter, "turret must be a name or a kiks.firmware.turret.Turret"),
@@ -264,17 +247,11 @@ def a_turret(**changes: Any) -> Turret:
         (a_turret(orders={"c": (0, len)}), "orders of a turret must be capital letters other than B, but one was 'c'"),
         (a_turret(orders={"C": len}), "orders of a turret must be a count of numbers and a function, but C was"),
         (a_turret(memory_count=17), "turret Odd: memory_count must be at most 16, but it was 17"),
-    ],
-)
-def test_what_is_no_turret_is_refused(turret: Any, words: str) -> None:
-    with pytest.raises(kiks.ParameterError, match=words):
-        kiks.Simulation().fit(1, turret)
-
-
-@pytest.mark.parametrize("name", TURRETS)
-def test_nothing_is_fitted_twice(name: str) -> None:
-    sim = kiks.Simulation()
-    first = sim.fit(1, name)
-    with pytest.raises(kiks.ParameterError, match="turret must be one that robot 1 has not got"):
+    ):
+        with pytest.raises(kiks.ParameterError, match=words):
+            sim.fit(1, turret)
+    for count, name in enumerate(TURRETS, 1):
         sim.fit(1, name)
-    assert sim.wires[0].firmware.fitted == [first]
+        with pytest.raises(kiks.ParameterError, match="turret must be one that robot 1 has not got"):
+            sim.fit(1, name)
+        assert len(sim.wires[0].firmware.fitted) == count

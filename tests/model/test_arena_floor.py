@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
+from tests.model.refusals import refused
 
 from kiks.errors import KiksError
 from kiks.export.pictures import Picture
@@ -43,27 +44,23 @@ def test_zones_lie_over_the_floor_and_change_no_wall() -> None:
     assert np.array_equal(shades[~disc & ~(np.abs(rows - 20) <= 6)], SHADES[~disc & ~(np.abs(rows - 20) <= 6)])
 
 
-def same(one: Arena, other: Arena) -> bool:
-    assert one.shades is not None
-    assert other.shades is not None
-    return one.zones == other.zones and np.array_equal(one.shades, other.shades)
-
-
 def test_a_floor_comes_back_from_files_and_pickles(tmp_path: Path) -> None:
     arena = drawn()
     save_arena(arena, tmp_path / "den.toml")
     assert sorted(each.name for each in tmp_path.iterdir()) == ["den.png", "den.toml", "den_floor.png"]
-    project = Project(arena)
     coarse = Arena.from_array(np.zeros((60, 70), np.uint8), mm_per_pixel=2.5)
     coarse = replace(coarse, floor=np.kron(SHADES[:60, :70], np.ones((3, 3), np.uint8)))
-    for found in (
-        Arena.load(tmp_path / "den.toml"),
-        Project.from_bytes(project.to_bytes()).arena,
-        pickle.loads(pickle.dumps(arena)),
-        copy.deepcopy(arena),
+    for given, found in (
+        (arena, Arena.load(tmp_path / "den.toml")),
+        (arena, Project.from_bytes(Project(arena).to_bytes()).arena),
+        (arena, pickle.loads(pickle.dumps(arena))),
+        (arena, copy.deepcopy(arena)),
+        (coarse, Project.from_bytes(Project(coarse).to_bytes()).arena),
     ):
-        assert same(found, arena)
-    assert same(Project.from_bytes(Project(coarse).to_bytes()).arena, coarse)
+        assert given.shades is not None
+        assert found.shades is not None
+        assert found.zones == given.zones
+        assert np.array_equal(found.shades, given.shades)
     assert repr(arena) == "<Arena 'box': 300 x 200 mm, 2 zones, a floor>"
 
 
@@ -79,35 +76,22 @@ def test_the_picture_of_a_floor_has_row_0_on_top_and_the_scale_of_the_walls(tmp_
     assert [arena.floor[-1, -1], arena.floor[-2, -2], arena.floor[-3, -3], arena.floor[0, 0]] == [0, 0, 255, 255]
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
+def test_a_floor_that_is_wrong_is_one_line(tmp_path: Path) -> None:
+    Image.fromarray(SHADES).save(tmp_path / "zones.png")
+    for text, words in (
         ('size_mm = [300, 201]\nfloor = "zones.png"', "as large as the arena, 300 x 201 pixels of 1 mm, but it"),
         ('size_mm = [300, 200]\nfloor = "none.png"', "none.png"),
         ('size_mm = [300, 200]\nfloor = "../zones.png"', "floor"),
         ("size_mm = [300, 200]\n[[zone]]\nradius_mm = 3", "a zone must have one of line_mm, box_mm and disc_mm"),
         ("size_mm = [300, 200]\n[[zone]]\ndisc_mm = [900, 0]\nradius_mm = 3", "zone 1 must cover a part of the arena"),
         ("size_mm = [300, 200]\n[[zone]]\nbox_mm = [[0, 0], [9, 9]]\nbrightness = 256", "brightness"),
-    ],
-)
-def test_a_floor_that_is_wrong_is_one_line(tmp_path: Path, text: str, words: str) -> None:
-    Image.fromarray(SHADES).save(tmp_path / "zones.png")
-    (tmp_path / "a.toml").write_text(text)
-    with pytest.raises(KiksError) as caught:
-        Arena.load(tmp_path / "a.toml")
-    assert words in str(caught.value)
-    assert "\n" not in str(caught.value)
-
-
-@pytest.mark.parametrize("floor", [SHADES[:-1], SHADES.astype(float), "white", SHADES[None]])
-def test_a_floor_is_checked(floor: object) -> None:
-    with pytest.raises(KiksError, match="floor must"):
-        replace(Arena.box(300, 200), floor=floor)
-
-
-def test_an_arena_alone_names_no_picture_of_a_floor() -> None:
-    with pytest.raises(KiksError, match="no floor beside it"):
-        decode_arena(b'size_mm = [300, 200]\nfloor = "zones.png"')
+    ):
+        (tmp_path / "a.toml").write_text(text)
+        refused(words, Arena.load, tmp_path / "a.toml", error=KiksError)
+    for floor in (SHADES[:-1], SHADES.astype(float), "white", SHADES[None]):
+        refused("floor must", lambda floor=floor: replace(Arena.box(300, 200), floor=floor), error=KiksError)
+    file = b'size_mm = [300, 200]\nfloor = "zones.png"'
+    refused("no floor beside it", decode_arena, file, error=KiksError)
 
 
 def test_a_floor_never_changes() -> None:

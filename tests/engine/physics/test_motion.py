@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numba import njit
 from tests.at_length import share
 
+from kiks.engine.compiling import entry
 from kiks.engine.physics.contact import Ground, clearance_mm
 from kiks.engine.physics.motion import move, pose_between, remember_pose
 from kiks.model.arena import PAD, Arena
@@ -22,7 +22,7 @@ PULSE, BASE = 0.08, 53.0
 PATHS = st.floats(-130.0, 130.0)
 
 
-@njit
+@entry
 def _drive(robots, kinds, field, paths):
     ground, robot = Ground(field, 1.0, PAD), robots[0, 0]
     for tick in range(paths.shape[0]):
@@ -31,7 +31,7 @@ def _drive(robots, kinds, field, paths):
         move(ground, robot, kinds[0], paths[tick, 0], paths[tick, 1], room_mm, 0.1)
 
 
-@njit
+@entry
 def _between(robots, ticks_ago, share):
     return pose_between(robots[0, 0], ticks_ago, share)
 
@@ -89,7 +89,7 @@ def test_power_follows_the_closed_form_of_the_lag(make_world):
         assert world.pose[2] == pytest.approx((path[1] - path[0]) * PULSE / BASE, abs=1e-9)
 
 
-@settings(derandomize=True, max_examples=share(100, 200))
+@settings(derandomize=True, max_examples=share(50, 200))
 @given(left=PATHS, right=PATHS, heading=st.floats(-50.0, 50.0), share=st.floats(0.0, 1.0))
 def test_a_moment_within_a_tick_is_where_a_part_of_the_paths_leads(make_world, left, right, heading, share):
     whole = make_world(FLOOR).place(2000.0, 2000.0, heading)
@@ -99,7 +99,7 @@ def test_a_moment_within_a_tick_is_where_a_part_of_the_paths_leads(make_world, l
     assert _between(whole.state.robots, 0, share) == pytest.approx(part.pose, rel=0, abs=1e-9)
 
 
-@settings(derandomize=True, max_examples=100)
+@settings(derandomize=True, max_examples=share(30, 100))
 @given(paths=st.lists(st.tuples(PATHS, PATHS), min_size=3, max_size=3), ticks_ago=st.integers(0, 2))
 def test_both_ends_of_a_tick_are_exact(make_world, paths, ticks_ago):
     world = make_world(FLOOR).place(2000.0, 2000.0, 0.4)
@@ -107,12 +107,11 @@ def test_both_ends_of_a_tick_are_exact(make_world, paths, ticks_ago):
     for path in paths:
         drive(world, path)
         ends.append(world.pose)
-    begin, end = ends[-2 - ticks_ago], ends[-1 - ticks_ago]
-    assert _between(world.state.robots, ticks_ago, 0.0) == pytest.approx(begin, rel=0, abs=1e-12)
-    assert _between(world.state.robots, ticks_ago, 1.0) == pytest.approx(end, rel=0, abs=1e-12)
+    for part, end in ((0.0, ends[-2 - ticks_ago]), (1.0, ends[-1 - ticks_ago])):
+        assert _between(world.state.robots, ticks_ago, part) == pytest.approx(end, rel=0, abs=1e-12)
 
 
-@settings(derandomize=True, max_examples=100)
+@settings(derandomize=True, max_examples=share(50, 100))
 @given(left=PATHS, right=PATHS)
 def test_pieces_near_a_wall_add_up_to_the_same_arc(make_world, left, right):
     """The arc is cut where a wall is near; without a contact that changes nothing."""

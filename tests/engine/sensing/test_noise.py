@@ -28,12 +28,17 @@ SILENT, KIKS2 = documented(0), documented(1)
 """The noise of the thesis (3.3), and that of KiKS 2.2.0 (kiks-behaviour.md 3.1, steps 7 and 8)."""
 
 
-def rounds(robot: RobotSpec, count: int, gap_mm: float | None = None, seed: int = 2) -> np.ndarray:
-    """Return readings of a robot that stands still, in the open or looking straight at a wall, shape [count, 8]."""
-    sim = kiks.Simulation(kiks.Arena.box(600, 600), robot=robot, seed=seed)
+def before_wall(robot: RobotSpec, gap_mm: float | None) -> kiks.Simulation:
+    """Return a robot in the open, or one that looks straight at a wall."""
+    sim = kiks.Simulation(kiks.Arena.box(600, 600), robot=robot, seed=2)
     if gap_mm is not None:
         sim.place(1, 300, 590 - robot.body.radius_mm - gap_mm, math.pi / 2)
-    rows = []
+    return sim
+
+
+def rounds(robot: RobotSpec, count: int, gap_mm: float | None = None) -> np.ndarray:
+    """Return readings of a robot that stands still, shape [count, 8]."""
+    sim, rows = before_wall(robot, gap_mm), []
     for _ in range(count):
         sim.run(0.02)
         rows.append(sim.proximity(1, noise=True))
@@ -41,9 +46,7 @@ def rounds(robot: RobotSpec, count: int, gap_mm: float | None = None, seed: int 
 
 
 def expected(robot: RobotSpec, gap_mm: float) -> np.ndarray:
-    sim = kiks.Simulation(kiks.Arena.box(600, 600), robot=robot)
-    sim.place(1, 300, 590 - robot.body.radius_mm - gap_mm, math.pi / 2)
-    return np.array(sim.proximity(1))
+    return np.array(before_wall(robot, gap_mm).proximity(1))
 
 
 def test_idle_readings_are_those_of_a_real_khepera() -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import math
-import re
 from pathlib import Path
 
 import numpy as np
@@ -161,23 +160,3 @@ def test_the_khepera_ii_reads_multiples_of_four_above_a_baseline() -> None:
     assert 40 < readings.mean(axis=0).min() < readings.mean(axis=0).max() < 156
     sim.place(1, 400, 790 - 35, math.pi / 2)
     assert max(sim.proximity(1, noise=True)) > 900
-
-
-@pytest.mark.parametrize(
-    ("robot", "key", "value", "words"),
-    [
-        (KHEPERA_II, "curve.distance_mm", (10.0, 10.0), "a list that rises"),
-        (KHEPERA_II, "curve.counts", (1200.0, 1300.0, 10.0, 5.0), "one for each distance, falling"),
-        (KHEPERA, "proximity.jitter_counts", (), "have at least 1 item"),
-        (KHEPERA, "proximity.jitter_counts", (3.0, 1.0), "be a list in which none is below the one before"),
-        (KHEPERA, "proximity.noise_down", 1.5, "be at most 1"),
-        (KHEPERA, "ambient.lamp_counts", (50.0, 70.0, 60.0), "a list that rises to dark_counts"),
-        (KHEPERA, "ambient.lamp_counts", (50.0, 460.0), "a list that rises to dark_counts"),
-        (KHEPERA, "ambient.background_counts", 460.0, "above lamp_counts, up to dark_counts"),
-        (KHEPERA, "ambient.background_counts", 50.0, "above lamp_counts, up to dark_counts"),
-    ],
-)
-def test_an_error_names_the_wrong_parameter(robot: RobotSpec, key: str, value: object, words: str) -> None:
-    with pytest.raises(ParameterError) as caught:
-        robot.with_changes(**{key.replace(".", "__"): value})
-    assert re.search(rf"{key} must .*{words}.*, but it was {re.escape(repr(value))}", str(caught.value))
