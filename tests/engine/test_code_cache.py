@@ -80,7 +80,7 @@ def another_version(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     code_cache._version.cache_clear()
 
 
-def test_the_second_call_comes_from_the_disk(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_the_second_call_comes_from_the_disk(tmp_path, caplog):
     assert not is_compiled("double_of")
     assert [call(), call(), call(0.5), call(0.5), call()] == [False, True, False, True, True]
     assert is_compiled("double_of")
@@ -89,7 +89,7 @@ def test_the_second_call_comes_from_the_disk(tmp_path: Path, caplog: pytest.LogC
     assert not caplog.records
 
 
-def test_a_start_that_was_interrupted_has_not_compiled_all() -> None:
+def test_a_start_that_was_interrupted_has_not_compiled_all():
     folder = next(code_cache.cache_folders())
     folder.mkdir(parents=True)
     digest = code_cache.digest_of("kiks.engine.step")
@@ -128,7 +128,7 @@ DAMAGES: list[Damage] = [
 
 
 @pytest.mark.slow
-def test_a_damaged_file_is_thrown_away(kept: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_a_damaged_file_is_thrown_away(kept, tmp_path, caplog):
     whole = kept.read_bytes()
     for damage in DAMAGES:
         kept.write_bytes(damage(whole))
@@ -141,9 +141,7 @@ def test_a_damaged_file_is_thrown_away(kept: Path, tmp_path: Path, caplog: pytes
 
 
 @pytest.mark.parametrize("rights", [0o620, 0o602, 0o600])
-def test_code_in_files_that_others_can_write_is_not_run(
-    rights: int, kept: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_code_in_files_that_others_can_write_is_not_run(rights, kept, tmp_path, monkeypatch, caplog):
     monkeypatch.setenv("KIKS_TEST_BOMB", str(tmp_path / "bombed"))
     key, payload = pickle.dumps(Bomb()), pickle.dumps(Bomb())
     head = [code_cache._FORMAT, b"%d" % len(key), code_cache._digest(key), code_cache._digest(payload)]
@@ -177,14 +175,7 @@ def open_folder(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 @needs_root
 @pytest.mark.parametrize("user", [0, STRANGER])
 @pytest.mark.parametrize(("cache", "level"), [("/proc/none", 0), ("named", 0), ("named", 1)])
-def test_code_in_a_folder_of_another_user_is_not_run(
-    user: int,
-    cache: str,
-    level: int,
-    open_folder: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    caplog: pytest.LogCaptureFixture,
-) -> None:
+def test_code_in_a_folder_of_another_user_is_not_run(user, cache, level, open_folder, monkeypatch, caplog):
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(open_folder / cache))
     acting = as_stranger if user else nullcontext
     with acting():
@@ -201,9 +192,7 @@ def test_code_in_a_folder_of_another_user_is_not_run(
 
 
 @needs_root
-def test_a_link_of_another_user_leads_to_no_code(
-    open_folder: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_a_link_of_another_user_leads_to_no_code(open_folder, monkeypatch, caplog):
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(open_folder / "own"))
     assert [call(), call()] == [False, True]
     (open_folder / "kiks").symlink_to("own/kiks")
@@ -222,9 +211,7 @@ class LateError(Exception):
     ("owner", "name"),
     [(os, "fstat"), (code_cache, "_digest"), (pickle, "loads"), (code_cache._Result, "_rebuild"), (os, "fsync")],
 )
-def test_what_a_signal_raises_while_code_is_loaded_or_kept_goes_on(
-    owner: Any, name: str, kept: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: Any
-) -> None:
+def test_what_a_signal_raises_while_code_is_loaded_or_kept_goes_on(owner, name, kept, tmp_path, monkeypatch, caplog):
     is_loaded, real = name != "fsync", getattr(owner, name)
 
     def reach(*args: Any, **words: Any) -> Any:
@@ -252,7 +239,7 @@ def test_what_a_signal_raises_while_code_is_loaded_or_kept_goes_on(
         assert call() == is_loaded
 
 
-def test_concurrent_writes_of_programs_are_all_kept() -> None:
+def test_concurrent_writes_of_programs_are_all_kept():
     one, other = entry(double_of), entry(double_of)
     contexts = one.targetctx, other.targetctx
     whole, real = (numba.int64,), (numba.float64,)
@@ -276,7 +263,7 @@ KERNELS = {
 }
 
 
-def test_a_change_concerns_what_is_compiled_from_it() -> None:
+def test_a_change_concerns_what_is_compiled_from_it():
     before = code_cache._syntax(KERNELS)
     for module, old, new, changed in (
         ("engine.f", b"A number", b"A sum", ""),
@@ -297,7 +284,7 @@ def test_a_change_concerns_what_is_compiled_from_it() -> None:
         assert differ == {f"kiks.engine.{each}" for each in changed.split()}
 
 
-def test_the_camera_is_no_part_of_the_motors() -> None:
+def test_the_camera_is_no_part_of_the_motors():
     kernels = code_cache._digests()
     assert {"kiks.engine.physics.motor", "kiks.engine.sensing.camera", "kiks.batch.loop"} <= set(kernels)
     sources = code_cache._sources()
@@ -308,7 +295,7 @@ def test_the_camera_is_no_part_of_the_motors() -> None:
         assert {each for each in before if before[each] != after[each]} == {f"kiks.engine.{k}" for k in wanted.split()}
 
 
-def test_the_digests_of_the_sources_are_computed_once(tmp_path: Path) -> None:
+def test_the_digests_of_the_sources_are_computed_once(tmp_path):
     digests = code_cache._digests.__wrapped__()
     (known,) = (tmp_path / "cache" / "kiks").glob("sources-*")
     text = known.read_bytes()
@@ -319,9 +306,7 @@ def test_the_digests_of_the_sources_are_computed_once(tmp_path: Path) -> None:
     assert known.read_bytes() == text
 
 
-def test_code_that_calls_a_kernel_with_other_arguments_than_it_takes_is_compiled_again(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_code_that_calls_a_kernel_with_other_arguments_than_it_takes_is_compiled_again(monkeypatch):
     monkeypatch.setattr(code_cache, "_AT_LOAD", {"numba.dynamic": lambda: None})
     monkeypatch.setattr(code_cache, "_linked_in", lambda library: ["numba.dynamic"])
     assert [call(), call()] == [False, True]
@@ -329,21 +314,19 @@ def test_code_that_calls_a_kernel_with_other_arguments_than_it_takes_is_compiled
     assert not call()
 
 
-def test_kernels_in_a_file_have_names_of_their_own() -> None:
+def test_kernels_in_a_file_have_names_of_their_own():
     for path in (Path(code_cache.__file__).parents[1]).rglob("*.py"):
         names = re.findall(r"^@(?:entry|linked.*)\ndef (\w+)", path.read_text(), re.M)
         assert len(names) == len(set(names))
 
 
 @pytest.mark.usefixtures("kept", "another_version")
-def test_another_version_has_a_folder_of_its_own() -> None:
+def test_another_version_has_a_folder_of_its_own():
     assert not is_compiled("double_of")
 
 
 @pytest.mark.parametrize("home", ["/proc/none", "/dev/null/none", f"/tmp/{'n' * 300}"])
-def test_without_a_home_it_is_among_temporary_files(
-    home: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_without_a_home_it_is_among_temporary_files(home, tmp_path, monkeypatch, caplog):
     monkeypatch.setenv("NUMBA_CACHE_DIR", home)
     assert [call(), call(), call(0.5)] == [False, True, False]
     (line,) = [record.getMessage() for record in caplog.records]
@@ -353,7 +336,7 @@ def test_without_a_home_it_is_among_temporary_files(
     assert stat.S_IMODE(folder.stat().st_mode) == 0o700
 
 
-def test_a_folder_that_others_can_write_to_is_not_used(kept: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_a_folder_that_others_can_write_to_is_not_used(kept, caplog):
     kept.unlink()
     kept.parent.chmod(0o777)
     assert [call(), call()] == [False, True]
@@ -361,7 +344,7 @@ def test_a_folder_that_others_can_write_to_is_not_used(kept: Path, caplog: pytes
     assert not kept.exists()
 
 
-def test_on_a_full_disk_the_run_goes_on(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_on_a_full_disk_the_run_goes_on(tmp_path, caplog):
     with full_disk(1000):
         assert [call(), call(), call(0.5)] == [False] * 3
     (line,) = [record.getMessage() for record in caplog.records]
@@ -378,7 +361,7 @@ def shipped(kept: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path
     return Path(shutil.move(kept.parent, tmp_path / "compiled")) / kept.name
 
 
-def test_what_a_wheel_brings_is_used(shipped: Path, tmp_path: Path) -> None:
+def test_what_a_wheel_brings_is_used(shipped, tmp_path):
     assert is_compiled("double_of")
     assert call()
     assert files(tmp_path / "cache") == []
@@ -387,7 +370,7 @@ def test_what_a_wheel_brings_is_used(shipped: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.usefixtures("shipped", "another_version")
-def test_what_a_wheel_brings_for_another_version_is_quietly_ignored(caplog: pytest.LogCaptureFixture) -> None:
+def test_what_a_wheel_brings_for_another_version_is_quietly_ignored(caplog):
     assert not is_compiled("double_of")
     assert [call(), call()] == [False, True]
     assert not caplog.records
@@ -395,9 +378,7 @@ def test_what_a_wheel_brings_for_another_version_is_quietly_ignored(caplog: pyte
 
 @pytest.mark.parametrize("is_folder", [False, True])
 @pytest.mark.parametrize("right", [0, 0o020, 0o002])
-def test_what_is_damaged_or_others_can_write_in_a_wheel_stays_and_is_quietly_ignored(
-    right: int, is_folder: bool, shipped: Path, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_what_is_damaged_or_others_can_write_in_a_wheel_stays_and_is_quietly_ignored(right, is_folder, shipped, caplog):
     path = shipped.parent if is_folder else shipped
     path.chmod(stat.S_IMODE(path.stat().st_mode) | right)
     if not right:
@@ -408,7 +389,7 @@ def test_what_is_damaged_or_others_can_write_in_a_wheel_stays_and_is_quietly_ign
     assert not caplog.records
 
 
-def test_a_user_without_a_home(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_a_user_without_a_home(monkeypatch, tmp_path):
     def lost() -> Path:
         raise RuntimeError("Could not determine home directory.")
 

@@ -1,19 +1,23 @@
-"""The robot's program: what lines do to its state, and the tools that have rules of their own."""
+"""The robot's program: what lines do to its state, the tools that have rules of their own, and the page."""
 
 import math
+import runpy
+from pathlib import Path
 
 import pytest
 from tests.session_player import TURRETS
 
-from kiks.firmware.commands import COMMANDS
+from kiks.firmware.commands import COMMANDS, Command
 from kiks.firmware.khepera import Firmware
 from kiks.firmware.receiver import LINE_LIMIT, Receiver
+from kiks.firmware.tools import TOOLS
 from kiks.firmware.turret import Turret
 from kiks.model.arena import Arena
 from kiks.model.robot import RobotSpec
 from kiks.sim.simulation import SimPort, Simulation
 
 UNKNOWN = b"Command not found\r\n"
+DOCS = Path(__file__).parents[2] / "docs"
 ERROR = b"z,Protocol error\r\n"
 NO_HELP = b"help: no tool or command of that name\r\n"
 
@@ -55,7 +59,8 @@ def test_quirks() -> None:
         ("accept_lower_case", b"help n", NO_HELP),
     ):
         assert a_robot(**{f"quirks__{quirk}": True}).execute(line, 0) == reply, line
-    assert [line for _, line in Receiver().feed(b"\r\nN\n")] == [b"", b"", b"N"]
+    robot = a_robot(quirks__answer_empty_lines=True)
+    assert [line for _, line in robot.receiver.feed(b"\r\nN\n")] == [b"", b"", b"N"]
     assert a_robot().execute(b"", 0) == b""
     assert a_robot().execute(b"D," + b"9" * 5000 + b",5", 0) == UNKNOWN, "execute itself minds the limit"
 
@@ -289,3 +294,15 @@ def test_the_demonstration_avoids_walls_and_still_answers() -> None:
     travelled_mm = sim.travelled_mm(1)
     sim.run(1.0)
     assert sim.travelled_mm(1) == pytest.approx(travelled_mm, abs=0.1)
+
+
+def test_the_page_of_the_protocol_has_a_section_of_each_command_and_tool() -> None:
+    page = (DOCS / "reference" / "protocol.md").read_text(encoding="utf-8")
+    for name in (*(f"{row.letter}: {row.name}" for row in COMMANDS), *TOOLS):
+        assert f"### {name}\n" in page
+
+
+def test_a_new_letter_has_an_example_without_an_entry_for_it() -> None:
+    row = Command("X", "new", ("a", "b"), (), "", print)
+    section = runpy.run_path(str(DOCS / "pages" / "protocol.py"))["command"](row)
+    assert "-> X,1,1" in list(section)
