@@ -142,4 +142,4 @@ def make_world() -> type[World]:
 @pytest.fixture(scope="session")
 def make_random_arena():
     """Return the maker of random arenas."""
-    return lru_cache(maxsize=32)(random_arena)
+    return lru_cache(maxsize=8)(random_arena)

@@ -49,10 +49,7 @@ def test_a_message_takes_the_time_of_its_characters() -> None:
         assert read(sim, 2) == [1, len(data), *data, *[0] * (16 - len(data))]
         assert status(sim, 2) == READY
         assert read(sim, 2) == [0] * 18
-
-
-def test_bytes_beyond_the_length_are_not_sent_and_only_eight_bits_count() -> None:
-    sim = a_simulation()
+    # Bytes beyond the length are not sent, and only eight bits count.
     execute(sim, 1, "T,4,S,2,3,257,-1,3,4,5,6,7,8,9,10,11,12,13,14,15,16")
     sim.run(0.1)
     assert read(sim, 2) == [1, 3, 1, 255, 3, *[0] * 13]
@@ -73,22 +70,18 @@ def test_a_message_without_a_receiver_fails_after_its_repeats() -> None:
         assert read(sim, 2)[:3] == [1, 1, 4]
 
 
-def test_busy_a_second_message_is_dropped() -> None:
-    sim = a_simulation()
+def test_busy_a_second_message_is_dropped_and_at_an_overrun_the_older_one_stays() -> None:
+    sim = a_simulation((1, 2, 3))
     send(sim, 1, 2, [1])
     send(sim, 1, 2, [2])
     sim.run(0.5)
     assert read(sim, 2)[:3] == [1, 1, 1]
     assert read(sim, 2)[0] == 0
-
-
-def test_overrun_the_older_message_stays_and_the_sender_learns_it() -> None:
-    sim = a_simulation((1, 2, 3))
     send(sim, 1, 2, [1])
     sim.run(0.1)
     send(sim, 3, 2, [3])
     sim.run(0.8)
-    assert status(sim, 3) == READY | FAILED
+    assert status(sim, 3) == READY | FAILED, "the sender learns it"
     assert read(sim, 2)[:3] == [1, 1, 1]
     assert read(sim, 2)[0] == 0
     # A program that reads in time gets the message that is being repeated.
@@ -143,7 +136,7 @@ def test_it_repeats_to_the_bit_however_often_one_looks() -> None:
     assert chat(1) == chat(3) == chat(500)
 
 
-def test_a_message_on_its_way_stands_in_the_state() -> None:
+def test_a_message_on_its_way_stands_in_the_state_and_a_restart_forgets_it() -> None:
     sim = a_simulation()
     idle = sim.state_hash()
     send(sim, 1, 2, [5])
@@ -156,10 +149,6 @@ def test_a_message_on_its_way_stands_in_the_state() -> None:
     assert status(sim, 2) == READY
     sim.run(0.1)
     assert read(sim, 2) == first == [1, 1, 5, *[0] * 15]
-
-
-def test_a_restart_forgets() -> None:
-    sim = a_simulation()
     send(sim, 1, 2, [5])
     execute(sim, 1, "restart")
     sim.run(0.5)

@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 import pytest
+from tests.model.refusals import refused
 from tests.reply_grammar import ORDERS
 from tests.session_player import FOLDER, TURRETS
 
@@ -137,8 +138,7 @@ def test_general_io_minds_its_numbers() -> None:
         (lambda: io.set_analog(3, float("nan")), "volts must be a finite number, but it was nan"),
         (lambda: io.set_analog(3, "1"), "volts must be a finite number, but it was '1'"),
     ):
-        with pytest.raises(kiks.ParameterError, match=words):
-            call()
+        refused(words, call)
 
 
 def test_the_example_runs(capsys: pytest.CaptureFixture[str]) -> None:
@@ -165,35 +165,32 @@ def test_what_it_remembers_stands_in_the_state() -> None:
     assert execute(sim, "T,24,C,5") == "t,24,c,5"
 
 
+def a_turret(**changes: Any) -> Turret:
+    return type("Odd", (Counter,), changes)()
+
+
 def test_two_of_them_do_not_share_their_numbers() -> None:
-    class Other(Counter):
-        number, name, memory_count = 25, "Other", MEMORY_COUNT - 2
-
-    class Third(Counter):
-        number, name, memory_count = 26, "Third", 1
-
     sim = kiks.Simulation()
     sim.fit(1, Counter())
-    sim.fit(1, Other())
+    sim.fit(1, a_turret(number=25, memory_count=MEMORY_COUNT - 2))
     execute(sim, "T,24,C,5")
     assert execute(sim, "T,25,C,7") == "t,25,c,7"
     assert execute(sim, "T,24,C,0") == "t,24,c,5"
-    with pytest.raises(kiks.ParameterError, match=r"memory_count of a turret must be .* from 0 to 0, but it was 1"):
-        sim.fit(1, Third())
+    words = r"memory_count of a turret must be .* from 0 to 0, but it was 1"
+    refused(words, sim.fit, 1, a_turret(number=26, memory_count=1))
 
 
 def test_chance_repeats() -> None:
-    def rolls(seed: int, robot: int) -> list[str]:
-        sim = kiks.Simulation(robots=2, seed=seed)
+    def rolls(seed: int, robot: int) -> tuple[str, ...]:
+        sim, found = kiks.Simulation(robots=2, seed=seed), []
         sim.fit(robot, Counter())
-        found = []
         for _ in range(20):
             found.append(execute(sim, "T,24,R", robot))
             sim.run(0.01)
-        return found
+        return tuple(found)
 
     assert rolls(1, 1) == rolls(1, 1)
-    assert len({tuple(rolls(seed, robot)) for seed in (1, 2) for robot in (1, 2)}) == 4
+    assert len({rolls(seed, robot) for seed in (1, 2) for robot in (1, 2)}) == 4
 
 
 def test_its_faults_never_reach_the_wire(caplog: pytest.LogCaptureFixture) -> None:
@@ -212,23 +209,20 @@ def test_a_ray_finds_what_is_there() -> None:
     sim.place(2, 300, 400, 0.0)
     ball = sim.add_ball(200, 300)
     site = sim.fit(1, Counter()).site
-    wall = site.ray()
-    assert (wall.robot, wall.body) == (0, 0)
-    assert wall.distance_mm == pytest.approx(290, abs=0.1)
-    above = site.ray(np.pi / 2)
-    assert (above.robot, above.body) == (2, 0)
-    assert above.distance_mm == pytest.approx(72.5, abs=1e-6)
-    behind = site.ray(-np.pi)
-    assert (behind.robot, behind.body) == (0, ball)
-    assert behind.distance_mm == pytest.approx(100 - sim.bodies()["radius_mm"][0], abs=1e-6)
+    rim_mm = 100 - sim.bodies()["radius_mm"][0]
+    for angle_rad, found, distance_mm, error_mm in (
+        (0.0, (0, 0), 290, 0.1),
+        (np.pi / 2, (2, 0), 72.5, 1e-6),
+        (-np.pi, (0, ball), rim_mm, 1e-6),
+    ):
+        met = site.ray(angle_rad)
+        assert (met.robot, met.body) == found
+        assert met.distance_mm == pytest.approx(distance_mm, abs=error_mm)
+    assert site.ray() == site.ray(0.0)
     assert site.poses() == [pytest.approx((300, 300, 0)), pytest.approx((300, 400, 0))]
     assert len(site.bodies()) == 1
     assert site.arena_mm == (600, 600)
     assert site.robot == 1
-
-
-def a_turret(**changes: Any) -> Turret:
-    return type("Odd", (Counter,), changes)()
 
 
 def test_what_is_no_turret_is_refused_and_nothing_is_fitted_twice() -> None:
@@ -248,10 +242,8 @@ def test_what_is_no_turret_is_refused_and_nothing_is_fitted_twice() -> None:
         (a_turret(orders={"C": len}), "orders of a turret must be a count of numbers and a function, but C was"),
         (a_turret(memory_count=17), "turret Odd: memory_count must be at most 16, but it was 17"),
     ):
-        with pytest.raises(kiks.ParameterError, match=words):
-            sim.fit(1, turret)
+        refused(words, sim.fit, 1, turret)
     for count, name in enumerate(TURRETS, 1):
         sim.fit(1, name)
-        with pytest.raises(kiks.ParameterError, match="turret must be one that robot 1 has not got"):
-            sim.fit(1, name)
+        refused("turret must be one that robot 1 has not got", sim.fit, 1, name)
         assert len(sim.wires[0].firmware.fitted) == count

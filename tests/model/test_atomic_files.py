@@ -36,14 +36,8 @@ from kiks.model.thesis_networks import NetworkResponse
 ROOM = Arena.box(300, 200)
 
 
-def champion(path: Path) -> None:
-    controller = linear()
-    parameters = (0.5,) * (controller.parameter_count or 0)
-    Champion(controller, parameters, task="avoid", fitness=1.0, measures={}, generation=1).save(path)
-
-
-def picture(path: Path) -> None:
-    Picture.of_arena(ROOM).save(path)
+def champion() -> Champion:
+    return Champion(linear(), (0.5,) * linear().parameter_count, task="avoid", fitness=1.0, measures={}, generation=1)
 
 
 WRITERS: dict[str, Callable[[Path], object]] = {
@@ -53,8 +47,8 @@ WRITERS: dict[str, Callable[[Path], object]] = {
     "robot.toml": lambda path: save_robot(kiks.RobotSpec.load("khepera"), path),
     "networks.json": lambda path: NetworkResponse.load().save(path),
     "thinking.txt": lambda path: save_thinking([12_345] * 100, path),
-    "champion.toml": champion,
-    "picture.png": picture,
+    "champion.toml": lambda path: champion().save(path),
+    "picture.png": lambda path: Picture.of_arena(ROOM).save(path),
 }
 
 
@@ -119,15 +113,12 @@ def test_rights_are_those_of_the_umask_and_of_the_earlier_file(tmp_path: Path) -
     assert [rights(name) for name in ("new", "private", "old", "taken")] == [0o640, 0o600, 0o604, 0o600]
 
 
-def test_a_link_stays_a_link(tmp_path: Path) -> None:
+def test_a_link_stays_a_link_and_what_is_no_file_is_written_to(tmp_path: Path) -> None:
     (tmp_path / "link").symlink_to("file")
     for text in ("one", "two"):
         replace_file(tmp_path / "link", text)
         assert (tmp_path / "file").read_text() == text
     assert (tmp_path / "link").is_symlink()
-
-
-def test_what_is_no_file_is_written_to(tmp_path: Path) -> None:
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
     reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)

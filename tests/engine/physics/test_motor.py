@@ -12,35 +12,35 @@ from tests.at_length import share
 
 from kiks.model.arena import Arena
 
-FAR = Arena.box(2000, 2000)
+FAR = Arena.box(1500, 1500)
 SPEEDS = st.integers(-127, 127)
 
 
 @pytest.fixture
 def world(make_world):
     """A robot on an open floor."""
-    return make_world(FAR).place(1000.0, 1000.0, 0.3)
+    return make_world(FAR).place(750.0, 750.0, 0.3)
 
 
 @pytest.fixture
 def two(make_world):
     """The same robot twice."""
-    return [make_world(FAR).place(1000.0, 1000.0) for _ in range(2)]
+    return [make_world(FAR).place(750.0, 750.0) for _ in range(2)]
 
 
 def spin(world, ticks):
     """Let ticks pass without ever reaching a wall: the robot is carried back to the middle."""
     for _ in range(ticks):
         world.tick()
-        if max(abs(world.robot["x_mm"] - 1000), abs(world.robot["y_mm"] - 1000)) > 800:
-            world.place(1000.0, 1000.0, world.pose[2])
+        if max(abs(world.robot["x_mm"] - 750), abs(world.robot["y_mm"] - 750)) > 600:
+            world.place(750.0, 750.0, world.pose[2])
 
 
 @settings(derandomize=True, max_examples=share(20, 40))
 @given(left=st.integers(-115, 115), right=st.integers(-115, 115))
 def test_speed_reaches_its_command_in_about_five_ticks_and_on_average_exactly(make_world, left, right):
     """Near full power there is nothing left to control with."""
-    world = make_world(FAR).place(1000.0, 1000.0)
+    world = make_world(FAR).place(750.0, 750.0)
     world.speed(left, right)
     for ticks, least, part in ((5, 2.0, 0.3), (55, 1.0, 0.03)):
         spin(world, ticks)
@@ -56,7 +56,7 @@ def test_speed_reaches_its_command_in_about_five_ticks_and_on_average_exactly(ma
 @settings(derandomize=True, max_examples=share(15, 30))
 @given(left=SPEEDS, right=SPEEDS, mode=st.sampled_from(["speed", "pwm", "position"]))
 def test_mirror_symmetry_to_the_bit_and_power_drives_backwards_as_forwards(make_world, left, right, mode):
-    one, other, back = (make_world(FAR).place(1000.0, 1000.0) for _ in range(3))
+    one, other, back = (make_world(FAR).place(750.0, 750.0) for _ in range(3))
     left, right = (round(speed * {"speed": 1, "pwm": 255 / 127, "position": 5}[mode]) for speed in (left, right))
     getattr(one, mode)(left, right)
     getattr(other, mode)(right, left)
@@ -113,7 +113,7 @@ def test_status_tells_mode_and_arrival(world):
     ticks=st.integers(0, 80),
 )
 def test_a_move_arrives_whatever_ran_before(make_world, mode, first, target, ticks):
-    world = make_world(FAR).place(1000.0, 1000.0)
+    world = make_world(FAR).place(750.0, 750.0)
     name, scale = mode
     getattr(world, name)(first * scale, -first * scale)
     world.tick(ticks)

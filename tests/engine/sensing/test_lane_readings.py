@@ -65,12 +65,12 @@ def kinds_of(*responses):
     return kinds, networks_for(*responses)
 
 
-def equal_readings(scene, robots, tick, time_ns):
+def equal_readings(record, robots, tick, time_ns):
     """Return all readings at a time in the last tick."""
     together, one_by_one = np.empty((2, robots, 8))
     for robot in range(robots):
-        read_proximity(scene.record, robot, tick, time_ns, True, together[robot])
-        read_one_by_one(scene.record, 0, robot, tick, time_ns, one_by_one[robot])
+        read_proximity(record, robot, tick, time_ns, True, together[robot])
+        read_one_by_one(record, 0, robot, tick, time_ns, one_by_one[robot])
     np.testing.assert_array_equal(together, one_by_one)
     return together
 
@@ -80,7 +80,7 @@ def check_random_world(arena, kinds, networks, robots, bodies, rng):
     tick = int(rng.integers(1000))
     time_ns = max(tick * 10_000_000 - int(rng.integers(10_000_000)), 0)
     scene = random_world(arena, kinds, networks, robots, bodies, rng)
-    return equal_readings(scene, robots, tick, time_ns).max()
+    return equal_readings(scene.record, robots, tick, time_ns).max()
 
 
 @pytest.mark.parametrize("response", RESPONSES)
