@@ -18,7 +18,7 @@ from typing import Any
 import numba
 import pytest
 from tests.at_length import share
-from tests.model.test_atomic_files import full_disk
+from tests.model.refusals import full_disk
 from tests.stranger import STRANGER, as_stranger, needs_root
 
 from kiks.engine import code_cache, compiling

@@ -1,7 +1,8 @@
-"""What is refused: the error, that its text is one line, and what memory the refusal takes."""
+"""What is refused: the error, that its text is one line, what memory it takes, and a full disk."""
 
 from __future__ import annotations
 
+import resource
 import tracemalloc
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -29,3 +30,14 @@ def traced() -> Iterator[list[int]]:
     finally:
         peak_bytes.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
+
+
+@contextmanager
+def full_disk(bytes_left: int) -> Iterator[None]:
+    """Limit the size of files, as a full disk does."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (bytes_left, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import os
-import resource
 import stat
-from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager
+from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 
 import pytest
-from tests.model.refusals import refused
+from tests.model.refusals import full_disk, refused
 
 import kiks
 from kiks.clock.thinking import save_thinking
@@ -50,17 +49,6 @@ WRITERS: dict[str, Callable[[Path], object]] = {
     "champion.toml": lambda path: champion().save(path),
     "picture.png": lambda path: Picture.of_arena(ROOM).save(path),
 }
-
-
-@contextmanager
-def full_disk(bytes_left: int) -> Iterator[None]:
-    """Limit the size of files, as a full disk does."""
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (bytes_left, before[1]))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
 def content(folder: Path) -> dict[str, bytes]:

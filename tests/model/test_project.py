@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from tests.at_length import share
 from tests.model.refusals import refused
 
-from kiks.cli.options import load_arena
 from kiks.errors import ArenaError, KiksError, ParameterError
 from kiks.model.arena import Arena, Ball, Cylinder, Lamp, Pose
 from kiks.model.arena_objects import THINGS_MAX
@@ -102,6 +101,8 @@ def test_a_box_is_kept_as_a_box(width, height, wall, rounded, brightness):
 
 
 def test_a_file_is_for_people(tmp_path):
+    from kiks.cli.options import load_arena
+
     arena = replace(Arena.box(400, 300, brightness="wood"), starts=(Pose(100, 150, math.pi / 2),), name="Room")
     project = Project(arena, robots=(ProjectRobot(turrets=("k213",), program="look.py"),), noise=False, speed=None)
     project.save(tmp_path / "room.kiks")

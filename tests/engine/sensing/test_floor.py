@@ -15,7 +15,6 @@ from kiks.engine.sensing.floor import COUNTS, NOISE_COUNTS, read_floor
 from kiks.engine.sensing.floor_spots import BLOCK, SPOT_MM, plains_of
 from kiks.firmware.turret import Turret
 from kiks.model.arena import Arena, Zone
-from kiks.recording.replay import check_recording
 from kiks.units import TICK_NS
 
 ANGLES = np.linspace(0.0, 2 * math.pi, 97)[:-1]
@@ -158,6 +157,8 @@ def on_black(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
 
 
 def test_a_recording_with_it_replays(tmp_path: Any) -> None:
+    from kiks.recording.replay import check_recording
+
     arena = replace(Arena.box(400, 400), zones=(Zone(disc_mm=(200, 200), radius_mm=80, brightness=40),))
     sim = kiks.Simulation(arena, seed=3)
     sim.fit(1, "floor")
