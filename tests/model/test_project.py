@@ -4,6 +4,7 @@ import math
 import os
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -23,6 +24,8 @@ from kiks.model.robot import RESPONSES, RobotSpec
 from kiks.model.turrets import TURRETS
 from kiks.sim.from_project import project_of, simulation_of
 from kiks.sim.simulation import Simulation
+
+EXAMPLES = Path(__file__).parents[2] / "examples" / "arenas"
 
 names = st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\0"), max_size=20)
 thousandths = st.integers(60_000, 240_000).map(lambda number: number / 1000)
@@ -123,8 +126,8 @@ def test_arenas_are_projects(tmp_path):
     arena = replace(Arena.box(400, 300), starts=(Pose(100, 150, 0), Pose(300, 150, 0)))
     save_kad(arena, tmp_path / "room.kad")
     assert len(Project.load(tmp_path / "room.kad").robots) == 2
-    assert Project.load("examples/arenas/maze.toml").arena.lamps
-    assert len(Project.load("examples/arenas/maze.png").robots) == 1
+    assert Project.load(EXAMPLES / "maze.toml").arena.lamps
+    assert len(Project.load(EXAMPLES / "maze.png").robots) == 1
 
 
 BASE = "kiks = 1\n[walls]\nsize_mm = [300, 300]\n"

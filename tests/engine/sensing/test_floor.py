@@ -150,20 +150,17 @@ def test_a_turret_of_a_users_own_looks_where_it_likes() -> None:
     assert right > COUNTS - 2 * NOISE_COUNTS
 
 
-@kiks.controller(senses="floor")
-def on_black(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
-    """Turn on what is black."""
-    wheels[0], wheels[1] = (4.0, -4.0 + sensors[0] % 7.0) if sensors[0] < 512 else (10.0, 10.0)
-
-
 def test_a_recording_with_it_replays(tmp_path: Any) -> None:
     from kiks.recording.replay import check_recording
 
     arena = replace(Arena.box(400, 400), zones=(Zone(disc_mm=(200, 200), radius_mm=80, brightness=40),))
     sim = kiks.Simulation(arena, seed=3)
     sim.fit(1, "floor")
+    robot = kiks.Khepera(sim.port(1))
     with sim.record(tmp_path / "floor.mcap"):
-        kiks.drive(sim.port(1), on_black, seconds=3.0)
+        while sim.time_s < 3.0:
+            (brightness,) = robot.turret(31, "F")
+            robot.set_speed(*((4, -4 + brightness % 7) if brightness < 512 else (10, 10)))
     again = check_recording(kiks.Recording(tmp_path / "floor.mcap").log).sim
     assert again.arena.zones == arena.zones
     assert again.state_hash() == sim.state_hash()
