@@ -5,8 +5,6 @@ that matches the whole rest of the line decides. What no pair matches is a proto
 anything else. The robot has all quirks off and all turrets of `tests.session_player.TURRETS`.
 """
 
-from __future__ import annotations
-
 import re
 
 END = rb"\r\n"

@@ -14,8 +14,6 @@ Nothing may be answered beyond what is written. No time-out is needed to see tha
 the end, and its answer must be the next one.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field

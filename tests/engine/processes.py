@@ -1,7 +1,5 @@
 """Python as a process, for tests of what a process settles as it begins."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Arenas that differ in what stands in them, not in their walls."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

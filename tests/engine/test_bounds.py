@@ -1,7 +1,5 @@
 """No kernel reads outside its arrays, and none depends on the processor or on the build."""
 
-from __future__ import annotations
-
 import numba
 import pytest
 from tests.at_length import at_length

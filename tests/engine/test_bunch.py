@@ -1,7 +1,5 @@
 """Robots in lanes move as each of them moves alone, to the bit: the same physics compiled for eight and for one."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from tests.at_length import share

@@ -1,7 +1,5 @@
 """Compiled code on the disk: whatever has become of it, calls give what they should, and one line tells of it."""
 
-from __future__ import annotations
-
 import os
 import pickle
 import random

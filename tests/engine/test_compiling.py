@@ -1,7 +1,5 @@
 """How kernels are compiled: for which processor, with which settings of Numba, linked, and the line that says so."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numba

@@ -1,7 +1,5 @@
 """The same run again: twice in one process, in another process, and for other processors."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

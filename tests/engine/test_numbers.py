@@ -1,7 +1,5 @@
 """The engine's own mathematics agrees with the library's, and its random numbers are random."""
 
-from __future__ import annotations
-
 import math
 from itertools import product
 

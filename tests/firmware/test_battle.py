@@ -1,7 +1,5 @@
 """The battle turret: where it says it is, what it hits, and what that costs."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

@@ -1,7 +1,5 @@
 """The linear camera K213: its orders, its view, its blur, its instants, its noise."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """The radio: messages between robots, their times, and what happens to those that no program reads."""
 
-from __future__ import annotations
-
 import kiks
 from kiks.firmware.radio import ATTEMPTS, FAILED, PAUSE_FRAMES, READY, RECEIVED, attempt_ns
 from kiks.units import character_ns

@@ -1,7 +1,5 @@
 """The one interface of all turrets: tables, names, errors, turrets of a user's own, and what they remember."""
 
-from __future__ import annotations
-
 import logging
 import re
 import runpy

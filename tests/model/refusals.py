@@ -1,7 +1,5 @@
 """What is refused: the error, that its text is one line, what memory it takes, and a full disk."""
 
-from __future__ import annotations
-
 import resource
 import tracemalloc
 from collections.abc import Callable, Iterator

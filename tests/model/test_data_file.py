@@ -1,7 +1,5 @@
 """Data files: limits of size and depth, and one line that names key, rule, value and way out."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from functools import partial

@@ -1,7 +1,5 @@
 """Goals, cases and exercises of projects: their way through files, what cases there are, and what is refused."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from pathlib import Path

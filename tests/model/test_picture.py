@@ -1,7 +1,5 @@
 """Pictures that were made to do harm or to be large: only an ArenaError comes out, and memory stays small."""
 
-from __future__ import annotations
-
 import io
 import struct
 import subprocess

@@ -1,7 +1,5 @@
 """Robots are data files: ours are complete, and what is wrong in a user's own is named."""
 
-from __future__ import annotations
-
 import re
 from functools import partial
 from importlib import resources

@@ -1,7 +1,5 @@
 """Walls and floors with shapes: in memory, in files, drawn by hand and on paper."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 import tomllib

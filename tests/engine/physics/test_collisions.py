@@ -1,7 +1,5 @@
 """Laws of robots, balls and cylinders that push and hit each other. Tolerances: measured, then rounded up."""
 
-from __future__ import annotations
-
 import math
 from functools import cache
 from itertools import product

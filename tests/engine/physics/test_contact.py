@@ -1,7 +1,5 @@
 """Laws of the contact with walls, on random arenas and on purpose-made ones. Tolerances: measured, then rounded up."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise, product
 

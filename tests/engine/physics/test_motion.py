@@ -1,7 +1,5 @@
 """Free motion is the exact arc, and a moment within a tick lies on it."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The motors keep the promises of khepera-protocol.md section 6, and nothing makes them run away."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

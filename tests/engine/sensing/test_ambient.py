@@ -1,7 +1,5 @@
 """Ambient light: the published curves, what hides a lamp, how lamps add up, and the shape of measured light."""
 
-from __future__ import annotations
-
 import math
 import os
 from dataclasses import replace

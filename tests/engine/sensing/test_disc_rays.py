@@ -1,7 +1,5 @@
 """What sensors see of robots, balls and cylinders: discs by geometry, each where it was when the sensor looked."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from itertools import product

@@ -1,7 +1,5 @@
 """The floor below a robot: its mean brightness in a spot, its noise, and what must not matter."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Sensors in lanes read what one sensor and one ray at a time read, to the bit."""
 
-from __future__ import annotations
-
 from contextlib import suppress
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Noise on proximity readings: with nothing near as a real Khepera has it, else as the thesis says, or otherwise."""
 
-from __future__ import annotations
-
 import math
 import re
 import tomllib

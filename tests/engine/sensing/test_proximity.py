@@ -1,7 +1,5 @@
 """The proximity sensors: sampled in turn, symmetric, nearer is more, darker is less."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

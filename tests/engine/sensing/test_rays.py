@@ -1,7 +1,5 @@
 """A ray ends where the first wall square begins, whatever the arena."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -4,8 +4,6 @@ Tolerances are what was found, rounded up, where geometry says that two readings
 half a cell off, and where a sensor answers at all its reading falls by up to 100 counts a millimetre.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any

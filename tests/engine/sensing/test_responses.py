@@ -1,7 +1,5 @@
 """Responses: the robot in the arena answers what the networks, the table and the curve say for the same pose."""
 
-from __future__ import annotations
-
 import csv
 import math
 from pathlib import Path
