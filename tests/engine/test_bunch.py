@@ -6,6 +6,8 @@ from tests.at_length import share
 from tests.engine.one_by_one import advance_alone, advance_each
 
 from kiks.engine import step
+from kiks.engine.compiling import make_ready
+from kiks.engine.meeting import MEETING
 from kiks.engine.parameters import pack
 from kiks.engine.physics import motor
 from kiks.engine.scene import Scene
@@ -94,6 +96,7 @@ def test_drives_are_those_of_robots_alone(make_random_arena, name, most):
 
 def test_positions_are_those_of_robots_alone_and_grippers_move(make_random_arena):
     """Some in one mode, some in another, beside each other."""
+    make_ready(MEETING)
     worlds = Worlds(make_random_arena(3), 21, 9)
     for robots in (worlds.lanes, worlds.alone):
         robots["has_gripper"] = (np.arange(21) % 3 == 0)[:, None]

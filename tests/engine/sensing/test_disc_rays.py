@@ -22,9 +22,7 @@ from kiks.units import SENSOR_SLOT_NS, TICK_NS
 
 ROBOT_MM = 27.5
 HALF_MM_FLOOR = Arena.from_array(np.zeros((1000, 1000), np.uint8), mm_per_pixel=0.5)
-EXACT = RobotSpec.load("khepera").with_changes(
-    proximity__noise_small=0.0, proximity__noise_large=0.0, proximity__jitter_counts=(0.0, 0.0)
-)
+EXACT = RobotSpec.load("khepera").without_noise()
 """A Khepera without noise."""
 
 
