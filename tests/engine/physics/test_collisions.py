@@ -1,13 +1,12 @@
 """Laws of robots, balls and cylinders that push and hit each other. Tolerances: measured, then rounded up."""
 
 import math
-from functools import cache
 from itertools import product
 
 import numpy as np
 import pytest
 from tests.at_length import cases, share
-from tests.engine.same_walls import with_things
+from tests.engine.same_walls import wide_floor, with_things
 from tests.piles import DEEPEST_MM, SHOVED_MM, Pile, calm, rush
 
 from kiks.engine.physics import motor
@@ -17,18 +16,6 @@ from kiks.sim.simulation import Simulation
 
 PULSE_MM = 0.08
 ROBOT_MM, BALL_MM, CYLINDER_MM = 27.5, 32.0, 16.0
-
-
-@cache
-def floor():
-    return Arena.box(2000, 2000)
-
-
-@pytest.fixture(scope="module", autouse=True)
-def _floor_is_forgotten():
-    """Its tables take 90 MB."""
-    yield
-    floor.cache_clear()
 
 
 STEADY_S = 0.5
@@ -41,7 +28,7 @@ class Company:
     def __init__(self, robots=((1900.0, 1900.0, 0.0),), balls=(), cylinders=(), arena=None, **changes):
         self.sim = Simulation(
             with_things(
-                arena or floor(),
+                arena or wide_floor(2000),
                 starts=tuple(Pose(*robot) for robot in robots),
                 balls=tuple(Ball(*ball) for ball in balls),
                 cylinders=tuple(Cylinder(*cylinder) for cylinder in cylinders),

@@ -7,23 +7,21 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from tests.at_length import share
+from tests.engine.same_walls import wide_floor
 
-from kiks.model.arena import Arena
-
-FAR = Arena.box(1500, 1500)
 SPEEDS = st.integers(-127, 127)
 
 
 @pytest.fixture
 def world(make_world):
     """A robot on an open floor."""
-    return make_world(FAR).place(750.0, 750.0, 0.3)
+    return make_world(wide_floor(1500)).place(750.0, 750.0, 0.3)
 
 
 @pytest.fixture
 def two(make_world):
     """The same robot twice."""
-    return [make_world(FAR).place(750.0, 750.0) for _ in range(2)]
+    return [make_world(wide_floor(1500)).place(750.0, 750.0) for _ in range(2)]
 
 
 def spin(world, ticks):
@@ -38,7 +36,7 @@ def spin(world, ticks):
 @given(left=st.integers(-115, 115), right=st.integers(-115, 115))
 def test_speed_reaches_its_command_in_about_five_ticks_and_on_average_exactly(make_world, left, right):
     """Near full power there is nothing left to control with."""
-    world = make_world(FAR).place(750.0, 750.0)
+    world = make_world(wide_floor(1500)).place(750.0, 750.0)
     world.speed(left, right)
     for ticks, least, part in ((5, 2.0, 0.3), (55, 1.0, 0.03)):
         spin(world, ticks)
@@ -54,7 +52,7 @@ def test_speed_reaches_its_command_in_about_five_ticks_and_on_average_exactly(ma
 @settings(derandomize=True, max_examples=share(15, 30))
 @given(left=SPEEDS, right=SPEEDS, mode=st.sampled_from(["speed", "pwm", "position"]))
 def test_mirror_symmetry_to_the_bit_and_power_drives_backwards_as_forwards(make_world, left, right, mode):
-    one, other, back = (make_world(FAR).place(750.0, 750.0) for _ in range(3))
+    one, other, back = (make_world(wide_floor(1500)).place(750.0, 750.0) for _ in range(3))
     left, right = (round(speed * {"speed": 1, "pwm": 255 / 127, "position": 5}[mode]) for speed in (left, right))
     getattr(one, mode)(left, right)
     getattr(other, mode)(right, left)
@@ -111,7 +109,7 @@ def test_status_tells_mode_and_arrival(world):
     ticks=st.integers(0, 80),
 )
 def test_a_move_arrives_whatever_ran_before(make_world, mode, first, target, ticks):
-    world = make_world(FAR).place(750.0, 750.0)
+    world = make_world(wide_floor(1500)).place(750.0, 750.0)
     name, scale = mode
     getattr(world, name)(first * scale, -first * scale)
     world.tick(ticks)

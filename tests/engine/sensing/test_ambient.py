@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.engine.same_walls import wide_floor
 from tests.symmetry import mirrored, symmetric
 
 import kiks
@@ -27,12 +28,9 @@ RIGHT_10 = {80: 496, 60: 476, 50: 444, 40: 404, 30: 342, 20: 283, 10: 262, 0: 22
 RIGHT_10 |= {-40: 345, -50: 407, -60: 453, -70: 487, -80: 497}
 
 
-ROOM = kiks.Arena.box(1400, 1400)
-
-
 def dark_room(*lamps: tuple[Any, ...], robot: RobotSpec = SPEC, seed: int = 0) -> kiks.Simulation:
     """A robot in the middle of a large box that looks to the right."""
-    sim = kiks.Simulation(ROOM, robot=robot, seed=seed)
+    sim = kiks.Simulation(wide_floor(1400), robot=robot, seed=seed)
     for lamp in lamps:
         x_mm, y_mm, power_w, is_on = (*lamp, 1.0, True)[:4] if len(lamp) == 2 else (*lamp, True)[:4]
         sim.add_lamp(x_mm, y_mm, power_w, is_on=is_on)
@@ -49,25 +47,32 @@ def beside(sensor: int, distance_mm: float, off_axis_deg: float = 0.0, power_w: 
     return (x, 700 + radius * math.sin(mount) + distance_mm * math.sin(axis), power_w)
 
 
+def readings(sensor: int, *lamps: tuple[float, ...], robot: RobotSpec = SPEC) -> np.ndarray:
+    """Return what a sensor reads of a lamp that is at one place after the other, each of `beside`'s arguments."""
+    sim, found = dark_room((0.0, 0.0), robot=robot), []
+    for lamp in lamps:
+        sim.lamps[0, :3] = beside(sensor, *lamp)
+        found.append(sim.ambient(1)[sensor])
+    return np.array(found)
+
+
 def test_the_published_curve_is_reproduced() -> None:
-    for i, published in enumerate(PUBLISHED):
-        for sensor in (0, 3, 6):
-            reading = dark_room(beside(sensor, 10.0 * (i + 1))).ambient(1)[sensor]
-            # 75 and 72 are averaged: more light never reads darker.
-            assert reading == pytest.approx(published, abs=1.5 + 1e-6)
+    for sensor in (0, 3, 6):
+        found = readings(sensor, *((10.0 * (i + 1),) for i in range(len(PUBLISHED))))
+        # 75 and 72 are averaged: more light never reads darker.
+        assert found == pytest.approx(PUBLISHED, abs=1.5 + 1e-6)
 
 
-@pytest.mark.slow
 def test_nearer_and_stronger_is_brighter() -> None:
-    readings = [dark_room(beside(2, distance)).ambient(1)[2] for distance in np.linspace(0.01, 600, 121)]
-    assert np.all(np.diff(readings) >= 0)
-    assert readings[0] == pytest.approx(50, abs=0.1)
-    assert 445 < readings[-1] < 450
-    powers = [dark_room(beside(2, 150, power_w=power)).ambient(1)[2] for power in np.geomspace(0.01, 1000, 60)]
-    assert np.all(np.diff(powers) <= 0)
-    assert powers[-1] < 60
+    nearer = readings(2, *((distance,) for distance in np.linspace(0.01, 600, 121)))
+    assert np.all(np.diff(nearer) >= 0)
+    assert nearer[0] == pytest.approx(50, abs=0.1)
+    assert 445 < nearer[-1] < 450
+    stronger = readings(2, *((150, 0.0, power) for power in np.geomspace(0.01, 1000, 60)))
+    assert np.all(np.diff(stronger) <= 0)
+    assert stronger[-1] < 60
     # Four times the power at twice the distance is the same light.
-    assert dark_room(beside(2, 200, power_w=4)).ambient(1)[2] == pytest.approx(PUBLISHED[9])
+    assert readings(2, (200, 0.0, 4.0))[0] == pytest.approx(PUBLISHED[9])
 
 
 def test_the_angle_curves_are_those_of_the_manual() -> None:
@@ -77,27 +82,23 @@ def test_the_angle_curves_are_those_of_the_manual() -> None:
         ambient__dark_counts=497.0,
         ambient__background_counts=497.0,
     )
-    errors: dict[str, list[float]] = {"flux": [], "thesis": []}
-    for model, found in errors.items():
-        robot = dark.with_changes(ambient__model=model)
+    errors = {}
+    for model in ("flux", "thesis"):
+        robot, found = dark.with_changes(ambient__model=model), []
         for sensor, curve, peak in ((0, LEFT_85, 82.5), (3, RIGHT_10, -8.3)):
-            for angle, published in curve.items():
-                lamp = beside(sensor, 79, angle - peak)
-                found.append(dark_room(lamp, robot=robot).ambient(1)[sensor] - published)
-    assert np.mean(np.abs(errors["flux"])) < 22
-    assert np.max(np.abs(errors["flux"])) < 60
-    assert np.mean(np.abs(errors["thesis"])) > 45
+            lamps = ((79, angle - peak) for angle in curve)
+            found.append(readings(sensor, *lamps, robot=robot) - list(curve.values()))
+        errors[model] = np.abs(np.concatenate(found))
+    assert errors["flux"].mean() < 22
+    assert errors["flux"].max() < 60
+    assert errors["thesis"].mean() > 45
 
 
-@pytest.mark.slow
 def test_half_of_the_light_comes_from_within_50_degrees() -> None:
     """khepera-protocol.md 9.2: the half width is about 50 degrees; from 90 on there is nothing."""
-    angles, sim = np.arange(-120, 121, 5), dark_room((0.0, 0.0))
+    angles = np.arange(-120, 121, 5)
     for sensor in range(8):
-        light = np.empty(len(angles))
-        for k, angle in enumerate(angles):
-            sim.lamps[0, :2] = beside(sensor, 90, float(angle))[:2]
-            light[k] = 450 - sim.ambient(1)[sensor]
+        light = 450 - readings(sensor, *((90, float(angle)) for angle in angles))
         bright = angles[light > light.max() / 2]
         assert [bright.min(), bright.max()] == pytest.approx([-45, 45], abs=10)
         assert np.all(light[np.abs(angles) >= 90] == 0)

@@ -48,10 +48,10 @@ def half_plane(normal_rad: float = 0.0, from_mm: float = 0.0) -> Inside:
     return lambda x, y: x * math.cos(normal_rad) + y * math.sin(normal_rad) >= from_mm
 
 
-def read(sim: kiks.Simulation, x_mm: float, y_mm: float, heading_rad: float) -> np.ndarray:
-    """Return what the robot expects at a place seen from the middle of the arena."""
-    sim.place(1, MIDDLE_MM + x_mm, MIDDLE_MM + y_mm, heading_rad)
-    return np.array(sim.proximity(1))
+def read(sim: kiks.Simulation, x_mm: Any, y_mm: Any, heading_rad: Any) -> np.ndarray:
+    """Return what the robot expects at places seen from the middle of the arena, shape [place, 8]."""
+    poses = np.broadcast_arrays(np.atleast_1d(x_mm) + MIDDLE_MM, y_mm + MIDDLE_MM, heading_rad)
+    return sim.proximity_at(1, np.stack(poses, axis=1))
 
 
 def facing(sensor: int) -> float:
@@ -82,7 +82,7 @@ def free_poses(sim: kiks.Simulation, rng: np.random.Generator, count: int, gap_m
     return found
 
 
-def test_nothing_within_60_mm_is_nothing_and_no_reading_leaves_the_converters_range():
+def test_nothing_within_60_mm_is_nothing_and_no_reading_leaves_the_converters_range() -> None:
     rng, checked = np.random.default_rng(1), 0
     readings, noisy = [], []
     for _ in range(8):
@@ -111,7 +111,7 @@ def test_straight_towards_a_wall_a_reading_rises_to_saturation(cell_mm):
     sim = world(half_plane(), cell_mm)
     gaps_mm = np.arange(70.0, 0.0, -0.1)
     for sensor in range(SENSOR_COUNT):
-        counts = np.array([read(sim, -RADIUS_MM - gap, 0.13, facing(sensor))[sensor] for gap in gaps_mm])
+        counts = read(sim, -RADIUS_MM - gaps_mm, 0.13, facing(sensor))[:, sensor]
         assert np.diff(counts).min() >= 0
         assert np.diff(counts).max() < 20  # a tenth of a millimetre
         assert counts[0] == BASELINE
@@ -136,9 +136,8 @@ def beside_walls(cell_mm: float) -> tuple[np.ndarray, np.ndarray]:
     for sensor in range(SENSOR_COUNT):
         place = math.radians(KHEPERA.proximity.mount_angle_deg[sensor]) + facing(sensor)
         ahead_mm = KHEPERA.proximity.mount_radius_mm[sensor] * math.cos(place)
-        for i, distance in enumerate(away_mm):
-            if distance + ahead_mm > RADIUS_MM + 0.1:
-                counts[sensor, i] = read(sim, -distance - ahead_mm, 0.0, facing(sensor))[sensor]
+        is_free = away_mm + ahead_mm > RADIUS_MM + 0.1
+        counts[sensor, is_free] = read(sim, -away_mm[is_free] - ahead_mm, 0.0, facing(sensor))[:, sensor]
     return away_mm, counts
 
 
@@ -147,23 +146,22 @@ def test_posts_and_corners_are_less_than_a_wall_that_is_as_near(cell_mm):
     """Seen from a sensor. What a robot with its sensors inside a surface would read is not asked."""
     rng = np.random.default_rng(6)
     away_mm, by_wall = beside_walls(cell_mm)
-    places = np.radians(KHEPERA.proximity.mount_angle_deg)
+    mounts_rad = np.radians(KHEPERA.proximity.mount_angle_deg)
     things: list[tuple[Inside, Callable[[Any, Any], Any]]] = [
         (lambda x, y: (x >= 0) & (y >= 0), lambda x, y: np.hypot(np.maximum(-x, 0.0), np.maximum(-y, 0.0))),
     ]
     for radius_mm in (2.0, 3.0, 6.0, 12.0):
         things.append((disc(radius_mm), lambda x, y, radius_mm=radius_mm: np.hypot(x, y) - radius_mm))
     for inside, distance in things:
-        sim, active = world(inside, cell_mm), 0
-        for x, y, heading in rng.uniform((-70, -70, -math.pi), (70, 70, math.pi), (share(600, 2500), 3)):
-            if distance(x, y) > RADIUS_MM + 1.5 * cell_mm:
-                counts = read(sim, x, y, heading)
-                at = 26.5 * np.cos(places + heading) + x, 26.5 * np.sin(places + heading) + y
-                most = [np.interp(distance(*at)[k], away_mm, by_wall[k]) for k in range(SENSOR_COUNT)]
-                assert np.all(counts >= BASELINE)
-                assert np.all(counts <= np.array(most) + 15.0)
-                active += np.sum((counts > 20) & (counts < 1000))
-        assert active > 20
+        poses = rng.uniform((-70, -70, -math.pi), (70, 70, math.pi), (share(600, 2500), 3))
+        x, y, heading = poses[distance(*poses.T[:2]) > RADIUS_MM + 1.5 * cell_mm].T
+        counts = read(world(inside, cell_mm), x, y, heading)
+        angles = mounts_rad + heading[:, None]
+        away = distance(26.5 * np.cos(angles) + x[:, None], 26.5 * np.sin(angles) + y[:, None])
+        most = np.stack([np.interp(away[:, k], away_mm, by_wall[k]) for k in range(SENSOR_COUNT)], axis=1)
+        assert np.all(counts >= BASELINE)
+        assert np.all(counts <= most + 15.0)
+        assert np.sum((counts > 20) & (counts < 1000)) > 20
 
 
 @pytest.mark.parametrize(
@@ -183,23 +181,19 @@ def test_readings_are_those_of_geometry_however_cells_lie(radius_mm, cell_mm, la
     gaps_mm, angles_deg = np.array([4.0, 8.0, 12.0, 16.0, 20.0, 25.0]), np.arange(0.0, 360.0, 15.0)
     shape = (len(gaps_mm), len(angles_deg))
     samples = Samples("object", radius_mm, gaps_mm, np.broadcast_to(angles_deg, shape), np.zeros((*shape, 8), int))
-    exact = predict(KHEPERA, samples)
-    errors = []
+    exact = predict(KHEPERA, samples).reshape(-1, 8)
+    is_wall, behind_mm = math.isinf(radius_mm), 0.0 if math.isinf(radius_mm) else radius_mm
+    away_mm, angles = np.repeat(behind_mm + RADIUS_MM + gaps_mm, len(angles_deg)), np.tile(angles_deg, len(gaps_mm))
+    active, errors = (exact > 20) & (exact < 1000), []
+    assert active.sum() > 40
     for _ in range(share(3, 5)):
         (x, y), turn = rng.uniform(-cell_mm, cell_mm, 2), rng.uniform(-math.pi, math.pi)
         ahead, aside = math.cos(turn), math.sin(turn)
-        is_wall, behind_mm = math.isinf(radius_mm), 0.0 if math.isinf(radius_mm) else radius_mm
         sim = world(half_plane(turn, x * ahead + y * aside) if is_wall else disc(radius_mm, x, y), cell_mm)
-        for i, gap in enumerate(gaps_mm):
-            away_mm = behind_mm + RADIUS_MM + gap
-            for j, angle in enumerate(angles_deg):
-                counts = read(sim, x - away_mm * ahead, y - away_mm * aside, turn + math.radians(angle))
-                errors.append(counts - exact[i, j])
-    both = np.array(errors), np.tile(exact.reshape(-1, 8), (share(3, 5), 1))
-    active = (both[1] > 20) & (both[1] < 1000)
-    assert active.sum() > 40 * share(3, 5)
-    assert np.abs(both[0]).max() < largest
-    assert np.sqrt(np.mean(both[0][active] ** 2)) < usual
+        error = read(sim, x - away_mm * ahead, y - away_mm * aside, turn + np.radians(angles)) - exact
+        assert np.abs(error).max() < largest
+        errors.append(error[active])
+    assert np.sqrt(np.mean(np.array(errors) ** 2)) < usual
 
 
 def normals(arena: Arena) -> tuple[np.ndarray, np.ndarray]:
