@@ -1,5 +1,7 @@
 """The radio: messages between robots, their times, and what happens to those that no program reads."""
 
+from tests.firmware.test_turrets import execute
+
 import kiks
 from kiks.firmware.radio import ATTEMPTS, FAILED, PAUSE_FRAMES, READY, RECEIVED, attempt_ns
 from kiks.units import character_ns
@@ -12,23 +14,17 @@ def a_simulation(radios: tuple[int, ...] = (1, 2), *, robots: int = 3, seed: int
     return sim
 
 
-def execute(sim: kiks.Simulation, robot: int, line: str) -> str:
-    """Give an order at this very instant, so that times are exact."""
-    sim.sync()
-    return sim.wires[robot - 1].firmware.execute(line.encode(), sim.now_ns).decode().rstrip()
-
-
 def send(sim: kiks.Simulation, sender: int, to: int, data: list[int]) -> None:
     numbers = [to, len(data), *data, *[0] * (16 - len(data))]
-    assert execute(sim, sender, f"T,4,S,{','.join(map(str, numbers))}") == "t,4,s"
+    assert execute(sim, f"T,4,S,{','.join(map(str, numbers))}", sender) == "t,4,s"
 
 
 def status(sim: kiks.Simulation, robot: int) -> int:
-    return int(execute(sim, robot, "T,4,F").removeprefix("t,4,f,"))
+    return int(execute(sim, "T,4,F", robot).removeprefix("t,4,f,"))
 
 
 def read(sim: kiks.Simulation, robot: int) -> list[int]:
-    return [int(word) for word in execute(sim, robot, "T,4,R").removeprefix("t,4,r,").split(",")]
+    return [int(word) for word in execute(sim, "T,4,R", robot).removeprefix("t,4,r,").split(",")]
 
 
 def run_ns(sim: kiks.Simulation, time_ns: int) -> None:
@@ -48,7 +44,7 @@ def test_a_message_takes_the_time_of_its_characters() -> None:
         assert status(sim, 2) == READY
         assert read(sim, 2) == [0] * 18
     # Bytes beyond the length are not sent, and only eight bits count.
-    execute(sim, 1, "T,4,S,2,3,257,-1,3,4,5,6,7,8,9,10,11,12,13,14,15,16")
+    execute(sim, "T,4,S,2,3,257,-1,3,4,5,6,7,8,9,10,11,12,13,14,15,16")
     sim.run(0.1)
     assert read(sim, 2) == [1, 3, 1, 255, 3, *[0] * 13]
 
@@ -148,11 +144,11 @@ def test_a_message_on_its_way_stands_in_the_state_and_a_restart_forgets_it() -> 
     sim.run(0.1)
     assert read(sim, 2) == first == [1, 1, 5, *[0] * 15]
     send(sim, 1, 2, [5])
-    execute(sim, 1, "restart")
+    execute(sim, "restart")
     sim.run(0.5)
     assert (status(sim, 1), status(sim, 2)) == (READY, READY)
     send(sim, 1, 2, [5])
     sim.run(0.1)
-    execute(sim, 2, "restart")
+    execute(sim, "restart", 2)
     assert status(sim, 2) == READY
     assert read(sim, 2) == [0] * 18
