@@ -33,17 +33,21 @@ def a_robot(robot: str = "khepera_ii", **changes: object) -> Firmware:
     return a_simulation(robot, **changes).wires[0].firmware
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("sizes", [[1000], [1] * 1000, [255, 1, 1, 743], [256, 744], [300, 300, 400]])
-def test_a_line_may_be_as_long_as_the_limit(sizes: list[int]) -> None:
-    for length, reply in ((LINE_LIMIT, b"d\r\n"), (LINE_LIMIT + 1, UNKNOWN), (900, UNKNOWN)):
-        robot = a_robot()
-        data = b"D,5," + b"0" * (length - 5) + b"5\nM\n"
-        lines, place = [], 0
-        for size in sizes:
-            lines += [line for _, line in robot.receiver.feed(data[place : place + size])]
-            place += size
-        assert [robot.execute(line, 0) for line in lines] == [reply, UNKNOWN]
+def test_a_line_may_be_as_long_as_the_limit_and_an_endless_one_takes_no_memory() -> None:
+    robot = a_robot()
+    for sizes in ([1000], [1] * 1000, [255, 1, 1, 743], [256, 744], [300, 300, 400]):
+        for length, reply in ((LINE_LIMIT, b"d\r\n"), (LINE_LIMIT + 1, UNKNOWN), (900, UNKNOWN)):
+            data = b"D,5," + b"0" * (length - 5) + b"5\nM\n"
+            receiver, lines, place = Receiver(), [], 0
+            for size in sizes:
+                lines += [line for _, line in receiver.feed(data[place : place + size])]
+                place += size
+            assert [robot.execute(line, 0) for line in lines] == [reply, UNKNOWN]
+    receiver = Receiver()
+    for _ in range(100):
+        receiver.feed(b"x" * 10_000)
+    ((_, line),) = receiver.feed(b"\n")
+    assert len(line) == LINE_LIMIT + 1
 
 
 def test_quirks() -> None:
@@ -63,14 +67,6 @@ def test_quirks() -> None:
     assert [line for _, line in robot.receiver.feed(b"\r\nN\n")] == [b"", b"", b"N"]
     assert a_robot().execute(b"", 0) == b""
     assert a_robot().execute(b"D," + b"9" * 5000 + b",5", 0) == UNKNOWN, "execute itself minds the limit"
-
-
-def test_an_endless_line_takes_no_memory() -> None:
-    receiver = Receiver()
-    for _ in range(100):
-        receiver.feed(b"x" * 10_000)
-    ((_, line),) = receiver.feed(b"\n")
-    assert len(line) == LINE_LIMIT + 1
 
 
 WRONG = [
@@ -228,7 +224,7 @@ def test_restart_puts_all_to_defaults() -> None:
     assert robot.demo_wakes_ns is None
 
 
-def test_restart_brings_the_robot_to_rest_where_it_is() -> None:
+def test_restart_brings_the_robot_to_rest_where_it_is_and_returns_to_the_selected_speed() -> None:
     port = a_port()
     port.write(b"D,50,50\n")
     port.readline()
@@ -242,9 +238,6 @@ def test_restart_brings_the_robot_to_rest_where_it_is() -> None:
     assert now[2] == pytest.approx(before[2], abs=0.1)
     port.write(b"E\n")
     assert port.readline() == b"e,0,0\r\n"
-
-
-def test_restart_returns_to_the_selected_speed() -> None:
     robot = a_robot(firmware__baud=38400)
     robot.execute(b"serial 115200", 0)
     assert robot.baud == 115200
