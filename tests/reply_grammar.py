@@ -5,10 +5,7 @@ that matches the whole rest of the line decides. What no pair matches is a proto
 anything else. The robot has all quirks off and all turrets of `tests.session_player.TURRETS`.
 """
 
-from __future__ import annotations
-
 import re
-from functools import cache
 
 END = rb"\r\n"
 TEXT = rb"[ -~]+" + END
@@ -193,13 +190,6 @@ def allowed(line: bytes, *, has_flash: bool) -> re.Pattern[bytes]:
             if request.fullmatch(rest):
                 return reply
     return UNKNOWN
-
-
-@cache
-def kind(reply: re.Pattern[bytes]) -> str:
-    """Return the kind of reply that an expression allows: its letter, the name of the error, or 'tool'."""
-    errors = {UNKNOWN: "unknown", PROTOCOL_ERROR: "protocol error", NO_TURRET: "no turret"}
-    return errors.get(reply) or (chr(reply.pattern[0]) if re.match(rb"[a-z](,|\(|\\r)", reply.pattern) else "tool")
 
 
 def first_violation(lines: list[bytes], output: bytes, *, has_flash: bool) -> str | None:

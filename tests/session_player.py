@@ -14,8 +14,6 @@ Nothing may be answered beyond what is written. No time-out is needed to see tha
 the end, and its answer must be the next one.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
@@ -113,16 +111,9 @@ def sessions() -> list[Session]:
 def simulation(session: Session) -> Simulation:
     """Return a simulation of the robot that a transcript was written for: alone, far from any wall."""
     spec = RobotSpec.load(session.settings.get("robot", "khepera"))
-    changes: dict[str, object] = {"firmware__baud": session.baud}
     if "quiet" in session.settings:
-        changes |= {
-            "proximity__baseline_counts": (0.0,) * 8,
-            "proximity__jitter_counts": (0.0,),
-            "proximity__noise_small": 0.0,
-            "proximity__noise_large": 0.0,
-            "ambient__noise_counts": 0.0,
-        }
-    sim = Simulation(FLOOR, robot=spec.with_changes(**changes))
+        spec = spec.without_noise().with_changes(proximity__baseline_counts=(0.0,) * 8)
+    sim = Simulation(FLOOR, robot=spec.with_changes(firmware__baud=session.baud))
     for name in session.settings.get("turrets", "").split():
         sim.fit(1, name)
     return sim

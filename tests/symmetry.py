@@ -1,7 +1,5 @@
 """A robot whose right side is the mirror image of its left one, which no real robot's is."""
 
-from __future__ import annotations
-
 from dataclasses import fields
 from typing import Any
 

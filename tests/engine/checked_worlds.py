@@ -4,8 +4,6 @@ It prints all that comes of plain runs, which no build may change. Then NaN and 
 into the state and the lamps themselves, behind the checks that guard every entrance.
 """
 
-from __future__ import annotations
-
 import logging
 import math
 from typing import Any

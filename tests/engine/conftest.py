@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from functools import lru_cache
+from functools import lru_cache, partialmethod
 
 import numpy as np
 import pytest
@@ -42,20 +42,15 @@ class World:
         self.robot["trail"][:] = (x_mm, y_mm, heading_rad)
         return self
 
-    def speed(self, left: int, right: int, *, ticks: int = 0) -> None:
-        motor.set_speed(self.state.robots, 0, 0, left, right)
+    def command(self, name: str, left: int, right: int, *, ticks: int = 0) -> None:
+        """Give a command and let time pass."""
+        getattr(motor, name)(self.state.robots, 0, 0, left, right)
         self.tick(ticks)
 
-    def pwm(self, left: int, right: int, *, ticks: int = 0) -> None:
-        motor.set_pwm(self.state.robots, 0, 0, left, right)
-        self.tick(ticks)
-
-    def position(self, left: int, right: int, *, ticks: int = 0) -> None:
-        motor.set_position(self.state.robots, 0, 0, left, right)
-        self.tick(ticks)
-
-    def set_counters(self, left: int, right: int) -> None:
-        motor.set_counters(self.state.robots, 0, 0, left, right)
+    speed = partialmethod(command, "set_speed")
+    pwm = partialmethod(command, "set_pwm")
+    position = partialmethod(command, "set_position")
+    set_counters = partialmethod(command, "set_counters")
 
     def tick(self, count: int = 1) -> None:
         now = self.state.tick_count
@@ -147,4 +142,4 @@ def make_world() -> type[World]:
 @pytest.fixture(scope="session")
 def make_random_arena():
     """Return the maker of random arenas."""
-    return lru_cache(maxsize=32)(random_arena)
+    return lru_cache(maxsize=8)(random_arena)

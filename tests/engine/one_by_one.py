@@ -1,7 +1,5 @@
 """The slow oracle of lanes: one robot, one sensor and one ray at a time, from the same formulas."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from kiks.engine.bunch import give_back, make_lanes, make_room, take

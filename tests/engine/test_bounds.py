@@ -1,20 +1,12 @@
 """No kernel reads outside its arrays, and none depends on the processor or on the build."""
 
-from __future__ import annotations
-
-import os
-import subprocess
-import sys
-from pathlib import Path
-
 import numba
 import pytest
 from tests.at_length import at_length
+from tests.engine.processes import python
 from tests.engine.test_determinism import record_of_process, run_record
 
 from kiks.engine import code_cache
-
-ROOT = Path(__file__).parent.parent.parent
 
 PLAIN_AND_CHECKED = {
     "NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": "", "NUMBA_BOUNDSCHECK": "1", "NUMBA_OPT": "1",
@@ -25,8 +17,7 @@ two thirds of the time."""
 
 def said_by_process(**environment: str) -> str:
     """Run all worlds in a process whose kernels are compiled as its environment says."""
-    command = [sys.executable, "-X", "faulthandler", "-m", "tests.engine.checked_worlds"]
-    done = subprocess.run(command, cwd=ROOT, env=os.environ | environment, capture_output=True, text=True, check=False)
+    done = python("-X", "faulthandler", "-m", "tests.engine.checked_worlds", **environment)
     assert done.returncode == 0, done.stderr[-3000:]
     assert done.stdout.endswith("\nall within their arrays\n")
     return done.stdout

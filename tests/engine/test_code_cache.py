@@ -1,7 +1,5 @@
 """Compiled code on the disk: whatever has become of it, calls give what they should, and one line tells of it."""
 
-from __future__ import annotations
-
 import os
 import pickle
 import random
@@ -10,21 +8,20 @@ import shutil
 import signal
 import stat
 import tempfile
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Iterator
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
 import numba
 import pytest
-from tests.model.test_atomic_files import full_disk
+from tests.at_length import share
+from tests.model.refusals import full_disk
 from tests.stranger import STRANGER, as_stranger, needs_root
 
 from kiks.engine import code_cache, compiling
 from kiks.engine.code_cache import is_compiled
 from kiks.engine.compiling import LAST, entry
-
-Damage = Callable[[bytes], bytes]
 
 
 def double_of(number: Any) -> Any:
@@ -42,6 +39,16 @@ def files(folder: Path) -> list[Path]:
     return sorted(folder.rglob("*.code"))
 
 
+@pytest.fixture(scope="module")
+def compiled(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A cache with the function's machine code, compiled once for the tests that begin with it."""
+    folder = tmp_path_factory.mktemp("compiled")
+    with pytest.MonkeyPatch.context() as context:
+        context.setenv("NUMBA_CACHE_DIR", str(folder))
+        call()
+    return folder
+
+
 @pytest.fixture(autouse=True)
 def _fresh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
@@ -51,7 +58,25 @@ def _fresh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(compiling, "_LINES", {})
 
 
-def test_the_second_call_comes_from_the_disk(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+@pytest.fixture
+def kept(compiled: Path, tmp_path: Path, _fresh: None) -> Path:
+    """Return the file with the function's machine code in the user's cache."""
+    shutil.copytree(compiled, tmp_path / "cache")
+    (file,) = files(tmp_path)
+    return file
+
+
+@pytest.fixture
+def another_version(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Be another version of Numba."""
+    with monkeypatch.context() as context:
+        context.setattr(numba, "__version__", "0.0")
+        code_cache._version.cache_clear()
+        yield
+    code_cache._version.cache_clear()
+
+
+def test_the_second_call_comes_from_the_disk(tmp_path, caplog):
     assert not is_compiled("double_of")
     assert [call(), call(), call(0.5), call(0.5), call()] == [False, True, False, True, True]
     assert is_compiled("double_of")
@@ -60,7 +85,7 @@ def test_the_second_call_comes_from_the_disk(tmp_path: Path, caplog: pytest.LogC
     assert not caplog.records
 
 
-def test_a_start_that_was_interrupted_has_not_compiled_all() -> None:
+def test_a_start_that_was_interrupted_has_not_compiled_all():
     folder = next(code_cache.cache_folders())
     folder.mkdir(parents=True)
     digest = code_cache.digest_of("kiks.engine.step")
@@ -69,16 +94,9 @@ def test_a_start_that_was_interrupted_has_not_compiled_all() -> None:
     assert not is_compiled(LAST)
 
 
-def flipped(seed: int) -> Damage:
-    def flip(data: bytes) -> bytes:
-        place = random.Random(seed).randrange(len(data))
-        return data[:place] + bytes([data[place] ^ 1 << seed % 8]) + data[place + 1 :]
-
-    return flip
-
-
-def cut(share: float) -> Damage:
-    return lambda data: data[: int(share * len(data))]
+def flipped(data: bytes, seed: int) -> bytes:
+    place = random.Random(seed).randrange(len(data))
+    return data[:place] + bytes([data[place] ^ 1 << seed % 8]) + data[place + 1 :]
 
 
 class Bomb:
@@ -88,45 +106,34 @@ class Bomb:
         return os.mkdir, (os.environ["KIKS_TEST_BOMB"],)
 
 
-def damages() -> list[Damage]:
-    whole: list[Damage] = [
-        lambda data: b"\n" + data,
-        lambda data: data * 2,
-        lambda data: bytes(1000),
-        lambda data: b"1 2",
-    ]
-    return whole + [cut(share) for share in (0, 0.001, 0.1, 0.5, 0.999)] + [flipped(seed) for seed in range(20)]
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize("number", range(len(damages())))
-def test_a_damaged_file_is_thrown_away(number: int, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    call()
-    (file,) = files(tmp_path)
-    file.write_bytes(damages()[number](file.read_bytes()))
-    assert not call()
-    assert [record.getMessage().split(" in ")[0] for record in caplog.records] == ["Damaged files"]
-    assert call()
-    assert len(files(tmp_path)) == 1
+def test_a_damaged_file_is_thrown_away(kept, tmp_path, caplog):
+    whole = kept.read_bytes()
+    damaged = [b"\n" + whole, whole * 2, bytes(1000), b"1 2"]
+    damaged += [whole[: int(part * len(whole))] for part in (0, 0.001, 0.1, 0.5, 0.999)]
+    for data in (*damaged, *(flipped(whole, seed) for seed in range(share(4, 20)))):
+        kept.write_bytes(data)
+        caplog.clear()
+        code_cache.tell.cache_clear()
+        assert not call()
+        assert [record.getMessage().split(" in ")[0] for record in caplog.records] == ["Damaged files"]
+        assert call()
+        assert files(tmp_path) == [kept]
 
 
 @pytest.mark.parametrize("rights", [0o620, 0o602, 0o600])
-def test_code_in_files_that_others_can_write_is_not_run(
-    rights: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    call()
-    (file,) = files(tmp_path)
+def test_code_in_files_that_others_can_write_is_not_run(rights, kept, tmp_path, monkeypatch, caplog):
     monkeypatch.setenv("KIKS_TEST_BOMB", str(tmp_path / "bombed"))
     key, payload = pickle.dumps(Bomb()), pickle.dumps(Bomb())
     head = [code_cache._FORMAT, b"%d" % len(key), code_cache._digest(key), code_cache._digest(payload)]
-    file.write_bytes(b" ".join(head) + b"\n" + key + payload)
-    file.chmod(rights)
+    kept.write_bytes(b" ".join(head) + b"\n" + key + payload)
+    kept.chmod(rights)
     if rights == 0o600:
         # All that tells it from a file of ours is whose it is.
-        here = file.stat().st_uid
+        here = kept.stat().st_uid
         monkeypatch.setattr(code_cache, "_user", lambda: here + 1)
         if here == 0:
-            os.chown(file, 4321, -1)
+            os.chown(kept, 4321, -1)
     assert not call()
     assert not (tmp_path / "bombed").exists()
     assert "files that you alone can write" in caplog.text
@@ -135,10 +142,6 @@ def test_code_in_files_that_others_can_write_is_not_run(
 
 OTHER = 4321
 """A user who is neither root nor the one who acts."""
-
-
-def acting_as(user: int) -> AbstractContextManager[None]:
-    return as_stranger() if user else nullcontext()
 
 
 @pytest.fixture
@@ -153,32 +156,24 @@ def open_folder(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
 @needs_root
 @pytest.mark.parametrize("user", [0, STRANGER])
 @pytest.mark.parametrize(("cache", "level"), [("/proc/none", 0), ("named", 0), ("named", 1)])
-def test_code_in_a_folder_of_another_user_is_not_run(
-    user: int,
-    cache: str,
-    level: int,
-    open_folder: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    caplog: pytest.LogCaptureFixture,
-) -> None:
+def test_code_in_a_folder_of_another_user_is_not_run(user, cache, level, open_folder, monkeypatch, caplog):
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(open_folder / cache))
-    with acting_as(user):
+    acting = as_stranger if user else nullcontext
+    with acting():
         assert [call(), call()] == [False, True]
     (file,) = files(open_folder)
     assert file.stat().st_uid == user
     caplog.clear()
     file.parents[level].chmod(0o755)
     os.chown(file.parents[level], OTHER, -1)
-    with acting_as(user):
+    with acting():
         assert not call()
     assert "files that you alone can write" in caplog.text
     assert file.exists()
 
 
 @needs_root
-def test_a_link_of_another_user_leads_to_no_code(
-    open_folder: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_a_link_of_another_user_leads_to_no_code(open_folder, monkeypatch, caplog):
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(open_folder / "own"))
     assert [call(), call()] == [False, True]
     (open_folder / "kiks").symlink_to("own/kiks")
@@ -193,41 +188,39 @@ class LateError(Exception):
     pass
 
 
-@pytest.mark.parametrize("error", [TimeoutError("time is up"), ValueError("late"), LateError()], ids=repr)
 @pytest.mark.parametrize(
     ("owner", "name"),
     [(os, "fstat"), (code_cache, "_digest"), (pickle, "loads"), (code_cache._Result, "_rebuild"), (os, "fsync")],
 )
-def test_what_a_signal_raises_while_code_is_loaded_or_kept_goes_on(
-    owner: Any, name: str, error: Exception, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: Any
-) -> None:
-    is_loaded = name != "fsync"
-    if is_loaded:
-        call()
-    real = getattr(owner, name)
+def test_what_a_signal_raises_while_code_is_loaded_or_kept_goes_on(owner, name, kept, tmp_path, monkeypatch, caplog):
+    is_loaded, real = name != "fsync", getattr(owner, name)
 
     def reach(*args: Any, **words: Any) -> Any:
         signal.raise_signal(signal.SIGALRM)
         return real(*args, **words)
 
-    def end(*_: object) -> None:
-        raise error
+    for error in (TimeoutError("time is up"), ValueError("late"), LateError()):
 
-    before = signal.signal(signal.SIGALRM, end)
-    try:
-        with monkeypatch.context() as context:
-            context.setattr(owner, name, reach)
-            with pytest.raises(type(error)) as caught:
-                call()
-    finally:
-        signal.signal(signal.SIGALRM, before)
-    assert caught.value is error
-    assert not caplog.records
-    assert len(files(tmp_path)) == is_loaded
-    assert call() == is_loaded
+        def end(*_: object, error: Exception = error) -> None:
+            raise error
+
+        if not is_loaded:
+            kept.unlink(missing_ok=True)
+        before = signal.signal(signal.SIGALRM, end)
+        try:
+            with monkeypatch.context() as context:
+                context.setattr(owner, name, reach)
+                with pytest.raises(type(error)) as caught:
+                    call()
+        finally:
+            signal.signal(signal.SIGALRM, before)
+        assert caught.value is error
+        assert not caplog.records
+        assert len(files(tmp_path)) == is_loaded
+        assert call() == is_loaded
 
 
-def test_concurrent_writes_of_programs_are_all_kept() -> None:
+def test_concurrent_writes_of_programs_are_all_kept():
     one, other = entry(double_of), entry(double_of)
     contexts = one.targetctx, other.targetctx
     whole, real = (numba.int64,), (numba.float64,)
@@ -251,9 +244,9 @@ KERNELS = {
 }
 
 
-@pytest.mark.parametrize(
-    ("module", "old", "new", "changed"),
-    [
+def test_a_change_concerns_what_is_compiled_from_it():
+    before = code_cache._syntax(KERNELS)
+    for module, old, new, changed in (
         ("engine.f", b"A number", b"A sum", ""),
         ("engine.f", b"a + X", b"a + X  # a comment", ""),
         ("engine.f", b"a + X", b"X + a", "f g entries"),
@@ -264,18 +257,15 @@ KERNELS = {
         ("units", b"Y = 2", b"Y = 3", "f g entries"),
         ("units", b"Z = 3", b"Z = 4", "motor"),
         ("units", b"Z = 3", b"Z = 3\ndef g(): pass", ""),
-    ],
-)
-def test_a_change_concerns_what_is_compiled_from_it(module: str, old: bytes, new: bytes, changed: str) -> None:
-    name = f"kiks.{module}"
-    assert old in KERNELS[name]
-    before, after = code_cache._syntax(KERNELS), code_cache._syntax(KERNELS | {name: KERNELS[name].replace(old, new)})
-    assert {each for each in before if before[each] != after[each]} == {
-        f"kiks.engine.{each}" for each in changed.split()
-    }
+    ):
+        name = f"kiks.{module}"
+        assert old in KERNELS[name]
+        after = code_cache._syntax(KERNELS | {name: KERNELS[name].replace(old, new)})
+        differ = {each for each in before if before[each] != after[each]}
+        assert differ == {f"kiks.engine.{each}" for each in changed.split()}
 
 
-def test_the_camera_is_no_part_of_the_motors() -> None:
+def test_the_camera_is_no_part_of_the_motors():
     kernels = code_cache._digests()
     assert {"kiks.engine.physics.motor", "kiks.engine.sensing.camera", "kiks.batch.loop"} <= set(kernels)
     sources = code_cache._sources()
@@ -286,7 +276,7 @@ def test_the_camera_is_no_part_of_the_motors() -> None:
         assert {each for each in before if before[each] != after[each]} == {f"kiks.engine.{k}" for k in wanted.split()}
 
 
-def test_the_digests_of_the_sources_are_computed_once(tmp_path: Path) -> None:
+def test_the_digests_of_the_sources_are_computed_once(tmp_path):
     digests = code_cache._digests.__wrapped__()
     (known,) = (tmp_path / "cache" / "kiks").glob("sources-*")
     text = known.read_bytes()
@@ -297,9 +287,7 @@ def test_the_digests_of_the_sources_are_computed_once(tmp_path: Path) -> None:
     assert known.read_bytes() == text
 
 
-def test_code_that_calls_a_kernel_with_other_arguments_than_it_takes_is_compiled_again(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_code_that_calls_a_kernel_with_other_arguments_than_it_takes_is_compiled_again(monkeypatch):
     monkeypatch.setattr(code_cache, "_AT_LOAD", {"numba.dynamic": lambda: None})
     monkeypatch.setattr(code_cache, "_linked_in", lambda library: ["numba.dynamic"])
     assert [call(), call()] == [False, True]
@@ -307,25 +295,19 @@ def test_code_that_calls_a_kernel_with_other_arguments_than_it_takes_is_compiled
     assert not call()
 
 
-def test_kernels_in_a_file_have_names_of_their_own() -> None:
+def test_kernels_in_a_file_have_names_of_their_own():
     for path in (Path(code_cache.__file__).parents[1]).rglob("*.py"):
         names = re.findall(r"^@(?:entry|linked.*)\ndef (\w+)", path.read_text(), re.M)
         assert len(names) == len(set(names))
 
 
-def test_another_version_has_a_folder_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
-    call()
-    monkeypatch.setattr(numba, "__version__", "0.0")
-    code_cache._version.cache_clear()
+@pytest.mark.usefixtures("kept", "another_version")
+def test_another_version_has_a_folder_of_its_own():
     assert not is_compiled("double_of")
-    monkeypatch.undo()
-    code_cache._version.cache_clear()
 
 
 @pytest.mark.parametrize("home", ["/proc/none", "/dev/null/none", f"/tmp/{'n' * 300}"])
-def test_without_a_home_it_is_among_temporary_files(
-    home: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_without_a_home_it_is_among_temporary_files(home, tmp_path, monkeypatch, caplog):
     monkeypatch.setenv("NUMBA_CACHE_DIR", home)
     assert [call(), call(), call(0.5)] == [False, True, False]
     (line,) = [record.getMessage() for record in caplog.records]
@@ -335,17 +317,15 @@ def test_without_a_home_it_is_among_temporary_files(
     assert stat.S_IMODE(folder.stat().st_mode) == 0o700
 
 
-def test_a_folder_that_others_can_write_to_is_not_used(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    call()
-    (file,) = files(tmp_path)
-    file.unlink()
-    file.parent.chmod(0o777)
+def test_a_folder_that_others_can_write_to_is_not_used(kept, caplog):
+    kept.unlink()
+    kept.parent.chmod(0o777)
     assert [call(), call()] == [False, True]
     assert "(others may write there)" in caplog.text
-    assert not file.exists()
+    assert not kept.exists()
 
 
-def test_on_a_full_disk_the_run_goes_on(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_on_a_full_disk_the_run_goes_on(tmp_path, caplog):
     with full_disk(1000):
         assert [call(), call(), call(0.5)] == [False] * 3
     (line,) = [record.getMessage() for record in caplog.records]
@@ -355,55 +335,43 @@ def test_on_a_full_disk_the_run_goes_on(tmp_path: Path, caplog: pytest.LogCaptur
 
 
 @pytest.fixture
-def shipped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def shipped(kept: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Return a file with machine code, as a wheel brings it; the user's cache is empty."""
-    call()
-    (file,) = files(tmp_path)
     monkeypatch.setattr(code_cache, "SHIPPED", tmp_path / "compiled")
     (tmp_path / "compiled").mkdir()
-    return Path(shutil.move(file.parent, tmp_path / "compiled")) / file.name
+    return Path(shutil.move(kept.parent, tmp_path / "compiled")) / kept.name
 
 
-def own_files(tmp_path: Path) -> list[Path]:
-    return files(tmp_path / "cache")
-
-
-def test_what_a_wheel_brings_is_used(shipped: Path, tmp_path: Path) -> None:
+def test_what_a_wheel_brings_is_used(shipped, tmp_path):
     assert is_compiled("double_of")
     assert call()
-    assert own_files(tmp_path) == []
+    assert files(tmp_path / "cache") == []
     assert [call(0.5), call(0.5)] == [False, True]
     assert files(shipped.parent) == [shipped]
 
 
-def test_what_a_wheel_brings_for_another_version_is_quietly_ignored(
-    shipped: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    with monkeypatch.context() as context:
-        context.setattr(numba, "__version__", "0.0")
-        code_cache._version.cache_clear()
-        assert not is_compiled("double_of")
-        assert [call(), call()] == [False, True]
-    code_cache._version.cache_clear()
+@pytest.mark.usefixtures("shipped", "another_version")
+def test_what_a_wheel_brings_for_another_version_is_quietly_ignored(caplog):
+    assert not is_compiled("double_of")
+    assert [call(), call()] == [False, True]
     assert not caplog.records
 
 
-@pytest.mark.parametrize("is_folder", [False, True])
-@pytest.mark.parametrize("right", [0, 0o020, 0o002])
-def test_what_is_damaged_or_others_can_write_in_a_wheel_stays_and_is_quietly_ignored(
-    right: int, is_folder: bool, shipped: Path, caplog: pytest.LogCaptureFixture
-) -> None:
+@pytest.mark.parametrize(
+    ("right", "is_folder"), [(0, False), (0o020, False), (0o002, False), (0o020, True), (0o002, True)]
+)
+def test_what_is_damaged_or_others_can_write_in_a_wheel_stays_and_is_quietly_ignored(right, is_folder, shipped, caplog):
     path = shipped.parent if is_folder else shipped
     path.chmod(stat.S_IMODE(path.stat().st_mode) | right)
     if not right:
-        shipped.write_bytes(flipped(1)(shipped.read_bytes()))
+        shipped.write_bytes(flipped(shipped.read_bytes(), 1))
     before = shipped.read_bytes()
     assert [call(), call()] == [False, True]
     assert shipped.read_bytes() == before
     assert not caplog.records
 
 
-def test_a_user_without_a_home(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_a_user_without_a_home(monkeypatch, tmp_path):
     def lost() -> Path:
         raise RuntimeError("Could not determine home directory.")
 

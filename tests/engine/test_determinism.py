@@ -1,24 +1,18 @@
 """The same run again: twice in one process, in another process, and for other processors."""
 
-from __future__ import annotations
-
-import os
-import subprocess
-import sys
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
 from llvmlite import binding
 from tests.at_length import at_length
+from tests.engine.processes import python
 
 from kiks.model.arena import Arena
 from kiks.model.arena_objects import Ball, Cylinder, Pose
 from kiks.model.robot import RESPONSES
 from kiks.sim.simulation import Simulation
 
-ROOT = Path(__file__).parents[2]
 SCRIPT = (b"D,60,57\n", b"P,-255,200\n", b"D,-5,90\n", b"G,0,0\n", b"C,3000,-2000\n", b"D,127,127\n", b"C,-900,-900\n")
 LAMPS = ((60.0, 250.0, 1.0), (330.0, 90.0, 4.0), (200.0, 5.0, 2.0))
 BALLS, CYLINDERS = ((150.0, 90.0), (320.0, 200.0, 25.0)), ((90.0, 150.0), (250.0, 90.0), (300.0, 130.0, 12.0))
@@ -40,7 +34,7 @@ def run_record() -> str:
         port = sim.port(1 + number % 2)
         for line in (command, *ORDERS):
             port.write(line)
-            lines.append(port.readline().decode())
+            lines.append(f"{port.readline()!r}\n")
         sim.run(1.7)
         for robot in (1, 2):
             expected = (*sim.proximity(robot), *sim.ambient(robot), *sim.image(robot))
@@ -72,9 +66,7 @@ def record() -> str:
 
 
 def record_of_process(**environment: str) -> str:
-    command = [sys.executable, "-m", "tests.engine.test_determinism"]
-    done = subprocess.run(command, cwd=ROOT, env=os.environ | environment, capture_output=True, check=True)
-    return done.stdout.decode()
+    return python("-m", "tests.engine.test_determinism", **environment).stdout
 
 
 def test_twice_in_one_process(record: str) -> None:
@@ -94,4 +86,4 @@ def test_for_another_processor(record: str) -> None:
 
 
 if __name__ == "__main__":
-    sys.stdout.buffer.write(run_record().encode())
+    print(run_record(), end="")

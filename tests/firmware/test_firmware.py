@@ -1,18 +1,25 @@
-"""The robot's program: what lines do to its state, and the tools that have rules of their own."""
+"""The robot's program: what lines do to its state, the tools that have rules of their own, and the page."""
+
+import math
+import runpy
+from pathlib import Path
 
 import pytest
 from tests.session_player import TURRETS
 
-from kiks.firmware.commands import COMMANDS
+from kiks.firmware.commands import COMMANDS, Command
 from kiks.firmware.khepera import Firmware
 from kiks.firmware.receiver import LINE_LIMIT, Receiver
+from kiks.firmware.tools import TOOLS
 from kiks.firmware.turret import Turret
 from kiks.model.arena import Arena
 from kiks.model.robot import RobotSpec
-from kiks.sim.simulation import Simulation
+from kiks.sim.simulation import SimPort, Simulation
 
 UNKNOWN = b"Command not found\r\n"
+DOCS = Path(__file__).parents[2] / "docs"
 ERROR = b"z,Protocol error\r\n"
+NO_HELP = b"help: no tool or command of that name\r\n"
 
 
 def a_simulation(robot: str = "khepera_ii", **changes: object) -> Simulation:
@@ -26,24 +33,16 @@ def a_robot(robot: str = "khepera_ii", **changes: object) -> Firmware:
     return a_simulation(robot, **changes).wires[0].firmware
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("sizes", [[1000], [1] * 1000, [255, 1, 1, 743], [256, 744], [300, 300, 400]])
-def test_a_line_may_be_as_long_as_the_limit(sizes: list[int]) -> None:
-    for length, reply in ((LINE_LIMIT, b"d\r\n"), (LINE_LIMIT + 1, UNKNOWN), (900, UNKNOWN)):
-        robot = a_robot()
-        data = b"D,5," + b"0" * (length - 5) + b"5\nM\n"
-        lines, place = [], 0
-        for size in sizes:
-            lines += [line for _, line in robot.receiver.feed(data[place : place + size])]
-            place += size
-        assert [robot.execute(line, 0) for line in lines] == [reply, UNKNOWN]
-
-
-def test_execute_itself_minds_the_limit() -> None:
-    assert a_robot().execute(b"D," + b"9" * 5000 + b",5", 0) == UNKNOWN
-
-
-def test_an_endless_line_takes_no_memory() -> None:
+def test_a_line_may_be_as_long_as_the_limit_and_an_endless_one_takes_no_memory() -> None:
+    robot = a_robot()
+    for sizes in ([1000], [1] * 1000, [255, 1, 1, 743], [256, 744], [300, 300, 400]):
+        for length, reply in ((LINE_LIMIT, b"d\r\n"), (LINE_LIMIT + 1, UNKNOWN), (900, UNKNOWN)):
+            data = b"D,5," + b"0" * (length - 5) + b"5\nM\n"
+            receiver, lines, place = Receiver(), [], 0
+            for size in sizes:
+                lines += [line for _, line in receiver.feed(data[place : place + size])]
+                place += size
+            assert [robot.execute(line, 0) for line in lines] == [reply, UNKNOWN]
     receiver = Receiver()
     for _ in range(100):
         receiver.feed(b"x" * 10_000)
@@ -51,22 +50,23 @@ def test_an_endless_line_takes_no_memory() -> None:
     assert len(line) == LINE_LIMIT + 1
 
 
-def test_empty_lines_are_kept_for_who_wants_answers() -> None:
-    robot = a_robot(quirks__answer_empty_lines=True)
-    lines = [line for _, line in robot.receiver.feed(b"\r\nN\n")]
-    assert lines == [b"", b"", b"N"]
-    assert robot.execute(b"", 0) == UNKNOWN
-    assert a_robot().execute(b"", 0) == b""
-
-
 def test_quirks() -> None:
-    assert a_robot(quirks__unknown_command_with_z=True).execute(b"M", 0) == b"z," + UNKNOWN
-    assert a_robot(quirks__d_reply_trailing_comma=True).execute(b"D,0,0", 0) == b"d,\r\n"
-    assert a_robot(quirks__d_reply_trailing_comma=True).execute(b"T,1,D,0", 0) == b"t,1,d\r\n"
-    robot = a_robot(quirks__accept_lower_case=True)
-    lines = (b"h", b"d,5,5", b"t,1,b", b"m", b"help n")
-    replies = (b"h,0,0\r\n", b"d\r\n", b"t,1,b,1,0\r\n", UNKNOWN, b"help: no tool or command of that name\r\n")
-    assert tuple(robot.execute(line, 0) for line in lines) == replies
+    for quirk, line, reply in (
+        ("answer_empty_lines", b"", UNKNOWN),
+        ("unknown_command_with_z", b"M", b"z," + UNKNOWN),
+        ("d_reply_trailing_comma", b"D,0,0", b"d,\r\n"),
+        ("d_reply_trailing_comma", b"T,1,D,0", b"t,1,d\r\n"),
+        ("accept_lower_case", b"h", b"h,0,0\r\n"),
+        ("accept_lower_case", b"d,5,5", b"d\r\n"),
+        ("accept_lower_case", b"t,1,b", b"t,1,b,1,0\r\n"),
+        ("accept_lower_case", b"m", UNKNOWN),
+        ("accept_lower_case", b"help n", NO_HELP),
+    ):
+        assert a_robot(**{f"quirks__{quirk}": True}).execute(line, 0) == reply, line
+    robot = a_robot(quirks__answer_empty_lines=True)
+    assert [line for _, line in robot.receiver.feed(b"\r\nN\n")] == [b"", b"", b"N"]
+    assert a_robot().execute(b"", 0) == b""
+    assert a_robot().execute(b"D," + b"9" * 5000 + b",5", 0) == UNKNOWN, "execute itself minds the limit"
 
 
 WRONG = [
@@ -76,9 +76,7 @@ WRONG = [
 ]  # fmt: skip
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("line", WRONG)
-def test_an_error_changes_nothing(line: bytes) -> None:
+def test_an_error_changes_nothing() -> None:
     sim = a_simulation()
     robot = sim.wires[0].firmware
     for before in (b"C,500,900", b"L,0,1", b"W,7,7", b"J,30,30,30,30"):
@@ -86,15 +84,15 @@ def test_an_error_changes_nothing(line: bytes) -> None:
     sim.run(0.2)
     sim.sync()
     state = sim.state_hash()
-    assert robot.execute(line, sim.now_ns) in (ERROR, UNKNOWN)
-    assert sim.state_hash() == state
-    assert robot.demo_wakes_ns is None
+    for line in WRONG:
+        assert robot.execute(line, sim.now_ns) in (ERROR, UNKNOWN), line
+        assert sim.state_hash() == state, line
+        assert robot.demo_wakes_ns is None, line
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("line", "field", "values"),
-    [
+def test_numbers_are_clamped() -> None:
+    robot = a_robot()
+    for line, field, values in (
         (b"A,1,2,99999", "speed_gains", [1, 2, 32767]),
         (b"F,0,-0,32768", "position_gains", [0, 0, 32767]),
         (b"D,500,-500", "speed_setpoint", [127, -127]),
@@ -107,46 +105,34 @@ def test_an_error_changes_nothing(line: bytes) -> None:
         (b"J,1,2,3,4", "profile_speed", [1, 3]),
         (b"J,1,2,3,4", "profile_acceleration", [2, 4]),
         (b"L,1,2", "led", [0, 1]),
-    ],
-)
-def test_numbers_are_clamped(line: bytes, field: str, values: list[int]) -> None:
+        (b"L,0,2", "led", [1, 1]),
+        (b"L,0,2", "led", [0, 1]),
+        (b"L,1,1", "led", [0, 1]),
+    ):
+        robot.execute(b"D,1,1", 0)
+        assert robot.execute(line, 0) == line[:1].lower() + b"\r\n", line
+        assert getattr(robot.view, field).tolist() == values, line
+
+
+def test_counters_keep_the_low_32_bits_and_the_bus_8() -> None:
     robot = a_robot()
-    assert robot.execute(line, 0) == line[:1].lower() + b"\r\n"
-    assert getattr(robot.view, field).tolist() == values
-
-
-@pytest.mark.parametrize("number", [2**31, -(2**31) - 1, 2**32 + 5, -(2**32) - 5, 10**200, -(10**200) + 1])
-def test_counters_keep_the_low_32_bits(number: int) -> None:
-    robot = a_robot()
-    assert robot.execute(b"G,%d,0" % number, 0) == b"g\r\n"
-    assert robot.execute(b"H", 0) == b"h,%d,0\r\n" % ((number + 2**31) % 2**32 - 2**31)
-
-
-def test_the_bus_holds_the_low_8_bits() -> None:
-    robot = a_robot()
+    for number in (2**31, -(2**31) - 1, 2**32 + 5, -(2**32) - 5, 10**200, -(10**200) + 1):
+        assert robot.execute(b"G,%d,0" % number, 0) == b"g\r\n"
+        assert robot.execute(b"H", 0) == b"h,%d,0\r\n" % ((number + 2**31) % 2**32 - 2**31)
     for data, address in ((170, 32), (256, 0), (-1, 63), (10**100 + 3, 5)):
         assert robot.execute(b"W,%d,%d" % (data, address), 0) == b"w\r\n"
         assert robot.view.bus[address] == data & 0xFF
         assert robot.execute(b"R,%d" % address, 0) == b"r,0\r\n"
 
 
-def test_leds_toggle() -> None:
-    robot = a_robot()
-    for line, leds in ((b"L,0,2", [1, 0]), (b"L,0,2", [0, 0]), (b"L,1,1", [0, 1]), (b"L,1,1", [0, 1])):
-        robot.execute(line, 0)
-        assert robot.view.led.tolist() == leds
-
-
-@pytest.mark.parametrize(
-    ("sensor", "time_ns"), [(0, 0), (0, 2_499_999), (1, 2_500_000), (7, 19_999_999), (0, 20_000_000)]
-)
-def test_channels_1_and_2_follow_the_scan(sensor: int, time_ns: int) -> None:
+def test_channels_1_and_2_follow_the_scan() -> None:
     robot = a_robot()
     assert robot.scanned_sensor() == 0
     robot.sense_proximity = lambda: list(range(10, 18))
     robot.sense_ambient = lambda: list(range(20, 28))
-    assert robot.execute(b"I,1", time_ns) == b"i,%d\r\n" % (10 + sensor)
-    assert robot.execute(b"I,2", time_ns) == b"i,%d\r\n" % (20 + sensor)
+    for sensor, time_ns in ((0, 0), (0, 2_499_999), (1, 2_500_000), (7, 19_999_999), (0, 20_000_000)):
+        assert robot.execute(b"I,1", time_ns) == b"i,%d\r\n" % (10 + sensor)
+        assert robot.execute(b"I,2", time_ns) == b"i,%d\r\n" % (20 + sensor)
 
 
 def test_current_follows_the_motors() -> None:
@@ -174,38 +160,41 @@ def test_a_turret_gets_numbers_that_fit_64_bits() -> None:
     assert listener.heard == (5, -(2**62))
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("letter", "ABCDEFGHIJKLMNOPQRSTUVWXYZ")
-def test_help_for_every_letter(letter: str) -> None:
-    names = {command.letter: command.name for command in COMMANDS}
-    reply = a_robot().execute(f"help {letter}".encode(), 0).decode()
-    if letter in names:
-        assert reply.startswith(letter)
-        assert reply.endswith(f": {names[letter]}\r\n")
-    else:
-        assert reply == "help: no tool or command of that name\r\n"
+def test_help_for_every_letter() -> None:
+    names, robot = {command.letter: command.name for command in COMMANDS}, a_robot()
+    for letter in "ABCDEFGHIJKLMNOPQRSTUVWXYZ":
+        reply = robot.execute(f"help {letter}".encode(), 0)
+        if letter in names:
+            assert reply.startswith(letter.encode())
+            assert reply.endswith(f": {names[letter]}\r\n".encode())
+        else:
+            assert reply == NO_HELP
 
 
-@pytest.mark.parametrize(("robot", "has_flash"), [("khepera", False), ("khepera_ii", True)])
-def test_only_the_second_khepera_has_flash(robot: str, has_flash: bool) -> None:
-    mind = a_robot(robot)
-    assert (mind.execute(b"flash E", 0) == b"Flash erased\r\n") == has_flash
-    assert (mind.execute(b"flash", 0) == UNKNOWN) != has_flash
-    for line in (b"help", b"list", b"help flash"):
-        assert (b"flash E" in mind.execute(line, 0) or b"  flash," in mind.execute(line, 0)) == has_flash
+def test_only_the_second_khepera_has_flash() -> None:
+    for name, has_flash in (("khepera", False), ("khepera_ii", True)):
+        robot = a_robot(name)
+        assert (robot.execute(b"flash E", 0) == b"Flash erased\r\n") == has_flash
+        assert (robot.execute(b"flash", 0) == UNKNOWN) != has_flash
+        for line in (b"help", b"list", b"help flash"):
+            assert (b"flash E" in robot.execute(line, 0) or b"  flash," in robot.execute(line, 0)) == has_flash
+
+
+def a_port(robot: str = "khepera_ii") -> SimPort:
+    port = a_simulation(robot).port(1)
+    port.timeout = 1.0
+    return port
 
 
 def test_serial_changes_the_speed_behind_its_reply() -> None:
-    sim = a_simulation()
-    port = sim.port(1)
-    port.timeout = 1.0
+    port = a_port()
     port.write(b"serial 115200\n")
     assert port.readline() == b"Line at 115200 baud\r\n"
-    assert sim.now_ns == (14 + 21) * 1_145_833 + 1_000_000  # the old speed
-    begin_ns = sim.now_ns
+    begin_ns = port.sim.now_ns
+    assert begin_ns == (14 + 21) * 1_145_833 + 1_000_000  # the old speed
     port.write(b"H\n")
     assert port.readline() == b"h,0,0\r\n"
-    assert sim.now_ns - begin_ns == (2 + 7) * 95_486 + 1_000_000
+    assert port.sim.now_ns - begin_ns == (2 + 7) * 95_486 + 1_000_000
     assert port.baudrate == 115200
 
 
@@ -235,25 +224,20 @@ def test_restart_puts_all_to_defaults() -> None:
     assert robot.demo_wakes_ns is None
 
 
-def test_restart_brings_the_robot_to_rest_where_it_is() -> None:
-    sim = a_simulation()
-    port = sim.port(1)
-    port.timeout = 1.0
+def test_restart_brings_the_robot_to_rest_where_it_is_and_returns_to_the_selected_speed() -> None:
+    port = a_port()
     port.write(b"D,50,50\n")
     port.readline()
-    sim.run(1.0)
-    before = sim.pose(1)
+    port.sim.run(1.0)
+    before = port.sim.pose(1)
     port.write(b"restart\n")
     assert b"Serial Communication Protocol\r\n" in [port.readline() for _ in range(3)]
-    sim.run(1.0)
-    x_mm, y_mm, heading_rad = sim.pose(1)
-    assert sum((now - then) ** 2 for now, then in zip((x_mm, y_mm), before, strict=False)) ** 0.5 < 100
-    assert heading_rad == pytest.approx(before[2], abs=0.1)
+    port.sim.run(1.0)
+    now = port.sim.pose(1)
+    assert math.dist(now[:2], before[:2]) < 100
+    assert now[2] == pytest.approx(before[2], abs=0.1)
     port.write(b"E\n")
     assert port.readline() == b"e,0,0\r\n"
-
-
-def test_restart_returns_to_the_selected_speed() -> None:
     robot = a_robot(firmware__baud=38400)
     robot.execute(b"serial 115200", 0)
     assert robot.baud == 115200
@@ -265,30 +249,30 @@ def test_restart_returns_to_the_selected_speed() -> None:
     assert robot.baud == 57600
 
 
-@pytest.mark.parametrize(
-    ("proximity", "speeds"),
-    [
-        ([0] * 8, (14, 14)),  # 0.7 * 20
-        ([400, 0, 0, 0, 0, 0, 0, 0], (17, 10)),  # left 0.7 * (20 + 4), right 0.7 * (20 - 5): away from the left
-        ([0, 0, 0, 0, 0, 400, 0, 0], (10, 17)),
-        ([0, 0, 1023, 1023, 0, 0, 0, 0], (-7, -7)),  # 0.7 * (20 - 12 * 1023 / 400)
-        ([0, 0, 0, 0, 0, 0, 400, 400], (20, 20)),
-    ],
-)
-def test_the_demonstration_is_braitenbergs_vehicle(proximity: list[int], speeds: tuple[int, int]) -> None:
+def test_the_demonstration_is_braitenbergs_vehicle() -> None:
     robot = a_robot()
-    robot.sense_proximity = lambda: proximity
-    robot.execute(b"run demo", 5)
-    assert robot.demo_wakes_ns == 5
-    robot.run_demo(5)
-    assert tuple(robot.view.speed_setpoint.tolist()) == speeds
-    assert robot.demo_wakes_ns == 20_000_005
+    for proximity, speeds in (
+        ([0] * 8, [14, 14]),  # 0.7 * 20
+        ([400, 0, 0, 0, 0, 0, 0, 0], [17, 10]),  # left 0.7 * (20 + 4), right 0.7 * (20 - 5): away from the left
+        ([0, 0, 0, 0, 0, 400, 0, 0], [10, 17]),
+        ([0, 0, 1023, 1023, 0, 0, 0, 0], [-7, -7]),  # 0.7 * (20 - 12 * 1023 / 400)
+        ([0, 0, 0, 0, 0, 0, 400, 400], [20, 20]),
+    ):
+        robot.sense_proximity = lambda proximity=proximity: proximity
+        robot.execute(b"run demo", 5)
+        assert robot.demo_wakes_ns == 5
+        robot.run_demo(5)
+        assert robot.view.speed_setpoint.tolist() == speeds
+        assert robot.demo_wakes_ns == 20_000_005
+        robot.execute(b"restart", 5)
+    for line in (b"run", b"run demon", b"run demo now", b"run Demo"):
+        assert robot.execute(line, 0).startswith(b"run: one of")
+        assert robot.demo_wakes_ns is None
 
 
 def test_the_demonstration_avoids_walls_and_still_answers() -> None:
-    sim = a_simulation("khepera")
-    port = sim.port(1)
-    port.timeout = 1.0
+    port = a_port("khepera")
+    sim = port.sim
     port.write(b"run demo\n")
     assert port.readline().startswith(b"Demonstration")
     sim.run(30.0)
@@ -305,8 +289,13 @@ def test_the_demonstration_avoids_walls_and_still_answers() -> None:
     assert sim.travelled_mm(1) == pytest.approx(travelled_mm, abs=0.1)
 
 
-@pytest.mark.parametrize("line", [b"run", b"run demon", b"run demo now", b"run Demo"])
-def test_other_functions_do_not_run(line: bytes) -> None:
-    robot = a_robot()
-    assert robot.execute(line, 0).startswith(b"run: one of")
-    assert robot.demo_wakes_ns is None
+def test_the_page_of_the_protocol_has_a_section_of_each_command_and_tool() -> None:
+    page = (DOCS / "reference" / "protocol.md").read_text(encoding="utf-8")
+    for name in (*(f"{row.letter}: {row.name}" for row in COMMANDS), *TOOLS):
+        assert f"### {name}\n" in page
+
+
+def test_a_new_letter_has_an_example_without_an_entry_for_it() -> None:
+    row = Command("X", "new", ("a", "b"), (), "", print)
+    section = runpy.run_path(str(DOCS / "pages" / "protocol.py"))["command"](row)
+    assert "-> X,1,1" in list(section)

@@ -1,14 +1,14 @@
 """The gripper: what it grips, how it carries and puts down, and that what it holds stays outside of everything else."""
 
-from __future__ import annotations
-
 import math
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.at_length import share
 
 import kiks
 from kiks.engine.physics import contact
@@ -27,8 +27,10 @@ def act(sim: kiks.Simulation, order: str, seconds: float, robot: int = 1) -> Non
     sim.run(seconds)
 
 
-def tell(sim: kiks.Simulation, line: str, robot: int = 1) -> None:
-    kiks.Khepera(sim.port(robot)).send(line)
+def drive(sim: kiks.Simulation, left: int, right: int, seconds: float = 0.0, robot: int = 1) -> None:
+    """Set the speeds of the wheels and let time pass."""
+    kiks.Khepera(sim.port(robot)).set_speed(left, right)
+    sim.run(seconds)
 
 
 def closed(sim: kiks.Simulation, robot: int = 1) -> None:
@@ -60,21 +62,20 @@ def held_by(sim: kiks.Simulation) -> int:
     return int(sim.bodies()["holder"][0])
 
 
+def place_of(sim: kiks.Simulation) -> tuple[float, float]:
+    return tuple(sim.bodies()[["x_mm", "y_mm"]][0].tolist())
+
+
 def records(sim: kiks.Simulation) -> tuple[Any, Any]:
     """Robots and bodies at one instant, the end of the tick: `pose` and `bodies` may be of two."""
     sim.sync()
     return sim.world.state.robots[0], sim.world.state.bodies[0]
 
 
-def place_of(sim: kiks.Simulation) -> tuple[float, float]:
-    body = sim.bodies()[0]
-    return float(body["x_mm"]), float(body["y_mm"])
-
-
-def seen_from(sim: kiks.Simulation, robot: int = 1) -> tuple[float, float]:
-    """Where the body is, ahead and to the left of the robot."""
+def seen_from(sim: kiks.Simulation) -> tuple[float, float]:
+    """Where the body is, ahead and to the left of robot 1."""
     robots, bodies = records(sim)
-    x, y, heading = robots[["x_mm", "y_mm", "heading_rad"]][robot - 1].tolist()
+    x, y, heading = robots[["x_mm", "y_mm", "heading_rad"]][0].tolist()
     dx, dy = bodies["x_mm"][0] - x, bodies["y_mm"][0] - y
     c, s = math.cos(heading), math.sin(heading)
     return dx * c + dy * s, dy * c - dx * s
@@ -94,7 +95,6 @@ def deepest_overlap_mm(sim: kiks.Simulation) -> float:
 
 def test_it_grips_carries_and_puts_down() -> None:
     sim = a_simulation()
-    robot, port = kiks.Khepera(sim.port(1)), sim.port(1)
     assert ask(sim, "G") == [0]  # the arm is up
     act(sim, "E,255", 0.6)
     assert ask(sim, "G") == [255]
@@ -105,10 +105,8 @@ def test_it_grips_carries_and_puts_down() -> None:
     act(sim, "E,150", 0.6)
     assert sim.bodies()["is_lifted"][0] == 1
     assert ask(sim, "G") == [255]
-    robot.set_speed(10, 10)
-    sim.run(2.0)
-    robot.set_speed(0, 0)
-    sim.run(0.2)
+    drive(sim, 10, 10, 2.0)
+    drive(sim, 0, 0, 0.2)
     assert sim.pose(1)[0] > 440
     assert seen_from(sim) == pytest.approx((TOUCHING_MM + 1, 0.0), abs=1e-9)
     act(sim, "E,255", 0.6)
@@ -117,17 +115,14 @@ def test_it_grips_carries_and_puts_down() -> None:
     act(sim, "D,0", 0.6)
     assert held_by(sim) == 0
     where = place_of(sim)
-    robot.set_speed(-10, -10)
-    sim.run(1.0)
+    drive(sim, -10, -10, 1.0)
     assert place_of(sim) == where
     assert sim.bodies()[["velocity_x", "velocity_y"]].tolist() == [(0.0, 0.0)]
     assert ask(sim, "G") == [0]
-    port.close()
 
 
-@pytest.mark.parametrize(
-    ("ahead_mm", "aside_mm", "is_gripped"),
-    [
+def test_what_stands_between_the_jaws_is_gripped() -> None:
+    for ahead_mm, aside_mm, is_gripped in (
         (TOUCHING_MM + 0.1, 0.0, True),
         (RIM_MM + 36.5, 0.0, True),
         (RIM_MM + 37.5, 0.0, False),
@@ -136,42 +131,38 @@ def test_it_grips_carries_and_puts_down() -> None:
         (TOUCHING_MM + 5, 12.5, False),  # one jaw would come down on it
         (-TOUCHING_MM - 1, 0.0, False),
         (0.0, TOUCHING_MM + 1, False),
-    ],
-)
-def test_what_stands_between_the_jaws_is_gripped(ahead_mm: float, aside_mm: float, is_gripped: bool) -> None:
-    sim = a_simulation(ahead_mm, aside_mm)
-    closed(sim)
-    assert held_by(sim) == is_gripped
-    assert ask(sim, "H,0") == [115 if is_gripped else 0]
-    if is_gripped:
-        ahead, aside = seen_from(sim)
-        assert aside == pytest.approx(0.0, abs=0.02)
-        assert ahead >= TOUCHING_MM
-    assert deepest_overlap_mm(sim) < 0.02
+    ):
+        sim = a_simulation(ahead_mm, aside_mm)
+        closed(sim)
+        assert held_by(sim) == is_gripped, (ahead_mm, aside_mm)
+        assert ask(sim, "H,0") == [115 if is_gripped else 0]
+        if is_gripped:
+            ahead, aside = seen_from(sim)
+            assert aside == pytest.approx(0.0, abs=0.02)
+            assert ahead >= TOUCHING_MM
+        assert deepest_overlap_mm(sim) < 0.02
 
 
 def test_what_is_too_wide_or_far_above_is_not_gripped() -> None:
-    sim = a_simulation()
-    sim.remove_body(1)
-    sim.add_ball(300 + RIM_MM + 32.5, 300)
-    closed(sim)
-    assert held_by(sim) == 0
     sim = a_simulation()
     act(sim, "E,200", 0.5)
     act(sim, "D,1", 0.6)
     assert held_by(sim) == 0
     act(sim, "E,255", 0.6)  # closed jaws grip nothing
     assert held_by(sim) == 0
+    sim.remove_body(1)
+    sim.add_ball(300 + RIM_MM + 32.5, 300)
+    closed(sim)
+    assert held_by(sim) == 0
 
 
 def test_two_grippers_at_one_cylinder() -> None:
     sim = a_simulation(robots=2)
-    x, _ = place_of(sim)
-    sim.place(2, x + TOUCHING_MM + 1, 300, math.pi)
+    sim.place(2, place_of(sim)[0] + TOUCHING_MM + 1, 300, math.pi)
     for robot in (1, 2):
         act(sim, "E,255", 0.6, robot)
     for robot in (1, 2):
-        tell(sim, "T,1,D,1", robot)
+        kiks.Khepera(sim.port(robot)).send("T,1,D,1")
     sim.run(0.7)
     assert held_by(sim) == 1
     assert ask(sim, "H,0", 2) == [0]
@@ -184,38 +175,32 @@ def test_it_drags_what_it_holds_as_fast_as_it_drives() -> None:
     ways = []
     for sim in (a_simulation(200.0), holding()):
         begin = sim.pose(1)[0]
-        kiks.Khepera(sim.port(1)).set_speed(10, 10)
-        sim.run(1.0)
+        drive(sim, 10, 10, 1.0)
         ways.append(sim.pose(1)[0] - begin)
     assert ways[1] == pytest.approx(ways[0], rel=0.01)
-    kiks.Khepera(sim.port(1)).set_speed(-5, 8)
-    sim.run(3.0)
+    drive(sim, -5, 8, 3.0)
     assert seen_from(sim) == pytest.approx((TOUCHING_MM + 1, 0.0), abs=0.01)
 
 
 def test_a_wall_stops_both() -> None:
     sim = holding()
-    robot = kiks.Khepera(sim.port(1))
-    robot.set_speed(20, 20)
-    sim.run(8.0)
+    drive(sim, 20, 20, 8.0)
     x, y = place_of(sim)
     assert (x, y) == pytest.approx((890 - CYLINDER_MM, 300), abs=0.05)
     assert sim.pose(1)[0] == pytest.approx(x - TOUCHING_MM - 1, abs=0.05)
     assert sim.contacts(1) == 1
-    assert max(robot.speed()) <= 5  # wheels slip, as a robot's at a wall
+    assert max(kiks.Khepera(sim.port(1)).speed()) <= 5  # wheels slip, as a robot's at a wall
     assert deepest_overlap_mm(sim) < 0.02
 
 
 def test_a_wall_beside_the_load_stops_the_turn() -> None:
     sim = holding()
-    sim.place(1, 300, 300, 0.0)
     act(sim, "E,150", 0.6)
     sim.place(1, 861, 300, math.pi / 2)  # almost at the wall at its right, which the load meets after 0.3 rad
     act(sim, "E,255", 0.6)
     assert sim.bodies()["is_lifted"][0] == 0
     before = sim.world.state.robots["wheel_pulses"][0, 0].copy()
-    kiks.Khepera(sim.port(1)).set_speed(5, -5)
-    sim.run(0.8)
+    drive(sim, 5, -5, 0.8)
     free_turn = 2 * 5 * 0.08 * 80 / 53
     assert math.pi / 2 - 0.7 * free_turn < sim.pose(1)[2] < math.pi / 2 - 0.29
     assert sim.pose(1)[0] < 860.0  # it levers itself off
@@ -224,25 +209,20 @@ def test_a_wall_beside_the_load_stops_the_turn() -> None:
     assert held_by(sim) == 1
 
 
-def test_another_robot_pushes_both() -> None:
+def test_another_robot_pushes_both_and_turns_a_robot_whose_load_it_pushes_aside() -> None:
     sim = holding(robots=2)
     begin_x, begin_y = place_of(sim)
     sim.place(2, 300 - 2 * RIM_MM - 2, 300, 0.0)
-    kiks.Khepera(sim.port(2)).set_speed(10, 10)
-    sim.run(2.0)
+    drive(sim, 10, 10, 2.0, robot=2)
     x, y = place_of(sim)
     assert x > begin_x + 20
     assert y == pytest.approx(begin_y, abs=0.1)
     assert seen_from(sim) == pytest.approx((TOUCHING_MM + 1, 0.0), abs=0.02)
     assert deepest_overlap_mm(sim) < 0.02
-
-
-def test_who_pushes_the_load_aside_turns_the_robot() -> None:
     sim = holding(robots=2)
     x, y = place_of(sim)
     sim.place(2, x, y + TOUCHING_MM + 1, -math.pi / 2)
-    kiks.Khepera(sim.port(2)).set_speed(10, 10)
-    sim.run(1.0)
+    drive(sim, 10, 10, 1.0, robot=2)
     assert sim.pose(1)[2] < -0.3
     assert sim.pose(1)[1] < 299
     assert held_by(sim) == 1
@@ -267,14 +247,6 @@ def test_it_puts_down_only_where_there_is_room() -> None:
     assert ask(sim, "H,1") == [255]
 
 
-def test_opened_in_the_air_it_drops_the_load_in_front() -> None:
-    sim = holding()
-    act(sim, "E,100", 0.7)
-    act(sim, "D,0", 0.1)
-    assert held_by(sim) == 0
-    assert place_of(sim) == pytest.approx((300 + TOUCHING_MM + 1, 300), abs=0.01)
-
-
 def test_what_fell_beyond_the_edge_is_neither_seen_nor_gripped_again() -> None:
     sim = kiks.Simulation(kiks.Arena.box(604, 354, wall_mm=2), seed=1)
     sim.add_cylinder(550, 177)
@@ -293,7 +265,18 @@ def test_what_fell_beyond_the_edge_is_neither_seen_nor_gripped_again() -> None:
     assert place_of(sim) == where
 
 
-def test_hands_take_things_out_of_the_jaws() -> None:
+def test_the_load_stays_where_it_is_dropped_or_put_by_hand_or_left_by_a_robot_that_is_lifted() -> None:
+    sim = holding()
+    act(sim, "E,100", 0.7)
+    act(sim, "D,0", 0.1)
+    assert held_by(sim) == 0
+    assert place_of(sim) == pytest.approx((300 + TOUCHING_MM + 1, 300), abs=0.01)
+    sim = holding()
+    where = place_of(sim)
+    sim.place(1, 500, 500, 1.0)
+    sim.run(0.1)
+    assert held_by(sim) == 0
+    assert place_of(sim) == where
     sim = holding()
     sim.move_body(1, 600, 400)
     sim.run(0.6)
@@ -303,38 +286,25 @@ def test_hands_take_things_out_of_the_jaws() -> None:
     sim = holding()
     sim.remove_body(1)
     sim.run(0.6)
-    assert ask(sim, "H,0") == [0]
-    assert ask(sim, "G") == [0]
+    assert ask(sim, "H,0") == ask(sim, "G") == [0]
 
 
-def test_a_robot_that_is_lifted_leaves_what_stands_on_the_floor() -> None:
-    sim = holding()
-    where = place_of(sim)
-    sim.place(1, 500, 500, 1.0)
-    sim.run(0.1)
-    assert held_by(sim) == 0
-    assert place_of(sim) == where
-
-
-@pytest.mark.parametrize("is_open", [True, False])
-def test_a_reset_takes_the_grip_back(is_open: bool) -> None:
-    sim = holding()
-    act(sim, "E,100", 0.7)
-    lifted = sim.checkpoint()
-    kiks.Khepera(sim.port(1)).set_speed(-10, -10)
-    if is_open:
-        act(sim, "D,0", 1.0)
-    sim.reset(lifted)
-    kiks.Khepera(sim.port(1)).set_speed(0, 0)
-    sim.run(0.5)
-    assert held_by(sim) == (0 if is_open else 1)
-    assert seen_from(sim)[0] == pytest.approx(TOUCHING_MM + 1, abs=12)
-    assert deepest_overlap_mm(sim) < 0.02
-
-
-def test_a_reset_to_before_the_grip_lets_go() -> None:
+def test_a_reset_takes_the_grip_back_or_lets_go() -> None:
     sim = a_simulation()
     before = sim.checkpoint()
+    closed(sim)
+    act(sim, "E,100", 0.7)
+    lifted = sim.checkpoint()
+    for is_open in (False, True):
+        drive(sim, -10, -10)
+        if is_open:
+            act(sim, "D,0", 1.0)
+        sim.reset(lifted)
+        drive(sim, 0, 0, 0.5)
+        assert held_by(sim) == (0 if is_open else 1)
+        assert seen_from(sim)[0] == pytest.approx(TOUCHING_MM + 1, abs=12)
+        assert deepest_overlap_mm(sim) < 0.02
+    sim.reset(before)
     closed(sim)
     act(sim, "E,100", 0.7)
     sim.reset(before)
@@ -345,29 +315,26 @@ def test_a_reset_to_before_the_grip_lets_go() -> None:
 
 
 @pytest.mark.slow
-@settings(max_examples=12)
+@settings(max_examples=share(5, 12))
 @given(seed=st.integers(0, 10_000))
 def test_nothing_overlaps_and_nothing_is_lost(seed: int) -> None:
     rng = np.random.default_rng(seed)
     size = [int(mm) for mm in rng.integers(280, 500, 2)]
-    sim = kiks.Simulation(
-        kiks.Arena.box(size[0], size[1], rounded_mm=60), seed=seed, robot=["khepera", "khepera_ii", "khepera"]
-    )
+    robots = ["khepera", "khepera_ii", "khepera"]
+    sim = kiks.Simulation(kiks.Arena.box(*size, rounded_mm=60), seed=seed, robot=robots)
     for robot in (1, 2, 3):
         sim.fit(robot, "gripper")
     for k in range(40):
-        try:
+        with suppress(kiks.ParameterError):
             add = sim.add_ball if k % 3 == 0 else sim.add_cylinder
             add(*rng.uniform(0, size), radius_mm=float(rng.uniform(4, 26)))
-        except kiks.ParameterError:
-            continue
     count = len(sim.bodies())
     for _ in range(60):
         for robot in (1, 2, 3):
             approach(sim, robot, rng)
             left, right = rng.integers(-40, 60, 2)
             line = (f"D,{left},{right}", "D,15,15", "T,1,D,1", "T,1,D,0", "T,1,E,255", "T,1,E,100")[rng.integers(0, 6)]
-            tell(sim, line, robot)
+            kiks.Khepera(sim.port(robot)).send(line)
         sim.run(float(rng.uniform(0.05, 0.5)))
         bodies = sim.bodies()
         on_floor = bodies[bodies["is_lifted"] == 0]
@@ -388,9 +355,7 @@ def approach(sim: kiks.Simulation, robot: int, rng: np.random.Generator) -> None
         return
     body, angle = bodies[rng.integers(0, len(bodies))], rng.uniform(0, 2 * math.pi)
     way = sim.specs[robot - 1].body.radius_mm + body["radius_mm"] + rng.uniform(0.1, 3)
-    try:
+    with suppress(kiks.ParameterError):
         sim.place(robot, body["x_mm"] - way * math.cos(angle), body["y_mm"] - way * math.sin(angle), angle)
-    except kiks.ParameterError:
-        return
-    kiks.Khepera(sim.port(robot)).set_speed(0, 0)
-    closed(sim, robot)
+        drive(sim, 0, 0, robot=robot)
+        closed(sim, robot)

@@ -1,8 +1,6 @@
 """The radio: messages between robots, their times, and what happens to those that no program reads."""
 
-from __future__ import annotations
-
-import pytest
+from tests.firmware.test_turrets import execute
 
 import kiks
 from kiks.firmware.radio import ATTEMPTS, FAILED, PAUSE_FRAMES, READY, RECEIVED, attempt_ns
@@ -16,80 +14,68 @@ def a_simulation(radios: tuple[int, ...] = (1, 2), *, robots: int = 3, seed: int
     return sim
 
 
-def execute(sim: kiks.Simulation, robot: int, line: str) -> str:
-    """Give an order at this very instant, so that times are exact."""
-    sim.sync()
-    return sim.wires[robot - 1].firmware.execute(line.encode(), sim.now_ns).decode().rstrip()
-
-
 def send(sim: kiks.Simulation, sender: int, to: int, data: list[int]) -> None:
     numbers = [to, len(data), *data, *[0] * (16 - len(data))]
-    assert execute(sim, sender, f"T,4,S,{','.join(map(str, numbers))}") == "t,4,s"
+    assert execute(sim, f"T,4,S,{','.join(map(str, numbers))}", sender) == "t,4,s"
 
 
 def status(sim: kiks.Simulation, robot: int) -> int:
-    return int(execute(sim, robot, "T,4,F").removeprefix("t,4,f,"))
+    return int(execute(sim, "T,4,F", robot).removeprefix("t,4,f,"))
 
 
 def read(sim: kiks.Simulation, robot: int) -> list[int]:
-    return [int(word) for word in execute(sim, robot, "T,4,R").removeprefix("t,4,r,").split(",")]
+    return [int(word) for word in execute(sim, "T,4,R", robot).removeprefix("t,4,r,").split(",")]
 
 
 def run_ns(sim: kiks.Simulation, time_ns: int) -> None:
     sim.advance_to(sim.now_ns + time_ns)
 
 
-@pytest.mark.parametrize("data", [[], [7], list(b"Terribly sorry!"), list(range(240, 256))])
-def test_a_message_takes_the_time_of_its_characters(data: list[int]) -> None:
+def test_a_message_takes_the_time_of_its_characters() -> None:
     sim = a_simulation()
-    send(sim, 1, 2, data)
-    assert attempt_ns(len(data)) == (10 + len(data)) * character_ns(9600)
-    run_ns(sim, attempt_ns(len(data)) - 1)
-    assert (status(sim, 1), status(sim, 2)) == (0, READY)
-    run_ns(sim, 1)
-    assert (status(sim, 1), status(sim, 2)) == (READY, READY | RECEIVED)
-    assert read(sim, 2) == [1, len(data), *data, *[0] * (16 - len(data))]
-    assert status(sim, 2) == READY
-    assert read(sim, 2) == [0] * 18
-
-
-def test_bytes_beyond_the_length_are_not_sent_and_only_eight_bits_count() -> None:
-    sim = a_simulation()
-    execute(sim, 1, "T,4,S,2,3,257,-1,3,4,5,6,7,8,9,10,11,12,13,14,15,16")
+    for data in ([], [7], list(b"Terribly sorry!"), list(range(240, 256))):
+        send(sim, 1, 2, data)
+        assert attempt_ns(len(data)) == (10 + len(data)) * character_ns(9600)
+        run_ns(sim, attempt_ns(len(data)) - 1)
+        assert (status(sim, 1), status(sim, 2)) == (0, READY)
+        run_ns(sim, 1)
+        assert (status(sim, 1), status(sim, 2)) == (READY, READY | RECEIVED)
+        assert read(sim, 2) == [1, len(data), *data, *[0] * (16 - len(data))]
+        assert status(sim, 2) == READY
+        assert read(sim, 2) == [0] * 18
+    # Bytes beyond the length are not sent, and only eight bits count.
+    execute(sim, "T,4,S,2,3,257,-1,3,4,5,6,7,8,9,10,11,12,13,14,15,16")
     sim.run(0.1)
     assert read(sim, 2) == [1, 3, 1, 255, 3, *[0] * 13]
 
 
-@pytest.mark.parametrize("to", [0, 1, 3, 9, -1, 10**30])
-def test_a_message_without_a_receiver_fails_after_its_repeats(to: int) -> None:
+def test_a_message_without_a_receiver_fails_after_its_repeats() -> None:
     sim = a_simulation()  # robot 3 has no radio
-    send(sim, 1, to, [1, 2, 3])
-    run_ns(sim, ATTEMPTS * attempt_ns(3) - 1)
-    assert status(sim, 1) == 0
-    run_ns(sim, (ATTEMPTS - 1) * PAUSE_FRAMES * 5 * character_ns(9600) + 1)
-    assert status(sim, 1) == READY | FAILED
-    send(sim, 1, 2, [4])
-    assert status(sim, 1) == 0
-    sim.run(0.1)
-    assert status(sim, 1) == READY
+    for to in (0, 1, 3, 9, -1, 10**30):
+        send(sim, 1, to, [1, 2, 3])
+        run_ns(sim, ATTEMPTS * attempt_ns(3) - 1)
+        assert status(sim, 1) == 0
+        run_ns(sim, (ATTEMPTS - 1) * PAUSE_FRAMES * 5 * character_ns(9600) + 1)
+        assert status(sim, 1) == READY | FAILED
+        send(sim, 1, 2, [4])
+        assert status(sim, 1) == 0
+        sim.run(0.1)
+        assert status(sim, 1) == READY
+        assert read(sim, 2)[:3] == [1, 1, 4]
 
 
-def test_busy_a_second_message_is_dropped() -> None:
-    sim = a_simulation()
+def test_busy_a_second_message_is_dropped_and_at_an_overrun_the_older_one_stays() -> None:
+    sim = a_simulation((1, 2, 3))
     send(sim, 1, 2, [1])
     send(sim, 1, 2, [2])
     sim.run(0.5)
     assert read(sim, 2)[:3] == [1, 1, 1]
     assert read(sim, 2)[0] == 0
-
-
-def test_overrun_the_older_message_stays_and_the_sender_learns_it() -> None:
-    sim = a_simulation((1, 2, 3))
     send(sim, 1, 2, [1])
     sim.run(0.1)
     send(sim, 3, 2, [3])
     sim.run(0.8)
-    assert status(sim, 3) == READY | FAILED
+    assert status(sim, 3) == READY | FAILED, "the sender learns it"
     assert read(sim, 2)[:3] == [1, 1, 1]
     assert read(sim, 2)[0] == 0
     # A program that reads in time gets the message that is being repeated.
@@ -144,7 +130,7 @@ def test_it_repeats_to_the_bit_however_often_one_looks() -> None:
     assert chat(1) == chat(3) == chat(500)
 
 
-def test_a_message_on_its_way_stands_in_the_state() -> None:
+def test_a_message_on_its_way_stands_in_the_state_and_a_restart_forgets_it() -> None:
     sim = a_simulation()
     idle = sim.state_hash()
     send(sim, 1, 2, [5])
@@ -157,16 +143,12 @@ def test_a_message_on_its_way_stands_in_the_state() -> None:
     assert status(sim, 2) == READY
     sim.run(0.1)
     assert read(sim, 2) == first == [1, 1, 5, *[0] * 15]
-
-
-def test_a_restart_forgets() -> None:
-    sim = a_simulation()
     send(sim, 1, 2, [5])
-    execute(sim, 1, "restart")
+    execute(sim, "restart")
     sim.run(0.5)
     assert (status(sim, 1), status(sim, 2)) == (READY, READY)
     send(sim, 1, 2, [5])
     sim.run(0.1)
-    execute(sim, 2, "restart")
+    execute(sim, "restart", 2)
     assert status(sim, 2) == READY
     assert read(sim, 2) == [0] * 18

@@ -8,13 +8,13 @@ from tests.session_player import FOLDER, Pieces, Session, Step, play, sessions, 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("pieces", ["lines", "bytes", "one write"])
-@pytest.mark.parametrize("session", sessions(), ids=lambda session: session.name)
-def test_session_in_memory(session: Session, pieces: Pieces) -> None:
-    sim = simulation(session)
-    port = sim.port(1)
-    port.timeout = 1.0
-    clock = None if pieces == "one write" else lambda: sim.time_s
-    play(port, session, wait=port.sleep, pieces=pieces, clock=clock)
+def test_sessions_in_memory(pieces: Pieces) -> None:
+    for session in sessions():
+        sim = simulation(session)
+        port = sim.port(1)
+        port.timeout = 1.0
+        clock = None if pieces == "one write" else lambda sim=sim: sim.time_s
+        play(port, session, wait=port.sleep, pieces=pieces, clock=clock)
 
 
 def test_all_thirty_vectors_are_there() -> None:

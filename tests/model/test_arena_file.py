@@ -3,18 +3,20 @@
 import math
 import struct
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
+from tests.model.refusals import refused
+from tests.model.test_picture import bmp
 
-from kiks.errors import ArenaError, ParameterError
+from kiks.errors import ArenaError
 from kiks.model.arena import Arena, Ball, Cylinder, Lamp, Pose
 from kiks.model.arena_file import save_arena
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "arenas"
-ARENAS = sorted(EXAMPLES.glob("*.toml"))
 ROOM_MM = 40
 
 
@@ -53,176 +55,127 @@ BIT_FORMATS = [
 ]
 
 
-@pytest.mark.parametrize(("name", "options"), GREY_FORMATS)
-def test_greys_come_back_unchanged(tmp_path, name, options):
-    picture = grey_picture()
-    Image.fromarray(picture).save(tmp_path / name, **options)
-    assert np.array_equal(read(tmp_path / name), picture)
+def test_greys_and_bits_come_back_unchanged_from_every_lossless_format(tmp_path):
+    greys, walls = grey_picture(), grey_picture() > 90
+    lossless = [*GREY_FORMATS, ("a.gif", {}), ("a.webp", {"lossless": True})]
+    for picture, formats in ((greys, lossless), (walls, BIT_FORMATS)):
+        for name, options in formats:
+            Image.fromarray(picture).save(tmp_path / name, **options)
+            found = read(tmp_path / name)
+            assert np.array_equal(found, picture * 255 if picture is walls else picture), (name, options)
 
 
-@pytest.mark.parametrize(("name", "options"), BIT_FORMATS)
-def test_bits_come_back_unchanged(tmp_path, name, options):
-    walls = grey_picture() > 90
-    Image.fromarray(walls).save(tmp_path / name, **options)
-    assert np.array_equal(read(tmp_path / name), walls * 255)
-
-
-@pytest.mark.parametrize("white_is_zero", [False, True])
-@pytest.mark.parametrize("bits", [1, 8])
-def test_a_tif_may_count_from_white_to_black(tmp_path, white_is_zero, bits):
+def test_a_tif_may_count_from_white_to_black(tmp_path):
     # Written by hand, so that Pillow's writer has no say in what the tags mean: one strip, uncompressed.
-    walls = grey_picture((120, 152)) > 90
-    stored = ~walls if white_is_zero else walls
-    data = (np.packbits(stored, axis=1) if bits == 1 else stored * np.uint8(255)).tobytes()
-    tags = [(256, 152), (257, 120), (258, bits), (259, 1), (262, 0 if white_is_zero else 1), (273, 0)]
-    tags += [(277, 1), (278, 120), (279, len(data))]
-    start = 8 + 2 + 12 * len(tags) + 4
-    entries = b"".join(struct.pack("<HHII", tag, 4, 1, start if tag == 273 else value) for tag, value in tags)
-    path = tmp_path / "a.tif"
-    path.write_bytes(b"II*\0" + struct.pack("<IH", 8, len(tags)) + entries + bytes(4) + data)
-    assert np.array_equal(read(path), walls * 255)
+    walls, path = grey_picture((120, 152)) > 90, tmp_path / "a.tif"
+    for white_is_zero, bits in product((False, True), (1, 8)):
+        stored = ~walls if white_is_zero else walls
+        data = (np.packbits(stored, axis=1) if bits == 1 else stored * np.uint8(255)).tobytes()
+        tags = [(256, 152), (257, 120), (258, bits), (259, 1), (262, 0 if white_is_zero else 1), (273, 0)]
+        tags += [(277, 1), (278, 120), (279, len(data))]
+        start = 8 + 2 + 12 * len(tags) + 4
+        entries = b"".join(struct.pack("<HHII", tag, 4, 1, start if tag == 273 else value) for tag, value in tags)
+        path.write_bytes(b"II*\0" + struct.pack("<IH", 8, len(tags)) + entries + bytes(4) + data)
+        assert np.array_equal(read(path), walls * 255)
 
 
-def test_a_colour_never_becomes_floor(tmp_path):
+def test_a_colour_never_becomes_floor_and_a_palette_is_read_as_its_colours(tmp_path):
     colours = np.zeros((120, 150, 3), np.uint8)
     colours[10, 10:13] = [(0, 0, 1), (0, 1, 0), (1, 0, 0)]
     colours[11, 10:13] = [(255, 255, 255), (0, 0, 255), (100, 100, 100)]
+    indices = np.zeros((120, 150), np.uint8)
+    indices[5, 5], indices[6, 6] = 1, 2
+    palette = Image.fromarray(indices).convert("P")
+    palette.putpalette([0, 0, 0, 0, 0, 2, 200, 200, 200])
+    palette.putdata(indices.ravel().tolist())
     for name in ("a.png", "a.tif", "a.bmp", "a.ppm"):
         Image.fromarray(colours).save(tmp_path / name)
         found = read(tmp_path / name)
         assert found[10, 10:13].min() == 1
         assert found[11, 10:13].tolist() == [255, 29, 100]
         assert np.count_nonzero(found) == 6
+        if name != "a.ppm":
+            palette.save(tmp_path / name)
+            found = read(tmp_path / name)
+            assert (found[5, 5], found[6, 6], np.count_nonzero(found)) == (1, 200, 2)
 
 
-def test_a_palette_is_read_as_its_colours(tmp_path):
-    indices = np.zeros((120, 150), np.uint8)
-    indices[5, 5], indices[6, 6] = 1, 2
-    image = Image.fromarray(indices).convert("P")
-    image.putpalette([0, 0, 0, 0, 0, 2, 200, 200, 200])
-    image.putdata(indices.ravel().tolist())
-    for name in ("a.png", "a.bmp", "a.tif"):
-        image.save(tmp_path / name)
-        found = read(tmp_path / name)
-        assert (found[5, 5], found[6, 6], np.count_nonzero(found)) == (1, 200, 2)
-
-
-@pytest.mark.parametrize("mode", ["LA", "RGBA"])
-def test_what_is_transparent_is_floor(tmp_path, mode):
-    layered = Image.new(mode, (150, 120), 0)
-    colour = (90,) if mode == "LA" else (90, 90, 90)
-    layered.putpixel((3, 4), (*colour, 255))
-    layered.putpixel((4, 4), (*colour, 1))
-    layered.putpixel((5, 4), (*colour, 0))
-    layered.save(tmp_path / "a.png")
-    found = read(tmp_path / "a.png")
-    assert found[4, 3:6].tolist() == [90, 90, 0]
-    assert np.count_nonzero(found) == 2
-
-
-def test_a_transparent_grey_is_floor(tmp_path):
+def test_what_is_transparent_is_floor(tmp_path):
+    for mode, colour in (("LA", (90,)), ("RGBA", (90, 90, 90))):
+        layered = Image.new(mode, (150, 120), 0)
+        for x, opacity in ((3, 255), (4, 1), (5, 0)):
+            layered.putpixel((x, 4), (*colour, opacity))
+        layered.save(tmp_path / "a.png")
+        found = read(tmp_path / "a.png")
+        assert found[4, 3:6].tolist() == [90, 90, 0]
+        assert np.count_nonzero(found) == 2
     Image.fromarray(grey_picture()).save(tmp_path / "a.png", transparency=90)
-    expected = np.where(grey_picture() == 90, 0, grey_picture())
-    assert np.array_equal(read(tmp_path / "a.png"), expected)
+    assert np.array_equal(read(tmp_path / "a.png"), np.where(grey_picture() == 90, 0, grey_picture()))
 
 
-@pytest.mark.parametrize("name", ["a.png", "a.tif", "a.pgm"])
-def test_sixteen_bits_are_scaled(tmp_path, name):
-    deep = np.zeros((120, 150), np.uint16)
-    deep[7, :4] = 1, 257, 32896, 65535
-    Image.fromarray(deep).save(tmp_path / name)
-    assert read(tmp_path / name)[7, :5].tolist() == [1, 1, 128, 255, 0]
-
-
-@pytest.mark.parametrize(
-    ("dtype", "values", "expected"),
-    [
-        (np.float32, (0.001, 0.5, 1.0), [1, 128, 255]),
-        (np.float32, (0.1, 100.0, 255.0), [1, 100, 255]),
-        (np.int32, (1, 100, 255), [1, 100, 255]),
-        (np.int32, (1, 257, 65535), [1, 1, 255]),
-        (np.int32, (1, 65536, 2**31 - 1), [1, 1, 127]),
-    ],
-)
-def test_thirty_two_bits_are_scaled(tmp_path, dtype, values, expected):
-    deep = np.zeros((120, 150), dtype)
-    deep[7, :3] = values
-    Image.fromarray(deep).save(tmp_path / "a.tif")
-    assert read(tmp_path / "a.tif")[7, :4].tolist() == [*expected, 0]
-
-
-@pytest.mark.parametrize("value", [-1.0, math.nan, math.inf])
-def test_brightness_is_a_number_from_zero(tmp_path, value):
-    deep = np.zeros((120, 150), np.float32)
-    deep[0, 0] = value
-    Image.fromarray(deep).save(tmp_path / "a.tif")
-    with pytest.raises(ArenaError, match=r"must hold brightness from 0 up, but its values span .* Save the arena as"):
-        Arena.load(tmp_path / "a.tif")
-
-
-def test_the_first_frame_counts(tmp_path):
-    first, second = Image.fromarray(grey_picture()), Image.new("L", (300, 300), 255)
-    first.save(tmp_path / "a.tif", save_all=True, append_images=[second])
-    assert np.array_equal(read(tmp_path / "a.tif"), grey_picture())
-
-
-def test_a_picture_gives_the_name_and_the_scale(tmp_path):
-    Image.fromarray(grey_picture()).save(tmp_path / "yard.png")
-    arena = Arena.from_image(str(tmp_path / "yard.png"), 2)
-    assert (arena.name, arena.width_mm, arena.height_mm) == ("yard", 300, 240)
-    with pytest.raises(ParameterError, match="mm_per_pixel must be from"):
-        Arena.from_image(tmp_path / "yard.png", 0)
-
-
-@pytest.mark.parametrize("content", [b"", b"hello", b"\x89PNG\r\n\x1a\n", b"P5 0 0 255 ", b"BM" + bytes(60)])
-def test_what_is_no_picture_is_refused(tmp_path, content):
-    (tmp_path / "a.png").write_bytes(content)
-    with pytest.raises(ArenaError, match=r"Picture '.*a.png' must be"):
-        Arena.load(tmp_path / "a.png")
-
-
-@pytest.mark.parametrize(
-    ("name", "words"), [("a.jpg", "JPEG. Lossy"), ("a.webp", "WEBP. Lossy"), ("a.tga", "TGA. Save")]
-)
-def test_other_types_are_refused(tmp_path, name, words):
-    Image.fromarray(grey_picture()).save(tmp_path / name)
-    with pytest.raises(
-        ArenaError, match=rf"must be a lossless picture, but it is of type {words}.*PNG, TIF, PGM or BMP"
+def test_numbers_of_sixteen_and_thirty_two_bits_are_scaled(tmp_path):
+    for name, dtype, values, expected in (
+        *((name, np.uint16, (1, 257, 32896, 65535), [1, 1, 128, 255]) for name in ("a.png", "a.tif", "a.pgm")),
+        ("a.tif", np.float32, (0.001, 0.5, 1.0), [1, 128, 255]),
+        ("a.tif", np.float32, (0.1, 100.0, 255.0), [1, 100, 255]),
+        ("a.tif", np.int32, (1, 100, 255), [1, 100, 255]),
+        ("a.tif", np.int32, (1, 257, 65535), [1, 1, 255]),
+        ("a.tif", np.int32, (1, 65536, 2**31 - 1), [1, 1, 127]),
     ):
-        Arena.load(tmp_path / name)
+        deep = np.zeros((120, 150), dtype)
+        deep[7, : len(values)] = values
+        Image.fromarray(deep).save(tmp_path / name)
+        assert read(tmp_path / name)[7, : len(values) + 1].tolist() == [*expected, 0]
+    for value in (-1.0, math.nan, math.inf):
+        deep = np.zeros((120, 150), np.float32)
+        deep[0, 0] = value
+        Image.fromarray(deep).save(tmp_path / "a.tif")
+        words = r"must hold brightness from 0 up, but its values span .* Save the arena as"
+        refused(words, Arena.load, tmp_path / "a.tif", error=ArenaError)
 
 
-def test_a_lossy_tif_is_refused(tmp_path):
-    Image.fromarray(grey_picture()).save(tmp_path / "a.tif", compression="jpeg")
-    with pytest.raises(ArenaError, match=r"but it is a TIFF compressed with .*jpeg. Lossy compression smears walls"):
-        Arena.load(tmp_path / "a.tif")
+def test_the_first_frame_counts_and_a_picture_gives_the_name_and_the_scale(tmp_path):
+    first, second = Image.fromarray(grey_picture()), Image.new("L", (300, 300), 255)
+    first.save(tmp_path / "yard.tif", save_all=True, append_images=[second])
+    assert np.array_equal(read(tmp_path / "yard.tif"), grey_picture())
+    arena = Arena.from_image(str(tmp_path / "yard.tif"), 2)
+    assert (arena.name, arena.width_mm, arena.height_mm) == ("yard", 300, 240)
+    refused("mm_per_pixel must be from", Arena.from_image, tmp_path / "yard.tif", 0)
 
 
-@pytest.mark.parametrize(("name", "options"), [*GREY_FORMATS, ("a.tif", {"compression": "group4"})])
-@pytest.mark.parametrize("share", [0.02, 0.3, 0.6])
-def test_truncated_pictures_are_refused(tmp_path, name, options, share):
-    path = tmp_path / name
+def test_what_is_no_lossless_picture_is_refused(tmp_path):
+    for content in (b"", b"hello", b"\x89PNG\r\n\x1a\n", b"P5 0 0 255 ", b"BM" + bytes(60)):
+        (tmp_path / "a.png").write_bytes(content)
+        refused(r"Picture '.*a.png' must be", Arena.load, tmp_path / "a.png", error=ArenaError)
+    for name, options, words in (
+        ("a.jpg", {}, "must be a lossless picture, but it is of type JPEG. Lossy.*PNG, TIF, PGM or BMP"),
+        ("a.webp", {}, "must be a lossless picture, but it is of type WEBP. Lossy.*PNG, TIF, PGM or BMP"),
+        ("a.tga", {}, "must be a lossless picture, but it is of type TGA. Save.*PNG, TIF, PGM or BMP"),
+        ("a.tif", {"compression": "jpeg"}, "but it is a TIFF compressed with .*jpeg. Lossy compression smears walls"),
+    ):
+        Image.fromarray(grey_picture()).save(tmp_path / name, **options)
+        refused(words, Arena.load, tmp_path / name, error=ArenaError)
+
+
+def test_truncated_pictures_are_refused(tmp_path):
     picture = np.random.default_rng(0).integers(0, 256, (120, 150), np.uint8)
-    Image.fromarray(picture > 90 if options.get("compression") == "group4" else picture).save(path, **options)
-    content = path.read_bytes()
-    path.write_bytes(content[: int(len(content) * share)])
-    with pytest.raises(ArenaError, match=r"must be (complete and readable|a picture), but"):
-        Arena.load(path)
+    for name, options in [*GREY_FORMATS, ("a.tif", {"compression": "group4"})]:
+        path = tmp_path / name
+        Image.fromarray(picture > 90 if options.get("compression") == "group4" else picture).save(path, **options)
+        content = path.read_bytes()
+        for share in (0.02, 0.3, 0.6):
+            path.write_bytes(content[: int(len(content) * share)])
+            refused(r"must be (complete and readable|a picture), but", Arena.load, path, error=ArenaError)
 
 
-def bitmap_header(width: int, height: int) -> bytes:
-    return b"BM" + struct.pack("<IHHI", 54, 0, 0, 54) + struct.pack("<IiiHHIIiiII", 40, width, height, 1, 24, *[0] * 6)
-
-
-@pytest.mark.parametrize("side", [8001, 9600, 60000])
-def test_size_is_checked_before_pixels_are_read(tmp_path, side):
+def test_size_is_checked_before_pixels_are_read(tmp_path):
     # There are no pixels behind the header: reading them would say something else.
-    (tmp_path / "a.bmp").write_bytes(bitmap_header(side, side))
-    with pytest.raises(ArenaError, match=r"must have at most 64 million"):
-        Arena.load(tmp_path / "a.bmp")
-    (tmp_path / "a.bmp").write_bytes(bitmap_header(1000, 1000))
-    with pytest.raises(ArenaError, match=r"a.bmp': An arena must have at most 64 million cells, .* 1000 x 1000 pixels"):
-        Arena.from_image(tmp_path / "a.bmp", 9)
+    for side in (8001, 9600, 60000):
+        (tmp_path / "a.bmp").write_bytes(bmp(side, side))
+        refused(r"must have at most 64 million", Arena.load, tmp_path / "a.bmp", error=ArenaError)
+    (tmp_path / "a.bmp").write_bytes(bmp(1000, 1000))
+    words = r"a.bmp': An arena must have at most 64 million cells, .* 1000 x 1000 pixels"
+    refused(words, Arena.from_image, tmp_path / "a.bmp", 9, error=ArenaError)
 
 
 FULL = """
@@ -283,16 +236,12 @@ def test_a_saved_arena_comes_back(folder):
     save_arena(arena, folder / "b.toml")
     again = Arena.load(folder / "b.toml")
     assert np.array_equal(again.brightness, arena.brightness)
-    assert (again.name, again.mm_per_cell) == (arena.name, arena.mm_per_cell)
-    assert (again.starts, again.lamps) == (arena.starts, arena.lamps)
-    assert (again.balls, again.cylinders) == (arena.balls, arena.cylinders)
-
-
-def test_save_arena_says_why_it_cannot(tmp_path):
-    with pytest.raises(ParameterError, match=r"path must end in '.toml', but it was .*a.png'. The picture goes beside"):
-        save_arena(Arena.default(), tmp_path / "a.png")
-    with pytest.raises(ParameterError, match=r"an arena must go to a file .* cannot \(No such file or directory\)"):
-        save_arena(Arena.default(), tmp_path / "none" / "a.toml")
+    for name in ("name", "mm_per_cell", "starts", "lamps", "balls", "cylinders"):
+        assert getattr(again, name) == getattr(arena, name)
+    words = r"path must end in '.toml', but it was .*a.png'. The picture goes beside"
+    refused(words, save_arena, arena, folder / "a.png")
+    words = r"an arena must go to a file .* cannot \(No such file or directory\)"
+    refused(words, save_arena, arena, folder / "none" / "a.toml")
 
 
 BOX = "size_mm = [300, 200]\n"
@@ -328,28 +277,22 @@ REFUSED = [
 ]
 
 
-@pytest.mark.parametrize(("text", "words"), REFUSED)
-def test_an_arena_file_that_is_wrong_says_where(folder, text, words):
-    if "link.png" in text:
-        outside = folder.parent / f"{folder.name}.png"
-        Image.fromarray(grey_picture()).save(outside)
-        (folder / "link.png").symlink_to(outside)
-    with pytest.raises(ArenaError, match=rf"(?s)^Arena file '.*a.toml'.*{words}"):
-        Arena.load(write(folder, text))
+def test_an_arena_file_that_is_wrong_says_where(folder):
+    outside = folder.parent / f"{folder.name}.png"
+    Image.fromarray(grey_picture()).save(outside)
+    (folder / "link.png").symlink_to(outside)
+    for text, words in REFUSED:
+        refused(rf"^Arena file '.*a.toml'.*{words}", Arena.load, write(folder, text), error=ArenaError)
 
 
-@pytest.mark.parametrize("path", ARENAS, ids=lambda path: path.stem)
-def test_all_floor_of_an_example_arena_can_be_reached_from_its_free_starts(path):
+def test_all_floor_of_an_example_arena_can_be_reached_from_its_free_starts():
     from scipy.ndimage import label
 
-    arena = Arena.load(path)
-    assert arena.starts
-    assert all(arena.free_for(start.x_mm, start.y_mm, ROOM_MM) for start in arena.starts)
-    _, part_count = label(arena.clearance - 0.5 >= ROOM_MM)
-    assert part_count == 1
-
-
-def test_the_default_arena_is_also_a_picture():
+    for path in sorted(EXAMPLES.glob("*.toml")):
+        arena = Arena.load(path)
+        assert arena.starts, path
+        assert all(arena.free_for(start.x_mm, start.y_mm, ROOM_MM) for start in arena.starts), path
+        assert label(arena.clearance - 0.5 >= ROOM_MM)[1] == 1, path
     assert np.array_equal(Arena.load(EXAMPLES / "default.toml").brightness, Arena.default().brightness)
 
 
@@ -367,13 +310,11 @@ def test_a_picture_with_black_walls_is_turned_round(tmp_path, caplog):
     walls[:5] = False  # grey, which only a map of ROS knows to be unknown
     assert np.array_equal(arena.brightness == 255, walls)
     assert not caplog.messages
-    with pytest.raises(
-        ArenaError, match=r"room for a robot 55 mm .* walls are black: an arena file with invert = true"
-    ):
-        Arena.load(tmp_path / "room.png").find_start(27.5)
+    words = r"room for a robot 55 mm .* walls are black: an arena file with invert = true"
+    refused(words, Arena.load(tmp_path / "room.png").find_start, 27.5, error=ArenaError)
     assert "is wall: black (0) is floor, and all else wall." in caplog.text
-    with pytest.raises(ArenaError, match="invert must come with a picture"):
-        Arena.load(write(tmp_path, "size_mm = [500, 650]\ninvert = true"))
+    file = write(tmp_path, "size_mm = [500, 650]\ninvert = true")
+    refused("invert must come with a picture", Arena.load, file, error=ArenaError)
 
 
 def test_what_a_map_of_ros_does_not_know_to_be_free_is_wall(tmp_path):
@@ -387,24 +328,14 @@ def test_what_a_map_of_ros_does_not_know_to_be_free_is_wall(tmp_path):
     assert np.array_equal(arena.brightness[::2, ::2] > 0, walls)
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
+def test_a_damaged_map_of_ros_is_one_line(tmp_path):
+    rest = "resolution: 0.01\noccupied_thresh: 0.65\nfree_thresh:"
+    for text, words in (
         ("image: [room.png\n", "must be YAML, but: while parsing a flow sequence"),
         ("- a\n", "must be a table"),
-        ("image: ../room.png\nresolution: 0.01\noccupied_thresh: 0.65\nfree_thresh: 0.2\n", "image"),
-        ("image: room.png\nresolution: 0.01\noccupied_thresh: 0.65\nfree_thresh: 2\n", "free_thresh must be at most 1"),
-        ("image: &a [*a, *a]\nresolution: 0.01\noccupied_thresh: 0.65\nfree_thresh: 0.2\n", "image must be a text"),
-    ],
-)
-def test_a_damaged_map_of_ros_is_one_line(tmp_path, text, message):
-    (tmp_path / "map.yaml").write_text(text)
-    with pytest.raises(ArenaError, match=message) as refusal:
-        Arena.load(tmp_path / "map.yaml")
-    assert "\n" not in str(refusal.value)
-
-
-@pytest.mark.parametrize(("name", "options"), [("a.gif", {}), ("a.webp", {"lossless": True})])
-def test_other_lossless_pictures_are_read(tmp_path, name, options):
-    Image.fromarray(grey_picture()).save(tmp_path / name, **options)
-    assert np.array_equal(read(tmp_path / name), grey_picture())
+        (f"image: ../room.png\n{rest} 0.2\n", "image"),
+        (f"image: room.png\n{rest} 2\n", "free_thresh must be at most 1"),
+        (f"image: &a [*a, *a]\n{rest} 0.2\n", "image must be a text"),
+    ):
+        (tmp_path / "map.yaml").write_text(text)
+        refused(words, Arena.load, tmp_path / "map.yaml", error=ArenaError)

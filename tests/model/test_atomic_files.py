@@ -1,20 +1,17 @@
 """Files are written whole or not at all, whatever goes wrong on the way."""
 
-from __future__ import annotations
-
 import os
-import resource
 import stat
-from collections.abc import Callable, Iterator
-from contextlib import closing, contextmanager
+from collections.abc import Callable
+from contextlib import closing
 from pathlib import Path
 
 import pytest
+from tests.model.refusals import full_disk, refused
 
 import kiks
 from kiks.clock.thinking import save_thinking
 from kiks.control.controllers import linear
-from kiks.errors import ParameterError
 from kiks.export.pictures import Picture
 from kiks.learn.champion import Champion
 from kiks.model.arena import Arena
@@ -36,14 +33,8 @@ from kiks.model.thesis_networks import NetworkResponse
 ROOM = Arena.box(300, 200)
 
 
-def champion(path: Path) -> None:
-    controller = linear()
-    parameters = (0.5,) * (controller.parameter_count or 0)
-    Champion(controller, parameters, task="avoid", fitness=1.0, measures={}, generation=1).save(path)
-
-
-def picture(path: Path) -> None:
-    Picture.of_arena(ROOM).save(path)
+def champion() -> Champion:
+    return Champion(linear(), (0.5,) * linear().parameter_count, task="avoid", fitness=1.0, measures={}, generation=1)
 
 
 WRITERS: dict[str, Callable[[Path], object]] = {
@@ -53,39 +44,31 @@ WRITERS: dict[str, Callable[[Path], object]] = {
     "robot.toml": lambda path: save_robot(kiks.RobotSpec.load("khepera"), path),
     "networks.json": lambda path: NetworkResponse.load().save(path),
     "thinking.txt": lambda path: save_thinking([12_345] * 100, path),
-    "champion.toml": champion,
-    "picture.png": picture,
+    "champion.toml": lambda path: champion().save(path),
+    "picture.png": lambda path: Picture.of_arena(ROOM).save(path),
 }
-
-
-@contextmanager
-def full_disk(bytes_left: int) -> Iterator[None]:
-    """Limit the size of files, as a full disk does."""
-    before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (bytes_left, before[1]))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
 def content(folder: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in folder.iterdir()}
 
 
-@pytest.mark.parametrize("bytes_left", [0, 100])
 @pytest.mark.parametrize("name", WRITERS)
-def test_on_a_full_disk_all_is_as_it_was(name: str, bytes_left: int, tmp_path: Path) -> None:
+def test_on_a_full_disk_all_is_as_it_was(name: str, tmp_path: Path) -> None:
     path = tmp_path / name
-    with full_disk(bytes_left), pytest.raises(ParameterError, match="must go to a file that can be written"):
-        WRITERS[name](path)
-    assert content(tmp_path) == {}
+
+    def refuse(bytes_left: int) -> None:
+        before = content(tmp_path)
+        with full_disk(bytes_left):
+            refused("must go to a file that can be written", WRITERS[name], path)
+        assert content(tmp_path) == before
+
+    refuse(0)
+    refuse(100)
     for each in (path, path.with_suffix(".png")):
         each.write_bytes(b"old")
-    before = content(tmp_path)
-    with full_disk(bytes_left), pytest.raises(ParameterError, match="must go to a file that can be written"):
-        WRITERS[name](path)
-    assert content(tmp_path) == before
+    refuse(0)
+    refuse(100)
     WRITERS[name](path)
     assert content(tmp_path)[name] != b"old"
 
@@ -93,8 +76,8 @@ def test_on_a_full_disk_all_is_as_it_was(name: str, bytes_left: int, tmp_path: P
 def test_files_that_belong_together_are_replaced_together(tmp_path: Path) -> None:
     first, second = tmp_path / "first", tmp_path / "second"
     first.write_text("old")
-    with full_disk(100), pytest.raises(ParameterError, match="second"):
-        replace_files({first: "new", second: bytes(200)})
+    with full_disk(100):
+        refused("second", replace_files, {first: "new", second: bytes(200)})
     assert content(tmp_path) == {"first": b"old"}
 
 
@@ -116,15 +99,12 @@ def test_rights_are_those_of_the_umask_and_of_the_earlier_file(tmp_path: Path) -
     assert [rights(name) for name in ("new", "private", "old", "taken")] == [0o640, 0o600, 0o604, 0o600]
 
 
-def test_a_link_stays_a_link(tmp_path: Path) -> None:
+def test_a_link_stays_a_link_and_what_is_no_file_is_written_to(tmp_path: Path) -> None:
     (tmp_path / "link").symlink_to("file")
     for text in ("one", "two"):
         replace_file(tmp_path / "link", text)
         assert (tmp_path / "file").read_text() == text
     assert (tmp_path / "link").is_symlink()
-
-
-def test_what_is_no_file_is_written_to(tmp_path: Path) -> None:
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
     reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
@@ -136,28 +116,27 @@ def test_what_is_no_file_is_written_to(tmp_path: Path) -> None:
     check_writable("/dev/null", "--out")
 
 
-@pytest.mark.parametrize("name", ["none/x", "file/x", "folder", ""])
-def test_what_cannot_be_written_is_told_before_and_after_in_the_same_words(name: str, tmp_path: Path) -> None:
+def test_what_cannot_be_written_is_told_before_and_after_in_the_same_words(tmp_path: Path) -> None:
     (tmp_path / "folder").mkdir()
     (tmp_path / "file").touch()
     before = sorted(tmp_path.rglob("*"))
-    path = tmp_path / name
-    for attempt in (lambda: check_writable(path, "--out"), lambda: replace_file(path, b"", "--out")):
-        with pytest.raises(ParameterError, match=r"^--out must go to a file that can be written, but '") as caught:
-            attempt()
-        assert "\n" not in str(caught.value)
+    words = r"^--out must go to a file that can be written, but '"
+    for name in ("none/x", "file/x", "folder", ""):
+        refused(words, check_writable, tmp_path / name, "--out")
+        refused(words, replace_file, tmp_path / name, b"", "--out")
     assert sorted(tmp_path.rglob("*")) == before
 
 
 def test_a_check_leaves_nothing_and_changes_nothing(tmp_path: Path) -> None:
     check_writable(tmp_path / "new", "--out")
     assert content(tmp_path) == {}
-    (tmp_path / "old").write_text("old")
-    check_writable(tmp_path / "old", "--out")
-    with pytest.raises(ParameterError, match=r"--out must name a new file, but .*old' exists"):
-        check_writable(tmp_path / "old", "--out", is_new=True)
-    with pytest.raises(ParameterError, match=r"--out must go to a folder that can be written, but .* \(File exists\)"):
-        make_folder(tmp_path / "old", "--out")
+    old = tmp_path / "old"
+    old.write_text("old")
+    check_writable(old, "--out")
+    words = r"--out must name a new file, but .*old' exists"
+    refused(words, lambda: check_writable(old, "--out", is_new=True))
+    words = r"--out must go to a folder that can be written, but .* \(File exists\)"
+    refused(words, make_folder, old, "--out")
     assert content(tmp_path) == {"old": b"old"}
 
 
@@ -166,9 +145,8 @@ def test_a_protected_file_is_not_replaced(tmp_path: Path) -> None:
     path = tmp_path / "file"
     path.write_text("old")
     path.chmod(0o444)
-    for attempt in (lambda: check_writable(path, "--out"), lambda: replace_file(path, b"", "--out")):
-        with pytest.raises(ParameterError, match="write-protected"):
-            attempt()
+    refused("write-protected", check_writable, path, "--out")
+    refused("write-protected", replace_file, path, b"", "--out")
 
 
 def test_what_a_killed_writer_left_goes_and_what_a_living_one_writes_stays(tmp_path: Path) -> None:
@@ -184,24 +162,24 @@ def test_what_a_killed_writer_left_goes_and_what_a_living_one_writes_stays(tmp_p
 
 
 @pytest.mark.parametrize("earlier", [None, b"", b"old"])
-@pytest.mark.parametrize("name", ["file", "link"])
-def test_of_those_that_want_to_be_the_only_one_there_is_one(name: str, earlier: bytes | None, tmp_path: Path) -> None:
+def test_of_those_that_want_to_be_the_only_one_there_is_one(earlier: bytes | None, tmp_path: Path) -> None:
     target = tmp_path / "file"
     (tmp_path / "link").symlink_to(target)
     if earlier is not None:
         target.write_bytes(earlier)
 
-    def refused() -> None:
-        with pytest.raises(BlockingIOError):
-            FileBeside(target_of(tmp_path / name), is_only=True)
+    def is_refused() -> None:
+        for name in ("file", "link"):
+            with pytest.raises(BlockingIOError):
+                FileBeside(target_of(tmp_path / name), is_only=True)
 
     with closing(FileBeside(target, is_only=True)) as one:
         assert one.has_earlier == bool(earlier)
-        refused()
+        is_refused()
         one.file.write(b"new")
         one.settle()
         one.take_place()
-        refused()
+        is_refused()
     with closing(FileBeside(target, is_only=True)) as other:
         assert other.has_earlier
     assert content(tmp_path) == {"file": b"new", "link": b"new"}
@@ -214,12 +192,10 @@ def test_an_empty_file_that_was_made_for_the_lock_goes(tmp_path: Path) -> None:
     assert content(tmp_path) == {}
 
 
-@pytest.mark.parametrize("path", [5, None, b"a", "", "a\0b", "a" * 256, "a/" * 4096, "\ud800"])
-def test_what_is_no_path_is_named(path: object) -> None:
-    with pytest.raises(ParameterError, match="must be the name of a file, of at most 255 bytes, but it was"):
-        path_of(path)
-    for attempt in (check_writable, lambda path, what: replace_file(path, b"", what)):
-        with pytest.raises(ParameterError, match=r"^--out must be the name of a file"):
-            attempt(path, "--out")
-    with pytest.raises(ParameterError, match=r"robot, if .*, must be the name of a file"):
-        RobotSpec.load(path)  # type: ignore[arg-type]
+def test_what_is_no_path_is_named() -> None:
+    words = "must be the name of a file, of at most 255 bytes, but it was"
+    for path in (5, None, b"a", "", "a\0b", "a" * 256, "a/" * 4096, "\ud800"):
+        refused(words, path_of, path)
+        refused(r"^--out must be the name of a file", check_writable, path, "--out")
+        refused(r"^--out must be the name of a file", replace_file, path, b"", "--out")
+        refused(r"robot, if .*, must be the name of a file", RobotSpec.load, path)

@@ -2,14 +2,17 @@
 
 import math
 from fractions import Fraction
+from functools import partial
 from itertools import product
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.at_length import share
+from tests.model.refusals import refused
 
-from kiks.errors import ArenaError, ParameterError
+from kiks.errors import ArenaError
 from kiks.model import brush
 from kiks.model.arena import Arena
 from kiks.model.brush import POINTS_MAX
@@ -43,7 +46,7 @@ def painted(draw) -> np.ndarray:
 
 
 @pytest.mark.slow
-@settings(max_examples=25)
+@settings(max_examples=share(10, 25))
 @given(points, points, widths)
 def test_a_line_covers_what_is_near_it(a, b, width):
     shown = painted(lambda arena: brush.line(arena, [a, b], width_mm=width))
@@ -53,7 +56,7 @@ def test_a_line_covers_what_is_near_it(a, b, width):
         assert (shown[row, column] == 255) == is_near(x, y, a, b, width)
 
 
-@settings(max_examples=40)
+@settings(max_examples=share(20, 40))
 @given(points, points)
 def test_a_rectangle_covers_centres_in_it(a, b):
     shown = painted(lambda arena: brush.rectangle(arena, *a, *b, 77))
@@ -62,7 +65,7 @@ def test_a_rectangle_covers_centres_in_it(a, b):
     assert inside.all() or np.array_equal(shown == 77, inside)
 
 
-@settings(max_examples=20)
+@settings(max_examples=share(10, 20))
 @given(st.lists(points, min_size=2, max_size=5), widths)
 def test_a_stroke_is_its_segments_together(stroke, width):
     whole = painted(lambda arena: brush.line(arena, stroke, width_mm=width))
@@ -88,26 +91,18 @@ def test_brightness_is_kept_and_nought_erases():
     arena = brush.line(arena, [(0, 25), (WIDTH, 25)], width_mm=4, brightness=0)
     assert np.count_nonzero(arena.brightness) == 50 * 26
     assert not FLOOR.brightness.any()
+    for corners in ((3.6, 3.6, 4.4, 4.4), (-50, -50, -10, -10), (10, 10, 20, 20, 0)):
+        assert brush.rectangle(FLOOR, *corners) is FLOOR, "what changes nothing is the same arena"
 
 
-def test_what_changes_nothing_is_the_same_arena():
-    assert brush.rectangle(FLOOR, 3.6, 3.6, 4.4, 4.4) is FLOOR
-    assert brush.rectangle(FLOOR, -50, -50, -10, -10) is FLOOR
-    assert brush.rectangle(FLOOR, 10, 10, 20, 20, 0) is FLOOR
-
-
-@pytest.mark.parametrize(
-    ("paint", "error", "words"),
-    [
-        (lambda: brush.line(FLOOR, [], width_mm=3), ParameterError, "the number of points"),
-        (lambda: brush.line(FLOOR, [(0, 0)] * (POINTS_MAX + 1), width_mm=3), ParameterError, "the number of points"),
-        (lambda: brush.line(FLOOR, [(0, math.inf)], width_mm=3), ParameterError, "y_mm must be"),
-        (lambda: brush.line(FLOOR, [(0, 1)], width_mm=0), ParameterError, "width_mm"),
-        (lambda: brush.rectangle(FLOOR, 0, 0, 5, 5, 256), ParameterError, "brightness"),
-        (lambda: brush.rectangle(FLOOR, 0, 0, 5, 5, "wod"), ParameterError, "wood"),
-        (lambda: brush.rectangle(FLOOR, 0, 0, WIDTH, HEIGHT), ArenaError, "floor"),
-    ],
-)
-def test_what_cannot_be_painted(paint, error, words):
-    with pytest.raises(error, match=words):
-        paint()
+def test_what_cannot_be_painted():
+    for stroke, width, words in (
+        ([], 3, "the number of points"),
+        ([(0, 0)] * (POINTS_MAX + 1), 3, "the number of points"),
+        ([(0, math.inf)], 3, "y_mm must be"),
+        ([(0, 1)], 0, "width_mm"),
+    ):
+        refused(words, partial(brush.line, FLOOR, stroke, width_mm=width))
+    refused("brightness", brush.rectangle, FLOOR, 0, 0, 5, 5, 256)
+    refused("wood", brush.rectangle, FLOOR, 0, 0, 5, 5, "wod")
+    refused("floor", brush.rectangle, FLOOR, 0, 0, WIDTH, HEIGHT, error=ArenaError)

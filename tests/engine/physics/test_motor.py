@@ -1,47 +1,47 @@
 """The motors keep the promises of khepera-protocol.md section 6, and nothing makes them run away."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from tests.at_length import share
+from tests.engine.same_walls import wide_floor
 
-from kiks.model.arena import Arena
-
-FAR = Arena.box(2000, 2000)
 SPEEDS = st.integers(-127, 127)
 
 
 @pytest.fixture
 def world(make_world):
     """A robot on an open floor."""
-    return make_world(FAR).place(1000.0, 1000.0, 0.3)
+    return make_world(wide_floor(1500)).place(750.0, 750.0, 0.3)
+
+
+@pytest.fixture
+def two(make_world):
+    """The same robot twice."""
+    return [make_world(wide_floor(1500)).place(750.0, 750.0) for _ in range(2)]
 
 
 def spin(world, ticks):
     """Let ticks pass without ever reaching a wall: the robot is carried back to the middle."""
     for _ in range(ticks):
         world.tick()
-        if max(abs(world.robot["x_mm"] - 1000), abs(world.robot["y_mm"] - 1000)) > 800:
-            world.place(1000.0, 1000.0, world.pose[2])
+        if max(abs(world.robot["x_mm"] - 750), abs(world.robot["y_mm"] - 750)) > 600:
+            world.place(750.0, 750.0, world.pose[2])
 
 
-@settings(derandomize=True, max_examples=40)
-@given(left=SPEEDS, right=SPEEDS)
+@settings(derandomize=True, max_examples=share(20, 40))
+@given(left=st.integers(-115, 115), right=st.integers(-115, 115))
 def test_speed_reaches_its_command_in_about_five_ticks_and_on_average_exactly(make_world, left, right):
-    # Near full power there is nothing left to control with.
-    left, right = (min(max(v, -115), 115) for v in (left, right))
-    world = make_world(FAR).place(1000.0, 1000.0)
+    """Near full power there is nothing left to control with."""
+    world = make_world(wide_floor(1500)).place(750.0, 750.0)
     world.speed(left, right)
-    spin(world, 5)
-    for reached, command in zip(world.robot["motor_speed"], (left, right), strict=True):
-        assert reached == pytest.approx(command, abs=max(2.0, 0.3 * abs(command)))
-    spin(world, 55)
-    for reached, command in zip(world.robot["motor_speed"], (left, right), strict=True):
-        assert reached == pytest.approx(command, abs=max(1.0, 0.03 * abs(command)))
+    for ticks, least, part in ((5, 2.0, 0.3), (55, 1.0, 0.03)):
+        spin(world, ticks)
+        for reached, command in zip(world.robot["motor_speed"], (left, right), strict=True):
+            assert reached == pytest.approx(command, abs=max(least, part * abs(command)))
     spin(world, 140)
     start = world.counters
     spin(world, 400)
@@ -49,51 +49,42 @@ def test_speed_reaches_its_command_in_about_five_ticks_and_on_average_exactly(ma
         assert (after - before) / 400 == pytest.approx(command, abs=0.02)
 
 
-@settings(derandomize=True, max_examples=30)
+@settings(derandomize=True, max_examples=share(15, 30))
 @given(left=SPEEDS, right=SPEEDS, mode=st.sampled_from(["speed", "pwm", "position"]))
-def test_mirror_symmetry_to_the_bit(make_world, left, right, mode):
-    one, other = make_world(FAR).place(1000.0, 1000.0), make_world(FAR).place(1000.0, 1000.0)
-    scale = 5 if mode == "position" else 1
-    getattr(one, mode)(left * scale, right * scale)
-    getattr(other, mode)(right * scale, left * scale)
+def test_mirror_symmetry_to_the_bit_and_power_drives_backwards_as_forwards(make_world, left, right, mode):
+    one, other, back = (make_world(wide_floor(1500)).place(750.0, 750.0) for _ in range(3))
+    left, right = (round(speed * {"speed": 1, "pwm": 255 / 127, "position": 5}[mode]) for speed in (left, right))
+    getattr(one, mode)(left, right)
+    getattr(other, mode)(right, left)
+    getattr(back, mode)(-left, -right)
     for _ in range(60):
-        one.tick()
-        other.tick()
+        for each in (one, other, back):
+            each.tick()
         assert one.robot["wheel_pulses"].tolist() == other.robot["wheel_pulses"][::-1].tolist()
         assert one.pose[2] == -other.pose[2]
-
-
-@settings(derandomize=True, max_examples=30)
-@given(left=st.integers(-255, 255), right=st.integers(-255, 255))
-def test_power_drives_backwards_as_it_drives_forwards(make_world, left, right):
-    one, other = make_world(FAR).place(1000.0, 1000.0), make_world(FAR).place(1000.0, 1000.0)
-    one.pwm(left, right)
-    other.pwm(-left, -right)
-    one.tick(50)
-    other.tick(50)
-    assert one.robot["wheel_pulses"].tolist() == (-other.robot["wheel_pulses"]).tolist()
+        if mode == "pwm":
+            assert one.robot["wheel_pulses"].tolist() == (-back.robot["wheel_pulses"]).tolist()
 
 
 @pytest.mark.parametrize("sign", [1, -1])
-@pytest.mark.parametrize(
-    ("pulses", "duration_ticks"), [(10, 13), (100, 40), (1000, 126), (1600, 160), (2000, 180), (10000, 580)]
-)
-def test_trapezoid_takes_as_long_as_the_table_says(world, pulses, duration_ticks, sign):
+def test_trapezoid_takes_as_long_as_the_table_says(world, sign):
     """khepera-protocol.md 6.2: within 5 ticks; at rest within 2 pulses of the target half a second later."""
-    world.position(sign * pulses, -sign * pulses)
-    ticks = 0
-    while not (world.status[0] and world.status[3]):
-        world.tick()
-        ticks += 1
-        assert ticks < 1000
-    assert abs(ticks - duration_ticks) <= 5
-    world.tick(50)
-    assert world.counters == pytest.approx((sign * pulses, -sign * pulses), abs=2)
-    assert world.status[1] == world.status[4] == 1
-    assert abs(world.status[2]) <= 2
-    held = world.counters
-    world.tick(500)
-    assert world.counters == pytest.approx(held, abs=2)
+    for pulses, duration_ticks in ((10, 13), (100, 40), (1000, 126), (1600, 160), (2000, 180), (10000, 580)):
+        world.set_counters(0, 0)
+        world.position(sign * pulses, -sign * pulses)
+        ticks = 0
+        while not (world.status[0] and world.status[3]):
+            world.tick()
+            ticks += 1
+            assert ticks < 1000
+        assert abs(ticks - duration_ticks) <= 5
+        world.tick(50)
+        assert world.counters == pytest.approx((sign * pulses, -sign * pulses), abs=2)
+        assert world.status[1] == world.status[4] == 1
+        assert abs(world.status[2]) <= 2
+        held = world.counters
+        world.tick(500)
+        assert world.counters == pytest.approx(held, abs=2)
 
 
 def test_status_tells_mode_and_arrival(world):
@@ -110,20 +101,24 @@ def test_status_tells_mode_and_arrival(world):
     assert world.status == (0, 2, 0, 0, 2, 0)
 
 
-@pytest.mark.parametrize("mode", ["speed", "pwm", "position"])
-@settings(derandomize=True, max_examples=15)
-@given(first=st.integers(-60, 60), target=st.integers(-3000, 3000), ticks=st.integers(0, 80))
+@settings(derandomize=True, max_examples=share(15, 45))
+@given(
+    mode=st.sampled_from([("speed", 1), ("pwm", 2), ("position", 50)]),
+    first=st.integers(-60, 60),
+    target=st.integers(-3000, 3000),
+    ticks=st.integers(0, 80),
+)
 def test_a_move_arrives_whatever_ran_before(make_world, mode, first, target, ticks):
-    world = make_world(FAR).place(1000.0, 1000.0)
-    scale = {"speed": 1, "pwm": 2, "position": 50}[mode]
-    getattr(world, mode)(first * scale, -first * scale)
+    world = make_world(wide_floor(1500)).place(750.0, 750.0)
+    name, scale = mode
+    getattr(world, name)(first * scale, -first * scale)
     world.tick(ticks)
     world.position(target, -target, ticks=1500)
     assert (world.status[0], world.status[3]) == (1, 1)
     assert world.counters == pytest.approx((target, -target), abs=2)
 
 
-def test_a_move_to_the_same_place_stirs_nothing(world):
+def test_a_move_to_the_same_place_stirs_nothing_and_a_new_profile_holds_for_the_move_in_progress(world):
     world.position(500, -500, ticks=300)
     before = world.counters
     world.position(500, -500)
@@ -131,22 +126,20 @@ def test_a_move_to_the_same_place_stirs_nothing(world):
     world.tick(100)
     assert world.status[0] == 1
     assert world.counters == pytest.approx(before, abs=1)
+    for speed, acceleration in ((1, 1), (5, 255), (127, 255), (60, 30)):
+        world.set_counters(0, 0)
+        world.robot["profile_speed"][:], world.robot["profile_acceleration"][:] = 20, 64
+        world.position(3000, -3000, ticks=60)
+        world.robot["profile_speed"][:], world.robot["profile_acceleration"][:] = speed, acceleration
+        world.tick(90)
+        assert abs(world.robot["trajectory_speed"][0]) <= max(speed, 15)
+        world.tick(6000)
+        assert world.counters == pytest.approx((3000, -3000), abs=3)
 
 
-@pytest.mark.parametrize(("speed", "acceleration"), [(1, 1), (5, 255), (127, 255), (60, 30)])
-def test_a_new_profile_holds_for_the_move_in_progress(world, speed, acceleration):
-    world.position(3000, -3000, ticks=60)
-    world.robot["profile_speed"][:] = speed
-    world.robot["profile_acceleration"][:] = acceleration
-    world.tick(90)
-    assert abs(world.robot["trajectory_speed"][0]) <= max(speed, 15)
-    world.tick(6000)
-    assert world.counters == pytest.approx((3000, -3000), abs=3)
-
-
-def test_setting_the_counters_moves_nothing_while_holding(make_world):
-    one, other = make_world(FAR).place(1000.0, 1000.0), make_world(FAR).place(1000.0, 1000.0)
-    for world in (one, other):
+def test_setting_the_counters_moves_nothing_while_holding(two):
+    one, other = two
+    for world in two:
         world.position(300, 300, ticks=300)
     one.set_counters(0, -12345)
     assert one.counters == (0, -12345)
@@ -157,9 +150,9 @@ def test_setting_the_counters_moves_nothing_while_holding(make_world):
         assert (one.status[0], one.status[3]) == (1, 1)
 
 
-def test_setting_the_counters_shifts_a_move(make_world):
-    one, other = make_world(FAR).place(1000.0, 1000.0), make_world(FAR).place(1000.0, 1000.0)
-    for world in (one, other):
+def test_setting_the_counters_shifts_a_move(two):
+    one, other = two
+    for world in two:
         world.position(1500, 900, ticks=40)
     shift = [7000 - one.counters[0], -9 - one.counters[1]]
     one.set_counters(7000, -9)
@@ -177,16 +170,14 @@ def test_full_power_is_the_free_speed_and_little_power_none(world):
     assert world.robot["motor_speed"].tolist() == pytest.approx([127 / 247, -127 / 247], abs=1e-6)
 
 
-def test_counters_overflow_at_32_bits(world):
+@pytest.mark.parametrize("edge", [2**31 - 1, -(2**31)])
+def test_holding_at_the_overflow_of_the_counters_stays_put(world, edge):
+    """The error is counted over the edge: a wheel that goes one pulse over it does not run off to bring back 2^32."""
     world.set_counters(2**31 - 1, -(2**31))
     world.speed(10, -10, ticks=100)
     moved = world.robot["pulse_count"]
     assert world.counters == (-(2**31) + moved[0] - 1, 2**31 + moved[1])
-
-
-@pytest.mark.parametrize("edge", [2**31 - 1, -(2**31)])
-def test_holding_at_the_overflow_of_the_counters_stays_put(world, edge):
-    """The error is counted over the edge: a wheel that goes one pulse over it does not run off to bring back 2^32."""
+    world.set_counters(0, 0)
     world.position(200, 200, ticks=200)
     world.set_counters(edge, edge)
     before = world.robot["wheel_pulses"].copy()
@@ -219,22 +210,20 @@ def test_no_gains_blow_up(world, gains, mode):
 
 def test_an_integrator_that_is_too_full_empties_again(world):
     """Without gains it fills up unseen. With gains again the wheels must not run at full power for ever."""
+    gains = world.robot["speed_gains"].copy()
     world.robot["speed_gains"] = (0, 0, 0)
     world.speed(20, -20, ticks=1000)
-    world.robot["speed_gains"] = (3800, 800, 100)
+    world.robot["speed_gains"] = gains
     world.tick(1000)
     start = world.counters
     world.tick(100)
     assert (world.counters[0] - start[0]) / 100 == pytest.approx(20, abs=0.5)
 
 
-@pytest.mark.parametrize("speed", [1, 2, 3])
-def test_slow_speeds_are_smooth(world, speed):
-    world.speed(speed, speed, ticks=300)
-    speeds = []
-    for _ in range(300):
-        world.tick()
-        speeds.append(world.robot["motor_speed"][0])
-        assert abs(world.robot["measured_speed"][0] - speed) <= 1
-    assert min(speeds) > 0.5 * speed
-    assert max(speeds) < 1.6 * speed
+def test_slow_speeds_are_smooth(world):
+    for speed in (1, 2, 3):
+        world.speed(speed, speed, ticks=300)
+        for _ in range(300):
+            world.tick()
+            assert 0.5 * speed < world.robot["motor_speed"][0] < 1.6 * speed
+            assert abs(world.robot["measured_speed"][0] - speed) <= 1

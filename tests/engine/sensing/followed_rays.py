@@ -1,7 +1,5 @@
 """Kernels that follow single rays, for tests to call."""
 
-from __future__ import annotations
-
 from kiks.engine.compiling import entry
 from kiks.engine.sensing.disc_rays import meet_discs
 from kiks.engine.sensing.ray_packets import WAY_SIZE, enter, met, step_all

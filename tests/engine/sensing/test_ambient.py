@@ -1,7 +1,5 @@
 """Ambient light: the published curves, what hides a lamp, how lamps add up, and the shape of measured light."""
 
-from __future__ import annotations
-
 import math
 import os
 from dataclasses import replace
@@ -10,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.engine.same_walls import wide_floor
 from tests.symmetry import mirrored, symmetric
 
 import kiks
@@ -29,12 +28,9 @@ RIGHT_10 = {80: 496, 60: 476, 50: 444, 40: 404, 30: 342, 20: 283, 10: 262, 0: 22
 RIGHT_10 |= {-40: 345, -50: 407, -60: 453, -70: 487, -80: 497}
 
 
-ROOM = kiks.Arena.box(1400, 1400)
-
-
 def dark_room(*lamps: tuple[Any, ...], robot: RobotSpec = SPEC, seed: int = 0) -> kiks.Simulation:
     """A robot in the middle of a large box that looks to the right."""
-    sim = kiks.Simulation(ROOM, robot=robot, seed=seed)
+    sim = kiks.Simulation(wide_floor(1400), robot=robot, seed=seed)
     for lamp in lamps:
         x_mm, y_mm, power_w, is_on = (*lamp, 1.0, True)[:4] if len(lamp) == 2 else (*lamp, True)[:4]
         sim.add_lamp(x_mm, y_mm, power_w, is_on=is_on)
@@ -51,25 +47,32 @@ def beside(sensor: int, distance_mm: float, off_axis_deg: float = 0.0, power_w: 
     return (x, 700 + radius * math.sin(mount) + distance_mm * math.sin(axis), power_w)
 
 
+def readings(sensor: int, *lamps: tuple[float, ...], robot: RobotSpec = SPEC) -> np.ndarray:
+    """Return what a sensor reads of a lamp that is at one place after the other, each of `beside`'s arguments."""
+    sim, found = dark_room((0.0, 0.0), robot=robot), []
+    for lamp in lamps:
+        sim.lamps[0, :3] = beside(sensor, *lamp)
+        found.append(sim.ambient(1)[sensor])
+    return np.array(found)
+
+
 def test_the_published_curve_is_reproduced() -> None:
-    for i, published in enumerate(PUBLISHED):
-        for sensor in (0, 3, 6):
-            reading = dark_room(beside(sensor, 10.0 * (i + 1))).ambient(1)[sensor]
-            # 75 and 72 are averaged: more light never reads darker.
-            assert reading == pytest.approx(published, abs=1.5 + 1e-6)
+    for sensor in (0, 3, 6):
+        found = readings(sensor, *((10.0 * (i + 1),) for i in range(len(PUBLISHED))))
+        # 75 and 72 are averaged: more light never reads darker.
+        assert found == pytest.approx(PUBLISHED, abs=1.5 + 1e-6)
 
 
-@pytest.mark.slow
 def test_nearer_and_stronger_is_brighter() -> None:
-    readings = [dark_room(beside(2, distance)).ambient(1)[2] for distance in np.linspace(0.01, 600, 121)]
-    assert np.all(np.diff(readings) >= 0)
-    assert readings[0] == pytest.approx(50, abs=0.1)
-    assert 445 < readings[-1] < 450
-    powers = [dark_room(beside(2, 150, power_w=power)).ambient(1)[2] for power in np.geomspace(0.01, 1000, 60)]
-    assert np.all(np.diff(powers) <= 0)
-    assert powers[-1] < 60
+    nearer = readings(2, *((distance,) for distance in np.linspace(0.01, 600, 121)))
+    assert np.all(np.diff(nearer) >= 0)
+    assert nearer[0] == pytest.approx(50, abs=0.1)
+    assert 445 < nearer[-1] < 450
+    stronger = readings(2, *((150, 0.0, power) for power in np.geomspace(0.01, 1000, 60)))
+    assert np.all(np.diff(stronger) <= 0)
+    assert stronger[-1] < 60
     # Four times the power at twice the distance is the same light.
-    assert dark_room(beside(2, 200, power_w=4)).ambient(1)[2] == pytest.approx(PUBLISHED[9])
+    assert readings(2, (200, 0.0, 4.0))[0] == pytest.approx(PUBLISHED[9])
 
 
 def test_the_angle_curves_are_those_of_the_manual() -> None:
@@ -79,28 +82,33 @@ def test_the_angle_curves_are_those_of_the_manual() -> None:
         ambient__dark_counts=497.0,
         ambient__background_counts=497.0,
     )
-    errors: dict[str, list[float]] = {"flux": [], "thesis": []}
-    for model, found in errors.items():
-        robot = dark.with_changes(ambient__model=model)
+    errors = {}
+    for model in ("flux", "thesis"):
+        robot, found = dark.with_changes(ambient__model=model), []
         for sensor, curve, peak in ((0, LEFT_85, 82.5), (3, RIGHT_10, -8.3)):
-            for angle, published in curve.items():
-                lamp = beside(sensor, 79, angle - peak)
-                found.append(dark_room(lamp, robot=robot).ambient(1)[sensor] - published)
-    assert np.mean(np.abs(errors["flux"])) < 22
-    assert np.max(np.abs(errors["flux"])) < 60
-    assert np.mean(np.abs(errors["thesis"])) > 45
+            lamps = ((79, angle - peak) for angle in curve)
+            found.append(readings(sensor, *lamps, robot=robot) - list(curve.values()))
+        errors[model] = np.abs(np.concatenate(found))
+    assert errors["flux"].mean() < 22
+    assert errors["flux"].max() < 60
+    assert errors["thesis"].mean() > 45
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("sensor", range(8))
-def test_half_of_the_light_comes_from_within_50_degrees(sensor: int) -> None:
+def test_half_of_the_light_comes_from_within_50_degrees() -> None:
     """khepera-protocol.md 9.2: the half width is about 50 degrees; from 90 on there is nothing."""
     angles = np.arange(-120, 121, 5)
-    counts = np.array([dark_room(beside(sensor, 90, float(angle))).ambient(1)[sensor] for angle in angles])
-    light = 450 - counts
-    assert angles[light > light.max() / 2].max() == pytest.approx(45, abs=10)
-    assert angles[light > light.max() / 2].min() == pytest.approx(-45, abs=10)
-    assert np.all(light[np.abs(angles) >= 90] == 0)
+    for sensor in range(8):
+        light = 450 - readings(sensor, *((90, float(angle)) for angle in angles))
+        bright = angles[light > light.max() / 2]
+        assert [bright.min(), bright.max()] == pytest.approx([-45, 45], abs=10)
+        assert np.all(light[np.abs(angles) >= 90] == 0)
+
+
+def lit_by(ground: Any, lamp_mm: float, y_mm: float, at_mm: tuple[float, float]) -> kiks.Simulation:
+    """A robot that looks to the right, in an arena with a lamp."""
+    sim = kiks.Simulation(replace(kiks.Arena.from_array(ground), lamps=(Lamp(lamp_mm, y_mm),)))
+    sim.place(1, *at_mm, 0.0)
+    return sim
 
 
 def test_a_wall_hides_a_lamp() -> None:
@@ -108,9 +116,7 @@ def test_a_wall_hides_a_lamp() -> None:
     assert lit[2] < 410
     ground = np.zeros((1400, 1400), np.uint8)
     ground[690:710, 780:785] = 100  # a thin screen before the robot
-    arena = replace(kiks.Arena.from_array(ground), lamps=(Lamp(850, 700),))
-    sim = kiks.Simulation(arena)
-    sim.place(1, 700, 700, 0.0)
+    sim = lit_by(ground, 850, 700, (700, 700))
     assert sim.ambient(1) == [450.0] * 8
     sim.place(1, 700, 750, 0.0)  # now it looks past it
     assert sim.ambient(1)[3] < 440
@@ -119,14 +125,10 @@ def test_a_wall_hides_a_lamp() -> None:
 def test_a_lamp_may_hang_over_a_wall() -> None:
     ground = np.zeros((400, 400), np.uint8)
     ground[:, 300:] = 255
-    for x, is_seen in ((300.5, True), (310.0, True), (399.0, True)):
-        sim = kiks.Simulation(replace(kiks.Arena.from_array(ground), lamps=(Lamp(x, 200),)))
-        sim.place(1, 200, 200, 0.0)
-        assert (sim.ambient(1)[2] < 450) is is_seen
+    for x_mm in (300.5, 310.0, 399.0):
+        assert lit_by(ground, x_mm, 200, (200, 200)).ambient(1)[2] < 450
     ground[:, 320:330] = 0  # between two walls
-    sim = kiks.Simulation(replace(kiks.Arena.from_array(ground), lamps=(Lamp(350, 200),)))
-    sim.place(1, 200, 200, 0.0)
-    assert sim.ambient(1)[2] == 450
+    assert lit_by(ground, 350, 200, (200, 200)).ambient(1)[2] == 450
 
 
 def test_the_own_body_hides_a_lamp() -> None:
@@ -142,9 +144,8 @@ def test_two_lamps_are_brighter_than_one() -> None:
     assert two[2] < one[2] - 20
     assert all(more <= less for more, less in zip(two, one, strict=True))
     # Two at the same place are one of twice the power.
-    assert dark_room(beside(2, 100), beside(2, 100)).ambient(1) == pytest.approx(
-        dark_room(beside(2, 100, 0.0, 2.0)).ambient(1)
-    )
+    same, twice = dark_room(beside(2, 100), beside(2, 100)), dark_room(beside(2, 100, 0.0, 2.0))
+    assert same.ambient(1) == pytest.approx(twice.ambient(1))
 
 
 def test_lamps_are_switched_moved_and_removed() -> None:
@@ -168,20 +169,20 @@ def test_lamps_are_switched_moved_and_removed() -> None:
 
 
 def test_left_and_right_are_mirror_images() -> None:
-    robot = symmetric(SPEC)
-    rng = np.random.default_rng(5)
+    rng, sim = np.random.default_rng(5), dark_room((0.0, 0.0), robot=symmetric(SPEC))
     for _ in range(40):
         x, y = rng.uniform(560, 840), rng.uniform(560, 840)
-        left, right = (dark_room((x, other), robot=robot).ambient(1) for other in (y, 1400 - y))
-        assert left == pytest.approx(mirrored(right), abs=1e-6)
+        sim.lamps[0, :2] = x, y
+        left = sim.ambient(1)
+        sim.lamps[0, :2] = x, 1400 - y
+        assert left == pytest.approx(mirrored(sim.ambient(1)), abs=1e-6)
 
 
 def test_daylight_adds_to_the_lamps() -> None:
-    room = SPEC.with_changes(ambient__background_counts=300.0)
-    assert dark_room(robot=room).ambient(1) == pytest.approx([300.0] * 8)
-    assert dark_room(beside(2, 100), robot=room).ambient(1)[2] < 280
-    dim = SPEC.with_changes(ambient__background_counts=445.0)
-    assert dark_room(robot=dim).ambient(1) == pytest.approx([445.0] * 8)
+    for counts in (300.0, 445.0):
+        room = SPEC.with_changes(ambient__background_counts=counts)
+        assert dark_room(robot=room).ambient(1) == pytest.approx([counts] * 8)
+        assert dark_room(beside(2, 100), robot=room).ambient(1)[2] < 280
 
 
 def test_the_formula_of_the_thesis() -> None:

@@ -1,7 +1,5 @@
 """The floor below a robot: its mean brightness in a spot, its noise, and what must not matter."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any
@@ -15,7 +13,6 @@ from kiks.engine.sensing.floor import COUNTS, NOISE_COUNTS, read_floor
 from kiks.engine.sensing.floor_spots import BLOCK, SPOT_MM, plains_of
 from kiks.firmware.turret import Turret
 from kiks.model.arena import Arena, Zone
-from kiks.recording.replay import check_recording
 from kiks.units import TICK_NS
 
 ANGLES = np.linspace(0.0, 2 * math.pi, 97)[:-1]
@@ -72,8 +69,7 @@ def test_a_floor_of_one_brightness_reads_the_same_everywhere() -> None:
         sim = world(np.full((150, 150), brightness, np.uint8))
         found = {expected(sim, *place) for place in np.random.default_rng(2).uniform(30, 120, (50, 2)).tolist()}
         assert found == {brightness * (COUNTS / 255)}
-    plain = kiks.Simulation(Arena.box(150, 150))
-    assert expected(plain, 70.3, 81.2) == COUNTS
+    assert expected(kiks.Simulation(Arena.box(150, 150)), 70.3, 81.2) == COUNTS
 
 
 def test_a_world_turned_by_a_quarter_reads_the_same() -> None:
@@ -82,21 +78,20 @@ def test_a_world_turned_by_a_quarter_reads_the_same() -> None:
     sim, turned = world(floor), world(np.ascontiguousarray(np.rot90(floor, -1)))
     for x_mm, y_mm in (np.random.default_rng(4).integers(35 * 8, 125 * 8, (30, 2)) / 8).tolist():
         assert expected(sim, x_mm, y_mm) == expected(turned, 160 - y_mm, x_mm)
-        aside = {"ahead": 12.0, "left": 5.0}
-        here = expected(sim, x_mm, y_mm, heading=0.3, **aside)
-        there = expected(turned, 160 - y_mm, x_mm, heading=0.3 + math.pi / 2, **aside)
+        here = expected(sim, x_mm, y_mm, heading=0.3, ahead=12.0, left=5.0)
+        there = expected(turned, 160 - y_mm, x_mm, heading=0.3 + math.pi / 2, ahead=12.0, left=5.0)
         assert here == pytest.approx(there, abs=1.0)
 
 
 def test_an_edge_is_crossed_evenly() -> None:
     floor = np.zeros((120, 120), np.uint8)
     floor[:, 60:] = 255
-    found = np.array([expected(world(floor), 55 + 0.1 * k, 60.3) for k in range(100)])
+    sim = world(floor)
+    found = np.array([expected(sim, 55 + 0.1 * k, 60.3) for k in range(100)])
     assert (np.diff(found) >= 0).all()
     assert np.diff(found).max() < 0.035 * COUNTS
-    assert found[0] == 0
-    assert found[-1] == COUNTS
-    assert expected(world(floor), 60.0, 60.0) == pytest.approx(COUNTS / 2)
+    assert (found[0], found[-1]) == (0, COUNTS)
+    assert expected(sim, 60.0, 60.0) == pytest.approx(COUNTS / 2)
 
 
 def test_noise_is_fair_and_the_robots_own() -> None:
@@ -154,20 +149,17 @@ def test_a_turret_of_a_users_own_looks_where_it_likes() -> None:
 
 
 def test_a_recording_with_it_replays(tmp_path: Any) -> None:
+    from kiks.recording.replay import check_recording
+
     arena = replace(Arena.box(400, 400), zones=(Zone(disc_mm=(200, 200), radius_mm=80, brightness=40),))
     sim = kiks.Simulation(arena, seed=3)
     sim.fit(1, "floor")
+    robot = kiks.Khepera(sim.port(1))
     with sim.record(tmp_path / "floor.mcap"):
-        kiks.drive(sim.port(1), on_black(), seconds=3.0)
-    recording = kiks.Recording(tmp_path / "floor.mcap")
-    again = check_recording(recording.log).sim
+        while sim.time_s < 3.0:
+            (brightness,) = robot.turret(31, "F")
+            robot.set_speed(*((4, -4 + brightness % 7) if brightness < 512 else (10, 10)))
+    again = check_recording(kiks.Recording(tmp_path / "floor.mcap").log).sim
     assert again.arena.zones == arena.zones
     assert again.state_hash() == sim.state_hash()
     assert [turret.name for turret in again.turrets(1)] == ["Floor sensor"]
-
-
-def on_black() -> kiks.Controller:
-    def choose(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
-        wheels[0], wheels[1] = (4.0, -4.0 + sensors[0] % 7.0) if sensors[0] < 512 else (10.0, 10.0)
-
-    return kiks.controller(senses="floor")(choose)

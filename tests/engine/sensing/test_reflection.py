@@ -4,8 +4,6 @@ Tolerances are what was found, rounded up, where geometry says that two readings
 half a cell off, and where a sensor answers at all its reading falls by up to 100 counts a millimetre.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any
@@ -50,10 +48,10 @@ def half_plane(normal_rad: float = 0.0, from_mm: float = 0.0) -> Inside:
     return lambda x, y: x * math.cos(normal_rad) + y * math.sin(normal_rad) >= from_mm
 
 
-def read(sim: kiks.Simulation, x_mm: float, y_mm: float, heading_rad: float) -> np.ndarray:
-    """Return what the robot expects at a place seen from the middle of the arena."""
-    sim.place(1, MIDDLE_MM + x_mm, MIDDLE_MM + y_mm, heading_rad)
-    return np.array(sim.proximity(1))
+def read(sim: kiks.Simulation, x_mm: Any, y_mm: Any, heading_rad: Any) -> np.ndarray:
+    """Return what the robot expects at places seen from the middle of the arena, shape [place, 8]."""
+    poses = np.broadcast_arrays(np.atleast_1d(x_mm) + MIDDLE_MM, y_mm + MIDDLE_MM, heading_rad)
+    return sim.proximity_at(1, np.stack(poses, axis=1))
 
 
 def facing(sensor: int) -> float:
@@ -84,9 +82,9 @@ def free_poses(sim: kiks.Simulation, rng: np.random.Generator, count: int, gap_m
     return found
 
 
-def test_nothing_within_60_mm_is_nothing() -> None:
-    rng = np.random.default_rng(1)
-    checked = 0
+def test_nothing_within_60_mm_is_nothing_and_no_reading_leaves_the_converters_range() -> None:
+    rng, checked = np.random.default_rng(1), 0
+    readings, noisy = [], []
     for _ in range(8):
         sim = random_world(rng)
         for pose in free_poses(sim, rng, 40, 60.0):
@@ -96,19 +94,12 @@ def test_nothing_within_60_mm_is_nothing() -> None:
                 sim.run(0.02)
                 assert max(sim.proximity(1, noise=True)) <= 20
             checked += 1
-    assert checked > 150
-
-
-def test_no_reading_leaves_the_converters_range() -> None:
-    rng = np.random.default_rng(2)
-    readings, noisy = [], []
-    for _ in range(6):
-        sim = random_world(rng)
-        for pose in free_poses(sim, rng, 60, 0.1):
+        for pose in free_poses(sim, rng, 45, 0.1):
             sim.place(1, *pose)
             sim.run(0.02)
             readings.append(sim.proximity(1))
             noisy.append(sim.proximity(1, noise=True))
+    assert checked > 150
     for counts in (np.array(readings), np.array(noisy)):
         assert 0 <= counts.min() < 20
         assert counts.max() == 1023
@@ -116,31 +107,26 @@ def test_no_reading_leaves_the_converters_range() -> None:
 
 
 @pytest.mark.parametrize("cell_mm", [0.25, 1.0])
-@pytest.mark.parametrize("sensor", range(SENSOR_COUNT))
-def test_straight_towards_a_wall_a_reading_rises_to_saturation(sensor: int, cell_mm: float) -> None:
+def test_straight_towards_a_wall_a_reading_rises_to_saturation(cell_mm):
     sim = world(half_plane(), cell_mm)
     gaps_mm = np.arange(70.0, 0.0, -0.1)
-    counts = np.array([read(sim, -RADIUS_MM - gap, 0.13, facing(sensor))[sensor] for gap in gaps_mm])
-    assert np.diff(counts).min() >= 0
-    assert np.diff(counts).max() < 20  # a tenth of a millimetre
-    assert counts[0] == BASELINE
-    assert np.all(counts[gaps_mm < 5] == 1023)
-    # As far as the real ones: they are at half between 18 and 28 mm (README of the Khepera samples).
-    assert 17 < gaps_mm[np.argmax(counts > 511)] < 29
+    for sensor in range(SENSOR_COUNT):
+        counts = read(sim, -RADIUS_MM - gaps_mm, 0.13, facing(sensor))[:, sensor]
+        assert np.diff(counts).min() >= 0
+        assert np.diff(counts).max() < 20  # a tenth of a millimetre
+        assert counts[0] == BASELINE
+        assert np.all(counts[gaps_mm < 5] == 1023)
+        # As far as the real ones: they are at half between 18 and 28 mm (README of the Khepera samples).
+        assert 17 < gaps_mm[np.argmax(counts > 511)] < 29
 
 
-def test_a_brighter_surface_never_reads_less() -> None:
+def test_a_brighter_surface_never_reads_less():
     for seed in range(share(1, 4)):
         worlds = [random_world(np.random.default_rng(seed), brightness=shade) for shade in (1, 40, 100, 180, 255)]
         poses = free_poses(worlds[0], np.random.default_rng(seed), 100, 0.5)
-        rows = []
-        for sim in worlds:
-            rows.append([])
-            for pose in poses:
-                sim.place(1, *pose)
-                rows[-1].append(sim.proximity(1))
-        assert np.diff(np.array(rows), axis=0).min() >= 0
-        assert (np.array(rows[-1]) - np.array(rows[0])).max() > 200
+        rows = np.array([sim.proximity_at(1, np.array(poses)) for sim in worlds])
+        assert np.diff(rows, axis=0).min() >= 0
+        assert (rows[-1] - rows[0]).max() > 200
 
 
 def beside_walls(cell_mm: float) -> tuple[np.ndarray, np.ndarray]:
@@ -150,34 +136,32 @@ def beside_walls(cell_mm: float) -> tuple[np.ndarray, np.ndarray]:
     for sensor in range(SENSOR_COUNT):
         place = math.radians(KHEPERA.proximity.mount_angle_deg[sensor]) + facing(sensor)
         ahead_mm = KHEPERA.proximity.mount_radius_mm[sensor] * math.cos(place)
-        for i, distance in enumerate(away_mm):
-            if distance + ahead_mm > RADIUS_MM + 0.1:
-                counts[sensor, i] = read(sim, -distance - ahead_mm, 0.0, facing(sensor))[sensor]
+        is_free = away_mm + ahead_mm > RADIUS_MM + 0.1
+        counts[sensor, is_free] = read(sim, -away_mm[is_free] - ahead_mm, 0.0, facing(sensor))[:, sensor]
     return away_mm, counts
 
 
 @pytest.mark.parametrize("cell_mm", [0.25, 1.0])
-def test_posts_and_corners_are_less_than_a_wall_that_is_as_near(cell_mm: float) -> None:
+def test_posts_and_corners_are_less_than_a_wall_that_is_as_near(cell_mm):
     """Seen from a sensor. What a robot with its sensors inside a surface would read is not asked."""
     rng = np.random.default_rng(6)
     away_mm, by_wall = beside_walls(cell_mm)
-    places = np.radians(KHEPERA.proximity.mount_angle_deg)
+    mounts_rad = np.radians(KHEPERA.proximity.mount_angle_deg)
     things: list[tuple[Inside, Callable[[Any, Any], Any]]] = [
         (lambda x, y: (x >= 0) & (y >= 0), lambda x, y: np.hypot(np.maximum(-x, 0.0), np.maximum(-y, 0.0))),
     ]
     for radius_mm in (2.0, 3.0, 6.0, 12.0):
         things.append((disc(radius_mm), lambda x, y, radius_mm=radius_mm: np.hypot(x, y) - radius_mm))
     for inside, distance in things:
-        sim, active = world(inside, cell_mm), 0
-        for x, y, heading in rng.uniform((-70, -70, -math.pi), (70, 70, math.pi), (share(600, 2500), 3)):
-            if distance(x, y) > RADIUS_MM + 1.5 * cell_mm:
-                counts = read(sim, x, y, heading)
-                at = 26.5 * np.cos(places + heading) + x, 26.5 * np.sin(places + heading) + y
-                most = [np.interp(distance(*at)[k], away_mm, by_wall[k]) for k in range(SENSOR_COUNT)]
-                assert np.all(counts >= BASELINE)
-                assert np.all(counts <= np.array(most) + 15.0)
-                active += np.sum((counts > 20) & (counts < 1000))
-        assert active > 20
+        poses = rng.uniform((-70, -70, -math.pi), (70, 70, math.pi), (share(600, 2500), 3))
+        x, y, heading = poses[distance(*poses.T[:2]) > RADIUS_MM + 1.5 * cell_mm].T
+        counts = read(world(inside, cell_mm), x, y, heading)
+        angles = mounts_rad + heading[:, None]
+        away = distance(26.5 * np.cos(angles) + x[:, None], 26.5 * np.sin(angles) + y[:, None])
+        most = np.stack([np.interp(away[:, k], away_mm, by_wall[k]) for k in range(SENSOR_COUNT)], axis=1)
+        assert np.all(counts >= BASELINE)
+        assert np.all(counts <= most + 15.0)
+        assert np.sum((counts > 20) & (counts < 1000)) > 20
 
 
 @pytest.mark.parametrize(
@@ -191,31 +175,25 @@ def test_posts_and_corners_are_less_than_a_wall_that_is_as_near(cell_mm: float) 
         (math.inf, 0.25, 8.0, 2.0),
     ],
 )
-def test_readings_are_those_of_geometry_however_cells_lie(
-    radius_mm: float, cell_mm: float, largest: float, usual: float
-) -> None:
+def test_readings_are_those_of_geometry_however_cells_lie(radius_mm, cell_mm, largest, usual):
     """Shifted by parts of a cell and turned by any angle, against rays that meet a circle or a line exactly."""
     rng = np.random.default_rng(7)
     gaps_mm, angles_deg = np.array([4.0, 8.0, 12.0, 16.0, 20.0, 25.0]), np.arange(0.0, 360.0, 15.0)
     shape = (len(gaps_mm), len(angles_deg))
     samples = Samples("object", radius_mm, gaps_mm, np.broadcast_to(angles_deg, shape), np.zeros((*shape, 8), int))
-    exact = predict(KHEPERA, samples)
-    errors = []
+    exact = predict(KHEPERA, samples).reshape(-1, 8)
+    is_wall, behind_mm = math.isinf(radius_mm), 0.0 if math.isinf(radius_mm) else radius_mm
+    away_mm, angles = np.repeat(behind_mm + RADIUS_MM + gaps_mm, len(angles_deg)), np.tile(angles_deg, len(gaps_mm))
+    active, errors = (exact > 20) & (exact < 1000), []
+    assert active.sum() > 40
     for _ in range(share(3, 5)):
         (x, y), turn = rng.uniform(-cell_mm, cell_mm, 2), rng.uniform(-math.pi, math.pi)
         ahead, aside = math.cos(turn), math.sin(turn)
-        is_wall, behind_mm = math.isinf(radius_mm), 0.0 if math.isinf(radius_mm) else radius_mm
         sim = world(half_plane(turn, x * ahead + y * aside) if is_wall else disc(radius_mm, x, y), cell_mm)
-        for i, gap in enumerate(gaps_mm):
-            away_mm = behind_mm + RADIUS_MM + gap
-            for j, angle in enumerate(angles_deg):
-                counts = read(sim, x - away_mm * ahead, y - away_mm * aside, turn + math.radians(angle))
-                errors.append(counts - exact[i, j])
-    both = np.array(errors), np.tile(exact.reshape(-1, 8), (share(3, 5), 1))
-    active = (both[1] > 20) & (both[1] < 1000)
-    assert active.sum() > 40 * share(3, 5)
-    assert np.abs(both[0]).max() < largest
-    assert np.sqrt(np.mean(both[0][active] ** 2)) < usual
+        error = read(sim, x - away_mm * ahead, y - away_mm * aside, turn + np.radians(angles)) - exact
+        assert np.abs(error).max() < largest
+        errors.append(error[active])
+    assert np.sqrt(np.mean(np.array(errors) ** 2)) < usual
 
 
 def normals(arena: Arena) -> tuple[np.ndarray, np.ndarray]:
@@ -227,31 +205,31 @@ def normals(arena: Arena) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize("cell_mm", [0.25, 1.0])
-@pytest.mark.parametrize("radius_mm", [6.0, 12.0, 27.0])
-def test_normals_of_a_disc_point_to_its_middle(radius_mm: float, cell_mm: float) -> None:
-    places, inward = normals(arena_of(disc(radius_mm, 0.3 * cell_mm, -0.2 * cell_mm), cell_mm))
-    assert len(places) > 4 * radius_mm / cell_mm
-    assert np.hypot(*inward.T) == pytest.approx(1.0, abs=1e-3)
-    inward = inward / np.hypot(*inward.T)[:, None]
-    towards = np.array([0.3, -0.2]) * cell_mm - places
-    cosine = np.sum(inward * towards, axis=1) / np.hypot(*towards.T)
-    assert np.degrees(np.arccos(np.minimum(cosine, 1.0))).max() < (5.0 if cell_mm == 1.0 else 1.5)
+def test_normals_of_a_disc_point_to_its_middle(cell_mm):
+    for radius_mm in (6.0, 12.0, 27.0):
+        places, inward = normals(arena_of(disc(radius_mm, 0.3 * cell_mm, -0.2 * cell_mm), cell_mm))
+        assert len(places) > 4 * radius_mm / cell_mm
+        assert np.hypot(*inward.T) == pytest.approx(1.0, abs=1e-3)
+        inward = inward / np.hypot(*inward.T)[:, None]
+        towards = np.array([0.3, -0.2]) * cell_mm - places
+        cosine = np.sum(inward * towards, axis=1) / np.hypot(*towards.T)
+        assert np.degrees(np.arccos(np.minimum(cosine, 1.0))).max() < (5.0 if cell_mm == 1.0 else 1.5)
 
 
 @pytest.mark.parametrize("cell_mm", [0.25, 1.0])
-@pytest.mark.parametrize("thickness", [1, 3, 40])
-def test_normals_of_an_upright_wall_are_exact_on_both_sides(thickness: int, cell_mm: float) -> None:
+def test_normals_of_an_upright_wall_are_exact_on_both_sides(cell_mm):
     """From one cell thick on, to 0.7 degrees."""
-    arena = arena_of(lambda x, y: (x > 0) & (x < thickness * cell_mm), cell_mm)
-    places, inward = normals(arena)
-    inner = np.abs(places[:, 1]) < MIDDLE_MM - 40.0
-    left = places[:, 0] < 0
-    assert (inner & left).sum() == (inner & ~left).sum() > 100
-    assert inward[inner & left] == pytest.approx(np.tile((1.0, 0.0), ((inner & left).sum(), 1)), abs=0.012)
-    assert inward[inner & ~left] == pytest.approx(np.tile((-1.0, 0.0), ((inner & ~left).sum(), 1)), abs=0.012)
+    for thickness in (1, 3, 40):
+        arena = arena_of(lambda x, y, end=thickness * cell_mm: (x > 0) & (x < end), cell_mm)
+        places, inward = normals(arena)
+        inner = np.abs(places[:, 1]) < MIDDLE_MM - 40.0
+        left, right = inner & (places[:, 0] < 0), inner & (places[:, 0] >= 0)
+        assert left.sum() == right.sum() > 100
+        for side, ahead in ((left, 1.0), (right, -1.0)):
+            assert inward[side] == pytest.approx(np.tile((ahead, 0.0), (side.sum(), 1)), abs=0.012)
 
 
-def test_every_cell_by_a_wall_has_a_normal_into_it() -> None:
+def test_every_cell_by_a_wall_has_a_normal_into_it():
     rng = np.random.default_rng(8)
     for _ in range(4):
         arena = random_world(rng).arena

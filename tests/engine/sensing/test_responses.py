@@ -1,10 +1,7 @@
 """Responses: the robot in the arena answers what the networks, the table and the curve say for the same pose."""
 
-from __future__ import annotations
-
 import csv
 import math
-import re
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +12,9 @@ from tools.sensors.card import data_folder
 from tools.sensors.train_networks import fan_of
 
 import kiks
+from kiks.engine.parameters import pack
+from kiks.engine.sensing.responses import respond_all
+from kiks.engine.sensing.thesis_networks import networks_for
 from kiks.errors import ParameterError
 from kiks.fit.samples import Samples, nearnesses
 from kiks.model.materials import REFLECTANCES
@@ -163,21 +163,47 @@ def test_the_khepera_ii_reads_multiples_of_four_above_a_baseline() -> None:
     assert max(sim.proximity(1, noise=True)) > 900
 
 
-@pytest.mark.parametrize(
-    ("robot", "key", "value", "words"),
+# Readings of KiKS 2.2.0 that students recorded (kiks-behaviour.md 3.1.1): a cross-check, as its robot was another.
+# Seven inverted lengths [mm], the leftmost first, and the reading; several readings of one pattern are a mean.
+PATTERNS = np.array(
     [
-        (KHEPERA_II, "curve.distance_mm", (10.0, 10.0), "a list that rises"),
-        (KHEPERA_II, "curve.counts", (1200.0, 1300.0, 10.0, 5.0), "one for each distance, falling"),
-        (KHEPERA, "proximity.jitter_counts", (), "have at least 1 item"),
-        (KHEPERA, "proximity.jitter_counts", (3.0, 1.0), "be a list in which none is below the one before"),
-        (KHEPERA, "proximity.noise_down", 1.5, "be at most 1"),
-        (KHEPERA, "ambient.lamp_counts", (50.0, 70.0, 60.0), "a list that rises to dark_counts"),
-        (KHEPERA, "ambient.lamp_counts", (50.0, 460.0), "a list that rises to dark_counts"),
-        (KHEPERA, "ambient.background_counts", 460.0, "above lamp_counts, up to dark_counts"),
-        (KHEPERA, "ambient.background_counts", 50.0, "above lamp_counts, up to dark_counts"),
+        (0, 41, 40, 0, 0, 0, 0, 454),
+        (0, 0, 0, 0, 16, 0, 0, 5),
+        (0, 0, 0, 0, 0, 39, 41, 324),
+        (0, 0, 16, 0, 0, 0, 0, 81),
+        (0, 0, 0, 48, 47, 47, 45, 836),
+        (0, 0, 0, 0, 27, 0, 0, 11),
+        (45, 47, 48, 0, 0, 0, 0, 801),
+        (0, 0, 27, 0, 0, 0, 0, 192),
+        (41, 0, 0, 0, 0, 0, 0, 51),
+        (0, 0, 0, 0, 39, 34, 0, 204),
+        (41, 40, 0, 0, 0, 0, 0, 282),
+        (0, 34, 39, 0, 0, 0, 0, 422),
+        (0, 0, 0, 39, 39, 0, 0, 459),
+        (0, 0, 39, 39, 0, 0, 0, 455),
+        (0, 0, 0, 0, 39, 39, 0, 211),
+        (0, 0, 34, 39, 0, 0, 0, 372),
+        (0, 29, 33, 0, 0, 0, 0, 307),
+        (0, 0, 0, 0, 0, 39, 35, 276),
+        (0, 0, 0, 0, 0, 31, 33, 161),
+        (0, 33, 0, 0, 0, 0, 0, 20),
+        (0, 0, 0, 0, 0, 35, 0, 10),
+        (0, 0, 0, 0, 0, 0, 34, 43),
+        (29, 0, 0, 0, 0, 0, 0, 6),
+        (0, 0, 0, 10, 0, 0, 0, 28),
+        (0, 0, 10, 0, 0, 0, 0, 63),
     ],
+    np.float64,
 )
-def test_an_error_names_the_wrong_parameter(robot: RobotSpec, key: str, value: object, words: str) -> None:
-    with pytest.raises(ParameterError) as caught:
-        robot.with_changes(**{key.replace(".", "__"): value})
-    assert re.search(rf"{key} must .*{words}.*, but it was {re.escape(repr(value))}", str(caught.value))
+INVERTED_MM = np.repeat(PATTERNS[:, None, :7], 8, axis=1)
+
+
+@pytest.mark.parametrize("response", ["thesis", "reflection"])
+def test_what_was_large_in_kiks_2_2_0_is_large_here(response: str) -> None:
+    """Each ray is taken to meet its surface squarely, as the patterns do not tell."""
+    robot, counts = RobotSpec.load("khepera", response=response), np.empty((len(PATTERNS), 8))
+    cosines = np.where(INVERTED_MM > 0.0, 1.0, 0.0)
+    respond_all(networks_for(response), pack(robot), 50.0 - INVERTED_MM, cosines, counts)
+    means = counts.mean(axis=1)
+    assert np.corrcoef(means, PATTERNS[:, 7])[0, 1] >= 0.8
+    assert means[PATTERNS[:, 7] > 800].min() > 0.9 * models.MAXIMUM_COUNTS
