@@ -133,15 +133,15 @@ def test_failed_calibration_writes_nothing(tmp_path: Path) -> None:
 
 
 class Misplaced(SimPlacements):
-    """Puts the robot at wrong gaps."""
+    """Puts the robot at wrong gaps; None is the open."""
 
-    def __init__(self, sim: kiks.Simulation, errors_mm: dict[float, float]) -> None:
+    def __init__(self, sim: kiks.Simulation, wrong_mm: dict[float | None, float]) -> None:
         super().__init__(sim)
-        self.errors_mm = errors_mm
+        self.wrong_mm = wrong_mm
         self.findings: list[str] = []
 
     def place(self, instruction: str, gap_mm: float | None = None) -> float | None:
-        super().place(instruction, None if gap_mm is None else gap_mm + self.errors_mm.get(gap_mm, 0.0))
+        super().place(instruction, self.wrong_mm.get(gap_mm, gap_mm))
         return gap_mm
 
     def wants_repeat(self, finding: str, *, is_good: bool) -> bool:
@@ -156,48 +156,47 @@ def stands_still(sim: kiks.Simulation) -> bool:
     return sim.pose(1) == pytest.approx(before, abs=0.1)
 
 
-def failure(placements: SimPlacements, gaps_mm: tuple[float, ...] = (5, 15)) -> str:
-    with pytest.raises(CalibrationError) as caught:
-        calibrate(kiks.Khepera(placements.sim.port(1)), placements, BASE, gaps_mm=gaps_mm)
-    assert stands_still(placements.sim)
-    return str(caught.value)
-
-
-def test_wall_out_of_sight_raises_after_all_attempts() -> None:
-    placements = Misplaced(kiks.Simulation(robot=BASE.with_changes(proximity__jitter_counts=(0.0,))), {5: 150})
-    words = failure(placements)
-    assert "some sensor must see the wall at 5 mm, but none reads more than 0 counts above its baseline" in words
-    assert len(placements.findings) == 3  # one good in the open, two before the last attempt
-    assert placements.findings[-1] == words
+@pytest.mark.parametrize(
+    ("wrong_mm", "gaps_mm", "finding_count", "words"),
+    [
+        ({None: 5.0}, (5, 15), 3, "the sensors must read little in the open, but sensor"),
+        # One good in the open, two before the last attempt.
+        (
+            {5: 155},
+            (5, 15),
+            3,
+            "some sensor must see the wall at 5 mm, but none reads more than 0 counts above its base",
+        ),
+        pytest.param(
+            *({15: 27}, (5, 15, 25), 3, r"measurements must agree with each other, but those at the .*Check the marks"),
+            marks=at_length,
+        ),
+    ],
+)
+def test_error_for_a_robot_that_is_put_elsewhere(
+    wrong_mm: dict[float | None, float], gaps_mm: tuple[float, ...], finding_count: int, words: str
+) -> None:
+    sim = kiks.Simulation(robot=BASE.with_changes(proximity__jitter_counts=(0.0,)))
+    placements = Misplaced(sim, wrong_mm)
+    with pytest.raises(CalibrationError, match=words) as caught:
+        calibrate(kiks.Khepera(sim.port(1)), placements, BASE, gaps_mm=gaps_mm)
+    assert stands_still(sim)
+    assert placements.findings[-1] == str(caught.value)
+    assert len(placements.findings) == finding_count
 
 
 def test_error_for_a_run_up_without_a_wall() -> None:
-    class Backwards(Misplaced):
+    class Backwards(SimPlacements):
         def place(self, instruction: str, gap_mm: float | None = None) -> float | None:
             super().place(instruction, gap_mm)
             if gap_mm == 200:
                 self.sim.place(1, 250.0, 500.0, -math.pi / 2)
             return gap_mm
 
-    placements = Backwards(kiks.Simulation(), {})
+    placements = Backwards(kiks.Simulation())
     with pytest.raises(CalibrationError, match="the wall must come into sight 200 mm ahead, but after 27"):
         calibrate(kiks.Khepera(placements.sim.port(1)), placements, BASE, gaps_mm=[5, 15], run_up_mm=200)
     assert stands_still(placements.sim)
-
-
-def test_error_for_an_obstacle_in_the_open() -> None:
-    class Cornered(Misplaced):
-        def place(self, instruction: str, gap_mm: float | None = None) -> float | None:
-            return super().place(instruction, gap_mm or 5.0)
-
-    assert "the sensors must read little in the open, but sensor" in failure(Cornered(kiks.Simulation(), {}))
-
-
-@at_length
-def test_error_for_contradictory_measurements() -> None:
-    words = failure(Misplaced(kiks.Simulation(), {15: 12}), (5, 15, 25))
-    assert "the measurements must agree with each other, but those at the" in words
-    assert "Check the marks" in words
 
 
 def test_error_for_wheels_that_do_not_turn() -> None:

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 import kiks
+from kiks.errors import ParameterError
 from kiks.firmware.turret import Turret
 
 
@@ -64,25 +65,19 @@ def test_a_command_on_its_way_is_answered_in_the_copy() -> None:
     assert twin.state_hash() == sim.state_hash()
 
 
-def test_unread_replies_are_refused() -> None:
+class Dice(Turret):
+    number, name = 24, "Dice"
+
+
+def test_unread_replies_and_turrets_of_a_user_are_refused() -> None:
     sim, robots = begun()
     robots[1].port.write(b"N\n")
     sim.run(0.1)
-    with pytest.raises(
-        kiks.ParameterError, match="must have no unread replies to be copied, but robot 2 has sent some"
-    ):
+    with pytest.raises(ParameterError, match="must have no unread replies to be copied, but robot 2 has sent some"):
         pickle.dumps(sim)
-
-
-def test_turrets_of_a_user_are_refused() -> None:
-    class Dice(Turret):
-        number, name = 24, "Dice"
-
     sim, _ = begun()
     sim.fit(2, Dice())
-    with pytest.raises(
-        kiks.ParameterError, match="no turrets of a user's own to be copied, but robot 2 has <Dice: turr"
-    ):
+    with pytest.raises(ParameterError, match="no turrets of a user's own to be copied, but robot 2 has <Dice: turr"):
         copy.deepcopy(sim)
 
 

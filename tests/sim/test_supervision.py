@@ -8,7 +8,6 @@ import pytest
 from tests import forked
 
 from kiks.errors import ParameterError
-from kiks.model.goal import Goal
 from kiks.sim.simulation import Simulation
 from kiks.sim.supervision import Supervision
 
@@ -74,9 +73,8 @@ def test_a_file_that_is_no_supervisor_is_an_error(text: str, message: str, tmp_p
 def test_a_supervisor_that_cannot_begin_is_an_error(
     text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (tmp_path / "referee.py").write_text(text)
     with pytest.raises(ParameterError, match=r"able to begin, but referee\.py has failed"):
-        Supervision(Simulation(), tmp_path / "referee.py")
+        supervised(tmp_path, text)
     assert "Traceback" in capsys.readouterr().err
 
 
@@ -97,20 +95,3 @@ def test_a_supervisor_that_fails_ends_the_run(tmp_path: Path) -> None:
     missing = forked.run("run", "game.kiks", cwd=tmp_path)
     assert missing.returncode == 2
     assert "a supervisor must be a Python file, but there is none at" in missing.stderr
-
-
-def test_a_solved_goal_is_worth_a_point() -> None:
-    sim = Simulation()
-    supervision = Supervision(sim, goal=Goal(solved="time_s >= 1"))
-    sim.run(3.0)
-    assert supervision.decide() == "Goal solved after 1.0 s, 1 point."
-
-
-@pytest.mark.parametrize(
-    ("failed", "said"), [("False", "solved after 1.0 s, 1 point"), ("time_s >= 1", "failed after")]
-)
-def test_what_must_hold_to_the_end_is_solved_there_unless_the_goal_has_failed(failed: str, said: str) -> None:
-    sim = Simulation()
-    supervision = Supervision(sim, goal=Goal(solved="is_over", failed=failed))
-    sim.run(1.0)
-    assert said in supervision.decide()
