@@ -36,15 +36,9 @@ def test_a_program_drives_alone(name: str, tmp_path: Path) -> None:
     drive("--arena", "office", str(PROGRAMS / name), cwd=tmp_path)
 
 
-def test_one_program_drives_two_robots(tmp_path: Path) -> None:
+def test_one_program_drives_two_robots_a_program_follows_another_or_takes_an_exercise(tmp_path: Path) -> None:
     drive("--robots", "2", str(PROGRAMS / "two_robots.py"), cwd=tmp_path, robots=2)
-
-
-def test_a_program_follows_another(tmp_path: Path) -> None:
     drive(str(PROGRAMS / "leader.py"), str(PROGRAMS / "follower.py"), cwd=tmp_path, robots=2)
-
-
-def test_a_program_takes_an_exercise(tmp_path: Path) -> None:
     drive(str(ROOT / "examples" / "exercises" / "lamp"), str(PROGRAMS / "to_the_light.py"), cwd=tmp_path)
 
 

@@ -1,4 +1,7 @@
-"""The scripts of the gallery run as they stand, say what came out, and leave a picture. `make docs` runs them, too."""
+"""The scripts of the gallery run as they stand, say what came out, and leave a picture.
+
+`make docs` runs all of them for the site and ends with the first that fails, so that `make test` has one.
+"""
 
 from __future__ import annotations
 
@@ -7,13 +10,14 @@ from pathlib import Path
 import pytest
 from PIL import Image
 from tests import forked
+from tests.at_length import cases
 
 SCRIPTS = Path(__file__).parents[2] / "examples" / "gallery"
 
 pytestmark = pytest.mark.slow
 
 
-@pytest.mark.parametrize("name", sorted(path.stem for path in SCRIPTS.glob("*.py")))
+@pytest.mark.parametrize("name", cases(sorted(path.stem for path in SCRIPTS.glob("*.py"))))
 def test_a_script_leaves_a_picture(name: str, tmp_path: Path) -> None:
     code = (SCRIPTS / f"{name}.py").read_text(encoding="utf-8")
     result = forked.run(code=code, cwd=tmp_path, env={"MPLBACKEND": "agg"})

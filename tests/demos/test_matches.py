@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from tests import forked
+from tests.at_length import cases
 from tests.cli.test_cli import state_of
 from tests.demos.shown import world_of
 
@@ -46,7 +47,7 @@ def test_a_match_is_the_same_on_every_computer(name: str, tmp_path: Path) -> Non
     assert state_of(result.stderr) == HASHES[name]
 
 
-@pytest.mark.parametrize("name", HASHES)
+@pytest.mark.parametrize("name", cases(HASHES))
 def test_a_whole_match_of_equals_has_points_on_both_sides(name: str, tmp_path: Path) -> None:
     result = forked.run("demo", name, "--seed", "1", cwd=tmp_path)
     points = [int(value) for value in re.findall(r"\d+", result.stdout.splitlines()[-1])[:2]]
@@ -79,13 +80,11 @@ def test_no_point_where_both_touch_the_wall_or_nothing_happens() -> None:
     sim.place(1, 320, 38, 0.0)
     sim.place(2, 602, 320, 0.0)
     sim.run(0.2)
-    assert sim.score == {1: 0, 2: 0}
     place = sim.pose(1)
-    sim.run(19.5)
-    assert sim.pose(1) == place
-    sim.run(1.0)
-    assert sim.score == {1: 0, 2: 0}
-    assert sim.pose(1) != place
+    for seconds, is_new_round in ((0.0, False), (19.5, False), (1.0, True)):
+        sim.run(seconds)
+        assert sim.score == {1: 0, 2: 0}
+        assert (sim.pose(1) != place) == is_new_round
 
 
 def test_the_faster_pushes_the_other_out() -> None:
@@ -137,25 +136,20 @@ def test_a_robot_that_shoots_with_its_last_points_is_out() -> None:
 # ---- hide and seek ----
 
 
-@pytest.mark.parametrize(
-    ("seeker", "hider", "is_caught"),
-    [
+def test_the_hider_is_caught_where_the_seeker_is_near_and_sees_it() -> None:
+    for seeker, hider, is_caught in (
         ((300, 300, 0.0), (380, 300), True),
         ((300, 300, 0.7), (380, 300), True),
         ((300, 300, 0.9), (380, 300), False),  # it is not in sight
         ((300, 300, 0.0), (395, 300), False),  # it is too far
         ((212, 100, 0.0), (288, 100), False),  # a wall is between
-    ],
-)
-def test_the_hider_is_caught_where_the_seeker_is_near_and_sees_it(
-    seeker: tuple[float, float, float], hider: tuple[float, float], is_caught: bool
-) -> None:
-    sim = match("hide_and_seek")
-    sim.place(1, *seeker)
-    sim.place(2, *hider, 0.0)
-    sim.run(0.2)
-    assert sim.score == {1: int(is_caught), 2: 0}
-    assert (sim.pose(1)[:2] == (100, 350)) == is_caught
+    ):
+        sim = match("hide_and_seek")
+        sim.place(1, *seeker)
+        sim.place(2, *hider, 0.0)
+        sim.run(0.2)
+        assert sim.score == {1: int(is_caught), 2: 0}
+        assert (sim.pose(1)[:2] == (100, 350)) == is_caught
 
 
 def test_the_round_is_the_hider_s_after_its_time() -> None:

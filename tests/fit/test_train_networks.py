@@ -156,9 +156,8 @@ def test_kernels_against_numpy():
         np.testing.assert_allclose(out[:, sensor], np.clip(network(seen[:, sensor]), 0, 1023), atol=0.5)
 
 
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
+def test_networks_have_their_shape(tmp_path):
+    for change, words in (
         (None, r"must be a table, but it was \[\]. `python tools/accuracy.py"),
         ({"hidden": [[1.0]]}, r"hidden\[0\]\[0\] must be a list, but it was 1.0"),
         ({"hidden": []}, "hidden must have at least 8 items"),
@@ -167,12 +166,10 @@ def test_kernels_against_numpy():
             r"hidden\[7\]\[12\]\[0\] must be at most 1000000",
         ),
         ({"field_of_view_deg": 1e9}, "field_of_view_deg must be at most 180"),
-    ],
-)
-def test_networks_have_their_shape(tmp_path, change, words):
-    data = [] if change is None else json.loads(THESIS.read_text()) | change
-    (tmp_path / "net.json").write_text(json.dumps(data))
-    with pytest.raises(ParameterError, match=words):
-        NetworkResponse.load(tmp_path / "net.json")
-    with pytest.raises(ParameterError, match="networks must go to a file that can be written"):
-        NetworkResponse.load().save(tmp_path / "no" / "net.json")
+    ):
+        data = [] if change is None else json.loads(THESIS.read_text()) | change
+        (tmp_path / "net.json").write_text(json.dumps(data))
+        with pytest.raises(ParameterError, match=words):
+            NetworkResponse.load(tmp_path / "net.json")
+        with pytest.raises(ParameterError, match="networks must go to a file that can be written"):
+            NetworkResponse.load().save(tmp_path / "no" / "net.json")

@@ -202,24 +202,21 @@ def test_a_run_ends_at_the_first_look_at_which_it_is_solved(tmp_path: Path) -> N
     assert supervision.decide() == "Goal solved after 0.8 s, 49.2 points."
 
 
-@pytest.mark.parametrize(
-    ("goal", "run_s", "decision"),
-    [
+def test_a_run_is_judged_by_its_goal_and_what_a_judge_in_python_counts(tmp_path: Path) -> None:
+    for goal, run_s, decision in (
         ({"failed": "contacts > 0", "points": "round(path_mm / 100)"}, 10, "failed after 2.8 s, 2 points."),
         ({"solved": "time_s >= 1"}, 3, "solved after 1.0 s, 1 point."),
         ({"solved": 'score("laps") >= 3', "points": 'score("laps")'}, 4, "solved after 1.5 s, 3 points."),
         ({"solved": "is_over"}, 1, "solved after 1.0 s, 1 point."),  # what must hold to the end
         ({"solved": "is_over", "failed": "time_s >= 1"}, 1, "failed after 1.0 s, 0 points."),
-    ],
-)
-def test_a_run_is_judged_by_its_goal_and_what_a_judge_in_python_counts(
-    goal: dict[str, str], run_s: float, decision: str, tmp_path: Path
-) -> None:
-    referee = "def supervise(sim):\n    while True:\n        yield 0.5\n        sim.set_score('laps', 2 * sim.time_s)\n"
-    sim, supervision, said = supervised(Goal(**goal), tmp_path, referee)
-    sim.run(run_s)
-    assert len(said) == (run_s > 1)
-    assert supervision.decide() == f"Goal {decision}"
+    ):
+        referee = (
+            "def supervise(sim):\n    while True:\n        yield 0.5\n        sim.set_score('laps', 2 * sim.time_s)\n"
+        )
+        sim, supervision, said = supervised(Goal(**goal), tmp_path, referee)
+        sim.run(run_s)
+        assert len(said) == (run_s > 1)
+        assert supervision.decide() == f"Goal {decision}"
 
 
 def test_a_run_that_ends_before_is_judged_as_it_is(tmp_path: Path) -> None:
@@ -251,9 +248,8 @@ def test_a_formula_without_a_value_ends_the_run_in_one_line(tmp_path: Path) -> N
     ]
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
+def test_what_is_wrong_is_said_before_the_run_in_one_line() -> None:
+    for text, message in (
         ("contact > 0", "the goal's solved must name measures, but 'contact' is none. Did you mean 'contacts'?"),
         ("measure > 0", "must name measures, but 'measure' is none"),
         ("contacts(3) > 0", "must use contacts without arguments, but it was 'contacts(3)'"),
@@ -272,16 +268,14 @@ def test_a_formula_without_a_value_ends_the_run_in_one_line(tmp_path: Path) -> N
         ("min() > 2", "must be a number, but 'min() > 2' has none at 0.0 s"),
         ("light_mm - light_mm", "the goal's solved must be from -1e9 to 1e9, but it was nan"),
         ("round(light_mm - light_mm, light_mm)", "the goal's solved must be a number"),
-    ],
-)
-def test_what_is_wrong_is_said_before_the_run_in_one_line(text: str, message: str) -> None:
-    sim = Simulation(Arena.box(500, 500), seed=1)
-    sim.set_score("laps", "many")
-    with pytest.raises(ParameterError) as caught:
-        Judge(sim, Goal(solved=text))
-    assert message in str(caught.value)
-    assert "\n" not in str(caught.value)
-    assert len(str(caught.value)) < 500
+    ):
+        sim = Simulation(Arena.box(500, 500), seed=1)
+        sim.set_score("laps", "many")
+        with pytest.raises(ParameterError) as caught:
+            Judge(sim, Goal(solved=text))
+        assert message in str(caught.value)
+        assert "\n" not in str(caught.value)
+        assert len(str(caught.value)) < 500
 
 
 # ---- what a run leaves ----

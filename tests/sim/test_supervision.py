@@ -53,29 +53,22 @@ def test_it_is_closed_wherever_it_waits(tmp_path: Path, capsys: pytest.CaptureFi
     assert sim.bodies()["x_mm"].tolist() == [110.0]
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
+def test_a_file_that_is_no_supervisor_is_an_error(tmp_path: Path) -> None:
+    for text, message in (
         ("x = 1", r"must define a function supervise\(sim\) that yields"),
         ("def supervise(sim):\n    return 1", r"must define a function supervise\(sim\) that yields"),
         ("def supervise(sim):\n    yield 0", "the time that a supervisor yields must be from 0.001"),
         ("def supervise(sim):\n    yield 'soon'", "the time that a supervisor yields must be a number"),
-    ],
-)
-def test_a_file_that_is_no_supervisor_is_an_error(text: str, message: str, tmp_path: Path) -> None:
-    with pytest.raises(ParameterError, match=message):
-        supervised(tmp_path, text)
+    ):
+        with pytest.raises(ParameterError, match=message):
+            supervised(tmp_path, text)
 
 
-@pytest.mark.parametrize(
-    "text", ["def supervise(sim:\n", "import nothing_of_this_name\n", "def supervise(sim):\n    yield 1 / 0\n"]
-)
-def test_a_supervisor_that_cannot_begin_is_an_error(
-    text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    with pytest.raises(ParameterError, match=r"able to begin, but referee\.py has failed"):
-        supervised(tmp_path, text)
-    assert "Traceback" in capsys.readouterr().err
+def test_a_supervisor_that_cannot_begin_is_an_error(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for text in ("def supervise(sim:\n", "import nothing_of_this_name\n", "def supervise(sim):\n    yield 1 / 0\n"):
+        with pytest.raises(ParameterError, match=r"able to begin, but referee\.py has failed"):
+            supervised(tmp_path, text)
+        assert "Traceback" in capsys.readouterr().err
 
 
 def test_a_supervisor_that_fails_ends_the_run(tmp_path: Path) -> None:
