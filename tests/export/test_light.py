@@ -22,15 +22,11 @@ def lamps(*rows: tuple[float, float, float, float]) -> NDArray[np.float64]:
     return np.array(rows, np.float64).reshape(-1, 4)
 
 
+@pytest.mark.parametrize("spec", [KHEPERA, KHEPERA.without_noise()], ids=["noisy", "without noise"])
 @pytest.mark.parametrize("power_w", [1.0, 4.0])
-@pytest.mark.parametrize("is_noisy", [True, False])
-def test_floor_is_lit_exactly_where_a_sensor_that_faces_the_lamp_reads_more_than_noise(
-    power_w: float, is_noisy: bool
-) -> None:
-    spec = KHEPERA if is_noisy else KHEPERA.without_noise()
+def test_floor_is_lit_exactly_where_a_sensor_that_faces_the_lamp_reads_more_than_noise(power_w, spec) -> None:
     arena = replace(Arena.box(2000, 200), lamps=(Lamp(60, 100, power_w),))
     light = light_map(arena, lamps((60, 100, power_w, 1)), spec)
-    assert light is not None
     sim = Simulation(arena, robot=spec)
     row, cell_mm = light.shape[0] // 2, 2000 / light.shape[1]
     strengths = {}
@@ -51,7 +47,6 @@ def test_walls_cast_shadows_lamps_that_are_off_none() -> None:
     brightness[100:300, 300:310] = 255
     arena = Arena(brightness, 1.0, "wall")
     light = light_map(arena, lamps((200, 200, 1, 1)), KHEPERA)
-    assert light is not None
     at = [light[light.shape[0] // 2, int(x_mm / 2.5)] for x_mm in (120, 280, 330, 400)]
     assert min(at[:2]) > 0.7
     assert at[2:] == [0, 0]
@@ -61,11 +56,8 @@ def test_walls_cast_shadows_lamps_that_are_off_none() -> None:
 
 def test_light_of_two_lamps_adds_up() -> None:
     arena = Arena.box(1000, 400)
-    one, two = (light_map(arena, lamps(*rows), KHEPERA) for rows in ([(300, 200, 1, 1)], [(300, 200, 1, 1)] * 2))
-    both = light_map(arena, lamps((300, 200, 2, 1)), KHEPERA)
-    assert one is not None
-    assert two is not None
-    assert both is not None
+    lamp, strong = (300, 200, 1, 1), (300, 200, 2, 1)
+    one, two, both = (light_map(arena, lamps(*rows), KHEPERA) for rows in ([lamp], [lamp] * 2, [strong]))
     assert (two >= one).all()
     assert two.sum() > 1.2 * one.sum()
     np.testing.assert_allclose(two, both, atol=1e-6)

@@ -186,7 +186,6 @@ def test_a_run_ends_at_the_first_look_at_which_it_is_solved(tmp_path: Path) -> N
     sim.run(0.7)
     assert said == []
     sim.run(2)
-    assert supervision.judge is not None
     assert supervision.judge.judgement == Judgement(True, False, 49.2, 0.8)
     assert said == ["0: "]
     assert dict(sim.score) == {"points": 49.2, "result": "solved after 0.8 s"}
@@ -307,7 +306,6 @@ def test_kiks_run_tells_and_records_the_same_judgement(words: tuple[str, str], g
     line = f"Goal {'solved' if goal['is_solved'] else 'not solved'} after {told['time_s']:.1f} s"
     assert line in result.stderr
     game = Project.load(tmp_path / "game.kiks").goal
-    assert game is not None
     with kiks.Recording(tmp_path / "run.mcap") as recording:
         end = recording.world_at(recording.duration_s)
         assert end.score["points"] == told["points"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -31,9 +32,7 @@ def watched(sim: Simulation, robot: int = 1) -> WireLog:
 
 
 def shares(sim: Simulation, from_ns: int = 0, robot: int = 1) -> TimeShares:
-    found = sim.wires[robot - 1].shares(from_ns, sim.now_ns)
-    assert found is not None
-    return found
+    return sim.wires[robot - 1].shares(from_ns, sim.now_ns)
 
 
 def test_exchange_has_the_times_of_its_characters() -> None:
@@ -121,15 +120,13 @@ def test_who_watches_changes_nothing() -> None:
 SPANS = st.lists(st.tuples(st.integers(0, 40), st.integers(0, 40)), max_size=8)
 
 
-@given(st.tuples(st.integers(0, 40), st.integers(0, 40)), SPANS, SPANS, SPANS)
-def test_shares_give_each_instant_to_the_first_who_claims_it(
-    window: Span, link: list[Span], robot: list[Span], thinking: list[Span]
-) -> None:
+@given(st.tuples(st.integers(0, 40), st.integers(0, 40)), st.tuples(SPANS, SPANS, SPANS))
+def test_shares_give_each_instant_to_the_first_who_claims_it(window: Span, claimed: tuple[list[Span], ...]) -> None:
     counts = [0, 0, 0, 0]
     for instant in range(*window):
-        claims = (any(begin <= instant < end for begin, end in spans) for spans in (link, robot, thinking))
+        claims = (any(begin <= instant < end for begin, end in spans) for spans in claimed)
         counts[[*claims, True].index(True)] += 1
-    found = share_time(window, link=link, robot=robot, thinking=thinking)
+    found = share_time(window, **dict(zip(("link", "robot", "thinking"), claimed, strict=True)))
     assert found == TimeShares(*counts)
     assert found.window_ns == max(window[1] - window[0], 0)
 
@@ -148,8 +145,8 @@ port.read(1)
 
 @pytest.mark.slow
 @pytest.mark.parametrize("is_near", [True, False], ids=["in memory", "in a process of its own"])
-def test_shares_of_a_program_add_up(is_near: bool, tmp_path_factory: pytest.TempPathFactory) -> None:
-    program = tmp_path_factory.mktemp("program") / "program.py"
+def test_shares_of_a_program_add_up(is_near: bool, tmp_path: Path) -> None:
+    program = tmp_path / "program.py"
     program.write_text(PROGRAM)
     sim = fresh(thinking="fixed:2.5" if is_near else "none")
     log = watched(sim)
