@@ -30,7 +30,7 @@ from kiks.recording.recorder import CHECK_NS
 from kiks.recording.replay import check_recording
 from kiks.sim.run_log import Kind
 
-KILLS = share(2, 30)
+KILLS = share(1, 30)
 """How many runs are killed."""
 
 CUTS = share(12, 1000)
@@ -136,7 +136,7 @@ def test_a_flipped_byte_of_an_attachment_is_noticed(file: Path) -> None:
     assert "whole attachments" in refused(file)
 
 
-def with_entries(kind: Kind, **changes: int) -> Parts:
+def with_entries(kind: Kind, /, **changes: int) -> Parts:
     return sound_parts().with_entry(lambda entry: entry.kind == kind, lambda entry: entry._replace(**changes))
 
 
