@@ -6,15 +6,13 @@ import inspect
 import re
 import runpy
 import sys
-from collections.abc import Callable
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from tests.at_length import at_length, cases
+from tests.at_length import cases
 
 import kiks
 from kiks.learn.classics import Finding, table_of
@@ -27,29 +25,37 @@ SMALL: dict[str, Any] = {"seeds": "1-2", "generations": 2, "population": 6, "sta
 """Settings of a script in a test: those that it has."""
 
 
-@pytest.fixture(scope="module")
-def found(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], dict[str, Finding]]:
-    """Return what a script finds with small settings, by what it is about; each runs once."""
-
-    @cache
-    def found(name: str) -> dict[str, Finding]:
-        main = runpy.run_path(str(SCRIPTS[name]))["main"]
-        settings = {key: value for key, value in SMALL.items() if key in inspect.signature(main).parameters}
-        out = tmp_path_factory.mktemp(name) / "figure.svg"
-        findings = {each.what: each for each in main(out=out, **settings)}
-        assert out.read_text(encoding="utf-8").startswith("<?xml")
-        return findings
-
-    return found
+def of_squares(findings: dict[str, Finding]) -> None:
+    """Check that the square test finds track and wheels."""
+    numbers = {what.split(" found")[0]: each.here for what, each in findings.items()}
+    assert numbers["track"] == pytest.approx(54.0, abs=0.15)
+    assert numbers["right wheel to left one"] == pytest.approx(1.004, abs=6e-4)
+    assert numbers["farther centre after [mm]"] < 0.2 * numbers["farther centre before [mm]"]
 
 
-@pytest.mark.parametrize("name", cases(sorted(SCRIPTS, key=lambda name: name != "umbmark")))
-def test_a_script_makes_its_figure_and_its_table(name: str, found: Callable[[str], dict[str, Finding]]) -> None:
-    for each in found(name).values():
+def of_vehicles(findings: dict[str, Finding]) -> None:
+    """Check that vehicles do what Braitenberg says."""
+    nearest_mm = {what[:2]: float(each.here.split()[0]) for what, each in findings.items() if "lamp" in what}
+    assert nearest_mm["2b"] < 20 < nearest_mm["3a"] < 200 < min(nearest_mm["2a"], nearest_mm["3b"])
+    assert findings["k-team: speed in free space [mm/s]"].here == pytest.approx(112, abs=8)
+
+
+CHECKS = {"umbmark": of_squares, "braitenberg": of_vehicles}
+
+
+@pytest.mark.parametrize("name", cases([*CHECKS, *sorted(SCRIPTS.keys() - CHECKS)]))
+def test_a_script_makes_its_figure_and_its_table(name: str, tmp_path: Path) -> None:
+    main, out = runpy.run_path(str(SCRIPTS[name]))["main"], tmp_path / "figure.svg"
+    settings = {key: value for key, value in SMALL.items() if key in inspect.signature(main).parameters}
+    findings = {each.what: each for each in main(out=out, **settings)}
+    assert out.read_text(encoding="utf-8").startswith("<?xml")
+    for each in findings.values():
         assert each.what
         assert each.text
         if not isinstance(each.here, str):
             assert np.isfinite(each.here).all(), each.what
+    if name in CHECKS:
+        CHECKS[name](findings)
 
 
 def test_the_page_has_the_command_and_the_figure_of_each_script() -> None:
@@ -64,22 +70,6 @@ def test_a_script_is_a_command(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "argv", ["script", "--seeds", "2-1"])
     with pytest.raises(SystemExit, match="kiks: seeds must be numbers or rising ranges"):
         runpy.run_path(str(SCRIPTS["floreano_mondada_1994"]), run_name="__main__")
-
-
-def test_the_square_test_finds_track_and_wheels(found: Callable[[str], dict[str, Finding]]) -> None:
-    findings = found("umbmark")
-    numbers = {what.split(" found")[0]: each.here for what, each in findings.items()}
-    assert numbers["track"] == pytest.approx(54.0, abs=0.15)
-    assert numbers["right wheel to left one"] == pytest.approx(1.004, abs=6e-4)
-    assert numbers["farther centre after [mm]"] < 0.2 * numbers["farther centre before [mm]"]
-
-
-@at_length
-def test_vehicles_do_what_braitenberg_says(found: Callable[[str], dict[str, Finding]]) -> None:
-    findings = found("braitenberg")
-    nearest_mm = {what[:2]: float(each.here.split()[0]) for what, each in findings.items() if "lamp" in what}
-    assert nearest_mm["2b"] < 20 < nearest_mm["3a"] < 200 < min(nearest_mm["2a"], nearest_mm["3b"])
-    assert findings["k-team: speed in free space [mm/s]"].here == pytest.approx(112, abs=8)
 
 
 # ---- what they share ----

@@ -100,13 +100,10 @@ def ball_at(bearing_deg: float, distance_mm: float, ground: list[float]) -> list
     return [sight.BALL if abs(at - bearing_deg) < half_deg else grey for at, grey in zip(degrees, ground, strict=True)]
 
 
-def seen(scene: list[float], shift: float = 0.0) -> list[float]:
-    greys = sight.smooth(take(scene, shift=shift))
+def seen(scene: list[float]) -> list[float]:
+    greys = sight.smooth(take(scene))
     sight.undarken(greys)
-    return [grey - shift for grey in greys]
-
-
-WALL = [sight.WALL] * sight.COUNT
+    return greys
 
 
 @pytest.mark.parametrize("ground", [sight.WALL, sight.DIM, sight.BRIGHT])

@@ -55,11 +55,8 @@ def test_robots_are_copied_with_their_simulation() -> None:
     twin, twins = copy.deepcopy((sim, robots))
     assert (twins[0].port.sim, twins[0].port.timeout) == (twin, 0.25)
     assert gone_on(sim, robots)[:4] == gone_on(twin, twins)[:4]
-
-
-def test_a_command_on_its_way_is_answered_in_the_copy() -> None:
     sim, robots = begun("none")
-    robots[0].port.write(b"N\n")
+    robots[0].port.write(b"N\n")  # a command on its way is answered in the copy
     twin, (first, _) = copy.deepcopy((sim, robots))
     assert first.port.readline() == robots[0].port.readline()
     assert twin.state_hash() == sim.state_hash()

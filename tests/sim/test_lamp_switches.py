@@ -84,17 +84,15 @@ def test_files_keep_the_switches(tmp_path: Path) -> None:
 
 
 def test_switches_without_a_lamp_are_refused() -> None:
-    with pytest.raises(KiksError, match="must name lamps from 1 to 0, but one names lamp 2"):
-        kiks.Simulation(replace(ROOM, lamps=()))
-    sim = kiks.Simulation(ROOM)
-    with pytest.raises(KiksError, match="must come after all that the arena switches"):
-        sim.remove_lamp(1)
-    with pytest.raises(KiksError, match="must name lamps from 1 to 1"):
-        sim.lamps = sim.lamps[:1]
+    sim, batch = kiks.Simulation(ROOM), kiks.Batch(ROOM, 1)
+    for act, words in (
+        (lambda: kiks.Simulation(replace(ROOM, lamps=())), "must name lamps from 1 to 0, but one names lamp 2"),
+        (lambda: sim.remove_lamp(1), "must come after all that the arena switches"),
+        (lambda: setattr(sim, "lamps", sim.lamps[:1]), "must name lamps from 1 to 1"),
+        (lambda: setattr(batch, "lamps", batch.lamps[:, :1]), "at least 2 in each world"),
+        (lambda: LampSwitch(-1, 1, True), "time_s must be at least 0|greater than or equal"),
+    ):
+        with pytest.raises(KiksError, match=words):
+            act()
     assert sim.add_lamp(100, 100) == 3
     sim.remove_lamp(3)
-    batch = kiks.Batch(ROOM, 1)
-    with pytest.raises(KiksError, match="at least 2 in each world"):
-        batch.lamps = batch.lamps[:, :1]
-    with pytest.raises(KiksError, match=r"time_s must be at least 0|greater than or equal"):
-        LampSwitch(-1, 1, True)

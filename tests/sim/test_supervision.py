@@ -23,6 +23,9 @@ def supervise(sim):
 """
 
 
+FAILED = r"able to begin, but referee\.py has failed"
+
+
 def supervised(tmp_path: Path, text: str) -> tuple[Simulation, Supervision]:
     file = tmp_path / "referee.py"
     file.write_text(text)
@@ -30,9 +33,7 @@ def supervised(tmp_path: Path, text: str) -> tuple[Simulation, Supervision]:
     return sim, Supervision(sim, file)
 
 
-def test_it_prepares_the_world_acts_at_its_times_and_returns(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_it_prepares_the_world_acts_at_its_times_and_returns(tmp_path, capsys: pytest.CaptureFixture[str]) -> None:
     sim, supervision = supervised(tmp_path, TICKS)
     ended = []
     supervision.end = lambda code, message: ended.append((code, message))
@@ -42,33 +43,27 @@ def test_it_prepares_the_world_acts_at_its_times_and_returns(
     sim.run(1.0)
     assert ended == [(0, "the supervisor has ended the run at 1.500 s of simulated time.")]
     assert capsys.readouterr().out == "moved 3 times at 1.5\n"
-
-
-def test_it_is_closed_wherever_it_waits(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     sim, supervision = supervised(tmp_path, TICKS)
     sim.run(0.7)
-    supervision.close()
+    supervision.close()  # wherever it waits
     assert capsys.readouterr().out == "moved 2 times at 0.7\n"
     sim.run(1.0)
     assert sim.bodies()["x_mm"].tolist() == [110.0]
 
 
-def test_a_file_that_is_no_supervisor_is_an_error(tmp_path: Path) -> None:
+def test_what_cannot_begin_as_a_supervisor_is_an_error(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for text, message in (
         ("x = 1", r"must define a function supervise\(sim\) that yields"),
         ("def supervise(sim):\n    return 1", r"must define a function supervise\(sim\) that yields"),
         ("def supervise(sim):\n    yield 0", "the time that a supervisor yields must be from 0.001"),
         ("def supervise(sim):\n    yield 'soon'", "the time that a supervisor yields must be a number"),
+        ("def supervise(sim:\n", FAILED),
+        ("import nothing_of_this_name\n", FAILED),
+        ("def supervise(sim):\n    yield 1 / 0\n", FAILED),
     ):
         with pytest.raises(ParameterError, match=message):
             supervised(tmp_path, text)
-
-
-def test_a_supervisor_that_cannot_begin_is_an_error(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    for text in ("def supervise(sim:\n", "import nothing_of_this_name\n", "def supervise(sim):\n    yield 1 / 0\n"):
-        with pytest.raises(ParameterError, match=r"able to begin, but referee\.py has failed"):
-            supervised(tmp_path, text)
-        assert "Traceback" in capsys.readouterr().err
+        assert ("Traceback" in capsys.readouterr().err) == (message == FAILED)
 
 
 def test_a_supervisor_that_fails_ends_the_run(tmp_path: Path) -> None:

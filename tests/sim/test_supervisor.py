@@ -49,7 +49,7 @@ def test_robots_start_apart_from_each_other_and_from_balls():
     assert (np.abs(places[:, None] - places) + 1000 * np.eye(30)).min() >= 55 - 0.01
 
 
-def test_a_thing_comes_and_goes_and_keeps_its_number(sim):
+def test_a_thing_comes_and_goes_keeps_its_number_and_changes_its_looks(sim):
     first, second = sim.add_ball(100, 100), sim.add_cylinder(100, 300, brightness="white", radius_mm=12)
     assert (first, second) == (1, 2)
     sim.remove_body(first)
@@ -57,6 +57,11 @@ def test_a_thing_comes_and_goes_and_keeps_its_number(sim):
     assert sim.add_ball(100, 100) == 3
     sim.move_body(second, 200, 300)
     assert sim.bodies()[["number", "x_mm"]].tolist() == [(2, 200.0), (3, 100.0)]
+    sim.change_body(3, radius_mm=40, brightness="wood")
+    for changes in ({"x_mm": 120}, {"radius_mm": math.nan}, {"radius_mm": 90}):
+        with pytest.raises(ParameterError, match=f"{next(iter(changes))}|the place of body 3 must be free"):
+            sim.change_body(3, **changes)
+    assert sim.bodies()[["x_mm", "radius_mm", "brightness"]].tolist()[1] == (100.0, 40.0, 190)
 
 
 @pytest.mark.slow
@@ -272,15 +277,6 @@ def test_a_world_without_a_robot_gets_one():
     sim.run(1.0)
     assert sim.pose(1)[0] > 300
     assert sim.paths().shape[0] == 1
-
-
-def test_a_body_changes_its_looks_and_not_its_place(sim: Simulation) -> None:
-    ball = sim.add_ball(100, 100)
-    sim.change_body(ball, radius_mm=40, brightness="wood")
-    for changes in ({"x_mm": 120}, {"radius_mm": math.nan}, {"radius_mm": 90}):
-        with pytest.raises(ParameterError, match=f"{next(iter(changes))}|the place of body 1 must be free"):
-            sim.change_body(ball, **changes)
-    assert sim.bodies()[["x_mm", "radius_mm", "brightness"]].tolist() == [(100.0, 40.0, 190)]
 
 
 def test_a_score_is_set_read_copied_and_checked(sim: Simulation) -> None:
