@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import pickle
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -12,6 +13,9 @@ import pytest
 import kiks
 from kiks.errors import ParameterError
 from kiks.firmware.turret import Turret
+from kiks.model.exercise import Case
+from kiks.model.project import Project
+from kiks.sim.from_project import in_case, simulation_of
 
 
 def begun(thinking: str = "fixed:2") -> tuple[kiks.Simulation, list[kiks.Khepera]]:
@@ -83,3 +87,14 @@ def test_what_never_changes_is_shared() -> None:
     assert copy.deepcopy(sim).arena is sim.arena
     for thing in (sim.arena, sim.spec, kiks.measures.contacts, kiks.controllers.linear(), kiks.tasks.avoid()):
         assert copy.deepcopy(thing) is thing
+
+
+def test_the_line_of_a_case_has_its_speed_whatever_a_program_sets() -> None:
+    project = Project.from_bytes(in_case(Project(), Case(baud=38400), Path()).to_bytes())
+    sim = simulation_of(project)
+    for each in (sim, copy.copy(sim)):
+        each.port(1).baudrate = 9600
+        assert each.wires[0].line.baud == 38400
+    free = simulation_of(in_case(Project(baud=38400), Case(seed=2), Path()))
+    free.port(1).baudrate = 9600
+    assert free.wires[0].line.baud == 9600
