@@ -66,10 +66,8 @@ def test_the_robot_that_touches_the_wall_has_lost_the_round() -> None:
     assert math.dist(one[:2], two[:2]) == pytest.approx(240)
     assert math.dist(one[:2], (320, 320)) == pytest.approx(120)
     # Neither has the other nearer to its front.
-    turns = [
-        math.remainder(math.atan2(b[1] - a[1], b[0] - a[0]) - a[2], 2 * math.pi) for a, b in ((one, two), (two, one))
-    ]
-    assert turns[0] == pytest.approx(turns[1])
+    left, right = (math.atan2(b[1] - a[1], b[0] - a[0]) - a[2] for a, b in ((one, two), (two, one)))
+    assert math.remainder(left - right, 2 * math.pi) == pytest.approx(0, abs=1e-6)
     sim.place(2, 602, 320, 0.0)
     sim.run(0.2)
     assert sim.score == {1: 1, 2: 1}

@@ -57,13 +57,11 @@ def test_stripes_stand_around_a_robot() -> None:
     sim = kiks.Simulation(kiks.Arena.box(300, 300), robot=robot)
     sim.place(1, 150, 150, math.pi / 2)
     image, rim_mm = Picture.of_simulation(sim).image(), robot.body.radius_mm - 1.5
-    black, white = (
-        {
-            pixel(image, 150 - rim_mm * math.sin(angle), 150 + rim_mm * math.cos(angle))
-            for angle in (first, first + math.pi)
-        }
-        for first in (0.6, math.pi / 2 + 0.6)
-    )
+
+    def at(*angles: float) -> list[tuple[int, int, int]]:
+        return [pixel(image, 150 - rim_mm * math.sin(angle), 150 + rim_mm * math.cos(angle)) for angle in angles]
+
+    black, white = at(0.6, 0.6 + math.pi), at(0.6 + math.pi / 2, 0.6 - math.pi / 2)
     assert max(map(max, black)) < 30
     assert min(map(min, white)) > 230
 
@@ -89,17 +87,17 @@ def test_trails_show_where_everything_was(tmp_path: Path) -> None:
     assert pixel(image, 100, 220) == FLOOR  # the ball that went
 
 
-@pytest.mark.parametrize(("width_mm", "text"), [(99, "10 mm"), (300, "50 mm"), (1000, "200 mm"), (20_000, "2 m")])
-def test_a_scale_bar_has_a_round_length(width_mm: float, text: str) -> None:
-    sign = scale_bar(width_mm, width_mm / 40)
-    assert sign.text == text
-    assert width_mm / 15 < sign.width_mm <= width_mm / 5
+def test_a_scale_bar_has_a_round_length() -> None:
+    for width_mm, text in ((99, "10 mm"), (300, "50 mm"), (1000, "200 mm"), (20_000, "2 m")):
+        sign = scale_bar(width_mm, width_mm / 40)
+        assert sign.text == text
+        assert width_mm / 15 < sign.width_mm <= width_mm / 5
 
 
-@pytest.mark.parametrize("name", ["no/such/folder/x.png", "x.nothing"])
-def test_a_picture_that_cannot_be_written_says_so(name: str, tmp_path) -> None:
-    with pytest.raises(ParameterError, match=r"a picture must (go to a file|end in .png)"):
-        Picture.of_simulation(world()).save(tmp_path / name)
+def test_a_picture_that_cannot_be_written_says_so(tmp_path: Path) -> None:
+    for name, words in (("no/such/folder/x.png", "a picture must go to a file"), ("x.nothing", "must end in .png")):
+        with pytest.raises(ParameterError, match=words):
+            Picture.of_simulation(world()).save(tmp_path / name)
 
 
 # ---- light on the floor ----

@@ -100,10 +100,9 @@ def test_boxes_of_walls_cover_what_is_wall(name: str) -> None:
     step = -(-max(cells.shape) // CELLS_MAX)
     for (grey, *_), boxes in walls(arena).items():
         for box in boxes:
-            ends = [
-                (middle - size / 2, middle + size / 2) for middle, size in zip(box.middle[:2], box.size, strict=False)
-            ]
-            (left, right), (low, high) = (tuple(round(edge / arena.mm_per_cell) for edge in pair) for pair in ends)
+            half = np.array(box.size[:2]) / 2
+            corners = (np.array(box.middle[:2]) - half, np.array(box.middle[:2]) + half)
+            (left, low), (right, high) = np.rint(np.array(corners) / arena.mm_per_cell).astype(int).tolist()
             assert not cells[low:high, left:right].any()  # no box lies in another one
             cells[low:high, left:right] = grey
     assert (cells[arena.brightness > 0] >= wall_grey(arena.brightness[arena.brightness > 0].astype(int))).all()

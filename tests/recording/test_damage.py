@@ -201,11 +201,10 @@ def test_no_state_holds_what_kernels_cannot_take(file: Path) -> None:
             assert name.replace("trail", "") in refused(file)
 
 
-@pytest.mark.parametrize("value", [np.nan, np.inf, -1e300])
-def test_memory_of_turrets_holds_any_number(value: float, file: Path) -> None:
-    sound_parts().with_records("turret_memory", value).save(file)
-    recording = kiks.Recording(file)
-    recording.world_at(0.0).run(0.5)
+def test_memory_of_turrets_holds_any_number(file: Path) -> None:
+    for value in (np.nan, np.inf, -1e300):
+        sound_parts().with_records("turret_memory", value).save(file)
+        kiks.Recording(file).world_at(0.0).run(0.5)
 
 
 def test_what_a_gripper_lifts_over_a_thin_wall_can_be_recorded(file: Path) -> None:

@@ -16,12 +16,8 @@ from kiks.model.arena_file import save_arena
 from kiks.model.project import Project
 
 SWITCHES = (LampSwitch(1.005, 1, False), LampSwitch(0, 2, True), LampSwitch(2, 1, True), LampSwitch(2, 2, False))
-ROOM = replace(
-    kiks.Arena.box(500, 400),
-    starts=(Pose(250, 200, 0.3),),
-    lamps=(Lamp(300, 200), Lamp(200, 250, 1.0, False)),
-    lamp_switches=SWITCHES,
-)
+LAMPS = Lamp(300, 200), Lamp(200, 250, 1.0, False)
+ROOM = replace(kiks.Arena.box(500, 400), starts=(Pose(250, 200, 0.3),), lamps=LAMPS, lamp_switches=SWITCHES)
 
 
 @kiks.controller(senses=("ambient",))
@@ -31,8 +27,7 @@ def to_the_light(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> Non
 
 
 def lit(sim: kiks.Simulation) -> list[float]:
-    lamps: list[float] = sim.lamps[:, 3].tolist()
-    return lamps
+    return sim.lamps[:, 3].tolist()
 
 
 def test_a_lamp_is_switched_with_the_tick_that_ends_at_its_time_or_after_it() -> None:
