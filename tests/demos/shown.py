@@ -1,7 +1,5 @@
 """Runs a demonstration of one program in this process, as `kiks demo` does."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 from typing import Any

@@ -1,7 +1,5 @@
 """The scripts of `examples/classics` run as they stand with small settings; the tables say numbers that can be true."""
 
-from __future__ import annotations
-
 import inspect
 import re
 import runpy

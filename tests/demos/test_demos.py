@@ -1,7 +1,5 @@
 """The demonstrations: what they achieve on several seeds, that they repeat, and that a real robot could run them."""
 
-from __future__ import annotations
-
 import ast
 import math
 import re

@@ -1,7 +1,5 @@
 """Programs in `examples/programs` run as they stand, on the way that each is for, and scripts of the gallery do."""
 
-from __future__ import annotations
-
 import re
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """The ready matches: a whole one of each is the same everywhere, and referees keep their rules."""
 
-from __future__ import annotations
-
 import math
 import re
 from pathlib import Path

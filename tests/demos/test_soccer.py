@@ -1,7 +1,5 @@
 """Soccer: what the player sees and knows, what the referee does, and that a match is the same again."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import re

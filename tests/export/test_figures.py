@@ -1,7 +1,5 @@
 """Figures of recordings show what was recorded."""
 
-from __future__ import annotations
-
 import io
 from base64 import b64decode
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Films of recordings show what was recorded."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Frames contain the state of the simulation, as a slow and obvious parser reads it."""
 
-from __future__ import annotations
-
 import io
 import math
 import struct

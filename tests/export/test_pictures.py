@@ -1,7 +1,5 @@
 """Pictures of a run show what there is, where it is, and light where a sensor would see it."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from pathlib import Path

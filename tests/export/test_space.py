@@ -1,7 +1,5 @@
 """Films and photos in space show the same world as pictures from above."""
 
-from __future__ import annotations
-
 import math
 import sys
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The accuracy card says what its page says, and holds what the sensors promise."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

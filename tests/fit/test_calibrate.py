@@ -1,7 +1,5 @@
 """Calibration: finds the hidden parameters of a simulated robot over its line alone, and names mistakes."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Files of samples are read, and what is wrong in one is said with its line; rays are those of the engine."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Networks: exact gradients, training that trains, the same by the same seed; kernels that agree with NumPy."""
 
-from __future__ import annotations
-
 import json
 import math
 

@@ -1,7 +1,5 @@
 """Recordings whose run was killed, that were cut off, or that hold anything: read as far as they go, or refused."""
 
-from __future__ import annotations
-
 import json
 import random
 import resource

@@ -1,7 +1,5 @@
 """What a recording tells of moments is where everything was, between ticks too."""
 
-from __future__ import annotations
-
 import random
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A recorded run is the same as one that is not, is made again to the bit, and can be gone on with from any time."""
 
-from __future__ import annotations
-
 import json
 import resource
 import threading

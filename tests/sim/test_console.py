@@ -1,7 +1,5 @@
 """Commands that a person types."""
 
-from __future__ import annotations
-
 import pytest
 import serial
 from tests.served import fresh

@@ -1,7 +1,5 @@
 """A copy of a simulation goes on as the simulation does, and neither changes the other."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 from collections.abc import Callable

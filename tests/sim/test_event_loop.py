@@ -1,7 +1,5 @@
 """How time passes: in slices, so that little work is ever due, and to an end if one is set."""
 
-from __future__ import annotations
-
 from typing import NoReturn
 
 import pytest

@@ -1,7 +1,5 @@
 """Explanations: their parts make the count, and what rays met is there."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """The judge of a run: what each name of a formula is, when a run ends, and what is kept of its result."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from dataclasses import replace

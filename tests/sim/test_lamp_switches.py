@@ -1,7 +1,5 @@
 """Lamps that an arena switches in the course of a run: on a line, in a batch, after a jump and in files."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Supervisors: programs that act in a world from outside."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

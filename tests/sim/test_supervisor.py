@@ -1,7 +1,5 @@
 """The world from outside: what stands in it is placed, moved, taken away, looked at and put back."""
 
-from __future__ import annotations
-
 import copy
 import math
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """What goes over a robot's line, and where the time went."""
 
-from __future__ import annotations
-
 import itertools
 from pathlib import Path
 
