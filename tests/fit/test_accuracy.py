@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import typer
-from tests.at_length import at_length
+from tests.at_length import AT_LENGTH, at_length
 from tools.accuracy import accuracy
 from tools.sensors import card as cards
-from tools.sensors import models
-from tools.sensors.card import FOUND, HALVES, TOLD, data_folder, half_distances_mm, load_tables, make_card, page
+from tools.sensors import models, train_networks
+from tools.sensors.card import FOUND, HALVES, TOLD, Score, data_folder, half_distances_mm, load_tables, make_card, page
 from typer.testing import CliRunner
 
 from kiks.cli.fit import fit, parse_file
@@ -37,7 +37,12 @@ needs_data = pytest.mark.skipif(FOLDER is None, reason=REASON if FOLDER is None 
 
 @pytest.fixture(scope="module")
 def card():
-    return make_card(load_tables(FOLDER))
+    """The card; what is learnt from one object is asked about the other in test-all only, as it takes half of the time."""
+    with pytest.MonkeyPatch.context() as patch:
+        if not AT_LENGTH:
+            nothing = dict.fromkeys(("wall", "cylinder"), Score.of(np.zeros(1)))
+            patch.setattr(cards, "_unseen", lambda tables: dict.fromkeys((FOUND, TOLD), nothing))
+        return make_card(load_tables(FOLDER))
 
 
 @at_length
@@ -96,6 +101,7 @@ def test_the_robot_of_the_file_is_the_one_that_is_found(card):
     assert np.subtract(found.spec.proximity.direction_deg, base.proximity.direction_deg) == pytest.approx(0, abs=3)
 
 
+@at_length
 @needs_data
 def test_what_is_learnt_from_one_object_helps_with_the_other(card):
     """The response is fitted to one object alone and then asked about the other, which it never saw."""
@@ -183,7 +189,8 @@ def test_fit_reads_files_and_writes_a_robot(tmp_path):
             parse_file(entry)
 
 
-def test_networks_are_trained_and_written(tmp_path):
+def test_networks_are_trained_and_written(tmp_path, monkeypatch):
+    monkeypatch.setattr(train_networks, "ITERATIONS", 2)
     samples = made_up()
     folder = tmp_path / "samples"
     folder.mkdir()

@@ -60,18 +60,24 @@ def error_of(network, inputs, counts):
     return float(np.mean(np.abs(network(inputs) - counts)))
 
 
+@pytest.fixture
+def briefly(monkeypatch):
+    monkeypatch.setattr(train_networks, "ITERATIONS", 3)
+
+
 @pytest.mark.slow
-def test_training_reduces_the_error():
+def test_training_reduces_the_error(monkeypatch):
+    monkeypatch.setattr(train_networks, "ITERATIONS", 30)
     inputs, counts = made_up()
     weights = train_networks.unpack(parameters_of(LAYERS, np.random.default_rng(0)), LAYERS, 7)
     start = train_networks.Network(weights, (True, False, False))
     linear = train_networks.train(inputs, counts, train_networks.SIZES["no hidden layer"], seed=0, starts=1)
-    thesis = train_networks.train(inputs, counts, LAYERS, seed=0, starts=2)
+    thesis = train_networks.train(inputs, counts, LAYERS, seed=0, starts=1)
     assert error_of(linear, inputs, counts) < 0.7 * error_of(start, inputs, counts)
     assert error_of(thesis, inputs, counts) < 0.5 * error_of(linear, inputs, counts)
 
 
-@pytest.mark.slow
+@pytest.mark.usefixtures("briefly")
 def test_the_same_seed_trains_the_same_network():
     inputs, counts = made_up(150)
     one, two, other = (train_networks.train(inputs, counts, LAYERS, seed=seed, starts=1) for seed in (4, 4, 5))
@@ -82,7 +88,7 @@ def test_the_same_seed_trains_the_same_network():
         train_networks.train(inputs[:9], counts[:9], LAYERS, seed=0)
 
 
-@pytest.mark.slow
+@pytest.mark.usefixtures("briefly")
 def test_sensors_are_trained_on_samples_and_saved(tmp_path):
     angles = np.tile(np.arange(0.0, 360.0, 10.0), (5, 1))
     counts = np.random.default_rng(0).integers(0, 1024, (5, 36, 8))
