@@ -37,7 +37,7 @@ needs_data = pytest.mark.skipif(FOLDER is None, reason=REASON if FOLDER is None 
 
 @pytest.fixture(scope="module")
 def card():
-    """The card; what is learnt from one object is asked about the other in test-all only, as it takes half of the time."""
+    """The card, in `make test` without what is learnt from one object about the other, which takes half of the time."""
     with pytest.MonkeyPatch.context() as patch:
         if not AT_LENGTH:
             nothing = dict.fromkeys(("wall", "cylinder"), Score.of(np.zeros(1)))
