@@ -1,7 +1,5 @@
 """Runs a demonstration of one program in this process, as `kiks demo` does."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -27,7 +25,6 @@ def run(sim: Simulation, name: str, seconds: float | None = None) -> int:
     path = demonstrations()[name]
     project = Project.load(path)
     command = commands_of(project, path.parent)[0]
-    assert command is not None
     supervisor = supervisor_of(project, path.parent)
     supervision = None if supervisor is None else Supervision(sim, supervisor)
     limits = Limits(seconds or project.seconds, None)

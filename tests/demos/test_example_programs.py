@@ -1,6 +1,4 @@
-"""The programs in `examples/programs` run as they stand, on the way that each is for."""
-
-from __future__ import annotations
+"""Programs in `examples/programs` run as they stand, on the way that each is for, and scripts of the gallery do."""
 
 import re
 import shutil
@@ -8,7 +6,9 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from PIL import Image
 from tests import forked
+from tests.at_length import cases
 from tests.served import GUARD_S, served
 
 import kiks
@@ -16,7 +16,7 @@ from kiks.ports.pty import PtyEndpoint
 from kiks.ports.tcp import TcpEndpoint
 
 ROOT = Path(__file__).parents[2]
-PROGRAMS = ROOT / "examples" / "programs"
+PROGRAMS, GALLERY = ROOT / "examples" / "programs", ROOT / "examples" / "gallery"
 ALONE = sorted({path.name for path in PROGRAMS.glob("*.py")} - {"follower.py", "two_robots.py"})
 
 pytestmark = pytest.mark.slow
@@ -36,15 +36,9 @@ def test_a_program_drives_alone(name: str, tmp_path: Path) -> None:
     drive("--arena", "office", str(PROGRAMS / name), cwd=tmp_path)
 
 
-def test_one_program_drives_two_robots(tmp_path: Path) -> None:
+def test_one_program_drives_two_robots_a_program_follows_another_or_takes_an_exercise(tmp_path: Path) -> None:
     drive("--robots", "2", str(PROGRAMS / "two_robots.py"), cwd=tmp_path, robots=2)
-
-
-def test_a_program_follows_another(tmp_path: Path) -> None:
     drive(str(PROGRAMS / "leader.py"), str(PROGRAMS / "follower.py"), cwd=tmp_path, robots=2)
-
-
-def test_a_program_takes_an_exercise(tmp_path: Path) -> None:
     drive(str(ROOT / "examples" / "exercises" / "lamp"), str(PROGRAMS / "to_the_light.py"), cwd=tmp_path)
 
 
@@ -79,3 +73,18 @@ def test_programs_in_c_and_java_drive_as_one_in_python(tmp_path: Path) -> None:
             words = "localhost", str(endpoint.port), "200"
             assert turns(java, str(PROGRAMS / "Wander.java"), *words) == f"turned {expected} times\n"
             assert run.sim.state_hash() == sim.state_hash()
+
+
+@pytest.mark.parametrize("name", cases(sorted(path.stem for path in GALLERY.glob("*.py"))))
+def test_a_script_leaves_a_picture(name: str, tmp_path: Path) -> None:
+    """`make docs` runs all of them for the site and ends with the first that fails, so that `make test` has one."""
+    code = (GALLERY / f"{name}.py").read_text(encoding="utf-8")
+    result = forked.run(code=code, cwd=tmp_path, env={"MPLBACKEND": "agg"})
+    assert result.returncode == 0, result.stderr
+    assert result.stdout
+    pictures = [path for path in tmp_path.iterdir() if path.suffix in (".png", ".webp")]
+    assert pictures
+    for path in pictures:
+        assert path.stem.startswith(name)
+        with Image.open(path) as picture:
+            assert min(picture.size) > 200

@@ -1,13 +1,12 @@
 """The ready matches: a whole one of each is the same everywhere, and referees keep their rules."""
 
-from __future__ import annotations
-
 import math
 import re
 from pathlib import Path
 
 import pytest
 from tests import forked
+from tests.at_length import cases
 from tests.cli.test_cli import state_of
 from tests.demos.shown import world_of
 
@@ -46,7 +45,7 @@ def test_a_match_is_the_same_on_every_computer(name: str, tmp_path: Path) -> Non
     assert state_of(result.stderr) == HASHES[name]
 
 
-@pytest.mark.parametrize("name", HASHES)
+@pytest.mark.parametrize("name", cases(HASHES))
 def test_a_whole_match_of_equals_has_points_on_both_sides(name: str, tmp_path: Path) -> None:
     result = forked.run("demo", name, "--seed", "1", cwd=tmp_path)
     points = [int(value) for value in re.findall(r"\d+", result.stdout.splitlines()[-1])[:2]]
@@ -65,10 +64,8 @@ def test_the_robot_that_touches_the_wall_has_lost_the_round() -> None:
     assert math.dist(one[:2], two[:2]) == pytest.approx(240)
     assert math.dist(one[:2], (320, 320)) == pytest.approx(120)
     # Neither has the other nearer to its front.
-    turns = [
-        math.remainder(math.atan2(b[1] - a[1], b[0] - a[0]) - a[2], 2 * math.pi) for a, b in ((one, two), (two, one))
-    ]
-    assert turns[0] == pytest.approx(turns[1])
+    left, right = (math.atan2(b[1] - a[1], b[0] - a[0]) - a[2] for a, b in ((one, two), (two, one)))
+    assert math.remainder(left - right, 2 * math.pi) == pytest.approx(0, abs=1e-6)
     sim.place(2, 602, 320, 0.0)
     sim.run(0.2)
     assert sim.score == {1: 1, 2: 1}
@@ -79,13 +76,11 @@ def test_no_point_where_both_touch_the_wall_or_nothing_happens() -> None:
     sim.place(1, 320, 38, 0.0)
     sim.place(2, 602, 320, 0.0)
     sim.run(0.2)
-    assert sim.score == {1: 0, 2: 0}
     place = sim.pose(1)
-    sim.run(19.5)
-    assert sim.pose(1) == place
-    sim.run(1.0)
-    assert sim.score == {1: 0, 2: 0}
-    assert sim.pose(1) != place
+    for seconds, is_new_round in ((0.0, False), (19.5, False), (1.0, True)):
+        sim.run(seconds)
+        assert sim.score == {1: 0, 2: 0}
+        assert (sim.pose(1) != place) == is_new_round
 
 
 def test_the_faster_pushes_the_other_out() -> None:
@@ -137,25 +132,20 @@ def test_a_robot_that_shoots_with_its_last_points_is_out() -> None:
 # ---- hide and seek ----
 
 
-@pytest.mark.parametrize(
-    ("seeker", "hider", "is_caught"),
-    [
+def test_the_hider_is_caught_where_the_seeker_is_near_and_sees_it() -> None:
+    for seeker, hider, is_caught in (
         ((300, 300, 0.0), (380, 300), True),
         ((300, 300, 0.7), (380, 300), True),
         ((300, 300, 0.9), (380, 300), False),  # it is not in sight
         ((300, 300, 0.0), (395, 300), False),  # it is too far
         ((212, 100, 0.0), (288, 100), False),  # a wall is between
-    ],
-)
-def test_the_hider_is_caught_where_the_seeker_is_near_and_sees_it(
-    seeker: tuple[float, float, float], hider: tuple[float, float], is_caught: bool
-) -> None:
-    sim = match("hide_and_seek")
-    sim.place(1, *seeker)
-    sim.place(2, *hider, 0.0)
-    sim.run(0.2)
-    assert sim.score == {1: int(is_caught), 2: 0}
-    assert (sim.pose(1)[:2] == (100, 350)) == is_caught
+    ):
+        sim = match("hide_and_seek")
+        sim.place(1, *seeker)
+        sim.place(2, *hider, 0.0)
+        sim.run(0.2)
+        assert sim.score == {1: int(is_caught), 2: 0}
+        assert (sim.pose(1)[:2] == (100, 350)) == is_caught
 
 
 def test_the_round_is_the_hider_s_after_its_time() -> None:

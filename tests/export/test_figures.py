@@ -1,7 +1,5 @@
 """Figures of recordings show what was recorded."""
 
-from __future__ import annotations
-
 import io
 from base64 import b64decode
 from pathlib import Path
@@ -71,12 +69,6 @@ def test_a_run_is_plotted_while_it_is_recorded(tmp_path: Path) -> None:
     np.testing.assert_array_equal(again.get_xdata(), x_mm)
 
 
-def test_a_notebook_shows_the_figures(recording: Recording) -> None:
-    data, sizes = recording._repr_mimebundle_()  # type: ignore[attr-defined]
-    with Image.open(io.BytesIO(b64decode(data["image/png"]))) as picture:
-        assert picture.width > sizes["image/png"]["width"] > 400
-
-
 def test_panels_are_the_rows_of_the_figure(recording: Recording) -> None:
     panels = panels_of(recording)
     assert list(panels) == list(PANELS)
@@ -85,17 +77,18 @@ def test_panels_are_the_rows_of_the_figure(recording: Recording) -> None:
     assert panels == panels_of(recording)
     with pytest.raises(ParameterError, match="robot must be a whole number from 1 to 1"):
         panels_of(recording, robot=2)
+    # A notebook shows them together.
+    data, sizes = recording._repr_mimebundle_()  # type: ignore[attr-defined]
+    with Image.open(io.BytesIO(b64decode(data["image/png"]))) as picture:
+        assert picture.width > sizes["image/png"]["width"] > 400
 
 
-DOLLARS = "cash$_$"
-
-
-def test_a_dollar_in_a_name_is_a_dollar(recording: Recording, tmp_path: Path) -> None:
+def test_a_dollar_in_a_name_is_a_dollar(tmp_path: Path) -> None:
     sim = Simulation(Arena.box(300, 260), seed=3)
-    with RunRecorder(sim, tmp_path / "run.mcap", programs={f"1-{DOLLARS}.py": ""}):
+    with RunRecorder(sim, tmp_path / "run.mcap", programs={"1-cash$_$.py": ""}):
         sim.run(0.1)
     figure = Recording(tmp_path / "run.mcap").plot()
-    assert figure.axes[0].get_title().startswith(f"{DOLLARS}.py in box, seed 3")
+    assert figure.axes[0].get_title().startswith("cash$_$.py in box, seed 3")
     # It is drawn where the figure is shown, after all settings for drawing it.
     figure.savefig(tmp_path / "figure.png")
     save_figures([Recording(tmp_path / "run.mcap")], tmp_path / "figure.svg")
@@ -120,9 +113,7 @@ def test_a_figure_has_a_column_for_each_recording(recording: Recording) -> None:
     paths, places = figure.axes[0], figure.axes[2]
     figure.draw_without_rendering()
     assert paths.get_position().size == pytest.approx(places.get_position().size)
-    path = figure.axes[0].lines[0]
-    poses = recording.table("poses")
-    np.testing.assert_array_equal(path.get_xdata(), poses["x_mm"])
+    np.testing.assert_array_equal(paths.lines[0].get_xdata(), recording.table("poses")["x_mm"])
     readings = figure.axes[4].lines
     assert len(readings) == 8
     np.testing.assert_array_equal(readings[2].get_ydata(), recording.table("readings")["counts"][:, 2])

@@ -1,10 +1,9 @@
 """Frames contain the state of the simulation, as a slow and obvious parser reads it."""
 
-from __future__ import annotations
-
 import io
 import math
 import struct
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -20,25 +19,17 @@ WALL_MM = 10.0
 """Thickness of the walls of a box."""
 
 
-class Reader:
-    """Takes values off the front of some bytes."""
+def read_frame(data: bytes) -> SimpleNamespace:
+    file = io.BytesIO(data)
 
-    def __init__(self, data: bytes) -> None:
-        self.data, self.at = data, 0
-
-    def take(self, code: str, count: int = 1):
-        values = struct.unpack_from(f"<{count}{code}", self.data, self.at)
-        self.at += struct.calcsize(f"<{count}{code}")
+    def take(code: str, count: int = 1):
+        values = struct.unpack(f"<{count}{code}", file.read(struct.calcsize(f"<{count}{code}")))
         return values[0] if count == 1 else list(values)
 
-
-def read_frame(data: bytes) -> SimpleNamespace:
-    reader = Reader(data)
-    take = reader.take
     frame = SimpleNamespace(version=take("B"), kind=take("B"), flags=take("H"), scene=take("I"), time_s=take("d"))
     frame.speed_now, frame.speed_average = take("f"), take("f")
-    robots, bodies, lamps, cameras = take("H"), take("H"), take("H"), take("H")
-    assert reader.at == 32
+    robots, bodies, lamps, cameras = take("H", 4)
+    assert file.tell() == 32
     frame.robots = []
     for _ in range(robots):
         robot = SimpleNamespace(pose=take("f", 3), measured=take("f", 2), commanded=take("f", 2), flags=take("I"))
@@ -46,23 +37,21 @@ def read_frame(data: bytes) -> SimpleNamespace:
         robot.encoders, robot.distances = take("i", 2), take("f", 3)
         robot.proximity, robot.ambient = take("f", 8), take("f", 8)
         frame.robots.append(robot)
-    assert reader.at == 32 + 128 * robots
+    assert file.tell() == 32 + 128 * robots
     frame.bodies = [take("f", 3) for _ in range(bodies)]
     frame.lamps = [take("f", 4) for _ in range(lamps)]
     frame.cameras = [(take("H"), take("H"), take("B", 64)) for _ in range(cameras)]
     for robot in frame.robots:
         robot.rays = [take("H", 7) for _ in range(8)]
-    assert reader.at == len(data)
+    assert not file.read()
     return frame
 
 
 def busy_world(**changes) -> Simulation:
     """Return a world with all there is to be packed, some seconds into its run."""
-    plain = Arena.box(600, 400, rounded_mm=50)
-    arena = Arena(
-        plain.brightness,
-        plain.mm_per_cell,
-        "busy",
+    arena = replace(
+        Arena.box(600, 400, rounded_mm=50),
+        name="busy",
         starts=(Pose(80, 100, 0.3), Pose(200, 100, 2.0), Pose(300, 300, -1.0), Pose(480, 200, 4.0)),
         lamps=(Lamp(50, 350, 2.0), Lamp(550, 50, 1.0, False)),
         balls=(Ball(160, 240),),
@@ -70,16 +59,14 @@ def busy_world(**changes) -> Simulation:
     )
     kinds = ["khepera", "khepera_ii", "khepera", "khepera_ii"]
     sim = Simulation(arena, seed=4, robot=kinds, **changes)
-    sim.fit(2, "k213")
-    sim.fit(4, "k213")
-    sim.fit(3, "gripper")
-    sim.fit(1, "radio")
+    for robot, turret in enumerate(("radio", "k213", "gripper", "k213"), 1):
+        sim.fit(robot, turret)
     for robot, line in enumerate((b"D,10,-6\n", b"D,7,9\n", b"C,1000,-700\n", b",20,30\n"), 1):
         sim.port(robot).write(line)
     for line in (b"L,1,1\n", b"G,-70000,12\n", b"T,2,N\n"):
         sim.port(2).write(line)
-    sim.port(3).write(b"T,1,E,200\n")
-    sim.port(3).write(b"T,1,D,1\n")
+    for line in (b"T,1,E,200\n", b"T,1,D,1\n"):
+        sim.port(3).write(line)
     sim.port(4).write(b",\n")
     sim.run(1.2)
     sim.port(4).write(b"L,0,1\n")
@@ -91,16 +78,9 @@ def test_a_frame_contains_the_state_of_the_simulation():
     sim = busy_world()
     sim.wires[1].holder = "somebody"
     held = {("robot", 2)}
+    said = {"is_paused": True, "speed_now": 3.5, "speed_average": 2.25}
     with sim.lock:
-        data = pack_frame(
-            sim,
-            scene=7,
-            is_paused=True,
-            speed_now=3.5,
-            speed_average=2.25,
-            is_held=lambda what, index: (what, index) in held,
-        )
-    frame = read_frame(data)
+        frame = read_frame(pack_frame(sim, scene=7, is_held=lambda *what: what in held, **said))
     assert (frame.version, frame.kind, frame.flags, frame.scene) == (1, 1, 1, 7)
     assert (frame.time_s, frame.speed_now, frame.speed_average) == (sim.time_s, 3.5, 2.25)
     assert len(frame.robots) == 4
@@ -141,8 +121,12 @@ def test_bodies_lamps_and_cameras():
     assert [body[2] for body in read_frame(pack_frame(sim, scene=1)).bodies] == [0, 1, 2]
 
 
-def test_a_motor_on_pwm_has_no_commanded_speed():
+def test_counters_wrap_like_the_robots_and_a_motor_on_pwm_has_no_commanded_speed():
     sim = Simulation(Arena.box(400, 400))
+    sim.world.state.robots["pulse_count"][0, 0] = (2**31 + 5, -(2**31) - 1)
+    frame = read_frame(pack_frame(sim, scene=1, speed_now=math.inf, is_driven=True))
+    assert frame.robots[0].encoders == [-(2**31) + 5, 2**31 - 1]
+    assert (frame.speed_now, frame.flags) == (0.0, 2), "a speed that is not finite"
     sim.port(1).write(b"P,30,40\n")
     sim.run(0.2)
     frame = read_frame(pack_frame(sim, scene=1))
@@ -162,28 +146,26 @@ def test_encoders_equal_the_robots_reply():
     assert heard[0] < -60000
 
 
-def test_counters_wrap_like_the_robots():
-    sim = Simulation(Arena.box(400, 400))
-    sim.world.state.robots["pulse_count"][0, 0] = (2**31 + 5, -(2**31) - 1)
-    assert read_frame(pack_frame(sim, scene=1)).robots[0].encoders == [-(2**31) + 5, 2**31 - 1]
-
-
-def test_speeds_that_are_not_finite_are_shown_as_0():
-    frame = read_frame(pack_frame(Simulation(Arena.box(200, 200)), scene=1, speed_now=math.inf, is_driven=True))
-    assert (frame.speed_now, frame.flags) == (0.0, 2)
-
-
 @pytest.mark.parametrize("response", [None, "fast"])
-def test_frames_do_not_change_the_run(response):
-    """A run with a frame every 40 ms ends like a run without frames."""
+def test_watching_does_not_change_the_run(response):
+    """A run of which frames, paths, logs, views and explanations are taken every 37 ms ends like a run without them."""
     hashes = []
     for is_seen in (False, True):
         sim = busy_world(response=response)
+        if is_seen:
+            sim.record_paths(0.05)
+            for wire in sim.wires:
+                wire.watch(sim.now_ns)
         for _ in range(50):
-            sim.run(0.04)
+            sim.run(0.0371)
             if is_seen:
                 with sim.lock:
                     pack_frame(sim, scene=1)
+                sim.look()
+                for sensor in range(8):
+                    sim.explain(2, sensor)
+                    sim.explain_light(1, sensor)
+                sim.rays(3)
         hashes.append(sim.state_hash())
     assert hashes[0] == hashes[1]
 

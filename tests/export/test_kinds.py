@@ -1,7 +1,5 @@
 """`export` makes of a recording what the ending of a file's name says."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

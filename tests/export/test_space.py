@@ -1,7 +1,5 @@
 """Films and photos in space show the same world as pictures from above."""
 
-from __future__ import annotations
-
 import math
 import sys
 from dataclasses import replace
@@ -100,10 +98,9 @@ def test_boxes_of_walls_cover_what_is_wall(name: str) -> None:
     step = -(-max(cells.shape) // CELLS_MAX)
     for (grey, *_), boxes in walls(arena).items():
         for box in boxes:
-            ends = [
-                (middle - size / 2, middle + size / 2) for middle, size in zip(box.middle[:2], box.size, strict=False)
-            ]
-            (left, right), (low, high) = (tuple(round(edge / arena.mm_per_cell) for edge in pair) for pair in ends)
+            half = np.array(box.size[:2]) / 2
+            corners = (np.array(box.middle[:2]) - half, np.array(box.middle[:2]) + half)
+            (left, low), (right, high) = np.rint(np.array(corners) / arena.mm_per_cell).astype(int).tolist()
             assert not cells[low:high, left:right].any()  # no box lies in another one
             cells[low:high, left:right] = grey
     assert (cells[arena.brightness > 0] >= wall_grey(arena.brightness[arena.brightness > 0].astype(int))).all()
@@ -173,19 +170,15 @@ def test_a_photo_that_cannot_be_taken_says_so(recording: Recording, tmp_path: Pa
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize(
-    ("library", "extra", "options"),
-    [("av", "film", {"view": "3d"}), ("vtk", "render", {"view": "3d"}), ("mitsuba", "render", {"kind": "photo"})],
-)
-def test_the_error_for_a_missing_library_names_its_extra(
-    library: str,
-    extra: str,
-    options: dict[str, str],
-    recording: Recording,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setitem(sys.modules, library, None)
-    with pytest.raises(ParameterError, match=rf"This needs {library}, but it cannot be imported .*\[{extra}\]"):
-        recording.export(tmp_path / ("photo.png" if "kind" in options else "film.mp4"), **options)
+def test_the_error_for_a_missing_library_names_its_extra(recording: Recording, tmp_path: Path) -> None:
+    for library, extra, name, options in (
+        ("av", "film", "film.mp4", {"view": "3d"}),
+        ("vtk", "render", "film.mp4", {"view": "3d"}),
+        ("mitsuba", "render", "photo.png", {"kind": "photo"}),
+    ):
+        words = rf"This needs {library}, but it cannot be imported .*\[{extra}\]"
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setitem(sys.modules, library, None)
+            with pytest.raises(ParameterError, match=words):
+                recording.export(tmp_path / name, **options)
     assert not list(tmp_path.iterdir())

@@ -1,7 +1,5 @@
 """The fit of the default response: a made-up robot on a made-up rig is found again."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Files of samples are read, and what is wrong in one is said with its line; rays are those of the engine."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -34,9 +32,8 @@ def test_text_files_are_read(tmp_path, text):
     assert samples.at_angles(slice(1, None, 2)).counts.shape == (3, 1, 8)
 
 
-@pytest.mark.parametrize(
-    ("text", "line", "words"),
-    [
+def test_broken_text_files_are_told_by_their_line(tmp_path):
+    for text, line, words in (
         (b"", 1, "an empty file"),
         (b" \n\n", 1, "an empty file"),
         (b"8 2 3 5 2\nTURN 0\n\xff\xfe", 3, "binary (byte 0xff)"),
@@ -61,15 +58,13 @@ def test_text_files_are_read(tmp_path, text):
         (GOOD.replace("2 3 4", "2 -3 4", 1), 3, "from 0 to 1023, but it was -3"),
         (GOOD.replace("9 9 9 9 9 9 9 9\n", ""), 9, "the end of the file"),
         (GOOD + ROW, 11, "Nothing may follow the"),
-    ],
-)
-def test_broken_text_files_are_told_by_their_line(tmp_path, text, line, words):
-    with pytest.raises(ParameterError) as caught:
-        load_samples(write(tmp_path, text))
-    message = str(caught.value)
-    assert f"post.sam', line {line}: " in message
-    assert words in message
-    assert message.endswith((".", "?"))
+    ):
+        with pytest.raises(ParameterError) as caught:
+            load_samples(write(tmp_path, text))
+        message = str(caught.value)
+        assert f"post.sam', line {line}: " in message
+        assert words in message
+        assert message.endswith((".", "?"))
 
 
 def table(**changes):
@@ -90,22 +85,19 @@ def test_tables_are_read(tmp_path):
     assert (samples.angle_deg[-1] + RIG_OFFSET_DEG).tolist() == [0, 120, 240]
 
 
-@pytest.mark.parametrize(
-    ("changes", "words"),
-    [
+def test_broken_tables_are_told(tmp_path):
+    for changes, words in (
         ({"values": None}, "values must be whole numbers from 0 to 1023 [gap, angle, 8], but it is missing."),
         ({"gap_mm": np.array([5])}, "but it had the shape [2, 3, 8], gap = 1, angle = 3."),
         ({"gap_mm": np.array([-5, 7])}, "but it was -5 at [0]."),
         ({"values": np.full((2, 3, 8), 1024)}, "but it was 1024 at [0, 0, 0]."),
-    ],
-)
-def test_broken_tables_are_told(tmp_path, changes, words):
-    np.savez(tmp_path / "wall.npz", **table(**changes))
-    with pytest.raises(ParameterError) as caught:
-        load_samples(tmp_path / "wall.npz")
-    assert words in str(caught.value)
-    assert "wall.npz': " in str(caught.value)
-    assert str(caught.value).endswith("See the README of the samples.")
+    ):
+        np.savez(tmp_path / "wall.npz", **table(**changes))
+        with pytest.raises(ParameterError) as caught:
+            load_samples(tmp_path / "wall.npz")
+        assert words in str(caught.value)
+        assert "wall.npz': " in str(caught.value)
+        assert str(caught.value).endswith("See the README of the samples.")
 
 
 def test_a_header_asks_for_no_memory(tmp_path):

@@ -1,7 +1,5 @@
 """The square test: its formulas undo what wrong wheels and a wrong track do to squares."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

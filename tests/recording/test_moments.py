@@ -1,7 +1,5 @@
 """What a recording tells of moments is where everything was, between ticks too."""
 
-from __future__ import annotations
-
 import random
 
 import numpy as np
@@ -53,15 +51,15 @@ def test_they_are_those_of_the_run_made_again(recording: Recording) -> None:
         assert len(moment.saved.specs) == replay.sim.robot_count
 
 
-@pytest.mark.parametrize("start_s", [0.0, 0.995, 1.0, 1.0049, 2.0, 3.33])
-def test_they_are_the_same_from_any_time_on(start_s: float, recording: Recording) -> None:
+def test_they_are_the_same_from_any_time_on(recording: Recording) -> None:
     begin_ns, end_ns = recording.log.begin_ns, recording.log.end_ns
-    times_ns = list(range(max(round(start_s * 1e9), begin_ns), end_ns, 33_000_000))
-    earlier_ns = range(begin_ns, times_ns[0], 7_000_000)
-    whole = {each.time_ns: each for each in moments(recording.log, [*earlier_ns, *times_ns])}
-    for moment in moments(recording.log, times_ns):
-        np.testing.assert_array_equal(moment.poses, whole[moment.time_ns].poses)
-        np.testing.assert_array_equal(moment.bodies, whole[moment.time_ns].bodies)
+    for start_s in (0.0, 0.995, 1.0, 1.0049, 2.0, 3.33):
+        times_ns = list(range(max(round(start_s * 1e9), begin_ns), end_ns, 33_000_000))
+        earlier_ns = range(begin_ns, times_ns[0], 7_000_000)
+        whole = {each.time_ns: each for each in moments(recording.log, [*earlier_ns, *times_ns])}
+        for moment in moments(recording.log, times_ns):
+            np.testing.assert_array_equal(moment.poses, whole[moment.time_ns].poses)
+            np.testing.assert_array_equal(moment.bodies, whole[moment.time_ns].bodies)
 
 
 def test_each_tick_has_passed_once(recording: Recording) -> None:

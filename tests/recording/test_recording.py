@@ -1,11 +1,10 @@
 """A recorded run is the same as one that is not, is made again to the bit, and can be gone on with from any time."""
 
-from __future__ import annotations
-
 import json
 import resource
 import threading
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, ClassVar
@@ -14,6 +13,7 @@ import jsonschema
 import numpy as np
 import pytest
 from mcap.reader import make_reader
+from tests.at_length import cases
 from tests.demos.shown import run, shown, world_of
 
 import kiks
@@ -57,64 +57,56 @@ def recorded(sim: Simulation, file: Path, act: Callable[[Simulation], object]) -
 
 
 def check_again(recording: Recording, state_hash: str) -> None:
-    """Check that a recording makes the same run again, from the beginning and from each second on."""
-    checked = check_recording(recording.log)
+    """Check that a recording makes the same run again: from the beginning, from each second on, and to and fro.
+
+    One replay that jumps is everywhere what a new one is, and ends as the run did.
+    """
+    log = recording.log
+    checked = check_recording(log)
     assert checked.differs_ns is None
     assert checked.equal_count > recording.duration_s
-    end_s = recording.log.end_ns / 1e9
-    assert recording.world_at(end_s).state_hash() == state_hash
-    for second in range(round(recording.log.begin_ns / 1e9), int(end_s)):
-        replay = recording.replay(second + 0.5)
-        while replay.advance():
-            pass
-        assert replay.sim.state_hash() == state_hash
-    check_jumps(recording, state_hash)
-
-
-def check_jumps(recording: Recording, state_hash: str) -> None:
-    """Check that one replay that goes to and fro is everywhere what a new one is, and ends as the run did."""
-    rng, log = np.random.default_rng(1), recording.log
+    assert recording.world_at(log.end_ns / 1e9).state_hash() == state_hash
+    replays = [recording.replay(second + 0.5) for second in range(round(log.begin_ns / 1e9), int(log.end_ns / 1e9))]
     replay = recording.replay()
-    times_ns = rng.integers(log.begin_ns, log.end_ns, 10, endpoint=True).tolist()
-    for time_ns in times_ns:
+    for time_ns in np.random.default_rng(1).integers(log.begin_ns, log.end_ns, 10, endpoint=True).tolist():
         there = Replay(log, time_ns)
         if not replay.go_to(time_ns):
             assert there.sim.robot_count < replay.sim.robot_count or has_fewer_turrets(there.sim, replay.sim)
             replay = there
         assert replay.sim.now_ns == time_ns
         assert replay.sim.state_hash() == there.sim.state_hash()
-    while replay.advance():
-        pass
-    assert replay.sim.state_hash() == state_hash
+    for each in (*replays, replay):
+        while each.advance():
+            pass
+        assert each.sim.state_hash() == state_hash
 
 
 def has_fewer_turrets(sim: Simulation, other: Simulation) -> bool:
     return any(len(sim.turrets(robot)) < len(other.turrets(robot)) for robot in range(1, sim.robot_count + 1))
 
 
-@pytest.mark.parametrize("name", ["follow", "clean", "camera"])
-def test_demonstrations_are_the_same_with_a_recording_and_again(name: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", cases(["camera", "clean", "follow"]))
+def test_demonstrations_are_the_same_with_a_recording_and_again(name: str, file: Path) -> None:
     alone, with_it = shown(name, SECONDS, seed=3), world_of(name, seed=3)
-    recording = recorded(with_it, tmp_path / "run.mcap", lambda sim: run(sim, name, SECONDS))
+    recording = recorded(with_it, file, lambda sim: run(sim, name, SECONDS))
     assert with_it.state_hash() == alone.state_hash()
     check_again(recording, alone.state_hash())
 
 
-def test_a_world_goes_on_from_any_time_as_it_went_on_then(tmp_path: Path) -> None:
+def test_a_world_goes_on_from_any_time_as_it_went_on_then(file: Path) -> None:
     """Commands that were on their way, and the line's timing, are part of the state."""
     sim = Simulation(Arena.box(400, 400), seed=2)
-    recording = recorded(sim, tmp_path / "run.mcap", lambda sim: drive(sim, SECONDS))
+    recording = recorded(sim, file, lambda sim: drive(sim, SECONDS))
     poses = recording.table("poses")
     for time_s in (0.0, 1.234, 3.0, 5.678):
-        world = recording.world_at(time_s)
+        world, row = recording.world_at(time_s), poses[poses["time_s"] <= time_s][-1]
         assert world.time_s == pytest.approx(time_s, abs=1e-9)
-        row = poses[poses["time_s"] <= time_s][-1]
         assert world.pose(1)[0] == pytest.approx(row["x_mm"], abs=1.0)
         drive(world, 1.0)  # it takes commands
         assert world.time_s > time_s + 1.0
 
 
-def test_all_that_comes_from_outside_is_part_of_the_run(tmp_path: Path) -> None:
+def test_all_that_comes_from_outside_is_part_of_the_run(file: Path) -> None:
     """Hands, other robots, walls, lamps, turrets, wires and typed commands."""
 
     def act(sim: Simulation) -> None:
@@ -149,14 +141,13 @@ def test_all_that_comes_from_outside_is_part_of_the_run(tmp_path: Path) -> None:
         sim.run(1.3)
 
     def fresh() -> Simulation:
-        arena = kiks.Arena.box(400, 420)
-        sim = Simulation(kiks.Arena(arena.brightness, 1.0, "room", lamps=(Lamp(50, 50),)), seed=5)
+        sim = Simulation(replace(Arena.box(400, 420), lamps=(Lamp(50, 50),)), seed=5)
         sim.fit(1, "radio")
         return sim
 
     alone, sim = fresh(), fresh()
     act(alone)
-    recording = recorded(sim, tmp_path / "run.mcap", act)
+    recording = recorded(sim, file, act)
     assert sim.state_hash() == alone.state_hash()
     check_again(recording, sim.state_hash())
     assert recording.robots == range(1, 3)
@@ -179,12 +170,10 @@ class Switch(Turret):
     orders: ClassVar[Orders] = {"S": (0, switch)}
 
 
-def test_turrets_of_users_need_not_be_there_again(tmp_path: Path) -> None:
-    arena = Arena.box(400, 420)
-    sim = Simulation(Arena(arena.brightness, 1.0, "room", lamps=(Lamp(50, 50, 25.0),)), seed=5)
-    switch = Switch()
+def test_turrets_of_users_need_not_be_there_again(file: Path) -> None:
+    sim = Simulation(replace(Arena.box(400, 420), lamps=(Lamp(50, 50, 25.0),)), seed=5)
+    switch = sim.fit(1, Switch())
     switch.lamp = sim.lamps
-    sim.fit(1, switch)
 
     def act(sim: Simulation) -> None:
         khepera = Khepera(sim.port(1))
@@ -193,25 +182,23 @@ def test_turrets_of_users_need_not_be_there_again(tmp_path: Path) -> None:
             assert khepera.turret(24, "S") == [count]
             khepera.ambient()
 
-    recording = recorded(sim, tmp_path / "run.mcap", act)
+    recording = recorded(sim, file, act)
     check_again(recording, sim.state_hash())
 
 
-def test_a_hand_that_drags_while_the_world_runs(tmp_path: Path) -> None:
+def test_a_hand_that_drags_while_the_world_runs(file: Path) -> None:
     """The gate lets another thread act between two events; where that is depends on real time, the replay does not."""
     sim = Simulation(Arena.box(500, 500), seed=4)
     sim.loop.gate = Gate(sim.lock, speed=30.0)
-    drags = Drags(sim)
-    is_over = threading.Event()
+    drags, is_over = Drags(sim), threading.Event()
+    places_mm: list[float] = []
 
     def drag() -> None:
-        step = 0
         while not is_over.is_set():
-            step += 1
+            places_mm.append(150.0 + len(places_mm) % 200)
             with sim.lock:
-                place = 150.0 + step % 200
                 drags.grab("hand", "robot", 0)
-                drags.move("hand", place, 250.0)
+                drags.move("hand", places_mm[-1], 250.0)
                 drags.drop("hand")
             is_over.wait(0.003)
 
@@ -219,48 +206,41 @@ def test_a_hand_that_drags_while_the_world_runs(tmp_path: Path) -> None:
 
     def act(sim: Simulation) -> None:
         thread.start()
-        drive(sim, 5.0)
+        while len(places_mm) < 10 or sim.time_s < 2:
+            drive(sim, 0.5)
         is_over.set()
         thread.join()
 
-    recording = recorded(sim, tmp_path / "run.mcap", act)
-    changes = recording.table("events")
-    assert (changes["kind"] == "change").sum() > 3
+    recording = recorded(sim, file, act)
+    assert (recording.table("events")["kind"] == "change").sum() > 3
     check_again(recording, sim.state_hash())
 
 
 def test_a_block_gives_back_its_entries() -> None:
     rng = np.random.default_rng(1)
-    rows = [
-        Entry(
-            int(rng.choice(list(Kind))),
-            *(int(rng.integers(0, most, endpoint=True)) for most in (CLOCK_END_NS, ROBOTS_MAX - 1)),
-            *rng.integers(-(2**63), 2**63 - 1, 2).tolist(),
-            rng.bytes(rng.integers(0, 300)),
-        )
-        for _ in range(1000)
-    ]
+    rows = []
+    for kind in rng.choice(list(Kind), 1000).tolist():
+        place = (int(rng.integers(0, most, endpoint=True)) for most in (CLOCK_END_NS, ROBOTS_MAX - 1))
+        numbers = rng.integers(-(2**63), 2**63 - 1, 2).tolist()
+        rows.append(Entry(kind, *place, *numbers, rng.bytes(rng.integers(0, 300))))
     block = block_of([value for row in rows for value in row])
     assert entries_of(block, "block") == rows
     assert entries_of(block, "block", [Kind.SEND]) == [row for row in rows if row.kind == Kind.SEND]
     assert characters_in(block) == sum(len(row.data) for row in rows)
 
 
-def test_what_is_too_much_for_a_block_goes_into_several(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_too_much_for_a_block_goes_into_several(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("kiks.recording.recorder.ENTRIES_MAX", 7)
     sim = Simulation(Arena.box(400, 400), seed=2)
-    recording = recorded(sim, tmp_path / "run.mcap", lambda sim: drive(sim, 3.0))
+    recording = recorded(sim, file, lambda sim: drive(sim, 3.0))
     assert len(recording.log.blocks) > 10
     check_again(recording, sim.state_hash())
 
 
-def test_tables_tell_what_happened(tmp_path: Path) -> None:
+def test_tables_tell_what_happened(file: Path) -> None:
     sim = Simulation(Arena.box(300, 300), robots=2, seed=1)
-    read: list[list[int]] = []
-    at: list[float] = []
-    truth: dict[int, Any] = {}
-
-    with sim.record(tmp_path / "run.mcap") as recorder:
+    read, at, truth = [], [], {}
+    with sim.record(file) as recorder:
         khepera = Khepera(sim.port(2))
         khepera.set_speed(10, 10)
         for _ in range(40):
@@ -271,15 +251,13 @@ def test_tables_tell_what_happened(tmp_path: Path) -> None:
         recorder.mark("half")
         recorder.say(1, "grüße")
         sim.run(2.0)
-    recording = Recording(tmp_path / "run.mcap")
+    recording = Recording(file)
     poses, wheels = recording.table("poses"), recording.table("wheels", 2)
     ticks = np.rint(poses["time_s"][poses["robot"] == 2] * 100).astype(int)
     np.testing.assert_array_equal(ticks, np.arange(ticks[-1] + 1))
     for tick, expected in truth.items():
         rows = poses[np.rint(poses["time_s"] * 100) == tick]
-        np.testing.assert_array_equal(
-            np.column_stack([rows[name] for name in ("x_mm", "y_mm", "heading_rad")]), expected
-        )
+        assert rows[["x_mm", "y_mm", "heading_rad"]].tolist() == list(map(tuple, expected.tolist()))
     readings = recording.table("readings")
     assert (readings["robot"] == 2).all()
     assert readings["counts"].tolist() == read
@@ -292,21 +270,21 @@ def test_tables_tell_what_happened(tmp_path: Path) -> None:
     assert (np.diff(wire["time_s"]) >= 0).all()
     events = recording.table("events")
     assert set(events["kind"]) == {"contact", "bookmark", "output"}
-    assert events[events["kind"] == "output"]["text"].tolist() == ["grüße"]
-    assert events[events["kind"] == "bookmark"]["text"].tolist() == ["half"]
-    with pytest.raises(ParameterError, match=r"Did you mean 'poses'"):
-        recording.table("pose")
-    with pytest.raises(ParameterError, match="from 1 to 2"):
-        recording.table("poses", 3)
-    with pytest.raises(ParameterError, match="time_s must be from 0 to"):
-        recording.world_at(99.0)
+    texts = {kind: events[events["kind"] == kind]["text"].tolist() for kind in ("output", "bookmark")}
+    assert texts == {"output": ["grüße"], "bookmark": ["half"]}
+    for ask, words in (
+        (lambda: recording.table("pose"), "Did you mean 'poses'"),
+        (lambda: recording.table("poses", 3), "from 1 to 2"),
+        (lambda: recording.world_at(99.0), "time_s must be from 0 to"),
+    ):
+        with pytest.raises(ParameterError, match=words):
+            ask()
 
 
-def test_events_of_a_recording_that_grows_are_read_as_they_come(tmp_path: Path) -> None:
+def test_events_of_a_recording_that_grows_are_read_as_they_come(file: Path) -> None:
     sim = Simulation(Arena.box(300, 300), robots=2, seed=1)
-    found = []
-    ring = Ring(sim)
-    with sim.record(tmp_path / "run.mcap") as recorder:
+    found, ring = [], Ring(sim)
+    with sim.record(file) as recorder:
         RunWriter.of(sim).add(ring)
         log = RecordedLog(ring)
         reader = EventReader(log)
@@ -321,7 +299,7 @@ def test_events_of_a_recording_that_grows_are_read_as_they_come(tmp_path: Path) 
             assert Replay(log, sim.now_ns).sim.state_hash() == sim.state_hash()
     RunWriter.of(sim).flush()
     found += [*reader.contacts(), *reader.notes()]
-    table = Recording(tmp_path / "run.mcap").table("events")
+    table = Recording(file).table("events")
     found.sort(key=lambda event: event.time_s)
     # Of a contact, it is known within which 40 ms it began; others begin where the recording was read before.
     np.testing.assert_allclose([event.time_s for event in found], table["time_s"], rtol=0.0, atol=0.04)
@@ -329,25 +307,23 @@ def test_events_of_a_recording_that_grows_are_read_as_they_come(tmp_path: Path) 
     assert {"contact", "bookmark"} <= set(table["kind"])
 
 
-def test_the_record_of_a_watched_line_begins_anew_at_another_time(tmp_path: Path) -> None:
+def test_the_record_of_a_watched_line_begins_anew_at_another_time(file: Path) -> None:
     sim = Simulation(Arena.box(300, 300), seed=1)
-    replay = recorded(sim, tmp_path / "run.mcap", lambda sim: drive(sim, 3.0)).replay(2.5)
+    replay = recorded(sim, file, lambda sim: drive(sim, 3.0)).replay(2.5)
     wire = replay.sim.wires[0]
     wire.watch(replay.sim.now_ns)
     replay.sim.advance_to(2_900_000_000)
-    assert wire.log is not None
     assert wire.log.pieces.count
     replay.go_to(1_500_000_000)
-    assert wire.log is not None
     assert all(piece.first_ns < 1_600_000_000 for piece in wire.log.pieces.since(0)[1])
 
 
-def test_the_project_is_the_world_at_the_beginning(tmp_path: Path) -> None:
+def test_the_project_is_the_world_at_the_beginning(file: Path) -> None:
     sim = Simulation(Arena.box(300, 300), robots=2, seed=7)
     sim.fit(2, "k213")
     sim.add_cylinder(60, 60)
     before = sim.poses()
-    recording = recorded(sim, tmp_path / "run.mcap", lambda sim: drive(sim, 1.0))
+    recording = recorded(sim, file, lambda sim: drive(sim, 1.0))
     project = recording.project
     assert project.seed == 7
     assert [each.turrets for each in project.robots] == [(), ("k213",)]
@@ -356,9 +332,9 @@ def test_the_project_is_the_world_at_the_beginning(tmp_path: Path) -> None:
     assert recording.about["kiks"] == kiks.__version__
 
 
-def test_another_run_is_told_with_its_first_second(tmp_path: Path) -> None:
+def test_another_run_is_told_with_its_first_second(file: Path) -> None:
     sim = Simulation(Arena.box(300, 300), seed=1)
-    recording = recorded(sim, tmp_path / "run.mcap", lambda sim: drive(sim, 4.0))
+    recording = recorded(sim, file, lambda sim: drive(sim, 4.0))
     found = recording.log.next_input
     changed_ns = []
 
@@ -377,11 +353,11 @@ def test_another_run_is_told_with_its_first_second(tmp_path: Path) -> None:
     checked = check_recording(recording.log)
     assert checked.equal_count == 2
     assert checked.differs_ns == 3_000_000_000
-    assert check_recording(Recording(tmp_path / "run.mcap").log).equal_count == 5
+    assert check_recording(Recording(file).log).equal_count == 5
 
 
-def test_a_score_is_recorded_with_its_times(tmp_path: Path) -> None:
-    file, sim = tmp_path / "run.mcap", Simulation(Arena.box(400, 400), robots=2, seed=1)
+def test_a_score_is_recorded_with_its_times(file: Path) -> None:
+    sim = Simulation(Arena.box(400, 400), robots=2, seed=1)
     with sim.record(file):
         sim.set_score("laps", 0)
         sim.run(1.3)
@@ -390,17 +366,10 @@ def test_a_score_is_recorded_with_its_times(tmp_path: Path) -> None:
         sim.set_score("laps", 1)
         sim.run(0.4)
     recording = Recording(file)
-    events = recording.table("events")
-    assert events[["time_s", "robot", "kind", "text"]].tolist() == [
-        (0.0, 0, "score", "laps: 0"),
-        (1.3, 2, "score", "1"),
-        (3.3, 0, "score", "laps: 1"),
-    ]
-    assert [dict(recording.world_at(time_s).score) for time_s in (1.0, 1.5, 3.6)] == [
-        {"laps": 0},
-        {"laps": 0, 2: 1},
-        {"laps": 1, 2: 1},
-    ]
+    events = recording.table("events")[["time_s", "robot", "kind", "text"]].tolist()
+    assert events == [(0.0, 0, "score", "laps: 0"), (1.3, 2, "score", "1"), (3.3, 0, "score", "laps: 1")]
+    for time_s, score in ((1.0, {"laps": 0}), (1.5, {"laps": 0, 2: 1}), (3.6, {"laps": 1, 2: 1})):
+        assert recording.world_at(time_s).score == score
     assert check_recording(recording.log).differs_ns is None
 
 
@@ -410,59 +379,54 @@ def test_a_score_in_a_file_keeps_the_rules_of_one_that_is_set(data: str) -> None
         score_of(Entry(Kind.SCORE, 0, 0, 0, 0, data.encode()))
 
 
-def test_a_closed_recording_takes_no_bookmark(tmp_path: Path) -> None:
-    recorder = Simulation(seed=1).record(tmp_path / "run.mcap")
-    with pytest.raises(ParameterError, match="note must be a text, but it was 5"):
-        recorder.mark(5)
-    recorder.close()
-    with pytest.raises(ParameterError, match="Cannot set a bookmark: the recording is closed"):
-        recorder.mark("late")
-
-
-def test_foxglove_opens_it(tmp_path: Path) -> None:
+def test_foxglove_opens_it(file: Path) -> None:
     """The library's reader finds all messages, and each keeps its schema."""
     sim = Simulation(Arena.box(300, 200), robots=2, seed=1)
     sim.add_ball(50, 50)
-    with sim.record(tmp_path / "run.mcap") as recorder:
+    with sim.record(file) as recorder:
         sim.run(3.0)
         recorder.mark("a note")
         sim.run(1.0)
-    foxglove.save_foxglove(Recording(tmp_path / "run.mcap"), tmp_path / "out.mcap")
+    foxglove.save_foxglove(Recording(file), file.parent / "out.mcap")
     counts: dict[str, int] = {}
-    with (tmp_path / "out.mcap").open("rb") as file:
-        for schema, channel, message in make_reader(file, validate_crcs=True).iter_messages():
+    with (file.parent / "out.mcap").open("rb") as opened:
+        for schema, channel, message in make_reader(opened, validate_crcs=True).iter_messages():
             counts[channel.topic] = counts.get(channel.topic, 0) + 1
-            assert schema is not None
             assert schema.name.startswith("foxglove.")
             jsonschema.validate(json.loads(message.data), json.loads(schema.data))
             assert message.log_time <= sim.now_ns
     assert counts == {"/walls": 1, "/scene": 1, "/tf": 41, "/log": 1}
 
 
-def test_mistakes_get_a_clear_error(tmp_path: Path) -> None:
-    sim = Simulation(seed=1)
-    with pytest.raises(ParameterError, match=r"must end in .mcap, but"):
-        sim.record(tmp_path / "run.txt")
-    with pytest.raises(ParameterError, match="cannot"):
-        sim.record(tmp_path / "none" / "run.mcap")
-    with pytest.raises(ParameterError, match="no such file"):
-        Recording(tmp_path / "nothing.mcap")
-    (tmp_path / "text.mcap").write_text("no recording")
-    with pytest.raises(ParameterError, match="must be an MCAP file"):
-        Recording(tmp_path / "text.mcap")
+def test_mistakes_get_a_clear_error(file: Path) -> None:
+    sim, folder = Simulation(seed=1), file.parent
+    (folder / "text.mcap").write_text("no recording")
+    recorder = sim.record(file)
+    with pytest.raises(ParameterError, match="note must be a text, but it was 5"):
+        recorder.mark(5)
+    recorder.close()
+    for act, words in (
+        (lambda: recorder.mark("late"), "Cannot set a bookmark: the recording is closed"),
+        (lambda: sim.record(folder / "run.txt"), "must end in .mcap, but"),
+        (lambda: sim.record(folder / "none" / "run.mcap"), "cannot"),
+        (lambda: Recording(folder / "nothing.mcap"), "no such file"),
+        (lambda: Recording(folder / "text.mcap"), "must be an MCAP file"),
+    ):
+        with pytest.raises(ParameterError, match=words):
+            act()
 
 
 def test_a_file_that_can_grow_no_more_is_read_up_to_there(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+    file: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     """The system refuses the middle of a chunk, as a full disk does."""
     monkeypatch.setattr("kiks.recording.recorder.CHUNK_S", 0.0)
     sim, alone = Simulation(seed=1), Simulation(seed=1)
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
-    recorder = sim.record(tmp_path / "run.mcap")
+    recorder = sim.record(file)
     drive(sim, 1.0)
     try:
-        resource.setrlimit(resource.RLIMIT_FSIZE, ((tmp_path / "run.mcap").stat().st_size + 1_000, before[1]))
+        resource.setrlimit(resource.RLIMIT_FSIZE, (file.stat().st_size + 1_000, before[1]))
         drive(sim, 5.0)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
@@ -475,24 +439,29 @@ def test_a_file_that_can_grow_no_more_is_read_up_to_there(
     for seconds in (1.0, 5.0, 1.0):
         drive(alone, seconds)
     assert sim.state_hash() == alone.state_hash()
-    recording = Recording(tmp_path / "run.mcap")
+    recording = Recording(file)
     assert not recording.is_whole
     assert recording.duration_s >= 2.0
     assert check_recording(recording.log).differs_ns is None
 
 
-def test_a_recording_leaves_a_reserve_of_its_disk_free(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    file, reserve_bytes, size = tmp_path / "run.mcap", 128 << 20, 5_000
+def disk(folder: Path, total: int, room: int) -> Callable[[Path], SimpleNamespace]:
+    """Return what tells the usage of a folder's disk, which has room for so many bytes of files in that folder."""
 
-    def disk_usage(folder: Path) -> SimpleNamespace:
-        assert folder == tmp_path
+    def usage(asked: Path) -> SimpleNamespace:
+        assert asked == folder
         used = sum(each.stat().st_size for each in folder.iterdir())
-        return SimpleNamespace(total=1 << 40, used=used, free=reserve_bytes + size - used)
+        return SimpleNamespace(total=total, used=used, free=room - used)
 
+    return usage
+
+
+def test_a_recording_leaves_a_reserve_of_its_disk_free(
+    file: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    size = 5_000
     monkeypatch.setattr("kiks.recording.recorder.CHUNK_S", 0.0)
-    monkeypatch.setattr("shutil.disk_usage", disk_usage)
+    monkeypatch.setattr("shutil.disk_usage", disk(file.parent, 1 << 40, (128 << 20) + size))
     sim, alone = Simulation(seed=1), Simulation(seed=1)
     recorder = sim.record(file)
     drive(sim, 9.0)
@@ -516,26 +485,22 @@ def test_a_recording_leaves_a_reserve_of_its_disk_free(
     assert Recording(file).is_whole
 
 
-def test_the_first_chunk_leaves_the_reserve_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    file = tmp_path / "run.mcap"
-    with Simulation().record(file):
+def test_the_first_chunk_leaves_the_reserve_too(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("shutil.disk_usage", lambda _folder: SimpleNamespace(total=10**8, used=0, free=10**7))
+    assert room_of(file.parent) == (10**7, 5 * 10**6), "a share of a small disk"
+    with Simulation(seed=1).record(file):
         pass
     before = file.read_bytes()
-
-    def disk_usage(folder: Path) -> SimpleNamespace:
-        used = sum(each.stat().st_size for each in folder.iterdir())
-        return SimpleNamespace(total=3 << 20, used=used, free=(154 << 10) + len(before) - used)
-
-    monkeypatch.setattr("shutil.disk_usage", disk_usage)
+    monkeypatch.setattr("shutil.disk_usage", disk(file.parent, 3 << 20, (154 << 10) + len(before)))
     sim = Simulation()
     with pytest.raises(ParameterError, match="the recording cannot begin"):
         sim.record(file)
     assert sim.loop.recorder is None
-    assert [(path, path.read_bytes()) for path in tmp_path.iterdir()] == [(file, before)]
+    assert [(path, path.read_bytes()) for path in file.parent.iterdir()] == [(file, before)]
 
 
-def test_a_recording_has_one_writer(tmp_path: Path) -> None:
-    file, link = tmp_path / "run.mcap", tmp_path / "link.mcap"
+def test_a_recording_has_one_writer(file: Path) -> None:
+    link = file.parent / "link.mcap"
     link.symlink_to(file)
     for _ in range(2):  # where there is no file, and where there is one
         sim = Simulation(seed=1)
@@ -546,49 +511,34 @@ def test_a_recording_has_one_writer(tmp_path: Path) -> None:
                     with pytest.raises(ParameterError, match="another run is writing it"):
                         Simulation().record(name)
         assert check_recording(Recording(file).log).equal_count == 3
-    assert sorted(tmp_path.iterdir()) == [link, file]
+    assert sorted(file.parent.iterdir()) == [link, file]
 
 
-def test_a_run_in_which_nothing_happens_keeps_the_recording_of_before(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture
+def test_until_something_has_happened_for_a_second_the_recording_of_before_stays(
+    file: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    file, sim = tmp_path / "run.mcap", Simulation(seed=1)
-    with sim.record(file):
-        drive(sim, 1.0)
+    monkeypatch.setattr("kiks.recording.recorder.CHUNK_S", 0.0)
+    with (sim := Simulation(seed=1)).record(file):
+        drive(sim, 4.0)
     before = file.read_bytes()
     with Simulation().record(file) as recorder:
         recorder.say(0, "SyntaxError")
         assert file.read_bytes() == before
     assert "nothing has happened" in caplog.text
-    assert [(path, path.read_bytes()) for path in tmp_path.iterdir()] == [(file, before)]
-    with (other := Simulation()).record(file):
-        other.place(1, 100, 100, 0)
-    assert Recording(file).duration_s == 0
-
-
-def test_a_killed_run_leaves_the_recording_of_before_or_its_own_without_the_last_second(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("kiks.recording.recorder.CHUNK_S", 0.0)
-    file = tmp_path / "run.mcap"
-    with (sim := Simulation(seed=1)).record(file):
-        drive(sim, 4.0)
+    assert [(path, path.read_bytes()) for path in file.parent.iterdir()] == [(file, before)]
+    # A killed run leaves the recording of before, or its own without the last second.
     recorder = (sim := Simulation(seed=1)).record(file)
     for driven_s, found_s in ((0.5, 4.0), (1.0, 1.0), (1.0, 2.0)):
         drive(sim, driven_s)
         assert Recording(file).duration_s == pytest.approx(found_s, abs=0.05)
     recorder.close()
     assert Recording(file).is_whole
+    with (other := Simulation()).record(file):
+        other.place(1, 100, 100, 0)
+    assert Recording(file).duration_s == 0
 
 
-def test_of_a_small_disk_the_reserve_is_a_share(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("shutil.disk_usage", lambda _folder: SimpleNamespace(total=10**8, used=0, free=10**7))
-    assert room_of(tmp_path) == (10**7, 5 * 10**6)
-    with Simulation(seed=1).record(tmp_path / "run.mcap"):
-        pass
-
-
-def test_a_world_without_a_robot_is_made_again_with_the_robot_that_comes(tmp_path):
+def test_a_world_without_a_robot_is_made_again_with_the_robot_that_comes_or_without(file):
     def act(sim):
         ball = sim.add_ball(100, 100)
         sim.move_body(ball, 100, 100, speed_mm_s=200.0)
@@ -597,18 +547,14 @@ def test_a_world_without_a_robot_is_made_again_with_the_robot_that_comes(tmp_pat
         drive(sim, 1.5)
 
     sim = Simulation(Arena.box(500, 500), robots=0)
-    recording = recorded(sim, tmp_path / "run.mcap", act)
+    recording = recorded(sim, file, act)
     check_again(recording, sim.state_hash())
     assert recording.world_at(1.0).robot_count == 0
-    assert recording.project_at(1.0).robots == ()
-    assert len(recording.project_at(2.0).robots) == 1
+    assert [len(recording.project_at(time_s).robots) for time_s in (1.0, 2.0)] == [0, 1]
     poses = recording.table("poses")
     assert set(poses["robot"]) == {1}
     assert poses["time_s"].min() >= 1.2 - 1e-9
-
-
-def test_a_table_of_a_robot_needs_one(tmp_path):
-    recording = recorded(Simulation(robots=0), tmp_path / "run.mcap", lambda sim: sim.run(1.0))
+    recording = recorded(Simulation(robots=0), file, lambda sim: sim.run(1.0))
     assert check_recording(recording.log).differs_ns is None
     assert len(recording.table("poses")) == 0
     with pytest.raises(ParameterError, match="must have a robot for this, but its world has none"):

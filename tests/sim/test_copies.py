@@ -1,16 +1,19 @@
 """A copy of a simulation goes on as the simulation does, and neither changes the other."""
 
-from __future__ import annotations
-
 import copy
 import pickle
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 import kiks
+from kiks.errors import ParameterError
 from kiks.firmware.turret import Turret
+from kiks.model.exercise import Case
+from kiks.model.project import Project
+from kiks.sim.from_project import in_case, simulation_of
 
 
 def begun(thinking: str = "fixed:2") -> tuple[kiks.Simulation, list[kiks.Khepera]]:
@@ -54,35 +57,26 @@ def test_robots_are_copied_with_their_simulation() -> None:
     twin, twins = copy.deepcopy((sim, robots))
     assert (twins[0].port.sim, twins[0].port.timeout) == (twin, 0.25)
     assert gone_on(sim, robots)[:4] == gone_on(twin, twins)[:4]
-
-
-def test_a_command_on_its_way_is_answered_in_the_copy() -> None:
     sim, robots = begun("none")
-    robots[0].port.write(b"N\n")
+    robots[0].port.write(b"N\n")  # a command on its way is answered in the copy
     twin, (first, _) = copy.deepcopy((sim, robots))
     assert first.port.readline() == robots[0].port.readline()
     assert twin.state_hash() == sim.state_hash()
 
 
-def test_unread_replies_are_refused() -> None:
+class Dice(Turret):
+    number, name = 24, "Dice"
+
+
+def test_unread_replies_and_turrets_of_a_user_are_refused() -> None:
     sim, robots = begun()
     robots[1].port.write(b"N\n")
     sim.run(0.1)
-    with pytest.raises(
-        kiks.ParameterError, match="must have no unread replies to be copied, but robot 2 has sent some"
-    ):
+    with pytest.raises(ParameterError, match="must have no unread replies to be copied, but robot 2 has sent some"):
         pickle.dumps(sim)
-
-
-def test_turrets_of_a_user_are_refused() -> None:
-    class Dice(Turret):
-        number, name = 24, "Dice"
-
     sim, _ = begun()
     sim.fit(2, Dice())
-    with pytest.raises(
-        kiks.ParameterError, match="no turrets of a user's own to be copied, but robot 2 has <Dice: turr"
-    ):
+    with pytest.raises(ParameterError, match="no turrets of a user's own to be copied, but robot 2 has <Dice: turr"):
         copy.deepcopy(sim)
 
 
@@ -91,3 +85,14 @@ def test_what_never_changes_is_shared() -> None:
     assert copy.deepcopy(sim).arena is sim.arena
     for thing in (sim.arena, sim.spec, kiks.measures.contacts, kiks.controllers.linear(), kiks.tasks.avoid()):
         assert copy.deepcopy(thing) is thing
+
+
+def test_the_line_of_a_case_has_its_speed_whatever_a_program_sets() -> None:
+    project = Project.from_bytes(in_case(Project(), Case(baud=38400), Path()).to_bytes())
+    sim = simulation_of(project)
+    for each in (sim, copy.copy(sim)):
+        each.port(1).baudrate = 9600
+        assert each.wires[0].line.baud == 38400
+    free = simulation_of(in_case(Project(baud=38400), Case(seed=2), Path()))
+    free.port(1).baudrate = 9600
+    assert free.wires[0].line.baud == 9600

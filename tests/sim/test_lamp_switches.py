@@ -1,7 +1,5 @@
 """Lamps that an arena switches in the course of a run: on a line, in a batch, after a jump and in files."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,12 +14,8 @@ from kiks.model.arena_file import save_arena
 from kiks.model.project import Project
 
 SWITCHES = (LampSwitch(1.005, 1, False), LampSwitch(0, 2, True), LampSwitch(2, 1, True), LampSwitch(2, 2, False))
-ROOM = replace(
-    kiks.Arena.box(500, 400),
-    starts=(Pose(250, 200, 0.3),),
-    lamps=(Lamp(300, 200), Lamp(200, 250, 1.0, False)),
-    lamp_switches=SWITCHES,
-)
+LAMPS = Lamp(300, 200), Lamp(200, 250, 1.0, False)
+ROOM = replace(kiks.Arena.box(500, 400), starts=(Pose(250, 200, 0.3),), lamps=LAMPS, lamp_switches=SWITCHES)
 
 
 @kiks.controller(senses=("ambient",))
@@ -31,8 +25,7 @@ def to_the_light(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> Non
 
 
 def lit(sim: kiks.Simulation) -> list[float]:
-    lamps: list[float] = sim.lamps[:, 3].tolist()
-    return lamps
+    return sim.lamps[:, 3].tolist()
 
 
 def test_a_lamp_is_switched_with_the_tick_that_ends_at_its_time_or_after_it() -> None:
@@ -84,17 +77,15 @@ def test_files_keep_the_switches(tmp_path: Path) -> None:
 
 
 def test_switches_without_a_lamp_are_refused() -> None:
-    with pytest.raises(KiksError, match="must name lamps from 1 to 0, but one names lamp 2"):
-        kiks.Simulation(replace(ROOM, lamps=()))
-    sim = kiks.Simulation(ROOM)
-    with pytest.raises(KiksError, match="must come after all that the arena switches"):
-        sim.remove_lamp(1)
-    with pytest.raises(KiksError, match="must name lamps from 1 to 1"):
-        sim.lamps = sim.lamps[:1]
+    sim, batch = kiks.Simulation(ROOM), kiks.Batch(ROOM, 1)
+    for act, words in (
+        (lambda: kiks.Simulation(replace(ROOM, lamps=())), "must name lamps from 1 to 0, but one names lamp 2"),
+        (lambda: sim.remove_lamp(1), "must come after all that the arena switches"),
+        (lambda: setattr(sim, "lamps", sim.lamps[:1]), "must name lamps from 1 to 1"),
+        (lambda: setattr(batch, "lamps", batch.lamps[:, :1]), "at least 2 in each world"),
+        (lambda: LampSwitch(-1, 1, True), "time_s must be at least 0|greater than or equal"),
+    ):
+        with pytest.raises(KiksError, match=words):
+            act()
     assert sim.add_lamp(100, 100) == 3
     sim.remove_lamp(3)
-    batch = kiks.Batch(ROOM, 1)
-    with pytest.raises(KiksError, match="at least 2 in each world"):
-        batch.lamps = batch.lamps[:, :1]
-    with pytest.raises(KiksError, match=r"time_s must be at least 0|greater than or equal"):
-        LampSwitch(-1, 1, True)

@@ -1,14 +1,11 @@
 """Supervisors: programs that act in a world from outside."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
 from tests import forked
 
 from kiks.errors import ParameterError
-from kiks.model.goal import Goal
 from kiks.sim.simulation import Simulation
 from kiks.sim.supervision import Supervision
 
@@ -24,6 +21,9 @@ def supervise(sim):
 """
 
 
+FAILED = r"able to begin, but referee\.py has failed"
+
+
 def supervised(tmp_path: Path, text: str) -> tuple[Simulation, Supervision]:
     file = tmp_path / "referee.py"
     file.write_text(text)
@@ -31,9 +31,7 @@ def supervised(tmp_path: Path, text: str) -> tuple[Simulation, Supervision]:
     return sim, Supervision(sim, file)
 
 
-def test_it_prepares_the_world_acts_at_its_times_and_returns(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_it_prepares_the_world_acts_at_its_times_and_returns(tmp_path, capsys: pytest.CaptureFixture[str]) -> None:
     sim, supervision = supervised(tmp_path, TICKS)
     ended = []
     supervision.end = lambda code, message: ended.append((code, message))
@@ -43,41 +41,27 @@ def test_it_prepares_the_world_acts_at_its_times_and_returns(
     sim.run(1.0)
     assert ended == [(0, "the supervisor has ended the run at 1.500 s of simulated time.")]
     assert capsys.readouterr().out == "moved 3 times at 1.5\n"
-
-
-def test_it_is_closed_wherever_it_waits(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     sim, supervision = supervised(tmp_path, TICKS)
     sim.run(0.7)
-    supervision.close()
+    supervision.close()  # wherever it waits
     assert capsys.readouterr().out == "moved 2 times at 0.7\n"
     sim.run(1.0)
     assert sim.bodies()["x_mm"].tolist() == [110.0]
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
+def test_what_cannot_begin_as_a_supervisor_is_an_error(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for text, message in (
         ("x = 1", r"must define a function supervise\(sim\) that yields"),
         ("def supervise(sim):\n    return 1", r"must define a function supervise\(sim\) that yields"),
         ("def supervise(sim):\n    yield 0", "the time that a supervisor yields must be from 0.001"),
         ("def supervise(sim):\n    yield 'soon'", "the time that a supervisor yields must be a number"),
-    ],
-)
-def test_a_file_that_is_no_supervisor_is_an_error(text: str, message: str, tmp_path: Path) -> None:
-    with pytest.raises(ParameterError, match=message):
-        supervised(tmp_path, text)
-
-
-@pytest.mark.parametrize(
-    "text", ["def supervise(sim:\n", "import nothing_of_this_name\n", "def supervise(sim):\n    yield 1 / 0\n"]
-)
-def test_a_supervisor_that_cannot_begin_is_an_error(
-    text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (tmp_path / "referee.py").write_text(text)
-    with pytest.raises(ParameterError, match=r"able to begin, but referee\.py has failed"):
-        Supervision(Simulation(), tmp_path / "referee.py")
-    assert "Traceback" in capsys.readouterr().err
+        ("def supervise(sim:\n", FAILED),
+        ("import nothing_of_this_name\n", FAILED),
+        ("def supervise(sim):\n    yield 1 / 0\n", FAILED),
+    ):
+        with pytest.raises(ParameterError, match=message):
+            supervised(tmp_path, text)
+        assert ("Traceback" in capsys.readouterr().err) == (message == FAILED)
 
 
 def test_a_supervisor_that_fails_ends_the_run(tmp_path: Path) -> None:
@@ -97,20 +81,3 @@ def test_a_supervisor_that_fails_ends_the_run(tmp_path: Path) -> None:
     missing = forked.run("run", "game.kiks", cwd=tmp_path)
     assert missing.returncode == 2
     assert "a supervisor must be a Python file, but there is none at" in missing.stderr
-
-
-def test_a_solved_goal_is_worth_a_point() -> None:
-    sim = Simulation()
-    supervision = Supervision(sim, goal=Goal(solved="time_s >= 1"))
-    sim.run(3.0)
-    assert supervision.decide() == "Goal solved after 1.0 s, 1 point."
-
-
-@pytest.mark.parametrize(
-    ("failed", "said"), [("False", "solved after 1.0 s, 1 point"), ("time_s >= 1", "failed after")]
-)
-def test_what_must_hold_to_the_end_is_solved_there_unless_the_goal_has_failed(failed: str, said: str) -> None:
-    sim = Simulation()
-    supervision = Supervision(sim, goal=Goal(solved="is_over", failed=failed))
-    sim.run(1.0)
-    assert said in supervision.decide()

@@ -1,8 +1,7 @@
 """What goes over a robot's line, and where the time went."""
 
-from __future__ import annotations
-
 import itertools
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -31,9 +30,7 @@ def watched(sim: Simulation, robot: int = 1) -> WireLog:
 
 
 def shares(sim: Simulation, from_ns: int = 0, robot: int = 1) -> TimeShares:
-    found = sim.wires[robot - 1].shares(from_ns, sim.now_ns)
-    assert found is not None
-    return found
+    return sim.wires[robot - 1].shares(from_ns, sim.now_ns)
 
 
 def test_exchange_has_the_times_of_its_characters() -> None:
@@ -52,24 +49,21 @@ def test_exchange_has_the_times_of_its_characters() -> None:
     assert sim.wires[0].watch(sim.now_ns) is log
 
 
-@pytest.mark.parametrize(
-    ("data", "cut"),
-    [
+def test_characters_are_cut_into_commands() -> None:
+    for data, cut in (
         (b"E\nH\n", [b"E\n", b"H\n"]),
         (b"E\r\nH\r\n", [b"E\r\n", b"H\r\n"]),
         (b"E\nD,5", [b"E\n", b"D,5"]),
         (b"D,5", [b"D,5"]),
-    ],
-)
-def test_characters_are_cut_into_commands(data: bytes, cut: list[bytes]) -> None:
-    sim = fresh()
-    log = watched(sim)
-    sim.port(1).write(data)
-    sent = pieces(log)
-    assert [piece.data for piece in sent] == cut
-    assert [piece.acted_ns is None for piece in sent] == [not each.endswith(b"\n") for each in cut]
-    assert all(piece.last_ns - piece.first_ns == len(piece.data) * CHARACTER_NS for piece in sent)
-    assert all(before.last_ns == after.first_ns for before, after in itertools.pairwise(sent))
+    ):
+        sim = fresh()
+        log = watched(sim)
+        sim.port(1).write(data)
+        sent = pieces(log)
+        assert [piece.data for piece in sent] == cut
+        assert [piece.acted_ns is None for piece in sent] == [not each.endswith(b"\n") for each in cut]
+        assert all(piece.last_ns - piece.first_ns == len(piece.data) * CHARACTER_NS for piece in sent)
+        assert all(before.last_ns == after.first_ns for before, after in itertools.pairwise(sent))
 
 
 @given(st.lists(st.tuples(st.integers(0, 5), st.integers(0, 3)), max_size=30), st.integers(1, 7))
@@ -104,22 +98,19 @@ def test_an_unwatched_wire_keeps_no_log() -> None:
     wire = fresh().wires[0]
     log = wire.watch(0)
     assert wire.watch(0) is log
-    wire.unwatch()
-    assert wire.log is log
-    wire.unwatch()
-    assert wire.log is None
+    for kept in (log, None):
+        wire.unwatch()
+        assert wire.log is kept
     assert wire.shares(0, 1) is None
 
 
-@pytest.mark.slow
 def test_who_watches_changes_nothing() -> None:
-    drive, sleeper = Command(PROGRAMS / "drive.py", ["COM1", "40", "3", "7"]), Command(PROGRAMS / "sleeper.py", ["12"])
     ends = []
     for is_watched in (False, True):
-        sim = fresh(2)
+        sim = fresh(thinking="fixed:2.5")
         if is_watched:
-            watched(sim), watched(sim, 2)
-        assert Programs(sim, [drive, sleeper], thinking="fixed:2.5", patience_s=GUARD_S).run() == 0
+            watched(sim)
+        assert run_here(sim, PROGRAMS / "drive.py", ["COM1", "40", "3", "7"], {}) == 0
         ends.append((sim.state_hash(), sim.now_ns))
     assert ends[0] == ends[1]
 
@@ -127,15 +118,13 @@ def test_who_watches_changes_nothing() -> None:
 SPANS = st.lists(st.tuples(st.integers(0, 40), st.integers(0, 40)), max_size=8)
 
 
-@given(st.tuples(st.integers(0, 40), st.integers(0, 40)), SPANS, SPANS, SPANS)
-def test_shares_give_each_instant_to_the_first_who_claims_it(
-    window: Span, link: list[Span], robot: list[Span], thinking: list[Span]
-) -> None:
+@given(st.tuples(st.integers(0, 40), st.integers(0, 40)), st.tuples(SPANS, SPANS, SPANS))
+def test_shares_give_each_instant_to_the_first_who_claims_it(window: Span, claimed: tuple[list[Span], ...]) -> None:
     counts = [0, 0, 0, 0]
     for instant in range(*window):
-        claims = (any(begin <= instant < end for begin, end in spans) for spans in (link, robot, thinking))
+        claims = (any(begin <= instant < end for begin, end in spans) for spans in claimed)
         counts[[*claims, True].index(True)] += 1
-    found = share_time(window, link=link, robot=robot, thinking=thinking)
+    found = share_time(window, **dict(zip(("link", "robot", "thinking"), claimed, strict=True)))
     assert found == TimeShares(*counts)
     assert found.window_ns == max(window[1] - window[0], 0)
 
@@ -154,8 +143,8 @@ port.read(1)
 
 @pytest.mark.slow
 @pytest.mark.parametrize("is_near", [True, False], ids=["in memory", "in a process of its own"])
-def test_shares_of_a_program_add_up(is_near: bool, tmp_path_factory: pytest.TempPathFactory) -> None:
-    program = tmp_path_factory.mktemp("program") / "program.py"
+def test_shares_of_a_program_add_up(is_near: bool, tmp_path: Path) -> None:
+    program = tmp_path / "program.py"
     program.write_text(PROGRAM)
     sim = fresh(thinking="fixed:2.5" if is_near else "none")
     log = watched(sim)
