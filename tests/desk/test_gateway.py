@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 from tests.at_length import share
-from tests.desk.clients import open_socket
+from tests.desk.clients import feed_of
 from tests.guard import GUARD_S
 from websockets.sync.client import ClientConnection
 
@@ -78,8 +78,8 @@ class Browser:
 
 
 @contextmanager
-def browsing(shown: Shown, **options: Any) -> Iterator[Browser]:
-    with open_socket(shown, **options) as socket:
+def browsing(shown: Shown) -> Iterator[Browser]:
+    with feed_of(shown) as socket:
         yield Browser(socket)
 
 
