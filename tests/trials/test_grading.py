@@ -11,7 +11,6 @@ import subprocess
 from dataclasses import replace
 from pathlib import Path
 from textwrap import dedent
-from typing import Any
 
 import pytest
 from playwright.sync_api import expect
@@ -68,8 +67,8 @@ NEIGHBOUR = """
 
 def exercise(folder: Path, *cases: Cases) -> Path:
     goal = Goal("Drive 10 cm", solved="path_mm > 100", points="10 - time_s if is_solved else path_mm / 100")
-    cases = cases or (Cases(seed=(1,)),)
-    project = Project(Arena.box(900, 900), seconds=4.0, goal=goal, cases=cases, exercise=Exercise("Ten <centimetres>"))
+    title = Exercise("Ten <centimetres>")
+    project = Project(Arena.box(900, 900), seconds=4.0, goal=goal, cases=cases or (Cases(seed=(1,)),), exercise=title)
     project.save(folder / "ten.kiks")
     return folder / "ten.kiks"
 
@@ -100,22 +99,23 @@ def outcomes_of(out: Path) -> dict[str, Outcome]:
 
 
 @pytest.fixture(scope="module")
-def graded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]]:
-    """The folder with the grades of a class, and what the command told."""
+def graded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder with the grades of a class; what the command told is in `told.json`."""
     folder = tmp_path_factory.mktemp("graded")
     programs = write(folder / "class", {"ann": GOOD, "bob": GOOD.replace("robot", "r") + "    # mine\n", **BROKEN})
     write(programs / "frank", {"a": "", "b": ""})
     project = exercise(folder, Cases(seed=(1,)), Cases("hidden", seed=(3,), is_hidden=True))
     done = grade(project, programs, "--trusted", "--workers", "1", "--out", folder / "out", "--json")
     assert done.returncode == 0, done.stderr
-    return folder / "out", json.loads(done.stdout)
+    (folder / "out" / "told.json").write_text(done.stdout)
+    return folder / "out"
 
 
-def test_a_class_is_graded(graded: tuple[Path, dict[str, Any]]) -> None:
-    out, told = graded
+def test_a_class_is_graded(graded: Path) -> None:
+    told = json.loads((graded / "told.json").read_text())
     assert [each["name"] for each in told["submissions"]] == ["ann", "bob", "carl", "dora", "frank"]
     assert told["alike"] == [{"first": "ann", "second": "bob", "share": 1.0}]
-    rows = rows_of(out)
+    rows = rows_of(graded)
     assert rows["ann"]["solved"] == "2"
     assert float(rows["ann"]["points"]) > 7
     assert rows["ann"]["said_last"].startswith("encoders")
@@ -123,27 +123,27 @@ def test_a_class_is_graded(graded: tuple[Path, dict[str, Any]]) -> None:
     assert rows["carl"]["said_last"] == "ValueError: =1+1 <b>what</b>"
     assert rows["frank"]["said_last"].startswith("it must have one program")
     for number in (1, 2):
-        assert (out / "runs" / "ann" / f"{number}.mcap").is_file()
-    results = json.loads((out / "results" / "ann.json").read_text())
+        assert (graded / "runs" / "ann" / f"{number}.mcap").is_file()
+    results = json.loads((graded / "results" / "ann.json").read_text())
     assert sum(test["score"] for test in results["tests"]) == pytest.approx(results["score"], abs=0.001)
     assert [test["visibility"] for test in results["tests"]] == ["visible", "hidden"]
     assert [entry.get("order") for entry in results["leaderboard"]] == [None, None, "asc"]
-    report = (out / "report.html").read_text()
+    report = (graded / "report.html").read_text()
     assert "Ten &lt;centimetres&gt;" in report
     assert "<b>what" not in report
     assert "<script>alert" not in report
     assert not re.search(r"(?:src|href)=.?https?:", report)
-    first, *columns = table(out, "moodle.csv")[0]
+    first, *columns = table(graded, "moodle.csv")[0]
     assert first == "Identifier"
     assert {"Grade", "Last modified (grade)"} <= {*columns}
 
 
-def test_the_report_opens_what_belongs_to_a_name(graded: tuple[Path, dict[str, Any]], new_page: NewPage) -> None:
+def test_the_report_opens_what_belongs_to_a_name(graded: Path, new_page: NewPage) -> None:
     page = new_page(1366, 768)
     for colours, width in (("light", 1366), ("dark", 390)):
         page.emulate_media(color_scheme=colours)  # type: ignore[arg-type]
         page.set_viewport_size({"width": width, "height": 800})
-        page.goto((graded[0] / "report.html").as_uri())
+        page.goto((graded / "report.html").as_uri())
         check_access(page, colours)
         for name in ("ann", "carl"):
             page.get_by_role("button", name=name, exact=True).click()
@@ -159,9 +159,7 @@ def test_the_report_opens_what_belongs_to_a_name(graded: tuple[Path, dict[str, A
 
 
 @needs_sandbox
-def test_hostile_programs_are_named_and_cost_the_others_nothing(
-    tmp_path: Path, graded: tuple[Path, dict[str, Any]]
-) -> None:
+def test_hostile_programs_are_named_and_cost_the_others_nothing(tmp_path: Path, graded: Path) -> None:
     project, out, before = exercise(tmp_path), tmp_path / "out", tmp_path / "before"
     with socket.create_server(("127.0.0.1", 0)) as server:
         target, port = out / "programs" / "ann" / "ann.py", server.getsockname()[1]
@@ -170,11 +168,10 @@ def test_hostile_programs_are_named_and_cost_the_others_nothing(
         done = grade(project, programs, "--out", out)
     assert done.returncode == 0, done.stderr
     # Ann's run is the one that a class without them saw.
-    assert replace(outcomes_of(out)["ann/1"], key="") == replace(outcomes_of(graded[0])["ann/1"], key="")
+    assert replace(outcomes_of(out)["ann/1"], key="") == replace(outcomes_of(graded)["ann/1"], key="")
     rows = rows_of(out)
     assert rows["eve"]["said_last"] == "found []"
-    reasons = {"mallory": "processes", "oscar": "MB of memory", "trudy": "printed more than"}
-    for name, words in reasons.items():
+    for name, words in (("mallory", "processes"), ("oscar", "MB of memory"), ("trudy", "printed more than")):
         assert rows[name]["stopped"] == "1", rows[name]
         assert words in rows[name]["said_last"]
     assert float(rows["victor"]["points"]) == 0
