@@ -186,12 +186,17 @@ def test_messages_reach_pages_of_the_same_token_alone(room: Room) -> None:
     assert ada.ask(upload, "POST", "x", content_length="1")[0] == 404
 
 
-def test_a_student_who_asks_too_much_is_refused(room: Room) -> None:
+def test_a_student_who_asks_too_much_is_refused_and_a_guesser_has_to_wait(room: Room) -> None:
     ada, bob = entered("Ada", "Bob")
     answers = [ada.page("desk/1/unknown")[0] for _ in range(40)]
     assert answers[:15] == [404] * 15
     assert answers[-1] == 429
     assert bob.page("desk/2")[0] == OWNER.page("desk/1")[0] == 200
+    guesser = Browser()
+    answers = [guesser.ask("/?code=AAAAA" + letter)[0] for letter in "BCDEFGHIJKLMNOPQRSTUVWXYZ"]
+    assert answers[:10] == [403] * 10
+    assert answers[-1] == 429
+    assert guesser.enter("Ada") == 429
 
 
 def test_wrong_codes_are_few() -> None:
@@ -205,14 +210,6 @@ def test_wrong_codes_are_few() -> None:
                 borne += 1
                 guesses.note_wrong(f"192.0.2.{second % 200}")
     assert borne <= 200 + 5 * 600
-
-
-def test_a_guesser_has_to_wait(room: Room) -> None:
-    guesser = Browser()
-    answers = [guesser.ask("/?code=AAAAA" + letter)[0] for letter in "BCDEFGHIJKLMNOPQRSTUVWXYZ"]
-    assert answers[:10] == [403] * 10
-    assert answers[-1] == 429
-    assert guesser.enter("Ada") == 429
 
 
 def test_a_wrong_file_of_names_gets_one_line(tmp_path: Path) -> None:
@@ -292,7 +289,7 @@ def test_a_room_comes_up_again(tmp_path: Path) -> None:
         Room(exercise(), tmp_path, NAMES, tmp_path / "room", is_trusted=True)
 
 
-def test_a_desk_stays_with_the_exercise(room: Room) -> None:
+def test_a_desk_stays_with_the_exercise_without_hidden_cases_and_has_a_highest_speed(room: Room) -> None:
     """A project of a student's own could have a supervisor, which would run in the server's process."""
     entered("Ada")
     desk = room.desks["Ada"].desk
@@ -301,6 +298,10 @@ def test_a_desk_stays_with_the_exercise(room: Room) -> None:
     with pytest.raises(ParameterError, match="must stay with its exercise"):
         SERVER.run(desk.replace(project, desk.folder))
     assert desk.project == room.project
+    assert not any(case.is_hidden for table in room.project.cases for case in table.each())
+    for speed in (None, 2 * SPEED_MAX):
+        with pytest.raises(ParameterError, match="as many share this computer"):
+            SERVER.run(desk.set_speed(speed))
 
 
 def test_a_room_without_a_sandbox_does_not_open(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -348,14 +349,6 @@ def test_a_program_of_a_student_reaches_nothing_of_another(tmp_path: Path) -> No
         assert handle.output is not None
         assert [each.text for each in handle.output.since(0)[1]] == ["done"]
         assert (other.folder / "secret.py").read_text() == "print(1)"
-
-
-def test_a_desk_of_a_room_has_a_highest_speed(room: Room) -> None:
-    entered("Ada")
-    for speed in (None, 2 * SPEED_MAX):
-        with pytest.raises(ParameterError, match="as many share this computer"):
-            SERVER.run(room.desks["Ada"].desk.set_speed(speed))
-    assert not any(case.is_hidden for table in room.project.cases for case in table.each())
 
 
 def test_a_code_of_a_persons_own() -> None:
