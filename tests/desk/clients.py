@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import http.client
-import socket
+from contextlib import closing
+from dataclasses import dataclass
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -14,30 +15,45 @@ from kiks.desk.server.server import SERVER
 from kiks.desk.server.show import Shown
 from kiks.desk.server.token import COOKIE
 
-WITH_TOKEN = {"Cookie": f"{COOKIE}={SERVER.key.token}"}
-"""The header of a client with the token."""
+
+@dataclass
+class Client:
+    """A browser without a person: it keeps one cookie.
+
+    Attributes:
+        cookie: The cookie.
+        home: What the addresses of its pages begin with.
+    """
+
+    cookie: str = ""
+    home: str = ""
+
+    def ask(
+        self, path: str, method: str = "GET", body: str | bytes | None = None, **headers: str
+    ) -> tuple[int, str, str]:
+        """Return status, headers and page."""
+        sent = {"Cookie": self.cookie, **{name.replace("_", "-"): value for name, value in headers.items()}}
+        with closing(http.client.HTTPConnection(urlsplit(SERVER.address()).netloc, timeout=GUARD_S)) as asking:
+            asking.request(method, path, body, sent)
+            answer = asking.getresponse()
+            return answer.status, str(answer.headers), answer.read().decode(errors="replace")
+
+    def page(self, path: str = "") -> tuple[int, str]:
+        """Return status and text of a page of its own."""
+        status, _, page = self.ask(f"{self.home}{path}")
+        return status, page
+
+    def socket(self, path: str, **options: Any) -> ClientConnection:
+        """Open a WebSocket of its own."""
+        url = f"ws://{urlsplit(SERVER.address()).netloc}{self.home}{path}"
+        headers = {"Cookie": self.cookie}
+        return connect(url, additional_headers=headers, compression=None, open_timeout=GUARD_S, **options)
 
 
-def connected(shown: Shown) -> socket.socket:
-    """Return a new connection to the server."""
-    url = urlsplit(shown.url)
-    return socket.create_connection((url.hostname, url.port), timeout=GUARD_S)
+OWNER = Client(f"{COOKIE}={SERVER.key.token}", f"{SERVER.key.place}/")
+"""A client with the token of the server."""
 
 
-def open_socket(shown: Shown, path: str | None = None, **options: Any) -> ClientConnection:
-    """Open a WebSocket with the token: the feed of the desk if no path is given."""
-    url = urlsplit(shown.url)
-    address = f"ws://{url.netloc}{SERVER.key.place}{path or f'{url.path}/feed'}"
-    options = {"additional_headers": WITH_TOKEN, **options}
-    return connect(address, compression=None, open_timeout=GUARD_S, **options)
-
-
-def ask(shown: Shown, method: str, path: str, body: bytes | None = None, **headers: str) -> tuple[int, str, bytes]:
-    """Return status, headers and page that a client with the token gets."""
-    url = urlsplit(shown.url)
-    asking = http.client.HTTPConnection(url.netloc, timeout=GUARD_S)
-    asking.request(method, f"{SERVER.key.place}{path}", body, {**WITH_TOKEN, **headers})
-    answer = asking.getresponse()
-    page = answer.read()
-    asking.close()
-    return answer.status, str(answer.headers), page
+def feed_of(shown: Shown) -> ClientConnection:
+    """Open the feed of a desk with the token."""
+    return OWNER.socket(f"{urlsplit(shown.url).path[1:]}/feed")

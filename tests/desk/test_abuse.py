@@ -7,11 +7,10 @@ import random
 import socket
 from collections.abc import Iterator
 from contextlib import suppress
-from typing import Any
 from urllib.parse import urlsplit
 
 import pytest
-from tests.desk.clients import WITH_TOKEN, ask, connected, open_socket
+from tests.desk.clients import OWNER, feed_of
 from tests.guard import GUARD_S
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 
@@ -29,19 +28,23 @@ def shown() -> Iterator[Shown]:
     shown.close()
 
 
-@pytest.fixture
-def said(caplog: pytest.LogCaptureFixture, capfd: pytest.CaptureFixture[str]) -> Iterator[list[str]]:
-    """Lines of the log, which must never contain a traceback."""
-    lines: list[str] = []
-    yield lines
-    lines += [record.getMessage() for record in caplog.records if record.levelno >= logging.WARNING]
+@pytest.fixture(autouse=True)
+def no_traceback(caplog: pytest.LogCaptureFixture, capfd: pytest.CaptureFixture[str]) -> Iterator[None]:
+    """Neither the log nor the standard error has a traceback after a test."""
+    yield
     assert not [record for record in caplog.records if record.levelno >= logging.WARNING and record.exc_info]
     assert "Traceback" not in capfd.readouterr().err
 
 
-def knock(shown: Shown, data: bytes) -> bytes:
+def connected() -> socket.socket:
+    """Return a new connection to the server, which sends no token."""
+    url = urlsplit(SERVER.address())
+    return socket.create_connection((url.hostname, url.port), timeout=GUARD_S)
+
+
+def knock(data: bytes) -> bytes:
     """Return the answer to bytes of a client without the token."""
-    with connected(shown) as stranger:
+    with connected() as stranger:
         with suppress(OSError):
             stranger.sendall(data)
             stranger.shutdown(socket.SHUT_WR)
@@ -54,8 +57,8 @@ def knock(shown: Shown, data: bytes) -> bytes:
 
 def is_well(shown: Shown) -> bool:
     """Return whether a browser with the token gets its page."""
-    status, _, page = ask(shown, "GET", urlsplit(shown.url).path)
-    return status == 200 and b"KiKS" in page
+    status, page = OWNER.page(urlsplit(shown.url).path[1:])
+    return status == 200 and "KiKS" in page
 
 
 NO_REQUESTS = [
@@ -85,7 +88,7 @@ NO_REQUESTS = [
 ]
 
 
-def test_malformed_requests_are_refused(shown: Shown, said: list[str]) -> None:
+def test_malformed_requests_are_refused(shown: Shown) -> None:
     chance = random.Random(1)
     whole = b"GET /desk/1?x=1 HTTP/1.1\r\nHost: 127.0.0.1\r\nOrigin: http://127.0.0.1\r\nCookie: a=b\r\n\r\n"
     spoilt = []
@@ -95,15 +98,14 @@ def test_malformed_requests_are_refused(shown: Shown, said: list[str]) -> None:
             data[chance.randrange(len(data))] = chance.randrange(256)
         spoilt.append(bytes(data))
     for data in NO_REQUESTS + spoilt:
-        answer = knock(shown, data)
+        answer = knock(data)
         assert answer == b"" or answer.split(b" ", 2)[1] in (b"400", b"403", b"413", b"426", b"431"), data[:200]
         assert SERVER.key.token.encode() not in answer
     assert is_well(shown)
-    assert not said
 
 
-def test_silent_connections_do_not_block_others(shown: Shown, said: list[str]) -> None:
-    idle = [connected(shown) for _ in range(3 * access.STRANGERS_MAX)]
+def test_silent_connections_do_not_block_others(shown: Shown) -> None:
+    idle = [connected() for _ in range(3 * access.STRANGERS_MAX)]
     for half in idle[::2]:
         with suppress(OSError):
             half.sendall(b"GET / HTTP/1.1\r\n")
@@ -119,13 +121,13 @@ def test_silent_connections_do_not_block_others(shown: Shown, said: list[str]) -
 
 def test_an_unauthenticated_connection_times_out(shown: Shown, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(access, "STRANGER_S", 0.0)
-    with connected(shown) as stranger, suppress(ConnectionError):
+    with connected() as stranger, suppress(ConnectionError):
         assert stranger.recv(1) == b""
 
 
-def test_an_authenticated_connection_does_not_time_out(shown: Shown, monkeypatch: pytest.MonkeyPatch) -> None:
-    with open_socket(shown) as feed:
-        idle = [connected(shown) for _ in range(2 * access.STRANGERS_MAX)]
+def test_an_authenticated_connection_does_not_time_out(shown: Shown) -> None:
+    with feed_of(shown) as feed:
+        idle = [connected() for _ in range(2 * access.STRANGERS_MAX)]
         for _ in range(5):
             while not isinstance(feed.recv(GUARD_S), bytes):
                 pass
@@ -136,40 +138,38 @@ def test_an_authenticated_connection_does_not_time_out(shown: Shown, monkeypatch
 
 # ---- an authenticated browser that misbehaves ----
 
-EVENTS = "/_nicegui_ws/socket.io/?EIO=4&transport=websocket"
+EVENTS = "_nicegui_ws/socket.io/?EIO=4&transport=websocket"
 """Where a page sends its events."""
+
+NO_FRAMES = [
+    b"\x81\x84\0\0\0\0\xff\xfe\xff\xfe",  # a text that is none
+    b"\x82\x81\0\0\0\0x",  # bytes, not a text
+    b"\x81\x01x",  # not masked
+    b"\xf1\x80\0\0\0\0",  # bits that mean nothing
+    b"\x83\x80\0\0\0\0",  # an opcode that is none
+    b"\x89\xfe\xff\xff\0\0\0\0",  # a ping that is too long
+    b"\x80\x80\0\0\0\0",  # goes on where nothing began
+    b"\x81\xff" + (MESSAGE_BYTES_MAX + 1).to_bytes(8, "big") + b"\0\0\0\0",  # too long
+    b"\x81\xff\xff\xff\xff\xff\xff\xff\xff\xff\0\0\0\0",
+    b"\x88\x81\0\0\0\0x",  # a close that is half
+    b"\x88\x82\0\0\0\0\xff\xff",
+    bytes(range(256)),
+]
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "frames",
-    [
-        b"\x81\x84\0\0\0\0\xff\xfe\xff\xfe",  # a text that is none
-        b"\x82\x81\0\0\0\0x",  # bytes, not a text
-        b"\x81\x01x",  # not masked
-        b"\xf1\x80\0\0\0\0",  # bits that mean nothing
-        b"\x83\x80\0\0\0\0",  # an opcode that is none
-        b"\x89\xfe\xff\xff\0\0\0\0",  # a ping that is too long
-        b"\x80\x80\0\0\0\0",  # goes on where nothing began
-        b"\x81\xff" + (MESSAGE_BYTES_MAX + 1).to_bytes(8, "big") + b"\0\0\0\0",  # too long
-        b"\x81\xff\xff\xff\xff\xff\xff\xff\xff\xff\0\0\0\0",
-        b"\x88\x81\0\0\0\0x",  # a close that is half
-        b"\x88\x82\0\0\0\0\xff\xff",
-        bytes(range(256)),
-    ],
-)
-@pytest.mark.parametrize("which", ["feed", "socket.io"])
-def test_malformed_websocket_frames_close_the_socket(shown: Shown, said: list[str], which: str, frames: bytes) -> None:
-    with open_socket(shown, None if which == "feed" else EVENTS) as client:
-        client.socket.sendall(frames)
-        # Below the library: it would object itself.
-        with suppress(OSError):
-            client.socket.shutdown(socket.SHUT_WR)
-        with suppress(Exception):
-            while client.recv(GUARD_S):
-                pass
+def test_malformed_websocket_frames_close_the_socket(shown: Shown) -> None:
+    for frames in NO_FRAMES:
+        for client in (feed_of(shown), OWNER.socket(EVENTS)):
+            with client:
+                client.socket.sendall(frames)
+                # Below the library: it would object itself.
+                with suppress(OSError):
+                    client.socket.shutdown(socket.SHUT_WR)
+                with suppress(Exception):
+                    while client.recv(GUARD_S):
+                        pass
     assert is_well(shown)
-    assert not said
 
 
 MESSAGES = """
@@ -181,27 +181,25 @@ MESSAGES = """
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "message", ["", "42" + "[" * 100_000, f'42["event",{"9" * 5000}]', *MESSAGES.split()], ids=lambda text: text[:40]
-)
-def test_malformed_events_are_ignored(shown: Shown, caplog: pytest.LogCaptureFixture, message: str, said: Any) -> None:
-    with open_socket(shown, EVENTS) as client:
-        client.send("40")
-        client.recv(GUARD_S)
-        client.send(message)
-        with suppress(ConnectionClosed):  # the desk may hang up on it
-            client.send("3")
+def test_malformed_events_are_ignored(shown: Shown) -> None:
+    for message in ("", "42" + "[" * 100_000, f'42["event",{"9" * 5000}]', *MESSAGES.split()):
+        with OWNER.socket(EVENTS) as client:
+            client.send("40")
+            client.recv(GUARD_S)
+            client.send(message)
+            with suppress(ConnectionClosed):  # the desk may hang up on it
+                client.send("3")
     assert is_well(shown)
 
 
-def test_malformed_uploads_are_refused(shown: Shown, said: list[str]) -> None:
+def test_malformed_uploads_are_refused(shown: Shown) -> None:
     from nicegui import app, ui
 
     @ui.page("/with-an-upload")
     def page() -> None:
         ui.upload()
 
-    ask(shown, "GET", "/with-an-upload")
+    OWNER.page("with-an-upload")
     (path,) = {route.path for route in app.routes if "/upload/" in getattr(route, "path", "")}
     kinds = [
         ("text/plain", b"x"),
@@ -213,16 +211,17 @@ def test_malformed_uploads_are_refused(shown: Shown, said: list[str]) -> None:
         ("\xff", b""),
     ]
     for kind, body in kinds:
-        assert ask(shown, "POST", path, body, **{"Content-Type": kind})[0] in (200, 400, 415, 500), (kind, body)
+        status, *_ = OWNER.ask(f"{SERVER.key.place}{path}", "POST", body, content_type=kind)
+        assert status in (200, 400, 415, 500), (kind, body)
     assert is_well(shown)
 
 
-def test_a_too_large_body_is_not_stored(shown: Shown, said: list[str]) -> None:
+def test_a_too_large_body_is_not_stored(shown: Shown) -> None:
     url = urlsplit(shown.url)
     piece = b"100000\r\n" + b"x" * 0x100000 + b"\r\n"
-    head = f"POST {SERVER.key.place}/desk/1 HTTP/1.1\r\nHost: {url.netloc}\r\nCookie: {WITH_TOKEN['Cookie']}\r\n"
+    head = f"POST {SERVER.key.place}/desk/1 HTTP/1.1\r\nHost: {url.netloc}\r\nCookie: {OWNER.cookie}\r\n"
     for header, body in ((f"Content-Length: {REQUEST_BYTES_MAX + 1}", b""), ("Transfer-Encoding: chunked", piece)):
-        with connected(shown) as client:
+        with connected() as client:
             client.sendall(f"{head}{header}\r\n\r\n".encode())
             with suppress(OSError):
                 for _ in range(REQUEST_BYTES_MAX // 0x100000 + 2):
@@ -240,10 +239,10 @@ def test_a_failure_of_the_application_is_one_line_of_the_log(shown: Shown, caplo
     async def fail() -> None:
         raise KeyError("x" * 1000)
 
-    status, _, page = ask(shown, "GET", "/fails")
-    assert (status, b"Traceback" in page) == (500, False)
+    status, page = OWNER.page("fails")
+    assert (status, "Traceback" in page) == (500, False)
     with pytest.raises(InvalidStatus, match="500"):
-        open_socket(shown, "/fails-too")
+        OWNER.socket("fails-too")
     for record in (record for record in caplog.records if record.name.startswith("kiks")):
         assert record.getMessage().startswith("The desk: Exception in ASGI application: KeyError(")
         assert len(record.getMessage()) < 250
@@ -251,8 +250,8 @@ def test_a_failure_of_the_application_is_one_line_of_the_log(shown: Shown, caplo
 
 
 def test_only_pages_of_this_computer_may_embed_the_desk(shown: Shown) -> None:
-    inside, refused = ask(shown, "GET", urlsplit(shown.url).path)[1], knock(shown, b"GET / HTTP/1.0\r\n\r\n").decode()
-    for headers in (inside, refused):
+    inside = OWNER.ask(f"{SERVER.key.place}{urlsplit(shown.url).path}")[1]
+    for headers in (inside, knock(b"GET / HTTP/1.0\r\n\r\n").decode()):
         policy = headers.split("content-security-policy: ")[1].splitlines()[0]
         assert policy.startswith("frame-ancestors 'self' http://localhost:*")
         assert " *" not in policy.replace(":*", "")

@@ -42,29 +42,24 @@ def come(
     is_local: bool = True,
     application: Any = app,
     key: Token = KEY,
-    ends: tuple[Any, Any] | None = None,
+    ends: tuple[Any, Any] = (None, None),
     headers: list[tuple[bytes, bytes]] | None = None,
+    received: str = "http.request",
     **named: str,
 ) -> list[dict[str, Any]]:
     """Return the answer to a request with these headers."""
     sent: list[dict[str, Any]] = []
 
     async def receive() -> dict[str, Any]:
-        return {"type": "websocket.connect" if kind == "websocket" else "http.request"}
+        return {"type": "websocket.connect" if kind == "websocket" else received}
 
     async def send(message: Any) -> None:
         sent.append(message)
 
     given = {"host": "127.0.0.1:8123", **{name.replace("_", "-"): value for name, value in named.items()}}
-    scope = {
-        "type": kind,
-        "method": method,
-        "path": path,
-        "query_string": query,
-        "headers": headers or [(name.encode(), value.encode("utf-8")) for name, value in given.items()],
-    }
-    if ends is not None:
-        scope["client"], scope["server"] = ends
+    headers = headers or [(name.encode(), value.encode("utf-8")) for name, value in given.items()]
+    scope = {"type": kind, "method": method, "path": path, "query_string": query, "headers": headers}
+    scope |= {"client": ends[0], "server": ends[1]}
     asyncio.run(AccessControl(application, key, is_local=is_local)(scope, receive, send))
     return sent
 
@@ -74,36 +69,25 @@ def status(answers: list[dict[str, Any]]) -> int:
     return 403 if first["type"] == "websocket.close" else first.get("status", 101)
 
 
-def page(answers: list[dict[str, Any]]) -> str:
-    return str(answers[1]["body"].decode())
+def headers_of(answers: list[dict[str, Any]]) -> dict[str, str]:
+    return {name.decode(): value.decode() for name, value in answers[0]["headers"]}
 
 
-@pytest.mark.parametrize("host", ["127.0.0.1:8123", "localhost:8123", "[::1]:8123", "localhost"])
-@pytest.mark.parametrize("kind", ["http", "websocket"])
-def test_a_browser_with_the_token_is_accepted(kind: str, host: str) -> None:
-    welcome = 200 if kind == "http" else 101
-    assert status(come(kind=kind, host=host, cookie=COOKIE)) == welcome
-    assert status(come(kind=kind, host=host, cookie=COOKIE, origin=f"http://{host}")) == welcome
-    # Other programs of this computer have cookies in the same jar, of any form.
-    assert status(come(kind=kind, host=host, cookie=f'a={{"b": [1; 2]}}; x; =; {COOKIE}; c="')) == welcome
+@pytest.mark.parametrize(("kind", "welcome"), [("http", 200), ("websocket", 101)])
+def test_a_browser_with_the_token_is_accepted(kind: str, welcome: int) -> None:
+    for host in ("127.0.0.1:8123", "localhost:8123", "[::1]:8123", "localhost"):
+        # Other programs of this computer have cookies in the same jar, of any form.
+        for more in ({}, {"origin": f"http://{host}"}, {"cookie": f'a={{"b": [1; 2]}}; x; =; {COOKIE}; c="'}):
+            assert status(come(kind=kind, host=host, **{"cookie": COOKIE, **more})) == welcome, (host, more)
 
 
 @pytest.mark.parametrize("kind", ["http", "websocket"])
-@pytest.mark.parametrize(
-    "headers",
-    [
-        {"origin": "http://evil.example"},
-        {"origin": "null"},
-        {"origin": ""},
-        {"origin": "http://127.0.0.1:9999"},
-        {"host": "evil.example:8123"},
-        {"host": "evil.example:8123", "origin": "http://evil.example:8123"},
-        {"host": ""},
-    ],
-)
-def test_a_page_of_another_site_is_refused_even_with_the_token(kind: str, headers: dict[str, str]) -> None:
-    assert status(come(kind=kind, cookie=COOKIE, **headers)) == 403
-    assert status(come(kind=kind, query=b"token=a-secret", **headers)) == 403
+def test_a_page_of_another_site_is_refused_even_with_the_token(kind: str) -> None:
+    origins = ("http://evil.example", "null", "", "http://127.0.0.1:9999")
+    hosts = {"host": "evil.example:8123"}, {"host": "evil.example:8123", "origin": "http://evil.example:8123"}
+    for headers in (*({"origin": origin} for origin in origins), *hosts, {"host": ""}):
+        assert status(come(kind=kind, cookie=COOKIE, **headers)) == 403, headers
+        assert status(come(kind=kind, query=b"token=a-secret", **headers)) == 403, headers
 
 
 @pytest.mark.parametrize("is_local", [True, False])
@@ -123,27 +107,25 @@ def test_requests_without_the_token_are_refused(kind: str, cookie: str, is_local
 
 
 def test_refusal_tells_how_to_open_the_desk() -> None:
-    answers = come()
-    assert "must be opened with its token" in page(answers)
-    assert "Open the complete address that KiKS printed" in page(answers)
-    assert "<script" not in page(come(path="/<script>alert(1)</script>\x01", host="<script>"))
+    page = come()[1]["body"].decode()
+    assert "must be opened with its token" in page
+    assert "Open the complete address that KiKS printed" in page
+    assert b"<script" not in come(path="/<script>alert(1)</script>\x01", host="<script>")[1]["body"]
 
 
 def test_token_becomes_a_cookie_and_leaves_the_address() -> None:
     for path in ("/desk/1", PAGE):
         answers = come(path=path, query=b"token=a-secret&x=1", host="robots.example:8123", is_local=False)
-        headers = dict(answers[0]["headers"])
-        assert answers[0]["status"] == 303
-        assert headers[b"location"].decode() == f"{PAGE}?x=1"
-        cookie = headers[b"set-cookie"].decode()
-        assert cookie == f"kiks_token=a-secret; Path={KEY.place}; HttpOnly; SameSite=Strict"
+        headers = headers_of(answers)
+        assert (status(answers), headers["location"]) == (303, f"{PAGE}?x=1")
+        assert headers["set-cookie"] == f"kiks_token=a-secret; Path={KEY.place}; HttpOnly; SameSite=Strict"
     assert status(come(host="robots.example:8123", cookie="a=b; kiks_token=a-secret", is_local=False)) == 200
 
 
 def test_a_notebook_of_another_site_gets_a_partitioned_cookie() -> None:
     within = {"sec_fetch_site": "cross-site", "sec_fetch_dest": "iframe"}
-    cookie = dict(come(query=b"token=a-secret", **within)[0]["headers"])[b"set-cookie"]
-    assert cookie.endswith(b"HttpOnly; SameSite=None; Secure; Partitioned")
+    cookie = headers_of(come(query=b"token=a-secret", **within))["set-cookie"]
+    assert cookie.endswith("HttpOnly; SameSite=None; Secure; Partitioned")
     assert status(come(**within)) == 403
 
 
@@ -152,55 +134,43 @@ def test_a_notebook_of_another_site_gets_a_partitioned_cookie() -> None:
 def test_redirect_with_the_cookie_leads_to_the_desk(path: str, query: bytes) -> None:
     answers = come(path=path, query=b"token=a-secret&" + query)
     if status(answers) == 303:
-        location = dict(answers[0]["headers"])[b"location"]
-        assert re.fullmatch(rb"/[!-.0-~][!-~]*", location)
-        assert location.startswith(KEY.place.encode() + b"/")
-        assert TOKEN.encode() not in location or b"token" in query or "secret" in path
+        location = headers_of(answers)["location"]
+        assert re.fullmatch(r"/[!-.0-~][!-~]*", location)
+        assert location.startswith(f"{KEY.place}/")
+        assert TOKEN not in location or b"token" in query or "secret" in path
     else:
         assert status(answers) in (400, 403)
 
 
-RAW = st.one_of(
-    st.binary(max_size=40),
-    st.sampled_from(
-        [*b"http://[ http://[::1 // http://a]b http://127.0.0.1:99999999".split(), b"\r\nx: y", b"kiks_token=\xff"]
-    ),
+RAW = st.binary(max_size=40) | st.sampled_from(
+    [*b"http://[ http://[::1 // http://a]b http://127.0.0.1:99999999".split(), b"\r\nx: y", b"kiks_token=\xff"]
 )
+NAMES = st.sampled_from([b"host", b"origin", b"cookie", b"content-length", b"sec-fetch-site", b"x"])
 
 
 @given(
     kind=st.sampled_from(["http", "websocket"]),
     path=st.text(max_size=20).map(lambda text: f"/{text}"),
     query=st.binary(max_size=20),
-    headers=st.lists(
-        st.tuples(st.sampled_from([b"host", b"origin", b"cookie", b"content-length", b"sec-fetch-site", b"x"]), RAW),
-        min_size=1,
-        max_size=6,
-    ),
+    headers=st.lists(st.tuples(NAMES, RAW), min_size=1, max_size=6),
     is_local=st.booleans(),
 )
-def test_random_requests_without_the_token_are_refused(
-    kind: str, path: str, query: bytes, headers: list[tuple[bytes, bytes]], is_local: bool
-) -> None:
+def test_random_requests_without_the_token_are_refused(**parts: Any) -> None:
     async def inside(scope: Any, receive: Any, send: Any) -> None:
         raise AssertionError("a stranger is in")
 
-    answers = come(kind=kind, path=path, query=query, headers=headers, is_local=is_local, application=inside)
-    assert status(answers) in (400, 403, 413)
+    assert status(come(application=inside, **parts)) in (400, 403, 413)
 
 
-@pytest.mark.parametrize(
-    ("request_parts", "refused"),
-    [
+def test_malformed_and_too_large_requests_are_refused() -> None:
+    for parts, refused in (
         *(({"origin": origin}, 400) for origin in ("http://[", "http://[::1", "http://a]b")),
         ({"path": f"{PAGE}\r\nset-cookie: a=b"}, 400),
         *(({"content_length": length}, 413) for length in (str(REQUEST_BYTES_MAX + 1), "9" * 30, "-1", "x")),
         ({"transfer_encoding": "chunked"}, 413),
         ({"content_length": str(REQUEST_BYTES_MAX)}, 200),
-    ],
-)
-def test_malformed_and_too_large_requests_are_refused(request_parts: dict[str, Any], refused: int) -> None:
-    assert status(come(method="POST", cookie=COOKIE, **request_parts)) == refused
+    ):
+        assert status(come(method="POST", cookie=COOKIE, **parts)) == refused, parts
 
 
 def test_a_failure_after_the_client_has_left_is_none() -> None:
@@ -208,15 +178,7 @@ def test_a_failure_after_the_client_has_left_is_none() -> None:
         await receive()
         raise RuntimeError("No response returned.")
 
-    async def receive() -> dict[str, Any]:
-        return {"type": "http.disconnect"}
-
-    async def send(message: Any) -> None:
-        raise AssertionError(message)
-
-    headers = [(b"host", b"localhost"), (b"cookie", COOKIE.encode())]
-    scope = {"type": "http", "method": "GET", "path": PAGE, "headers": headers}
-    asyncio.run(AccessControl(fails, KEY)(scope, receive, send))
+    assert come(application=fails, cookie=COOKIE, received="http.disconnect") == []
 
 
 # ---- tickets ----
@@ -236,55 +198,53 @@ def ends(request: pytest.FixtureRequest) -> Any:
 
 def test_a_ticket_is_valid_once_and_for_this_user_only(ends: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     key = Token(TOKEN)
-    path = "/desk/1"
-    ticket = key.new_ticket()
-    query = f"ticket={ticket}".encode()
-    nowhere = (ends[0][0], 1), ends[1]
-    assert status(come(path=path, query=query, key=key)) == 403
-    assert status(come(path=path, query=query, key=key, ends=nowhere)) == 403
+    shown = {"path": "/desk/1", "query": f"ticket={key.new_ticket()}".encode(), "key": key}
+    assert status(come(**shown)) == 403
+    assert status(come(**shown, ends=((ends[0][0], 1), ends[1]))) == 403
     mine = os.getuid()
     monkeypatch.setattr(os, "getuid", lambda: mine + 1)
     monkeypatch.setattr("kiks.desk.server.token.user_of", lambda client, server: mine + 2)
-    assert status(come(path=path, query=query, key=key, ends=ends)) == 403
+    assert status(come(**shown, ends=ends)) == 403
     monkeypatch.undo()
-    answers = come(path=path, query=query, key=key, ends=ends)
+    answers = come(**shown, ends=ends)
     assert status(answers) == 303
-    headers = dict(answers[0]["headers"])
+    headers = headers_of(answers)
     page = f"{key.place}/desk/1"
-    assert headers[b"location"].decode() == page
-    assert headers[b"set-cookie"].startswith(b"kiks_token=a-secret;")
-    assert status(come(path=path, query=query, key=key, ends=ends)) == 403
+    assert headers["location"] == page
+    assert headers["set-cookie"].startswith("kiks_token=a-secret;")
+    assert status(come(**shown, ends=ends)) == 403
     assert status(come(path=page, key=key, ends=ends, cookie=COOKIE)) == 200
 
 
 @needs_root
 def test_a_ticket_is_nothing_to_another_user() -> None:
-    key = Token(TOKEN)
-    query = f"ticket={key.new_ticket()}".encode()
-    with socket.create_server(("127.0.0.1", 0)) as listener:
-        for user in (STRANGER, 0):
-            with as_stranger() if user else nullcontext():
-                client = socket.create_connection(listener.getsockname())
-            ends = client.getsockname(), listener.getsockname()
-            with client, listener.accept()[0]:
-                assert user_of(*ends) == user
-                assert status(come(path="/desk/1", query=query, key=key, ends=ends)) == (403 if user else 303)
+    check_ticket((STRANGER, as_stranger, False), (0, nullcontext, False))
 
 
 def test_a_connection_that_was_closed_belongs_to_nobody() -> None:
+    # The system lists what is left of it as the superuser's, who may open every desk.
+    check_ticket((None, nullcontext, True), (os.getuid(), nullcontext, False))
+
+
+def check_ticket(*clients: tuple[int | None, Any, bool]) -> None:
+    """Check that of clients with a ticket the last one alone comes in.
+
+    Args:
+        *clients: For each its user, the rights with which it connects, and whether it has closed the connection.
+    """
     key = Token(TOKEN)
     query = f"ticket={key.new_ticket()}".encode()
     with socket.create_server(("127.0.0.1", 0)) as listener:
-        for is_open in (False, True):
-            client = socket.create_connection(listener.getsockname())
+        for user, rights, is_closed in clients:
+            with rights():
+                client = socket.create_connection(listener.getsockname())
             ends = client.getsockname(), listener.getsockname()
-            with listener.accept()[0]:
-                if not is_open:
+            with client, listener.accept()[0]:
+                if is_closed:
                     client.close()
-                # The system lists what is left of it as the superuser's, who may open every desk.
-                assert user_of(*ends) == (os.getuid() if is_open else None)
-                assert status(come(path="/desk/1", query=query, key=key, ends=ends)) == (303 if is_open else 403)
-            client.close()
+                assert user_of(*ends) == user
+                is_last = user == clients[-1][0]
+                assert status(come(path="/desk/1", query=query, key=key, ends=ends)) == (303 if is_last else 403)
 
 
 def test_user_of_finds_the_owner_of_a_connection(ends: Any) -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -20,69 +22,60 @@ from kiks.sim.simulation import Simulation
 CLEAN = demonstrations()["clean"]
 
 
-def desk_in(folder: Path, *, may_run_programs: bool = True) -> Desk:
-    return Desk(Simulation(), folder=folder, owns_world=True, may_run_programs=may_run_programs, is_held=True)
+@contextmanager
+def desk_in(folder: Path, project: Project, home: Path | None = None, *, is_free: bool = True) -> Iterator[Desk]:
+    """Open a desk, which may run programs if it is free, and a project on it."""
+    desk = Desk(Simulation(), folder=folder, owns_world=True, is_held=True, may_run_programs=is_free)
+    asyncio.run(desk.replace(project, home))
+    yield desk
+    desk.clear_away()
+    desk.close()
 
 
 def test_a_demonstration_begins_with_its_program_and_supervisor_also_again_and_after_a_change(tmp_path: Path) -> None:
-    desk = desk_in(tmp_path)
-
-    async def do() -> None:
-        await desk.replace(Project.load(CLEAN), CLEAN.parent)
+    with desk_in(tmp_path, Project.load(CLEAN), CLEAN.parent) as desk:
         places = desk.sim.bodies()["x_mm"].tolist()
         assert len(places) == 12
         assert desk.has_beginners
-        await desk.start_over()
+        asyncio.run(desk.start_over())
         assert desk.sim.bodies()["x_mm"].tolist() == places
-        await desk.replace(await desk.present_project())
+        asyncio.run(desk.replace(asyncio.run(desk.present_project())))
         assert desk.sim.bodies()["x_mm"].tolist() == pytest.approx(places, abs=1e-3)
         assert desk.has_beginners
-        saved = await desk.project_to_save("mine")
+        saved = asyncio.run(desk.project_to_save("mine"))
         assert (saved.supervisor, saved.robots[0].program, len(saved.arena.cylinders)) == (None, None, 12)
-
-    asyncio.run(do())
-    desk.clear_away()
-    desk.close()
 
 
 def test_a_page_without_that_right_opens_the_world_alone(tmp_path: Path) -> None:
-    desk = desk_in(tmp_path, may_run_programs=False)
-    asyncio.run(desk.replace(Project.load(CLEAN), CLEAN.parent))
-    assert len(desk.sim.bodies()) == 0
-    assert not desk.has_beginners
-    assert [text.partition(":")[0] for text in desk.news.since(0)[1]] == ["A program was left out"] * 2
-    desk.clear_away()
-    desk.close()
+    with desk_in(tmp_path, Project.load(CLEAN), CLEAN.parent, is_free=False) as desk:
+        assert len(desk.sim.bodies()) == 0
+        assert not desk.has_beginners
+        assert [text.partition(":")[0] for text in desk.news.since(0)[1]] == ["A program was left out"] * 2
 
 
 @pytest.mark.parametrize("how", [{"supervisor": "ends.py"}, {"seconds": 0.5}])
 def test_the_world_pauses_when_the_project_has_ended_and_may_go_on(how: dict[str, Any], tmp_path: Path) -> None:
     (tmp_path / "ends.py").write_text("def supervise(sim):\n    yield 0.5\n")
-    desk = desk_in(tmp_path)
-    asyncio.run(desk.replace(Project(**how)))
-    running = threading.Thread(target=lambda: desk.sim.run(1.0))
-    running.start()
-    wait_until(lambda: desk.is_paused)
-    assert desk.sim.time_s == 0.5
-    assert "of simulated time" in desk.news.since(0)[1][-1]
-    asyncio.run(desk.set_speed(None))
-    asyncio.run(desk.go_on())
-    running.join(GUARD_S)
-    assert desk.sim.time_s == 1.0
-    desk.clear_away()
-    desk.close()
+    with desk_in(tmp_path, Project(**how)) as desk:
+        running = threading.Thread(target=lambda: desk.sim.run(1.0))
+        running.start()
+        wait_until(lambda: desk.is_paused)
+        assert desk.sim.time_s == 0.5
+        assert "of simulated time" in desk.news.since(0)[1][-1]
+        asyncio.run(desk.set_speed(None))
+        asyncio.run(desk.go_on())
+        running.join(GUARD_S)
+        assert desk.sim.time_s == 1.0
 
 
 def test_a_desk_that_closes_lets_its_supervisor_end(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "referee.py").write_text(
         "def supervise(sim):\n    try:\n        yield 9.0\n    finally:\n        print('1:0')\n"
     )
-    desk = desk_in(tmp_path)
-    asyncio.run(desk.replace(Project(supervisor="referee.py")))
-    asyncio.run(desk.start_over())
-    desk.clear_away()
-    assert capsys.readouterr().out == "1:0\n"  # that of the world before
-    desk.close()
+    with desk_in(tmp_path, Project(supervisor="referee.py")) as desk:
+        asyncio.run(desk.start_over())
+        desk.clear_away()
+        assert capsys.readouterr().out == "1:0\n"  # that of the world before
     assert capsys.readouterr().out == "1:0\n"
 
 

@@ -7,29 +7,35 @@ import re
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import IO
 from urllib.error import HTTPError
-from urllib.request import HTTPCookieProcessor, OpenerDirector, build_opener, urlopen
+from urllib.parse import urlsplit
+from urllib.request import HTTPCookieProcessor, build_opener, urlopen
 
 import pytest
 from tests import forked
 from tests.at_length import at_length, cases
 from tests.cli.test_cli import state_of
+from tests.forked import kiks_command
 from tests.guard import GUARD_S
 from tests.served import PROGRAMS
+from websockets.sync.client import connect
 
 pytestmark = pytest.mark.slow
 DRIVE = str(PROGRAMS / "drive.py")
+KIKS = (sys.executable, "-m", "kiks")
 
 
 @contextmanager
-def started(*words: str, folder: Path) -> Iterator[tuple[subprocess.Popen[str], IO[str]]]:
+def started(
+    *words: str, folder: Path, command: Sequence[str] = KIKS
+) -> Iterator[tuple[subprocess.Popen[str], IO[str]]]:
     """Start the command; its processes end with the test."""
     with subprocess.Popen(
-        [sys.executable, "-m", "kiks", *words],
+        [*command, *words],
         start_new_session=True,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
@@ -58,14 +64,17 @@ def url_of(output: IO[str]) -> str:
     return found[0]
 
 
-def browser() -> OpenerDirector:
-    """Return an opener that follows redirects and keeps cookies."""
-    return build_opener(HTTPCookieProcessor())
-
-
 @pytest.mark.parametrize("host", cases(["127.0.0.1", "0.0.0.0"]))
 def test_desk_serves_a_page_to_the_token_alone_and_ends_with_ctrl_c(host: str, tmp_path: Path) -> None:
-    with started("desk", "--port", "0", "--no-browser", "--host", host, folder=tmp_path) as (process, output):
+    # Programs of a project lie beside it, wherever the desk saves.
+    for name in ("own", "set"):
+        (tmp_path / name).mkdir()
+    (tmp_path / "set" / "judge.py").write_text("def supervise(sim):\n    yield 1\n")
+    (tmp_path / "set" / "it.kiks").write_text(
+        'kiks = 1\nsupervisor = "judge.py"\n[walls]\nsize_mm = [400, 400]\n[[robot]]\n'
+    )
+    words = ("desk", "set/it.kiks", "--folder", "own", "--no-browser", "--port", "0", "--host", host)
+    with started(*words, folder=tmp_path) as (process, output):
         url = url_of(output)
         assert "0.0.0.0" not in url
         bare, token = url.split("?token=")
@@ -73,7 +82,7 @@ def test_desk_serves_a_page_to_the_token_alone_and_ends_with_ctrl_c(host: str, t
         for wrong in (bare, f"{bare}?token=guess", f"{bare}/arena/1.png"):
             with pytest.raises(HTTPError, match="403"):
                 urlopen(wrong, timeout=GUARD_S)
-        with browser().open(url, timeout=GUARD_S) as answer:
+        with build_opener(HTTPCookieProcessor()).open(url, timeout=GUARD_S) as answer:
             assert answer.status == 200
             assert "token" not in answer.url
             assert b"KiKS" in answer.read()
@@ -84,7 +93,7 @@ def test_desk_serves_a_page_to_the_token_alone_and_ends_with_ctrl_c(host: str, t
 
 def test_run_with_a_desk_equals_run_without(tmp_path: Path) -> None:
     words = ("--seed", "3", DRIVE, "COM1", "5", "3", "5")
-    with started("run", "--desk", "--no-wait", *words, folder=tmp_path) as (_, output):
+    with started("run", "--desk", "--no-wait", *words, folder=tmp_path, command=kiks_command()) as (_, output):
         url_of(output)
         shown = state_of(line_with(output, "s simulated"))
     assert shown == state_of(forked.run("run", *words).stderr)
@@ -92,10 +101,6 @@ def test_run_with_a_desk_equals_run_without(tmp_path: Path) -> None:
 
 def show_page(url: str) -> None:
     """Receive a frame and acknowledge it, as a page does."""
-    from urllib.parse import urlsplit
-
-    from websockets.sync.client import connect
-
     cookies = HTTPCookieProcessor()
     with build_opener(cookies).open(url, timeout=GUARD_S) as page:
         parts = urlsplit(page.url)
@@ -133,9 +138,8 @@ def test_errors_are_reported_before_waiting_for_a_page(tmp_path: Path) -> None:
 
 
 @at_length
-@pytest.mark.parametrize("words", [("run", "--desk"), ("demo", "avoid", "--desk")])
+@pytest.mark.parametrize("words", [("run", "--desk", DRIVE, "COM1", "5", "3", "5"), ("demo", "avoid", "--desk")])
 def test_ctrl_c_ends_waiting_for_a_page(words: tuple[str, ...], tmp_path: Path) -> None:
-    words = (*words, DRIVE, "COM1", "5", "3", "5") if words[0] == "run" else words
     with started(*words, folder=tmp_path) as (process, output):
         assert line_with(output, "The run begins when a page shows it")
         process.send_signal(signal.SIGINT)
@@ -145,12 +149,12 @@ def test_ctrl_c_ends_waiting_for_a_page(words: tuple[str, ...], tmp_path: Path) 
 
 @pytest.mark.parametrize("name", cases(["soccer", "avoid"]))
 def test_demonstration_on_a_desk(name: str, tmp_path: Path) -> None:
-    with started("demo", name, "--desk", "--no-wait", folder=tmp_path) as (process, output):
-        url = url_of(output)
-        with browser().open(url, timeout=GUARD_S) as answer:
-            assert answer.status == 200
-        process.send_signal(signal.SIGINT)
-        assert process.wait(GUARD_S) == 0
+    words, opener = ("demo", name, "--desk", "--no-wait"), build_opener(HTTPCookieProcessor())
+    with (
+        started(*words, folder=tmp_path, command=kiks_command()) as (_, output),
+        opener.open(url_of(output), timeout=GUARD_S) as answer,
+    ):
+        assert answer.status == 200
 
 
 @pytest.mark.parametrize("thinking", cases(["live", "none"]))
@@ -189,21 +193,6 @@ def test_errors_are_one_clear_line(words: tuple[str, ...], message: str, tmp_pat
     assert result.returncode == 2
     assert message in result.stderr
     assert "Traceback" not in result.stderr
-
-
-def test_programs_of_a_project_lie_beside_it_wherever_the_desk_saves(tmp_path: Path) -> None:
-    (tmp_path / "own").mkdir()
-    (tmp_path / "set").mkdir()
-    (tmp_path / "set" / "judge.py").write_text("def supervise(sim):\n    yield 1\n")
-    (tmp_path / "set" / "it.kiks").write_text(
-        'kiks = 1\nsupervisor = "judge.py"\n[walls]\nsize_mm = [400, 400]\n[[robot]]\n'
-    )
-    words = ("desk", "set/it.kiks", "--folder", "own", "--no-browser", "--port", "0")
-    with started(*words, folder=tmp_path) as (process, output):
-        with browser().open(url_of(output), timeout=GUARD_S) as answer:
-            assert answer.status == 200
-        process.send_signal(signal.SIGINT)
-        assert process.wait(GUARD_S) == 0
 
 
 @at_length

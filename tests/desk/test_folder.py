@@ -1,9 +1,10 @@
-"""Files of a desk: no name leads out of its folder, and invalid files are refused."""
+"""Projects and programs of a desk: no name leads out of its folder, and invalid files are refused."""
 
 from __future__ import annotations
 
 import io
 import os
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,15 +13,25 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
+from tests.at_length import share
 
 from kiks.desk.server.folder import LISTED_MAX, OPENED, Folder, decode, encode
-from kiks.desk.server.scripts import ProgramFolder
+from kiks.desk.server.scripts import (
+    EXAMPLES,
+    ProgramFolder,
+    encode_script,
+    find_mistake,
+    offered,
+    read_script,
+    split_arguments,
+)
 from kiks.errors import ArenaError, KiksError, ParameterError
 from kiks.model.arena import Arena, Lamp
-from kiks.model.limits import UPLOAD_BYTES_MAX
+from kiks.model.limits import PROGRAM_BYTES_MAX, UPLOAD_BYTES_MAX
 from kiks.model.project import Project
+from kiks.model.shipped import demonstrations
 
-PROJECT = Project()
+PROJECT = Project(Arena.box(300, 200))
 
 BAD_NAMES = [
     "", " ", ".", "..", "../x", "a/../../x", "/etc/x", "//x", "\0", "x\0.kiks", "a\\b", "C:\\x", "c:x", "~/x", "~x",
@@ -37,47 +48,41 @@ def read(folder: Folder, name: str) -> Project:
     return Project.load(folder.open(name))
 
 
-def snapshot(folder: Path) -> list[Path]:
-    return sorted(folder.rglob("*"))
-
-
 @pytest.fixture
 def home(tmp_path: Path) -> Path:
     home = tmp_path / "home"
     home.mkdir()
-    (tmp_path / "secret.kiks").write_bytes(Project().to_bytes())
+    (tmp_path / "secret.kiks").write_bytes(PROJECT.to_bytes())
     return home
 
 
-@pytest.mark.parametrize("name", BAD_NAMES)
-def test_names_outside_the_folder_are_refused(home, name):
-    folder, before = Folder(home), snapshot(home.parent)
-    for each in (name, f"{name}/x.kiks"):
-        with pytest.raises(KiksError):
-            save(folder, each, may_replace=True)
-        with pytest.raises(KiksError):
-            read(folder, each)
-    assert [path for path in snapshot(home.parent) if path not in before] == []
+def test_names_outside_the_folder_are_refused(home):
+    folder, before = Folder(home), {*home.parent.rglob("*")}
+    for name in BAD_NAMES:
+        for each in (name, f"{name}/x.kiks"):
+            with pytest.raises(KiksError):
+                save(folder, each, may_replace=True)
+            with pytest.raises(KiksError):
+                read(folder, each)
+        assert {*home.parent.rglob("*")} <= before, name
 
 
-@settings(max_examples=200)
+@settings(max_examples=share(60, 200))
 @given(st.text(st.sampled_from("./\\ab~:\0 -"), max_size=12))
 def test_random_names_stay_in_the_folder(tmp_path_factory, name):
-    base = tmp_path_factory.mktemp("base")
-    home = base / "home"
+    home = tmp_path_factory.mktemp("base") / "home"
     home.mkdir()
-    try:
-        saved = save(Folder(home), name)
-    except KiksError:
-        assert snapshot(base) == [home]
-        return
-    assert snapshot(base) == [home, home / saved]
-    assert Folder(home).names() == [saved]
+    found = []
+    with suppress(KiksError):
+        found = [save(Folder(home), name)]
+    assert {*home.parent.rglob("*")} == {home, *(home / each for each in found)}
+    assert Folder(home).names() == found
 
 
 def test_links_do_not_lead_out(home):
     os.symlink(home.parent, home / "up")
     os.symlink(home.parent / "secret.kiks", home / "secret.kiks")
+    os.symlink(home.parent / "secret.kiks", home / "link.py")
     os.symlink(home / "loop", home / "loop")
     folder = Folder(home)
     for name in ("up/secret.kiks", "secret.kiks", "up/new.kiks"):
@@ -85,16 +90,17 @@ def test_links_do_not_lead_out(home):
             read(folder, name)
         with pytest.raises(ParameterError, match="elsewhere"):
             save(folder, name, may_replace=True)
+    with pytest.raises(ParameterError, match="leads elsewhere"):
+        read_script(home / "link.py")
     assert folder.names() == []
     assert not (home.parent / "new.kiks").exists()
 
 
 def test_files_are_kept_and_listed(home):
-    folder = Folder(home)
+    folder, project = Folder(home), replace(PROJECT, seed=5)
     (home / "sub").mkdir()
     (home / "b.txt").write_text("")
     (home / ".hidden.kiks").write_text("")
-    project = replace(Project(Arena.box(300, 200)), seed=5)
     assert save(folder, " room ", project) == "room.kiks"
     assert save(folder, "sub/other.kiks", project) == "sub/other.kiks"
     assert save(folder, "old.KAD", project) == "old.KAD"
@@ -107,57 +113,59 @@ def test_files_are_kept_and_listed(home):
         save(folder, "room", project)
     save(folder, "room", replace(project, seed=6), may_replace=True)
     assert read(folder, "room.kiks").seed == 6
-    for name, words in [("sub/none/a", "can be written"), ("a.toml", "end in"), ("none.kiks", "exist")]:
-        with pytest.raises(KiksError, match=words):
-            read(folder, name) if name.startswith("none") else save(folder, name, project)
     (home / "dir.kiks").mkdir()
-    with pytest.raises(ParameterError, match="folder"):
-        save(folder, "dir", project, may_replace=True)
+    for name, words in [("sub/none/a", "can be written"), ("a.toml", "end in"), ("dir", "folder")]:
+        with pytest.raises(KiksError, match=words):
+            save(folder, name, project, may_replace=name == "dir")
+    with pytest.raises(KiksError, match="exist"):
+        read(folder, "none.kiks")
 
 
 def test_the_second_of_two_desks_is_told_that_a_file_has_changed(home):
-    project, changed = Project(Arena.box(300, 200)), "was changed elsewhere since you opened or saved it here"
-    save(Folder(home), "room", project)
+    changed = "was changed elsewhere since you opened or saved it here"
+    save(Folder(home), "room")
     one, two = Folder(home), Folder(home)
-    assert "exists" in one.question("room")
-    assert "exists" in two.question("room")
-    save(one, "room", replace(project, seed=1), may_replace=True)
+    for each in (one, two):
+        assert "exists" in each.question("room")
+    save(one, "room", replace(PROJECT, seed=1), may_replace=True)
     with pytest.raises(ParameterError, match="exists"):
-        save(two, "room", replace(project, seed=2), may_replace=True)
+        save(two, "room", replace(PROJECT, seed=2), may_replace=True)
     assert changed in two.question("room")
-    save(two, "room", replace(project, seed=2), may_replace=True)
+    save(two, "room", replace(PROJECT, seed=2), may_replace=True)
     assert changed in one.question("room")
     assert read(one, "room.kiks").seed == 2
     assert "exists" in one.question("room")
-    save(two, "new", project)
+    save(two, "new")
     assert changed in one.question("new")
 
 
-def test_long_lists_are_cut(home):
+def test_long_lists_are_cut_and_a_folder_has_at_most_so_many_files(home):
+    folder = ProgramFolder(home)
+    folder.count_max = 2
+    for name in ("a", "b", "b"):
+        folder.save(b"1", name, "a program", may_replace=True)
+    with pytest.raises(ParameterError, match="at most 2 files"):
+        folder.save(b"1", "c", "a program")
     for number in range(LISTED_MAX + 20):
         (home / f"{number}.kiks").touch()
     assert len(Folder(home).names()) == LISTED_MAX
     assert Folder(home / "none").names() == []
 
 
-def test_uploads_become_projects():
+def test_uploads_become_projects_or_are_refused():
     picture = io.BytesIO()
     Image.fromarray(np.zeros((120, 150), np.uint8)).save(picture, "PNG")
-    arena = replace(Arena.box(300, 200), lamps=(Lamp(50, 50),))
+    project = replace(PROJECT, arena=replace(PROJECT.arena, lamps=(Lamp(50, 50),)))
     for name, data, width_mm in [
-        ("a.kiks", Project(arena).to_bytes(), 300),
-        ("C:\\docs\\a.KAD", encode(Project(arena), "a.kad"), 300),
+        ("a.kiks", project.to_bytes(), 300),
+        ("C:\\docs\\a.KAD", encode(project, "a.kad"), 300),
         ("../a.toml", b"size_mm = [400, 300]\n", 400),
         ("a.png", picture.getvalue(), 150),
     ]:
-        project = decode(name, data)
-        assert project.arena.width_mm == width_mm
-        assert project.arena.name in ("a", "box")
-
-
-@pytest.mark.parametrize(
-    ("name", "data", "words"),
-    [
+        arena = decode(name, data).arena
+        assert arena.width_mm == width_mm
+        assert arena.name in ("a", "box")
+    for name, data, words in [
         ("a.exe", b"", "end in"),
         ("", b"", "name of a file"),
         ("a.png", b"none", "picture"),
@@ -165,17 +173,70 @@ def test_uploads_become_projects():
         ("a.toml", b'picture = "/etc/passwd.png"', "comes alone"),
         ("a.kiks", b"kiks = 3", "kiks must be 1"),
         *((f"a{ending}", bytes(UPLOAD_BYTES_MAX + 1), "at most") for ending in OPENED),
-    ],
-)
-def test_invalid_uploads_are_refused(name, data, words):
-    with pytest.raises((ArenaError, ParameterError), match=words):
-        decode(name, data)
+    ]:
+        with pytest.raises((ArenaError, ParameterError), match=words):
+            decode(name, data)
 
 
-def test_a_folder_has_at_most_so_many_files(tmp_path: Path) -> None:
+# ---- programs ----
+
+
+def test_own_programs_and_examples_are_offered(tmp_path: Path) -> None:
+    for name in ("b.py", "a.py", ".hidden.py", "text.txt"):
+        (tmp_path / name).write_text("")
+    (tmp_path / "folder.py").mkdir()
+    (tmp_path / "folder.py" / "below.py").write_text("")
+    labels = [*offered(ProgramFolder(tmp_path)).values()]
+    assert labels[:3] == ["a.py", "b.py", "example: avoid"]
+    examples = sum(path.parent.name == "demos" for path in demonstrations().values())
+    assert len(labels) == 2 + examples
+    assert len(offered(ProgramFolder(tmp_path / "nowhere"))) == examples
+
+
+def test_programs_are_saved_in_the_folder_alone_and_read_again(tmp_path: Path) -> None:
     folder = ProgramFolder(tmp_path)
-    folder.count_max = 2
-    for name in ("a", "b", "b"):
-        folder.save(b"1", name, "a program", may_replace=True)
-    with pytest.raises(ParameterError, match="at most 2 files"):
-        folder.save(b"1", "c", "a program")
+    assert folder.save(encode_script("print('grün')\n"), " mine ", "a program") == "mine.py"
+    assert read_script(tmp_path / "mine.py") == "print('grün')\n"
+    assert folder.full_name("text.txt") == "text.txt.py"
+    with pytest.raises(ParameterError, match="less deep"):
+        folder.save(b"pass", "a/b.py", "a program")
+    (tmp_path / "long.py").write_bytes(b"#" * (PROGRAM_BYTES_MAX + 1))
+    (tmp_path / "odd.py").write_bytes(b"\xff\xfe")
+    for name, message in (("long.py", "at most 200000 bytes"), ("odd.py", "readable"), ("none.py", "readable")):
+        with pytest.raises(ParameterError, match=message):
+            read_script(tmp_path / name)
+    with pytest.raises(ParameterError, match=r"at most 200000 bytes"):
+        encode_script("#" * (PROGRAM_BYTES_MAX + 1))
+
+
+def test_syntax_errors_have_their_line_and_their_place_in_it() -> None:
+    for line, *texts in (
+        (1, "x = (1,\n", "x = '\n", "x = 1\0", "(" * 10000),
+        (2, "pass\nif x\n    pass\n", "def f():\nreturn 1\n", "a = 1\n\tb = 2\n"),
+        (3, "pass\n\nreturn 1\n"),
+    ):
+        for text in texts:
+            mistake = find_mistake(text)
+            assert mistake is not None
+            assert mistake.line == line, text[:99]
+            assert str(mistake).startswith(f"Line {line}: ")
+    text = "# größer 🤖\nif größe = 2:\n    pass\n"
+    mistake = find_mistake(text)
+    assert mistake is not None
+    assert text[mistake.begin : mistake.end] == "größe = 2"
+    for script in EXAMPLES.glob("[!_]*.py"):
+        assert not find_mistake(read_script(script))
+
+
+@given(st.text(max_size=200))
+def test_any_text_is_a_program_or_has_a_mistake(text: str) -> None:
+    mistake = find_mistake(text)
+    if mistake is not None:
+        assert 0 <= mistake.begin <= mistake.end <= len(text)
+        assert 1 <= mistake.line <= text.count("\n") + 1
+
+
+def test_arguments_are_words() -> None:
+    assert split_arguments("""1 "two words" -x 'it'""") == ["1", "two words", "-x", "it"]
+    with pytest.raises(ParameterError, match=r"no closing quotation. Close the quotes"):
+        split_arguments("'it")

@@ -113,18 +113,34 @@ def at_once(*acts: Any) -> list[Any]:
 DRIVE = str(PROGRAMS / "drive.py")
 
 
-def joined(url: str, *words: str) -> str:
-    """Run a program in simulated time; return what it prints."""
-    done = forked.run("run", "--join", url, DRIVE, "COM1", *words)
+def printed(*words: str, code: str | None = None) -> str:
+    """Run `kiks`, or a program; return what it prints."""
+    done = forked.run(*words, code=code)
     assert done.returncode == 0, done.stderr
     return done.stdout
+
+
+def joined(url: str, *words: str, program: str = DRIVE) -> str:
+    """Run a program in simulated time; return what it prints."""
+    return printed("run", "--join", url, program, "COM1", *words)
 
 
 def opened(url: str, *words: str) -> str:
     """Run a program that opens the address as a port; return what it prints."""
-    done = forked.run(code=f"import sys; sys.argv = {['drive.py', url, *words]}\n{Path(DRIVE).read_text()}")
-    assert done.returncode == 0, done.stderr
-    return done.stdout
+    return printed(code=f"import sys; sys.argv = {['drive.py', url, *words]}\n{Path(DRIVE).read_text()}")
+
+
+def run_here(
+    folder: Path, thinking: str, words: Sequence[Sequence[str]], program: str = DRIVE
+) -> tuple[list[str], tuple[int, str]]:
+    """Run a program in each robot of this computer; return what each prints, and time and state at the end."""
+    here, files = fresh(len(words)), [folder / f"{number}.txt" for number in range(len(words))]
+    commands = [
+        Command(PROGRAMS / "into_file.py", [str(file), program, "COM1", *each])
+        for file, each in zip(files, words, strict=True)
+    ]
+    assert Programs(here, commands, thinking=thinking, patience_s=GUARD_S).run() == 0
+    return [file.read_text() for file in files], (here.now_ns, here.state_hash())
 
 
 @pytest.mark.parametrize("thinking", cases(["fixed:2.5", "none"]))
@@ -134,15 +150,7 @@ def test_robots_of_a_host_run_as_those_of_kiks_run(thinking: str, tmp_path: Path
         heard = at_once(lambda: joined(host.url(1), *words[0]), lambda: opened(host.url(2), *words[1]))
         there = wait_until(lambda: host.ends)[0]
         assert not host.desk.programs.doubt
-    files = [tmp_path / "1", tmp_path / "2"]
-    here = fresh(2)
-    commands = [
-        Command(PROGRAMS / "into_file.py", [str(file), DRIVE, "COM1", *each])
-        for file, each in zip(files, words, strict=True)
-    ]
-    assert Programs(here, commands, thinking=thinking, patience_s=GUARD_S).run() == 0
-    assert heard == [file.read_text() for file in files]
-    assert there == (here.now_ns, here.state_hash())
+    assert (heard, there) == run_here(tmp_path, thinking, words)
 
 
 OCTAVE = r"""
@@ -186,25 +194,16 @@ def test_octave_and_python_run_together_as_python_alone_under_kiks_run(tmp_path:
                 return program.finish()
 
         def python(number: int) -> str:
-            done = forked.run("run", "--join", host.url(number + 1), str(program), "COM1", *words[number])
-            assert done.returncode == 0, done.stderr
-            return done.stdout
+            return joined(host.url(number + 1), *words[number], program=str(program))
 
         (program := tmp_path / "identified.py").write_text(IDENTIFIED)
         acts = [partial(octave if number % 2 else python, number) for number in range(count)]
         done = at_once(*acts)
         assert not [each for each in done if isinstance(each, Exception)], done
         there = wait_until(lambda: host.ends)[0]
-    here = fresh(count)
-    files = [tmp_path / f"{number}.txt" for number in range(count)]
-    commands = [
-        Command(PROGRAMS / "into_file.py", [str(file), str(program), "COM1", *each])
-        for file, each in zip(files, words, strict=True)
-    ]
-    assert Programs(here, commands, thinking="fixed:1.5", patience_s=GUARD_S).run() == 0
-    assert there == (here.now_ns, here.state_hash())
-    for number, heard in enumerate(done):
-        text = files[number].read_text()
+    texts, here = run_here(tmp_path, "fixed:1.5", words, str(program))
+    assert there == here
+    for number, (heard, text) in enumerate(zip(done, texts, strict=True)):
         assert text.splitlines()[-1] == heard.said["reply"] if number % 2 else heard == text
     said = done[1].said
     assert said["pulse"] == 1000
@@ -292,7 +291,7 @@ def test_a_world_with_live_thinking_waits_for_no_program() -> None:
         robot.close()
 
 
-def test_a_person_begins_without_those_who_have_not_come() -> None:
+def test_a_person_begins_without_those_who_have_not_come_and_a_world_without_their_robots_lets_none_in() -> None:
     with hosted(3) as host:
         assert host.desk.is_paused
         with pytest.raises(ParameterError, match="robot 1 must be for programs of this computer"):
@@ -306,10 +305,6 @@ def test_a_person_begins_without_those_who_have_not_come() -> None:
         assert host.desk.programs.doubt == "the world did not wait for every program"
         assert host.desk.programs.players == {1: "has not come yet", 2: "drives", 3: "has not come yet"}
         robot.close()
-
-
-def test_a_world_without_the_robot_lets_no_program_in() -> None:
-    with hosted(2) as host:
         fewer = replace(host.desk.project, robots=host.desk.project.robots[:1])
         SERVER.run(host.desk.replace(fewer))
         with pytest.raises(LinkError, match="it does not: robot must be "):
@@ -372,7 +367,7 @@ def test_hostile_programs_end_alone() -> None:
         good.close()
 
 
-def test_a_wrong_token_is_refused() -> None:
+def test_a_wrong_token_is_refused_and_that_of_a_robot_opens_no_page() -> None:
     with hosted() as host:
         for token in ("", "x", "\xe9", "%0d%0aX:%20y", "a" * 5000, SERVER.key.token):
             with pytest.raises(LinkError, match=r"must (know the token|let the program in|be named as)"):
@@ -380,10 +375,6 @@ def test_a_wrong_token_is_refused() -> None:
         assert not host.desk.programs.are_there
         with pytest.raises(LinkError, match=r"must be that of robot 2, but it is that of robot 1\."):
             kiks.Khepera(host.url(1).replace("/1?", "/2?"))
-
-
-def test_a_token_of_a_robot_opens_no_page() -> None:
-    with hosted() as host:
         for path in (PATH, "/", "/desk/1", f"{SERVER.key.place}/desk/1"):
             request = Request(f"http://{SERVER.place()}{path}", headers={"Authorization": f"Bearer {host.tokens[1]}"})
             with pytest.raises(HTTPError, match="403"):
@@ -410,28 +401,22 @@ def test_kiks_host_runs_a_project_with_programs_elsewhere_and_its_own(tmp_path: 
     assert f"state {state}" in done.stderr
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (("run", "--join", "kiks://127.0.0.1:1/1?token=x", DRIVE), "must let the program in, but it does not: "),
-        (("run", "--join", "kiks://1", DRIVE), "must be named as kiks host prints it"),
-        (("run", "--join", "kiks://[::1:8123/1?token=x", DRIVE), "must be named as kiks host prints it"),
-        (("run", "--join", "kiks://127.0.0.1:99999/1?token=x", DRIVE), "must be named as kiks host prints it"),
-        (
-            ("run", "--join", "x", "--seed", "3", DRIVE),
-            "--seed must be left out with --join, as the host has the world",
-        ),
-        (("run", "--join", "x", DRIVE, DRIVE), "--join must have one program, for its address is that of one robot"),
-        (("host", "--thinking", "replay:x"), "thinking must be none, fixed:MS or live for programs elsewhere"),
-        (("host", "--thinking", "live", "--patience", "3"), "--patience must be left out with --thinking live"),
-    ],
-)
-def test_wrong_words_are_told(words: tuple[str, ...], message: str) -> None:
-    done = forked.run(*words)
-    assert done.returncode == 2
-    assert message in done.stderr
-    assert done.stderr.count("\n") == 1
-    assert "token=" not in done.stderr or "TOKEN" in done.stderr
+def test_wrong_words_are_told() -> None:
+    for words, message in (
+        ("run --join kiks://127.0.0.1:1/1?token=x DRIVE", "must let the program in, but it does not: "),
+        ("run --join kiks://1 DRIVE", "must be named as kiks host prints it"),
+        ("run --join kiks://[::1:8123/1?token=x DRIVE", "must be named as kiks host prints it"),
+        ("run --join kiks://127.0.0.1:99999/1?token=x DRIVE", "must be named as kiks host prints it"),
+        ("run --join x --seed 3 DRIVE", "--seed must be left out with --join, as the host has the world"),
+        ("run --join x DRIVE DRIVE", "--join must have one program, for its address is that of one robot"),
+        ("host --thinking replay:x", "thinking must be none, fixed:MS or live for programs elsewhere"),
+        ("host --thinking live --patience 3", "--patience must be left out with --thinking live"),
+    ):
+        done = forked.run(*(DRIVE if word == "DRIVE" else word for word in words.split()))
+        assert done.returncode == 2
+        assert message in done.stderr
+        assert done.stderr.count("\n") == 1
+        assert "token=" not in done.stderr or "TOKEN" in done.stderr
 
 
 def test_a_program_in_simulated_time_opens_no_robot_elsewhere(tmp_path: Path) -> None:
@@ -446,30 +431,33 @@ WELCOME = {"version": __version__, "robot": 1, "is_late": False, "end_ns": 1 << 
 WELCOME |= {"offered": ["COM1"], "seed": "0 1", "pulse_mm": 0.08}
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        ([b"no text"], "both computers must have the same KiKS, but"),
-        (["{"], "both computers must have the same KiKS, but"),
-        ([json.dumps(WELCOME | {"version": "0.1"})], "has '0.1', and this is"),
-        ([json.dumps(WELCOME | {"robot": 0})], "the host at"),
-        ([json.dumps(WELCOME | {"thinking": "replay:times.txt"})], "it asks for a file of this computer"),
-        ([json.dumps(WELCOME), b"\xff" * 100], "must answer as KiKS does, but it does not"),
-        ([json.dumps(WELCOME), packed((1,))], "must answer as KiKS does, but it does not"),
-        ([json.dumps(WELCOME), packed((1, -5, None, 0, ""))], "must answer as KiKS does, but it does not"),
-        ([json.dumps(WELCOME), "text"], "must be there, but has gone"),
-        ([], "must let the program in, but it does not"),
-    ],
-)
-def test_a_host_is_not_trusted_either(words: list[str | bytes], message: str) -> None:
+LIES: list[tuple[list[str | bytes], str]] = [
+    ([b"no text"], "both computers must have the same KiKS, but"),
+    (["{"], "both computers must have the same KiKS, but"),
+    ([json.dumps(WELCOME | {"version": "0.1"})], "has '0.1', and this is"),
+    ([json.dumps(WELCOME | {"robot": 0})], "the host at"),
+    ([json.dumps(WELCOME | {"thinking": "replay:times.txt"})], "it asks for a file of this computer"),
+    ([json.dumps(WELCOME), b"\xff" * 100], "must answer as KiKS does, but it does not"),
+    ([json.dumps(WELCOME), packed((1,))], "must answer as KiKS does, but it does not"),
+    ([json.dumps(WELCOME), packed((1, -5, None, 0, ""))], "must answer as KiKS does, but it does not"),
+    ([json.dumps(WELCOME), "text"], "must be there, but has gone"),
+    ([], "must let the program in, but it does not"),
+]
+
+
+def test_a_host_is_not_trusted_either() -> None:
+    lie: list[str | bytes] = []
+
     def attend(web: ServerConnection) -> None:
-        for word in words:
-            web.send(word)
-        if len(words) > 1:
+        answers = [*lie]
+        for answer in answers:
+            web.send(answer)
+        if len(answers) > 1:
             web.recv(GUARD_S)
 
     with serve(attend, "127.0.0.1", 0) as server:
         threading.Thread(target=server.serve_forever, daemon=True).start()
         place = f"127.0.0.1:{server.socket.getsockname()[1]}"
-        with pytest.raises(LinkError, match=re.escape(message)):
-            kiks.Khepera(f"kiks://{place}/1?token=x")
+        for lie[:], message in LIES:
+            with pytest.raises(LinkError, match=re.escape(message)):
+                kiks.Khepera(f"kiks://{place}/1?token=x")

@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 import asyncio
-import http.client
 import json
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
-from urllib.parse import urlencode, urlsplit
+from urllib.parse import urlencode
 
 import pytest
 import socketio
-from nicegui import Client
+from nicegui import Client as Page
+from tests.desk.clients import OWNER, Client
 from tests.guard import GUARD_S
 from tests.namespaces import needs_sandbox
 from websockets.exceptions import ConnectionClosed, InvalidStatus
-from websockets.sync.client import ClientConnection, connect
+from websockets.sync.client import ClientConnection
 
 from kiks.desk.room.entrance import Guesses, check_code
 from kiks.desk.room.names import folder_name, read_names
@@ -37,22 +37,8 @@ NAMES = ["Ada", "Bob", "../etc", "<b>Eve</b>"]
 CODE = "KX7Q2M"
 
 
-@dataclass
-class Browser:
-    """A browser without a person: it keeps one cookie."""
-
-    cookie: str = ""
-    home: str = ""
-
-    def ask(self, path: str, method: str = "GET", body: str | None = None, **headers: str) -> tuple[int, str, str]:
-        """Return status, headers and page."""
-        asking = http.client.HTTPConnection(urlsplit(SERVER.address()).netloc, timeout=GUARD_S)
-        sent = {"Cookie": self.cookie, **{name.replace("_", "-"): value for name, value in headers.items()}}
-        asking.request(method, path, body, sent)
-        answer = asking.getresponse()
-        page = answer.read().decode(errors="replace")
-        asking.close()
-        return answer.status, str(answer.headers), page
+class Browser(Client):
+    """A browser of a student."""
 
     def enter(self, name: str, code: str = CODE) -> int:
         """Choose a name, and keep the cookie; return the status."""
@@ -62,33 +48,27 @@ class Browser:
             self.home = json.loads(re.search("const home = (.*);", page)[1])  # type: ignore[index]
         return status
 
-    def page(self, path: str = "") -> tuple[int, str]:
-        status, _, page = self.ask(f"{self.home}{path}")
-        return status, page
 
-    def feed(self, path: str) -> ClientConnection:
-        netloc = urlsplit(SERVER.address()).netloc
-        return connect(f"ws://{netloc}{path}", additional_headers={"Cookie": self.cookie}, compression=None)
+def entered(*names: str) -> list[Browser]:
+    """Return browsers of students who have chosen these names."""
+    browsers = [Browser() for _ in names]
+    assert [browser.enter(name) for browser, name in zip(browsers, names, strict=True)] == [200] * len(names)
+    return browsers
 
-    def client_id(self, path: str) -> str:
-        """Open a page of NiceGUI, and return the number that it has."""
-        known = set(Client.instances)
-        assert self.page(path)[0] == 200
-        (new,) = set(Client.instances) - known
-        return new
+
+def page_number(client: Client, path: str) -> str:
+    """Open a page of NiceGUI; return the number that it has."""
+    known = set(Page.instances)
+    assert client.page(path)[0] == 200
+    (new,) = set(Page.instances) - known
+    return new
 
 
 def exercise() -> Project:
     arena = Arena.box(400, 400)
     shown, hidden = Cases("home", seed=(1, 2)), Cases("secret", seed=(3,), is_hidden=True)
     goal = Goal("Drive 5 cm", solved="path_mm > 50", points="7 * is_solved")
-    return Project(
-        arena,
-        robots=(ProjectRobot(),),
-        goal=goal,
-        cases=(shown, hidden),
-        exercise=Exercise("Drive"),
-    )
+    return Project(arena, robots=(ProjectRobot(),), goal=goal, cases=(shown, hidden), exercise=Exercise("Drive"))
 
 
 @pytest.fixture
@@ -105,10 +85,6 @@ def assert_ends(feed: ClientConnection) -> None:
         except ConnectionClosed:
             return
     raise AssertionError("the connection is still there")
-
-
-def owner() -> Browser:
-    return Browser(f"{COOKIE}={SERVER.key.token}", f"{SERVER.key.place}/")
 
 
 def test_a_student_comes_in_by_code_and_name(room: Room) -> None:
@@ -128,17 +104,16 @@ def test_a_student_comes_in_by_code_and_name(room: Room) -> None:
     assert status == 307
     assert "desk/1" in headers
     assert browser.page("desk/1")[0] == 200
-    with browser.feed(f"{browser.home}desk/1/feed") as feed:
+    with browser.socket("desk/1/feed") as feed:
         assert json.loads(feed.recv(timeout=GUARD_S))["kind"] == "scene"
 
 
 def test_a_name_is_taken_until_it_is_given_free(room: Room) -> None:
-    first, second = Browser(), Browser()
-    assert first.enter("Ada") == 200
+    (first,), second = entered("Ada"), Browser()
     assert second.enter("Ada") == 409
     assert not second.cookie
     (room.desks["Ada"].desk.folder / "mine.py").write_text("print(1)")
-    with first.feed(f"{first.home}desk/1/feed") as feed:
+    with first.socket("desk/1/feed") as feed:
         feed.recv(timeout=GUARD_S)
         SERVER.run(room.give_free("Ada"))
         assert_ends(feed)
@@ -150,8 +125,7 @@ def test_a_name_is_taken_until_it_is_given_free(room: Room) -> None:
 
 
 def test_a_student_reaches_nothing_of_another(room: Room) -> None:
-    ada, bob = Browser(), Browser()
-    assert ada.enter("Ada") == bob.enter("Bob") == 200
+    ada, bob = entered("Ada", "Bob")
     for path in (
         *("desk/2", "desk/2/feed", "desk/2/arena/1.png", "desk/02", "desk/1/../2", "desk/1/%2e%2e/2", "desk//2"),
         *("room", "room/picture/1", "room/", "/room", "./room", "room?token=x", "desk/1/../../room", "openapi.json"),
@@ -161,27 +135,25 @@ def test_a_student_reaches_nothing_of_another(room: Room) -> None:
     for mixed in (Browser(ada.cookie, bob.home), Browser(bob.cookie, ada.home), Browser("", ada.home)):
         assert mixed.page("desk/1")[0] == mixed.page("desk/2")[0] == mixed.page("room")[0] == 403
         for number in (1, 2):
-            with pytest.raises(InvalidStatus), mixed.feed(f"{mixed.home}desk/{number}/feed"):
+            with pytest.raises(InvalidStatus), mixed.socket(f"desk/{number}/feed"):
                 pass
-    with pytest.raises(InvalidStatus), ada.feed(f"{ada.home}desk/2/feed"):
+    with pytest.raises(InvalidStatus), ada.socket("desk/2/feed"):
         pass
-    assert Browser(ada.cookie, owner().home).page("room")[0] == 403
+    assert Browser(ada.cookie, OWNER.home).page("room")[0] == 403
     assert Browser(f"{COOKIE}={SERVER.key.token}", ada.home).page("desk/1")[0] == 403
     assert ada.ask("/room?token=" + ada.cookie.partition("=")[2])[0] == 403
-    assert owner().page("desk/2")[0] == owner().page("room")[0] == 200
-    assert owner().ask(f"{owner().home}room/picture/1")[2].startswith("\ufffd\ufffd")
+    assert OWNER.page("desk/2")[0] == OWNER.page("room")[0] == 200
+    assert OWNER.ask(f"{OWNER.home}room/picture/1")[2].startswith("\ufffd\ufffd")
 
 
 def test_messages_reach_pages_of_the_same_token_alone(room: Room) -> None:
-    ada, bob = Browser(), Browser()
-    assert ada.enter("Ada") == bob.enter("Bob") == 200
-    own, other, lecturers = ada.client_id("desk/1"), bob.client_id("desk/2"), owner().client_id("room")
+    ada, bob = entered("Ada", "Bob")
+    own, other, lecturers = (page_number(*each) for each in ((ada, "desk/1"), (bob, "desk/2"), (OWNER, "room")))
     heard: list[Any] = []
     for page in (other, lecturers):
-        client = Client.instances[page]
         for name in ("handle_event", "handle_javascript_response", "handle_log_message"):
-            setattr(client, name, lambda message, name=name: heard.append(name))
-    Client.instances[own].handle_event = lambda message: heard.append("own")  # type: ignore[method-assign]
+            setattr(Page.instances[page], name, lambda message, name=name: heard.append(name))
+    Page.instances[own].handle_event = lambda message: heard.append("own")  # type: ignore[method-assign]
 
     async def attack() -> list[Any]:
         answers = []
@@ -209,34 +181,17 @@ def test_messages_reach_pages_of_the_same_token_alone(room: Room) -> None:
 
     assert asyncio.run(attack())[:3] == [False, False, True]
     assert set(heard) <= {"own"}
-    assert Client.instances[other].tab_id is None
+    assert Page.instances[other].tab_id is None
     upload = f"{ada.home}_nicegui/client/{other}/upload/5"
     assert ada.ask(upload, "POST", "x", content_length="1")[0] == 404
 
 
-def test_a_student_who_asks_too_much_is_refused(room: Room) -> None:
-    ada, bob = Browser(), Browser()
-    assert ada.enter("Ada") == bob.enter("Bob") == 200
+def test_a_student_who_asks_too_much_is_refused_and_a_guesser_has_to_wait(room: Room) -> None:
+    ada, bob = entered("Ada", "Bob")
     answers = [ada.page("desk/1/unknown")[0] for _ in range(40)]
     assert answers[:15] == [404] * 15
     assert answers[-1] == 429
-    assert bob.page("desk/2")[0] == owner().page("desk/1")[0] == 200
-
-
-def test_wrong_codes_are_few() -> None:
-    now = [0.0]
-    guesses = Guesses(wall_s=lambda: now[0])
-    borne = 0
-    for second in range(3600):
-        now[0] = float(second)
-        for _ in range(100):
-            if not guesses.must_wait(f"192.0.2.{second % 200}"):
-                borne += 1
-                guesses.note_wrong(f"192.0.2.{second % 200}")
-    assert borne <= 200 + 5 * 3600
-
-
-def test_a_guesser_has_to_wait(room: Room) -> None:
+    assert bob.page("desk/2")[0] == OWNER.page("desk/1")[0] == 200
     guesser = Browser()
     answers = [guesser.ask("/?code=AAAAA" + letter)[0] for letter in "BCDEFGHIJKLMNOPQRSTUVWXYZ"]
     assert answers[:10] == [403] * 10
@@ -244,26 +199,39 @@ def test_a_guesser_has_to_wait(room: Room) -> None:
     assert guesser.enter("Ada") == 429
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("Ada\nBob\n ada \n", "each name once, but 'ada' stands on lines 1 and 3"),
-        ("\n\n \n", "1 to 200 names"),
-        ("\n".join(f"student {number}" for number in range(10_000)), "200 names, one on each line, but it has 10000"),
-        ("Ada\n" + "x" * 61, "60 printable characters, but line 2"),
-        ("Ada\nB\u202eob\n", "60 printable characters, but line 2"),
-        ("Ada\nB\x1b[31mob\n", "60 printable characters"),
-        ("x" * 2_000_000, "at most 1 MiB"),
-        ("A\xffda".encode("latin-1"), "text in UTF-8"),
-    ],
-)
-def test_a_wrong_file_of_names_gets_one_line(tmp_path: Path, text: str | bytes, words: str) -> None:
+def test_wrong_codes_are_few() -> None:
+    now = [0.0]
+    guesses = Guesses(wall_s=lambda: now[0])
+    borne = 0
+    for second in range(600):
+        now[0] = float(second)
+        for _ in range(100):
+            if not guesses.must_wait(f"192.0.2.{second % 200}"):
+                borne += 1
+                guesses.note_wrong(f"192.0.2.{second % 200}")
+    assert borne <= 200 + 5 * 600
+
+
+def test_a_wrong_file_of_names_gets_one_line(tmp_path: Path) -> None:
     file = tmp_path / "names.txt"
-    file.write_bytes(text if isinstance(text, bytes) else text.encode())
-    with pytest.raises(ParameterError) as raised:
-        read_names(file)
-    assert words in str(raised.value)
-    assert "\n" not in str(raised.value)
+    for text, words in (
+        (b"Ada\nBob\n ada \n", "each name once, but 'ada' stands on lines 1 and 3"),
+        (b"\n\n \n", "1 to 200 names"),
+        (
+            b"".join(b"student %d\n" % number for number in range(10_000)),
+            "200 names, one on each line, but it has 10000",
+        ),
+        (b"Ada\n" + b"x" * 61, "60 printable characters, but line 2"),
+        ("Ada\nB\u202eob\n".encode(), "60 printable characters, but line 2"),
+        (b"Ada\nB\x1b[31mob\n", "60 printable characters"),
+        (b"x" * 2_000_000, "at most 1 MiB"),
+        (b"A\xffda", "text in UTF-8"),
+    ):
+        file.write_bytes(text)
+        with pytest.raises(ParameterError) as raised:
+            read_names(file)
+        assert words in str(raised.value)
+        assert "\n" not in str(raised.value)
 
 
 def test_names_become_folders_that_differ_and_lead_nowhere(tmp_path: Path) -> None:
@@ -280,26 +248,21 @@ def test_names_become_folders_that_differ_and_lead_nowhere(tmp_path: Path) -> No
 
 
 def test_what_is_handed_in_lies_in_one_folder(room: Room) -> None:
-    for name in ("Ada", "../etc"):
-        assert Browser().enter(name) == 200
-    desks = {name: each.desk for name, each in room.desks.items()}
-    for name, desk in desks.items():
-        assert desk.hand_in is not None
-        desk.hand_in(b"1", "mine.py")
-        desk.hand_in(name.encode(), "../../evil.zip")
-    folder = room.folder / "handed-in"
-    assert {each.name: each.read_bytes() for each in folder.iterdir()} == {
-        "Ada.zip": b"Ada",
-        f"{folder_name('../etc')}.zip": b"../etc",
-    }
+    entered("Ada", "../etc")
+    for name, each in room.desks.items():
+        each.desk.hand_in(b"1", "mine.py")  # type: ignore[misc]
+        each.desk.hand_in(name.encode(), "../../evil.zip")  # type: ignore[misc]
+    handed_in = {each.name: each.read_bytes() for each in (room.folder / "handed-in").iterdir()}
+    assert handed_in == {"Ada.zip": b"Ada", f"{folder_name('../etc')}.zip": b"../etc"}
     room.let_hand_in(False)
-    assert not desks["Ada"].may_hand_in
+    desk = room.desks["Ada"].desk
+    assert not desk.may_hand_in
     with pytest.raises(ParameterError, match="your teacher has closed it"):
-        desks["Ada"].hand_in(b"2", "mine.py")  # type: ignore[misc]
+        desk.hand_in(b"2", "mine.py")  # type: ignore[misc]
     room.let_hand_in(True)
     for wrong in ("mine", "x.p/y", ".", "a.\u65e5"):
         with pytest.raises(ParameterError, match="must be a file"):
-            desks["Ada"].hand_in(b"2", wrong)  # type: ignore[misc]
+            desk.hand_in(b"2", wrong)  # type: ignore[misc]
 
 
 def test_a_room_comes_up_again(tmp_path: Path) -> None:
@@ -326,15 +289,19 @@ def test_a_room_comes_up_again(tmp_path: Path) -> None:
         Room(exercise(), tmp_path, NAMES, tmp_path / "room", is_trusted=True)
 
 
-def test_a_desk_stays_with_the_exercise(room: Room) -> None:
+def test_a_desk_stays_with_the_exercise_without_hidden_cases_and_has_a_highest_speed(room: Room) -> None:
     """A project of a student's own could have a supervisor, which would run in the server's process."""
-    assert Browser().enter("Ada") == 200
+    entered("Ada")
     desk = room.desks["Ada"].desk
     (desk.folder / "evil.py").write_text("def supervise(sim):\n    yield 1\n")
     project = replace(exercise(), supervisor="evil.py")
     with pytest.raises(ParameterError, match="must stay with its exercise"):
         SERVER.run(desk.replace(project, desk.folder))
     assert desk.project == room.project
+    assert not any(case.is_hidden for table in room.project.cases for case in table.each())
+    for speed in (None, 2 * SPEED_MAX):
+        with pytest.raises(ParameterError, match="as many share this computer"):
+            SERVER.run(desk.set_speed(speed))
 
 
 def test_a_room_without_a_sandbox_does_not_open(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -368,10 +335,9 @@ print("done")
 @needs_sandbox
 def test_a_program_of_a_student_reaches_nothing_of_another(tmp_path: Path) -> None:
     (tmp_path / "names.txt").write_text("Ada")
-    room = Room(exercise(), tmp_path, NAMES, tmp_path / "room")
+    room = Room(exercise(), tmp_path, NAMES, tmp_path / "room", code=CODE)
     with open_room(room, port=0):
-        ada, bob = Browser(), Browser()
-        assert ada.enter("Ada", room.code) == bob.enter("Bob", room.code) == 200
+        entered("Ada", "Bob")
         desk, other = room.desks["Ada"].desk, room.desks["Bob"].desk
         (other.folder / "secret.py").write_text("print(1)")
         (desk.folder / "spy.py").write_text(SPY)
@@ -383,14 +349,6 @@ def test_a_program_of_a_student_reaches_nothing_of_another(tmp_path: Path) -> No
         assert handle.output is not None
         assert [each.text for each in handle.output.since(0)[1]] == ["done"]
         assert (other.folder / "secret.py").read_text() == "print(1)"
-
-
-def test_a_desk_of_a_room_has_a_highest_speed(room: Room) -> None:
-    assert Browser().enter("Ada") == 200
-    for speed in (None, 2 * SPEED_MAX):
-        with pytest.raises(ParameterError, match="as many share this computer"):
-            SERVER.run(room.desks["Ada"].desk.set_speed(speed))
-    assert not any(case.is_hidden for table in room.project.cases for case in table.each())
 
 
 def test_a_code_of_a_persons_own() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -28,26 +27,26 @@ PROJECT = Project(
 DRIVE = "import kiks\nkiks.Khepera('/dev/ttyUSB0').set_speed(10, 10)\nimport time\ntime.sleep(1)\nprint('there')\n"
 
 
-@pytest.fixture
-def program(tmp_path: Path) -> Callable[[str], Command]:
-    def write(text: str) -> Command:
-        (tmp_path / "drive.py").write_text(text)
-        return Command(tmp_path / "drive.py")
-
-    return write
+def program(folder: Path, text: str) -> Command:
+    (folder / "drive.py").write_text(text)
+    return Command(folder / "drive.py")
 
 
-def test_tries_are_those_of_a_program_and_can_be_stopped(tmp_path: Path, program: Callable[[str], Command]) -> None:
-    tries = Tries()
-    drive = program(DRIVE)
+def test_tries_are_those_of_a_program_wait_for_others_and_can_be_stopped(tmp_path: Path) -> None:
+    tries, drive, turns = Tries(), program(tmp_path, DRIVE), 0
+    while _TURNS.acquire(blocking=False):
+        turns += 1
     tries.begin(PROJECT, tmp_path, drive, has_hidden=False)
+    wait_until(lambda: tries.is_waiting)
+    _TURNS.release(turns)
     tries.wait()
+    assert (tries.is_waiting, tries.is_whole) == (False, True)
     assert (tries.error, [case.seed for case in tries.cases]) == ("", [1, 2])
     assert (tries.grade.points, tries.grade.solved) == (1, 2)
     assert tries.is_of(PROJECT, drive)
     assert tries.recording(1).is_file()
 
-    endless = program("while True:\n    pass\n")
+    endless = program(tmp_path, "while True:\n    pass\n")
     assert not tries.is_of(PROJECT, drive)
     tries.begin(PROJECT, tmp_path, endless, has_hidden=True)
     with pytest.raises(ParameterError, match="must end first"):
@@ -60,25 +59,11 @@ def test_tries_are_those_of_a_program_and_can_be_stopped(tmp_path: Path, program
     tries.close()
 
 
-def test_tries_that_wait_for_others_say_so(tmp_path: Path, program: Callable[[str], Command]) -> None:
-    tries = Tries()
-    turns = 0
-    while _TURNS.acquire(blocking=False):
-        turns += 1
-    tries.begin(PROJECT, tmp_path, program(DRIVE), has_hidden=False)
-    wait_until(lambda: tries.is_waiting)
-    _TURNS.release(turns)
-    tries.wait()
-    assert not tries.is_waiting
-    assert tries.is_whole
-    tries.close()
-
-
-def test_what_cannot_be_tried_is_said(tmp_path: Path, program: Callable[[str], Command]) -> None:
-    tries = Tries()
+def test_what_cannot_be_tried_is_said(tmp_path: Path) -> None:
+    tries, drive = Tries(), program(tmp_path, DRIVE)
     with pytest.raises(ParameterError, match="must have a robot"):
-        tries.begin(replace(PROJECT, robots=()), tmp_path, program(DRIVE), has_hidden=False)
-    tries.begin(replace(PROJECT, seconds=None), tmp_path, program(DRIVE), has_hidden=False)
+        tries.begin(replace(PROJECT, robots=()), tmp_path, drive, has_hidden=False)
+    tries.begin(replace(PROJECT, seconds=None), tmp_path, drive, has_hidden=False)
     tries.wait()
     with pytest.raises(ParameterError, match="must have a time limit"):
         tries.packed()

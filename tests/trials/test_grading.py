@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import csv
-import io
 import json
 import re
 import signal
 import socket
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 from textwrap import dedent
 
 import pytest
 from playwright.sync_api import expect
+from tests import forked
+from tests.at_length import AT_LENGTH
 from tests.desk.visitor import NewPage, check_access, leave_picture
 from tests.guard import GUARD_S, wait_until
 from tests.namespaces import needs_sandbox
@@ -27,6 +29,7 @@ from kiks.model.project import Project
 from kiks.ports.program_process import python_line
 from kiks.trials.grading import load_exercise
 from kiks.trials.tables import cell
+from kiks.trials.trial import Outcome
 
 GOOD = """
     import kiks
@@ -64,8 +67,8 @@ NEIGHBOUR = """
 
 def exercise(folder: Path, *cases: Cases) -> Path:
     goal = Goal("Drive 10 cm", solved="path_mm > 100", points="10 - time_s if is_solved else path_mm / 100")
-    cases = cases or (Cases(seed=(1, 2)), Cases("hidden", seed=(3,), is_hidden=True))
-    project = Project(Arena.box(900, 900), seconds=4.0, goal=goal, cases=cases, exercise=Exercise("Ten <centimetres>"))
+    title = Exercise("Ten <centimetres>")
+    project = Project(Arena.box(900, 900), seconds=4.0, goal=goal, cases=cases or (Cases(seed=(1,)),), exercise=title)
     project.save(folder / "ten.kiks")
     return folder / "ten.kiks"
 
@@ -77,56 +80,70 @@ def write(folder: Path, programs: dict[str, str]) -> Path:
     return folder
 
 
-def grade(*words: object) -> subprocess.CompletedProcess[str]:
-    line = python_line("-m", "kiks", "grade", *map(str, words))
-    return subprocess.run(line, capture_output=True, text=True, timeout=GUARD_S, check=False)
+def grade(*words: object, **env: str) -> subprocess.CompletedProcess[str]:
+    return forked.run("grade", *map(str, words), env=env)
+
+
+def table(out: Path, name: str) -> list[dict[str, str]]:
+    with (out / name).open(newline="") as file:
+        return [*csv.DictReader(file)]
 
 
 def rows_of(out: Path) -> dict[str, dict[str, str]]:
-    text = (out / "grades.csv").read_text()
-    return {row["name"]: row for row in csv.DictReader(io.StringIO(text))}
+    return {row["name"]: row for row in table(out, "grades.csv")}
 
 
-def test_a_class_is_graded(tmp_path: Path) -> None:
-    project = exercise(tmp_path)
-    programs = write(tmp_path / "class", {"ann": GOOD, "bob": GOOD.replace("robot", "r") + "    # mine\n", **BROKEN})
+def outcomes_of(out: Path) -> dict[str, Outcome]:
+    lines = (out / "outcomes.jsonl").read_bytes().splitlines()
+    return {outcome.name: outcome for outcome in map(Outcome.from_line, lines)}
+
+
+@pytest.fixture(scope="module")
+def graded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder with the grades of a class; what the command told is in `told.json`."""
+    folder = tmp_path_factory.mktemp("graded")
+    programs = write(folder / "class", {"ann": GOOD, "bob": GOOD.replace("robot", "r") + "    # mine\n", **BROKEN})
     write(programs / "frank", {"a": "", "b": ""})
-    done = grade(project, programs, "--trusted", "--out", tmp_path / "out", "--json")
+    project = exercise(folder, Cases(seed=(1,)), Cases("hidden", seed=(3,), is_hidden=True))
+    done = grade(project, programs, "--trusted", "--workers", "1", "--out", folder / "out", "--json")
     assert done.returncode == 0, done.stderr
-    told = json.loads(done.stdout)
+    (folder / "out" / "told.json").write_text(done.stdout)
+    return folder / "out"
+
+
+def test_a_class_is_graded(graded: Path) -> None:
+    told = json.loads((graded / "told.json").read_text())
     assert [each["name"] for each in told["submissions"]] == ["ann", "bob", "carl", "dora", "frank"]
     assert told["alike"] == [{"first": "ann", "second": "bob", "share": 1.0}]
-    rows = rows_of(tmp_path / "out")
-    assert rows["ann"]["solved"] == "3"
+    rows = rows_of(graded)
+    assert rows["ann"]["solved"] == "2"
     assert float(rows["ann"]["points"]) > 7
     assert rows["ann"]["said_last"].startswith("encoders")
-    assert (rows["carl"]["crashed"], rows["dora"]["out of time"]) == ("3", "3")
+    assert (rows["carl"]["crashed"], rows["dora"]["out of time"]) == ("2", "2")
     assert rows["carl"]["said_last"] == "ValueError: =1+1 <b>what</b>"
     assert rows["frank"]["said_last"].startswith("it must have one program")
-    for number in (1, 3):
-        assert (tmp_path / "out" / "runs" / "ann" / f"{number}.mcap").is_file()
-    results = json.loads((tmp_path / "out" / "results" / "ann.json").read_text())
+    for number in (1, 2):
+        assert (graded / "runs" / "ann" / f"{number}.mcap").is_file()
+    results = json.loads((graded / "results" / "ann.json").read_text())
     assert sum(test["score"] for test in results["tests"]) == pytest.approx(results["score"], abs=0.001)
-    assert [test["visibility"] for test in results["tests"]] == ["visible", "visible", "hidden"]
+    assert [test["visibility"] for test in results["tests"]] == ["visible", "hidden"]
     assert [entry.get("order") for entry in results["leaderboard"]] == [None, None, "asc"]
-    report = (tmp_path / "out" / "report.html").read_text()
+    report = (graded / "report.html").read_text()
     assert "Ten &lt;centimetres&gt;" in report
     assert "<b>what" not in report
     assert "<script>alert" not in report
     assert not re.search(r"(?:src|href)=.?https?:", report)
-    moodle = [*csv.reader(io.StringIO((tmp_path / "out" / "moodle.csv").read_text()))]
-    assert moodle[0][0] == "Identifier"
-    assert {"Grade", "Last modified (grade)"} <= set(moodle[0])
+    first, *columns = table(graded, "moodle.csv")[0]
+    assert first == "Identifier"
+    assert {"Grade", "Last modified (grade)"} <= {*columns}
 
 
-def test_the_report_opens_what_belongs_to_a_name(tmp_path: Path, new_page: NewPage) -> None:
-    programs = write(tmp_path / "class", {"ann": GOOD, **BROKEN})
-    assert grade(exercise(tmp_path), programs, "--trusted", "--out", tmp_path / "out").returncode == 0
+def test_the_report_opens_what_belongs_to_a_name(graded: Path, new_page: NewPage) -> None:
     page = new_page(1366, 768)
     for colours, width in (("light", 1366), ("dark", 390)):
         page.emulate_media(color_scheme=colours)  # type: ignore[arg-type]
         page.set_viewport_size({"width": width, "height": 800})
-        page.goto((tmp_path / "out" / "report.html").as_uri())
+        page.goto((graded / "report.html").as_uri())
         check_access(page, colours)
         for name in ("ann", "carl"):
             page.get_by_role("button", name=name, exact=True).click()
@@ -142,45 +159,42 @@ def test_the_report_opens_what_belongs_to_a_name(tmp_path: Path, new_page: NewPa
 
 
 @needs_sandbox
-def test_hostile_programs_are_named_and_cost_the_others_nothing(tmp_path: Path) -> None:
-    project = exercise(tmp_path, Cases(seed=(1,)))
-    alone = write(tmp_path / "alone", {"ann": GOOD})
-    assert grade(project, alone, "--out", tmp_path / "expected").returncode == 0
-    target = tmp_path / "out" / "programs" / "ann" / "ann.py"
+def test_hostile_programs_are_named_and_cost_the_others_nothing(tmp_path: Path, graded: Path) -> None:
+    project, out, before = exercise(tmp_path), tmp_path / "out", tmp_path / "before"
     with socket.create_server(("127.0.0.1", 0)) as server:
-        neighbour = dedent(NEIGHBOUR).format(folder=tmp_path, target=target, port=server.getsockname()[1])
+        target, port = out / "programs" / "ann" / "ann.py", server.getsockname()[1]
+        neighbour = NEIGHBOUR.format(folder=tmp_path, target=target, port=port)
         programs = write(tmp_path / "class", {"ann": GOOD, "eve": neighbour, **HOSTILE})
-        done = grade(project, programs, "--out", tmp_path / "out")
+        done = grade(project, programs, "--out", out)
     assert done.returncode == 0, done.stderr
-    expected, rows = rows_of(tmp_path / "expected")["ann"], rows_of(tmp_path / "out")
-    assert rows["ann"] == expected
+    # Ann's run is the one that a class without them saw.
+    assert replace(outcomes_of(out)["ann/1"], key="") == replace(outcomes_of(graded)["ann/1"], key="")
+    rows = rows_of(out)
     assert rows["eve"]["said_last"] == "found []"
-    reasons = {"mallory": "processes", "oscar": "MB of memory", "trudy": "printed more than"}
-    for name, words in reasons.items():
+    for name, words in (("mallory", "processes"), ("oscar", "MB of memory"), ("trudy", "printed more than")):
         assert rows[name]["stopped"] == "1", rows[name]
         assert words in rows[name]["said_last"]
     assert float(rows["victor"]["points"]) == 0
     assert int(rows["victor"]["crashed"]) + int(rows["victor"]["stopped"]) == 1
-    # In the same place: a traceback that a program prints names it.
-    (tmp_path / "out").rename(tmp_path / "before")
-    assert grade(project, programs, "--out", tmp_path / "out", "--workers", "1").returncode == 0
-    for name in ("grades.csv", "moodle.csv", "outcomes.jsonl"):
-        assert (tmp_path / "before" / name).read_bytes() == (tmp_path / "out" / name).read_bytes()
+    if AT_LENGTH:
+        # In the same place: a traceback that a program prints names it.
+        out.rename(before)
+        assert grade(project, programs, "--out", out, "--workers", "1").returncode == 0
+        for name in ("grades.csv", "moodle.csv", "outcomes.jsonl"):
+            assert (before / name).read_bytes() == (out / name).read_bytes()
 
 
 def test_ctrl_c_says_how_to_go_on(tmp_path: Path) -> None:
-    project = exercise(tmp_path)
-    loop = "import kiks\nrobot = kiks.Khepera('/dev/ttyUSB0')\nwhile True: robot.pause(1e-3)"
-    programs = write(tmp_path / "class", {"ann": GOOD, "zoe": "while True: pass", "mia": loop})
-    words = [project, programs, "--trusted", "--workers", "1", "--out", tmp_path / "out"]
+    programs = write(tmp_path / "class", {"ann": GOOD, "zoe": "while True: pass"})
+    words = [exercise(tmp_path), programs, "--trusted", "--workers", "1", "--out", tmp_path / "out"]
     outcomes = tmp_path / "out" / "outcomes.jsonl"
     line = python_line("-m", "kiks", "grade", *map(str, words))
     with subprocess.Popen(line, stderr=subprocess.PIPE, text=True) as run:
-        wait_until(lambda: outcomes.exists() and outcomes.read_bytes().count(b"}\n") >= 6)
+        wait_until(lambda: outcomes.exists() and outcomes.read_bytes().count(b"}\n") >= 1)
         run.send_signal(signal.SIGINT)
         _, said = run.communicate(timeout=GUARD_S)
     assert run.returncode == 130
-    assert "stopped after 6 of 9 runs. The same command goes on from there." in said
+    assert "stopped after 1 of 2 runs. The same command goes on from there." in said
     assert "Traceback" not in said
 
 
@@ -211,9 +225,9 @@ def test_no_cell_begins_a_formula() -> None:
     assert cell(-1.5) == -1.5
 
 
-def test_without_a_sandbox_nothing_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("PATH", str(tmp_path))
-    done = grade(exercise(tmp_path), write(tmp_path / "class", {"ann": GOOD}), "--out", tmp_path / "out")
+def test_without_a_sandbox_nothing_runs(tmp_path: Path) -> None:
+    programs = write(tmp_path / "class", {"ann": GOOD})
+    done = grade(exercise(tmp_path), programs, "--out", tmp_path / "out", PATH=str(tmp_path))
     assert done.returncode == 2
     assert "bubblewrap" in done.stderr
     assert "--trusted" in done.stderr
