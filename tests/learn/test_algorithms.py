@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from tests.learn.small import small
+from tests.learn.small import refused, small
 
 import kiks
 from kiks import ParameterError
@@ -274,8 +274,7 @@ def test_an_evolution_with_other_options_is_another_one(tmp_path: Path) -> None:
 def test_tasks_that_an_algorithm_cannot_have_are_refused(
     algorithm: str | None, changes: dict[str, Any], message: str
 ) -> None:
-    with pytest.raises(ParameterError, match=message):
-        kiks.Evolution(small(**changes), algorithm)
+    refused(message, kiks.Evolution, small(**changes), algorithm)
 
 
 def test_a_task_without_objectives_has_no_front() -> None:

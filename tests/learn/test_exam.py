@@ -6,10 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.learn.small import ahead, small
+from tests.learn.small import ahead, refused, small
 
 import kiks
-from kiks.errors import ParameterError
 from kiks.learn.exam import EXAM_SEED, IMPERFECT, PASS_SHARE, ExamResult, imperfect_robots
 from kiks.model.arena import Pose
 
@@ -67,8 +66,7 @@ def test_the_text_says_whether_the_exam_is_passed(solved, word):
     ],
 )
 def test_wrong_exams_are_errors(make, message):
-    with pytest.raises(ParameterError, match=message):
-        make()
+    refused(message, make)
 
 
 def test_an_exam_with_imperfect_robots_is_that_with_each_of_them():

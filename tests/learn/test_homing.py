@@ -71,7 +71,7 @@ def test_the_same_robot_drives_on_a_line() -> None:
     assert [turret.name for turret in sim.turrets(1)] == ["Floor sensor"]
     start = [*sim.pose(1)]
     driver = Driver(ports, homing_network, parameters, period_s=ACTION_S)
-    while driver.begin_ns < 8_000_000_000:
+    while driver.begin_ns < 8e9:
         driver.step()
     batch = kiks.Batch(TASK.arenas[0], 1, seed=4, starts=start, timing=TASK.timings[0])
     batch.run(homing_network, parameters, seconds=8.0)
