@@ -154,23 +154,20 @@ def test_a_family_differs_and_repeats() -> None:
     assert 0.3 < dead < 0.7
 
 
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        ({"worlds": 0}, "worlds must be a whole number from 1"),
-        ({"robots": 0}, "robots must be a whole number from 1"),
-        ({"threads": 0}, "threads must be"),
-        ({"seed": -1}, "seeds must be"),
-        ({"seed": [1, 2]}, "seeds must be 4 whole numbers"),
-        ({"starts": (10, 10, 0)}, "start of robot 1 of world 0 must be free"),
-        ({"starts": [[1, 2]]}, "starts must be poses"),
-        ({"starts": (np.nan, 10, 0)}, "starts must be finite numbers"),
-        ({"robot": ["khepera"] * 3}, "one for each of 4 worlds"),
-        ({"senses": ("smell",)}, "senses must be some of"),
-    ],
-)
-def test_wrong_arguments_are_errors(options: dict[str, Any], words: str) -> None:
-    refused(words, kiks.Batch, arenas()[0], **{"worlds": 4} | options)
+def test_wrong_arguments_are_errors() -> None:
+    for words, options in (
+        ("worlds must be a whole number from 1", {"worlds": 0}),
+        ("robots must be a whole number from 1", {"robots": 0}),
+        ("threads must be", {"threads": 0}),
+        ("seeds must be", {"seed": -1}),
+        ("seeds must be 4 whole numbers", {"seed": [1, 2]}),
+        ("start of robot 1 of world 0 must be free", {"starts": (10, 10, 0)}),
+        ("starts must be poses", {"starts": [[1, 2]]}),
+        ("starts must be finite numbers", {"starts": (np.nan, 10, 0)}),
+        ("one for each of 4 worlds", {"robot": ["khepera"] * 3}),
+        ("senses must be some of", {"senses": ("smell",)}),
+    ):
+        refused(words, kiks.Batch, arenas()[0], **{"worlds": 4} | options)
 
 
 def test_an_arena_may_come_in_several_turns() -> None:
@@ -196,28 +193,24 @@ def light_only(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
     """Stand still."""
 
 
-@pytest.mark.parametrize(
-    ("robots", "controller", "parameters", "options", "words"),
-    [
-        (1, vehicle, [1.0], {}, "must be given 2 parameters"),
-        (1, vehicle, [[1.0, np.nan]], {}, "must be finite"),
-        (1, vehicle, np.zeros((3, 2)), {}, r"parameters must be \[parameter\]"),
-        (1, vehicle, [1.0, 0.0], {"seconds": -1}, "seconds must be"),
-        (1, 5, [1.0, 0.0], {}, "controller must be a kiks.Controller"),
-        (1, vehicle, [1.0, 0.0], {"measures": [5]}, "each of measures must be a kiks.Measure"),
-        (2, [vehicle], [[1.0, 0.0]], {}, "or a list of 2, one for each robot of a world, but it was a list of 1"),
-        (2, [vehicle, 5], [[1.0, 0.0]] * 2, {}, "controller must be a kiks.Controller"),
-        (2, [vehicle, light_only], [[1.0, 0.0], []], {}, "'light_only' senses ambient where another senses proximity"),
-        (2, [vehicle, vehicle], [1.0, 0.0, 2.0], {}, "a list with those of each of the 2 controllers"),
-        (2, [vehicle, vehicle], [[1.0, 0.0], [1.0]], {}, "must be given 2 parameters"),
-        (2, [vehicle] * 2, [[1.0, 0.0], np.zeros((3, 2))], {}, r"those of robot 2 had the shape \(3, 2\)"),
-    ],
-)
-def test_a_run_rejects_wrong_arguments(
-    robots: int, controller: Any, parameters: Any, options: dict[str, Any], words: str
-) -> None:
-    batch = kiks.Batch(kiks.Arena.box(400, 400), 4, robots=robots)
-    refused(words, batch.run, controller, parameters, **{"seconds": 1.0} | options)
+def test_a_run_rejects_wrong_arguments() -> None:
+    alone, pair = (kiks.Batch(kiks.Arena.box(400, 400), 4, robots=robots).run for robots in (1, 2))
+    given = [1.0, 0.0]
+    refused("must be given 2 parameters", alone, vehicle, [1.0], seconds=1.0)
+    refused("must be finite", alone, vehicle, [[1.0, np.nan]], seconds=1.0)
+    refused(r"parameters must be \[parameter\]", alone, vehicle, np.zeros((3, 2)), seconds=1.0)
+    refused("seconds must be", alone, vehicle, given, seconds=-1)
+    refused("controller must be a kiks.Controller", alone, 5, given, seconds=1.0)
+    refused("each of measures must be a kiks.Measure", alone, vehicle, given, seconds=1.0, measures=[5])
+    words = "or a list of 2, one for each robot of a world, but it was a list of 1"
+    refused(words, pair, [vehicle], [given], seconds=1.0)
+    refused("controller must be a kiks.Controller", pair, [vehicle, 5], [given] * 2, seconds=1.0)
+    words = "'light_only' senses ambient where another senses proximity"
+    refused(words, pair, [vehicle, light_only], [given, []], seconds=1.0)
+    refused("a list with those of each of the 2 controllers", pair, [vehicle] * 2, [1.0, 0.0, 2.0], seconds=1.0)
+    refused("must be given 2 parameters", pair, [vehicle] * 2, [given, [1.0]], seconds=1.0)
+    words = r"those of robot 2 had the shape \(3, 2\)"
+    refused(words, pair, [vehicle] * 2, [given, np.zeros((3, 2))], seconds=1.0)
 
 
 def test_the_same_controller_for_each_robot_is_one_for_all() -> None:

@@ -256,17 +256,12 @@ def test_what_a_measure_needs_must_be_sensed() -> None:
         batch.run(controller, np.zeros(34), seconds=1, measures=[kiks.measures.avoidance])
 
 
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: kiks.measures.wall_following("top"), "side must be 'left' or 'right', but it was 'top'"),
-        (lambda: kiks.measures.coverage(kiks.Arena.box(2000, 2000), square_mm=1), "at most 1000000 squares, but 1 mm"),
-        (lambda: kiks.measures.goal_mm("here", 0), "x_mm must be a number, but it was 'here'"),
-        (lambda: kiks.measures.largest_group(-1), "radius_mm must be at least 0"),
-    ],
-)
-def test_arguments_out_of_range(make: Any, message: str) -> None:
-    refused(message, make)
+def test_arguments_out_of_range() -> None:
+    measures = kiks.measures
+    refused("side must be 'left' or 'right', but it was 'top'", measures.wall_following, "top")
+    refused("at most 1000000 squares, but 1 mm", measures.coverage, kiks.Arena.box(2000, 2000), square_mm=1)
+    refused("x_mm must be a number, but it was 'here'", measures.goal_mm, "here", 0)
+    refused("radius_mm must be at least 0", measures.largest_group, -1)
 
 
 # ---- several values ----

@@ -76,9 +76,16 @@ def test_a_sense_inside_a_function_cannot_be_named() -> None:
         kiks.controllers.recipe_for(kiks.controllers.linear(senses=(inner,)))
 
 
-@pytest.mark.parametrize(
-    ("recipe", "message"),
-    [
+def test_wrong_recipes_are_errors(tmp_path: Path) -> None:
+    folder, elsewhere = tmp_path / "folder", tmp_path / "elsewhere"
+    for place in (elsewhere, folder / ".git"):
+        place.mkdir(parents=True)
+        (place / "mine.py").write_text(SHY)
+    for name in ("mine.py", "mine.txt"):
+        (folder / name).write_text(SHY)
+    (folder / "bad.py").write_text("1 / 0\n")
+    (folder / "link.py").symlink_to(elsewhere / "mine.py")
+    for recipe, message in (
         ("mlp", "must be a table with a kind .* or a function, but it was 'mlp'"),
         ({}, "must be a table with a kind .* or a function, but it was {}"),
         ({"function": 3}, "function must be 'package.module:name' or 'file.py:name', but it was 3"),
@@ -97,15 +104,5 @@ def test_a_sense_inside_a_function_cannot_be_named() -> None:
         ({"function": ".git/mine.py:shy"}, "in no folder whose name begins with a dot, but it was '.git/mine.py'"),
         ({"function": "../mine.py:shy"}, "must lead to a file in the"),
         ({"function": "link.py:shy"}, "must lie in the folder of the file that names it"),
-    ],
-)
-def test_wrong_recipes_are_errors(recipe: Any, message: str, tmp_path: Path) -> None:
-    folder, elsewhere = tmp_path / "folder", tmp_path / "elsewhere"
-    for place in (elsewhere, folder / ".git"):
-        place.mkdir(parents=True)
-        (place / "mine.py").write_text(SHY)
-    for name in ("mine.py", "mine.txt"):
-        (folder / name).write_text(SHY)
-    (folder / "bad.py").write_text("1 / 0\n")
-    (folder / "link.py").symlink_to(elsewhere / "mine.py")
-    refused(message, kiks.controllers.from_recipe, recipe, folder)
+    ):
+        refused(message, kiks.controllers.from_recipe, recipe, folder)

@@ -49,7 +49,9 @@ def candidates_of(evolution: kiks.Evolution) -> bytes:
     return b"".join(each.candidates.tobytes() + each.values.tobytes() for each in evolution.generations)
 
 
-def refused(message: str, call: Callable[..., Any], *given: Any, **options: Any) -> None:
-    """Check that a call with these arguments raises an error whose text fits the message."""
-    with pytest.raises(kiks.ParameterError, match=message):
+def refused(message: str, call: Callable[..., Any], *given: Any, **options: Any) -> str:
+    """Return the text of the error that a call with these arguments raises: one line that fits the message."""
+    with pytest.raises(kiks.ParameterError, match=message) as caught:
         call(*given, **options)
+    assert "\n" not in str(caught.value)
+    return str(caught.value)

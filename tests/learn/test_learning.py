@@ -9,10 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.learn.small import noted
-
-import kiks
-from kiks.learn.environments import environment_of
 
 pytestmark = pytest.mark.slow
 
@@ -140,18 +136,3 @@ def test_the_policy_that_learns_is_the_one_that_drives(pgpe: Any, name: str) -> 
             pgpe.tracing(counts[world], memory[world], parameters, wheels[world])
         np.testing.assert_allclose(wheels / 8.0, actions, rtol=0, atol=1e-12)
         assert actions.std() > 0.1
-
-
-def test_the_policy_drives_on_a_line_as_in_a_batch(pgpe: Any) -> None:
-    weights = 0.5 * np.random.default_rng(4).normal(size=(pgpe.INPUTS, 2))
-    weights[0] = 0.5
-    timing = environment_of("Avoid").timings[0]
-    parameters = [5.0, 0.04, *weights.ravel()]
-    batch = kiks.Batch(kiks.Arena.load("pillars"), 2, seed=7, timing=timing)
-    batch.run(pgpe.tracing, parameters, seconds=6)
-    for world in range(2):
-        sim = kiks.Simulation(kiks.Arena.load("pillars"), seed=7 + world)
-        hashes = noted(sim, sim.port(1))
-        kiks.drive(sim.port(1), pgpe.tracing, parameters, seconds=6, period_s=timing.period_s)
-        # The last line that it sends stops the robot.
-        assert hashes[-1] == batch.state_hash(world)

@@ -200,9 +200,8 @@ def test_exploration_changed_spaces_and_other_functions_are_refused() -> None:
         refused(message, kiks.champion_of_policy, changed, "Avoid")
 
 
-@pytest.mark.parametrize(
-    ("policy", "message"),
-    [
+def test_what_is_no_policy_is_an_error() -> None:
+    for policy, message in (
         (None, "policy must be a model or a policy .* but it was None"),
         ("model.zip", "policy must be a model or a policy .* but it was 'model.zip'"),
         ([], "but it had no layer"),
@@ -218,24 +217,19 @@ def test_exploration_changed_spaces_and_other_functions_are_refused() -> None:
         ({"scale": np.zeros(2)}, "it has 'scale'. Give the part that maps observations to actions"),
         ({"0.weight": np.zeros(2)}, "the weights of layer 1 must be finite numbers"),
         ({3: np.zeros(2)}, "policy must be a model or a policy"),
-    ],
-)
-def test_what_is_no_policy_is_an_error(policy: Any, message: str) -> None:
-    refused(message, kiks.champion_of_policy, policy, "Avoid")
+    ):
+        refused(message, kiks.champion_of_policy, policy, "Avoid")
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
+def test_options_that_do_not_fit_are_errors() -> None:
+    for options, message in (
         ({"activation": "relu"}, "activation must be 'tanh', as the policy has it, but it was 'relu'"),
         ({"output": "hard"}, "output must be 'clip', as the policy has it, but it was 'hard'"),
         ({"policy": LAYERS, "activation": "relu", "output": ["clip"]}, "output must be"),
         ({"task": "Avoit"}, "Did you mean 'Avoid'"),
         ({"task": "Maze"}, "with 16 inputs"),
-    ],
-)
-def test_options_that_do_not_fit_are_errors(options: dict[str, Any], message: str) -> None:
-    refused(message, kiks.champion_of_policy, **{"policy": PPO, "task": "Avoid"} | options)
+    ):
+        refused(message, kiks.champion_of_policy, **{"policy": PPO, "task": "Avoid"} | options)
 
 
 def test_networks_of_pytorch() -> None:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.learn.small import candidates_of, noted, refused
+from tests.learn.small import candidates_of, refused
 
 import kiks
 from kiks import ParameterError
@@ -99,25 +99,6 @@ def test_starts_are_apart_and_the_same_for_the_same_seed() -> None:
     np.testing.assert_array_equal(poses[:2], poses[4:])
     assert (poses[:2] != poses[2:4]).any()
     assert (np.hypot(*(poses[:, 0, :2] - poses[:, 1, :2]).T) > 55 + 100).all()
-
-
-def test_a_pair_on_the_wire_equals_that_of_the_batch() -> None:
-    task, seed = small(seconds=5.0), 7
-    pair, timing = pairs_of(task, 1), task.timings[0]
-    starts = task.start_poses(np.array([seed]))
-    assert starts is not None
-    batch = kiks.Batch(task.arenas[0], 1, robots=2, seed=seed, starts=starts, timing=timing)
-    batch.run(task.controllers, task.parameters_of(pair), seconds=5.0)
-    room = replace(task.arenas[0], starts=tuple(Pose(*pose) for pose in starts[0].tolist()))
-    sim = kiks.Simulation(room, robots=2, seed=seed)
-    sim.fit(1, "k213")
-    ports = [sim.port(1), sim.port(2)]
-    for port in ports:
-        port.baudrate = timing.baud or 0
-    hashes = noted(sim, ports[0])
-    kiks.drive(ports, task.controllers, [each[0] for each in task.parameters_of(pair)], seconds=5.0)
-    # The last line that it sends stops the robot.
-    assert hashes[-1] == batch.state_hash(0)
 
 
 def test_sides_may_have_several_robots_of_different_kinds() -> None:

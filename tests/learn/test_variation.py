@@ -114,13 +114,6 @@ def test_an_evolution_in_many_arenas_resumes(tmp_path: Any) -> None:
     refused("arenas", kiks.Evolution, task_of(arenas=many(8), worlds=2), "ga", seed=4, population=6, folder=tmp_path)
 
 
-def test_values_do_not_depend_on_other_candidates() -> None:
-    task = task_of(robot=family(KHEPERA, 4, seed=3), timing=TIMINGS)
-    together = values_of(task, (1, 2, 9))
-    for number, seed in enumerate((1, 2, 9)):
-        assert (values_of(task, (seed,))[0] == together[number]).all()
-
-
 def test_the_digest_depends_on_robots_and_timings() -> None:
     robots = ["khepera_ii", *(family(KHEPERA, 2, seed=seed) for seed in (1, 2))]
     changed = [{"robot": robot} for robot in robots] + [{"timing": timing} for timing in (TIMINGS, TIMINGS[1])]
