@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tests.learn.small import refused
 
 import kiks
-from kiks.batch import batch as batch_module
+from kiks.batch.batch import LANES
 from kiks.batch.initial_state import random_starts
 from kiks.batch.loop import sort_commands
 from kiks.batch.loop_timing import LENGTHS
@@ -36,8 +37,8 @@ def arenas() -> list[kiks.Arena]:
 def make(world_count: int = 37, **changes: Any) -> kiks.Batch:
     """Return worlds of two arenas with robots that differ."""
     robots = family(kiks.RobotSpec.load("khepera"), world_count, seed=4, dead_share=0.1)
-    options: dict[str, Any] = {"robot": robots, "seed": 21, "timing": kiks.Timing(0.05, 57600, 0.0013)}
-    return kiks.Batch(arenas(), world_count, **options | changes)
+    usual = {"arena": arenas(), "robot": robots, "seed": 21, "timing": kiks.Timing(0.05, 57600, 0.0013)}
+    return kiks.Batch(worlds=world_count, **usual | changes)
 
 
 def hashes(batch: kiks.Batch, seconds: float = 6.0) -> list[str]:
@@ -66,13 +67,10 @@ def expected() -> list[str]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("threads", "lanes"), [(2, None), (5, None), (2, 8), (2, 24), (2, 1000)])
-def test_threads_and_blocks_do_not_matter(
-    expected: list[str], monkeypatch: pytest.MonkeyPatch, threads: int, lanes: int | None
-) -> None:
-    if lanes is not None:
-        monkeypatch.setattr(batch_module, "LANES", lanes)
-    assert hashes(make(threads=threads)) == expected
+def test_threads_and_blocks_do_not_matter(expected: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    for threads, lanes in ((2, LANES), (5, LANES), (2, 8), (2, 24), (2, 1000)):
+        monkeypatch.setattr("kiks.batch.batch.LANES", lanes)
+        assert hashes(make(threads=threads)) == expected, (threads, lanes)
 
 
 def test_threads_that_share_a_batch_take_turns():
@@ -102,9 +100,7 @@ def test_threads_that_share_a_batch_take_turns():
 def test_a_world_is_the_same_among_others_and_alone(expected: list[str]) -> None:
     robots = family(kiks.RobotSpec.load("khepera"), 37, seed=4, dead_share=0.1)
     for world in (0, 13, 36):
-        alone = kiks.Batch(
-            arenas()[world % 2], 1, robot=[robots[world]], seed=21 + world, timing=kiks.Timing(0.05, 57600, 0.0013)
-        )
+        alone = make(1, arena=arenas()[world % 2], robot=[robots[world]], seed=21 + world)
         alone.run(vehicle, [np.linspace(2, 15, 37)[world], np.linspace(0.001, 0.02, 37)[world]], seconds=6.0)
         assert alone.state_hash(0) == expected[world]
 
@@ -147,8 +143,7 @@ def test_random_starts_of_several_robots_are_clear_of_each_other() -> None:
     assert gaps[:, ~np.eye(8, dtype=bool)].min() > 4.0
     kiks.Batch(arena, 50, robots=8, starts=starts)  # accepts them
     np.testing.assert_array_equal(starts[:, 0], random_starts(arena, 50, seed=1, clear_mm=4.0))
-    with pytest.raises(kiks.ParameterError, match="must have room for 60 robots"):
-        random_starts(arena, 1, seed=1, robots=60)
+    refused("must have room for 60 robots", random_starts, arena, 1, seed=1, robots=60)
 
 
 def test_a_family_differs_and_repeats() -> None:
@@ -159,24 +154,20 @@ def test_a_family_differs_and_repeats() -> None:
     assert 0.3 < dead < 0.7
 
 
-@pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        ({"worlds": 0}, "worlds must be a whole number from 1"),
-        ({"robots": 0}, "robots must be a whole number from 1"),
-        ({"threads": 0}, "threads must be"),
-        ({"seed": -1}, "seeds must be"),
-        ({"seed": [1, 2]}, "seeds must be 4 whole numbers"),
-        ({"starts": (10, 10, 0)}, "start of robot 1 of world 0 must be free"),
-        ({"starts": [[1, 2]]}, "starts must be poses"),
-        ({"starts": (np.nan, 10, 0)}, "starts must be finite numbers"),
-        ({"robot": ["khepera"] * 3}, "one for each of 4 worlds"),
-        ({"senses": ("smell",)}, "senses must be some of"),
-    ],
-)
-def test_wrong_arguments_are_errors(options: dict[str, Any], words: str) -> None:
-    with pytest.raises(kiks.ParameterError, match=words):
-        kiks.Batch(arenas()[0], **{"worlds": 4} | options)
+def test_wrong_arguments_are_errors() -> None:
+    for words, options in (
+        ("worlds must be a whole number from 1", {"worlds": 0}),
+        ("robots must be a whole number from 1", {"robots": 0}),
+        ("threads must be", {"threads": 0}),
+        ("seeds must be", {"seed": -1}),
+        ("seeds must be 4 whole numbers", {"seed": [1, 2]}),
+        ("start of robot 1 of world 0 must be free", {"starts": (10, 10, 0)}),
+        ("starts must be poses", {"starts": [[1, 2]]}),
+        ("starts must be finite numbers", {"starts": (np.nan, 10, 0)}),
+        ("one for each of 4 worlds", {"robot": ["khepera"] * 3}),
+        ("senses must be some of", {"senses": ("smell",)}),
+    ):
+        refused(words, kiks.Batch, arenas()[0], **{"worlds": 4} | options)
 
 
 def test_an_arena_may_come_in_several_turns() -> None:
@@ -194,25 +185,7 @@ def test_an_arena_may_come_in_several_turns() -> None:
 
 def test_arenas_must_hold_as_many_bodies() -> None:
     with_ball = kiks.Arena(arenas()[0].brightness, 1.0, "b", balls=(Ball(330, 100),))
-    with pytest.raises(kiks.ParameterError, match="same number of balls and cylinders"):
-        kiks.Batch([arenas()[0], with_ball], 2)
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        ({"parameters": [1.0]}, "must be given 2 parameters"),
-        ({"parameters": [[1.0, np.nan]]}, "must be finite"),
-        ({"parameters": np.zeros((3, 2))}, r"parameters must be \[parameter\]"),
-        ({"seconds": -1}, "seconds must be"),
-        ({"controller": 5}, "controller must be a kiks.Controller"),
-        ({"measures": [5]}, "each of measures must be a kiks.Measure"),
-    ],
-)
-def test_a_run_rejects_wrong_arguments(arguments: dict[str, Any], words: str) -> None:
-    given: dict[str, Any] = {"controller": vehicle, "parameters": [1.0, 0.0], "seconds": 1.0} | arguments
-    with pytest.raises(kiks.ParameterError, match=words):
-        make(4).run(given.pop("controller"), given.pop("parameters"), **given)
+    refused("same number of balls and cylinders", kiks.Batch, [arenas()[0], with_ball], 2)
 
 
 @kiks.controller(senses=("ambient",))
@@ -220,20 +193,24 @@ def light_only(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
     """Stand still."""
 
 
-@pytest.mark.parametrize(
-    ("controllers", "parameters", "words"),
-    [
-        ([vehicle], [[1.0, 0.0]], "or a list of 2, one for each robot of a world, but it was a list of 1"),
-        ([vehicle, 5], [[1.0, 0.0]] * 2, "controller must be a kiks.Controller"),
-        ([vehicle, light_only], [[1.0, 0.0], []], "'light_only' senses ambient where another senses proximity"),
-        ([vehicle, vehicle], [1.0, 0.0, 2.0], "a list with those of each of the 2 controllers"),
-        ([vehicle, vehicle], [[1.0, 0.0], [1.0]], "must be given 2 parameters"),
-        ([vehicle, vehicle], [[1.0, 0.0], np.zeros((3, 2))], r"those of robot 2 had the shape \(3, 2\)"),
-    ],
-)
-def test_a_run_rejects_wrong_controllers_of_several_robots(controllers: Any, parameters: Any, words: str) -> None:
-    with pytest.raises(kiks.ParameterError, match=words):
-        kiks.Batch(kiks.Arena.box(400, 400), 2, robots=2).run(controllers, parameters, seconds=1.0)
+def test_a_run_rejects_wrong_arguments() -> None:
+    alone, pair = (kiks.Batch(kiks.Arena.box(400, 400), 4, robots=robots).run for robots in (1, 2))
+    given = [1.0, 0.0]
+    refused("must be given 2 parameters", alone, vehicle, [1.0], seconds=1.0)
+    refused("must be finite", alone, vehicle, [[1.0, np.nan]], seconds=1.0)
+    refused(r"parameters must be \[parameter\]", alone, vehicle, np.zeros((3, 2)), seconds=1.0)
+    refused("seconds must be", alone, vehicle, given, seconds=-1)
+    refused("controller must be a kiks.Controller", alone, 5, given, seconds=1.0)
+    refused("each of measures must be a kiks.Measure", alone, vehicle, given, seconds=1.0, measures=[5])
+    words = "or a list of 2, one for each robot of a world, but it was a list of 1"
+    refused(words, pair, [vehicle], [given], seconds=1.0)
+    refused("controller must be a kiks.Controller", pair, [vehicle, 5], [given] * 2, seconds=1.0)
+    words = "'light_only' senses ambient where another senses proximity"
+    refused(words, pair, [vehicle, light_only], [given, []], seconds=1.0)
+    refused("a list with those of each of the 2 controllers", pair, [vehicle] * 2, [1.0, 0.0, 2.0], seconds=1.0)
+    refused("must be given 2 parameters", pair, [vehicle] * 2, [given, [1.0]], seconds=1.0)
+    words = r"those of robot 2 had the shape \(3, 2\)"
+    refused(words, pair, [vehicle] * 2, [given, np.zeros((3, 2))], seconds=1.0)
 
 
 def test_the_same_controller_for_each_robot_is_one_for_all() -> None:
@@ -244,54 +221,42 @@ def test_the_same_controller_for_each_robot_is_one_for_all() -> None:
     assert [batch.state_hash(world) for world in range(3)] == expected
 
 
+def counts(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
+    wheels[0] = len(sensors) + 10 * len(memory) + len(parameters) + parameters[-1]
+
+
+@kiks.measure(notes=4, result=lambda notes: notes, names=("error", "next_mm", "own_mm", "left"))
+def seen(moment: Any, notes: Any) -> None:
+    """How far what it sees of itself and of its number of robots is wrong, summed up; two places and a speed."""
+    own = moment.poses[moment.robot]
+    notes[0] += abs(own[0] - moment.x_mm) + abs(own[1] - moment.y_mm) + abs(own[2] - moment.heading_rad)
+    notes[0] += abs(len(moment.poses) - 3)
+    notes[1] = moment.poses[(moment.robot + 1) % 3, 0]
+    notes[2] = moment.x_mm
+    notes[3] = moment.wheels[0]
+
+
 def test_controllers_get_their_own_counts_of_numbers() -> None:
-    @kiks.controller(senses=("proximity", "ambient"), memory=3, parameters=1)
-    def large(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
-        wheels[0] = 10000 * len(sensors) + 100 * len(memory) + len(parameters) + parameters[0]
-
-    @kiks.controller(memory=1)
-    def small(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
-        wheels[0] = 10000 * len(sensors) + 100 * len(memory) + len(parameters) + parameters[1]
-
-    @kiks.measure
-    def wanted(moment: Any, notes: Any) -> None:
-        notes[0] = moment.wheels[0]
-
+    large = kiks.controller(senses=("proximity", "ambient"), memory=3, parameters=1)(counts)
+    small = kiks.controller(memory=1)(counts)
     batch = kiks.Batch(kiks.Arena.box(400, 400), 1, robots=3)
-    rollouts = batch.run([small, large, small], [[1, 0.25], [-0.5], [1, 2, 3]], seconds=0.1, measures=[wanted])
-    assert rollouts.values[0, :, 0].tolist() == [127.0] * 3
+    rollouts = batch.run([small, large, small], [[1, 2.0], [-1.0], [1, 2, 3]], seconds=0.1, measures=[seen])
+    assert rollouts.values[0, :, 3].tolist() == [8 + 10 + 2 + 2, 16 + 30 + 1 - 1, 8 + 10 + 3 + 3]
 
 
 def test_measures_see_all_robots_of_their_world() -> None:
-    @kiks.measure(notes=3, result=lambda notes: notes[..., 2])
-    def errors(moment: Any, notes: Any) -> None:
-        own = moment.poses[moment.robot]
-        notes[2] += abs(own[0] - moment.x_mm) + abs(own[1] - moment.y_mm) + abs(own[2] - moment.heading_rad)
-        notes[2] += abs(len(moment.poses) - 3)
-
-    @kiks.measure
-    def of_next_mm(moment: Any, notes: Any) -> None:
-        notes[0] = moment.poses[(moment.robot + 1) % 3, 0]
-
-    @kiks.measure
-    def own_mm(moment: Any, notes: Any) -> None:
-        notes[0] = moment.x_mm
-
     batch = kiks.Batch(kiks.Arena.box(500, 500), 10, robots=3, seed=2)
-    values = batch.run(vehicle, [1.0, 0.01], seconds=2.0, measures=[errors, of_next_mm, own_mm]).values
+    values = batch.run(vehicle, [1.0, 0.01], seconds=2.0, measures=[seen]).values
     assert (values[..., 0] == 0.0).all()
     assert np.array_equal(values[..., 1], np.roll(values[..., 2], -1, axis=1))
 
 
 def test_steps_reject_wrong_arguments() -> None:
     batch = make(2)
-    with pytest.raises(kiks.ParameterError, match=r"reset\(\) must be called"):
-        batch.step(np.zeros((2, 1, 2)))
+    refused(r"reset\(\) must be called", batch.step, np.zeros((2, 1, 2)))
     batch.reset()
-    with pytest.raises(kiks.ParameterError, match="wheels must be"):
-        batch.step(np.zeros((2, 2)))
-    with pytest.raises(kiks.ParameterError, match="world must be a whole number from 0 to 1"):
-        batch.state_hash(2)
+    refused("wheels must be", batch.step, np.zeros((2, 2)))
+    refused("world must be a whole number from 0 to 1", batch.state_hash, 2)
 
 
 def test_commands_act_in_the_order_of_their_lengths() -> None:

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
+from tests.at_length import cases, share
+from tests.learn.small import noted
 
 import kiks
 from kiks.client.drive import Driver
+from kiks.model.arena import Ball, Lamp
 
 pytestmark = pytest.mark.slow
 
@@ -32,93 +36,6 @@ def peer(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
     wheels[1] = 6.0 - (sensors[8] - sensors[13]) / 50.0 - sensors[1] / 100.0
 
 
-def arena(**things: Any) -> kiks.Arena:
-    from kiks.model.arena import Ball, Lamp
-
-    walls = np.zeros((500, 600), np.uint8)
-    walls[200:210, 150:400] = 255
-    walls[300:400, 420:430] = 1
-    drawn = kiks.Arena.from_array(walls)
-    from dataclasses import replace
-
-    return replace(drawn, balls=(Ball(300, 100),) * bool(things.get("ball")), lamps=(Lamp(100, 400),))
-
-
-def drive_alone(
-    where: kiks.Arena,
-    seed: int,
-    timing: kiks.Timing,
-    controller: Any,
-    parameters: Any,
-    cameras: Sequence[int] = (),
-    **sim_options: Any,
-) -> tuple[int, str]:
-    """Return the loops of a drive on the wire, and the hash when it ended, before the robot was stopped."""
-    assert timing.baud is not None
-    sim = kiks.Simulation(where, seed=seed, thinking=f"fixed:{timing.think_s * 1e3}", **sim_options)
-    for number in cameras:
-        sim.fit(number, "k213")
-    ports = [sim.port(number + 1) for number in range(sim.robot_count)]
-    hashes = []
-    for port in ports:
-        port.baudrate = timing.baud
-    first: Any = ports[0]
-    send = first.write
-
-    def note_and_send(data: bytes) -> int:
-        hashes.append(sim.state_hash())
-        return int(send(data))
-
-    first.write = note_and_send
-    loops = kiks.drive(ports, controller, parameters, seconds=8.0, period_s=timing.period_s)
-    return loops, hashes[-1]
-
-
-@pytest.mark.parametrize(
-    "timing",
-    [kiks.Timing(0.1, 9600), kiks.Timing(0.0, 9600), kiks.Timing(0.05, 38400, 0.0031)],
-    ids=["each 100 ms", "as fast as it goes", "with thinking"],
-)
-@pytest.mark.parametrize("controller", [wander, peer], ids=["proximity", "both senses"])
-@pytest.mark.parametrize("ball", [False, True], ids=["alone", "with a ball"])
-def test_batch_and_wire_agree_to_the_bit(timing: kiks.Timing, controller: kiks.Controller, ball: bool) -> None:
-    where = arena(ball=ball)
-    batch = kiks.Batch(where, worlds=3, seed=11, timing=timing)
-    rollouts = batch.run(controller, [1.0], seconds=8.0)
-    for world in range(3):
-        loops, state_hash = drive_alone(where, 11 + world, timing, controller, [1.0])
-        assert (loops, state_hash) == (rollouts.step_counts[world], batch.state_hash(world))
-
-
-@pytest.mark.parametrize("response", ["thesis", "fast"])
-def test_every_response_is_that_of_the_wire(response: str) -> None:
-    timing = kiks.Timing(0.1, 9600)
-    batch = kiks.Batch(arena(), worlds=2, seed=3, timing=timing, response=response)
-    rollouts = batch.run(wander, [[1.0], [0.7]], seconds=8.0)
-    for world, gain in enumerate((1.0, 0.7)):
-        found = drive_alone(arena(), 3 + world, timing, wander, [gain], response=response)
-        assert found == (rollouts.step_counts[world], batch.state_hash(world))
-
-
-@pytest.mark.parametrize("kind", ["linear", "mlp", "elman", "ctrnn", "graph", "gru", "plastic"])
-def test_controllers_that_come_with_kiks_agree(kind: str) -> None:
-    controller, timing = getattr(kiks.controllers, kind)(), kiks.Timing(0.1, 9600)
-    parameters = kiks.controllers.random_parameters(controller, 1, seed=7)[0]
-    batch = kiks.Batch(arena(), worlds=1, seed=8, timing=timing)
-    rollouts = batch.run(controller, parameters, seconds=8.0)
-    assert drive_alone(arena(), 8, timing, controller, parameters) == (rollouts.step_counts[0], batch.state_hash(0))
-
-
-def test_one_program_with_a_controller_for_each_robot() -> None:
-    timing = kiks.Timing(0.1, 19200)
-    batch = kiks.Batch(arena(ball=True), worlds=2, robots=3, seed=5, timing=timing)
-    controllers, parameters = [wander, peer, wander], [[1.0], [], [0.5]]
-    rollouts = batch.run(controllers, parameters, seconds=8.0)
-    for world in range(2):
-        found = drive_alone(arena(ball=True), 5 + world, timing, controllers, parameters, robots=3)
-        assert found == (rollouts.step_counts[world], batch.state_hash(world))
-
-
 @kiks.controller(senses=("proximity", "camera"))
 def gaze(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
     """Turn to the brighter side of the picture, away from what is near."""
@@ -133,15 +50,79 @@ def gaze_only(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
     wheels[0], wheels[1] = 4.0 + sensors[12:].sum() / 500.0, 4.0 + sensors[:4].sum() / 500.0
 
 
-@pytest.mark.parametrize("timing", [kiks.Timing(0.1, 19200), kiks.Timing(0.03, 57600)], ids=["100 ms", "30 ms"])
-@pytest.mark.parametrize("controllers", [[gaze, wander], [gaze_only, gaze_only]], ids=["one camera", "two"])
-def test_pictures_are_those_of_the_wire(timing: kiks.Timing, controllers: list[kiks.Controller]) -> None:
-    batch = kiks.Batch(arena(ball=True), worlds=11, robots=2, seed=7, timing=timing)
-    rollouts = batch.run(controllers, [[1.0], [1.0]], seconds=8.0)
-    for world in (0, 10):
-        cameras = [number for number, each in enumerate(controllers, 1) if "camera" in each.senses]
-        found = drive_alone(arena(ball=True), 7 + world, timing, controllers, [[1.0], [1.0]], cameras, robots=2)
-        assert found == (rollouts.step_counts[world], batch.state_hash(world))
+def arena(*, ball: bool = False) -> kiks.Arena:
+    walls = np.zeros((500, 600), np.uint8)
+    walls[200:210, 150:400] = 255
+    walls[300:400, 420:430] = 1
+    return replace(kiks.Arena.from_array(walls), balls=(Ball(300, 100),) * ball, lamps=(Lamp(100, 400),))
+
+
+def check_worlds(
+    worlds: Sequence[int], timing: kiks.Timing, controller: Any, parameters: Any, *, ball: bool = False, **options: Any
+) -> None:
+    """Check that worlds of a batch take as many loops as drives on the wire, and end in the same states."""
+    batch = kiks.Batch(arena(ball=ball), worlds[-1] + 1, seed=11, timing=timing, **options)
+    rollouts = batch.run(controller, parameters, seconds=8.0)
+    for world in worlds:
+        thinking = f"fixed:{timing.think_s * 1e3}"
+        sim = kiks.Simulation(arena(ball=ball), seed=11 + world, thinking=thinking, **options)
+        ports = [sim.port(number) for number in range(1, sim.robot_count + 1)]
+        for number, each in enumerate(controller if isinstance(controller, list) else [], 1):
+            if "camera" in each.senses:
+                sim.fit(number, "k213")
+        for port in ports:
+            port.baudrate = timing.baud
+        hashes = noted(sim, ports[0])
+        loops = kiks.drive(ports, controller, parameters, seconds=8.0, period_s=timing.period_s)
+        # The last line that it sends stops the robot.
+        assert (loops, hashes[-1]) == (rollouts.step_counts[world], batch.state_hash(world))
+
+
+@pytest.mark.parametrize(
+    "timing",
+    [kiks.Timing(0.1, 9600), kiks.Timing(0.0, 9600), kiks.Timing(0.05, 38400, 0.0031)],
+    ids=["each 100 ms", "as fast as it goes", "with thinking"],
+)
+@pytest.mark.parametrize(
+    ("controller", "parameters", "ball"),
+    cases([(wander, [1.0], False), (peer, [], True), (wander, [1.0], True), (peer, [], False)], 2),
+)
+def test_batch_and_wire_agree_to_the_bit(
+    timing: kiks.Timing, controller: kiks.Controller, parameters: list[float], ball: bool
+) -> None:
+    check_worlds(share((0, 2), (0, 1, 2)), timing, controller, parameters, ball=ball)
+
+
+@pytest.mark.parametrize("response", ["thesis", "fast"])
+def test_every_response_is_that_of_the_wire(response: str) -> None:
+    check_worlds((0, 1), kiks.Timing(0.1, 9600), wander, [0.7], response=response)
+
+
+@pytest.mark.parametrize("kind", cases(["plastic", "elman", "linear", "mlp", "ctrnn", "graph", "gru"], 2))
+def test_controllers_that_come_with_kiks_agree(kind: str) -> None:
+    controller = getattr(kiks.controllers, kind)()
+    check_worlds((0,), kiks.Timing(0.1, 9600), controller, kiks.controllers.random_parameters(controller, 1, seed=7)[0])
+
+
+def test_one_program_with_a_controller_for_each_robot() -> None:
+    given = [wander, peer, wander], [[1.0], [], [0.5]]
+    check_worlds((0, 1), kiks.Timing(0.1, 19200), *given, ball=True, robots=3)
+
+
+@pytest.mark.parametrize(
+    ("timing", "controllers", "parameters"),
+    cases(
+        [
+            (kiks.Timing(0.1, 19200), [gaze, wander], [[], [1.0]]),
+            (kiks.Timing(0.03, 57600), [gaze_only, gaze_only], [[], []]),
+            (kiks.Timing(0.03, 57600), [gaze, wander], [[], [1.0]]),
+            (kiks.Timing(0.1, 19200), [gaze_only, gaze_only], [[], []]),
+        ],
+        2,
+    ),
+)
+def test_pictures_are_those_of_the_wire(timing: kiks.Timing, controllers: Any, parameters: Any) -> None:
+    check_worlds((0, 10), timing, controllers, parameters, ball=True, robots=2)
 
 
 def test_step_by_step_is_the_same_as_at_once() -> None:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from tests.at_length import cases
+from tests.learn.small import ahead, refused
 
 import kiks
 from kiks.control import neural_nets
@@ -19,8 +21,6 @@ pytestmark = pytest.mark.slow
 BOTH = ("proximity", "ambient")
 
 Trace = np.ndarray[Any, np.dtype[np.float64]]
-
-EXPONENTIAL_BETWEEN = callable_kernel(neural_nets.exponential_between.py_func)
 
 
 def outputs(controller: kiks.Controller, parameters: Any, sensors: Any) -> Trace:
@@ -57,7 +57,8 @@ def taken(parameters: Trace, *shapes: tuple[int, ...]) -> list[Trace]:
     return parts
 
 
-def feed_forward(parameters: Trace, inputs: Trace, counts: list[int], *, feedback: bool, is_cut: bool) -> Trace:
+def feed_forward(hidden: tuple[int, ...], parameters: Trace, inputs: Trace, *, feedback: bool, is_cut: bool) -> Trace:
+    counts = [inputs.shape[1] + 2 * feedback, *hidden, 2]
     layers = taken(parameters, *((1 + counts[k], counts[k + 1]) for k in range(len(counts) - 1)))
     wheels, last = [], np.zeros(2)
     for each in inputs:
@@ -70,100 +71,33 @@ def feed_forward(parameters: Trace, inputs: Trace, counts: list[int], *, feedbac
     return np.array(wheels)
 
 
-@pytest.mark.parametrize("feedback", [False, True])
-def test_linear(feedback: bool) -> None:
-    controller = kiks.controllers.linear(feedback=feedback, speed_limit=7.0)
-    parameters = 0.8 * kiks.controllers.random_parameters(controller, 1, seed=1)[0]
-    sensors = readings(controller)
-    expected = feed_forward(
-        parameters, inputs_of(controller, sensors), [8 + 2 * feedback, 2], feedback=feedback, is_cut=True
-    )
-    np.testing.assert_allclose(outputs(controller, parameters, sensors), 7.0 * expected, atol=1e-12)
-    assert abs(expected).max() == 1.0
-    assert abs(expected).min() < 0.5
+def elman(parameters: Trace, inputs: Trace) -> Trace:
+    to_units, to_wheels = taken(parameters, (20, 3), (4, 2))
+    h, expected = np.zeros(3), []
+    for x in inputs:
+        h = np.tanh(to_units[0] + np.concatenate([x, h]) @ to_units[1:])
+        expected.append(np.tanh(to_wheels[0] + h @ to_wheels[1:]))
+    return np.array(expected)
 
 
-@pytest.mark.parametrize(
-    ("hidden", "senses", "feedback"),
-    [((6,), "proximity", False), ((), "proximity", True), ((5, 3), BOTH, True)],
-    ids=["as it comes", "recurrent perceptron", "two hidden layers"],
-)
-def test_mlp(hidden: tuple[int, ...], senses: Any, feedback: bool) -> None:
-    controller = kiks.controllers.mlp(hidden=hidden, senses=senses, feedback=feedback)
-    parameters = kiks.controllers.random_parameters(controller, 1, seed=2)[0]
-    sensors = readings(controller)
-    counts = [controller.sensor_count + 2 * feedback, *hidden, 2]
-    expected = 10.0 * feed_forward(parameters, inputs_of(controller, sensors), counts, feedback=feedback, is_cut=False)
-    np.testing.assert_allclose(outputs(controller, parameters, sensors), expected, atol=1e-3)
-
-
-@pytest.mark.parametrize("time_constant_s", [0.02, 0.4, 5.0])
-def test_ctrnn(time_constant_s: float) -> None:
-    controller = kiks.controllers.ctrnn(neurons=3, period_s=0.1, time_constant_s=time_constant_s, senses=BOTH)
-    parameters = kiks.controllers.random_parameters(controller, 1, seed=3)[0]
-    logarithms, biases, to_inputs, to_neurons = taken(parameters, (3,), (3,), (16, 3), (3, 3))
-    constants_s = time_constant_s * np.exp(np.clip(logarithms, -4, 4))
-    step_count = max(int(np.ceil(0.2 / constants_s.min())), 1)
-    y, expected = np.zeros(3), []
-    sensors = readings(controller)
-    for x in inputs_of(controller, sensors):
-        for _ in range(step_count):
-            drive = 4 * (logistic(y + 4 * biases) @ to_neurons + x @ to_inputs)
-            y = y + 0.1 / step_count / constants_s * (drive - y)
-        expected.append(10.0 * (2.0 * logistic(y + 4 * biases) - 1.0)[:2])
-    np.testing.assert_allclose(outputs(controller, parameters, sensors), expected, atol=5e-2)
-
-
-@pytest.mark.parametrize("logarithm", [-1000.0, 1000.0])
-def test_ctrnn_of_any_time_constant_stays_in_its_bounds(logarithm: float) -> None:
-    controller = kiks.controllers.ctrnn(neurons=3, time_constant_s=0.4)
-    parameters = np.full(controller.parameter_count or 0, 1.0)
-    parameters[:3] = logarithm
-    assert abs(outputs(controller, parameters, readings(controller, 200))).max() <= 10.0
-
-
-@settings(max_examples=50)
-@given(st.floats(-6, 6))
-def test_exponential_between(x: float) -> None:
-    assert EXPONENTIAL_BETWEEN(x) == pytest.approx(np.exp(np.clip(x, -4, 4)), rel=1e-3)
-
-
-def test_gru() -> None:
-    controller = kiks.controllers.gru(units=3, senses=("ambient", "proximity"))
-    parameters = kiks.controllers.random_parameters(controller, 1, seed=4)[0]
+def gru(parameters: Trace, inputs: Trace) -> Trace:
     to_gates, to_units, to_wheels = taken(parameters, (20, 6), (20, 3), (4, 2))
     h, expected = np.zeros(3), []
-    sensors = readings(controller)
-    for x in inputs_of(controller, sensors):
+    for x in inputs:
         gates = logistic(to_gates[0] + np.concatenate([x, h]) @ to_gates[1:])
         z, r = gates[:3], gates[3:]
         h = z * h + (1 - z) * np.tanh(to_units[0] + np.concatenate([x, r * h]) @ to_units[1:])
-        expected.append(10.0 * np.tanh(to_wheels[0] + h @ to_wheels[1:]))
-    np.testing.assert_allclose(outputs(controller, parameters, sensors), expected, atol=1e-3)
+        expected.append(np.tanh(to_wheels[0] + h @ to_wheels[1:]))
+    return np.array(expected)
 
 
-def test_elman() -> None:
-    controller = kiks.controllers.elman(units=3, senses=BOTH, speed_limit=8.0)
-    parameters = kiks.controllers.random_parameters(controller, 1, seed=4)[0]
-    to_units, to_wheels = taken(parameters, (20, 3), (4, 2))
-    h, expected = np.zeros(3), []
-    sensors = readings(controller)
-    for x in inputs_of(controller, sensors):
-        h = np.tanh(to_units[0] + np.concatenate([x, h]) @ to_units[1:])
-        expected.append(8.0 * np.tanh(to_wheels[0] + h @ to_wheels[1:]))
-    np.testing.assert_allclose(outputs(controller, parameters, sensors), expected, atol=1e-3)
-
-
-def test_graph() -> None:
-    controller = kiks.controllers.graph(hidden=3, senses=BOTH, speed_limit=8.0)
-    parameters = kiks.controllers.random_parameters(controller, 1, seed=4)[0]
+def graph(parameters: Trace, inputs: Trace) -> Trace:
     (weights,) = taken(parameters, (1 + 16 + 5, 5))
     y, expected = np.zeros(5), []
-    sensors = readings(controller)
-    for x in inputs_of(controller, sensors):
+    for x in inputs:
         y = np.tanh(weights[0] + np.concatenate([x, y]) @ weights[1:])
-        expected.append(8.0 * y[:2])
-    np.testing.assert_allclose(outputs(controller, parameters, sensors), expected, atol=1e-3)
+        expected.append(y[:2])
+    return np.array(expected)
 
 
 def covariance(w: float, x: float, y: float) -> float:
@@ -180,9 +114,8 @@ HEBB_RULES = {
 """The rules of Floreano and Mondada (1996) as they wrote them, by the bits."""
 
 
-def plastic(inputs: Trace, parameters: Trace, neurons: int, *, per: str) -> tuple[Trace, Trace]:
-    """Return what the wheels do as shares of the speed limit, and the weights at the end, [sender, neuron]."""
-    sender_count = inputs.shape[1] + neurons + 1
+def plastic(per: str, parameters: Trace, inputs: Trace) -> Trace:
+    neurons, sender_count = 4, inputs.shape[1] + 5
     table = (sender_count, neurons)
     if per == "synapse":
         rates, first, second = taken(parameters, table, table, table)
@@ -201,25 +134,81 @@ def plastic(inputs: Trace, parameters: Trace, neurons: int, *, per: str) -> tupl
                 rate = abs(rates[sender, k]) / (1 + abs(rates[sender, k]))
                 weights[sender, k] += rate * rule(weights[sender, k], x[sender], y[k])
         wheels.append(2 * y[:2] - 1)
-    return np.array(wheels), weights
+    return np.array(wheels)
 
 
-@pytest.mark.parametrize("per", ["synapse", "neuron"])
-@pytest.mark.parametrize("senses", [("proximity",), ("ambient", "proximity")], ids=len)
-def test_plastic(per: str, senses: tuple[str, ...]) -> None:
-    controller = kiks.controllers.plastic(neurons=4, per=per, senses=senses)
-    parameters = kiks.controllers.random_parameters(controller, 1, seed=6)[0]
-    sensors = readings(controller, 60)
-    inputs = inputs_of(controller, sensors)
-    expected, weights = plastic(inputs, parameters, 4, per=per)
-    np.testing.assert_allclose(outputs(controller, parameters, sensors), 10.0 * expected, atol=5e-3)
-    assert len(weights) == controller.sensor_count + 5
-    assert controller.memory_count == 4 + weights.size
+NETWORKS: list[tuple[str, dict[str, Any], Callable[[Trace, Trace], Trace], float]] = [
+    ("linear", {"speed_limit": 7.0}, partial(feed_forward, (), feedback=False, is_cut=True), 1e-12),
+    ("mlp", {"hidden": (), "feedback": True}, partial(feed_forward, (), feedback=True, is_cut=False), 1e-3),
+    (
+        "mlp",
+        {"hidden": (5, 3), "senses": BOTH, "feedback": True},
+        partial(feed_forward, (5, 3), feedback=True, is_cut=False),
+        1e-3,
+    ),
+    ("gru", {"units": 3, "senses": BOTH[::-1]}, gru, 1e-3),
+    ("elman", {"units": 3, "senses": BOTH, "speed_limit": 8.0}, elman, 1e-3),
+    ("graph", {"hidden": 3, "senses": BOTH, "speed_limit": 8.0}, graph, 1e-3),
+    ("plastic", {"neurons": 4, "senses": BOTH[::-1]}, partial(plastic, "synapse"), 5e-3),
+    ("plastic", {"neurons": 4, "per": "neuron"}, partial(plastic, "neuron"), 5e-3),
+    ("linear", {"feedback": True}, partial(feed_forward, (), feedback=True, is_cut=True), 1e-12),
+    ("mlp", {"hidden": (6,)}, partial(feed_forward, (6,), feedback=False, is_cut=False), 1e-3),
+    ("plastic", {"neurons": 4}, partial(plastic, "synapse"), 5e-3),
+    ("plastic", {"neurons": 4, "senses": BOTH[::-1], "per": "neuron"}, partial(plastic, "neuron"), 5e-3),
+]
+
+
+@pytest.mark.parametrize(("kind", "options", "shares", "tolerance"), cases(NETWORKS, 8))
+def test_a_controller_computes_what_numpy_does(
+    kind: str, options: dict[str, Any], shares: Callable[[Trace, Trace], Trace], tolerance: float
+) -> None:
+    controller = getattr(kiks.controllers, kind)(**options)
+    parameters = (0.8 if kind == "linear" else 1.0) * kiks.controllers.random_parameters(controller, 1, seed=1)[0]
+    sensors = readings(controller, 60 if kind == "plastic" else 12)
+    expected = shares(parameters, inputs_of(controller, sensors))
+    limit = options.get("speed_limit", 10.0)
+    np.testing.assert_allclose(outputs(controller, parameters, sensors), limit * expected, atol=tolerance)
+    if kind == "linear":
+        assert abs(expected).max() == 1.0
+        assert abs(expected).min() < 0.5
+
+
+CTRNN = kiks.controllers.ctrnn(neurons=3, period_s=0.05, time_constant_s=0.2, senses=BOTH)
+
+
+@pytest.mark.parametrize("time_constant_s", [0.01, 0.2, 2.5])
+def test_ctrnn(time_constant_s: float) -> None:
+    parameters = kiks.controllers.random_parameters(CTRNN, 1, seed=3)[0]
+    parameters[:3] += np.log(time_constant_s / 0.2)
+    logarithms, biases, to_inputs, to_neurons = taken(parameters, (3,), (3,), (16, 3), (3, 3))
+    constants_s = 0.2 * np.exp(np.clip(logarithms, -4, 4))
+    step_count = max(int(np.ceil(0.1 / constants_s.min())), 1)
+    y, expected = np.zeros(3), []
+    sensors = readings(CTRNN)
+    for x in inputs_of(CTRNN, sensors):
+        for _ in range(step_count):
+            drive = 4 * (logistic(y + 4 * biases) @ to_neurons + x @ to_inputs)
+            y = y + 0.05 / step_count / constants_s * (drive - y)
+        expected.append(10.0 * (2.0 * logistic(y + 4 * biases) - 1.0)[:2])
+    np.testing.assert_allclose(outputs(CTRNN, parameters, sensors), expected, atol=5e-2)
+
+
+@pytest.mark.parametrize("logarithm", [-1000.0, 1000.0])
+def test_ctrnn_of_any_time_constant_stays_in_its_bounds(logarithm: float) -> None:
+    parameters = np.full(CTRNN.parameter_count or 0, 1.0)
+    parameters[:3] = logarithm
+    assert abs(outputs(CTRNN, parameters, readings(CTRNN, 200))).max() <= 10.0
+
+
+def test_exponential_between() -> None:
+    between = callable_kernel(neural_nets.exponential_between.py_func)
+    x = np.linspace(-6, 6, 1201)
+    np.testing.assert_allclose([between(each) for each in x], np.exp(np.clip(x, -4, 4)), rtol=1e-3)
 
 
 def test_the_weights_of_a_plastic_network_stay_between_0_and_1() -> None:
-    controller = kiks.controllers.plastic(neurons=3)
-    assert controller.parameter_count is not None
+    controller = kiks.controllers.plastic(neurons=4, senses=BOTH[::-1])
+    assert controller.memory_count == 4 + (16 + 5) * 4
     for seed, scale in ((1, 1.0), (2, 30.0), (3, 1e300)):
         parameters = scale * kiks.controllers.random_parameters(controller, 1, seed=seed)[0]
         memory, wheels = np.zeros(controller.memory_count), np.zeros(2)
@@ -238,12 +227,8 @@ def test_random_parameters() -> None:
     assert drawn.std() == pytest.approx(1.0, abs=0.05)
     np.testing.assert_array_equal(drawn, kiks.controllers.random_parameters(controller, 1000, seed=1))
 
-    @kiks.controller
-    def free(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
-        wheels[0] = parameters[0]
-
-    with pytest.raises(kiks.ParameterError, match=r"'free' must say how many parameters.*parameters=\.\.\."):
-        kiks.controllers.random_parameters(free, 3, seed=1)
+    with pytest.raises(kiks.ParameterError, match=r"'ahead' must say how many parameters.*parameters=\.\.\."):
+        kiks.controllers.random_parameters(kiks.controller(ahead.function), 3, seed=1)
 
 
 def test_speeds_are_clamped_and_nan_is_zero() -> None:
@@ -251,17 +236,11 @@ def test_speeds_are_clamped_and_nan_is_zero() -> None:
     assert whole_speeds(np.array([-np.inf, 2.5])) == (-127, 2)
 
 
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: kiks.controllers.mlp(hidden=(0,)), r"hidden\[0\] must be at least 1"),
-        (lambda: kiks.controllers.ctrnn(period_s=0), "period_s must be at least 0.001, but it was 0"),
-        (lambda: kiks.controllers.plastic(per="node"), "per must be 'synapse' or 'neuron', but it was 'node'"),
-        (lambda: kiks.controllers.linear(senses=("proximty",)), "Did you mean 'proximity'"),
-        (lambda: kiks.controllers.linear(senses=("ambient", "ambient")), "senses must name each sense once"),
-        (lambda: kiks.controllers.linear(senses=()), "senses must have at least 1 item"),
-    ],
-)
-def test_arguments_out_of_range(make: Any, message: str) -> None:
-    with pytest.raises(kiks.ParameterError, match=message):
-        make()
+def test_arguments_out_of_range() -> None:
+    controllers = kiks.controllers
+    refused(r"hidden\[0\] must be at least 1", controllers.mlp, hidden=(0,))
+    refused("period_s must be at least 0.001, but it was 0", controllers.ctrnn, period_s=0)
+    refused("per must be 'synapse' or 'neuron', but it was 'node'", controllers.plastic, per="node")
+    refused("Did you mean 'proximity'", controllers.linear, senses=("proximty",))
+    refused("senses must name each sense once", controllers.linear, senses=("ambient", "ambient"))
+    refused("senses must have at least 1 item", controllers.linear, senses=())

@@ -8,19 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.learn.small import SHY, refused
 
 import kiks
-
-SHY = """
-import kiks
-
-@kiks.controller(memory=2, parameters=1)
-def shy(sensors, memory, parameters, wheels):
-    wheels[0] = wheels[1] = 5.0 - parameters[0] * sensors[2]
-
-def plain(sensors):
-    pass
-"""
 
 
 @pytest.mark.parametrize(
@@ -56,8 +46,7 @@ def test_a_file(tmp_path: Path) -> None:
     assert found.recipe == made.recipe
     elsewhere = kiks.controllers.recipe_for(made, tmp_path / "deeper")
     assert elsewhere == made.recipe
-    with pytest.raises(kiks.ParameterError, match="must lead to a file in the"):
-        kiks.controllers.from_recipe(elsewhere, tmp_path)
+    refused("must lead to a file in the", kiks.controllers.from_recipe, elsewhere, tmp_path)
 
 
 def test_a_module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -75,8 +64,7 @@ def test_a_controller_inside_a_function_cannot_be_named() -> None:
         wheels[0] = 1.0
 
     assert inner.recipe is None
-    with pytest.raises(kiks.ParameterError, match="'inner' must be defined at the top of a module or file"):
-        kiks.controllers.recipe_for(inner)
+    refused("'inner' must be defined at the top of a module or file", kiks.controllers.recipe_for, inner)
 
 
 def test_a_sense_inside_a_function_cannot_be_named() -> None:
@@ -88,9 +76,16 @@ def test_a_sense_inside_a_function_cannot_be_named() -> None:
         kiks.controllers.recipe_for(kiks.controllers.linear(senses=(inner,)))
 
 
-@pytest.mark.parametrize(
-    ("recipe", "message"),
-    [
+def test_wrong_recipes_are_errors(tmp_path: Path) -> None:
+    folder, elsewhere = tmp_path / "folder", tmp_path / "elsewhere"
+    for place in (elsewhere, folder / ".git"):
+        place.mkdir(parents=True)
+        (place / "mine.py").write_text(SHY)
+    for name in ("mine.py", "mine.txt"):
+        (folder / name).write_text(SHY)
+    (folder / "bad.py").write_text("1 / 0\n")
+    (folder / "link.py").symlink_to(elsewhere / "mine.py")
+    for recipe, message in (
         ("mlp", "must be a table with a kind .* or a function, but it was 'mlp'"),
         ({}, "must be a table with a kind .* or a function, but it was {}"),
         ({"function": 3}, "function must be 'package.module:name' or 'file.py:name', but it was 3"),
@@ -109,16 +104,5 @@ def test_a_sense_inside_a_function_cannot_be_named() -> None:
         ({"function": ".git/mine.py:shy"}, "in no folder whose name begins with a dot, but it was '.git/mine.py'"),
         ({"function": "../mine.py:shy"}, "must lead to a file in the"),
         ({"function": "link.py:shy"}, "must lie in the folder of the file that names it"),
-    ],
-)
-def test_wrong_recipes_are_errors(recipe: Any, message: str, tmp_path: Path) -> None:
-    folder, elsewhere = tmp_path / "folder", tmp_path / "elsewhere"
-    for place in (elsewhere, folder / ".git"):
-        place.mkdir(parents=True)
-        (place / "mine.py").write_text(SHY)
-    for name in ("mine.py", "mine.txt"):
-        (folder / name).write_text(SHY)
-    (folder / "bad.py").write_text("1 / 0\n")
-    (folder / "link.py").symlink_to(elsewhere / "mine.py")
-    with pytest.raises(kiks.ParameterError, match=message):
-        kiks.controllers.from_recipe(recipe, folder)
+    ):
+        refused(message, kiks.controllers.from_recipe, recipe, folder)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from tests.learn.small import small
+from tests.learn.small import refused, small
 
 import kiks
 from kiks import ParameterError
@@ -233,9 +233,8 @@ def test_the_name_of_an_algorithm_has_the_options_that_differ_from_the_usual_one
     assert whole_name(whole_name("sga:bits=8,crossover=0")) == "sga:bits=8,crossover=0.0"
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
+def test_wrong_options_and_tasks_are_refused_in_one_line() -> None:
+    for text, message in (
         ("cmaes", "must be one of cma, ga.*Did you mean 'cma"),
         ("cma:restart=ipop", "algorithm cma: Options must have known keys only, but it has 'restart'.*'restarts'"),
         ("cma:restarts=often", "algorithm cma: restarts must be 'none', 'ipop' or 'bipop', but it was 'often'"),
@@ -245,12 +244,10 @@ def test_the_name_of_an_algorithm_has_the_options_that_differ_from_the_usual_one
         ("sga:", "must be like"),
         ("sga:bits=5,bits=6", "each once"),
         ("novelty:cells=9", "known keys only"),
-    ],
-)
-def test_wrong_options_are_refused_in_one_line(text: str, message: str) -> None:
-    with pytest.raises(ParameterError, match=message) as refused:
-        kiks.Evolution(small(), text)
-    assert "\n" not in str(refused.value)
+        ("nsga2", "at least two objectives for nsga2, but it has 0"),
+        ("neat", "must be a graph for neat, but it was linear"),
+    ):
+        refused(message, kiks.Evolution, small(), text)
 
 
 def test_an_evolution_with_other_options_is_another_one(tmp_path: Path) -> None:
@@ -262,23 +259,7 @@ def test_an_evolution_with_other_options_is_another_one(tmp_path: Path) -> None:
     assert (again.ask() == evolution.ask()).all()
 
 
-@pytest.mark.parametrize(
-    ("algorithm", "changes", "message"),
-    [
-        ("nsga2", {}, "at least two objectives for nsga2, but it has 0"),
-        ("neat", {}, "must be a graph for neat, but it was linear"),
-        ("ga", {"objectives": ("path",)}, "an objective must name one of fitness, "),
-        (None, {"algorithm": "cm"}, "must be one of cma, ga"),
-    ],
-)
-def test_tasks_that_an_algorithm_cannot_have_are_refused(
-    algorithm: str | None, changes: dict[str, Any], message: str
-) -> None:
-    with pytest.raises(ParameterError, match=message):
-        kiks.Evolution(small(**changes), algorithm)
-
-
-def test_a_task_without_objectives_has_no_front() -> None:
-    evolution = kiks.Evolution(small(), "ga", population=8)
-    with pytest.raises(ParameterError, match="at least two objectives"):
-        _ = evolution.front
+def test_wrong_tasks_are_refused() -> None:
+    refused("an objective must name one of fitness, ", small, objectives=("path",))
+    refused("must be one of cma, ga", small, algorithm="cm")
+    refused("at least two objectives", lambda: kiks.Evolution(small(), "ga", population=8).front)

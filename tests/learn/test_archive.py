@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.at_length import cases
-from tests.learn.small import small
+from tests.learn.small import refused, small
 from typer.testing import CliRunner
 
 import kiks
 from kiks import ParameterError
 from kiks.cli import app
-from kiks.learn.algorithm_name import AlgorithmName, parts_of
+from kiks.learn.algorithm_name import AlgorithmName
 from kiks.learn.algorithms import ALGORITHMS, Diverse
 
 pytestmark = pytest.mark.slow
@@ -23,9 +23,9 @@ pytestmark = pytest.mark.slow
 DIVERSE = [str(name) for name, kind in ALGORITHMS.items() if isinstance(kind, type) and issubclass(kind, Diverse)]
 
 
-def run(algorithm: str, generations: int = 4, folder: Path | None = None, **changes: Any) -> kiks.Evolution:
+def run(algorithm: str, folder: Path | None = None, **changes: Any) -> kiks.Evolution:
     evolution = kiks.Evolution(small(**changes), algorithm, population=8, seed=3, folder=folder)
-    evolution.run(generations=generations)
+    evolution.run(generations=4)
     return evolution
 
 
@@ -48,18 +48,15 @@ def told(evolution: kiks.Evolution, seed: int, generations: int = 6) -> kiks.Evo
 # ---- algorithms ----
 
 
-def test_each_algorithm_has_a_name_and_each_task_one_of_them() -> None:
+def test_each_algorithm_has_a_name() -> None:
     assert list(ALGORITHMS) == list(AlgorithmName)
-    assert {parts_of(make().algorithm)[0] for make in kiks.tasks.TASKS.values()} <= set(AlgorithmName)
 
 
-@pytest.mark.parametrize("algorithm", DIVERSE)
-def test_algorithms_for_many_behaviours_need_axes_and_measures(algorithm: str) -> None:
-    with pytest.raises(ParameterError, match="must have axes"):
-        kiks.Evolution(small(axes=()), algorithm)
-    evolution = kiks.Evolution(small(), algorithm, population=8)
-    with pytest.raises(ParameterError, match="must be given fitness and measures"):
-        evolution.tell(np.zeros(len(evolution.ask())))
+def test_algorithms_for_many_behaviours_need_axes_and_measures() -> None:
+    for algorithm in DIVERSE:
+        refused("must have axes", kiks.Evolution, small(axes=()), algorithm)
+        evolution = kiks.Evolution(small(), algorithm, population=8)
+        refused("must be given fitness and measures", evolution.tell, np.zeros(len(evolution.ask())))
 
 
 @pytest.mark.parametrize("algorithm", cases(DIVERSE))
@@ -96,13 +93,12 @@ def test_the_champion_is_the_elite_that_does_best_on_trial(algorithm: str) -> No
 # ---- cells ----
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_each_cell_holds_the_first_of_the_best_that_fell_into_it(seed: int) -> None:
-    evolution = told(kiks.Evolution(small(), "ga", seed=seed, population=30), seed)
+def test_each_cell_holds_the_first_of_the_best_that_fell_into_it() -> None:
+    evolution = told(kiks.Evolution(small(), "ga", seed=1, population=60), 1)
     archive, names = archive_of(evolution), evolution.task.value_names
     best: dict[tuple[int, ...], tuple[float, list[float]]] = {}
     for generation in evolution.generations:
-        for candidate, values in zip(generation.candidates[:30], generation.values[:30], strict=True):
+        for candidate, values in zip(generation.candidates[:60], generation.values[:60], strict=True):
             cell = []
             for axis in archive.axes:
                 edges = np.linspace(axis.low, axis.high, axis.cells + 1)
@@ -133,13 +129,10 @@ def test_the_elite_of_a_place_is_that_of_the_nearest_filled_cell() -> None:
 
 def test_wrong_places_are_errors() -> None:
     evolution = kiks.Evolution(small(), "ga", population=8)
-    with pytest.raises(ParameterError, match="must hold an elite, but it is empty"):
-        archive_of(evolution).elite_at(1, 1)
+    refused("must hold an elite, but it is empty", archive_of(evolution).elite_at, 1, 1)
     archive = archive_of(told(evolution, 1))
-    with pytest.raises(ParameterError, match=r"must be 2 numbers \(path_mm, straightness\), but it was"):
-        archive.elite_at(1)
-    with pytest.raises(ParameterError, match="straightness must be a finite number"):
-        archive.champion_at(1, float("nan"))
+    refused(r"must be 2 numbers \(path_mm, straightness\), but it was", archive.elite_at, 1)
+    refused("straightness must be a finite number", archive.champion_at, 1, float("nan"))
 
 
 # ---- files ----
@@ -157,11 +150,9 @@ def test_an_archive_equals_the_one_loaded_from_its_folder(tmp_path: Path) -> Non
 
 
 def test_folders_without_an_archive_are_errors(tmp_path: Path) -> None:
-    with pytest.raises(ParameterError, match="must be the folder of an evolution"):
-        kiks.Archive.load(tmp_path)
+    refused("must be the folder of an evolution", kiks.Archive.load, tmp_path)
     run("cma", folder=tmp_path, axes=())
-    with pytest.raises(ParameterError, match="for an archive, but it has 0 axes"):
-        kiks.Archive.load(tmp_path)
+    refused("for an archive, but it has 0 axes", kiks.Archive.load, tmp_path)
 
 
 def test_generations_with_fitness_alone_are_not_in_the_archive(tmp_path: Path) -> None:
@@ -174,8 +165,7 @@ def test_generations_with_fitness_alone_are_not_in_the_archive(tmp_path: Path) -
 
 def test_too_many_cells_are_an_error() -> None:
     axes = tuple(kiks.Axis(name, 0, 1, 10_000) for name in ("path_mm", "straightness", "avoidance", "roaming"))
-    with pytest.raises(ParameterError, match="at most 2\\^53 cells"):
-        kiks.Evolution(small(axes=axes), "ga")
+    refused("at most 2\\^53 cells", kiks.Evolution, small(axes=axes), "ga")
 
 
 # ---- commands ----

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
+from tests.at_length import cases
+from tests.learn.small import noted, refused
 
 import kiks
 from kiks.control.controllers import PICK_UP, RELEASE, steps_of
 from kiks.model.arena import Cylinder
 
-ARCHITECTURES = ("feed_forward", "hidden", "elman", "designed", "emergent")
+ARCHITECTURES = ("designed", "emergent", "elman", "feed_forward", "hidden")
 
 
 def arena() -> kiks.Arena:
@@ -39,7 +40,7 @@ def test_a_cylinder_is_carried_out_and_counted() -> None:
     assert bodies["x_mm"][1] < 0.0
 
 
-@pytest.mark.parametrize("architecture", ARCHITECTURES)
+@pytest.mark.parametrize("architecture", cases(ARCHITECTURES, 3))
 def test_a_collector_is_the_same_on_the_wire(architecture: str) -> None:
     task = kiks.tasks.nolfi_1997(architecture=architecture)
     parameters = 3.0 * kiks.controllers.random_parameters(task.controller, 1, seed=2)[0]
@@ -49,14 +50,7 @@ def test_a_collector_is_the_same_on_the_wire(architecture: str) -> None:
     rollouts = batch.run(task.controller, parameters, seconds=8.0)
     champion = kiks.Champion(task.controller, tuple(parameters), timing=timing)
     sim, ports = champion.simulation(where, seed=5)
-    port: Any = ports[0]
-    send, hashes = port.write, list[str]()
-
-    def note_and_send(data: bytes) -> int:
-        hashes.append(sim.state_hash())
-        return int(send(data))
-
-    port.write = note_and_send
+    hashes = noted(sim, ports[0])
     assert champion.drive(ports, seconds=8.0) == rollouts.step_counts[0]
     assert hashes[-1] == batch.state_hash(0)
 
@@ -102,5 +96,4 @@ def test_what_is_outside_is_out_of_the_way() -> None:
 
 
 def test_an_unknown_architecture_is_refused() -> None:
-    with pytest.raises(kiks.ParameterError, match="architecture"):
-        kiks.tasks.nolfi_1997(architecture="emergnt")
+    refused("architecture", kiks.tasks.nolfi_1997, architecture="emergnt")

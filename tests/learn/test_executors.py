@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.at_length import at_length
+from tests.learn.small import refused, small
 
-import kiks
 from kiks.errors import ParameterError, WorkError
 from kiks.learn.evaluation import evaluate
 from kiks.learn.ray_executor import RayExecutor
@@ -67,16 +67,21 @@ def check_values(executor: Any) -> None:
         assert evaluate(Sums(), candidates, seeds, executor).tobytes() == Sums().evaluate(candidates, seeds).tobytes()
 
 
-def test_values_are_the_same_on_threads_and_processes() -> None:
+def test_values_are_the_same_on_threads() -> None:
     check_values(None)
     with ThreadPoolExecutor(3) as threads:
         check_values(threads)
+
+
+def test_values_are_the_same_on_processes_and_a_lost_one_whose_work_is_not_repeated_is_an_error() -> None:
     with ProcessPoolExecutor(2, get_context("spawn")) as processes:
         check_values(processes)
-        task, candidates, seeds = kiks.tasks.avoid(seconds=1.0), np.ones((9, 18)), np.arange(9)
+        task, candidates, seeds = small(), np.ones((9, 18)), np.arange(9)
         expected = task.evaluate(candidates, seeds, 1)
         for _ in range(2):
             assert evaluate(task, candidates, seeds, processes).tobytes() == expected.tobytes()
+        with pytest.raises(WorkError, match=r"Cannot evaluate candidates \d to \d: BrokenProcessPool: .* to see why"):
+            evaluate(Sums("die"), *drawn(9, marked=True), processes)
 
 
 def test_what_a_task_raises_is_an_error_that_names_its_candidates() -> None:
@@ -85,16 +90,7 @@ def test_what_a_task_raises_is_an_error_that_names_its_candidates() -> None:
             evaluate(Sums("raise"), *drawn(9, marked=True), threads)
         with pytest.raises(WorkError, match="Cannot evaluate candidates 0 to 8: ZeroDivisionError"):
             evaluate(Sums("raise"), *drawn(9, marked=True))
-        with pytest.raises(ParameterError, match=r"^measures must be finite\.$"):
-            evaluate(Sums("refuse"), *drawn(9, marked=True), threads)
-
-
-def test_a_lost_worker_is_an_error_if_the_executor_does_not_repeat_its_work() -> None:
-    with (
-        ProcessPoolExecutor(2, get_context("spawn")) as processes,
-        pytest.raises(WorkError, match=r"Cannot evaluate candidates \d to \d: BrokenProcessPool: .* to see why"),
-    ):
-        evaluate(Sums("die"), *drawn(9, marked=True), processes)
+        refused(r"^measures must be finite\.$", evaluate, Sums("refuse"), *drawn(9, marked=True), threads)
 
 
 def test_wrong_arguments_are_errors() -> None:
@@ -105,8 +101,7 @@ def test_wrong_arguments_are_errors() -> None:
         ((candidates, np.full(5, 0.5)), r"seeds must be whole numbers \[5\], but it was 0\.5"),
         ((candidates, seeds, "threads"), r"executor must have submit\(\) .* but it was 'threads'"),
     ):
-        with pytest.raises(ParameterError, match=message):
-            evaluate(Sums(), *given)
+        refused(message, evaluate, Sums(), *given)
 
 
 # ---- Ray ----
@@ -127,13 +122,11 @@ def ray():
 
 def test_the_error_without_ray_says_how_to_install_it(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "ray", None)
-    with pytest.raises(ParameterError, match=r"pip install 'kiks\[ray\]'"):
-        RayExecutor()
+    refused(r"pip install 'kiks\[ray\]'", RayExecutor)
 
 
 def test_an_address_without_a_server_is_an_error(ray: Any) -> None:
-    with pytest.raises(ParameterError, match=r"must be reached, but at 127\.0\.0\.1:1 none was.*ray start --head"):
-        RayExecutor("127.0.0.1:1")
+    refused(r"must be reached, but at 127\.0\.0\.1:1 none was.*ray start --head", RayExecutor, "127.0.0.1:1")
 
 
 @at_length
@@ -151,16 +144,14 @@ def test_ray_repeats_the_work_of_lost_workers_on_loopback_alone(ray: Any, tmp_pa
             evaluate(Sums("die"), *given, executor)
         with pytest.raises(WorkError, match=r"candidates 4 to 7: ZeroDivisionError: a wheel came off\. Eval"):
             evaluate(Sums("raise"), *given, executor)
-        with pytest.raises(ParameterError, match=r"^measures must be finite\.$"):
-            evaluate(Sums("refuse"), *given, executor)
+        refused(r"^measures must be finite\.$", evaluate, Sums("refuse"), *given, executor)
         broken: Any = Sums()
         broken.lock = threading.Lock()
         with pytest.raises(WorkError, match=r"TypeError: .*lock"):
             evaluate(broken, *given, executor)
         with RayExecutor("auto") as second:  # the connection of the program stays open
             check_values(second)
-        with pytest.raises(ParameterError, match=r"must use one cluster at a time.*asked for 127\.0\.0\.1:1\."):
-            RayExecutor("127.0.0.1:1")
+        refused(r"must use one cluster at a time.*asked for 127\.0\.0\.1:1\.", RayExecutor, "127.0.0.1:1")
         assert ray.is_initialized()
     assert not ray.is_initialized()
 

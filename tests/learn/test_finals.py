@@ -12,10 +12,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from tests.at_length import cases
-from tests.learn.small import small
+from tests.learn.small import refused, small
 
 import kiks
-from kiks import ParameterError
 from kiks.learn.algorithm_name import AlgorithmName
 from kiks.learn.finals import FINALISTS, SHARE, Contender, Finals, hold_finals, rounds_of
 from kiks.learn.results import result_of
@@ -244,8 +243,7 @@ def test_elites_take_part_where_an_algorithm_prefers_none() -> None:
 
 def test_finals_after_ask_and_tell() -> None:
     evolution = evolution_of()
-    with pytest.raises(ParameterError, match="before there is a champion"):
-        evolution.hold_finals()
+    refused("before there is a champion", evolution.hold_finals)
     for _ in range(6):
         evolution.tell(evolution.task.evaluate(evolution.ask(), evolution.seeds))
     rounds: list[int] = []
@@ -274,14 +272,11 @@ def test_the_error_names_a_broken_file_of_finals(tmp_path: Path) -> None:
     ]
     for change in wrong:
         np.savez(file, **good | change)
-        with pytest.raises(ParameterError, match=rf"000006_finals.npz': {next(iter(change))} .* are held again"):
-            evolution_of(folder=tmp_path)
+        refused(rf"000006_finals.npz': {next(iter(change))} .* are held again", evolution_of, folder=tmp_path)
     np.savez(file, **good | {"finalists": good["finalists"] + 1})
-    with pytest.raises(ParameterError, match="must have the finalists of this evolution, but has others"):
-        evolution_of(folder=tmp_path)
+    refused("must have the finalists of this evolution, but has others", evolution_of, folder=tmp_path)
     for data in (b"", b"nothing", file.read_bytes()[:-30]):
         file.write_bytes(data)
-        with pytest.raises(ParameterError, match=r"Finals '.*000006_finals.npz' must be a whole .npz file"):
-            evolution_of(folder=tmp_path)
+        refused(r"Finals '.*000006_finals.npz' must be a whole .npz file", evolution_of, folder=tmp_path)
     file.unlink()
     assert outcome(run(folder=tmp_path)) == outcome(whole)

@@ -7,6 +7,7 @@ import functools
 import itertools
 import json
 import logging
+import os
 import pickle
 import subprocess
 import sys
@@ -18,6 +19,7 @@ from typing import Any
 import numba
 import numpy as np
 import pytest
+from tests import forked
 
 import kiks
 from kiks.learn.evaluation import _evaluate_chunk, _identity
@@ -131,26 +133,8 @@ def test_what_a_function_holds_counts(kind: str) -> None:
 
 
 def test_different_things_differ() -> None:
-    things = [
-        1,
-        1.0,
-        "1",
-        True,
-        None,
-        (1,),
-        [1],
-        {1: 1},
-        {1},
-        np.mean,
-        np.sum,
-        len,
-        int,
-        kiks,
-        np,
-        of,
-        Scaled,
-        Scaled(1),
-    ]
+    numbers = [1, 1.0, "1", True, None, (1,), [1], {1: 1}, {1}]
+    things = [*numbers, np.mean, np.sum, len, int, kiks, np, of, Scaled, Scaled(1)]
     assert all(of(one) != of(other) for one, other in itertools.combinations(things, 2))
 
 
@@ -168,23 +152,22 @@ def test_what_a_task_says_of_itself_does_not_count() -> None:
     assert differing(task.with_changes(exam=None, fitness=None).digest(), task.digest()) == "fitness, exam"
 
 
-@pytest.fixture
-def own_task(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Any]:
-    """Return the digest of a task whose file imports a helper beside it, in another process with another hash seed."""
-
-    def digest(folder: str, helper: str, seed: str = "1") -> Any:
-        home = tmp_path / folder
-        home.mkdir(exist_ok=True)
-        (home / "helper.py").write_text(helper)
-        (home / "task.py").write_text(TASK)
-        code = f"import kiks, json; print(json.dumps(kiks.tasks.load({str(home / 'task.py')!r}).digest()))"
-        monkeypatch.setenv("PYTHONHASHSEED", seed)
-        # A helper of the same size in the same second would be the one before.
-        monkeypatch.setenv("PYTHONDONTWRITEBYTECODE", "1")
-        done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-        return json.loads(done.stdout)
-
-    return digest
+def own_task(home: Path, helper: str, seed: str = "") -> Any:
+    """Return the digest of a task whose file imports a helper beside it, in another process, maybe with a hash seed."""
+    home.mkdir(exist_ok=True)
+    (home / "helper.py").write_text(helper)
+    (home / "task.py").write_text(TASK)
+    # Compiled, a helper of the same size in the same second would be the one before.
+    code = "import sys\nsys.dont_write_bytecode = True\nimport kiks, json\n"
+    code += f"print(json.dumps(kiks.tasks.load({str(home / 'task.py')!r}).digest()))"
+    if seed:
+        surroundings = {**os.environ, "PYTHONHASHSEED": seed}
+        command = [sys.executable, "-c", code]
+        done = subprocess.run(command, env=surroundings, capture_output=True, text=True, check=False)
+    else:
+        done = forked.run(code=code)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
 
 
 TASK = """
@@ -210,25 +193,26 @@ HELPER = "GAIN = 1.0\nWEIGHT = 2.0\nOTHER = 3\ndef score(x): return WEIGHT * x\n
 
 
 @pytest.mark.slow
-def test_a_helper_beside_a_task_counts_and_its_folder_and_process_do_not(own_task: Any) -> None:
-    first = own_task("here", HELPER)
-    assert own_task("there", HELPER, "2") == first
-    assert own_task("there", HELPER.replace("OTHER = 3", "OTHER = 4")) == first
-    assert differing(own_task("there", HELPER.replace("GAIN = 1.0", "GAIN = 0.0")), first) == "controller, fitness"
-    assert differing(own_task("there", HELPER.replace("2.0", "3.0")), first) == "fitness"
-    assert differing(own_task("there", HELPER.replace("len", "sum")), first) == "fitness"
+def test_a_helper_beside_a_task_counts_and_its_folder_and_process_do_not(tmp_path: Path) -> None:
+    here, there = tmp_path / "here", tmp_path / "there"
+    first = own_task(here, HELPER, "2")
+    assert own_task(there, HELPER) == first
+    assert own_task(there, HELPER.replace("OTHER = 3", "OTHER = 4")) == first
+    assert differing(own_task(there, HELPER.replace("GAIN = 1.0", "GAIN = 0.0")), first) == "controller, fitness"
+    assert differing(own_task(there, HELPER.replace("2.0", "3.0")), first) == "fitness"
+    assert differing(own_task(there, HELPER.replace("len", "sum")), first) == "fitness"
 
 
 @pytest.mark.slow
 def test_a_worker_gets_what_was_sent_or_says_what_differs() -> None:
     code = (
         "import pickle, sys\nfrom kiks.learn.evaluation import _identity\n"
-        "work, identity = pickle.load(sys.stdin.buffer)\nassert _identity(work) == identity\n"
+        "for work, identity in pickle.load(sys.stdin.buffer):\n    assert _identity(work) == identity\n"
     )
     arena = kiks.Arena.box(400, 400)
     own = kiks.Task("own", [arena], kiks.controllers.linear(), [kiks.measures.path_mm], scaled(2.0))
-    for work in (own, kiks.tasks.follow(), kiks.tasks.pursuit()):
-        subprocess.run([sys.executable, "-c", code], input=pickle.dumps((work, _identity(work))), check=True)
+    sent = [(work, _identity(work)) for work in (own, kiks.tasks.follow(), kiks.tasks.pursuit())]
+    subprocess.run([sys.executable, "-c", code], input=pickle.dumps(sent), check=True)
     with pytest.raises(kiks.ParameterError, match=r"the same modules of yours, but on one these differ: fitness\."):
         _evaluate_chunk(own, _identity(own) | {"fitness": "0"}, np.zeros((1, 18)), np.zeros(1, np.int64))
 
@@ -236,20 +220,21 @@ def test_a_worker_gets_what_was_sent_or_says_what_differs() -> None:
 # ---- what cannot be seen ----
 
 
+OPENED = "def f(values):\n    return open('table.csv').read()\n"
+
+
 def test_what_cannot_be_seen_is_told(caplog: pytest.LogCaptureFixture) -> None:
-    opened = defined("def f(values):\n    return open('table.csv').read()\n")
     cyclic: list[Any] = []
     cyclic.append(cyclic)
-    found = fingerprints({"a": opened, "b": scaled(2.0), "c": (each for each in ()), "d": cyclic, "e": LIBRARY})
-    tell_unseen(found, "This")
+    things = {"a": defined(OPENED), "b": scaled(2.0), "c": (each for each in ()), "d": cyclic, "e": LIBRARY}
+    tell_unseen(fingerprints(things), "This")
     tell_unseen(kiks.tasks.avoid().digest(), "That")
     (message,) = caplog.messages
     assert message.endswith("cannot see: a: open; c: builtins.generator; d: what lies too deep; e: ctypes.CDLL.")
 
 
 def test_a_folder_says_once_what_cannot_be_seen(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    opened = defined("def f(values):\n    return open('table.csv').read()\n")
-    task = kiks.tasks.avoid(seconds=1, fitness=opened)
+    task = kiks.tasks.avoid(seconds=1, fitness=defined(OPENED))
     with caplog.at_level(logging.WARNING, "kiks.learn"):
         for _ in range(2):
             kiks.Evolution(task, "ga", population=4, folder=tmp_path)

@@ -6,11 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.learn.small import small
+from tests.learn.small import refused, small
 from typer.testing import CliRunner
 
 import kiks
-from kiks import ParameterError
 from kiks.cli import app
 from kiks.export.ghost_frames import save_ghost_page
 from kiks.export.ghosts import save_ghosts
@@ -92,19 +91,15 @@ def test_the_frames_of_a_page_have_the_poses_of_all_generations(folder: Path, tm
 
 
 def test_what_cannot_be_shown_is_refused_in_one_line(folder: Path, tmp_path: Path) -> None:
-    with pytest.raises(ParameterError, match="generation must be a whole number from 1 to 2"):
-        ghosts_of(folder, [3])
-    with pytest.raises(ParameterError, match="world must be"):
-        ghosts_of(folder, [1], world=1000)
+    refused("generation must be a whole number from 1 to 2", ghosts_of, folder, [3])
+    refused("world must be", ghosts_of, folder, [1], world=1000)
     failed = CliRunner().invoke(app, ["ghosts", str(folder), str(tmp_path / "a.png"), "--generations", "1,x"])
     assert "--generations must be numbers such as 1,20,60" in str(failed.exception)
     task = kiks.tasks.pursuit(seconds=1)
     kiks.Evolution(task, seed=1, population=4, opponents=2, folder=tmp_path / "two").run(generations=1)
-    with pytest.raises(ParameterError, match="must have one side and a generation for ghosts"):
-        ghosts_of(tmp_path / "two", [1], task=task)
+    refused("must have one side and a generation for ghosts", ghosts_of, tmp_path / "two", [1], task=task)
 
 
 def test_no_generation_is_an_error(tmp_path: Path) -> None:
     for save, name in ((save_ghosts, "ghosts.png"), (save_ghosts, "ghosts.gif"), (save_ghost_page, "ghosts.html")):
-        with pytest.raises(ParameterError, match="ghosts must be of one generation at least"):
-            save([], tmp_path / name)
+        refused("ghosts must be of one generation at least", save, [], tmp_path / name)

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 import kiks
-from kiks.client.drive import Driver
 from kiks.learn.classic_tasks import (
     ACTION_S,
     FULL_ACTIONS,
@@ -62,17 +61,3 @@ def test_the_battery_is_an_input_and_counts_down_in_memory() -> None:
         np.testing.assert_allclose(wheels, expected, atol=2e-4)
     homing_network(np.append(readings[:-1], 0.0), memory, parameters, wheels)
     assert memory[USED] == 0.0
-
-
-def test_the_same_robot_drives_on_a_line() -> None:
-    parameters = np.random.default_rng(6).normal(0.0, 1.0, 102)
-    champion = kiks.Champion(homing_network, parameters.tolist(), timing=TASK.timings[0])
-    sim, ports = champion.simulation(TASK.arenas[0], seed=4)
-    assert [turret.name for turret in sim.turrets(1)] == ["Floor sensor"]
-    start = [*sim.pose(1)]
-    driver = Driver(ports, homing_network, parameters, period_s=ACTION_S)
-    while driver.begin_ns < 8_000_000_000:
-        driver.step()
-    batch = kiks.Batch(TASK.arenas[0], 1, seed=4, starts=start, timing=TASK.timings[0])
-    batch.run(homing_network, parameters, seconds=8.0)
-    assert batch.state_hash(0) == sim.state_hash()

@@ -7,18 +7,18 @@ from itertools import count
 from pathlib import Path
 from typing import Any
 
-import gymnasium
 import numpy as np
 import pytest
-
-import kiks
-import kiks.learn.gymnasium_envs  # registers the environments
-from kiks.learn.environments import environment_of
-from kiks.learn.gymnasium_envs import KheperaVectorEnv
 
 pytestmark = pytest.mark.slow
 
 ROOT = Path(__file__).parents[2]
+
+
+def vector(task: Any, count: int, **options: Any) -> Any:
+    from kiks.learn.gymnasium_envs import KheperaVectorEnv
+
+    return KheperaVectorEnv(count, task, threads=1, **options)
 
 
 def stand_still(seen: np.ndarray) -> np.ndarray:
@@ -64,17 +64,17 @@ def seek_the_light(seen: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize(
     ("name", "good", "return_min", "useless_max"),
     [
-        ("kiks/Avoid-v0", follow_the_wall, 20.0, 2.0),
-        ("kiks/Follow-v0", follow_the_wall, 200.0, 20.0),
-        ("kiks/Light-v0", seek_the_light, 250.0, 60.0),
-        ("kiks/Maze-v0", follow_the_wall, 5.0, 2.0),
+        ("Avoid", follow_the_wall, 20.0, 2.0),
+        ("Follow", follow_the_wall, 200.0, 20.0),
+        ("Light", seek_the_light, 250.0, 60.0),
+        ("Maze", follow_the_wall, 5.0, 2.0),
     ],
 )
 def test_rewards_are_for_those_that_do_what_is_wanted(
     name: str, good: Any, return_min: float, useless_max: float
 ) -> None:
     def mean_return(policy: Any) -> float:
-        envs: Any = gymnasium.make_vec(name, num_envs=24, autoreset_mode="SameStep", threads=1)
+        envs = vector(name, 24, autoreset_mode="SameStep")
         seen, _ = envs.reset(seed=1)
         returns, is_over = np.zeros(24), np.zeros(24, np.bool_)
         for _ in range(600):
@@ -103,10 +103,9 @@ def pgpe() -> Any:
 
 
 def test_a_tiny_training_improves_the_reward(pgpe: Any) -> None:
-    task = environment_of("Avoid")
     champion = pgpe.learn("Avoid", seed=1, generations=12, pairs=24)
     weights = np.array(champion.parameters[2:]).reshape(pgpe.INPUTS, 2)
-    envs = KheperaVectorEnv(12, task, reward=pgpe.REWARDS["Avoid"], threads=1)
+    envs = vector("Avoid", 12, reward=pgpe.REWARDS["Avoid"])
     before, after = (
         pgpe.returns_of(envs, np.tile(each, (12, 1, 1)), list(range(12)), champion.parameters[1]).mean()
         for each in (0 * weights, weights)
@@ -137,25 +136,3 @@ def test_the_policy_that_learns_is_the_one_that_drives(pgpe: Any, name: str) -> 
             pgpe.tracing(counts[world], memory[world], parameters, wheels[world])
         np.testing.assert_allclose(wheels / 8.0, actions, rtol=0, atol=1e-12)
         assert actions.std() > 0.1
-
-
-def test_the_policy_drives_on_a_line_as_in_a_batch(pgpe: Any) -> None:
-    weights = 0.5 * np.random.default_rng(4).normal(size=(pgpe.INPUTS, 2))
-    weights[0] = 0.5
-    timing = environment_of("Avoid").timings[0]
-    parameters = [5.0, 0.04, *weights.ravel()]
-    batch = kiks.Batch(kiks.Arena.load("pillars"), 2, seed=7, timing=timing)
-    batch.run(pgpe.tracing, parameters, seconds=6)
-    for world in range(2):
-        sim, hashes = kiks.Simulation(kiks.Arena.load("pillars"), seed=7 + world), list[str]()
-        port: Any = sim.port(1)
-        send = port.write
-
-        def note_and_send(data: bytes, sim: Any = sim, send: Any = send, hashes: list[str] = hashes) -> int:
-            hashes.append(sim.state_hash())
-            return int(send(data))
-
-        port.write = note_and_send
-        kiks.drive(port, pgpe.tracing, parameters, seconds=6, period_s=timing.period_s)
-        # The last line that it sends stops the robot.
-        assert hashes[-1] == batch.state_hash(world)

@@ -9,14 +9,14 @@ import pytest
 from tests.learn.small import small
 
 import kiks
-from kiks.learn.tensorboard_log import FILES, TensorBoardLog
-
-pytest.importorskip("tensorboard")
-pytestmark = pytest.mark.slow
 
 
+@pytest.mark.slow
 def test_the_curves_are_those_of_the_generations(tmp_path: Path) -> None:
+    pytest.importorskip("tensorboard")
     from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
+
+    from kiks.learn.tensorboard_log import FILES, TensorBoardLog
 
     evolution = kiks.Evolution(small(), "ga", seed=3, population=8)
     for count in (1, 3):  # a log of an evolution that goes on begins anew
