@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import math
 import re
+from collections import deque
+from contextlib import closing
 
 import pytest
 from playwright.sync_api import expect
 from tests.at_length import at_length
 from tests.desk.visitor import Visitor
+
+from kiks.ports.programs import Programs
+from kiks.sim.simulation import Simulation
 
 pytestmark = pytest.mark.slow
 
@@ -93,6 +98,22 @@ def test_tooltips_cover_no_control(visitor: Visitor) -> None:
 
 
 # ---- above the arena ----
+
+
+def test_programs_are_looked_at_with_the_lock_under_which_halt_drops_their_requests() -> None:
+    """Else the thread that moves the world would end in an error, and a robot would drive on."""
+    sim = Simulation()
+    were_locked: list[bool] = []
+
+    class Requests(deque):
+        def __bool__(self) -> bool:
+            were_locked.append(sim.lock._is_owned())  # type: ignore[attr-defined]
+            return False
+
+    with closing(Programs(sim)) as programs:
+        programs.admit("a program for which the world does not wait", 1)._requests = Requests()
+        assert not programs.drive
+    assert set(were_locked) == {True}
 
 
 def test_halt_stops_programs_and_robots(visitor: Visitor) -> None:
