@@ -7,14 +7,8 @@ import threading
 from collections.abc import Iterator
 
 import pytest
-from nicegui import Client
-from playwright.sync_api import expect
 from tests.at_length import at_length, cases, share
-from tests.desk.visitor import NewPage, Visitor, check_access, check_reach
-
-from kiks.desk.panels.page import Page
-from kiks.desk.server.server import SERVER
-from kiks.desk.server.show import Shown
+from tests.desk.visitor import COLOURS, NewPage, Shown, Visitor, check_access, check_reach, expect
 
 pytestmark = pytest.mark.slow
 
@@ -72,7 +66,7 @@ def test_tab_reaches_everything(visitor: Visitor, tab: str, inside: tuple[str, .
 
 
 def test_axe_finds_nothing_serious(visitor: Visitor) -> None:
-    for theme in ("Light", "Dark"):
+    for theme, rules in (("Light", None), ("Dark", share(COLOURS, None))):
         visitor.choose("dark", theme)
         expect(visitor.page.locator("body.body--dark .kiks-arena.kiks-dark")).to_have_count(int(theme == "Dark"))
         for tab in TABS:
@@ -85,12 +79,12 @@ def test_axe_finds_nothing_serious(visitor: Visitor) -> None:
                 visitor.at("arena-top").press("n")
                 visitor.at("arena-top").press("Enter")
                 expect(visitor.at("properties")).to_be_visible()
-            check_access(visitor.page, f"{tab}, {theme}")
+            check_access(visitor.page, f"{tab}, {theme}", rules)
             visitor.picture(f"{tab}_{theme.lower()}")
         for opener in ("help", "layers", "follow"):
             visitor.at(opener).click()
             expect(opened := visitor.page.locator(".q-menu, .q-dialog__inner")).to_be_visible()
-            check_access(visitor.page, f"{opener}, {theme}")
+            check_access(visitor.page, f"{opener}, {theme}", rules)
             visitor.picture(f"{opener}_{theme.lower()}")
             visitor.page.keyboard.press("Escape")
             expect(opened).to_have_count(0)
@@ -106,13 +100,6 @@ def test_readers_of_screens_hear_what_happens(visitor: Visitor) -> None:
     visitor.tab("wire")
     visitor.send("D,10,10")
     expect(live).to_have_text("robot 1 touches something")
-
-
-def test_escape_closes_an_explanation(visitor: Visitor) -> None:
-    visitor.at("proximity-0").press("Enter")
-    expect(visitor.at("explanation")).to_be_visible()
-    visitor.page.keyboard.press("Escape")
-    expect(visitor.at("explanation")).to_be_hidden()
 
 
 @pytest.mark.parametrize(
@@ -135,6 +122,10 @@ def test_fingers_reach_everything_on_small_screens(new_page: NewPage, shown: Sho
 
 @at_length
 def test_closed_pages_leave_nothing_behind(new_page: NewPage, shown: Shown) -> None:
+    from nicegui import Client
+
+    from kiks.desk.panels.page import Page
+
     page = new_page()
     for _ in range(share(2, 4)):
         visitor = Visitor(page, shown)
@@ -150,6 +141,10 @@ def test_closed_pages_leave_nothing_behind(new_page: NewPage, shown: Shown) -> N
 
 def forget_all() -> None:
     """Delete what NiceGUI keeps for pages that may come back, as it does by itself after ten seconds."""
+    from nicegui import Client
+
+    from kiks.desk.server.server import SERVER
+
     done = threading.Event()
 
     def forget() -> None:

@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from PIL import Image
-from playwright.sync_api import expect
 from tests.at_length import at_length
-from tests.desk.visitor import NewPage, Visitor, open_desk
+from tests.desk.visitor import NewPage, Shown, Visitor, expect
 
-from kiks.desk.server.desk import Desk
-from kiks.desk.server.show import Shown
 from kiks.model import brush
 from kiks.model.arena import Arena, Pose, Wall
 from kiks.model.project import Project
@@ -24,21 +20,13 @@ pytestmark = pytest.mark.slow
 
 
 @pytest.fixture
-def shown(tmp_path: Path) -> Iterator[Shown]:
-    project = Project(replace(Arena.box(600, 500), starts=(Pose(120.0, 120.0, 0.0),)))
-    shown = open_desk(tmp_path, project)
-    shown.desk.gate.pause(0)
-    yield shown
-    shown.close()
-
-
-@pytest.fixture
-def desk(shown: Shown) -> Desk:
-    return shown.desk
+def project() -> Project:
+    return Project(replace(Arena.box(600, 500), starts=(Pose(120.0, 120.0, 0.0),)))
 
 
 @pytest.fixture
 def visitor(shown: Shown, new_page: NewPage) -> Visitor:
+    shown.desk.gate.pause(0)
     visitor = Visitor(new_page(1400, 1000), shown)
     visitor.tab("arena")
     return visitor
@@ -53,8 +41,8 @@ def wait_for_step(visitor: Visitor, *, undo: bool = True, redo: bool = False) ->
         expect(visitor.at(name)).to_be_enabled(enabled=is_there)
 
 
-def test_walls_are_drawn_and_undone(desk: Desk, visitor: Visitor) -> None:
-    page = visitor.page
+def test_walls_are_drawn_and_undone(visitor: Visitor) -> None:
+    desk, page = visitor.desk, visitor.page
 
     def brightness(x_mm: int, y_mm: int) -> int:
         return int(desk.sim.arena.brightness[y_mm, x_mm])
@@ -103,7 +91,8 @@ def test_walls_are_drawn_and_undone(desk: Desk, visitor: Visitor) -> None:
     visitor.until(lambda: desk.sim.pose(1)[1] > 170)
 
 
-def test_strokes_snap_to_the_grid_end_at_the_arena_and_are_dropped_with_escape(desk: Desk, visitor: Visitor) -> None:
+def test_strokes_snap_to_the_grid_end_at_the_arena_and_are_dropped_with_escape(visitor: Visitor) -> None:
+    desk = visitor.desk
     arena = brush.line(desk.sim.arena, [(400, 300), (600, 300)], width_mm=10)
     walls = brush.rectangle(arena, 200, 380, 260, 420).brightness
     visitor.choose("snap", "10 mm")
@@ -121,8 +110,8 @@ def test_strokes_snap_to_the_grid_end_at_the_arena_and_are_dropped_with_escape(d
     visitor.until(lambda: desk.sim.bodies()["x_mm"].tolist() == [300])
 
 
-def test_worlds_are_created_saved_and_opened(desk: Desk, visitor: Visitor) -> None:
-    page = visitor.page
+def test_worlds_are_created_saved_and_opened(visitor: Visitor) -> None:
+    desk, page = visitor.desk, visitor.page
     visitor.at("new-arena").click()
     visitor.at("box-width").fill("700")
     visitor.at("box-rounded").fill("80")
@@ -166,8 +155,8 @@ def test_worlds_are_created_saved_and_opened(desk: Desk, visitor: Visitor) -> No
 
 
 @at_length
-def test_files_are_uploaded(desk: Desk, visitor: Visitor) -> None:
-    page = visitor.page
+def test_files_are_uploaded(visitor: Visitor) -> None:
+    desk, page = visitor.desk, visitor.page
     picture = io.BytesIO()
     Image.fromarray(np.zeros((300, 400), np.uint8)).save(picture, "PNG")
     chooser = page.locator("[data-testid=upload] input[type=file]")
@@ -183,7 +172,9 @@ def test_files_are_uploaded(desk: Desk, visitor: Visitor) -> None:
     assert list(desk.folder.iterdir()) == []
 
 
-def test_properties_are_set_by_a_double_click(desk: Desk, visitor: Visitor) -> None:
+def test_properties_are_set_by_a_double_click(visitor: Visitor) -> None:
+    desk = visitor.desk
+
     def put(name: str, text: str) -> None:
         visitor.at(f"property-{name}").fill(text)
         visitor.at(f"property-{name}").press("Enter")

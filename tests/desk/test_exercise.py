@@ -10,10 +10,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import expect
-from tests.desk.visitor import NewPage, Visitor, check_access, check_reach, make_project, open_desk
+from tests.desk.visitor import Visitor, check_access, check_reach, expect, make_project
 
-from kiks.desk.panels.exercise_text import parts_of
 from kiks.model.arena import Arena
 from kiks.model.arena_objects import Lamp, Pose
 from kiks.model.exercise import Cases, Exercise, cases_of
@@ -21,7 +19,6 @@ from kiks.model.goal import Goal
 from kiks.model.project import Project
 from kiks.sim.from_project import simulation_of
 from kiks.sim.judge import Judge
-from kiks.trials.hand_in import PAGE, PROGRAM, SCORE
 
 TEXT = """Drive to the lamp.
 
@@ -58,15 +55,14 @@ def make_exercise() -> Project:
     )
 
 
-def test_text_loads_and_runs_nothing() -> None:
+def test_text_loads_and_runs_nothing_and_takes_no_time() -> None:
+    from kiks.desk.panels.exercise_text import parts_of
+
     parts = parts_of(TEXT)
     assert [part.hint for part in parts] == ["", "Hint: how to begin", ""]
     html = "".join(part.html for part in parts)
     assert not [each for each in ("<script", "<img", "href") if each in html]
     assert "<em>a plan</em>" in html
-
-
-def test_text_of_brackets_takes_no_time() -> None:
     # markdown-it would take a minute for these.
     for text in ("[" * 200_000, "![" * 100_000, "[a](" * 50_000):
         (part,) = parts_of(text)
@@ -74,69 +70,67 @@ def test_text_of_brackets_takes_no_time() -> None:
 
 
 @pytest.mark.slow
-def test_exercise_is_read_solved_tried_and_handed_in(tmp_path: Path, new_page: NewPage) -> None:
-    shown = open_desk(tmp_path, make_exercise())
-    try:
-        visitor = Visitor(new_page(), shown)
-        expect(visitor.at("exercise-text")).to_contain_text("Drive to the lamp")
-        hint = visitor.page.get_by_text("Set both wheels to 30.")
-        expect(hint).to_be_hidden()
-        visitor.at("hint").click()
-        expect(hint).to_be_visible()
-        assert visitor.page.title() == "KiKS"
-        assert visitor.desk.is_paused
-        assert visitor.sim.now_ns == 0
+@pytest.mark.parametrize("project", [make_exercise()], ids=["exercise"])
+def test_exercise_is_read_solved_tried_and_handed_in(visitor: Visitor, tmp_path: Path) -> None:
+    from kiks.trials.hand_in import PAGE, PROGRAM, SCORE
 
-        visitor.tab("programs")
-        expect(visitor.page.locator(".cm-content")).to_contain_text("D,0,0")
-        visitor.write(DRIVE.replace("sleep(5)", "sleep(0.4)"))
-        visitor.at("run-program").click()
-        expect(visitor.at("board-result")).to_contain_text("not solved after 0.4")
-        visitor.told("All programs have ended. Goal not solved")
-        visitor.write(DRIVE)
-        visitor.at("run-program").click()
-        expect(visitor.at("board-result")).to_contain_text("solved after 2.")
-        expect(visitor.at("board-points")).to_have_text("10 points")
-        assert (tmp_path / "to_the_lamp.py").read_text() == DRIVE
-        assert visitor.desk.is_paused
+    expect(visitor.at("exercise-text")).to_contain_text("Drive to the lamp")
+    hint = visitor.page.get_by_text("Set both wheels to 30.")
+    expect(hint).to_be_hidden()
+    visitor.at("hint").click()
+    expect(hint).to_be_visible()
+    assert visitor.page.title() == "KiKS"
+    assert visitor.desk.is_paused
+    assert visitor.sim.now_ns == 0
 
-        visitor.at("tab-exercise").click()
-        visitor.at("try-all").click()
-        expect(visitor.at("tries-state")).to_have_text("2 of 2 solved, 10 points.")
-        check_access(visitor.page, "exercise")
-        visitor.picture("exercise-tried")
-        visitor.at("show-try-1").click()
-        visitor.until(lambda: visitor.desk.past is not None and visitor.sim.seed == 2 and visitor.sim.time_s > 0.1)
-        visitor.at("back-to-now").click()
-        visitor.until(lambda: visitor.desk.past is None)
-        assert visitor.sim.seed == 0
-        with visitor.page.expect_download() as download:
-            visitor.at("hand-in").click()
-        file = download.value.path().read_bytes()
-        assert download.value.suggested_filename == "to_the_lamp.zip"
-        with zipfile.ZipFile(io.BytesIO(file)) as archive:
-            assert archive.read(PROGRAM) == DRIVE.encode()
-            assert json.loads(archive.read(SCORE))["points"] == 10
-            assert archive.read(PAGE).startswith(b"<!DOCTYPE html>")
-        given: list[tuple[str, bytes]] = []
-        visitor.desk.hand_in = lambda data, name: given.append((name, data))
+    visitor.tab("programs")
+    expect(visitor.page.locator(".cm-content")).to_contain_text("D,0,0")
+    visitor.write(DRIVE.replace("sleep(5)", "sleep(0.4)"))
+    visitor.at("run-program").click()
+    expect(visitor.at("board-result")).to_contain_text("not solved after 0.4")
+    visitor.told("All programs have ended. Goal not solved")
+    visitor.write(DRIVE)
+    visitor.at("run-program").click()
+    expect(visitor.at("board-result")).to_contain_text("solved after 2.")
+    expect(visitor.at("board-points")).to_have_text("10 points")
+    assert (tmp_path / "to_the_lamp.py").read_text() == DRIVE
+    assert visitor.desk.is_paused
+
+    visitor.at("tab-exercise").click()
+    visitor.at("try-all").click()
+    expect(visitor.at("tries-state")).to_have_text("2 of 2 solved, 10 points.")
+    check_access(visitor.page, "exercise")
+    visitor.picture("exercise-tried")
+    visitor.at("show-try-1").click()
+    visitor.until(lambda: visitor.desk.past is not None and visitor.sim.seed == 2 and visitor.sim.time_s > 0.1)
+    visitor.at("back-to-now").click()
+    visitor.until(lambda: visitor.desk.past is None)
+    assert visitor.sim.seed == 0
+    with visitor.page.expect_download() as download:
         visitor.at("hand-in").click()
-        visitor.told("Handed in: 2 of 2 solved")
-        assert given == [("to_the_lamp.zip", file)]
-        visitor.desk.may_hand_in = False
-        expect(visitor.at("hand-in")).to_be_disabled()
+    file = download.value.path().read_bytes()
+    assert download.value.suggested_filename == "to_the_lamp.zip"
+    with zipfile.ZipFile(io.BytesIO(file)) as archive:
+        assert archive.read(PROGRAM) == DRIVE.encode()
+        assert json.loads(archive.read(SCORE))["points"] == 10
+        assert archive.read(PAGE).startswith(b"<!DOCTYPE html>")
+    given: list[tuple[str, bytes]] = []
+    visitor.desk.hand_in = lambda data, name: given.append((name, data))
+    visitor.at("hand-in").click()
+    visitor.told("Handed in: 2 of 2 solved")
+    assert given == [("to_the_lamp.zip", file)]
+    visitor.desk.may_hand_in = False
+    expect(visitor.at("hand-in")).to_be_disabled()
 
-        lies = visitor.sim.pose(1)
-        visitor.pull(lies[:2], (300, 200))
-        expect(visitor.at("arena-notice")).to_contain_text("it is locked")
-        visitor.page.mouse.up()
-        visitor.tab("settings")
-        expect(visitor.at("locked").locator("visible=true")).to_have_count(1)
-        visitor.at("apply").click()
-        visitor.told("it is locked")
-        assert visitor.sim.pose(1) == lies
-    finally:
-        shown.close()
+    lies = visitor.sim.pose(1)
+    visitor.pull(lies[:2], (300, 200))
+    expect(visitor.at("arena-notice")).to_contain_text("it is locked")
+    visitor.page.mouse.up()
+    visitor.tab("settings")
+    expect(visitor.at("locked").locator("visible=true")).to_have_count(1)
+    visitor.at("apply").click()
+    visitor.told("it is locked")
+    assert visitor.sim.pose(1) == lies
 
 
 def test_formulas_of_the_page_can_be_judged() -> None:
@@ -149,67 +143,62 @@ def test_formulas_of_the_page_can_be_judged() -> None:
 
 
 @pytest.mark.slow
-def test_lecturer_saves_a_world_as_an_exercise_and_opens_it(tmp_path: Path, new_page: NewPage) -> None:
-    shown = open_desk(tmp_path)
-    try:
-        visitor = Visitor(new_page(), shown)
-        expect(visitor.at("tab-exercise")).to_be_hidden()
-        visitor.tab("programs")
-        visitor.write(DRIVE)
-        visitor.choose("dark", "Dark")
-        visitor.tab("arena")
-        visitor.at("save-exercise").click()
-        visitor.at("exercise-title").fill("Find it")
-        visitor.at("exercise-text").fill(TEXT)
-        for typed, wrong in (("ligt_mm < 80", "Did you mean 'light_mm'?"), ("light_mm <", "must be a formula")):
-            visitor.at("goal-solved").fill(typed)
-            expect(visitor.page.get_by_text(wrong)).to_be_visible()
-        check_access(visitor.page, "a wrong formula")
-        visitor.at("dialog-yes").click()
-        visitor.told("solved must be a formula")
-        visitor.at("goal-solved").fill("light_mm < 80")
-        expect(visitor.page.get_by_text("must be a formula")).to_have_count(0)
-        visitor.at("limit").fill("30")
-        visitor.at("case-0-seed").fill("1..20")
-        visitor.at("case-0-start").fill("100, 100; 100, 300, 90")
-        visitor.at("add-case").click()
-        visitor.at("case-1-family").fill("1, 2")
-        visitor.at("case-1-is_hidden").click()
-        visitor.page.mouse.move(5, 400)
-        expect(visitor.page.locator(".q-tooltip")).to_have_count(0)
-        check_access(visitor.page, "save as exercise")
-        visitor.picture("save-as-exercise")
-        visitor.page.set_viewport_size({"width": 390, "height": 844})
-        check_reach(visitor.page, "save as exercise")
-        visitor.picture("save-as-exercise-390")
-        visitor.page.set_viewport_size({"width": 1366, "height": 768})
-        visitor.at("exercise-name").fill("find")
-        visitor.at("dialog-yes").click()
-        visitor.told("Saved as find.kiks and find-students.kiks.")
+def test_lecturer_saves_a_world_as_an_exercise_and_opens_it(visitor: Visitor, tmp_path: Path) -> None:
+    expect(visitor.at("tab-exercise")).to_be_hidden()
+    visitor.tab("programs")
+    visitor.write(DRIVE)
+    visitor.choose("dark", "Dark")
+    visitor.tab("arena")
+    visitor.at("save-exercise").click()
+    visitor.at("exercise-title").fill("Find it")
+    visitor.at("exercise-text").fill(TEXT)
+    for typed, wrong in (("ligt_mm < 80", "Did you mean 'light_mm'?"), ("light_mm <", "must be a formula")):
+        visitor.at("goal-solved").fill(typed)
+        expect(visitor.page.get_by_text(wrong)).to_be_visible()
+    check_access(visitor.page, "a wrong formula")
+    visitor.at("dialog-yes").click()
+    visitor.told("solved must be a formula")
+    visitor.at("goal-solved").fill("light_mm < 80")
+    expect(visitor.page.get_by_text("must be a formula")).to_have_count(0)
+    visitor.at("limit").fill("30")
+    visitor.at("case-0-seed").fill("1..20")
+    visitor.at("case-0-start").fill("100, 100; 100, 300, 90")
+    visitor.at("add-case").click()
+    visitor.at("case-1-family").fill("1, 2")
+    visitor.at("case-1-is_hidden").click()
+    visitor.page.mouse.move(5, 400)
+    expect(visitor.page.locator(".q-tooltip")).to_have_count(0)
+    check_access(visitor.page, "save as exercise")
+    visitor.picture("save-as-exercise")
+    visitor.page.set_viewport_size({"width": 390, "height": 844})
+    check_reach(visitor.page, "save as exercise")
+    visitor.picture("save-as-exercise-390")
+    visitor.page.set_viewport_size({"width": 1366, "height": 768})
+    visitor.at("exercise-name").fill("find")
+    visitor.at("dialog-yes").click()
+    visitor.told("Saved as find.kiks and find-students.kiks.")
 
-        made = Project.load(tmp_path / "find.kiks")
-        assert made.goal is not None
-        assert made.exercise == Exercise("Find it", text=TEXT, template=DRIVE)
-        assert (made.goal.solved, made.seconds) == ("light_mm < 80", 30)
-        assert [len(cases_of([each])) for each in made.cases] == [40, 2]
-        assert Project.load(tmp_path / "find-students.kiks").cases == made.cases[:1]
+    made = Project.load(tmp_path / "find.kiks")
+    assert made.goal is not None
+    assert made.exercise == Exercise("Find it", text=TEXT, template=DRIVE)
+    assert (made.goal.solved, made.seconds) == ("light_mm < 80", 30)
+    assert [len(cases_of([each])) for each in made.cases] == [40, 2]
+    assert Project.load(tmp_path / "find-students.kiks").cases == made.cases[:1]
 
-        visitor.at("open-name").fill("find-s")
-        visitor.page.locator(".q-menu .q-item").get_by_text("find-students.kiks").click()
-        visitor.at("open").click()
-        expect(visitor.page.get_by_role("heading", name="Find it")).to_be_visible()
-        visitor.tab("arena")
-        visitor.at("save-exercise").click()
-        visitor.told("it is locked")
+    visitor.at("open-name").fill("find-s")
+    visitor.page.locator(".q-menu .q-item").get_by_text("find-students.kiks").click()
+    visitor.at("open").click()
+    expect(visitor.page.get_by_role("heading", name="Find it")).to_be_visible()
+    visitor.tab("arena")
+    visitor.at("save-exercise").click()
+    visitor.told("it is locked")
 
-        # An exercise in a folder has its text beside it, and so have the programs of other robots.
-        folder = tmp_path / "third"
-        folder.mkdir()
-        made.for_students().save(folder / "exercise.kiks")
-        (folder / "text.md").write_text("Here is **another** text.")
-        visitor.at("open-name").fill("third")
-        visitor.page.locator(".q-menu .q-item").get_by_text("third/exercise.kiks").click()
-        visitor.at("open").click()
-        expect(visitor.at("exercise-text")).to_contain_text("Here is another text.")
-    finally:
-        shown.close()
+    # An exercise in a folder has its text beside it, and so have the programs of other robots.
+    folder = tmp_path / "third"
+    folder.mkdir()
+    made.for_students().save(folder / "exercise.kiks")
+    (folder / "text.md").write_text("Here is **another** text.")
+    visitor.at("open-name").fill("third")
+    visitor.page.locator(".q-menu .q-item").get_by_text("third/exercise.kiks").click()
+    visitor.at("open").click()
+    expect(visitor.at("exercise-text")).to_contain_text("Here is another text.")

@@ -17,11 +17,10 @@ from typing import Any
 
 import pytest
 from tests.at_length import AT_LENGTH
-from tests.desk.visitor import SCREENSHOTS
+from tests.desk.visitor import SCREENSHOTS, Shown
 from tests.guard import GUARD_S, wait_until
 
 from kiks import Arena, Khepera, Recording, Simulation
-from kiks.desk.server.show import Shown
 from kiks.export.page import save_page
 
 pytestmark = pytest.mark.slow

@@ -3,32 +3,25 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
-from playwright.sync_api import expect
-from tests.at_length import at_length
-from tests.desk.visitor import NewPage, Visitor, make_project, open_desk
+from tests.desk.visitor import NewPage, Shown, Visitor, expect, make_project
 
-from kiks.desk.server.show import Shown
 from kiks.model.arena_objects import Lamp, Pose
-from kiks.model.project import ProjectRobot
+from kiks.model.project import Project, ProjectRobot
 
 pytestmark = pytest.mark.slow
 
 
 @pytest.fixture
-def shown(tmp_path: Path) -> Iterator[Shown]:
-    """A desk whose first robot stands by a wall, with a camera and a radio."""
+def project() -> Project:
+    """The first robot stands by a wall, with a camera and a radio."""
     project = make_project()
     starts = (Pose(45, 240, 2.9), *project.arena.starts[1:])
     arena = replace(project.arena, starts=starts, lamps=(Lamp(200, 60, 2.0), Lamp(30, 330, 1.0)))
     robots = (ProjectRobot(turrets=("k213", "radio")), *project.robots[1:])
-    shown = open_desk(tmp_path, replace(project, arena=arena, robots=robots))
-    yield shown
-    shown.close()
+    return replace(project, arena=arena, robots=robots)
 
 
 @pytest.fixture
@@ -78,7 +71,7 @@ def test_readings_on_the_page_equal_the_simulations(visitor: Visitor) -> None:
     assert painted(visitor, ".kiks-monitor-robot canvas") > 20
 
 
-def test_a_click_explains_a_reading(visitor: Visitor) -> None:
+def test_a_click_or_a_key_explains_a_reading(visitor: Visitor) -> None:
     visitor.pause()
     why = visitor.sim.explain(1, 2)
     visitor.at("proximity-2").click()
@@ -98,9 +91,12 @@ def test_a_click_explains_a_reading(visitor: Visitor) -> None:
     expect(rows).to_have_count(2)
     visitor.at("close-explanation").click()
     expect(answer).to_be_hidden()
-
-
-def test_keep_looking_updates_the_explanation(visitor: Visitor) -> None:
+    # With keys alone; test_desk_for_all.py reaches each control with Tab.
+    visitor.at("proximity-1").press("Enter")
+    expect(answer).to_contain_text("Sensor 1 (")
+    visitor.page.keyboard.press("Escape")
+    expect(answer).to_be_hidden()
+    # It follows the robot if it is told to keep looking.
     visitor.at("proximity-1").click()
     visitor.at("keep-looking").click()
     text = visitor.at("explanation-text")
@@ -110,21 +106,10 @@ def test_keep_looking_updates_the_explanation(visitor: Visitor) -> None:
     expect(text).not_to_have_text(before)
 
 
-@at_length
-def test_the_monitor_works_with_keys_alone(visitor: Visitor) -> None:
-    """test_desk_for_all.py reaches each control with Tab."""
-    visitor.at("proximity-3").focus()
-    visitor.page.keyboard.press("Enter")
-    expect(visitor.at("explanation")).to_contain_text("Sensor 3 (")
-    visitor.at("curves-speeds").focus()
-    visitor.page.keyboard.press("Enter")
-    expect(visitor.at("curves-speeds")).to_have_attribute("aria-checked", "true")
-
-
 def test_curves_can_be_chosen_and_lines_left_out(visitor: Visitor) -> None:
     drive(visitor)
     for kind in ("ambient", "speeds", "proximity"):
-        visitor.at(f"curves-{kind}").click()
+        visitor.at(f"curves-{kind}").press("Enter")
         expect(visitor.at(f"curves-{kind}")).to_have_attribute("aria-checked", "true")
         drawn(visitor, 10)
         assert painted(visitor, ".kiks-curves") > 8

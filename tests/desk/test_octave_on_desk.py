@@ -9,9 +9,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Page, expect
 from tests.at_length import at_length, share
-from tests.desk.visitor import FIRST_PICTURE, NewPage, check_access, leave_picture
+from tests.desk.visitor import FIRST_PICTURE, NewPage, Page, check_access, expect, leave_picture
 from tests.forked import kiks_command
 from tests.matlab.octave import need_tcp, needs_octave
 from tests.matlab.terminal import Terminal

@@ -5,14 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import expect
 from tests.at_length import at_length
-from tests.desk.visitor import NewPage, Visitor, check_access, make_project
+from tests.desk.visitor import NewPage, Visitor, check_access, expect, open_desk
 
-from kiks.desk.server.desk import Desk
-from kiks.desk.server.show import Shown
 from kiks.model.project import Project
-from kiks.sim.from_project import simulation_of
 
 pytestmark = pytest.mark.slow
 
@@ -76,12 +72,8 @@ def test_a_program_that_ran_is_saved_with_the_project_and_shown_when_that_is_ope
     visitor.at("save").click()
     visitor.told("Saved as lesson.kiks")
     saved = Project.load(visitor.desk.folder / "lesson.kiks")
-    assert (saved.arena.name, saved.robots[0].program, saved.robots[0].arguments) == (
-        "lesson",
-        "exercise1.py",
-        ("--fast", "a b"),
-    )
-
+    robot = saved.robots[0]
+    assert (saved.arena.name, robot.program, robot.arguments) == ("lesson", "exercise1.py", ("--fast", "a b"))
     visitor.tab("programs")
     visitor.at("leave-out").click()
     expect(visitor.at("attached")).to_contain_text("no program yet")
@@ -186,10 +178,7 @@ def test_line_is_watched_only_while_the_panel_is_visible(visitor: Visitor) -> No
 def test_a_page_that_may_not_start_programs_tells_why(
     owns_world: bool, reason: str, other: str, new_page: NewPage, tmp_path: Path
 ) -> None:
-    project = make_project()
-    desk = Desk(simulation_of(project, tmp_path), project=project, folder=tmp_path, owns_world=owns_world)
-    shown = Shown(desk, port=0)
-    shown.drive()
+    shown = open_desk(tmp_path, may_run_programs=False, owns_world=owns_world)
     visitor = Visitor(new_page(), shown)
     visitor.at("tab-programs").click()
     expect(visitor.at("may-not")).to_contain_text(reason)

@@ -3,16 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
-from playwright.sync_api import Browser, Page, expect
 from tests.desk.test_exercise import DRIVE, make_exercise
-from tests.desk.visitor import FIRST_PICTURE, NewPage, check_access, check_reach, leave_picture
-from tests.namespaces import has_namespaces
-
-from kiks.desk.room.page import open_room
-from kiks.desk.room.room import Room
-from kiks.trials.submissions import submissions_in
+from tests.desk.visitor import FIRST_PICTURE, Browser, NewPage, Page, check_access, check_reach, expect, leave_picture
 
 NAMES = ["Ada Lovelace", "Alan Turing", "Grace <b>Hopper</b>", "J\xf6rg M\xfcller"]
 
@@ -20,7 +15,7 @@ LOOKS = ((1366, 768, "light"), (1280, 800, "dark"))
 """Screens and colours of two students."""
 
 
-def come_in(page: Page, room: Room, name: str) -> None:
+def come_in(page: Page, room: Any, name: str) -> None:
     """Give the code, choose a name, and wait for the desk."""
     page.goto(room.address)
     check_access(page, "entrance")
@@ -52,6 +47,12 @@ def solve(page: Page) -> None:
 
 @pytest.mark.slow
 def test_a_class_comes_solves_and_hands_in(tmp_path: Path, new_page: NewPage, browser: Browser) -> None:
+    from tests.namespaces import has_namespaces
+
+    from kiks.desk.room.page import open_room
+    from kiks.desk.room.room import Room
+    from kiks.trials.submissions import submissions_in
+
     project, is_trusted = make_exercise(), not has_namespaces()
     room = Room(project, tmp_path, NAMES, tmp_path / "room", is_trusted=is_trusted)
     with open_room(room, port=0):

@@ -6,14 +6,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import expect
 from tests.at_length import at_length
-from tests.desk.test_looking_back import drive
-from tests.desk.visitor import NewPage, Visitor, check_access
+from tests.desk.visitor import NewPage, Shown, Visitor, check_access, expect
 
 from kiks import Khepera, Recording, Simulation
-from kiks.desk.server.desk import Desk
-from kiks.desk.server.show import Shown
 from kiks.model.arena import Arena
 
 pytestmark = pytest.mark.slow
@@ -22,20 +18,24 @@ pytestmark = pytest.mark.slow
 @pytest.fixture
 def played(tmp_path: Path) -> Iterator[Shown]:
     """A desk with a recording of four seconds, in which something happens."""
+    from kiks.desk.server.desk import Desk
+    from kiks.desk.server.show import Shown
+
     sim = Simulation(Arena.box(500, 400), robots=2, seed=2)
     sim.place(1, 100, 100, 0.5)
     sim.place(2, 350, 300, 1.0)
-    file = tmp_path / "run.mcap"
+    file, robot = tmp_path / "run.mcap", Khepera(sim.port(1))
     with sim.record(file) as recorder:
-        drive(sim, 1.0)
+        robot.set_speed(8, 6)
+        sim.run(1.0 - sim.time_s)
         recorder.mark("look here")
-        drive(sim, 0.5)
+        sim.run(0.5)
         recorder.say(1, "I have seen it")
         sim.set_score(1, 2)
         sim.set_score(2, 1)
-        drive(sim, 0.5)
+        sim.run(0.5)
         sim.place(1, 100, 200, 3.1)
-        Khepera(sim.port(1)).set_speed(15, 15)
+        robot.set_speed(15, 15)
         sim.run(4.0 - sim.time_s)
     recording = Recording(file)
     desk = Desk(recording.world_at(0), project=recording.project, owns_world=True, folder=tmp_path)

@@ -8,18 +8,16 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from urllib.parse import urlsplit
 
 import pytest
-from playwright.sync_api import Browser, expect
 from tests.at_length import at_length
-from tests.desk.visitor import FIRST_PICTURE, NewPage, Visitor, leave_picture
+from tests.desk.visitor import FIRST_PICTURE, Browser, NewPage, Shown, Visitor, expect, leave_picture
 from tests.guard import GUARD_S
-
-from kiks.desk.server.server import SERVER
-from kiks.desk.server.show import Shown
 
 pytestmark = pytest.mark.slow
 
 
 def test_the_token_moves_from_the_address_to_a_cookie(visitor: Visitor, shown: Shown) -> None:
+    from kiks.desk.server.server import SERVER
+
     assert "token" not in visitor.page.url
     assert SERVER.key.token not in visitor.page.content()
     assert visitor.answer("document.cookie") == ""
@@ -41,6 +39,8 @@ def test_other_servers_of_this_computer_never_get_the_token(visitor: Visitor, no
 
 
 def test_a_ticket_opens_the_desk_once(new_page: NewPage, browser: Browser, shown: Shown) -> None:
+    from kiks.desk.server.server import SERVER
+
     url = SERVER.url_for_once(shown.gateway.number)
     page = new_page()
     page.goto(url)

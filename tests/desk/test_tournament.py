@@ -5,18 +5,17 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import expect
 from tests.cli.test_tournament import DRIVE, MATCH, REFEREE
-from tests.desk.visitor import NewPage, Visitor, check_access, leave_picture, open_desk
-
-from kiks.desk.server.hall import Hall
-from kiks.trials.submissions import submissions_in
-from kiks.trials.tournament import Match, in_order, play
+from tests.desk.visitor import NewPage, Visitor, check_access, expect, leave_picture, open_desk
 
 pytestmark = pytest.mark.slow
 
 
 def test_games_are_shown_one_after_the_other_with_the_table_between(tmp_path: Path, new_page: NewPage) -> None:
+    from kiks.desk.server.hall import Hall
+    from kiks.trials.submissions import submissions_in
+    from kiks.trials.tournament import Match, in_order, play
+
     (tmp_path / "race.kiks").write_text(MATCH.replace("seconds = 3.0", "seconds = 2.0"))
     (tmp_path / "referee.py").write_text(REFEREE)
     for name, speed in {"ann": 5, "bob": 9}.items():

@@ -5,32 +5,35 @@ Nothing sleeps: `until` lets the page draw its next picture, again and again, un
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import pytest
-from axe_playwright_python.sync_playwright import Axe
-from playwright.sync_api import Locator, Page, expect
 from tests.at_length import AT_LENGTH
 
-from kiks.desk.server.desk import Desk
-from kiks.desk.server.show import Shown
 from kiks.model.arena import Arena
 from kiks.model.arena_objects import Ball, Cylinder, Lamp, Pose
 from kiks.model.project import Project, ProjectRobot
-from kiks.ports.program_process import Command
 from kiks.sim.from_project import simulation_of
-from kiks.sim.simulation import Simulation
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser, Locator, Page
+
+    from kiks.desk.server.show import Shown
+    from kiks.sim.simulation import Simulation
+else:
+    # Tests name them as types alone, and their modules take seconds to import.
+    Browser = Locator = Page = Shown = Any
 
 SCREENSHOTS = Path(__file__).parents[2] / "screenshots"
 """Where pictures of what tests have seen are left for a person."""
 
 PICTURES_MAX = 3600
-"""Most pictures of the screen that something is waited for, a minute or so: a guard, no measure."""
+"""Most pictures of the screen that something is waited for, a minute or more: a guard, no measure."""
 
 NEXT_PICTURE = "() => new Promise((done) => requestAnimationFrame(() => done(true)))"
-FIRST_PICTURE = "() => window.kiksDesk?.stats().frames_drawn > 3 && kiksDesk.pose(0)"
+FIRST_PICTURE = "() => window.kiksDesk?.stats().frames_drawn > 1 && kiksDesk.pose(0) && window.socket?.connected"
 
 STILL = """() => {
     const moving = document.getAnimations().filter(
@@ -59,6 +62,18 @@ OUT_OF_REACH = """() => {
 }"""
 """Controls that are smaller than a finger, or cut off at the edge of the screen."""
 
+SERIOUS = """async (runOnly) => (await axe.run({ resultTypes: ["violations"], ...(runOnly && { runOnly }) })).violations
+    .filter(({ impact }) => ["serious", "critical"].includes(impact))
+    .flatMap(({ help, nodes }) => nodes.map(({ html }) => `${help}: ${html}`))"""
+"""What axe-core finds that keeps people out."""
+
+COLOURS = ["color-contrast", "link-in-text-block"]
+"""The rules of axe-core that colours can break."""
+
+PLACE = """([x_mm, y_mm, scene]) => import("kiks-desk").then(
+    ({ pageFeed }) => pageFeed().frame?.scene === scene && kiksDesk.toClient(x_mm, y_mm))"""
+"""Where a place of the arena is on the page, as soon as it shows a scene."""
+
 INSIDE = {"robot": "proximity-0", "wire": "console", "arena": "save", "programs": "editor", "settings": "apply"}
 """Something in each tab."""
 
@@ -66,6 +81,13 @@ NewPage = Callable[..., Page]
 """What the fixture `new_page` of conftest.py is."""
 
 Fact = TypeVar("Fact")
+
+
+def expect(what: Locator | Page) -> Any:
+    """Return Playwright's `expect`, whose import takes long."""
+    from playwright.sync_api import expect
+
+    return expect(what)
 
 
 def make_project() -> Project:
@@ -84,19 +106,14 @@ def make_project() -> Project:
     return Project(arena, robots=(ProjectRobot(turrets=("k213",)), striped), seed=3)
 
 
-def open_desk(folder: Path, project: Project | None = None, commands: Sequence[Command | None] = ()) -> Shown:
-    """Show a world that goes on by itself, with programs."""
+def open_desk(folder: Path, project: Project | None = None, **changes: Any) -> Shown:
+    """Show a world that goes on by itself, on a desk that may run programs, unless `changes` of its options say no."""
+    from kiks.desk.server.desk import Desk
+    from kiks.desk.server.show import Shown
+
     project = project or make_project()
-    sim = simulation_of(project, folder)
-    desk = Desk(
-        sim,
-        project=project,
-        folder=folder,
-        owns_world=True,
-        may_run_programs=True,
-        commands=commands,
-        is_held=True,
-    )
+    options = {"owns_world": True, "may_run_programs": True, "is_held": True, **changes}
+    desk = Desk(simulation_of(project, folder), project=project, folder=folder, **options)
     shown = Shown(desk, port=0)
     desk.begin()
     shown.drive()
@@ -110,16 +127,20 @@ def leave_picture(page: Page, name: str, **options: Any) -> None:
         page.screenshot(path=SCREENSHOTS / f"{name}.png", animations="disabled", **options)
 
 
-def check_access(page: Page, where: str) -> None:
-    """Let axe-core look for what keeps people out: contrast, names, roles. Nothing it finds may be serious."""
+def check_access(page: Page, where: str, rules: list[str] | None = None) -> None:
+    """Let axe-core look for what keeps people out: contrast, names, roles. Nothing it finds may be serious.
+
+    Args:
+        page: The page.
+        where: What it shows.
+        rules: The names of rules; all if left out.
+    """
+    from axe_playwright_python.base import AXE_SCRIPT
+
     page.wait_for_function(STILL)
-    found = [
-        f"{where}: {rule['help']}: {node['html']}"
-        for rule in Axe().run(page).response["violations"]
-        if rule["impact"] in ("serious", "critical")
-        for node in rule["nodes"]
-    ]
-    assert not found, "\n".join(found)
+    if not page.evaluate("'axe' in window"):
+        page.evaluate(AXE_SCRIPT)
+    assert not (found := page.evaluate(SERIOUS, rules)), f"{where}: {found}"
 
 
 def check_reach(page: Page, where: str) -> None:
@@ -153,7 +174,9 @@ class Visitor:
                 return found
             self.page.evaluate(NEXT_PICTURE)
         states = [(handle.name, handle.state) for handle in self.desk.programs.handles]
-        raise AssertionError(f"it did not come until {self.sim}, {self.desk.gate.is_paused=}, {states}")
+        commands = [list(wire.pending) for wire in self.sim.wires]
+        state = f"{self.shown._thread}, {self.desk.gate.is_paused=}, {states}, {commands}"
+        raise AssertionError(f"it did not come until {self.sim}, {state}")
 
     def tab(self, name: str) -> None:
         self.at(f"tab-{name}").click()
@@ -191,8 +214,17 @@ class Visitor:
         return pose["x_mm"], pose["y_mm"], pose["heading_rad"]
 
     def on_page(self, x_mm: float, y_mm: float) -> tuple[float, float]:
-        x, y = self.page.evaluate("([x, y]) => kiksDesk.toClient(x, y)", [x_mm, y_mm])
+        """Return where a place of the arena is when the page shows all that the world has, so that a click hits it."""
+        x, y = self.until(lambda: self.answer(PLACE, [x_mm, y_mm, self._scene()]))
         return x, y
+
+    def _scene(self) -> int | None:
+        """Return the number of the scene that describes the world; None until the desk has described it."""
+        from kiks.export.frames import scene_key
+
+        gateway = self.shown.gateway
+        with self.sim.lock:
+            return gateway._scene_number if gateway._seen == (self.desk.scene, *scene_key(self.sim)) else None
 
     def feed(self, expression: str) -> Any:
         """Return the value of an expression in JavaScript that may use the page's `feed`."""

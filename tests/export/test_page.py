@@ -7,12 +7,12 @@ from collections.abc import Callable
 from html.parser import HTMLParser
 from pathlib import Path
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import pytest
-from tests.at_length import at_length
-from tests.desk.visitor import check_access, check_reach
+from tests.at_length import at_length, share
+from tests.desk.visitor import COLOURS, Browser, NewPage, Page, check_access, check_reach
 
 from kiks import Arena, Khepera, ParameterError, Recording, Simulation
 from kiks.export import page_contents as contents
@@ -24,9 +24,7 @@ from kiks.recording.mcap_file import McapReader
 from kiks.recording.recorder import RunRecorder
 from kiks.recording.replay import Replay
 
-if TYPE_CHECKING:
-    from playwright.sync_api import Browser, Page
-    from tests.desk.visitor import NewPage
+END_S = share(60.0, 300.0)
 
 EVIL = (
     "</script><script>document.title = 'evil'</script><img src=x onerror=\"document.title = 'evil'\">{{ 123457 * 2 }}"
@@ -42,6 +40,12 @@ def drive(sim: Simulation, seconds: float) -> None:
             robot.set_speed(8 - values[3] // 60, 8 - values[2] // 60)
 
 
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A recording of one robot, which is not short."""
+    return recorded(tmp_path_factory.mktemp("plain") / "run.mcap", END_S)
+
+
 def recorded(file: Path, seconds: float) -> Path:
     sim = Simulation(Arena.box(500, 400), seed=3)
     with sim.record(file):
@@ -50,20 +54,12 @@ def recorded(file: Path, seconds: float) -> Path:
 
 
 @pytest.fixture(scope="module")
-def plain(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A recording of one robot, five minutes long."""
-    return recorded(tmp_path_factory.mktemp("plain") / "run.mcap", 300)
-
-
-@pytest.fixture(scope="module")
 def plain_page(plain: Path) -> Path:
-    """Its page."""
     return page_of(plain, plain.parent)
 
 
 @pytest.fixture(scope="module")
 def short(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A recording of one robot."""
     return recorded(tmp_path_factory.mktemp("short") / "short.mcap", 12)
 
 
@@ -94,7 +90,6 @@ def rich(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def rich_page(rich: Path) -> Path:
-    """Its page."""
     return page_of(rich, rich.parent, title=EVIL, robot=2)
 
 
@@ -168,22 +163,19 @@ def test_long_texts_are_cut(tmp_path: Path) -> None:
     assert "word word …" in Tags(page).text
 
 
-@pytest.mark.parametrize("text", [" \n" * 90_000, "x = 1\n" + "\r \x0c" * 60_000 + "y"], ids=["blanks", "other ends"])
-def test_a_program_of_blank_lines_is_not_coloured_for_minutes(text: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    seen: list[str] = []
-    monkeypatch.setattr(contents, "highlight", lambda code, *_: seen.append(code) or "")
-    contents._programs(SimpleNamespace(programs={"1-a.py": text}))  # type: ignore[arg-type]
-    (code,) = seen
-    assert not any(line and line.isspace() for line in code.split("\n"))
-
-
-def test_programs_have_colours_up_to_a_limit(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_programs_have_colours_up_to_a_limit_and_none_where_that_takes_minutes(monkeypatch: pytest.MonkeyPatch) -> None:
     texts = {"1-a.py": "if x: pass\n" * 2000, "2-b.py": "if y: pass\n" * 4000, "3-c.txt": "if z: pass\n"}
     first, second, third = (each["text"] for each in contents._programs(SimpleNamespace(programs=texts)))  # type: ignore[arg-type]
     assert "<span" in first
     assert "<span" not in second
     assert "<span" not in third
     assert second.unescape().startswith("if y: pass\nif y")
+    seen: list[str] = []
+    monkeypatch.setattr(contents, "highlight", lambda code, *_: seen.append(code) or "")
+    for text in (" \n" * 90_000, "x = 1\n" + "\r \x0c" * 60_000 + "y"):
+        contents._programs(SimpleNamespace(programs={"1-a.py": text}))  # type: ignore[arg-type]
+        assert not any(line and line.isspace() for line in seen.pop().split("\n"))
+    assert not seen
 
 
 def test_the_numbers_are_those_of_the_run(rich: Path, rich_page: Path) -> None:
@@ -315,59 +307,55 @@ def shown_pose(page: Page, time_s: float, robot: int = 0) -> list[float]:
 
 
 @pytest.mark.slow
-def test_the_player_shows_what_was_recorded(plain: Path, plain_page: Path, visit: Callable[..., Page]) -> None:
+def test_the_player_shows_the_recording_plays_jumps_and_ends(
+    plain: Path, plain_page: Path, visit: Callable[..., Page]
+) -> None:
     page, recording = visit(plain_page), Recording(plain)
     poses = recording.table("poses")
     # Near and far, forwards and backwards, at frames and between them.
-    for time_s in (0.0, 0.04, 0.1, 7.0, 290.0, 290.02, 12.34, 12.3, 299.99):
+    for time_s in (0.0, 0.04, 0.1, 7.0, END_S - 10, END_S - 9.98, 12.34, 12.3, END_S - 0.01):
         row = poses[np.searchsorted(poses["time_s"], time_s - 1e-6)]
         x_mm, y_mm, heading_rad = shown_pose(page, time_s)
         assert (x_mm, y_mm) == pytest.approx((row["x_mm"], row["y_mm"]), abs=0.15)
         assert np.cos(heading_rad - row["heading_rad"]) > 0.999
-    for time_s in (4.0, 200.0):
+    for time_s in (4.0, END_S - 20):
         shown_pose(page, time_s)
         readings = page.evaluate("[...kiksPage.feed.frame.robot(0).proximity]")
         assert readings == recording.world_at(time_s).look().proximity[0].tolist()
 
-
-@pytest.mark.slow
-def test_the_player_plays_jumps_and_ends(plain_page: Path, visit: Callable[..., Page]) -> None:
-    page = visit(plain_page)
+    # It plays, jumps and ends.
+    shown_pose(page, 0.0)
     clock, play = page.locator("#clock"), page.locator("#play")
     assert clock.text_content() == "0:00.00"
     play.click()
     page.wait_for_function("() => kiksPage.player.time_s > 0.2")
     play.click()
     assert page.evaluate("kiksPage.player.isPlaying") is False
-    page.locator("#slider").fill("123.4")
-    page.wait_for_function("() => document.getElementById('clock').textContent === '2:03.40'")
-    assert page.evaluate("kiksPage.feed.frame.time_s") == pytest.approx(123.4, abs=0.04)
+    page.locator("#slider").fill("43.4")
+    page.wait_for_function("() => document.getElementById('clock').textContent === '0:43.40'")
+    assert page.evaluate("kiksPage.feed.frame.time_s") == pytest.approx(43.4, abs=0.04)
     assert page.evaluate("kiksPage.stage.topView.trails.ways[0].length") > 100
     page.locator("h1").click()
-    for key, time_s in (
-        ("ArrowRight", 124.4),
-        ("ArrowLeft", 123.4),
-        ("Shift+ArrowRight", 123.44),
-        ("Shift+ArrowLeft", 123.4),
-    ):
+    long, short = ("ArrowRight", 44.4), ("Shift+ArrowRight", 43.44)
+    for key, time_s in (long, ("ArrowLeft", 43.4), short, ("Shift+ArrowLeft", 43.4)):
         page.keyboard.press(key)
         assert page.evaluate("kiksPage.player.time_s") == pytest.approx(time_s, abs=1e-6)
     page.locator("#speed").select_option("30")
-    page.locator("#slider").fill("299")
+    page.locator("#slider").fill(f"{END_S - 1}")
     page.locator("h1").click()
     page.keyboard.press("Space")
     page.wait_for_function("() => !kiksPage.player.isPlaying && kiksPage.player.time_s === kiksPage.feed.end_s")
     assert page.locator(".times").inner_text().replace(" ", "").split("/")[0] == clock.inner_text()
     page.keyboard.press("Space")
-    page.wait_for_function("() => kiksPage.player.isPlaying && kiksPage.player.time_s < 290")
+    page.wait_for_function("(end_s) => kiksPage.player.isPlaying && kiksPage.player.time_s < end_s - 10", arg=END_S)
 
 
 @pytest.mark.slow
 def test_axe_finds_nothing_serious(rich_page: Path, visit: Callable[..., Page]) -> None:
     page = visit(rich_page)
-    for colours in ("light", "dark"):
+    for colours, rules in (("light", None), ("dark", COLOURS)):
         page.emulate_media(color_scheme=colours)
-        check_access(page, colours)
+        check_access(page, colours, rules)
     page = visit(rich_page, 390, 844, has_touch=True, is_mobile=True)
     check_access(page, "phone")
     check_reach(page, "phone")

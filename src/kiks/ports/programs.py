@@ -249,7 +249,9 @@ class Programs:
     @property
     def drive(self) -> bool:
         """Whether programs move the world's time, or it waits for players; then nothing else may."""
-        return self._scheduler.drive or (self._gate is not None and not self._scheduler.has_begun)
+        # With the lock: another thread, such as that of Halt, may drop a program's requests while they are looked at.
+        with self.sim.lock:
+            return self._scheduler.drive or (self._gate is not None and not self._scheduler.has_begun)
 
     @property
     def are_there(self) -> bool:
