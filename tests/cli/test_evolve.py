@@ -11,10 +11,9 @@ from pathlib import Path
 import pytest
 from tests import forked
 from tests.at_length import at_length
-from typer.testing import CliRunner, Result
+from tests.cli.test_cli import kiks
 
 from kiks import Recording
-from kiks.cli import app
 from kiks.errors import KiksError
 
 pytestmark = pytest.mark.slow
@@ -23,14 +22,6 @@ TASK = """
 import kiks
 task = kiks.tasks.avoid(seconds=1.0, worlds=4)
 """
-
-
-def kiks(*words: object) -> Result:
-    result = CliRunner().invoke(app, [str(word) for word in words])
-    if isinstance(result.exception, KiksError):
-        raise result.exception
-    assert result.exit_code == 0, result.output
-    return result
 
 
 def ran(*words: object, cwd: Path) -> subprocess.CompletedProcess[str]:
@@ -134,18 +125,6 @@ def test_a_log_for_tensorboard_needs_it(tmp_path: Path, monkeypatch: pytest.Monk
     (tmp_path / "quick.py").write_text(TASK)
     with pytest.raises(KiksError, match=r"--tensorboard must have TensorBoard, .* pip install tensorboard\."):
         kiks("evolve", tmp_path / "quick.py", "--tensorboard", "--generations", 1, "--out", tmp_path / "out")
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (("evolve", "avoyd"), "Did you mean 'avoid'"),
-        (("run", "nowhere.toml"), "Champion's file 'nowhere.toml' must exist"),
-    ],
-)
-def test_wrong_words_are_named(words: tuple[str, ...], said: str) -> None:
-    with pytest.raises(KiksError, match=said):
-        kiks(*words)
 
 
 @at_length
