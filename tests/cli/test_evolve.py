@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -28,11 +29,18 @@ def ran(*words: object, cwd: Path) -> subprocess.CompletedProcess[str]:
     return forked.run(*map(str, words), cwd=cwd)
 
 
+@pytest.fixture(scope="module")
+def evolved(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    place = tmp_path_factory.mktemp("evolved")
+    (place / "quick.py").write_text(TASK)
+    kiks("evolve", place / "quick.py", "--seed", 1, "--population", 8, "--generations", 3, "--out", place / "out")
+    return place
+
+
 @pytest.fixture
-def folder(tmp_path: Path) -> Path:
-    (tmp_path / "quick.py").write_text(TASK)
-    kiks("evolve", tmp_path / "quick.py", "--seed", 1, "--population", 8, "--generations", 3, "--out", tmp_path / "out")
-    return tmp_path / "out"
+def folder(evolved: Path, tmp_path: Path) -> Path:
+    """A copy of an evolution, for a test to change."""
+    return Path(shutil.copytree(evolved, tmp_path / "evolved")) / "out"
 
 
 def test_a_run_leaves_its_files_and_goes_on(folder: Path) -> None:
