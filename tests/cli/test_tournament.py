@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 from tests import forked
+from tests.at_length import at_length
 
 pytestmark = pytest.mark.slow
 
@@ -90,6 +91,7 @@ def test_the_table_is_the_same_with_any_workers_and_after_a_stop(place: Path) ->
     assert "<b>wall" not in page
 
 
+@at_length
 def test_in_the_swiss_system_one_rests_in_each_round_of_three(place: Path) -> None:
     found = tournament(place, "--trusted", "--seeds", "1", "--rounds", "3")
     assert [each["round"] for each in found["games"]] == [1, 1, 2, 2, 3, 3]
