@@ -102,8 +102,6 @@ class Reader:
     def _run(self, *words: str) -> subprocess.CompletedProcess[str]:
         command = ["timeout", "-s", "KILL", str(forked.LIMIT_S), *words]
         environment = os.environ | self._environment
-        for name in ("DISPLAY", "WAYLAND_DISPLAY"):
-            environment.pop(name, None)
         return subprocess.run(command, cwd=self.folder, env=environment, capture_output=True, text=True, check=False)
 
     def do_octave(self, code: str) -> None:

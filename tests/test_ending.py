@@ -49,26 +49,27 @@ COMMANDS = {
 PLACES = ["typer", "kiks.cli.serve", "numpy", "numba", "llvmlite.binding", "kiks.engine.step", "callback"]
 
 
-def python(script: str, *words: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(
-        [sys.executable, "-c", script, *words],
-        capture_output=True,
-        text=True,
-        timeout=GUARD_S,
-        check=False,
-        stdin=subprocess.DEVNULL,
-    )
+def python(script: str, *words: str) -> tuple[int, str, str]:
+    """Return exit code, output and error output of a program."""
+    command = [sys.executable, "-c", script, *words]
+    pipes = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+    done = subprocess.run(command, text=True, timeout=GUARD_S, check=False, **pipes)
+    return done.returncode, done.stdout, done.stderr
+
+
+# In `make test` each place interrupts one command.
+PAIRS = [(command, place) for command in COMMANDS for place in PLACES]
+PAIRS.sort(key=lambda pair: pair[0] != ("run", "serve")[PLACES.index(pair[1]) % 2])
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("place", PLACES)
-@pytest.mark.parametrize("command", cases(COMMANDS, 2))
+@pytest.mark.parametrize(("command", "place"), cases(PAIRS, len(PLACES)))
 def test_a_command_ends_wherever_it_is_interrupted_while_it_loads(command: str, place: str, tmp_path: Path) -> None:
     words = [str(tmp_path / "out") if word == "OUT" else word for word in COMMANDS[command]]
     ending = (signal.SIGINT, signal.SIGTERM)[(PLACES.index(place) + len(command)) % 2]
-    result = python(AT_A_PLACE, place, str(int(ending)), *words)
-    *before, last = result.stderr.splitlines()
-    assert (result.returncode, last) == (130, "kiks: stopped.")
+    code, _, errors = python(AT_A_PLACE, place, str(int(ending)), *words)
+    *before, last = errors.splitlines()
+    assert (code, last) == (130, "kiks: stopped.")
     assert all(line.removeprefix("kiks: ").startswith("Compiling ") for line in before)
 
 
@@ -93,11 +94,6 @@ except KeyboardInterrupt:
 """
 
 
-def test_what_a_callback_drops_is_sent_again() -> None:
-    result = python(IN_A_CALLBACK)
-    assert (result.returncode, result.stdout, result.stderr) == (0, "dropped\nended\n", "")
-
-
 IN_THE_HOOK = """
 import signal, sys
 from kiks.ending import send_again_what_is_dropped
@@ -120,11 +116,6 @@ try:
 except KeyboardInterrupt:
     print("ended")
 """
-
-
-def test_what_comes_while_another_error_is_shown_is_sent_again() -> None:
-    result = python(IN_THE_HOOK)
-    assert (result.returncode, result.stdout, result.stderr) == (0, "shown\nended\n", "")
 
 
 IN_A_DESTRUCTOR = """
@@ -152,20 +143,48 @@ except KeyboardInterrupt:
 """
 
 
+IGNORED = """
+import signal
+from kiks.ending import end_at_once
+
+signal.signal(signal.SIGHUP, signal.SIG_IGN)
+end_at_once()
+signal.raise_signal(signal.SIGHUP)
+print("here", flush=True)
+signal.raise_signal(signal.SIGTERM)
+"""
+
+HELPER_IS_STUCK = """
+import threading
+import kiks.cli
+
+def command():
+    threading.Thread(target=threading.Event().wait).start()
+    print("summary")
+    raise SystemExit(130)
+
+kiks.cli.app = command
+kiks.cli.main()
+"""
+
+
+@pytest.mark.parametrize(
+    ("script", "expected"),
+    [
+        pytest.param(IN_A_CALLBACK, (0, "dropped\nended\n", ""), id="what a callback drops is sent again"),
+        pytest.param(IN_THE_HOOK, (0, "shown\nended\n", ""), id="so is what comes while another error is shown"),
+        pytest.param(IGNORED, (130, "here\n", "kiks: stopped.\n"), id="what is ignored stays ignored"),
+        pytest.param(HELPER_IS_STUCK, (130, "summary\n", ""), id="an interrupted command waits for no thread"),
+    ],
+)
+def test_signals_are_heard(script: str, expected: tuple[int, str, str]) -> None:
+    assert python(script) == expected
+
+
 def test_what_a_destructor_drops_is_sent_again_and_other_errors_are_shown_as_ever() -> None:
-    result = python(IN_A_DESTRUCTOR)
-    assert (result.returncode, result.stdout) == (0, "ended True\n")
-    assert result.stderr.count("Traceback") == 1
-    assert "ValueError: mine" in result.stderr
-
-
-def test_what_is_ignored_stays_ignored() -> None:
-    script = (
-        "import signal\nfrom kiks.ending import *\nsignal.signal(signal.SIGHUP, signal.SIG_IGN)\nend_at_once()\n"
-        "signal.raise_signal(signal.SIGHUP)\nprint('here', flush=True)\nsignal.raise_signal(signal.SIGTERM)\n"
-    )
-    result = python(script)
-    assert (result.returncode, result.stdout, result.stderr) == (130, "here\n", "kiks: stopped.\n")
+    code, out, errors = python(IN_A_DESTRUCTOR)
+    assert (code, out, errors.count("Traceback")) == (0, "ended True\n", 1)
+    assert "ValueError: mine" in errors
 
 
 # Compiled code that hears no signal: it lets other threads run, as the kernels of KiKS do.
@@ -270,7 +289,8 @@ import os, signal, sys
 from kiks.ending import end_at_once
 end_at_once()
 # Not `print`, in the middle of which the signal may come.
-signal.signal(signal.SIGTERM, lambda number, frame: os.write(1, b"noted\n"))
+signal.signal(signal.SIGTERM, lambda number, frame: os.write(1, b"noted\\n"))
+
 print("ready", flush=True)
 print(sys.stdin.read())
 """
@@ -286,22 +306,3 @@ def test_who_notes_a_signal_and_waits_on_has_heard_it() -> None:
             assert process.stdout.readline() == "noted\n"
         assert process.communicate("ended", timeout=GUARD_S)[0] == "ended\n"
     assert process.returncode == 0
-
-
-HELPER_IS_STUCK = """
-import threading
-import kiks.cli
-
-def command():
-    threading.Thread(target=threading.Event().wait).start()
-    print("summary")
-    raise SystemExit(130)
-
-kiks.cli.app = command
-kiks.cli.main()
-"""
-
-
-def test_an_interrupted_command_waits_for_no_thread() -> None:
-    result = python(HELPER_IS_STUCK)
-    assert (result.returncode, result.stdout, result.stderr) == (130, "summary\n", "")

@@ -5,9 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
-from typer.testing import CliRunner
+from tests.cli.test_cli import kiks
 
-from kiks.cli import app
 from kiks.errors import KiksError
 from kiks.model.arena import Arena, Ball, Cylinder, Lamp, Pose, Wall
 from kiks.model.arena_file import save_arena
@@ -16,16 +15,7 @@ MAZE = Path(__file__).parents[2] / "examples" / "arenas" / "maze.toml"
 
 
 def kiks_arena(*arguments: object) -> str:
-    result = CliRunner().invoke(app, ["arena", *map(str, arguments)])
-    if isinstance(result.exception, KiksError):
-        raise result.exception
-    assert result.exit_code == 0, result.output
-    return result.output
-
-
-@pytest.mark.parametrize("command", ["maze", "new", "info"])
-def test_each_has_help_with_an_example(command):
-    assert f"Example: kiks arena {command}" in kiks_arena(command, "--help")
+    return kiks("arena", *arguments).output
 
 
 def test_maze_writes_the_arena_that_python_makes(tmp_path):

@@ -40,64 +40,38 @@ except LoadedError:
     print("the walk finds out")
 """
 
-WRONG = """
-run none.py
-run none.kiks
-run -m none --arena none.toml
-run --nothing program.py
-run --arena none.toml program.py
-run --robot none program.py
-run --robot none.toml program.py
-run --turret none program.py
-run --thinking none:5 program.py
-run --thinking replay:none program.py
-run --when-silent no program.py program.py
-run --map a=9 program.py
-run --seconds -1 program.py
-demo none
-demo follow --arena none.toml
-demo follow --robot none
-desk none.py
-desk none.kiks
-desk --arena none.toml
-desk --robot none
-desk --thinking none:5
-desk --folder none
-serve --arena none.toml
-serve --robot none
-serve --thinking none:5
-serve --when-silent no --thinking none
-evolve none
-evolve none.py
-evolve avoid --algorithm none
-evolve avoid --controller none
-champion none.toml out
-ghosts none out.png
-compare none none2
-replay none.mcap
-replay none.mcap --check
-export none.mcap out.csv
-export none.mcap out.none
-monitor --port none
-calibrate --port none
-fit none.csv out.toml
-schema none
-arena none
-"""
+WORLDS = ("--arena none.toml", "--robot none", "--thinking none:5")
+WRONG = {
+    "demo": ("none", "follow --arena none.toml", "follow --robot none"),
+    "champion": ("none.toml out",),
+    "run": (
+        *("none.py", "none.kiks", "-m none --arena none.toml", *(f"{each} program.py" for each in WORLDS)),
+        *(f"{each} program.py" for each in ("--nothing", "--robot none.toml", "--turret none", "--map a=9")),
+        *("--thinking replay:none program.py", "--when-silent no program.py program.py", "--seconds -1 program.py"),
+    ),
+    "desk": ("none.py", "none.kiks", "--folder none", *WORLDS),
+    "monitor": ("--port none",),
+    "schema": ("none",),
+    "serve": (*WORLDS, "--when-silent no --thinking none"),
+    "calibrate": ("--port none",),
+    "arena": ("none",),
+    "evolve": ("none", "none.py", "avoid --algorithm none", "avoid --controller none"),
+    "ghosts": ("none out.png",),
+    "compare": ("none none2",),
+    "fit": ("none.csv out.toml",),
+    "replay": ("none.mcap", "none.mcap --check"),
+    "export": ("none.mcap out.csv", "none.mcap out.none"),
+}
+"""Words that are wrong behind a command."""
 
 
 def test_mistakes_are_told_before_anything_is_compiled(tmp_path: Path) -> None:
     names = [each.name or each.callback.__name__ for each in app.registered_commands if each.callback]
     assert {"run", "demo", "desk", "warmup"} <= set(names)
-    lines = [*WRONG.strip().splitlines(), *(f"{name} {word}" for name in names for word in ("--nothing", "--help"))]
-    done = subprocess.run(
-        [sys.executable, "-c", WALK],
-        input="\n".join(lines),
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    lines = [f"{name} {words}" for name, each in WRONG.items() for words in each]
+    lines += [f"{name} {word}" for name in names for word in ("--nothing", "--help")]
+    words = [sys.executable, "-c", WALK]
+    done = subprocess.run(words, input="\n".join(lines), cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     told = [line for line in done.stdout.splitlines() if line.startswith(("no error:", "it was compiled:", "the walk"))]
     assert told == ["the walk finds out"]

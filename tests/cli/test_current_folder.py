@@ -25,8 +25,8 @@ EVOLVE = ("evolve", "--generations", "1", "--population", "4", "--out", "OUT/evo
 
 COMMANDS = {
     "run": ("run", "--record", "OUT/run.mcap", WANDER, WANDER),
-    "figures": ("export", "OUT/sound.mcap", "OUT/plot.png", "--kind", "figures"),
     "desk": ("desk", "--port", "0", "--no-browser"),
+    "figures": ("export", "OUT/sound.mcap", "OUT/plot.png", "--kind", "figures"),
     "replay": ("replay", "--check", "OUT/sound.mcap"),
     "page": ("export", "OUT/sound.mcap", "OUT/page.html"),
     "film": ("export", "OUT/sound.mcap", "OUT/film.gif"),
@@ -57,7 +57,7 @@ def test_the_files_would_run(folder: Path) -> None:
     assert ran(folder)  # random.py, or under Python 3.13 first linecache.py, which -c needs
 
 
-@pytest.mark.parametrize("name", cases(COMMANDS, 3))
+@pytest.mark.parametrize("name", cases(COMMANDS, 2))
 def test_no_command_runs_what_lies_in_the_current_folder(name: str, folder: Path) -> None:
     if name == "evolve on Ray":
         pytest.importorskip("ray")
@@ -65,7 +65,7 @@ def test_no_command_runs_what_lies_in_the_current_folder(name: str, folder: Path
     with sim.record(folder.parent / "sound.mcap"):
         sim.run(1.1)
     words = [word.replace("OUT", str(folder.parent)) for word in COMMANDS[name]]
-    environment = {**os.environ, "PYTHONUNBUFFERED": "1", "DISPLAY": "", "WAYLAND_DISPLAY": ""}
+    environment = {**os.environ, "PYTHONUNBUFFERED": "1"}
     pipes = {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
     said = []
     with subprocess.Popen([KIKS, *words], cwd=folder, env=environment, text=True, **pipes) as process:
@@ -105,6 +105,5 @@ def test_what_libraries_start_runs_it_neither(folder: Path) -> None:
 def test_a_program_starts_processes_as_without_kiks(tmp_path: Path) -> None:
     program = tmp_path / "starts.py"
     program.write_text("import os\nprint(os.environ.get('PYTHONSAFEPATH'))\n")
-    environment = {name: value for name, value in os.environ.items() if name != "PYTHONSAFEPATH"}
-    done = subprocess.run([KIKS, "run", program], env=environment, capture_output=True, text=True, check=True)
+    done = subprocess.run([KIKS, "run", program], capture_output=True, text=True, check=True)
     assert done.stdout.startswith("None\n")

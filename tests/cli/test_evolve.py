@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -11,10 +12,9 @@ from pathlib import Path
 import pytest
 from tests import forked
 from tests.at_length import at_length
-from typer.testing import CliRunner, Result
+from tests.cli.test_cli import kiks
 
 from kiks import Recording
-from kiks.cli import app
 from kiks.errors import KiksError
 
 pytestmark = pytest.mark.slow
@@ -25,23 +25,22 @@ task = kiks.tasks.avoid(seconds=1.0, worlds=4)
 """
 
 
-def kiks(*words: object) -> Result:
-    result = CliRunner().invoke(app, [str(word) for word in words])
-    if isinstance(result.exception, KiksError):
-        raise result.exception
-    assert result.exit_code == 0, result.output
-    return result
-
-
 def ran(*words: object, cwd: Path) -> subprocess.CompletedProcess[str]:
     return forked.run(*map(str, words), cwd=cwd)
 
 
+@pytest.fixture(scope="module")
+def evolved(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    place = tmp_path_factory.mktemp("evolved")
+    (place / "quick.py").write_text(TASK)
+    kiks("evolve", place / "quick.py", "--seed", 1, "--population", 8, "--generations", 3, "--out", place / "out")
+    return place
+
+
 @pytest.fixture
-def folder(tmp_path: Path) -> Path:
-    (tmp_path / "quick.py").write_text(TASK)
-    kiks("evolve", tmp_path / "quick.py", "--seed", 1, "--population", 8, "--generations", 3, "--out", tmp_path / "out")
-    return tmp_path / "out"
+def folder(evolved: Path, tmp_path: Path) -> Path:
+    """A copy of an evolution, for a test to change."""
+    return Path(shutil.copytree(evolved, tmp_path / "evolved")) / "out"
 
 
 def test_a_run_leaves_its_files_and_goes_on(folder: Path) -> None:
@@ -134,18 +133,6 @@ def test_a_log_for_tensorboard_needs_it(tmp_path: Path, monkeypatch: pytest.Monk
     (tmp_path / "quick.py").write_text(TASK)
     with pytest.raises(KiksError, match=r"--tensorboard must have TensorBoard, .* pip install tensorboard\."):
         kiks("evolve", tmp_path / "quick.py", "--tensorboard", "--generations", 1, "--out", tmp_path / "out")
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (("evolve", "avoyd"), "Did you mean 'avoid'"),
-        (("run", "nowhere.toml"), "Champion's file 'nowhere.toml' must exist"),
-    ],
-)
-def test_wrong_words_are_named(words: tuple[str, ...], said: str) -> None:
-    with pytest.raises(KiksError, match=said):
-        kiks(*words)
 
 
 @at_length

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -27,9 +28,14 @@ LIKE = {
 """How files of a kind begin whose `BEGINNINGS` are no plain bytes."""
 
 
+@cache
+def group() -> Any:
+    return typer.main.get_command(app)
+
+
 def told(*words: object) -> dict[str, Any]:
     """Return what a command would begin with."""
-    command: Any = typer.main.get_command(app)
+    command = group()
     names = list(map(str, words))
     while hasattr(command, "commands"):
         command = command.commands[names.pop(0)]
@@ -39,8 +45,7 @@ def told(*words: object) -> dict[str, Any]:
 
 def outputs() -> Iterator[tuple[tuple[str, str], str]]:
     """Yield all outputs of all commands, with each of their endings."""
-    group: Any = typer.main.get_command(app)
-    commands = {**group.commands, **group.commands["arena"].commands}
+    commands = {**group().commands, **group().commands["arena"].commands}
     del commands["demo"]  # another name of run
     for name, command in commands.items():
         for param, (endings, _, _, is_new) in getattr(command, "_outputs", ()):
@@ -74,19 +79,17 @@ def test_only_its_like_is_replaced_without_force(output: tuple[str, str], ending
     path.write_bytes(b"precious")
     with pytest.raises(ParameterError, match=r"must be new.*exists\. Choose another name or add --force"):
         told(*words)
-    forced = [words[0], *words[1 : 1 + (words[0] == "arena")], "--force", *words[1 + (words[0] == "arena") :]]
-    assert told(*forced)[output[1]] == path
+    names = 1 + (words[0] == "arena")
+    assert told(*words[:names], "--force", *words[names:])[output[1]] == path
     assert path.read_bytes() == b"precious"
 
 
 @pytest.mark.parametrize("output", sorted({output for output, ending in OUTPUTS if ending}))
-@pytest.mark.parametrize("name", ["student.py", "other", "folder.html"])
-def test_an_output_has_one_of_its_endings_and_is_no_folder(output: tuple[str, str], name: str, tmp_path: Path) -> None:
-    path = tmp_path / name
-    if name.startswith("folder"):
-        path.mkdir()
-    with pytest.raises(ParameterError, match="it is a folder" if path.is_dir() else "must end in "):
-        told(*words_for(output, path))
+def test_an_output_has_one_of_its_endings_and_is_no_folder(output: tuple[str, str], tmp_path: Path) -> None:
+    (tmp_path / "folder.html").mkdir()
+    for name, why in (("student.py", "must end in "), ("other", "must end in "), ("folder.html", "it is a folder")):
+        with pytest.raises(ParameterError, match=why):
+            told(*words_for(output, tmp_path / name))
 
 
 SAME: dict[str, Callable[[Path, Path], object]] = {
@@ -97,33 +100,30 @@ SAME: dict[str, Callable[[Path, Path], object]] = {
 }
 
 
-@pytest.mark.parametrize("how", SAME)
-@pytest.mark.parametrize("is_forced", [False, True])
 @pytest.mark.parametrize(
-    ("words", "name"),
+    ("line", "name"),
     [
-        (("export", "INPUT", "PLACE"), "page.html"),
-        (("export", "--kind", "figures", "other.mcap", "INPUT", "PLACE"), "plot.png"),
-        (("run", "--record", "PLACE", "program.py", "INPUT"), "run.mcap"),
-        (("run", "--thinking", "replay:INPUT", "--export", "PLACE", WANDER), "thoughts.csv"),
-        (("fit", "INPUT=12.5", "--robot", "PLACE"), "post.toml"),
-        (("serve", "--arena", "INPUT", "--record", "PLACE"), "arena.mcap"),
-        (("calibrate", "--port", "kiks://1", "--base", "INPUT", "--out", "PLACE"), "robot.toml"),
-        (("evolve", "INPUT", "--record", "PLACE"), "task.mcap"),
+        ("export INPUT PLACE", "page.html"),
+        ("export --kind figures other.mcap INPUT PLACE", "plot.png"),
+        ("run --record PLACE program.py INPUT", "run.mcap"),
+        (f"run --thinking replay:INPUT --export PLACE {WANDER}", "thoughts.csv"),
+        ("fit INPUT=12.5 --robot PLACE", "post.toml"),
+        ("serve --arena INPUT --record PLACE", "arena.mcap"),
+        ("calibrate --port kiks://1 --base INPUT --out PLACE", "robot.toml"),
+        ("evolve INPUT --record PLACE", "task.mcap"),
     ],
 )
-def test_no_output_is_an_input(
-    words: tuple[str, ...], name: str, how: str, is_forced: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_no_output_is_an_input(line: str, name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "folder").mkdir()
-    given, file = tmp_path / name, tmp_path / f"link{Path(name).suffix}"
+    given = tmp_path / name
     given.touch()
-    place = SAME[how](given, file) or file
-    command = [word.replace("INPUT", str(given)).replace("PLACE", str(place)) for word in words]
-    command[1:1] = ["--force"] * is_forced
-    with pytest.raises(ParameterError, match="must be a file that the command does not need besides"):
-        told(*command)
+    for number, how in enumerate(SAME.values()):
+        file = tmp_path / f"link{number}{given.suffix}"
+        command = line.replace("INPUT", str(given)).replace("PLACE", str(how(given, file) or file)).split()
+        for force in ((), ("--force",)):
+            with pytest.raises(ParameterError, match="must be a file that the command does not need besides"):
+                told(command[0], *force, *command[1:])
 
 
 @pytest.mark.parametrize("how", ["a link", "a hard link"])
@@ -167,66 +167,62 @@ def test_the_place_of_an_output_that_is_left_out_is_checked_too(
 
 
 @pytest.mark.parametrize(
-    ("words", "option"),
+    ("line", "option"),
     [
-        (("run", "--seed", "1", "--seed", "2", WANDER), "--seed"),
-        (("run", "exercise.kiks", "--seed", "1", "--export", "a.csv", "--seed", "1"), "--seed"),
-        (("demo", "--export", "a.png", "--export", "b.png", "avoid"), "--export"),
-        (("export", "run.mcap", "run.html", "--title", "A", "--title", "B"), "--title"),
-        (("serve", "--pty", "--no-pty"), "--pty"),
-        (("arena", "maze", "maze.toml", "--rows", "4", "--rows", "5"), "--rows"),
+        (f"run --seed 1 --seed 2 {WANDER}", "--seed"),
+        ("run exercise.kiks --seed 1 --export a.csv --seed 1", "--seed"),
+        ("demo --export a.png --export b.png avoid", "--export"),
+        ("export run.mcap run.html --title A --title B", "--title"),
+        ("serve --pty --no-pty", "--pty"),
+        ("arena maze maze.toml --rows 4 --rows 5", "--rows"),
     ],
 )
-def test_an_option_that_has_one_value_is_given_once(words: tuple[str, ...], option: str) -> None:
+def test_an_option_that_has_one_value_is_given_once(line: str, option: str) -> None:
     with pytest.raises(ParameterError, match=f"{option} must be given once, but it was given 2 times"):
-        told(*words)
+        told(*line.split())
+
+
+def test_some_options_have_several_values() -> None:
     assert told("run", "--robot", "khepera", "--robot", "khepera_ii", WANDER)["robot"] == ["khepera", "khepera_ii"]
 
 
-IDLE = [
-    (
-        ("run", "--desk", "--seconds", "5", WANDER),
-        "--seconds must be left out with --desk, where a person ends the run, but it was 5.0",
-    ),
-    (
-        ("run", "--desk", "--max-wall", "5", WANDER),
-        "--max-wall must be left out with --desk, where a person ends the run, but it was 5.0",
-    ),
-    (("run", "--no-wait", WANDER), "--no-wait must be left out without --desk"),
-    (("run", "--when-silent", "drop", WANDER), "--when-silent must be left out with one program"),
-    (("run", "--patience", "2", WANDER), "--patience must be left out with one program"),
-    (("run", "--save-thinking", "times", WANDER), "--save-thinking must be left out with --thinking none"),
-    (("run", "--robots", "1", WANDER, WANDER), "--robots must be at least 2"),
-    (("run", "--map", "never-opened=4", WANDER), "robot must be the number of an existing robot, but it was 4"),
-    (("run", WANDER, "exercise.kiks"), "a project must come first, but 'exercise.kiks' stands among the programs"),
-    (("desk", WANDER, "exercise.kiks"), "a project must come first, but 'exercise.kiks' stands among the programs"),
-    (("demo", "avoid", "--no-wait"), "--no-wait must be left out without --desk"),
-    (("champion", ".", "c.toml", "--at", "1,2", "--world", "1"), "--world must be left out with --at"),
-    (("evolve", "--list", "--seed", "0"), "--seed must be left out with --list"),
-    (("replay", "run.mcap", "--check", "--start", "1"), "--start must be left out with --check"),
-    (("replay", "run.mcap", "--check", "--speed", "1"), "--speed must be left out with --check"),
-    (("export", "run.mcap", "run.mp4", "--time", "1"), "--time must be left out of a film, but it was 1.0"),
-    (("export", "run.mcap", "run.png", "--fps", "1"), "--fps must be left out of a picture, but it was 1"),
-    (("export", "run.mcap", "run.csv", "--plain"), "--plain must be left out of a table"),
-    (("export", "run.mcap", "run.png", "--kind", "page"), "a page must end in .html"),
-    (("export", "run.mcap", "run.png", "--kind", "pages"), "Did you mean 'page'?"),
-    (("serve", "--programs", "1"), "--programs must be left out with --thinking live"),
-    (("serve", "--patience", "1"), "--patience must be left out with --thinking live"),
-    (("serve", "--when-silent", "drop"), "--when-silent must be left out with --thinking live"),
-    (("serve", "--thinking", "none", "--speed", "2"), "--speed must be left out with --thinking none"),
-    (("serve", "--thinking", "none", "--by-character"), "--by-character must be left out with --thinking none"),
-    (("serve", "--no-pty", "--link", "x"), "--link must be left out with --no-pty"),
-]
+DESK = "must be left out with --desk, where a person ends the run, but it was 5.0"
+IDLE = {
+    f"run --desk --seconds 5 {WANDER}": f"--seconds {DESK}",
+    f"run --desk --max-wall 5 {WANDER}": f"--max-wall {DESK}",
+    f"run --no-wait {WANDER}": "--no-wait must be left out without --desk",
+    f"run --when-silent drop {WANDER}": "--when-silent must be left out with one program",
+    f"run --patience 2 {WANDER}": "--patience must be left out with one program",
+    f"run --save-thinking times {WANDER}": "--save-thinking must be left out with --thinking none",
+    f"run --robots 1 {WANDER} {WANDER}": "--robots must be at least 2",
+    f"run --map never-opened=4 {WANDER}": "robot must be the number of an existing robot, but it was 4",
+    f"run {WANDER} exercise.kiks": "a project must come first, but 'exercise.kiks' stands among the programs",
+    f"desk {WANDER} exercise.kiks": "a project must come first, but 'exercise.kiks' stands among the programs",
+    "demo avoid --no-wait": "--no-wait must be left out without --desk",
+    "champion . c.toml --at 1,2 --world 1": "--world must be left out with --at",
+    "evolve --list --seed 0": "--seed must be left out with --list",
+    "replay run.mcap --check --start 1": "--start must be left out with --check",
+    "replay run.mcap --check --speed 1": "--speed must be left out with --check",
+    "export run.mcap run.mp4 --time 1": "--time must be left out of a film, but it was 1.0",
+    "export run.mcap run.png --fps 1": "--fps must be left out of a picture, but it was 1",
+    "export run.mcap run.csv --plain": "--plain must be left out of a table",
+    "export run.mcap run.png --kind page": "a page must end in .html",
+    "export run.mcap run.png --kind pages": "Did you mean 'page'?",
+    "serve --programs 1": "--programs must be left out with --thinking live",
+    "serve --patience 1": "--patience must be left out with --thinking live",
+    "serve --when-silent drop": "--when-silent must be left out with --thinking live",
+    "serve --thinking none --speed 2": "--speed must be left out with --thinking none",
+    "serve --thinking none --by-character": "--by-character must be left out with --thinking none",
+    "serve --no-pty --link x": "--link must be left out with --no-pty",
+}
 """Options that would have no effect, or be taken for something else, and what is told of them."""
 
 
-@pytest.mark.parametrize(("words", "message"), IDLE)
-def test_no_option_is_ignored(
-    words: tuple[str, ...], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.mark.parametrize("line", IDLE)
+def test_no_option_is_ignored(line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     for name in ("exercise.kiks", "champion.toml"):
         Path(name).touch()
     save_arena(Arena.box(300, 300), "box.toml")
-    with pytest.raises(ParameterError, match=re.escape(message)):
-        app(list(words), standalone_mode=False)
+    with pytest.raises(ParameterError, match=re.escape(IDLE[line])):
+        app(line.split(), standalone_mode=False)

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import json
 import tomllib
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import jsonschema
 import pytest
-from typer.testing import CliRunner
+from tests.cli.test_cli import kiks
 
-from kiks.cli import app
 from kiks.model.arena import Arena
 from kiks.model.project import Project, ProjectRobot
 from kiks.model.robot import RobotSpec, robot_toml
@@ -28,18 +28,13 @@ ARENA = {"size_mm": [300, 200], "start": [{"at_mm": [100, 100]}], "ball": [{"at_
 GOOD = {"robot": ROBOT, "arena": ARENA, "project": PROJECT, "task": TASK}
 
 
+@cache
 def schema_of(kind: str) -> Any:
-    result = CliRunner().invoke(app, ["schema", kind])
-    assert result.exit_code == 0
-    return json.loads(result.output)
+    return json.loads(kiks("schema", kind).output)
 
 
 def accepts(kind: str, content: object) -> bool:
     return bool(jsonschema.Draft202012Validator(schema_of(kind)).is_valid(content))
-
-
-def objects(schema: Any) -> list[Any]:
-    return [schema, *schema.get("$defs", {}).values()]
 
 
 @pytest.mark.parametrize("kind", GOOD)
@@ -48,14 +43,13 @@ def test_a_schema_is_whole(kind: str) -> None:
     assert schema["$schema"] == "https://json-schema.org/draft/2020-12/schema"
     jsonschema.Draft202012Validator.check_schema(schema)
     assert schema["title"] == f"KiKS {kind} file"
-    for each in objects(schema):
+    for each in (schema, *schema.get("$defs", {}).values()):
         if each["type"] == "object":
             assert each["description"]
             assert each["additionalProperties"] is False
     assert '"null"' not in json.dumps(schema)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("kind", GOOD)
 def test_good_files_are_accepted_and_each_broken_key_is_not(kind: str) -> None:
     good = GOOD[kind]

@@ -11,6 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from importlib import resources
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -33,14 +34,15 @@ HEAD = 20
 
 
 class Asker:
-    """Sends requests and returns answers and errors."""
+    """Sends requests; returns the answer to the last, or an error."""
 
     def __init__(self, session: Session, number: int = 1) -> None:
         self.client = SessionClient(session, number)
 
-    def __call__(self, request: str) -> str:
-        told = self.told(request)
-        assert told[0] == "+", told
+    def __call__(self, *requests: str) -> str:
+        for request in requests:
+            told = self.told(request)
+            assert told[0] == "+", told
         return told[HEAD:]
 
     def told(self, request: str) -> str:
@@ -91,10 +93,13 @@ def ask(session: Session) -> Asker:
 
 def begun(session: Session, *settings: str, world: str = "default") -> Asker:
     ask = Asker(session)
-    for setting in ("thinking none", *settings):
-        ask(f"set {setting}")
-    ask(f"world {world}")
+    ask(*(f"set {setting}" for setting in ("thinking none", *settings)), f"world {world}")
     return ask
+
+
+def floor(*shape: int) -> str:
+    """Return an arena without anything in it."""
+    return f"matrix {matrix_text(np.zeros(shape))}"
 
 
 def test_a_session_equals_a_port_in_memory(session: Session) -> None:
@@ -117,29 +122,24 @@ def test_a_session_equals_a_port_in_memory(session: Session) -> None:
 def test_polling_lets_time_pass(ask: Asker, poll: str) -> None:
     ask("ask 1 D,5,5")
     y = ask.numbers("pose 1")[1]
-    for _ in range(3000):
-        ask(poll)
+    ask(*[poll] * 3000)
     assert ask.numbers("pose 1")[1] < y - 10
 
 
 def test_nothing_moves_without_a_request(ask: Asker) -> None:
-    ask("ask 1 D,5,5")
-    ask("close 1")
+    ask("ask 1 D,5,5", "close 1")
     state = ask("state")
-    for _ in range(100):
-        ask("objects")
+    ask(*["objects"] * 100)
     assert ask("state") == state
 
 
 def test_thinking_time_passes_live_in_a_window(session: Session) -> None:
     """Thinking time counts once: the robot drives for exactly as long as the program has thought."""
     ask = Asker(session)
-    ask("set thinking live")
-    ask("world default")
+    ask("set thinking live", "world default")
     begin_s, begin_ns = time.monotonic(), session.world.now_ns
     session.desk.gate.set_speed(1.0, begin_ns)
-    ask("open 1 9600")
-    ask("ask 1 D,5,5")
+    ask("open 1 9600", "ask 1 D,5,5")
     driven_ns = begin_ns + 500_000_000
     guard = threading.Event()
     for _ in range(1000):
@@ -153,26 +153,17 @@ def test_thinking_time_passes_live_in_a_window(session: Session) -> None:
     assert (end_ns - begin_ns) * 1e-9 < thought_s + 0.1, "time that has passed counts once"
 
 
-def test_a_pause_lets_simulated_time_pass(ask: Asker) -> None:
-    ask("ask 1 D,5,5")
-    before = ask.numbers("pose 1")
-    ask("pause 2")
-    after = ask.numbers("pose 1")
-    assert before[1] - after[1] == pytest.approx(80, abs=3), "2 s at 40 mm/s, upwards: y is less"
-    forwards, backwards, straight = ask.numbers("distances 1")
-    assert (forwards, backwards) == (pytest.approx(straight, abs=1), 0)
-
-
-def test_distances_and_paths_begin_when_the_port_is_opened(session: Session) -> None:
+def test_a_pause_lets_time_pass_and_distances_and_paths_begin_when_the_port_is_opened(session: Session) -> None:
     ask = begun(session)
     for _ in range(2):
         ask("open 1 9600")
+        before = ask.numbers("pose 1")
         assert ask.numbers("distances 1") == pytest.approx([0, 0, 0], abs=1e-3)
-        ask("ask 1 D,5,5")
-        ask("pause 1")
-        ask("ask 1 D,0,0")
-        ask("pause 0.2")
-        assert ask.numbers("distances 1")[0] == pytest.approx(40, abs=5)
+        ask("ask 1 D,5,5", "pause 1", "ask 1 D,0,0", "pause 0.2")
+        forwards, backwards, straight = ask.numbers("distances 1")
+        assert (forwards, backwards) == (pytest.approx(straight, abs=1), pytest.approx(0, abs=1e-3))
+        assert forwards == pytest.approx(40, abs=3), "1 s at 40 mm/s"
+        assert before[1] - ask.numbers("pose 1")[1] == pytest.approx(forwards, abs=1), "upwards: y is less"
         path = matrices_of(ask("path 1"))[0]
         assert path.shape[0] == 2
         assert 20 < path.shape[1] < 60
@@ -183,12 +174,9 @@ def test_distances_and_paths_begin_when_the_port_is_opened(session: Session) -> 
 
 def test_a_long_path_keeps_its_ends_in_few_points(session: Session) -> None:
     ask = Asker(session)
-    ask("set path_points 40")
-    ask("world default")
-    ask("open 1 9600")
+    ask("set path_points 40", "world default", "open 1 9600")
     start = ask.numbers("pose 1")
-    ask("ask 1 D,5,5")
-    ask("pause 3")
+    ask("ask 1 D,5,5", "pause 3")
     path = matrices_of(ask("path 1"))[0]
     assert 20 <= path.shape[1] <= 40, "3 s have 75 points; every second one is left"
     assert path[:, 0] == pytest.approx(start[:2], abs=0.1)
@@ -196,8 +184,7 @@ def test_a_long_path_keeps_its_ends_in_few_points(session: Session) -> None:
     ask("close 1")
     assert matrices_of(ask("path 1"))[0].shape == path.shape, "a closed port has a path"
     # A new port begins with all points again.
-    ask("open 1 9600")
-    ask("pause 1")
+    ask("open 1 9600", "pause 1")
     assert 23 <= matrices_of(ask("path 1"))[0].shape[1] <= 27
 
 
@@ -210,29 +197,17 @@ def test_a_late_reply_answers_nothing_else(ask: Asker) -> None:
     assert ask("ask 1 E").startswith("e,")
 
 
-@pytest.mark.parametrize(
-    ("command", "counters"),
-    [
-        ("G,5.5,-5.5", "h,6,-6"),
-        ("G,.4,2.", "h,0,2"),
-        ("G, 1.25e2 ,-0.1", "h,125,0"),
-        ("G,+7.0,8", "h,7,8"),
-        ("G,1.5.5,3", None),
-        ("G,x.5,3", None),
-        ("G,1e400.5,3", None),
-        ("G," + "9" * 99 + ".5,3", None),
-    ],
-)
-def test_fractions_are_rounded(ask: Asker, command: str, counters: str | None) -> None:
-    assert ask(f"ask 1 {command}") == ("z,Protocol error" if counters is None else "g")
-    assert ask("ask 1 H") == ("h,0,0" if counters is None else counters)
+def test_fractions_are_rounded(ask: Asker) -> None:
+    for command, counters in {"5.5,-5.5": "6,-6", ".4,2.": "0,2", " 1.25e2 ,-0.1": "125,0", "+7.0,8": "7,8"}.items():
+        assert (ask(f"ask 1 G,{command}"), ask("ask 1 H")) == ("g", f"h,{counters}")
+    for command in ("1.5.5,3", "x.5,3", "1e400.5,3", "9" * 99 + ".5,3"):
+        assert (ask(f"ask 1 G,{command}"), ask("ask 1 H")) == ("z,Protocol error", "h,7,8")
 
 
 def test_the_pace_stays_after_the_ports_are_closed(session: Session) -> None:
     ask = begun(session)
     assert ask.numbers("pace") == [100, 100]
-    ask("open 1 9600")
-    ask("pause 1000")
+    ask("open 1 9600", "pause 1000")
     assert min(ask.numbers("pace")) > 100
     before = ask("state")
     ask("close 1")
@@ -252,21 +227,17 @@ def test_replies_of_several_lines_are_read_completely(ask: Asker) -> None:
 
 def test_every_port_has_its_own_robot(session: Session) -> None:
     ask = begun(session)
-    for port in (1, 2, 3):
-        ask(f"open {port} 9600")
+    ask("open 1 9600", "open 2 9600", "open 3 9600")
     poses = {ask(f"pose {port}") for port in (1, 2, 3)}
     assert len(poses) == 3
-    ask("close 0")
-    ask("open 2 9600")
+    ask("close 0", "open 2 9600")
     assert ask("pose 2") in poses
     assert session.world.robot_count == 3
 
 
 def test_a_port_is_opened_once(ask: Asker) -> None:
     assert "use kiks_kclose([])" in ask.refused("open 1 9600").lower()
-    ask("close 1")
-    ask("close 1")
-    ask("open 1 19200")
+    ask("close 1", "close 1", "open 1 19200")
     assert "baudrate must be" in ask.refused("open 2 7")
     assert "must be -1, -2" in ask.refused("open 0 9600")
 
@@ -274,12 +245,10 @@ def test_a_port_is_opened_once(ask: Asker) -> None:
 def test_a_new_world_closes_ports_with_an_error(session: Session, ask: Asker) -> None:
     ask("world default")
     assert "must be open, but it is not" in ask.refused("ask 1 N")
-    ask("open 1 9600")
-    assert ask("ask 1 N").startswith("n,")
+    assert ask("open 1 9600", "ask 1 N").startswith("n,")
     Asker(session, 2)("world default")
     assert "another world has taken its place" in ask.refused("ask 1 N")
-    ask("open 1 9600")
-    assert ask("ask 1 N").startswith("n,")
+    assert ask("open 1 9600", "ask 1 N").startswith("n,")
 
 
 def cancelled(session: Session, ask: Asker, number: int, request: str, then: str) -> list[str]:
@@ -323,8 +292,7 @@ def test_requests_to_a_paused_world_can_be_cancelled(session: Session, request_:
 
 def test_an_interrupted_pause_in_a_shared_world_has_not_run_ahead_of_it(session: Session) -> None:
     other = begun(session)
-    other("open 1 9600")
-    other("close 1")
+    other("open 1 9600", "close 1")
     told = cancelled(session, Asker(session, 2), 2, "pause 1e6", "time 1")
     assert "the program was interrupted" in told[0]
     assert float(told[1][HEAD:]) < 5
@@ -389,9 +357,8 @@ def test_a_client_that_leaves_frees_its_robot(session: Session) -> None:
 
 
 def test_objects_are_listed_lights_first_and_can_be_moved(session: Session) -> None:
-    ask = begun(session, world=f"matrix {matrix_text(np.zeros((500, 600)))}")
-    for spawned in ("2 100 400", "1 50 60", "3 200 400"):
-        ask(f"spawn {spawned}")
+    ask = begun(session, world=floor(500, 600))
+    ask("spawn 2 100 400", "spawn 1 50 60", "spawn 3 200 400")
     objects = matrices_of(ask("objects"))[0]
     assert objects[:, 0].tolist() == [1, 2, 3]
     assert objects[:, 1:3].tolist() == [[50, 60], [100, 400], [200, 400]]
@@ -408,9 +375,8 @@ def test_objects_are_listed_lights_first_and_can_be_moved(session: Session) -> N
 
 
 def test_objects_are_deleted_by_their_rows(session: Session) -> None:
-    ask = begun(session, world=f"matrix {matrix_text(np.zeros((500, 600)))}")
-    for spawned in ("2 100 400", "1 50 60", "3 200 400", "1 80 90", "2 300 400"):
-        ask(f"spawn {spawned}")
+    ask = begun(session, world=floor(500, 600))
+    ask("spawn 2 100 400", "spawn 1 50 60", "spawn 3 200 400", "spawn 1 80 90", "spawn 2 300 400")
     assert "row must be one of the 5" in ask.refused("delete 1 6")
     ask("delete 4 1 4")
     objects = matrices_of(ask("objects"))[0]
@@ -422,10 +388,8 @@ def test_objects_are_deleted_by_their_rows(session: Session) -> None:
 
 
 def test_objects_spawned_without_a_place_get_one(session: Session) -> None:
-    ask = begun(session, world=f"matrix {matrix_text(np.zeros((500, 600)))}")
-    for _ in range(5):
-        ask("spawn 3 NaN NaN")
-    ask("spawn 1 NaN NaN")
+    ask = begun(session, world=floor(500, 600))
+    ask(*["spawn 3 NaN NaN"] * 5, "spawn 1 NaN NaN")
     objects = matrices_of(ask("objects"))[0]
     assert objects[:, 0].tolist() == [1, 3, 3, 3, 3, 3]
     assert len({tuple(place) for place in objects[:, 1:3].tolist()}) == 6
@@ -444,13 +408,9 @@ def test_a_robot_is_moved_to_a_free_place(ask: Asker) -> None:
 
 def test_a_reset_restores_everything(session: Session) -> None:
     ask = begun(session)
-    ask("spawn 2 100 200")
-    ask("open 1 9600")
+    ask("spawn 2 100 200", "open 1 9600")
     before = ask("pose 1"), ask("objects")
-    ask("ask 1 D,5,5")
-    ask("set_object 1 300 300 0 0")
-    ask("pause 1")
-    ask("reset")
+    ask("ask 1 D,5,5", "set_object 1 300 300 0 0", "pause 1", "reset")
     assert ask("objects") == before[1]
     assert ask.numbers("pose 1") == pytest.approx([float(word) for word in before[0].split()], abs=0.5)
 
@@ -506,10 +466,10 @@ def test_bad_requests_get_an_error(session: Session) -> None:
     assert ask("active") == "1"
 
 
-@pytest.mark.parametrize("request_", ["pose 1", "path 1", "objects", "state", "save x.kad", "checkpoint", "reset"])
-def test_requests_without_a_world_get_an_error(session: Session, request_: str) -> None:
-    told = Asker(session).told(request_)
-    assert (told[0] == "+" and told[HEAD:] == "") or "there must be a world first" in told
+def test_requests_without_a_world_get_an_error(session: Session) -> None:
+    for request in ("pose 1", "path 1", "objects", "state", "save x.kad", "checkpoint", "reset"):
+        told = Asker(session).told(request)
+        assert (told[0] == "+" and told[HEAD:] == "") or "there must be a world first" in told, request
 
 
 HOSTILE = (
@@ -532,10 +492,8 @@ def test_random_requests_get_an_answer(
 ) -> None:
     """No request ends the process or fails inside, and each refusal is one line."""
     monkeypatch.chdir(tmp_path)
-    ask = begun(session, world=f"matrix {matrix_text(np.zeros((200, 200), np.int16))}")
-    ask("spawn 1 50 50")
-    ask("spawn 2 150 150")
-    ask("open 1 9600")
+    ask = begun(session, world=floor(200, 200))
+    ask("spawn 1 50 50", "spawn 2 150 150", "open 1 9600")
     for words in share(HOSTILE[len(name) % 3 :: 3], HOSTILE):
         told = ask.told(f"{name} {words}")
         assert told[0] in "+-"
@@ -546,40 +504,36 @@ def test_random_requests_get_an_answer(
             # What is wrong with a file says the reader of files.
             assert len(words) <= 80 or words[:81] not in told or name in ("read", "record", "save")
     assert ask("active") == "1"
-    for setting in ("seed", "robot", "robots", "response", "turrets", "thinking", "programs", "latency_s", "log_lines"):
-        ask(f"set {setting} ")
-    ask("world default")
-    ask("open 1 9600")
+    settings = ("seed", "robot", "robots", "response", "turrets", "thinking", "programs", "latency_s", "log_lines")
+    ask(*(f"set {setting} " for setting in settings), "world default", "open 1 9600")
     assert ask("ask 1 N").startswith("n,")
 
 
-@pytest.mark.parametrize(
-    ("words", "why"),
+HUGE = {
+    "2000 2000 4000000 3": "at most 10000 robots",
+    "200 200 40000 1.5": "an arena's elements must be",
+    "200 200 40000 1 200 200 40000 256": "greys of walls must be",
+} | dict.fromkeys(
     [
-        ("2000 2000 4000000 3", "at most 10000 robots"),
-        ("64000000 64000000 1 1", "a matrix must be"),
-        ("8000 8000 64000000 1e300", "a matrix must be"),
-        ("200 200 40000 nan", "a matrix must be"),
-        ("200 200 40000 -inf", "a matrix must be"),
-        ("200 200 39999.5 0 0.5 0", "a matrix must be"),
-        ("1e9 1", "a matrix must be"),
-        ("200 200 40000 0 200 200 40000 0 200 200 40000 0", "a matrix must be"),
-        ("200 200 40000 1.5", "an arena's elements must be"),
-        ("200 200 40000 1 200 200 40000 256", "greys of walls must be"),
-        (" ".join("9" * 3000), "a matrix must be"),
+        *("64000000 64000000 1 1", "8000 8000 64000000 1e300", "200 200 40000 nan", "200 200 40000 -inf", "1e9 1"),
+        *("200 200 39999.5 0 0.5 0", "200 200 40000 0 200 200 40000 0 200 200 40000 0", " ".join("9" * 3000)),
     ],
+    "a matrix must be",
 )
-def test_a_huge_matrix_header_allocates_no_memory(session: Session, words: str, why: str) -> None:
+
+
+def test_a_huge_matrix_header_allocates_no_memory(session: Session) -> None:
     ask = begun(session)
-    tracemalloc.start()
-    try:
-        told = ask.refused(f"world matrix {words}")
-        peak = tracemalloc.get_traced_memory()[1]
-    finally:
-        tracemalloc.stop()
-    assert why in told
-    assert len(told) < 500
-    assert peak < 100e6
+    for words, why in HUGE.items():
+        tracemalloc.start()
+        try:
+            told = ask.refused(f"world matrix {words}")
+            peak = tracemalloc.get_traced_memory()[1]
+        finally:
+            tracemalloc.stop()
+        assert why in told
+        assert len(told) < 500
+        assert peak < 100e6
 
 
 def test_a_robot_may_be_a_file(session: Session, tmp_path: Path) -> None:
@@ -588,8 +542,7 @@ def test_a_robot_may_be_a_file(session: Session, tmp_path: Path) -> None:
     file.write_text(ours.replace("pulse_mm = 0.08 ", "pulse_mm = 0.082 "), encoding="utf-8")
     ask = begun(session, f"robot {file}", "robots 1")
     assert session.world.specs[0].body.pulse_mm == 0.082
-    ask("open 1 9600")
-    ask("open 2 9600")
+    ask("open 1 9600", "open 2 9600")
     assert session.world.specs[1].body.pulse_mm == 0.082, "a robot that is added is of the same kind"
     ask(f"set robot {tmp_path / 'none.toml'}")
     assert "none.toml" in ask.refused("world default")
@@ -599,13 +552,14 @@ def test_a_robot_may_be_a_file(session: Session, tmp_path: Path) -> None:
 
 
 def test_a_film_shows_the_time_in_which_it_was_made(session: Session, ask: Asker, tmp_path: Path) -> None:
-    ask("pause 1")
-    ask(f"film 1 {tmp_path}/run.webp")
-    ask("pause 2")
+    ask("pause 1", f"film 1 {tmp_path}/run.webp", "pause 2")
     assert ask("film_save") == "51"
     assert (tmp_path / "run.webp").stat().st_size > 1000
     assert ask("film_save") == "0"
     assert session.world.loop.recorder is None
+    ask(f"film 1 {tmp_path}/left.webp", "pause 1")
+    ask.client.leave()
+    assert (tmp_path / "left.webp").stat().st_size > 1000, "a client that leaves has its film"
 
 
 def test_films_that_cannot_be_made_are_refused(session: Session, tmp_path: Path) -> None:
@@ -620,22 +574,12 @@ def test_films_that_cannot_be_made_are_refused(session: Session, tmp_path: Path)
     ask("film_save")
 
 
-def test_a_client_that_leaves_has_its_film(ask: Asker, tmp_path: Path) -> None:
-    ask(f"film 1 {tmp_path}/run.webp")
-    ask("pause 1")
-    ask.client.leave()
-    assert (tmp_path / "run.webp").stat().st_size > 1000
-
-
 def test_an_interrupted_film_is_given_up(tmp_path: Path) -> None:
     pending = AwaitedAnswer()
     with running(Session()) as session:
         ask = Asker(session)
         ask.client = SessionClient(session, 1, pending)
-        ask("set thinking none")
-        ask("open 1 9600")
-        ask(f"film 1 {tmp_path}/run.webp")
-        ask("pause 1")
+        ask("set thinking none", "open 1 9600", f"film 1 {tmp_path}/run.webp", "pause 1")
         pending.is_cancelled = True
         assert "The program was interrupted; the film was discarded" in ask.refused("film_save")
         assert not list(tmp_path.iterdir())
@@ -651,9 +595,8 @@ def halt(session: Session) -> None:
         pool.submit(lambda: asyncio.run(desk.halt())).result(GUARD_S)
 
 
-def set_points(session: Session) -> list[list[int]]:
-    points: list[list[int]] = session.world.world.state.robots["speed_setpoint"][0].tolist()
-    return points
+def set_points(session: Session) -> Any:
+    return session.world.world.state.robots["speed_setpoint"][0].tolist()
 
 
 @pytest.mark.parametrize("is_paused", [False, True])
@@ -663,8 +606,7 @@ def test_halt_ends_a_long_pause_and_stops_the_robot(session: Session, is_paused:
     desk, told, drives = session.desk, list[str](), threading.Event()
 
     def drive() -> None:
-        ask("open 1 9600")
-        ask("ask 1 D,9,7")
+        ask("open 1 9600", "ask 1 D,9,7")
         asyncio.run(desk.pause() if is_paused else desk.set_speed(1.0))
         drives.set()
         told.append(ask.told("pause 100000"))
@@ -681,9 +623,7 @@ def test_halt_ends_a_long_pause_and_stops_the_robot(session: Session, is_paused:
     asyncio.run(desk.set_speed(None))
     ask.told("time 1")
     assert "must be open" in ask.refused("ask 1 N")
-    ask("open 1 9600")
-    ask("pause 0.5")
-    assert ask("ask 1 E") == "e,0,0"
+    assert ask("open 1 9600", "pause 0.5", "ask 1 E") == "e,0,0"
     assert set_points(session) == [[0, 0]]
 
 
@@ -713,11 +653,8 @@ def test_halt_stops_every_program_at_its_next_request(session: Session) -> None:
 def test_an_idle_program_is_halted_without_an_error(session: Session, ask: Asker) -> None:
     ask("ask 1 D,5,5")
     halt(session)
-    assert ask("poll") == ""
-    assert ask("time 1") == ""
-    ask("open 1 9600")
-    ask("pause 0.5")
-    assert ask("ask 1 E") == "e,0,0"
+    assert (ask("poll"), ask("time 1")) == ("", "")
+    assert ask("open 1 9600", "pause 0.5", "ask 1 E") == "e,0,0"
 
 
 def test_a_typed_command_comes_before_the_answer(session: Session) -> None:
@@ -743,25 +680,19 @@ def test_a_program_replaces_only_its_own_last_line(session: Session) -> None:
     def lines() -> list[str]:
         return [line[9:] for line in log.since(0)[1]]
 
-    ask("print_over 0 of 9")
-    ask("print 1 of 9")
-    ask("print_over 2 of 9")
-    ask("print_over 3 of 9")
+    ask("print_over 0 of 9", "print 1 of 9", "print_over 2 of 9", "print_over 3 of 9")
     assert lines() == ["0 of 9", "3 of 9"]
     other("print hello")
-    ask("print_over 4 of 9")
-    ask("print_over 5 of 9")
+    ask("print_over 4 of 9", "print_over 5 of 9")
     assert lines()[-3:] == ["3 of 9", "hello", "5 of 9"]
 
 
 def test_polls_let_no_time_pass(session: Session) -> None:
     ask = begun(session, "thinking live")
-    ask("open 1 9600")
-    ask("ask 1 N")
+    ask("open 1 9600", "ask 1 N")
     before_ns = session.world.now_ns
     with session.world.lock:
-        for _ in range(100):
-            ask("poll")
+        ask(*["poll"] * 100)
         assert session.world.now_ns == before_ns
 
 
@@ -775,15 +706,11 @@ def test_a_program_is_not_disturbed_by_people_who_look_back(session: Session, tm
     """It takes and restores checkpoints of the present, and saves the present world."""
     ask = begun(session)
     session.desk.keep_past()
-    ask("open 1 9600")
-    ask("ask 1 D,5,5")
-    ask("checkpoint")
-    ask("pause 3")
+    ask("open 1 9600", "ask 1 D,5,5", "checkpoint", "pause 3")
     here = ask("pose 1")
     ask("close 1")
     asyncio.run(session.desk.looking.look_at(0))
-    ask(f"save {tmp_path / 'now.kiks'}")
-    ask("reset")
+    ask(f"save {tmp_path / 'now.kiks'}", "reset")
     assert session.desk.past is not None
     asyncio.run(session.desk.looking.back_to_now())
     assert ask("pose 1") != here

@@ -12,6 +12,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
+from subprocess import PIPE
 
 import pytest
 from tests import forked
@@ -39,13 +40,9 @@ class Session:
     """A process of a session, and the command that waits for it: a fork (tests/forked.py) unless one is given."""
 
     def __init__(self, *words: str, folder: Path, command: Sequence[str] = ()) -> None:
-        self.process = subprocess.Popen(
-            [*(command or forked.kiks_command()), "session", *words],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            bufsize=0,
-            env={**os.environ, "XDG_RUNTIME_DIR": str(folder), "DISPLAY": "", "WAYLAND_DISPLAY": ""},
-        )
+        command = [*(command or forked.kiks_command()), "session", *words]
+        environment = {**os.environ, "XDG_RUNTIME_DIR": str(folder)}
+        self.process = subprocess.Popen(command, bufsize=0, env=environment, stdin=PIPE, stdout=PIPE)
         assert self.process.stdin is not None
         assert self.process.stdout is not None
         self.to, self.out = self.process.stdin.fileno(), self.process.stdout.fileno()
@@ -72,16 +69,17 @@ class Session:
     def say(self, request: str) -> None:
         os.write(self.to, f"{request}\n".encode())
 
-    def ask(self, request: str) -> str:
-        self.say(request)
-        heard = self.hear()
-        assert heard[0] == "+", heard
+    def ask(self, *requests: str) -> str:
+        """Send requests; return the answer to the last."""
+        for request in requests:
+            self.say(request)
+            heard = self.hear()
+            assert heard[0] == "+", heard
         return heard[20:]
 
     def open(self) -> None:
         """Open port -1 in a new world."""
-        for request in ("set thinking none", "world default", "open 1 9600"):
-            self.ask(request)
+        self.ask("set thinking none", "world default", "open 1 9600")
 
     def hang_up(self) -> None:
         assert self.process.stdin is not None
@@ -106,6 +104,12 @@ class Session:
         return data.decode()
 
 
+def address(greeting: str) -> tuple[int, str]:
+    """Return the port of a session and its token."""
+    words = greeting.split()
+    return int(words[5]), words[7]
+
+
 def ended(*words: str, folder: Path) -> subprocess.CompletedProcess[str]:
     """Wait for a process to end and return its output and exit code."""
     return forked.run("session", *words, env={"XDG_RUNTIME_DIR": str(folder)})
@@ -114,28 +118,22 @@ def ended(*words: str, folder: Path) -> subprocess.CompletedProcess[str]:
 @contextmanager
 def started(*words: str, folder: Path, command: Sequence[str] = ()) -> Iterator[Session]:
     session = Session(*words, folder=folder, command=command)
-    try:
-        if session.greeting.startswith("KiKS"):
-            # Other programs find the session only after a client takes part.
-            session.ask("active")
-        yield session
-    finally:
-        session.process.kill()
-        session.process.wait()
-        assert session.process.stdout is not None
-        session.process.stdout.close()
-        if not session.process.stdin.closed:  # type: ignore[union-attr]
-            session.process.stdin.close()  # type: ignore[union-attr]
+    with session.process:
+        try:
+            if session.greeting.startswith("KiKS"):
+                # Other programs find the session only after a client takes part.
+                session.ask("active")
+            yield session
+        finally:
+            session.process.kill()
 
 
 def test_a_joined_session_ends_when_both_programs_have_left(tmp_path: Path) -> None:
     with started(folder=tmp_path) as first, started("--join", "0", folder=tmp_path) as second:
-        first.ask("set thinking none")
-        first.ask("world default")
+        first.ask("set thinking none", "world default")
         assert second.greeting == first.greeting
         assert second.ask("active") == "1"
-        second.ask("open 1 9600")
-        assert second.ask("ask 1 H") == "h,0,0"
+        assert second.ask("open 1 9600", "ask 1 H") == "h,0,0"
         first.hang_up()
         assert second.ask("ask 1 H") == "h,0,0"
         assert first.process.poll() is None
@@ -145,35 +143,29 @@ def test_a_joined_session_ends_when_both_programs_have_left(tmp_path: Path) -> N
 
 
 def test_joining_without_a_session_is_an_error(tmp_path: Path) -> None:
-    for words, told in ((["--join", "0"], "must run before it is joined"), (["--join", "7"], "session 7 must run")):
-        process = ended(*words, folder=tmp_path)
-        assert told in process.stdout
-        assert process.returncode == 2
+    for number, told in (("0", "must run before it is joined"), ("7", "session 7 must run")):
+        process = ended("--join", number, folder=tmp_path)
+        assert (process.returncode, told in process.stdout) == (2, True)
 
 
-def test_the_file_of_a_killed_session_is_removed(tmp_path: Path) -> None:
-    with started(folder=tmp_path) as session:
-        os.kill(session.number, signal.SIGKILL)
-        session.wait()
+def test_a_killed_session_is_noticed_by_a_joined_program_and_its_file_is_removed(tmp_path: Path) -> None:
+    with started(folder=tmp_path) as first, started("--join", "0", folder=tmp_path) as second:
+        os.kill(first.number, signal.SIGKILL)
+        assert second.wait() == 0
+        assert os.read(second.out, 1) == b""
+        first.wait()
         assert list((tmp_path / "kiks").glob("session-*"))
         with started(folder=tmp_path) as other, started("--join", "0", folder=tmp_path) as participant:
             assert participant.greeting == other.greeting
             assert len(list((tmp_path / "kiks").glob("session-*"))) == 1
 
 
-def test_a_joined_program_notices_that_the_session_was_killed(tmp_path: Path) -> None:
-    with started(folder=tmp_path) as first, started("--join", "0", folder=tmp_path) as second:
-        os.kill(first.number, signal.SIGKILL)
-        assert second.wait() == 0
-        assert os.read(second.out, 1) == b""
-
-
 def test_connections_without_the_token_are_refused(tmp_path: Path) -> None:
     with started(folder=tmp_path) as session:
-        words = session.greeting.split()
-        for token, answer in ((words[7][:-1], b""), (words[7], b"KiKS")):
-            with socket.create_connection(("127.0.0.1", int(words[5])), timeout=GUARD_S) as client:
-                client.sendall(f"{token}\nversion\n".encode())
+        port, token = address(session.greeting)
+        for given, answer in ((token[:-1], b""), (token, b"KiKS")):
+            with socket.create_connection(("127.0.0.1", port), timeout=GUARD_S) as client:
+                client.sendall(f"{given}\nversion\n".encode())
                 heard = b""
                 with suppress(ConnectionResetError):
                     heard = client.recv(200)
@@ -199,26 +191,23 @@ def test_ctrl_c_ends_a_listening_session_until_its_first_client_comes(tmp_path: 
     for has_client in (False, True):
         file = tmp_path / f"address-{has_client}"
         command = [*KIKS, "session", "--listen", str(file)]
-        with (
-            subprocess.Popen(command, env={**os.environ, "XDG_RUNTIME_DIR": str(tmp_path)}) as process,
-            ExitStack() as end,
-        ):
+        with subprocess.Popen(command) as process, ExitStack() as end:
             end.callback(process.kill)
             wait_until(file.exists)
-            if has_client:
-                words = file.read_text().split()
-                client = end.enter_context(socket.create_connection(("127.0.0.1", int(words[5])), timeout=GUARD_S))
-                client.sendall(f"{words[7]}\nactive\n".encode())
-                heard = client.makefile("rb")
-                assert b"KiKS" in heard.read(96)
-                client.sendall(b"active\n")
-                assert heard.read(96)
-            process.send_signal(signal.SIGINT)
-            if has_client:
-                client.sendall(b"active\n")
-                assert heard.read(96)
-                heard.close()
-                client.close()
+            if not has_client:
+                process.send_signal(signal.SIGINT)
+                assert process.wait(GUARD_S) == 0
+                continue
+            port, token = address(file.read_text())
+            with socket.create_connection(("127.0.0.1", port), timeout=GUARD_S) as client:
+                client.sendall(f"{token}\nactive\n".encode())
+                with client.makefile("rb") as heard:
+                    assert b"KiKS" in heard.read(96)
+                    client.sendall(b"active\n")
+                    assert heard.read(96)
+                    process.send_signal(signal.SIGINT)
+                    client.sendall(b"active\n")
+                    assert heard.read(96)
             assert process.wait(GUARD_S) == 0
 
 
@@ -251,18 +240,17 @@ def test_kiks_matlab_prints_the_folder_of_the_toolbox() -> None:
 def test_running_out_of_descriptors_ends_no_session(tmp_path: Path) -> None:
     with started(folder=tmp_path) as session, ExitStack() as friends:
         session.ask("world default")
-        words = session.greeting.split()
-        used = len(os.listdir(f"/proc/{session.number}/fd"))
+        port, token = address(session.greeting)
+        folder = Path(f"/proc/{session.number}/fd")
+        used = len([*folder.iterdir()])
         resource.prlimit(session.number, resource.RLIMIT_NOFILE, (used + 10, used + 10))
         for _ in range(30):
-            friend = friends.enter_context(socket.create_connection(("127.0.0.1", int(words[5]))))
-            friend.settimeout(GUARD_S)
-            with suppress(OSError):
-                friend.sendall(f"{words[7]}\n".encode())
-                friend.recv(200)
+            friend = friends.enter_context(socket.create_connection(("127.0.0.1", port), timeout=GUARD_S))
+            friend.sendall(f"{token}\n".encode())
+        wait_until(lambda: len([*folder.iterdir()]) > used + 8)
         assert session.ask("active") == "1"
         friends.close()
-        wait_until(lambda: len(os.listdir(f"/proc/{session.number}/fd")) <= used)
+        wait_until(lambda: len([*folder.iterdir()]) <= used)
         with started("--join", "0", folder=tmp_path) as participant:
             assert participant.ask("active") == "1"
 
@@ -290,14 +278,13 @@ def test_other_files_are_not_read_as_sessions(tmp_path: Path) -> None:
 def test_a_session_is_announced_when_a_client_takes_part(tmp_path: Path) -> None:
     """Octave may have forgotten it before: Ctrl-C."""
     session = Session(folder=tmp_path)
-    assert not list((tmp_path / "kiks").glob("session-*"))
-    session.ask("active")
-    assert len(list((tmp_path / "kiks").glob("session-*"))) == 1
-    session.hang_up()
-    assert session.wait() == 0
-    assert not list((tmp_path / "kiks").iterdir()), "it leaves nothing"
-    assert session.process.stdout is not None
-    session.process.stdout.close()
+    with session.process:
+        assert not list((tmp_path / "kiks").glob("session-*"))
+        session.ask("active")
+        assert len(list((tmp_path / "kiks").glob("session-*"))) == 1
+        session.hang_up()
+        assert session.wait() == 0
+        assert not list((tmp_path / "kiks").iterdir()), "it leaves nothing"
 
 
 def test_an_existing_file_is_not_replaced(tmp_path: Path) -> None:
