@@ -1,8 +1,8 @@
 """What the tests cost: `python tools/test_costs.py [ARGUMENTS OF PYTEST]` runs them and prints tables.
 
-Each worker notes for each test its processor time, that of the processes that it has waited for, the time in the compiler, the pages that it
-opened and its memory. Every second, the memory of the whole run is added up, with its browsers and programs: a page that processes share
-counts once (PSS). Linux only.
+Each worker notes for each test its processor time, that of the processes that it has waited for, the time in the
+compiler, the pages that it opened and its memory. Every second, the memory of the whole run is added up, with its
+browsers and programs; what processes share counts once (PSS). Linux only.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import tempfile
 import threading
 import time
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -27,9 +27,15 @@ ROOT = Path(__file__).resolve().parents[1]
 NOTES = "KIKS_TEST_COSTS"
 """The variable of the environment that names the folder for the notes of the workers."""
 
+Rows = dict[str, dict[str, float]]
+
 PERIOD_S = 1.0
 SHOWN = 40
 """Rows of a table."""
+
+NOTED = ("tests", "wall_s", "own_s", "children_s", "compile_s", "pages", "grew_mb")
+"""Columns of a table: processor time of the process, and of those that it has waited for; the compiler's part of the
+first; pages that a browser opened; by how much the process grew."""
 
 
 # ---- in the processes that run tests ----
@@ -48,6 +54,7 @@ class Costs:
 
     @pytest.hookimpl(wrapper=True)
     def pytest_collection(self) -> Iterator[None]:
+        """Note what collecting costs."""
         began_s = time.process_time()
         result = yield
         self._note(collecting_s=time.process_time() - began_s, rss_mb=rss_mb())
@@ -61,11 +68,15 @@ class Costs:
         costs = self
 
         class Compiling(event.Listener):
+            depth = 0  # the lock is taken again by what is compiled within
+
             def on_start(self, event: Any) -> None:
-                costs._compiling_s -= time.thread_time()
+                costs._compiling_s -= 0.0 if self.depth else time.thread_time()
+                self.depth += 1
 
             def on_end(self, event: Any) -> None:
-                costs._compiling_s += time.thread_time()
+                self.depth -= 1
+                costs._compiling_s += 0.0 if self.depth else time.thread_time()
 
         event.register("numba:compiler_lock", Compiling())
         with contextlib.suppress(ImportError):
@@ -81,23 +92,26 @@ class Costs:
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_protocol(self, item: pytest.Item) -> Iterator[None]:
-        before, began_s = self._spent(), time.monotonic()
+        """Note what a test costs."""
+        before = self._spent()
         result = yield
-        spent = [after - since for since, after in zip(before, self._spent(), strict=True)]
-        names = ("own_s", "children_s", "compiling_s", "pages")
-        self._note(test=item.nodeid, wall_s=time.monotonic() - began_s, rss_mb=rss_mb(), **dict(zip(names, spent, strict=True)))
+        spent = (after - since for since, after in zip(before, self._spent(), strict=True))
+        self._note(test=item.nodeid, rss_mb=rss_mb(), **dict(zip(NOTED[1:6], spent, strict=True)))
         return result
 
-    def _spent(self) -> tuple[float, float, float, int]:
+    def _spent(self) -> tuple[float, float, float, float, int]:
         children = resource.getrusage(resource.RUSAGE_CHILDREN)
-        return time.process_time(), children.ru_utime + children.ru_stime, self._compiling_s, self._page_count
+        children_s = children.ru_utime + children.ru_stime
+        return time.monotonic(), time.process_time(), children_s, self._compiling_s, self._page_count
 
 
 def pytest_configure(config: pytest.Config) -> None:
+    """Begin."""
     config.pluginmanager.register(Costs(Path(os.environ[NOTES])))
 
 
 def rss_mb() -> float:
+    """Return the resident memory of this process [MB]."""
     return int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize() / 1e6
 
 
@@ -117,6 +131,7 @@ class Memory:
         self._thread.start()
 
     def end(self) -> None:
+        """Take no more samples."""
         self._has_ended.set()
         self._thread.join()
 
@@ -145,53 +160,58 @@ def descendants(pid: int) -> set[int]:
     return found
 
 
-def table(title: str, rows: dict[str, dict[str, float]], by: str) -> None:
+def row(name: str, values: Iterable[object]) -> str:
+    """Return a row of a table: a name, cut on the left if it is long, and numbers."""
+    texts = (f"{value:.1f}" if isinstance(value, float) else str(value) for value in values)
+    return f"{name[-80:]:80s}" + "".join(f"{text:>11s}" for text in texts)
+
+
+def print_table(title: str, rows: Rows, by: str = "wall_s") -> None:
     """Print the dearest rows."""
-    print(f"\n{title:88s} {'tests':>6s} {'wall':>7s} {'own':>7s} {'children':>8s} {'compiling':>9s} {'pages':>5s} {'grew MB':>7s}")
-    for name, row in sorted(rows.items(), key=lambda each: -each[1][by])[:SHOWN]:
-        numbers = (row["wall_s"], row["own_s"], row["children_s"], row["compiling_s"], row["pages"], row["grew_mb"])
-        print(f"{name[-88:]:88s} {row['tests']:6.0f} {'{:7.1f} {:7.1f} {:8.1f} {:9.1f} {:5.0f} {:7.0f}'.format(*numbers)}")
+    print(f"\n{row(title, NOTED)}")
+    for name, costs in sorted(rows.items(), key=lambda each: -each[1][by])[:SHOWN]:
+        print(row(name, (costs[each] for each in NOTED)))
 
 
 def report(folder: Path) -> None:
     """Print what the notes of all workers say."""
-    files: dict[str, dict[str, float]] = defaultdict(lambda: defaultdict(float))
-    tests: dict[str, dict[str, float]] = defaultdict(lambda: defaultdict(float))
-    print("\nworker  collecting [s]  at first [MB]  at last  most")
-    for path in sorted(folder.glob("*.jsonl")):
-        collecting, *notes = [json.loads(line) for line in path.read_text().splitlines()] or [{"collecting_s": 0.0, "rss_mb": 0.0}]
+    whole: Rows = {}
+    files: Rows = {}
+    tests: Rows = {}
+    print(f"\n{row('worker', ('collect_s', 'first_mb', 'last_mb', 'most_mb'))}")
+    for path in sorted(folder.glob("gw*.jsonl")) or folder.glob("*.jsonl"):
+        collecting, *notes = [json.loads(line) for line in path.read_text().splitlines()]
         sizes_mb = [note["rss_mb"] for note in (collecting, *notes)]
-        print(f"{path.stem:6s} {collecting['collecting_s']:15.1f} {sizes_mb[0]:14.0f} {sizes_mb[-1]:8.0f} {max(sizes_mb):5.0f}")
+        print(row(path.stem, (collecting["collecting_s"], sizes_mb[0], sizes_mb[-1], max(sizes_mb))))
         for note, before_mb in zip(notes, sizes_mb, strict=False):
-            for row in (files[note["test"].partition("::")[0]], tests[note["test"]]):
-                row["tests"] += 1
-                row["grew_mb"] += note["rss_mb"] - before_mb
-                for name in ("wall_s", "own_s", "children_s", "compiling_s", "pages"):
-                    row[name] += note[name]
-    total: dict[str, float] = defaultdict(float)
-    for row in files.values():
-        for name, value in row.items():
-            total[name] += value
-    table("all", {"all": total}, "wall_s")
-    table("file", files, "wall_s")
-    table("file, by what it leaves in memory", files, "grew_mb")
-    table("test", tests, "wall_s")
+            note |= {"tests": 1, "grew_mb": note["rss_mb"] - before_mb}
+            for rows, name in ((whole, "all"), (files, note["test"].partition("::")[0]), (tests, note["test"])):
+                costs = rows.setdefault(name, dict.fromkeys(NOTED, 0))
+                for each in NOTED:
+                    costs[each] += note[each]
+    print_table("", whole)
+    print_table("file", files)
+    print_table("file, by what it leaves in memory", files, "grew_mb")
+    print_table("test", tests)
 
 
 def main() -> None:
     """Run the tests and print what they cost."""
+    options = sys.argv[1:] or ["-n", "3", "--dist", "worksteal"]
     with tempfile.TemporaryDirectory() as name:
         began_s = time.monotonic()
         path = os.pathsep.join(filter(None, (str(Path(__file__).parent), os.environ.get("PYTHONPATH"))))
-        command = [sys.executable, "-m", "pytest", "-p", "test_costs", *(sys.argv[1:] or ["-n", "3", "--dist", "worksteal"])]
+        command = [sys.executable, "-m", "pytest", "-p", "test_costs", *options]
         process = subprocess.Popen(command, cwd=ROOT, env={**os.environ, NOTES: name, "PYTHONPATH": path})
         memory = Memory(process.pid)
         exit_code = process.wait()
         memory.end()
-        spent = resource.getrusage(resource.RUSAGE_CHILDREN)
         report(Path(name))
-        print(f"\n{time.monotonic() - began_s:.0f} s, {spent.ru_utime + spent.ru_stime:.0f} s of processor time; at most {memory.peak_mb:.0f} MB:")
-        print(", ".join(f"{part} {size_mb:.0f}" for part, size_mb in sorted(memory.parts_mb.items(), key=lambda each: -each[1])[:8]))
+    spent = resource.getrusage(resource.RUSAGE_CHILDREN)
+    took_s, used_s = time.monotonic() - began_s, spent.ru_utime + spent.ru_stime
+    print(f"\n{took_s:.0f} s, {used_s:.0f} s of processor time; at most {memory.peak_mb:.0f} MB:")
+    parts = sorted(memory.parts_mb.items(), key=lambda each: -each[1])[:8]
+    print(", ".join(f"{part} {size_mb:.0f}" for part, size_mb in parts))
     sys.exit(exit_code)
 
 

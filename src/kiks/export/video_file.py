@@ -17,7 +17,7 @@ MP4, GIF, WEBP = ".mp4", ".gif", ".webp"
 
 _CODECS = {MP4: ("libx264", "yuv420p"), GIF: ("gif", "pal8"), WEBP: ("libwebp_anim", "bgra")}
 _OPTIONS = {
-    # Flat colours and still walls: `animation` keeps edges sharp. The macroblock tree of x264 differs from call to call.
+    # Flat colours and still walls: `animation` keeps edges sharp. The macroblock tree of x264 differs in each call.
     MP4: {"preset": "veryfast", "crf": "20", "tune": "animation", "x264-params": "mbtree=0"},
     GIF: {},
     # Drawings take half the bytes of a lossy film.

@@ -6,6 +6,7 @@ import json
 import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
+from functools import lru_cache
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from kiks.control.controller import Controller
+from kiks.control.senses import AnySense
 from kiks.errors import ParameterError
 from kiks.learn import seeds
 from kiks.learn.evolution import Evolution
@@ -227,12 +229,17 @@ def _first_solved(evolution: Evolution, exam: Exam) -> int | None:
 def baselines_of(task: Task, seed: int) -> Baselines:
     """Return the baselines of the evolution of a task with a seed."""
     trials = np.array([seed_for(seed, seeds.TRIALS, number) for number in range(TRIALS)])
-    still = Controller(_stand, senses=task.controller.senses, parameters=1)
-    standing = task.with_changes(controller=still).evaluate(np.zeros((TRIALS, 1)), trials)
+    standing = task.with_changes(controller=_still(task.controller.senses)).evaluate(np.zeros((TRIALS, 1)), trials)
     rng = np.random.default_rng(seed_for(seed, seeds.BASELINES))
     drawn = task.spread * rng.standard_normal((RANDOM_COUNT, task.parameter_count))
     random = task.evaluate(drawn, np.resize(trials, RANDOM_COUNT))
     return Baselines(float(standing[:, 0].mean()), float(np.median(random[:, 0])))
+
+
+@lru_cache(16)
+def _still(senses: tuple[AnySense, ...]) -> Controller:
+    """Return a controller that stands still, the same each time, so that it is compiled once."""
+    return Controller(_stand, senses=senses, parameters=1)
 
 
 def _stand(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
