@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import os
 import socket
-import sys
 from contextlib import ExitStack, suppress
 from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests import forked
 from tests.at_length import cases
 from tests.ports.helpers import WallClock, ask_socket, connect, live, no_descriptors, warnings, wheels
-from tests.served import GUARD_S, ask, called, opened, served
+from tests.served import GUARD_S, ask, opened, served
 
 from kiks.clock.pace import Pace
 from kiks.clock.serial_timing import BACKLOG_LIMIT
@@ -216,8 +216,12 @@ def test_error_explains_why_a_port_cannot_be_opened(what: str, tmp_path: Path) -
 
 @pytest.mark.slow
 def test_too_few_descriptors_for_all_robots_give_one_line(tmp_path: Path) -> None:
-    words = f"{sys.executable} -m kiks serve --robots 40 --tcp 0 --link {tmp_path}/robot"
-    done = called("bash", "-c", f"ulimit -n 100; exec {words}")
+    code = (
+        "import resource, sys\nresource.setrlimit(resource.RLIMIT_NOFILE, (100, 100))\n"
+        f"sys.argv = ['kiks', 'serve', '--robots', '40', '--tcp', '0', '--link', '{tmp_path}/robot']\n"
+        "from kiks.__main__ import main\nmain()\n"
+    )
+    done = forked.run(code=code)
     assert done.returncode == 2
     (line,) = done.stderr.splitlines()
     assert "this process may have 100" in line

@@ -16,6 +16,7 @@ from typing import IO, Any
 import pytest
 from tests.at_length import cases, share
 from tests.busy import busy_computer
+from tests.guard import wait_until
 from tests.ports.helpers import warnings
 from tests.served import GUARD_S, PROGRAMS, fresh
 
@@ -168,27 +169,27 @@ def test_program_without_a_port_takes_part(tmp_path: Path) -> None:
     assert run([[silent], [DRIVE, "COM1", "5", "3", "3"]])[2] == 0
 
 
-def test_hanging_program_is_ignored(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+def test_hanging_program_is_ignored_and_named(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     over = tmp_path / "over"
     hangs = write(tmp_path, "hangs.py", HANGS.replace("while True", f"while not os.path.exists({str(over)!r})"))
-    _, _, code, ends, doubt = run([[hangs], [write(tmp_path, "ends.py", ENDS), str(over)]], patience_s=0.2)
+
+    def release() -> None:
+        try:
+            wait_until(lambda: "still runs" in caplog.text)
+        finally:
+            over.touch()
+
+    releasing = threading.Thread(target=release)
+    releasing.start()
+    ends = write(tmp_path, "ends.py", ENDS)
+    _, _, code, told, doubt = run([[hangs], [ends, str(tmp_path / "end")]], patience_s=0.2)
+    releasing.join(GUARD_S)
     assert code == 0
-    assert ends == [
-        "program 1 (hangs.py) has ended with exit code 0.",
-        "program 2 (ends.py) has ended with exit code 0.",
-    ]
+    assert told == [f"program {number} has ended with exit code 0." for number in ("1 (hangs.py)", "2 (ends.py)")]
     assert doubt == "the world did not wait for every program"
-    assert program_warnings(caplog)[0].startswith(
-        "program 1 (hangs.py) must act while others wait, but it did nothing for 0."
-    )
-
-
-def test_warning_names_the_hanging_program(tmp_path: Path) -> None:
-    with started("--patience", "0.2", write(tmp_path, "hangs.py", HANGS), WATCHER, "1") as (_, _, errors):
-        told = b""
-        while b"Ctrl-C" not in told:
-            told = errors.readline()
-    assert told == b"kiks: program 1 (hangs.py), which the world does not wait for, still runs. Ctrl-C ends it.\n"
+    silent, still = program_warnings(caplog)
+    assert silent.startswith("program 1 (hangs.py) must act while others wait, but it did nothing for 0.")
+    assert still == "program 1 (hangs.py), which the world does not wait for, still runs. Ctrl-C ends it."
 
 
 def test_hanging_program_is_dropped_and_is_not_called_running_if_it_ends_late(

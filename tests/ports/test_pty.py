@@ -15,7 +15,7 @@ from tests.stranger import as_stranger, needs_root
 
 from kiks.errors import LinkError
 from kiks.ports.pty import PtyEndpoint, default_folder
-from kiks.sim.simulation import Simulation
+from kiks.script.runner import run_here
 
 CANONICAL = """
 import os, sys, termios
@@ -35,27 +35,20 @@ def link(tmp_path: Path) -> str:
     return str(tmp_path / "robot")
 
 
-def course_in_memory() -> tuple[str, Simulation]:
-    """Drive the course of `tests/programs` on a port in memory."""
-    sim = fresh()
-    port = sim.port(1)
-    for command in (b"D,8,5", *[b"N"] * 40, b"D,0,0", b"C,400,300", *[b"E"] * 60, b"H"):
-        port.write(command + b"\n")
-        reply = port.readline()
-    return reply.decode(), sim
-
-
-def test_c_program_gives_the_same_run_as_the_python_program(link: str, tmp_path: Path) -> None:
+def test_c_program_gives_the_same_run_as_the_python_program(
+    link: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     compiler = shutil.which("gcc")
     if compiler is None:
         pytest.skip("there is no gcc to compile the C program with")
     program = tmp_path / "course"
     subprocess.run([compiler, "-O2", "-o", program, PROGRAMS / "course.c"], check=True, timeout=60)
-    counts, memory = course_in_memory()
+    here = fresh()
+    assert run_here(here, PROGRAMS / "course.py", ["/dev/ttyUSB0"], {}) == 0
     with served([PtyEndpoint(link)]) as run:
         done = called(program, link, check=True)
-        assert done.stdout.strip() == counts.strip()
-        assert run.sim.state_hash() == memory.state_hash()
+        assert done.stdout.strip() == capsys.readouterr().out.strip()
+        assert run.sim.state_hash() == here.state_hash()
 
 
 def test_canonical_client_is_served_like_a_raw_one(link: str) -> None:

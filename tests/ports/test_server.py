@@ -2,16 +2,13 @@ from __future__ import annotations
 
 import os
 import signal
-import socket
 import subprocess
 import sys
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from pathlib import Path
-from typing import IO
 
 import pytest
-from tests.at_length import cases
+from tests import forked
 from tests.ports.helpers import WallClock, ask_socket, connect, live, warnings
 from tests.served import GUARD_S, PROGRAMS, ask, fresh, opened, read_line, run_python, served
 
@@ -172,39 +169,48 @@ def test_arguments_are_checked() -> None:
             Server(fresh(), {1: []}, speed=speed)
 
 
-@contextmanager
-def serving(*words: str, ending: int = signal.SIGINT) -> Iterator[IO[str]]:
-    """Start `kiks serve`; yield what it prints, and end it by a signal."""
-    command = [sys.executable, "-m", "kiks", "serve", "--tcp", "0", *words]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
-        assert process.stdout is not None
-        assert process.stdout.readline() == "Robot 1\n"
-        yield process.stdout
-        process.send_signal(ending)
-        told, _ = process.communicate(timeout=GUARD_S)
-        assert process.returncode == 0
-        assert "Stopped after " in told
-
-
 @pytest.mark.slow
 def test_serve_command(tmp_path: Path) -> None:
     link = str(tmp_path / "robot")
-    with serving("--thinking", "none", "--link", link, ending=signal.SIGTERM) as told:
-        assert told.readline() == f"  serial port  {link}\n"
-        assert told.readline().startswith("  TCP          socket://127.0.0.1:")
-        assert told.readline().startswith("The world waits for each command. Repeatable to the bit")
+    command = [sys.executable, "-m", "kiks", "serve", "--thinking", "none", "--link", link, "--tcp", "0"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "Robot 1\n"
+        assert process.stdout.readline() == f"  serial port  {link}\n"
+        assert process.stdout.readline().startswith("  TCP          socket://127.0.0.1:")
+        assert process.stdout.readline().startswith("The world waits for each command. Repeatable to the bit")
         assert run_python(PROGRAMS / "course.py", link).startswith("h,")
+        process.send_signal(signal.SIGTERM)
+        assert process.stdout.readline().startswith("Stopped after ")
+        assert process.wait(GUARD_S) == 0
     assert not os.path.lexists(link)
 
 
+# Runs `kiks serve` with a client, prints the first piece of a reply, and presses Ctrl-C.
+WITH_CLIENT = """
+import select, signal, socket, sys
+from kiks.__main__ import main
+from kiks.ports.server import Server
+serve = Server.serve
+def serve_client(server):
+    with socket.create_connection(("127.0.0.1", server._endpoints[1][0].port)) as client:
+        client.sendall(b"help\\n")
+        serve(server, lambda: select.select([client], [], [], 0)[0])
+        print(client.recv(4096))
+    serve(server, lambda: signal.raise_signal(signal.SIGINT))
+Server.serve = serve_client
+sys.argv = ["kiks", "serve", "--no-pty", "--tcp", "0", *OPTIONS]
+main()
+"""
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("option", cases([["--by-character"], []]))
+@pytest.mark.parametrize("option", [[], ["--by-character"]])
 def test_serve_command_says_how_replies_come_over_tcp(option: list[str]) -> None:
     # So slowly that the rest of a reply that comes by character is a minute away.
-    with serving("--no-pty", "--speed", "0.01" if option else "100", *option) as told:
-        address = ("127.0.0.1", int(told.readline().rpartition(":")[2]))
-        with socket.create_connection(address, timeout=GUARD_S) as client:
-            client.sendall(b"help\n")
-            reply = client.recv(4096)
-    assert reply.startswith(b"h")
-    assert reply.endswith(b"starting them\r\n") == (not option)
+    options = ["--speed", "0.01" if option else "100", *option]
+    done = forked.run(code=WITH_CLIENT.replace("OPTIONS", str(options)))
+    assert done.returncode == 0, done.stderr
+    (reply,) = [line for line in done.stdout.splitlines() if line.startswith("b'h")]
+    assert reply.endswith("starting them\\r\\n'") == (not option)
+    assert "Stopped after " in done.stdout

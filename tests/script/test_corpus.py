@@ -114,14 +114,14 @@ def served(folder: Path, robots: int) -> Iterator[list[str]]:
     """Serve robots in real time; yield their serial ports."""
     folder.mkdir()
     (folder / "wide.toml").write_text(WIDE)
-    options = ["--arena", str(folder / "wide.toml"), "--seed", SEED, "--robots", str(robots)]
+    options = ["--arena", str(folder / "wide.toml"), "--seed", SEED, "--robots", str(robots), "--tcp", "0"]
     command = [*KIKS, "serve", *options, "--link", str(folder / "ttyUSB")]
     with subprocess.Popen(command, stdout=PIPE, stderr=subprocess.DEVNULL, env=ENVIRONMENT, text=True) as process:
         assert process.stdout is not None
         lines = iter(process.stdout.readline, "")
-        ports = [line.split()[-1] for line in takewhile(lambda line: line.startswith(("Robot ", "  ")), lines)]
+        told = list(takewhile(lambda line: line.startswith(("Robot ", "  ")), lines))
         try:
-            yield ports[1::2]
+            yield [line.split()[-1] for line in told if line.startswith("  serial port")]
         finally:
             process.send_signal(signal.SIGINT)
             process.communicate(timeout=GUARD_S)

@@ -16,9 +16,6 @@ from tests.script.conftest import Run, programs_of
 
 from kiks.script import watchdog
 
-OPEN = "import serial\nport = serial.Serial('/dev/ttyUSB0', 9600, timeout=1)\n"
-
-
 # ---- threads ----
 
 
@@ -60,21 +57,18 @@ def test_thread_that_only_polls_yields(run: Run, loop: str) -> None:
 @pytest.mark.parametrize(
     ("text", "waiting"),
     [
-        ("import threading\nlock = threading.Lock()\nlock.acquire()\nlock.acquire()\n", "MainThread for a lock"),
+        ("lock = threading.Lock()\nlock.acquire()\nlock.acquire()", "MainThread for a lock"),
         (
-            f"{OPEN}port.timeout = None\nimport threading\nthreading.Thread(target=port.readline).start()\n",
+            "port = serial.Serial('COM1')\nthreading.Thread(target=port.readline).start()",
             "Thread-1 (readline) for a robot that was asked nothing",
         ),
-        ("import socket\nhere, there = socket.socketpair()\nhere.recv(1)\n", "MainThread for files"),
-        ("import os\nout, into = os.pipe()\nos.read(out, 1)\n", "MainThread for files"),
-        (
-            "import select, socket\nhere, there = socket.socketpair()\nselect.select([here], [], [])\n",
-            "MainThread for files",
-        ),
+        ("here, there = socket.socketpair()\nhere.recv(1)", "MainThread for files"),
+        ("out, into = os.pipe()\nos.read(out, 1)", "MainThread for files"),
+        ("here, there = socket.socketpair()\nselect.select([here], [], [])", "MainThread for files"),
     ],
 )
 def test_threads_that_wait_for_ever_end_with_one_line(text: str, waiting: str, run: Run) -> None:
-    ran = run(text)
+    ran = run(f"import os, select, serial, socket, threading\n{text}")
     assert ran.code == 1
     assert ran.err.startswith("kiks: some thread of a program must be able to go on, but all wait for ever: ")
     assert waiting in ran.err
@@ -150,7 +144,7 @@ def test_loop_that_asks_for_nothing_is_told(run: Run, monkeypatch: pytest.Monkey
     monkeypatch.setattr(watchdog, "SPINNING_S", 0.5)
     monkeypatch.setattr(watchdog, "tell", (told := []).append)
     monkeypatch.setattr(seen, "trace", told)
-    asks = f"{OPEN}port.write(b'D,4,4\\n')\nport.readline()\n"
+    asks = "import serial\nport = serial.Serial('COM1')\nport.write(b'D,4,4\\n')\nport.readline()\n"
     assert run(f"{asks}from tests.script import seen\nwhile not seen.trace:\n    pass\n").code == 0
     assert re.fullmatch(
         r"line [67] of program.py has computed for \d s without waiting for a time or a robot. If it computes, that is "
