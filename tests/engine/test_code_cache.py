@@ -52,7 +52,7 @@ def compiled(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(autouse=True)
 def _fresh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
-    (tmp_path / "temporary").mkdir()
+    (tmp_path / "temporary").mkdir(0o700)
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
     code_cache.tell.cache_clear()
     monkeypatch.setattr(compiling, "_LINES", {})
@@ -266,24 +266,27 @@ def test_a_change_concerns_what_is_compiled_from_it():
 
 
 def test_the_camera_is_no_part_of_the_motors():
-    kernels = code_cache._digests()
-    assert {"kiks.engine.physics.motor", "kiks.engine.sensing.camera", "kiks.batch.loop"} <= set(kernels)
-    sources = code_cache._sources()
-    before = code_cache._syntax(sources)
+    before, sources = code_cache._digests(), code_cache._sources()
+    assert {"kiks.engine.physics.motor", "kiks.engine.sensing.camera", "kiks.batch.loop"} <= set(before)
     for changed, wanted in (("sensing.camera", "sensing.camera"), ("physics.collisions", "physics.collisions meeting")):
         name = f"kiks.engine.{changed}"
         after = code_cache._syntax(sources | {name: sources[name] + b"\ndef another(): pass\n"})
-        assert {each for each in before if before[each] != after[each]} == {f"kiks.engine.{k}" for k in wanted.split()}
+        differ = {each for each in before if before[each] != code_cache._digest(after[each].encode())[:16].decode()}
+        assert differ == {f"kiks.engine.{each}" for each in wanted.split()}
 
 
-def test_the_digests_of_the_sources_are_computed_once(tmp_path):
+def test_the_digests_of_the_sources_are_computed_once(tmp_path, monkeypatch):
+    computed = []
+    monkeypatch.setattr(code_cache, "_syntax", lambda sources: computed.append(1) or {"kiks.engine.step": "text"})
     digests = code_cache._digests.__wrapped__()
     (known,) = (tmp_path / "cache" / "kiks").glob("sources-*")
     text = known.read_bytes()
     known.write_bytes(text.replace(digests["kiks.engine.step"].encode(), b"0" * 16))
-    assert code_cache._digests.__wrapped__()["kiks.engine.step"] == "0" * 16
+    assert code_cache._digests.__wrapped__() == {"kiks.engine.step": "0" * 16}
+    assert len(computed) == 1
     known.write_bytes(b"..")
     assert code_cache._digests.__wrapped__() == digests
+    assert len(computed) == 2
     assert known.read_bytes() == text
 
 
@@ -338,7 +341,7 @@ def test_on_a_full_disk_the_run_goes_on(tmp_path, caplog):
 def shipped(kept: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Return a file with machine code, as a wheel brings it; the user's cache is empty."""
     monkeypatch.setattr(code_cache, "SHIPPED", tmp_path / "compiled")
-    (tmp_path / "compiled").mkdir()
+    (tmp_path / "compiled").mkdir(0o700)
     return Path(shutil.move(kept.parent, tmp_path / "compiled")) / kept.name
 
 

@@ -77,12 +77,14 @@ def test_a_linked_kernel_is_compiled_once_and_whatever_compiles_says_so_once(tmp
 
 
 SHOWN = """
-from kiks.engine import step
+from kiks.engine.compiling import entry
 from kiks.engine.processor import processor
-compiler = step.advance.targetctx.codegen()
+compiler = entry(lambda: None).targetctx.codegen()
 assert processor()[1] == compiler.magic_tuple()[2]
 print('/'.join(processor()), end='')
 """
+
+
 COMPILED_BEFORE = "from numba import njit\nassert njit(lambda x: x + 1)(1) == 2\n"
 
 

@@ -33,8 +33,8 @@ def test_ours_differ_where_the_robots_do() -> None:
 @pytest.mark.slow
 def test_a_robot_of_ones_own_drives(tmp_path: Path) -> None:
     path = changed(tmp_path, "pulse_mm = 0.08 ", "pulse_mm = 0.12 ")
-    far = kiks.Simulation(kiks.Arena.box(2000, 2000), robot=path)
-    near = kiks.Simulation(kiks.Arena.box(2000, 2000))
+    floor = kiks.Arena.box(800, 800)
+    far, near = kiks.Simulation(floor, robot=path), kiks.Simulation(floor)
     for sim in (far, near):
         kiks.Khepera(sim.port(1)).set_speed(5, 5)
         sim.run(5)
