@@ -30,8 +30,8 @@ ROOT = Path(__file__).parents[2]
 SOCCER = ROOT / "examples/soccer"
 CHASER = ROOT / "examples/players/chaser.py"
 
-# States after twenty seconds with seed 1, by the programs of both sides.
-HASHES = {"own": "a12ddc206aca8100", "chaser": "0d0c8453d0ba36aa"}
+# States with seed 1, by the programs of both sides: after twenty seconds, and after eight.
+HASHES = {"own": "a12ddc206aca8100", "chaser": "46036bb4da35382d"}
 
 
 def match(seed: int = 0) -> Simulation:
@@ -56,7 +56,7 @@ def test_a_match_is_the_same_on_every_computer(tmp_path: Path) -> None:
     assert re.fullmatch(r"left \d, right \d, \d dropped balls", score)
     assert (tmp_path / "kiks-soccer.png").exists()
     own = [str(SOCCER / "player.py"), "kiks://1", "left"]
-    assert played(*own, str(CHASER), "kiks://2", cwd=tmp_path)[1] == HASHES["chaser"]
+    assert played(*own, str(CHASER), "kiks://2", seconds=8, cwd=tmp_path)[1] == HASHES["chaser"]
 
 
 @at_length
