@@ -24,7 +24,7 @@ pytestmark = pytest.mark.slow
 
 def drive(*words: str, cwd: Path, robots: int = 1) -> None:
     """Run programs; check that each robot has driven, and touched next to nothing."""
-    result = forked.run("run", "--seconds", "12", *words, cwd=cwd)
+    result = forked.run("run", "--seconds", "30", *words, cwd=cwd)
     assert result.returncode == 0, result.stderr
     found = re.findall(r"robot \d+: (\S+) m driven, (\d+) contact", result.stderr)
     assert len(found) == robots, result.stderr
