@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from tests import forked
-from tests.at_length import cases
+from tests.at_length import at_length
 from tests.cli.test_cli import state_of
 from tests.demos.shown import world_of
 
@@ -45,7 +45,8 @@ def test_a_match_is_the_same_on_every_computer(name: str, tmp_path: Path) -> Non
     assert state_of(result.stderr) == HASHES[name]
 
 
-@pytest.mark.parametrize("name", cases(HASHES))
+@at_length
+@pytest.mark.parametrize("name", HASHES)
 def test_a_whole_match_of_equals_has_points_on_both_sides(name: str, tmp_path: Path) -> None:
     result = forked.run("demo", name, "--seed", "1", cwd=tmp_path)
     points = [int(value) for value in re.findall(r"\d+", result.stdout.splitlines()[-1])[:2]]

@@ -107,10 +107,10 @@ def test_a_header_asks_for_no_memory(tmp_path):
     assert peak_bytes[0] < 1e7
 
 
-@pytest.mark.parametrize("radius_mm", [0.0, -1.0, math.nan, -math.inf, 1e300, "12", None, True])
-def test_a_radius_is_positive(tmp_path, radius_mm):
-    with pytest.raises(ParameterError, match=r"radius_mm must be (a number )?from 0\.001"):
-        load_samples(write(tmp_path, GOOD), radius_mm=radius_mm)
+def test_a_radius_is_positive(tmp_path):
+    for radius_mm in (0.0, -1.0, math.nan, -math.inf, 1e300, "12", None, True):
+        with pytest.raises(ParameterError, match=r"radius_mm must be (a number )?from 0\.001"):
+            load_samples(write(tmp_path, GOOD), radius_mm=radius_mm)
 
 
 def test_active_readings():

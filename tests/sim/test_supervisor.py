@@ -62,7 +62,6 @@ def test_a_thing_comes_and_goes_keeps_its_number_and_changes_its_looks(sim):
     assert sim.bodies()[["x_mm", "radius_mm", "brightness"]].tolist()[1] == (100.0, 40.0, 190)
 
 
-@pytest.mark.slow
 def test_a_mistake_is_explained_and_changes_nothing(sim):
     sim.add_ball(100, 500)
     before = sim.state_hash()
