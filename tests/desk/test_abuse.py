@@ -61,30 +61,20 @@ def is_well(shown: Shown) -> bool:
     return status == 200 and "KiKS" in page
 
 
+LOCAL = b" HTTP/1.1\r\nHost: 127.0.0.1\r\n"
 NO_REQUESTS = [
-    b"",
-    b"\0" * 1000,
-    b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03" + b"\xaa" * 100,
-    b"D,10,10\n",
-    b"GET\r\n\r\n",
-    b"GET / HTTP/9.9\r\n\r\n",
-    b"GET / HTTP/1.1\r\n\r\n",
-    b"GET / HTTP/1.1\r\nHost: a\r\nHost: b\r\n\r\n",
-    b"GET /\x00\xff HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n",
-    b"GET /%0d%0aset-cookie:%20a=b HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n",
-    b"GET //evil.example/%2e%2e HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n",
-    b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nOrigin: http://[\r\n\r\n",
-    b"GET / HTTP/1.1\r\nHost: [\r\n\r\n",
-    b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nCookie: \xff\xfe;;;=;\r\n\r\n",
-    b"POST / HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 99999999999999999999\r\n\r\n",
-    b"POST / HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: -1\r\n\r\n",
-    b"POST / HTTP/1.1\r\nHost: 127.0.0.1\r\nTransfer-Encoding: chunked\r\n\r\nFFFFFFFFFFFFFFFFFF\r\n",
-    b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n" + b"x: y\r\n" * 100_000,
-    b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nx: " + b"y" * 1_000_000,
+    *(b"", b"\0" * 1000, b"\x16\x03\x01\x02\x00\x01\x00\x01\xfc\x03\x03" + b"\xaa" * 100, b"D,10,10\n", b"GET\r\n\r\n"),
+    *(b"GET / HTTP/%s\r\n\r\n" % rest for rest in (b"9.9", b"1.1", b"1.1\r\nHost: a\r\nHost: b", b"1.1\r\nHost: [")),
+    *(b"GET /%s%s\r\n" % (path, LOCAL) for path in (b"\x00\xff", b"%0d%0aset-cookie:%20a=b", b"/evil.example/%2e%2e")),
+    b"GET /_nicegui_ws/socket.io/?EIO=4&transport=polling" + LOCAL + b"\r\n",
     b"GET /" + b"a" * 1_000_000 + b" HTTP/1.1\r\n\r\n",
-    b"GET /_nicegui_ws/socket.io/?EIO=4&transport=polling HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n",
-    b"GET /desk/1/feed HTTP/1.1\r\nHost: 127.0.0.1\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n\r\n",
-    b"GET /desk/1/feed HTTP/1.1\r\nHost: 127.0.0.1\r\nUpgrade: h2c\r\nConnection: Upgrade\r\n\r\n",
+    b"GET /%sOrigin: http://[\r\n\r\n" % LOCAL,
+    b"GET /%sCookie: \xff\xfe;;;=;\r\n\r\n" % LOCAL,
+    b"GET /%sx: %s" % (LOCAL, b"y" * 1_000_000),
+    b"GET /%s%s" % (LOCAL, b"x: y\r\n" * 100_000),
+    *(b"POST /%sContent-Length: %s\r\n\r\n" % (LOCAL, length) for length in (b"99999999999999999999", b"-1")),
+    b"POST /%sTransfer-Encoding: chunked\r\n\r\nFFFFFFFFFFFFFFFFFF\r\n" % LOCAL,
+    *(b"GET /desk/1/feed%sUpgrade: %s\r\nConnection: Upgrade\r\n\r\n" % (LOCAL, to) for to in (b"websocket", b"h2c")),
 ]
 
 

@@ -113,16 +113,14 @@ def test_refusal_tells_how_to_open_the_desk() -> None:
     assert b"<script" not in come(path="/<script>alert(1)</script>\x01", host="<script>")[1]["body"]
 
 
-def test_token_becomes_a_cookie_and_leaves_the_address() -> None:
+def test_token_becomes_a_cookie_and_leaves_the_address_also_within_a_notebook() -> None:
     for path in ("/desk/1", PAGE):
         answers = come(path=path, query=b"token=a-secret&x=1", host="robots.example:8123", is_local=False)
         headers = headers_of(answers)
         assert (status(answers), headers["location"]) == (303, f"{PAGE}?x=1")
         assert headers["set-cookie"] == f"kiks_token=a-secret; Path={KEY.place}; HttpOnly; SameSite=Strict"
     assert status(come(host="robots.example:8123", cookie="a=b; kiks_token=a-secret", is_local=False)) == 200
-
-
-def test_a_notebook_of_another_site_gets_a_partitioned_cookie() -> None:
+    # A notebook of another site gets a partitioned one.
     within = {"sec_fetch_site": "cross-site", "sec_fetch_dest": "iframe"}
     cookie = headers_of(come(query=b"token=a-secret", **within))["set-cookie"]
     assert cookie.endswith("HttpOnly; SameSite=None; Secure; Partitioned")

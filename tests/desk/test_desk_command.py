@@ -130,13 +130,6 @@ def test_programs_begin_when_a_page_shows_the_world(words: tuple[str, ...], tmp_
         assert process.wait(GUARD_S) == 0
 
 
-def test_errors_are_reported_before_waiting_for_a_page(tmp_path: Path) -> None:
-    result = forked.run("run", "--desk", "--thinking", "replay:nowhere", DRIVE, DRIVE, cwd=tmp_path)
-    assert result.returncode == 2
-    assert "replay file 'nowhere.1' must exist" in result.stderr
-    assert "http://" not in result.stdout
-
-
 @at_length
 @pytest.mark.parametrize("words", [("run", "--desk", DRIVE, "COM1", "5", "3", "5"), ("demo", "avoid", "--desk")])
 def test_ctrl_c_ends_waiting_for_a_page(words: tuple[str, ...], tmp_path: Path) -> None:
@@ -178,6 +171,7 @@ def test_served_robots_on_a_desk(thinking: str, tmp_path: Path) -> None:
     ("words", "message"),
     cases(
         [
+            (("run", "--thinking", "replay:nowhere", DRIVE, DRIVE), "replay file 'nowhere.1' must exist"),
             (("--folder", "nowhere"), "--folder must be a folder"),
             (("--host", "192.0.2.1"), "the desk must be able to listen"),
             (("--arena", "nowhere.kiks"), "nowhere.kiks"),
@@ -185,14 +179,18 @@ def test_served_robots_on_a_desk(thinking: str, tmp_path: Path) -> None:
             (("--speed", "-1"), "speed must be at least 0.001, but it was -1"),
             (("--host", "no such host"), "the desk must be able to listen"),
         ],
-        3,
+        4,
     ),
 )
-def test_errors_are_one_clear_line(words: tuple[str, ...], message: str, tmp_path: Path) -> None:
-    result = forked.run("desk", "--no-browser", "--port", "0", *words, cwd=tmp_path)
+def test_errors_are_one_clear_line_before_a_page_is_waited_for(
+    words: tuple[str, ...], message: str, tmp_path: Path
+) -> None:
+    command = ("run", "--desk") if words[0] == "run" else ("desk", "--no-browser", "--port", "0", words[0])
+    result = forked.run(*command, *words[1:], cwd=tmp_path)
     assert result.returncode == 2
     assert message in result.stderr
     assert "Traceback" not in result.stderr
+    assert "http://" not in result.stdout
 
 
 @at_length

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 from tests.at_length import share
 from tests.desk.clients import feed_of
-from tests.guard import GUARD_S
+from tests.guard import GUARD_S, wait_until
 from websockets.sync.client import ClientConnection
 
 import kiks
@@ -118,32 +118,24 @@ def test_a_browser_without_acknowledgements_gets_three_frames(shown: Shown) -> N
 
 
 def test_a_browser_that_does_not_read_is_disconnected() -> None:
-    async def far_behind() -> Viewer:
-        viewer = Viewer("somebody")
-        for _ in range(100):
-            viewer.tell({})
-        await viewer.send_all(None)  # type: ignore[arg-type]
-        return viewer
-
-    asyncio.run(far_behind())
+    viewer = Viewer("somebody")
+    for _ in range(100):
+        viewer.tell({})
+    asyncio.run(viewer.send_all(None))  # type: ignore[arg-type]
 
 
-def test_drags_move_things_in_the_engine(shown: Shown) -> None:
-    with browsing(shown) as browser:
-        browser.say("grab", what="robot", index=0)
-        browser.say("move", x_mm=900, y_mm=200)
-        frame = browser.wait_for(lambda frame: pose(frame)[0] > 200)
+def test_drags_move_things_in_the_engine_also_from_two_browsers_at_once(shown: Shown) -> None:
+    with browsing(shown) as one, browsing(shown) as two:
+        one.say("grab", what="robot", index=0)
+        one.say("move", x_mm=900, y_mm=200)
+        frame = one.wait_for(lambda frame: pose(frame)[0] > 200)
         assert shown.desk.sim.pose(1)[:2] == pytest.approx(pose(frame)[:2])
         assert is_held(frame)
-        browser.say("turn", heading_rad=1.0)
-        browser.wait_for(lambda frame: pose(frame)[2] == 1.0)
-        browser.say("drop")
-        browser.wait_for(lambda frame: not is_held(frame))
+        one.say("turn", heading_rad=1.0)
+        one.wait_for(lambda frame: pose(frame)[2] == 1.0)
+        one.say("drop")
+        one.wait_for(lambda frame: not is_held(frame))
         assert shown.desk.shown.hands.are_empty
-
-
-def test_two_browsers_may_drag_at_once(shown: Shown) -> None:
-    with browsing(shown) as one, browsing(shown) as two:
         one.say("grab", what="robot", index=0)
         one.wait_for(is_held)
         two.say("grab", what="robot", index=0)
@@ -152,8 +144,7 @@ def test_two_browsers_may_drag_at_once(shown: Shown) -> None:
         two.say("move", x_mm=500, y_mm=300)
         one.say("move", x_mm=100, y_mm=300)
         one.wait_for(lambda frame: pose(frame, 1)[1] == 300 and pose(frame)[1] == 300)
-    while not shown.desk.shown.hands.are_empty:
-        pass
+    wait_until(lambda: shown.desk.shown.hands.are_empty)
 
 
 def test_of_the_moves_of_a_page_only_the_newest_counts(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -141,9 +141,16 @@ async def test_an_edit_that_the_world_refuses_is_undone(desk, editing, monkeypat
         await editing.undo()
 
 
-async def test_edits_leave_what_has_moved_where_it_is(desk, editing):
+async def test_edits_leave_what_has_moved_where_it_is_and_steps_back_wait_until_there_is_room(desk, editing):
     await line(editing)
+    await rectangle(editing, 190, 10, 210, 300, brightness=0)
+    desk.sim.place(1, 200, 150, 0.0)
+    with pytest.raises(KiksError, match="robot 1"):
+        await editing.undo()
+    assert not desk.sim.arena.brightness[100, 200]
     desk.sim.place(1, 400, 300, 0.0)
+    await editing.undo()
+    assert desk.sim.arena.brightness[100, 200]
     desk.sim.move_body(1, 50, 50)
     with pytest.raises(KiksError, match="robot 1"):
         await rectangle(editing, 390, 290, 410, 310)
@@ -174,7 +181,7 @@ async def test_resets_keep_the_drawing(desk, editing):
     assert desk.sim.arena.brightness[100, 100] == 255
 
 
-async def test_adding_a_robot_restarts_the_world(desk, editing):
+async def test_adding_a_robot_restarts_the_world_and_the_last_one_may_go_and_come_back(desk, editing):
     first = desk.sim
     await line(editing)
     await editing.place(Robot(400, 300, 1.0, ProjectRobot("khepera_ii")))
@@ -191,9 +198,6 @@ async def test_adding_a_robot_restarts_the_world(desk, editing):
     assert counts(desk) == (1, 2, 1)
     assert not desk.sim.arena.brightness[100, 200]
     assert not editing.can_undo
-
-
-async def test_the_last_robot_may_go_and_come_back(desk, editing):
     await editing.remove(100, 100)
     assert counts(desk) == (0, 2, 1)
     assert desk.project.robots == ()
@@ -250,18 +254,6 @@ async def test_steps_back_find_their_things_whatever_their_order(desk, editing):
     assert places(desk) == [250, 400]
     await step(editing.redo, 2)
     assert places(desk) == [400, 430]
-
-
-async def test_steps_back_wait_until_there_is_room(desk, editing):
-    await line(editing)
-    await rectangle(editing, 190, 10, 210, 300, brightness=0)
-    desk.sim.place(1, 200, 150, 0.0)
-    with pytest.raises(KiksError, match="robot 1"):
-        await editing.undo()
-    assert not desk.sim.arena.brightness[100, 200]
-    desk.sim.place(1, 100, 100, 0.0)
-    await editing.undo()
-    assert desk.sim.arena.brightness[100, 200]
 
 
 async def test_steps_beyond_the_limit_are_forgotten(desk, monkeypatch, editing):

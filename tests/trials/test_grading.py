@@ -187,10 +187,10 @@ def test_hostile_programs_are_named_and_cost_the_others_nothing(tmp_path: Path, 
 def test_ctrl_c_says_how_to_go_on(tmp_path: Path) -> None:
     programs = write(tmp_path / "class", {"ann": GOOD, "zoe": "while True: pass"})
     words = [exercise(tmp_path), programs, "--trusted", "--workers", "1", "--out", tmp_path / "out"]
-    outcomes = tmp_path / "out" / "outcomes.jsonl"
+    outcomes, begun = tmp_path / "out" / "outcomes.jsonl", tmp_path / "out" / "runs" / "zoe" / "1.mcap"
     line = python_line("-m", "kiks", "grade", *map(str, words))
     with subprocess.Popen(line, stderr=subprocess.PIPE, text=True) as run:
-        wait_until(lambda: outcomes.exists() and outcomes.read_bytes().count(b"}\n") >= 1)
+        wait_until(lambda: begun.exists() and outcomes.exists() and outcomes.read_bytes().count(b"}\n") >= 1)
         run.send_signal(signal.SIGINT)
         _, said = run.communicate(timeout=GUARD_S)
     assert run.returncode == 130

@@ -13,7 +13,7 @@ import pytest
 from tests import forked
 
 from kiks import Recording
-from kiks.errors import KiksError, ParameterError
+from kiks.errors import ParameterError
 from kiks.model.arena import Arena, Pose
 from kiks.model.goal import Goal
 from kiks.model.project import Project
@@ -138,8 +138,10 @@ def test_the_same_comes_out_of_two_workers_in_another_order_after_kills_of_the_r
     assert (folder / OUTCOMES).read_bytes() == (home / "out" / OUTCOMES).read_bytes()
 
 
-def test_a_changed_file_is_another_trial(tmp_path: Path) -> None:
+def test_a_changed_file_is_another_trial_and_names_differ(tmp_path: Path) -> None:
     trial = trials_in(tmp_path)[0]
+    with pytest.raises(ParameterError, match="names of trials must differ"):
+        run_trials([trial, trial], tmp_path / "out")
     keys = {trial.key, replace(trial).key}
     assert len(keys) == 1
     for name in ("drives", "judge"):
@@ -186,12 +188,3 @@ def test_a_program_that_waits_runs_out_of_simulated_time(tmp_path: Path, sandbox
     outcome = run_trial(Trial("a", Project(seconds=7.0), tmp_path, (program,), is_trusted=True), tmp_path, sandboxes)
     assert outcome.end_of().how == OUT_OF_TIME
     assert outcome.time_s == 7.0
-
-
-def test_what_cannot_begin_is_refused_with_its_name(tmp_path: Path) -> None:
-    program = write(tmp_path, "program", "pass")
-    trial = Trial("ann/1", Project(), tmp_path, (program,), is_trusted=True)
-    with pytest.raises(KiksError, match=r"'ann/1' cannot begin: a project .* must have a time limit"):
-        run_trials([trial], tmp_path / "out")
-    with pytest.raises(ParameterError, match="names of trials must differ"):
-        run_trials([trial, trial], tmp_path / "out")
