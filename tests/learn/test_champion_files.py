@@ -46,7 +46,6 @@ def test_a_champion_lives_in_its_world_again(robot: str | kiks.RobotSpec, tmp_pa
     champion = kiks.Champion(LINEAR, PARAMETERS, robot=robot, world=world, timing=timing, **found)
     champion.save(tmp_path / "one.toml")
     again = kiks.Champion.load(tmp_path / "one.toml")
-    assert again.world is not None
     for name in ("controller", "parameters", "robot", "timing", "kiks", *found):
         assert getattr(again, name) == getattr(champion, name)
     np.testing.assert_array_equal(again.world.arena.brightness, world.arena.brightness)
