@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.learn.small import refused
 
 import kiks
 from kiks.learn.exam import EXAM_SEED
@@ -100,7 +99,8 @@ def test_wrong_files_are_errors(tmp_path: Path) -> None:
     ):
         assert before in text
         (tmp_path / "one.toml").write_text(text.replace(before, after))
-        refused(message, kiks.Champion.load, tmp_path / "one.toml")
+        with pytest.raises(kiks.KiksError, match=message):
+            kiks.Champion.load(tmp_path / "one.toml")
 
 
 def test_robots_and_seed_may_be_others_than_those_of_the_world() -> None:
