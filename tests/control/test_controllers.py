@@ -159,9 +159,7 @@ NETWORKS: list[tuple[str, dict[str, Any], Callable[[Trace, Trace], Trace], float
 
 
 @pytest.mark.parametrize(("kind", "options", "shares", "tolerance"), cases(NETWORKS, 8))
-def test_a_controller_computes_what_numpy_does(
-    kind: str, options: dict[str, Any], shares: Callable[[Trace, Trace], Trace], tolerance: float
-) -> None:
+def test_a_controller_computes_what_numpy_does(kind: str, options: Any, shares: Any, tolerance: float) -> None:
     controller = getattr(kiks.controllers, kind)(**options)
     parameters = (0.8 if kind == "linear" else 1.0) * kiks.controllers.random_parameters(controller, 1, seed=1)[0]
     sensors = readings(controller, 60 if kind == "plastic" else 12)

@@ -220,9 +220,7 @@ def test_lamps_that_do_not_burn_are_none() -> None:
 
 
 @given(st.lists(st.tuples(st.floats(-500, 500), st.floats(-500, 500)), max_size=8), st.sampled_from((60.0, 150.0)))
-def test_groups_and_closeness_follow_from_the_distances_of_pairs(
-    places_mm: list[tuple[float, float]], radius_mm: float
-) -> None:
+def test_groups_and_closeness_follow_from_the_distances_of_pairs(places_mm: Any, radius_mm: float) -> None:
     bodies = np.zeros(len(places_mm), BODY)
     bodies["x_mm"], bodies["y_mm"] = np.reshape(places_mm, (-1, 2)).T
     squares_mm2 = (bodies["x_mm"] - bodies["x_mm"][:, None]) ** 2 + (bodies["y_mm"] - bodies["y_mm"][:, None]) ** 2

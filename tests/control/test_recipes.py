@@ -27,7 +27,6 @@ import kiks
     ids=lambda each: each.name,
 )
 def test_the_same_again(controller: kiks.Controller) -> None:
-    assert controller.recipe is not None
     recipe = json.loads(json.dumps(controller.recipe))
     assert kiks.controllers.from_recipe(recipe) is controller
     assert recipe["kind"] == controller.name

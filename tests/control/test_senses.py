@@ -135,7 +135,6 @@ def test_senses_survive_pickles_and_recipes() -> None:
     assert (found.command, found.turret, found.size) == ("T,24,C", Compass, 1)
     assert check_senses(recipes_for(("speeds", Compass.heading))) == ("speeds", Compass.heading)
     controller = kiks.controllers.mlp(senses=("proximity", Compass.heading))
-    assert controller.recipe is not None
     assert kiks.controllers.from_recipe(controller.recipe) is controller
     batch = pickle.loads(pickle.dumps(kiks.Batch(arena(), 1, senses=("speeds", Compass.heading))))
     assert batch.reset().shape == (1, 1, 3)

@@ -29,11 +29,6 @@ def run(algorithm: str, folder: Path | None = None, **changes: Any) -> kiks.Evol
     return evolution
 
 
-def archive_of(evolution: kiks.Evolution) -> kiks.Archive:
-    assert evolution.archive is not None
-    return evolution.archive
-
-
 def told(evolution: kiks.Evolution, seed: int, generations: int = 6) -> kiks.Evolution:
     """Tell an evolution random values, a few of them equal."""
     rng = np.random.default_rng(seed)
@@ -70,7 +65,7 @@ def test_they_find_many_behaviours_where_one_gets_better(algorithm: str) -> None
         values[:, 0] = candidates[:, 0]
         values[:, names.index("path_mm")], values[:, names.index("straightness")] = candidates[:, 0], candidates[:, 1]
         evolution.tell(values)
-    assert archive_of(evolution).coverage > 0.3
+    assert evolution.archive.coverage > 0.3
 
 
 @pytest.mark.parametrize("algorithm", cases(DIVERSE))
@@ -95,7 +90,7 @@ def test_the_champion_is_the_elite_that_does_best_on_trial(algorithm: str) -> No
 
 def test_each_cell_holds_the_first_of_the_best_that_fell_into_it() -> None:
     evolution = told(kiks.Evolution(small(), "ga", seed=1, population=60), 1)
-    archive, names = archive_of(evolution), evolution.task.value_names
+    archive, names = evolution.archive, evolution.task.value_names
     best: dict[tuple[int, ...], tuple[float, list[float]]] = {}
     for generation in evolution.generations:
         for candidate, values in zip(generation.candidates[:60], generation.values[:60], strict=True):
@@ -115,7 +110,7 @@ def test_each_cell_holds_the_first_of_the_best_that_fell_into_it() -> None:
 
 
 def test_the_elite_of_a_place_is_that_of_the_nearest_filled_cell() -> None:
-    archive = archive_of(told(kiks.Evolution(small(), "ga", seed=2, population=8), 1, generations=2))
+    archive = told(kiks.Evolution(small(), "ga", seed=2, population=8), 1, generations=2).archive
     for elite in archive.elites:
         pairs = zip(archive.axes, elite.cell, strict=True)
         place = [axis.low + (k + 0.5) * (axis.high - axis.low) / axis.cells for axis, k in pairs]
@@ -129,8 +124,8 @@ def test_the_elite_of_a_place_is_that_of_the_nearest_filled_cell() -> None:
 
 def test_wrong_places_are_errors() -> None:
     evolution = kiks.Evolution(small(), "ga", population=8)
-    refused("must hold an elite, but it is empty", archive_of(evolution).elite_at, 1, 1)
-    archive = archive_of(told(evolution, 1))
+    refused("must hold an elite, but it is empty", evolution.archive.elite_at, 1, 1)
+    archive = told(evolution, 1).archive
     refused(r"must be 2 numbers \(path_mm, straightness\), but it was", archive.elite_at, 1)
     refused("straightness must be a finite number", archive.champion_at, 1, float("nan"))
 
@@ -140,7 +135,7 @@ def test_wrong_places_are_errors() -> None:
 
 def test_an_archive_equals_the_one_loaded_from_its_folder(tmp_path: Path) -> None:
     evolution = run("map-elites", folder=tmp_path)
-    archive, again = archive_of(evolution), kiks.Archive.load(tmp_path)
+    archive, again = evolution.archive, kiks.Archive.load(tmp_path)
     assert again.elites == archive.elites
     assert (again.axes, again.value_names, again.qd_score) == (archive.axes, archive.value_names, archive.qd_score)
     champion = again.champion_at(300, 0.5)
@@ -160,7 +155,7 @@ def test_generations_with_fitness_alone_are_not_in_the_archive(tmp_path: Path) -
     evolution.tell(np.zeros(len(evolution.ask())))
     told(evolution, 1, generations=2)
     evolution.save_log()
-    assert kiks.Archive.load(tmp_path).elites == archive_of(evolution).elites != ()
+    assert kiks.Archive.load(tmp_path).elites == evolution.archive.elites != ()
 
 
 def test_too_many_cells_are_an_error() -> None:
@@ -172,7 +167,7 @@ def test_too_many_cells_are_an_error() -> None:
 
 
 def test_an_elite_becomes_a_champion(tmp_path: Path) -> None:
-    archive = archive_of(run("map-elites", folder=tmp_path / "out"))
+    archive = run("map-elites", folder=tmp_path / "out").archive
     elite = archive.elites[-1]
     words = ["champion", str(tmp_path / "out"), str(tmp_path / "elite.toml"), "--at"]
     said = CliRunner().invoke(app, [*words, ",".join(str(elite.values[axis.measure]) for axis in archive.axes)])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,7 @@ from tests.learn.small import refused, small
 
 import kiks
 from kiks.learn.algorithm_name import AlgorithmName
-from kiks.learn.finals import FINALISTS, SHARE, Contender, Finals, hold_finals, rounds_of
+from kiks.learn.finals import FINALISTS, SHARE, Contender, hold_finals, rounds_of
 from kiks.learn.results import result_of
 from kiks.learn.seeds import FINALS, seed_for
 
@@ -28,7 +28,7 @@ def contenders(count: int) -> list[Contender]:
 
 
 def evolution_of(algorithm: str = "cma", folder: Path | None = None, **given: Any) -> kiks.Evolution:
-    return kiks.Evolution(small(), algorithm, population=8, folder=folder, **{"seed": 3} | given)
+    return kiks.Evolution(small(exam=None), algorithm, population=8, folder=folder, **{"seed": 3} | given)
 
 
 def run(algorithm: str = "cma", folder: Path | None = None, generations: int = 6, **given: Any) -> kiks.Evolution:
@@ -37,25 +37,24 @@ def run(algorithm: str = "cma", folder: Path | None = None, generations: int = 6
     return evolution
 
 
-def finals_of(evolution: kiks.Evolution) -> Finals:
-    assert evolution.finals is not None
-    return evolution.finals
+@cache
+def whole() -> kiks.Evolution:
+    """Return an evolution that never stopped."""
+    return run()
 
 
 def outcome(evolution: kiks.Evolution) -> tuple[Any, ...]:
     """Return all that finals decide, to the bit."""
-    champion, finals = evolution.champion, finals_of(evolution)
+    champion, finals = evolution.champion, evolution.finals
     told = finals.numbers.tobytes(), finals.seeds.tobytes(), finals.values.tobytes()
     return finals.finalists, told, champion.parameters, champion.fitness, champion.measures, champion.generation
 
 
 def noisy(candidates: Any, seeds: Any, noise: float = 1.0) -> Any:
-    """Return values whose first follows from the first parameter, and noise from the seed; a second value is extra."""
-    fitness = [
-        candidate[0] + noise * np.random.default_rng([int(seed), int(candidate[0])]).standard_normal()
-        for candidate, seed in zip(candidates, seeds, strict=True)
-    ]
-    return np.column_stack([fitness, candidates[:, 0]])
+    """Return values: the first parameter with noise, which follows from it and the seed, and the parameter."""
+    number = np.asarray(candidates)[:, 0]
+    drawn = (np.asarray(seeds) % 1009 * (number + 1)) % 1009 / 504.5 - 1.0
+    return np.column_stack([number + 2.0 * noise * drawn, number])
 
 
 # ---- rounds ----
@@ -153,7 +152,7 @@ def test_a_rival_that_was_lucky_in_its_trials_loses() -> None:
     assert evolution.champion.parameters[0] == best
     assert evolution.champion.generation == best + 1
     assert before[-1].fitness > 50 > evolution.champion.fitness
-    finals = finals_of(evolution)
+    finals = evolution.finals
     numbers, seeds, told = finals.numbers, finals.seeds, finals.values
     assert evolution.champion.fitness == told[numbers == finals.winner, 0].mean()
     assert not trials & set(seeds.tolist())
@@ -161,12 +160,12 @@ def test_a_rival_that_was_lucky_in_its_trials_loses() -> None:
 
 
 def test_chunks_and_batches_do_not_matter(monkeypatch: pytest.MonkeyPatch) -> None:
-    first, other = outcome(run()), evolution_of(seed=4)
+    other = evolution_of(seed=4)
     other.run(generations=6)
-    assert outcome(other) != first
-    assert outcome(run(executor=ThreadPoolExecutor(2))) == first
+    assert outcome(other) != outcome(whole())
+    assert outcome(run(executor=ThreadPoolExecutor(2))) == outcome(whole())
     monkeypatch.setattr("kiks.learn.task.BATCH_WORLDS_MAX", 6)
-    assert outcome(run()) == first
+    assert outcome(run()) == outcome(whole())
 
 
 @pytest.mark.parametrize("algorithm", cases(AlgorithmName))
@@ -175,7 +174,7 @@ def test_a_continued_evolution_holds_finals_at_its_new_end(algorithm: str, tmp_p
     whole = run(algorithm, tmp_path / "whole")
     np.random.seed(2)
     early = run(algorithm, tmp_path / "part", 4)
-    assert len(finals_of(early).finalists) < len(finals_of(whole).finalists)
+    assert len(early.finals.finalists) < len(whole.finals.finalists)
     rest = run(algorithm, tmp_path / "part")
     early.run(generations=6)
     assert outcome(rest) == outcome(early) == outcome(whole)
@@ -194,7 +193,7 @@ def test_the_finals_of_a_complete_folder_are_not_held_again(tmp_path: Path) -> N
     with Scripted(never) as executor:
         again.run(generations=6, executor=executor, each_round=never)
     assert outcome(again) == outcome(whole)
-    assert result_of(again).seconds == finals_of(whole).seconds
+    assert result_of(again).seconds == whole.finals.seconds
 
 
 @pytest.mark.parametrize("when", cases(["each", "each_round"]))
@@ -210,7 +209,7 @@ def test_an_interrupted_evolution_holds_no_finals(when: str, tmp_path: Path) -> 
     assert not list(tmp_path.glob("generations/*finals*"))
     best = evolution.generations[-1].champion_fitness
     assert evolution.champion.fitness == kiks.Champion.load(tmp_path / "champion.toml").fitness == best
-    assert outcome(run(folder=tmp_path)) == outcome(run())
+    assert outcome(run(folder=tmp_path)) == outcome(whole())
 
 
 def test_one_rival_alone_has_no_finals() -> None:
@@ -224,7 +223,6 @@ def test_elites_take_part_where_an_algorithm_prefers_none() -> None:
     rng = np.random.default_rng(1)
     for _ in range(5):
         evolution.tell(rng.uniform(0, 1, (len(evolution.ask()), len(evolution.task.value_names))))
-    assert evolution.archive is not None
     elites = evolution.archive.best_first()
     tried = {tuple(each.candidates[-1].tolist()) for each in evolution.generations[1:]}
     chosen = next(elite for elite in elites if elite.parameters not in tried)
@@ -232,13 +230,10 @@ def test_elites_take_part_where_an_algorithm_prefers_none() -> None:
     with Scripted(lambda found, _: np.tile((found == chosen.parameters).all(axis=1)[:, None], width) * 1.0) as executor:
         champion = evolution.hold_finals(executor)
     assert (champion.parameters, champion.fitness, champion.generation) == (chosen.parameters, 1.0, chosen.generation)
-    finalists = {each.parameters for each in finals_of(evolution).finalists}
+    finalists = {each.parameters for each in evolution.finals.finalists}
     assert finalists == tried | {elite.parameters for elite in elites[:FINALISTS]}
-    other = run("cma")
-    assert other.archive is not None
-    assert not {each.parameters for each in finals_of(other).finalists} & {
-        each.parameters for each in other.archive.elites
-    }
+    others = {each.parameters for each in whole().finals.finalists}
+    assert not others & {each.parameters for each in whole().archive.elites}
 
 
 def test_finals_after_ask_and_tell() -> None:
@@ -248,28 +243,23 @@ def test_finals_after_ask_and_tell() -> None:
         evolution.tell(evolution.task.evaluate(evolution.ask(), evolution.seeds))
     rounds: list[int] = []
     champion = evolution.hold_finals(each_round=lambda number, sizes: rounds.append(sizes[number]))
-    assert rounds == rounds_of(len(finals_of(evolution).finalists), 0)[0]
-    assert champion.parameters == evolution.champion.parameters == run().champion.parameters
+    assert rounds == rounds_of(len(evolution.finals.finalists), 0)[0]
+    assert champion.parameters == evolution.champion.parameters == whole().champion.parameters
     evolution.tell(np.zeros(len(evolution.ask())))
     assert evolution.finals is None
     assert evolution.champion.fitness == evolution.generations[-1].champion_fitness
 
 
 def test_the_error_names_a_broken_file_of_finals(tmp_path: Path) -> None:
-    whole = run(folder=tmp_path)
+    run(folder=tmp_path)
     file = tmp_path / "generations/000006_finals.npz"
     with np.load(file) as saved:
         good = dict(saved)
-    assert good["seed"].tolist() == finals_of(whole).seeds.tolist()
+    assert good["seed"].tolist() == whole().finals.seeds.tolist()
     again = small().evaluate(good["finalists"][good["finalist"]], good["seed"], 1)
     assert again.tolist() == good["values"].tolist()
-    wrong: list[dict[str, Any]] = [
-        {"values": good["values"][:-1]},
-        {"values": np.full_like(good["values"], np.nan)},
-        {"finalists": good["finalists"][:-1]},
-        {"seconds": np.float64(-1)},
-        {"finalist": good["finalist"] + 1},
-    ]
+    wrong = [{name: good[name][:-1]} for name in ("values", "finalists")]
+    wrong += [{"values": good["values"] * np.nan}, {"seconds": -1.0}, {"finalist": good["finalist"] + 1}]
     for change in wrong:
         np.savez(file, **good | change)
         refused(rf"000006_finals.npz': {next(iter(change))} .* are held again", evolution_of, folder=tmp_path)
@@ -279,4 +269,4 @@ def test_the_error_names_a_broken_file_of_finals(tmp_path: Path) -> None:
         file.write_bytes(data)
         refused(r"Finals '.*000006_finals.npz' must be a whole .npz file", evolution_of, folder=tmp_path)
     file.unlink()
-    assert outcome(run(folder=tmp_path)) == outcome(whole)
+    assert outcome(run(folder=tmp_path)) == outcome(whole())

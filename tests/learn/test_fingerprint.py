@@ -41,45 +41,38 @@ def defined(code: str, name: str = "f") -> Any:
 
 
 HELPED = """
-{space}
-GAIN = {gain}
+GAIN = 2.0
 def helper(values):
-    {comment}
-    return [GAIN * value for value in values if value in {{"left", "right", 2}}]
+    return [GAIN * value for value in values if value in {"left", "right", 2}]
 def f(values, power=2):
     return helper(values) ** power
 """
 
 
-@pytest.mark.parametrize(
-    "code",
-    [
-        HELPED.format(space="", gain=2.0, comment=""),
-        HELPED.format(space="\n\n\n", gain=2.0, comment="# slowly"),
-        HELPED.format(space="import math", gain=2.0, comment='"""Return much."""'),
-        HELPED.format(space="", gain="1 + 1.0", comment="").replace("GAIN * value for", "GAIN * value\nfor"),
-    ],
-)
-def test_lines_comments_and_what_is_not_used_do_not_count(code: str) -> None:
-    assert of(defined(code)) == of(defined(HELPED.format(space="", gain=2.0, comment="")))
+def changed(*pairs: tuple[str, str]) -> str:
+    """Return the fingerprint of the code with changes."""
+    code = HELPED
+    for now, then in pairs:
+        assert now in code
+        code = code.replace(now, then)
+    return of(defined(code))
 
 
-@pytest.mark.parametrize(
-    ("now", "then"),
-    [
-        ("GAIN * value for", "GAIN + value for"),
-        ("GAIN = 2.0", "GAIN = 2"),
-        ("GAIN = 2.0", "GAIN = 3.0"),
-        ("power=2", "power=3"),
-        ('"left"', '"lift"'),
-        ("GAIN = 2.0", "def GAIN(): return 2.0"),
-        ("f(values, power=2)", "f(values, *power)"),
-    ],
-)
-def test_code_constants_and_defaults_count_however_deep(now: str, then: str) -> None:
-    code = HELPED.format(space="", gain=2.0, comment="")
-    assert code.replace(now, then) != code
-    assert of(defined(code.replace(now, then))) != of(defined(code))
+def test_lines_comments_and_what_is_not_used_do_not_count() -> None:
+    doc = ("    return [", '    """Return much."""\n    return [')
+    comment = ("    return [", "    # slowly\n    return [")
+    assert changed() == of(defined(HELPED)) == changed(("GAIN = 2.0", "\n\n\nGAIN = 2.0"), comment)
+    assert changed() == changed(("GAIN = 2.0", "import math\nGAIN = 2.0"), doc)
+    assert changed() == changed(("GAIN = 2.0", "GAIN = 1 + 1.0"), ("value for", "value\nfor"))
+
+
+def test_code_constants_and_defaults_count_however_deep() -> None:
+    assert changed(("GAIN * value for", "GAIN + value for")) != changed()
+    for gain in ("GAIN = 2", "GAIN = 3.0", "def GAIN(): return 2.0"):
+        assert changed(("GAIN = 2.0", gain)) != changed(), gain
+    assert changed(("power=2", "power=3")) != changed()
+    assert changed(('"left"', '"lift"')) != changed()
+    assert changed(("f(values, power=2)", "f(values, *power)")) != changed()
 
 
 class Scaled:
@@ -124,11 +117,9 @@ KINDS: dict[str, Callable[[float], Any]] = {
 }
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_what_a_function_holds_counts(kind: str) -> None:
-    make = KINDS[kind]
-    assert of(make(1.0)) == of(make(1.0))
-    assert of(make(1.0)) != of(make(2.0))
+@pytest.mark.parametrize("make", KINDS.values(), ids=KINDS)
+def test_what_a_function_holds_counts(make: Callable[[float], Any]) -> None:
+    assert of(make(1.0)) == of(make(1.0)) != of(make(2.0))
     assert ", without" not in of(make(1.0))
 
 

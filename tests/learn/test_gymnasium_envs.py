@@ -73,7 +73,6 @@ def test_environments_pass_the_checks_of_gymnasium(name: str) -> None:
     from gymnasium.utils.env_checker import check_env
 
     env = registered(f"kiks/{name}-v0", render_mode="rgb_array")
-    assert env.spec is not None
     assert env.spec.max_episode_steps == 600
     check_env(env.unwrapped)
 
@@ -270,7 +269,6 @@ def test_pictures_show_the_robot() -> None:
     assert before.shape == (480, 480, 3)
     assert (env.render() != before).any()
     pictures = begun(vector(2, render_mode="rgb_array")).render()
-    assert pictures is not None
     np.testing.assert_array_equal(pictures[0], before)
 
 

@@ -65,9 +65,7 @@ TASKS = {
 
 
 @pytest.mark.parametrize("name", cases(TASKS, 2))
-def test_a_demonstration_is_the_world_of_the_evaluation(
-    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_demonstration_is_the_world_of_the_evaluation(name: str, tmp_path: Path, monkeypatch: Any) -> None:
     from pyarrow import parquet
 
     task = TASKS[name]()

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import importlib.util
-from itertools import count
+import itertools
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from tests.at_length import share
 
 pytestmark = pytest.mark.slow
 
@@ -30,7 +31,7 @@ def spin(seen: np.ndarray) -> np.ndarray:
 
 
 def shuttle() -> Any:
-    steps = count()
+    steps = itertools.count()
     return lambda seen: np.full((len(seen), 2), 1 if next(steps) // 20 % 2 else -1, np.float32)
 
 
@@ -62,7 +63,7 @@ def seek_the_light(seen: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize(
-    ("name", "good", "return_min", "useless_max"),
+    ("name", "good", "least", "useless_max"),
     [
         ("Avoid", follow_the_wall, 20.0, 2.0),
         ("Follow", follow_the_wall, 200.0, 20.0),
@@ -70,20 +71,20 @@ def seek_the_light(seen: np.ndarray) -> np.ndarray:
         ("Maze", follow_the_wall, 5.0, 2.0),
     ],
 )
-def test_rewards_are_for_those_that_do_what_is_wanted(
-    name: str, good: Any, return_min: float, useless_max: float
-) -> None:
+def test_rewards_are_for_those_that_do_what_is_wanted(name: str, good: Any, least: float, useless_max: float) -> None:
+    count = share(8, 24)
+
     def mean_return(policy: Any) -> float:
-        envs = vector(name, 24, autoreset_mode="SameStep")
+        envs = vector(name, count, autoreset_mode="SameStep")
         seen, _ = envs.reset(seed=1)
-        returns, is_over = np.zeros(24), np.zeros(24, np.bool_)
+        returns, is_over = np.zeros(count), np.zeros(count, np.bool_)
         for _ in range(600):
             seen, rewards, terminations, truncations, _ = envs.step(policy(seen))
             returns += np.where(is_over, 0.0, rewards)
             is_over |= terminations | truncations
         return float(returns.mean())
 
-    assert mean_return(good) > return_min
+    assert mean_return(good) > least
     assert mean_return(stand_still) == pytest.approx(0.0, abs=1e-9)
     for useless in (spin, act_at_random(), shuttle()):
         assert mean_return(useless) < useless_max
@@ -94,8 +95,6 @@ def pgpe() -> Any:
     """Return the example that learns, with short episodes and contacts that cost nothing."""
     path = ROOT / "examples/learning/pgpe.py"
     spec = importlib.util.spec_from_file_location("pgpe", path)
-    assert spec is not None
-    assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     vars(module).update(EPISODE_S=15.0, STARTS_PER_ARENA=1, CONTACT_COST=0.0)
@@ -114,9 +113,7 @@ def test_a_tiny_training_improves_the_reward(pgpe: Any) -> None:
     assert after > 1.0
 
 
-def test_a_poor_attempt_is_followed_by_another(
-    pgpe: Any, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_poor_attempt_is_followed_by_another(pgpe: Any, monkeypatch: pytest.MonkeyPatch, capsys: Any) -> None:
     monkeypatch.setattr(pgpe, "EPISODE_S", 1.0)
     pgpe.learn("Follow", seed=1, generations=2, pairs=2)
     # No policy follows walls after two generations, so each attempt but the last one ends after half of them.

@@ -78,9 +78,7 @@ def assert_equal_outputs(champion: kiks.Champion, layers: list[Layer], spec: Any
         3,
     ),
 )
-def test_outputs_are_those_of_the_network(
-    name: str, hidden: tuple[int, ...], activation: str | None, output: str
-) -> None:
+def test_outputs_are_those_of_the_network(name: str, hidden: tuple[int, ...], activation: Any, output: str) -> None:
     spec = environment_of(name)
     layers = network((spec.controller.sensor_count, *hidden, 2))
     champion = kiks.champion_of_policy(layers, name, activation=activation, output=output)

@@ -199,24 +199,23 @@ def test_pictures_are_of_the_kind_that_their_name_says(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_the_result_of_an_evolution(tmp_path: Path) -> None:
+    short = kiks.Evolution(small(exam=None), "ga", population=8)
+    refused("before there is a champion", results.result_of, short)
+    short.run(generations=1)
+    result = results.result_of(short)
+    assert (result.evaluations, result.fitness, result.exam) == ((8,), short.champion.fitness, None)
     evolution = kiks.Evolution(small(), "ga", population=8, folder=tmp_path)
-    refused("before there is a champion", results.result_of, evolution)
-    evolution.run(generations=1)
-    result = results.result_of(evolution)
-    assert (result.evaluations, result.fitness) == ((8,), evolution.champion.fitness)
     evolution.run(generations=3)
     assert results.load_result(tmp_path) is None
     result = results.result_of(evolution)
     result.save(tmp_path)
     assert results.load_results(tmp_path) == [result]
-    assert evolution.finals is not None
     assert (result.generations, result.evaluations, result.finals) == (3, (24, 40), len(evolution.finals.values))
     assert result.evaluation_count == 40 + result.finals
     assert result.seconds == evolution.finals.seconds > evolution.generations[-1].seconds
     assert result.fitness == evolution.champion.fitness
     assert result.champion_fitness == tuple(each.champion_fitness for each in evolution.generations[1:])
     assert result.solved is None  # no robot gets around in a second
-    assert result.exam is not None
     assert (result.exam.starts, result.exam.imperfect_starts) == (20, 200)
     evolution.run(generations=4)
     assert results.load_result(tmp_path) is None

@@ -94,7 +94,6 @@ def test_later_motion_does_not_count() -> None:
 
 def test_starts_are_apart_and_the_same_for_the_same_seed() -> None:
     poses = small(worlds=2, apart_mm=100.0).start_poses(np.array([5, 6, 5]))
-    assert poses is not None
     assert poses.shape == (6, 2, 3)
     np.testing.assert_array_equal(poses[:2], poses[4:])
     assert (poses[:2] != poses[2:4]).any()
@@ -124,11 +123,7 @@ def test_wrong_tasks_are_errors() -> None:
     refused("must state the number of its parameters", kiks.Side, "prey", kiks.controller(ahead_then.function))
     for changes, shape, message in (
         ({}, (1, 43), r"must have 76 parameters \(54 of the predator and 22 of the prey\), but"),
-        (
-            {"fitness": lambda values: values["path_mm"]},
-            (2, 76),
-            "fitness must return a finite number for each of 2",
-        ),
+        ({"fitness": lambda values: values["path_mm"]}, (2, 76), "fitness must return a finite number for each of 2"),
         ({"apart_mm": 600.0}, (1, 76), "must have room for 2 robots"),
     ):
         refused(message, small(**changes).evaluate, np.zeros(shape), np.zeros(shape[0], np.int64), 1)
@@ -179,7 +174,6 @@ def test_a_resumed_evolution_equals_one_that_never_stopped(tmp_path: Path) -> No
     assert log["evaluations"][-1] == 4 * 2 * 6 * 3
     result_of(whole).save(tmp_path / "whole")
     (result,) = load_results(tmp_path / "whole")
-    assert whole.tournament is not None
     assert (result.fitness, result.baselines) == (whole.tournament.means[0].max(), None)
     assert result.evaluations == (36, 72, 108, 144)
     refused("they have 'ga, 3 opponents' and 'ga, 4 opponents'", evolution_of, tmp_path / "whole", opponents=4)
@@ -212,7 +206,6 @@ def test_wrong_calls_are_errors() -> None:
 def test_the_tournament_equals_a_loop_over_all_pairs() -> None:
     evolution = run()
     tournament = evolution.tournament
-    assert tournament is not None
     assert [each.generation for each in evolution.champions] == [*tournament.best]
     square = latin_square(4, seed_for(3, SQUARE))
     for first in range(4):

@@ -37,7 +37,6 @@ def test_keys_left_out_keep_the_values_of_the_ready_made_task(folder: Path) -> N
 def test_the_second_side_has_a_controller_of_its_own(folder: Path) -> None:
     task = load(folder, 'base = "pursuit"\n[against]\nkind = "gru"\nunits = 2\n')
     base = kiks.tasks.pursuit()
-    assert task.against is not None
     assert task.against.controller is kiks.controllers.gru(units=2)
     assert task.controller is base.controller
     words = "against must be left out, because 'avoid' has one side"
@@ -55,7 +54,6 @@ def test_all_keys(folder: Path) -> None:
     )
     assert (task.name, task.seconds, task.worlds, task.starts) == ("in a room", 2.0, 4, "arena")
     assert [arena.width_mm for arena in task.arenas] == [400, 500]
-    assert task.exam is not None
     assert [arena.width_mm for arena in task.exam.arenas] == [500]
     assert task.robot == str((folder / "my.toml").resolve())
     assert task.timing == kiks.Timing(0.05, 38400, 0.0025)
