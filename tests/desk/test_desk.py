@@ -72,14 +72,12 @@ def test_run_pause_and_step(visitor: Visitor) -> None:
 
 def test_checkpoint_and_reset(visitor: Visitor) -> None:
     visitor.drag((150, 200), (250, 250))
-    visitor.at("mark").click()
-    visitor.told("Checkpoint taken.")
+    visitor.click("mark", told="Checkpoint taken.")
     there = visitor.sim.pose(1)
     visitor.drag(there[:2], (120, 120))
     assert visitor.sim.pose(1) != there
     now_ns = visitor.sim.now_ns
-    visitor.at("reset").click()
-    visitor.told("Everything is back where it stood.")
+    visitor.click("reset", told="Everything is back where it stood.")
     assert visitor.sim.pose(1) == pytest.approx(there)
     assert visitor.sim.now_ns >= now_ns
     visitor.picture("reset")

@@ -17,18 +17,6 @@ from kiks.sim.simulation import Simulation
 pytestmark = pytest.mark.slow
 
 
-# ---- Robot ----
-
-
-@at_length
-def test_click_on_a_sensor_in_the_arena_explains_its_reading(visitor: Visitor) -> None:
-    x_mm, y_mm, heading_rad = visitor.sim.pose(1)
-    visitor.page.mouse.click(*visitor.on_page(x_mm, y_mm))
-    angle = heading_rad + math.radians(66.4)
-    visitor.page.mouse.click(*visitor.on_page(x_mm + 24 * math.cos(angle), y_mm + 24 * math.sin(angle)))
-    expect(visitor.at("explanation")).to_contain_text("Sensor 0 (left 90) of robot 1")
-
-
 # ---- Wire ----
 
 
@@ -128,8 +116,7 @@ def test_halt_stops_programs_and_robots(visitor: Visitor) -> None:
     expect(visitor.page.locator(".cm-content")).to_contain_text("Braitenberg")
     visitor.at("run-program").click()
     visitor.until(lambda: visitor.setpoints() != [0, 0] and visitor.setpoints(2) == [4, 4])
-    visitor.at("halt").click()
-    visitor.told("All programs and all robots are stopped.")
+    visitor.click("halt", told="All programs and all robots are stopped.")
     expect(visitor.at("programs")).to_contain_text("avoid.py on robot 1: stopped")
     visitor.until(lambda: visitor.setpoints() == visitor.setpoints(2) == [0, 0])
 
@@ -138,6 +125,12 @@ def test_halt_stops_programs_and_robots(visitor: Visitor) -> None:
 def test_places_and_sensors_in_the_coordinates_of_kiks_2(visitor: Visitor) -> None:
     """From the upper left corner of 600 x 400 mm; x and y count from 1 in the middle of the first millimetre."""
     expect(visitor.at("facts")).to_contain_text("x 150.0, y 200.0 mm")
+    # A click on a sensor in the arena explains its reading.
+    x_mm, y_mm, heading_rad = visitor.sim.pose(1)
+    visitor.page.mouse.click(*visitor.on_page(x_mm, y_mm))
+    angle = heading_rad + math.radians(66.4)
+    visitor.page.mouse.click(*visitor.on_page(x_mm + 24 * math.cos(angle), y_mm + 24 * math.sin(angle)))
+    expect(visitor.at("explanation")).to_contain_text("Sensor 0 (left 90) of robot 1")
     visitor.tab("settings")
     visitor.at("old-coordinates").click()
     visitor.tab("robot")
@@ -169,11 +162,9 @@ def test_applying_settings_restarts_the_world(visitor: Visitor) -> None:
     visitor.at("seed").fill("42")
     visitor.choose("model", "fast: a table of those networks")
     visitor.choose("baud", "38400")
-    visitor.at("noise").click()
-    visitor.at("add-robot").click()
+    visitor.click("noise", "add-robot")
     visitor.picture("settings")
-    visitor.at("apply").click()
-    visitor.told("Restarted with these settings.")
+    visitor.click("apply", told="Restarted with these settings.")
     assert visitor.sim is not old
     project = visitor.desk.project
     assert (project.seed, project.response, project.baud, project.noise) == (42, "fast", 38400, False)
@@ -181,15 +172,13 @@ def test_applying_settings_restarts_the_world(visitor: Visitor) -> None:
     assert visitor.sim.robot_count == 3
     assert visitor.sim.pose(1)[:2] == pytest.approx((250, 250), abs=1)
     visitor.page.wait_for_function("() => kiksDesk.scene().robots.length === 3 && kiksDesk.pose(2)")
-    visitor.at("start-over").click()
-    visitor.told("Started over.")
+    visitor.click("start-over", told="Started over.")
     assert visitor.sim.robot_count == 3
     expect(visitor.at("seed")).to_have_value("42")
     visitor.picture("another_world")
     old = visitor.sim
     visitor.at("seed").fill("1.5")
-    visitor.at("apply").click()
-    visitor.told("seed must be a whole number, but it was 1.5.")
+    visitor.click("apply", told="seed must be a whole number, but it was 1.5.")
     visitor.picture("wrong_setting")
     assert visitor.sim is old
 
@@ -202,8 +191,7 @@ def test_all_robots_may_be_removed(visitor: Visitor) -> None:
     for left in (1, 0):
         buttons.first.click()
         expect(buttons).to_have_count(left)
-    visitor.at("apply").click()
-    visitor.told("Restarted with these settings.")
+    visitor.click("apply", told="Restarted with these settings.")
     assert visitor.sim is not old
     assert visitor.sim.robot_count == 0
     visitor.page.wait_for_function("() => kiksDesk.scene().robots.length === 0")
@@ -212,6 +200,5 @@ def test_all_robots_may_be_removed(visitor: Visitor) -> None:
         expect(visitor.at(f"tab-{tab}")).to_have_attribute("aria-selected", "true")
     visitor.picture("no_robot")
     visitor.tab("settings")
-    visitor.at("add-robot").click()
-    visitor.at("apply").click()
+    visitor.click("add-robot", "apply")
     visitor.page.wait_for_function("() => kiksDesk.scene().robots.length === 1 && kiksDesk.pose(0)")

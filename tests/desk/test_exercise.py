@@ -96,8 +96,7 @@ def test_exercise_is_read_solved_tried_and_handed_in(visitor: Visitor, tmp_path:
     assert (tmp_path / "to_the_lamp.py").read_text() == DRIVE
     assert visitor.desk.is_paused
 
-    visitor.at("tab-exercise").click()
-    visitor.at("try-all").click()
+    visitor.click("tab-exercise", "try-all")
     expect(visitor.at("tries-state")).to_have_text("2 of 2 solved, 10 points.")
     check_access(visitor.page, "exercise")
     visitor.picture("exercise-tried")
@@ -116,8 +115,7 @@ def test_exercise_is_read_solved_tried_and_handed_in(visitor: Visitor, tmp_path:
         assert archive.read(PAGE).startswith(b"<!DOCTYPE html>")
     given: list[tuple[str, bytes]] = []
     visitor.desk.hand_in = lambda data, name: given.append((name, data))
-    visitor.at("hand-in").click()
-    visitor.told("Handed in: 2 of 2 solved")
+    visitor.click("hand-in", told="Handed in: 2 of 2 solved")
     assert given == [("to_the_lamp.zip", file)]
     visitor.desk.may_hand_in = False
     expect(visitor.at("hand-in")).to_be_disabled()
@@ -128,8 +126,7 @@ def test_exercise_is_read_solved_tried_and_handed_in(visitor: Visitor, tmp_path:
     visitor.page.mouse.up()
     visitor.tab("settings")
     expect(visitor.at("locked").locator("visible=true")).to_have_count(1)
-    visitor.at("apply").click()
-    visitor.told("it is locked")
+    visitor.click("apply", told="it is locked")
     assert visitor.sim.pose(1) == lies
 
 
@@ -150,19 +147,15 @@ def test_lecturer_saves_a_world_as_an_exercise_and_opens_it(visitor: Visitor, tm
     visitor.choose("dark", "Dark")
     visitor.tab("arena")
     visitor.at("save-exercise").click()
-    visitor.at("exercise-title").fill("Find it")
-    visitor.at("exercise-text").fill(TEXT)
+    visitor.fill({"exercise-title": "Find it", "exercise-text": TEXT})
     for typed, wrong in (("ligt_mm < 80", "Did you mean 'light_mm'?"), ("light_mm <", "must be a formula")):
         visitor.at("goal-solved").fill(typed)
         expect(visitor.page.get_by_text(wrong)).to_be_visible()
     check_access(visitor.page, "a wrong formula")
-    visitor.at("dialog-yes").click()
-    visitor.told("solved must be a formula")
+    visitor.click("dialog-yes", told="solved must be a formula")
     visitor.at("goal-solved").fill("light_mm < 80")
     expect(visitor.page.get_by_text("must be a formula")).to_have_count(0)
-    visitor.at("limit").fill("30")
-    visitor.at("case-0-seed").fill("1..20")
-    visitor.at("case-0-start").fill("100, 100; 100, 300, 90")
+    visitor.fill({"limit": "30", "case-0-seed": "1..20", "case-0-start": "100, 100; 100, 300, 90"})
     visitor.at("add-case").click()
     visitor.at("case-1-family").fill("1, 2")
     visitor.at("case-1-is_hidden").click()
@@ -175,8 +168,7 @@ def test_lecturer_saves_a_world_as_an_exercise_and_opens_it(visitor: Visitor, tm
     visitor.picture("save-as-exercise-390")
     visitor.page.set_viewport_size({"width": 1366, "height": 768})
     visitor.at("exercise-name").fill("find")
-    visitor.at("dialog-yes").click()
-    visitor.told("Saved as find.kiks and find-students.kiks.")
+    visitor.click("dialog-yes", told="Saved as find.kiks and find-students.kiks.")
 
     made = Project.load(tmp_path / "find.kiks")
     assert made.goal is not None
@@ -190,8 +182,7 @@ def test_lecturer_saves_a_world_as_an_exercise_and_opens_it(visitor: Visitor, tm
     visitor.at("open").click()
     expect(visitor.page.get_by_role("heading", name="Find it")).to_be_visible()
     visitor.tab("arena")
-    visitor.at("save-exercise").click()
-    visitor.told("it is locked")
+    visitor.click("save-exercise", told="it is locked")
 
     # An exercise in a folder has its text beside it, and so have the programs of other robots.
     folder = tmp_path / "third"

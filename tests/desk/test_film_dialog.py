@@ -60,8 +60,7 @@ def test_a_part_of_the_run_is_filmed_and_downloaded(recorded: Visitor, tmp_path:
     assert end_s == pytest.approx(visitor.sim.time_s, abs=0.01)
     assert start_s == pytest.approx(end_s - 10.0, abs=0.01)
     assert start_s > begin_s
-    visitor.at("film-end").fill(f"{start_s + 1:g}")
-    visitor.at("film-speed").fill("2")
+    visitor.fill({"film-end": f"{start_s + 1:g}", "film-speed": "2"})
     visitor.choose("film-follow", "robot 2, in the middle")
     visitor.picture("film_dialog")
     assert make(visitor, tmp_path / "film.mp4") == "kiks-film.mp4"
@@ -70,9 +69,9 @@ def test_a_part_of_the_run_is_filmed_and_downloaded(recorded: Visitor, tmp_path:
 
 
 @at_length
-def test_mistakes_are_told(recorded: Visitor) -> None:
+def test_mistakes_are_told_and_a_closed_dialog_gives_the_film_up(recorded: Visitor) -> None:
     visitor = recorded
-    open_dialog(visitor, 2)
+    open_dialog(visitor, 6)
     end_s = visitor.at("film-end").input_value()
     for name, value, words in (
         ("end", "0", "a film must end after it begins"),
@@ -83,30 +82,21 @@ def test_mistakes_are_told(recorded: Visitor) -> None:
     ):
         before = visitor.at(f"film-{name}").input_value()
         visitor.at(f"film-{name}").fill(value)
-        visitor.at("film-make").click()
-        visitor.told(words)
+        visitor.click("film-make", told=words)
         visitor.at(f"film-{name}").fill(before)
     assert visitor.at("film-end").input_value() == end_s
-
-
-@at_length
-def test_a_closed_dialog_gives_the_film_up(recorded: Visitor) -> None:
-    visitor = recorded
-    open_dialog(visitor, 6)
-    visitor.at("film-start").fill(f"{span(visitor)[1] - 5:g}")
-    visitor.at("film-speed").fill("0.02")
+    # A closed dialog gives the film up.
+    visitor.fill({"film-start": f"{span(visitor)[1] - 5:g}", "film-speed": "0.02"})
     visitor.at("film-make").click()
     expect(visitor.at("film-make")).to_be_disabled()
-    visitor.at("film-close").click()
-    visitor.told("The dialog was closed; the film was discarded.")
+    visitor.click("film-close", told="The dialog was closed; the film was discarded.")
 
 
 @at_length
 def test_the_past_is_filmed_without_a_recording_of_ones_own(visitor: Visitor, tmp_path: Path) -> None:
     visitor.pause()
     open_dialog(visitor, 5)
-    visitor.at("film-close").click()
-    visitor.at("back-long").click()
+    visitor.click("film-close", "back-long")
     visitor.until(lambda: visitor.desk.past is not None)
     begin_s, now_s = visitor.desk.looking.span.begin_ns / 1e9, visitor.desk.present.sim.time_s
     visitor.at("film").click()

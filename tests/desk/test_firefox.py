@@ -16,14 +16,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.at_length import AT_LENGTH
+from tests.at_length import AT_LENGTH, at_length
 from tests.desk.visitor import SCREENSHOTS, Shown
 from tests.guard import GUARD_S, wait_until
 
 from kiks import Arena, Khepera, Recording, Simulation
 from kiks.export.page import save_page
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, at_length]
 
 FIREFOX = shutil.which("firefox-esr") or shutil.which("firefox")
 

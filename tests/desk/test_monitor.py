@@ -97,8 +97,7 @@ def test_a_click_or_a_key_explains_a_reading(visitor: Visitor) -> None:
     visitor.page.keyboard.press("Escape")
     expect(answer).to_be_hidden()
     # It follows the robot if it is told to keep looking.
-    visitor.at("proximity-1").click()
-    visitor.at("keep-looking").click()
+    visitor.click("proximity-1", "keep-looking")
     text = visitor.at("explanation-text")
     before = text.inner_text()
     x_mm, y_mm, _ = visitor.sim.pose(1)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from pathlib import Path
 
 import pytest
 from tests.at_length import at_length
 from tests.desk.visitor import NewPage, Visitor, check_access, expect, open_desk
-
-from kiks.model.project import Project
 
 pytestmark = pytest.mark.slow
 
@@ -68,10 +67,7 @@ def test_a_program_that_ran_is_saved_with_the_project_and_shown_when_that_is_ope
     visitor.at("run-program").click()
     expect(visitor.at("attached")).to_contain_text("exercise1.py starts with this world on robot 1.")
     visitor.tab("arena")
-    visitor.at("save-name").fill("lesson")
-    visitor.at("save").click()
-    visitor.told("Saved as lesson.kiks")
-    saved = Project.load(visitor.desk.folder / "lesson.kiks")
+    saved = visitor.save_as("lesson")
     robot = saved.robots[0]
     assert (saved.arena.name, robot.program, robot.arguments) == ("lesson", "exercise1.py", ("--fast", "a b"))
     visitor.tab("programs")
@@ -80,8 +76,7 @@ def test_a_program_that_ran_is_saved_with_the_project_and_shown_when_that_is_ope
     visitor.at("new-program").click()
     visitor.tab("arena")
     visitor.choose("open-name", "lesson.kiks")
-    visitor.at("open").click()
-    visitor.told("Opened lesson")
+    visitor.click("open", told="Opened lesson")
     visitor.tab("programs")
     expect(visitor.at("editor")).to_contain_text("begun")
     expect(visitor.at("name")).to_have_value("exercise1.py")
@@ -112,7 +107,7 @@ def test_mistake_is_marked_as_it_is_typed_and_before_anything_runs(visitor: Visi
 
 
 @at_length
-def test_console_has_history_suggestions_and_replies(visitor: Visitor) -> None:
+def test_console_has_history_and_suggestions_and_the_wire_is_filtered_held_and_cleared(visitor: Visitor) -> None:
     visitor.pause()
     visitor.tab("wire")
     console = visitor.at("console")
@@ -133,16 +128,11 @@ def test_console_has_history_suggestions_and_replies(visitor: Visitor) -> None:
     for key, text in (("ArrowUp", "D,0,0"), ("ArrowUp", "D,3,4"), ("ArrowDown", "D,0,0")):
         console.press(key)
         expect(console).to_have_value(text)
-
-
-@at_length
-def test_wire_is_filtered_held_and_cleared(visitor: Visitor) -> None:
-    visitor.tab("wire")
-    console, wire = visitor.at("console"), visitor.at("wire")
+    # The list of what goes over the line.
+    wire = visitor.at("wire")
 
     def send(text: str) -> None:
-        console.fill(text)
-        console.press("Enter")
+        visitor.send(text)
         expect(console).to_have_value("")
 
     send("E")
@@ -161,14 +151,10 @@ def test_wire_is_filtered_held_and_cleared(visitor: Visitor) -> None:
     expect(wire).to_contain_text("→ B\\n")
     visitor.at("wire-clear").click()
     expect(wire).to_have_text("")
-
-
-@at_length
-def test_line_is_watched_only_while_the_panel_is_visible(visitor: Visitor) -> None:
-    for tab, is_watched in (("wire", True), ("arena", False)):
-        visitor.tab(tab)
-        visitor.until(lambda watched=is_watched: (visitor.sim.wires[0].log is not None) == watched)
-        assert visitor.sim.wires[1].log is None
+    # The line is watched only while the panel is visible.
+    assert [wire.log is not None for wire in visitor.sim.wires] == [True, False]
+    visitor.tab("arena")
+    visitor.until(lambda: not any(wire.log is not None for wire in visitor.sim.wires))
 
 
 @pytest.mark.parametrize(
@@ -178,12 +164,10 @@ def test_line_is_watched_only_while_the_panel_is_visible(visitor: Visitor) -> No
 def test_a_page_that_may_not_start_programs_tells_why(
     owns_world: bool, reason: str, other: str, new_page: NewPage, tmp_path: Path
 ) -> None:
-    shown = open_desk(tmp_path, may_run_programs=False, owns_world=owns_world)
-    visitor = Visitor(new_page(), shown)
-    visitor.at("tab-programs").click()
-    expect(visitor.at("may-not")).to_contain_text(reason)
-    if other:
-        expect(visitor.at("programs")).not_to_contain_text(other)
-    assert visitor.at("run-program").count() == 0
-    visitor.page.close()
-    shown.close()
+    with closing(open_desk(tmp_path, may_run_programs=False, owns_world=owns_world)) as shown:
+        visitor = Visitor(new_page(), shown)
+        visitor.at("tab-programs").click()
+        expect(visitor.at("may-not")).to_contain_text(reason)
+        if other:
+            expect(visitor.at("programs")).not_to_contain_text(other)
+        assert visitor.at("run-program").count() == 0

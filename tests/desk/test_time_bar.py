@@ -100,8 +100,7 @@ def test_a_recording_is_played_stepped_and_jumped_through(replay: Visitor) -> No
         visitor.at("event-before").click()
         at_time(visitor, time_s)
     expect(visitor.at("board")).to_be_hidden()  # there was no score yet
-    visitor.at("event-before").click()
-    visitor.told("Nothing happened before this.")
+    visitor.click("event-before", told="Nothing happened before this.")
     page.keyboard.press("o")
     at_time(visitor, times[1])
     expect(visitor.at("bar-event")).to_contain_text(marks[1].text)
@@ -140,8 +139,7 @@ def test_a_person_goes_on_from_a_recording(replay: Visitor) -> None:
     expect(visitor.at("dialog-text")).to_contain_text("have hung up")
     visitor.picture("go_on_from_a_recording")
     scene = visitor.answer("kiksDesk.scene().scene")
-    visitor.at("dialog-yes").click()
-    visitor.told("The world is yours.")
+    visitor.click("dialog-yes", told="The world is yours.")
     expect(visitor.page.locator(".q-dialog__backdrop")).to_have_count(0)
     expect(visitor.at("bar-state")).to_have_text("Now")
     assert visitor.sim.time_s == time_s

@@ -10,7 +10,6 @@ from urllib.parse import urlsplit
 import pytest
 from tests.at_length import at_length
 from tests.desk.visitor import FIRST_PICTURE, Browser, NewPage, Shown, Visitor, expect, leave_picture
-from tests.guard import GUARD_S
 
 pytestmark = pytest.mark.slow
 
@@ -27,15 +26,15 @@ def test_the_token_moves_from_the_address_to_a_cookie(visitor: Visitor, shown: S
     visitor.picture("with_the_token")
 
 
-def test_other_servers_of_this_computer_never_get_the_token(visitor: Visitor, notebook: Notebook) -> None:
-    host = f"http://127.0.0.1:{notebook.server_port}"
+def test_other_servers_of_this_computer_never_get_the_token(visitor: Visitor, notebook: tuple[int, list[str]]) -> None:
+    port, cookies = notebook
     # A page of the same browser, which may ask for an icon when that server has gone.
     page = visitor.page.context.new_page()
     for path in ("/desk/1", "/desk/1/feed", "/_nicegui_ws/socket.io/", ""):
-        page.goto(f"{host}{path}")
+        page.goto(f"http://127.0.0.1:{port}{path}")
     page.close()
-    assert len(notebook.cookies) >= 4
-    assert not any(notebook.cookies)
+    assert len(cookies) >= 4
+    assert not any(cookies)
 
 
 def test_a_ticket_opens_the_desk_once(new_page: NewPage, browser: Browser, shown: Shown) -> None:
@@ -53,26 +52,14 @@ def test_a_ticket_opens_the_desk_once(new_page: NewPage, browser: Browser, shown
     other.close()
 
 
-class Notebook(ThreadingHTTPServer):
-    """A server of pages that show the desk within theirs, as a notebook does.
-
-    Attributes:
-        cookies: The cookies that came with each request.
-    """
-
-    def __init__(self, answer: type[BaseHTTPRequestHandler]) -> None:
-        self.cookies: list[str] = []
-        super().__init__(("127.0.0.1", 0), answer)
-
-
 @pytest.fixture
-def notebook(shown: Shown) -> Iterator[Notebook]:
+def notebook(shown: Shown) -> Iterator[tuple[int, list[str]]]:
+    """The port of a server whose pages show the desk within theirs, and the cookies that come with each request."""
+    cookies: list[str] = []
 
     class Answer(BaseHTTPRequestHandler):
-        server: Notebook
-
         def do_GET(self) -> None:
-            self.server.cookies.append(self.headers.get("cookie", ""))
+            cookies.append(self.headers.get("cookie", ""))
             body = shown._repr_html_().encode() if self.path == "/" else b""
             self.send_response(200)
             self.send_header("content-type", "text/html")
@@ -82,21 +69,19 @@ def notebook(shown: Shown) -> Iterator[Notebook]:
         def log_message(self, *_words: object) -> None:
             pass
 
-    server = Notebook(Answer)
-    threading.Thread(target=server.serve_forever, daemon=True).start()
-    yield server
-    server.shutdown()
-    server.server_close()
+    with ThreadingHTTPServer(("127.0.0.1", 0), Answer) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        yield server.server_port, cookies
+        server.shutdown()
 
 
 @at_length
 @pytest.mark.parametrize("host", ["localhost", "127.0.0.1"])
-def test_a_notebook_shows_the_desk(browser: Browser, shown: Shown, notebook: Notebook, host: str) -> None:
-    page = browser.new_page()
-    page.set_default_timeout(1000 * GUARD_S)
-    faults: list[str] = []
-    page.on("pageerror", lambda error: faults.append(str(error)))
-    page.goto(f"http://{host}:{notebook.server_port}/")
+def test_a_notebook_shows_the_desk(
+    browser: Browser, new_page: NewPage, shown: Shown, notebook: tuple[int, list[str]], host: str
+) -> None:
+    page = new_page(by=browser)
+    page.goto(f"http://{host}:{notebook[0]}/")
     frame = next(each for each in page.frames if each.parent_frame is not None)
     frame.wait_for_function(FIRST_PICTURE)
     assert urlsplit(frame.url).query == ""
@@ -104,6 +89,4 @@ def test_a_notebook_shows_the_desk(browser: Browser, shown: Shown, notebook: Not
     frame.get_by_test_id("run").click()
     expect(frame.get_by_test_id("run")).to_have_text("play_arrow")
     assert shown.desk.gate.is_paused
-    assert not faults
     leave_picture(page, f"notebook_{host}")
-    page.close()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -26,17 +27,16 @@ def test_games_are_shown_one_after_the_other_with_the_table_between(tmp_path: Pa
     hall = Hall("race", tuple(each.name for each in in_order(players)), out, clock=lambda: now_s[0])
     play(match, players, out, is_trusted=True, on_played=hall.note)
     hall.end()
-    shown = open_desk(tmp_path, match.project)
-    try:
+    with closing(open_desk(tmp_path, match.project)) as shown:
         shown.desk.hall = hall
-        visitor = Visitor(new_page(viewport={"width": 1366, "height": 768}), shown)
+        visitor = Visitor(new_page(1366, 768), shown)
         page = visitor.page
-        board = page.get_by_test_id("board-hall")
+        board = visitor.at("board-hall")
         expect(board).to_have_text("Game 1 of 2")
-        expect(page.get_by_test_id("board-match")).to_be_visible()
-        page.get_by_test_id("hall").click()
-        expect(page.get_by_test_id("board-clock")).to_contain_text("of 0:02")
-        table = page.get_by_test_id("board-table")
+        expect(visitor.at("board-match")).to_be_visible()
+        visitor.at("hall").click()
+        expect(visitor.at("board-clock")).to_contain_text("of 0:02")
+        table = visitor.at("board-table")
         expect(table).to_contain_text("bob")
         expect(board).to_contain_text("Next: bob – ann")
         check_access(page, "the table between games")
@@ -51,5 +51,3 @@ def test_games_are_shown_one_after_the_other_with_the_table_between(tmp_path: Pa
         expect(board).to_contain_text("The end")
         expect(table.locator("tbody tr").first).to_contain_text("bob")
         expect(table.locator("tbody tr").first).to_contain_text("100%")
-    finally:
-        shown.close()

@@ -168,6 +168,24 @@ class Visitor:
     def at(self, name: str) -> Locator:
         return self.page.get_by_test_id(name)
 
+    def click(self, *names: str, told: str = "") -> None:
+        """Click one thing after the other, and wait for a message if that is given."""
+        for name in names:
+            self.at(name).click()
+        if told:
+            self.told(told)
+
+    def fill(self, texts: dict[str, str]) -> None:
+        for name, text in texts.items():
+            self.at(name).fill(text)
+
+    def save_as(self, name: str) -> Project:
+        """Save the world from the tab of the arena, and return what is in the file."""
+        self.at("save-name").fill(name)
+        self.at("save").click()
+        self.told(f"Saved as {name}.kiks")
+        return Project.load(self.desk.folder / f"{name}.kiks")
+
     def until(self, fact: Callable[[], Fact]) -> Fact:
         for _ in range(PICTURES_MAX):
             if found := fact():

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.at_length import at_length, share
-from tests.desk.visitor import COLOURS, Browser, NewPage, Page, check_access, check_reach
+from tests.desk.visitor import COLOURS, Browser, NewPage, Page, check_access, check_reach, leave_picture
 
 from kiks import Arena, Khepera, ParameterError, Recording, Simulation
 from kiks.export import page_contents as contents
@@ -409,7 +409,9 @@ def test_a_page_shows_changes_robots_and_events(rich: Path, rich_page: Path, vis
 
 
 @at_length
-def test_a_narrow_page_and_one_without_time_fit(tmp_path: Path, rich_page: Path, visit: Callable[..., Page]) -> None:
+def test_pages_that_are_narrow_or_without_time_or_robots_fit(
+    tmp_path: Path, rich_page: Path, lonely: Path, visit: Callable[..., Page]
+) -> None:
     sim = Simulation(Arena.box(300, 300), seed=1)
     with sim.record(tmp_path / "none.mcap"):
         pass
@@ -422,12 +424,6 @@ def test_a_narrow_page_and_one_without_time_fit(tmp_path: Path, rich_page: Path,
             "() => document.getElementById('facts').textContent.includes(kiksPage.feed.frame.robot(0).x_mm.toFixed(1))"
             " && kiksPage.player._shown_s === kiksPage.feed.end_s"
         )
-
-
-@at_length
-def test_the_player_shows_a_world_without_a_robot(lonely: Path, visit: Callable[..., Page]) -> None:
-    from tests.desk.visitor import leave_picture
-
     page = visit(page_of(lonely, lonely.parent))
     assert "There was no robot in this run." in page.locator("#monitor").inner_text()
     assert not page.locator("#robot").is_visible()
