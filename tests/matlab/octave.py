@@ -93,21 +93,12 @@ class Octave:
         self.doors.mkdir(exist_ok=True)
         file = folder / f"program_{len(list(folder.glob('program_*')))}.m"
         file.write_text(_BEGIN + program, encoding="utf-8")
-        hidden = ("DISPLAY", "WAYLAND_DISPLAY", "KIKS_COMMAND", "KIKS_TRANSPORT")
-        own = {name: value for name, value in os.environ.items() if name not in hidden}
-        own |= {"KIKS_COMMAND": " ".join(kiks_command()), "KIKS_WINDOW": "0", "XDG_RUNTIME_DIR": str(self.doors)}
-        self._process = subprocess.Popen(
-            [OCTAVE, "--no-gui", "-qf", file.name],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            cwd=folder,
-            env=own | dict(environment or {}),
-            text=True,
-            # So that all of it can be killed at once.
-            start_new_session=True,
-            errors="replace",
-        )
+        own = {"KIKS_COMMAND": " ".join(kiks_command()), "KIKS_WINDOW": "0", "XDG_RUNTIME_DIR": str(self.doors)}
+        options: dict[str, Any] = {"cwd": folder, "env": {**os.environ, **own, **(environment or {})}}
+        options |= {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
+        # In a process group of its own, so that all of it can be killed at once.
+        options |= {"text": True, "errors": "replace", "start_new_session": True}
+        self._process = subprocess.Popen([OCTAVE, "--no-gui", "-qf", file.name], **options)
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
 
