@@ -41,9 +41,8 @@ def test_frames_contain_their_length(text: str) -> None:
 
 
 def test_malformed_matrices_are_refused() -> None:
-    malformed = ["", "2", "2 2", "2 2 1 0", "1 1 2 0", "2 2 5 0", "2 2 0 1 4 1", "-1 2 1 1", "2 2 4 x", "99999 99999 1 1"]
-    for words in malformed:
-:
+    short = ["", "2", "2 2", "2 2 1 0", "1 1 2 0", "2 2 5 0", "2 2 4 x"]
+    for words in (*short, "2 2 0 1 4 1", "-1 2 1 1", "99999 99999 1 1"):
         with pytest.raises(ParameterError, match="a matrix must be"):
             matrices_of(words)
 
@@ -141,15 +140,19 @@ def test_an_unknown_element_and_a_mask_of_another_size_are_refused() -> None:
 
 INVALID = {
     "seed": ("x", "1.5", "9" * 400, "1e400", "-1"),
-
-        "noise": ("2", "yes"),
-        "ball": ("0",),
-        "wall": ("256",),
-        "brightness": ("wood",),
-        "latency_s": ("-1", "nan", "11")
-    ,
-    "robots": ("1001",), "programs": ("0",), "turrets": ("k213 griper", "k213 " * 1000), "response": ("thesi",),
-    "thinking": ("liv",), "sed": ("1",), "x" * 1000: ("1",), "robot": ("x" * 1001, "a\0b"),
+    "noise": ("2", "yes"),
+    "ball": ("0",),
+    "wall": ("256",),
+    "brightness": ("wood",),
+    "latency_s": ("-1", "nan", "11"),
+    "robots": ("1001",),
+    "programs": ("0",),
+    "turrets": ("k213 griper", "k213 " * 1000),
+    "response": ("thesi",),
+    "thinking": ("liv",),
+    "sed": ("1",),
+    "x" * 1000: ("1",),
+    "robot": ("x" * 1001, "a\0b"),
 }
 
 
