@@ -121,8 +121,8 @@ def test_what_has_no_room_goes_to_the_nearest_free_place() -> None:
 
 
 def test_a_disc_drawn_of_balls_stays_an_error() -> None:
-    codes = np.zeros((200, MOVED_MAX + 200))
-    codes[99, 99 : 99 + MOVED_MAX + 2] = 3
+    codes = np.zeros((900, 900))
+    codes[449, 449 : 449 + MOVED_MAX + 2] = 3
     arena = arena_of(codes)
     assert settled(arena, 27.5) == (arena, [])
     with pytest.raises(ArenaError, match=r"the place of a ball must be free.* ball 1 is "):
