@@ -41,6 +41,9 @@ size_mm = [400, 400]
 """
 
 
+SWEEP = "sweep brake.py --arena wall.kiks --seeds 1"
+
+
 @pytest.fixture(autouse=True)
 def _files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
@@ -49,20 +52,7 @@ def _files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_sweep_says_up_to_where_a_program_holds_and_goes_on() -> None:
-    words = [
-        "sweep",
-        "brake.py",
-        "--arena",
-        "wall.kiks",
-        "--baud",
-        "1200,9600",
-        "--think",
-        "0,100,600",
-        "--family",
-        "2",
-        "--seeds",
-        "1",
-    ]
+    words = f"{SWEEP} --baud 1200,9600 --think 0,100,600 --family 2".split()
     result = forked.run(*words, "--json", "--picture", "brake.svg")
     assert result.returncode == 0, result.stderr
     found = json.loads(result.stdout)
@@ -83,7 +73,7 @@ def test_a_sweep_says_up_to_where_a_program_holds_and_goes_on() -> None:
 
 
 def test_formulas_and_limits_of_the_command_line_replace_those_of_the_project() -> None:
-    words = ["sweep", "brake.py", "--arena", "wall.kiks", "--think", "0", "--family", "0", "--seeds", "1", "--json"]
+    words = f"{SWEEP} --think 0 --family 0 --json".split()
     result = forked.run(*words, "--solved", "path_mm > 50", "--seconds", "3", "--out", "out")
     found = json.loads(result.stdout)
     assert found["goal"] == {"text": "", "solved": "path_mm > 50", "failed": "False", "points": "is_solved"}
