@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from kiks.engine.physics import motor
 from kiks.model.arena import Arena
@@ -30,27 +29,20 @@ REDRAWN_EVERY = 37
 """Ticks between two changes of what the robots are told."""
 
 
-@njit(error_model="numpy")  # type: ignore[untyped-decorator, unused-ignore]
-def worst_overlap_mm(discs: Any) -> float:
+def worst_overlap_mm(discs: np.ndarray) -> float:
     """Return how deep the two are in each other that are deepest [mm]; discs are x, y and radius, shape [disc, 3]."""
-    worst = -math.inf
-    for i in range(discs.shape[0]):
-        for j in range(i):
-            apart = math.hypot(discs[i, 0] - discs[j, 0], discs[i, 1] - discs[j, 1])
-            worst = max(worst, discs[i, 2] + discs[j, 2] - apart)
-    return worst
+    i, j = np.triu_indices(len(discs), 1)
+    apart = np.hypot(discs[i, 0] - discs[j, 0], discs[i, 1] - discs[j, 1])
+    return float((discs[i, 2] + discs[j, 2] - apart).max())
 
 
-@njit(error_model="numpy")  # type: ignore[untyped-decorator, unused-ignore]
-def worst_depth_mm(discs: Any, walls: Any) -> float:
+def worst_depth_mm(discs: np.ndarray, walls: np.ndarray) -> float:
     """Return how deep the disc is in a wall that is deepest [mm]; walls are rectangles, shape [wall, 4]."""
-    worst = -math.inf
-    for i in range(discs.shape[0]):
-        for k in range(walls.shape[0]):
-            dx = max(walls[k, 0] - discs[i, 0], 0.0, discs[i, 0] - walls[k, 2])
-            dy = max(walls[k, 1] - discs[i, 1], 0.0, discs[i, 1] - walls[k, 3])
-            worst = max(worst, discs[i, 2] - math.hypot(dx, dy))
-    return worst
+    x, y, radius = discs.T[:, :, np.newaxis]
+    left, bottom, right, top = walls.T
+    dx = np.maximum(np.maximum(left - x, x - right), 0.0)
+    dy = np.maximum(np.maximum(bottom - y, y - top), 0.0)
+    return float((radius - np.hypot(dx, dy)).max())
 
 
 def boxed_arena(rng: np.random.Generator) -> tuple[Arena, np.ndarray]:
@@ -58,8 +50,8 @@ def boxed_arena(rng: np.random.Generator) -> tuple[Arena, np.ndarray]:
     mm_per_pixel = float(rng.choice([0.5, 1.0, 2.5]))
     count = int(SIZE_MM / mm_per_pixel)
     border = int(WALL_MM / mm_per_pixel)
-    corners = [(0, 0, border, count), (count - border, 0, count, count), (0, 0, count, border)]
-    corners.append((0, count - border, count, count))
+    inner = count - border
+    corners = [(0, 0, border, count), (inner, 0, count, count), (0, 0, count, border), (0, inner, count, count)]
     for _ in range(rng.integers(0, 4)):
         x, y = rng.integers(100, 400, 2) / mm_per_pixel
         wide, high = rng.integers(1, 60, 2) / mm_per_pixel if rng.random() < 0.7 else (1, 1)
@@ -106,17 +98,15 @@ class Pile:
 
     def drive(self) -> None:
         """Tell some robots something new: mostly to go ahead, often at full speed."""
-        fastest = self.fastest
+        fastest, robots = self.fastest, self.sim.world.state.robots
         for robot in range(EACH):
             draw = self.rng.random()
             if draw < 0.3:
-                motor.set_speed(self.sim.world.state.robots, 0, robot, fastest, fastest)
+                motor.set_speed(robots, 0, robot, fastest, fastest)
             elif draw < 0.6:
-                motor.set_speed(
-                    self.sim.world.state.robots, 0, robot, *self.rng.integers(-fastest, fastest + 1, 2).tolist()
-                )
+                motor.set_speed(robots, 0, robot, *self.rng.integers(-fastest, fastest + 1, 2).tolist())
             elif draw < 0.7 and fastest == 127:
-                motor.set_pwm(self.sim.world.state.robots, 0, robot, *self.rng.integers(-255, 256, 2).tolist())
+                motor.set_pwm(robots, 0, robot, *self.rng.integers(-255, 256, 2).tolist())
 
     def stop(self) -> None:
         """Switch all motors off, at once."""

@@ -82,11 +82,16 @@ def test_the_tasks_are_listed() -> None:
     assert "a predator and a prey" in listed
 
 
-@at_length
-def test_two_sides_evolve_and_are_shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture
+def _short_pursuit(monkeypatch: pytest.MonkeyPatch) -> None:
     from kiks.learn.ready_tasks import TASKS, pursuit
 
     monkeypatch.setitem(TASKS, "pursuit", lambda *given: pursuit(*given, seconds=2.0))
+
+
+@at_length
+@pytest.mark.usefixtures("_short_pursuit")
+def test_two_sides_evolve_and_are_shown(tmp_path: Path) -> None:
     folder = tmp_path / "out"
     words = ("evolve", "pursuit", "--seed", 1, "--population", 4, "--out", folder, "--generations")
     said = kiks(*words, 2).output
@@ -103,28 +108,23 @@ def test_two_sides_evolve_and_are_shown(tmp_path: Path, monkeypatch: pytest.Monk
 
 
 @at_length
-def test_two_sides_are_compared_by_how_they_do_against_strangers(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    from kiks.learn.ready_tasks import TASKS, pursuit
-
-    monkeypatch.setitem(TASKS, "pursuit", lambda *given: pursuit(*given, seconds=2.0))
+@pytest.mark.usefixtures("_short_pursuit")
+def test_two_sides_are_compared_by_how_they_do_against_strangers(tmp_path: Path) -> None:
     one, other = tmp_path / "one", tmp_path / "other"
     words = ("evolve", "pursuit", "--generations", 2, "--plots", "svg", "--seeds", 2, "--out")
     said = kiks(*words, one, "--population", 4).output
-    assert re.search(r"\npredator, against all champions of the other side of its own evolution:\n", said)
-    assert re.search(r"\nprey, against all champions of the other side of its own evolution:\n", said)
+    for side in ("predator", "prey"):
+        assert f"\n{side}, against all champions of the other side of its own evolution:\n" in said
     assert {"fitness.svg", "tournament.svg"} <= {path.name for path in (one / "seed-1").iterdir()}
     assert (one / "seeds.svg").exists()
     kiks(*words, other, "--population", 6)
-    compared = kiks("compare", one, other, "--picture", tmp_path / "compared.png", "--json").stdout
+    compare = ("compare", one, other, "--picture", tmp_path / "compared.png")
+    compared = kiks(*compare, "--json").stdout
     found = json.loads(compared[compared.index("{") :])
     assert list(found["differences"]) == ["predator", "prey"]
     assert [len(each) for each in found["meetings"]["prey"].values()] == [2, 2]
-    assert (
-        "Compared: each champion against those of the other 3 evolutions, 8 times each."
-        in kiks("compare", one, other, "--picture", tmp_path / "compared.png").output
-    )
+    told = "Compared: each champion against those of the other 3 evolutions, 8 times each."
+    assert told in kiks(*compare).output
 
 
 def test_a_log_for_tensorboard_needs_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -161,10 +161,8 @@ def test_any_candidate_becomes_a_champion(folder: Path, tmp_path: Path) -> None:
     once = kiks(*words, "--rank", 3, "--world", 1, "--task", task).output
     assert re.search(r"Candidate \d of generation 2: rank 3, fitness \d", once)
     assert "1.000 s simulated" in ran("run", out, cwd=tmp_path).stderr
-    assert (
-        "The elite nearest to 300,0.5: path_mm"
-        in kiks("champion", folder, tmp_path / "elite.toml", "--at", "300,0.5").output
-    )
+    elite = kiks("champion", folder, tmp_path / "elite.toml", "--at", "300,0.5").output
+    assert "The elite nearest to 300,0.5: path_mm" in elite
     for more, message in (
         ((), "quick.py' is a Python file. Give it: --task FILE"),
         (("--task", task, "--rank", 9), "rank must be a whole number from 1 to 8"),

@@ -57,7 +57,7 @@ OUTPUTS = list(outputs())
 
 
 def words_for(output: tuple[str, str], path: Path) -> list[str]:
-    return [str(path) if word == "PLACE" else str(word) for word in RESULTS[output]]
+    return RESULTS[output].replace("PLACE", str(path)).split()
 
 
 def test_all_outputs_are_known() -> None:

@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 from tests import forked
-from tests.cli.test_cli import KIKS, state_of
+from tests.cli.test_cli import state_of
 from tests.served import GUARD_S, PROGRAMS, fresh
 
 from kiks.cli import app
@@ -76,11 +76,7 @@ def folder(tmp_path: Path) -> Path:
 def test_a_project_starts_its_programs(folder: Path) -> None:
     result = forked.run("run", "exercise.kiks", "--export", "rows.csv", cwd=folder)
     assert result.returncode == 0, result.stderr
-    assert result.stdout.splitlines() == [
-        "teacher b,6.01,6.01",
-        "teacher z,Turret order not supported",
-        "teacher d",
-    ]
+    assert result.stdout == "teacher b,6.01,6.01\nteacher z,Turret order not supported\nteacher d\n"
     assert "seed 5, state" in result.stderr
     rows = list(csv.DictReader((folder / "rows.csv").read_text().splitlines()))
     first, second = rows[:2], rows[-2:]
@@ -90,14 +86,12 @@ def test_a_project_starts_its_programs(folder: Path) -> None:
 
 def test_programs_behind_a_project_take_the_place_of_its_own_from_robot_1_on(folder: Path) -> None:
     both = forked.run("run", "exercise.kiks", "--seed", "6", "student.py", "--fast", cwd=folder)
-    assert sorted(both.stdout.splitlines()) == [
-        "1 student.py | --fast b,5.02,5.01",
-        "1 student.py | --fast d",
-        "1 student.py | --fast t,1,b,1,0",
-        "2 teacher.py | teacher b,6.01,6.01",
-        "2 teacher.py | teacher d",
-        "2 teacher.py | teacher z,Turret order not supported",
-    ], both.stderr
+    replies = {
+        "1 student.py | --fast": ("b,5.02,5.01", "d", "t,1,b,1,0"),
+        "2 teacher.py | teacher": ("b,6.01,6.01", "d", "z,Turret order not supported"),
+    }
+    lines = [f"{label} {reply}" for label, each in replies.items() for reply in each]
+    assert sorted(both.stdout.splitlines()) == lines, both.stderr
     assert "seed 6, state" in both.stderr
     before = forked.run("run", "--seed", "6", "exercise.kiks", "student.py", "--fast", cwd=folder)
     assert state_of(before.stderr) == state_of(both.stderr)
@@ -154,14 +148,10 @@ ENDED = "kiks: the run has ended after 20.5 s of simulated time."
 
 @pytest.fixture
 def endless(tmp_path: Path) -> Path:
-    for name, text in FOR_EVER.items():
+    for name, text in {**FOR_EVER, "spins": "import time\ntime.sleep(3)\nwhile True: pass\n"}.items():
         (tmp_path / f"{name}.py").write_text(text)
-    (tmp_path / "spins.py").write_text("import time\ntime.sleep(3)\nwhile True: pass\n")
-    (tmp_path / "three.kiks").write_text(
-        "kiks = 1\n"
-        + "".join(f'[[robot]]\nprogram = "{name}.py"\n' for name in ("talks", "sleeps", "reads"))
-        + "[walls]\nsize_mm = [400, 300]\nwall_mm = 10\n"
-    )
+    robots = "".join(f'[[robot]]\nprogram = "{name}.py"\n' for name in ("talks", "sleeps", "reads"))
+    (tmp_path / "three.kiks").write_text(f"kiks = 1\n{robots}[walls]\nsize_mm = [400, 300]\nwall_mm = 10\n")
     return tmp_path
 
 
@@ -278,11 +268,10 @@ def test_paths_stay_whole_if_ctrl_c_comes_while_a_point_is_kept() -> None:
     sim.record_paths(0.01)
     drive_into_a_wall(sim, 0.1)
     before = sim.paths().tolist()
-    state: Any = SimpleNamespace(
-        tick_count=sim.world.state.tick_count, robots=sim.world.state.robots, bodies=Interrupted()
-    )
+    state = sim.world.state
+    interrupted: Any = SimpleNamespace(tick_count=state.tick_count, robots=state.robots, bodies=Interrupted())
     with pytest.raises(KeyboardInterrupt):
-        sim.world.watchers[0].look(state)
+        sim.world.watchers[0].look(interrupted)
     assert sim.paths().tolist() == before
 
 
@@ -292,7 +281,8 @@ def test_paths_stay_whole_if_ctrl_c_comes_while_a_point_is_kept() -> None:
 def test_each_line_says_which_program_it_is_from(tmp_path: Path) -> None:
     (tmp_path / "a.py").write_text("import sys\nprint('one')\nprint('no end', end='')\nsys.stderr.write('wrong\\n')\n")
     (tmp_path / "other.py").write_text("import os\nos.write(1, b'\\xff' * 100_000 + b'\\nlast')\n")
-    result = subprocess.run([*KIKS, "run", "a.py", "other.py"], capture_output=True, cwd=tmp_path, check=True)
+    command = [*forked.kiks_command(), "run", "a.py", "other.py"]
+    result = subprocess.run(command, capture_output=True, cwd=tmp_path, check=True)
     lines = result.stdout.splitlines()
     assert [line for line in lines if line.startswith(b"1")] == [b"1 a.py     | one", b"1 a.py     | no end"]
     others = [line.removeprefix(b"2 other.py | ") for line in lines if line.startswith(b"2")]
@@ -306,10 +296,9 @@ def at_a_terminal(folder: Path, **environment: str) -> str:
     (folder / "asks.py").write_text("print('got', input('go? '))\n")
     (folder / "b.py").write_text("print('here')\n")
     ours, theirs = pty.openpty()
-    command = [*KIKS, "run", "asks.py", "b.py"]
-    surroundings = {**os.environ, "TERM": "xterm", **environment}
-    text = ""
-    with subprocess.Popen(command, stdin=theirs, stdout=theirs, stderr=theirs, cwd=folder, env=surroundings) as process:
+    command, text = [*forked.kiks_command(), "run", "asks.py", "b.py"], ""
+    options: dict[str, Any] = {"cwd": folder, "env": os.environ | environment}
+    with subprocess.Popen(command, stdin=theirs, stdout=theirs, stderr=theirs, **options) as process:
         os.close(theirs)
         has_answered = False
         while True:
@@ -341,7 +330,7 @@ def test_no_color_is_heeded(tmp_path: Path) -> None:
 def test_a_program_gets_an_error_when_its_output_is_closed(tmp_path: Path) -> None:
     (tmp_path / "talks.py").write_text("while True: print('more')\n")
     (tmp_path / "silent.py").write_text("")
-    command = [*KIKS, "run", "talks.py", "silent.py"]
+    command = [*forked.kiks_command(), "run", "talks.py", "silent.py"]
     pipes: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     with subprocess.Popen(command, cwd=tmp_path, text=True, **pipes) as process:
         assert process.stdout is not None

@@ -7,8 +7,10 @@ from pathlib import Path
 
 import pytest
 from tests import forked
+from tests.cli.test_cli import kiks
 
 from kiks import Recording
+from kiks.errors import KiksError
 
 pytestmark = pytest.mark.slow
 
@@ -39,12 +41,19 @@ size_mm = [400, 400]
 """
 
 
-def test_a_sweep_says_up_to_where_a_program_holds_and_goes_on(tmp_path: Path) -> None:
-    (tmp_path / "brake.py").write_text(SLOW)
-    (tmp_path / "wall.kiks").write_text(WALL)
-    words = ["sweep", "brake.py", "--arena", "wall.kiks", "--baud", "1200,9600", "--think", "0,100,600"]
-    words += ["--family", "2", "--seeds", "1"]
-    result = forked.run(*words, "--json", "--picture", "brake.svg", cwd=tmp_path)
+SWEEP = "sweep brake.py --arena wall.kiks --seeds 1"
+
+
+@pytest.fixture(autouse=True)
+def _files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("brake.py").write_text(SLOW)
+    Path("wall.kiks").write_text(WALL)
+
+
+def test_a_sweep_says_up_to_where_a_program_holds_and_goes_on() -> None:
+    words = f"{SWEEP} --baud 1200,9600 --think 0,100,600 --family 2".split()
+    result = forked.run(*words, "--json", "--picture", "brake.svg")
     assert result.returncode == 0, result.stderr
     found = json.loads(result.stdout)
     assert found["goal"]["text"] == "Stop before the wall"
@@ -53,33 +62,27 @@ def test_a_sweep_says_up_to_where_a_program_holds_and_goes_on(tmp_path: Path) ->
     assert (slow or 0) <= usual < 600
     assert len(found["rows"]) == 6
     assert all(row["runs"] == 2 for row in found["rows"])
-    assert (tmp_path / "brake.svg").read_bytes().startswith(b"<?xml")
+    assert Path("brake.svg").read_bytes().startswith(b"<?xml")
     worst = next(row["worst"] for row in found["rows"] if row["solved"] < 2)
-    recording = Recording(tmp_path / found["folder"] / worst["recording"])
-    assert recording.is_whole
-    times = (tmp_path / found["folder"] / worst["recording"]).stat().st_mtime_ns
-    again = forked.run(*words, cwd=tmp_path)
-    assert again.stdout.splitlines()[-1].startswith(
-        f"brake.py {found['verdict']}; see it with kiks replay kiks-sweep-brake/"
-    )
-    assert (tmp_path / found["folder"] / worst["recording"]).stat().st_mtime_ns == times
+    file = Path(found["folder"]) / worst["recording"]
+    assert Recording(file).is_whole
+    times = file.stat().st_mtime_ns
+    last = forked.run(*words).stdout.splitlines()[-1]
+    assert last.startswith(f"brake.py {found['verdict']}; see it with kiks replay kiks-sweep-brake/")
+    assert file.stat().st_mtime_ns == times
 
 
-def test_formulas_and_limits_of_the_command_line_replace_those_of_the_project(tmp_path: Path) -> None:
-    (tmp_path / "brake.py").write_text(SLOW)
-    (tmp_path / "wall.kiks").write_text(WALL)
-    words = ["sweep", "brake.py", "--arena", "wall.kiks", "--think", "0", "--family", "0", "--seeds", "1", "--json"]
-    result = forked.run(*words, "--solved", "path_mm > 50", "--seconds", "3", "--out", "out", cwd=tmp_path)
+def test_formulas_and_limits_of_the_command_line_replace_those_of_the_project() -> None:
+    words = f"{SWEEP} --think 0 --family 0 --json".split()
+    result = forked.run(*words, "--solved", "path_mm > 50", "--seconds", "3", "--out", "out")
     found = json.loads(result.stdout)
     assert found["goal"] == {"text": "", "solved": "path_mm > 50", "failed": "False", "points": "is_solved"}
     assert found["rows"][0]["worst"]["robot"] == 0
-    assert found["verdict"].startswith(
-        "holds up to 0 ms of thinking, the most that was tried; worst: seed 0, the exact"
-    )
-    wrong = forked.run(*words, "--solved", "path_mm >", cwd=tmp_path)
-    assert wrong.returncode == 2
-    assert "the goal: solved must be a formula, but 'path_mm >' is none" in wrong.stderr
-    unknown = forked.run(*words, "--solved", "paths_mm > 5", cwd=tmp_path)
-    assert unknown.returncode == 2
-    assert "must name measures, but 'paths_mm' is none" in unknown.stderr
-    assert "Traceback" not in unknown.stderr
+    told = "holds up to 0 ms of thinking, the most that was tried; worst: seed 0, the exact"
+    assert found["verdict"].startswith(told)
+    for formula, message in (
+        ("path_mm >", "the goal: solved must be a formula, but 'path_mm >' is none"),
+        ("paths_mm > 5", "must name measures, but 'paths_mm' is none"),
+    ):
+        with pytest.raises(KiksError, match=message):
+            kiks(*words, "--solved", formula)

@@ -7,7 +7,6 @@ has a folder of its own, for its files and for what tells where its session is f
 
 from __future__ import annotations
 
-import ast
 import contextlib
 import json
 import os
@@ -94,21 +93,12 @@ class Octave:
         self.doors.mkdir(exist_ok=True)
         file = folder / f"program_{len(list(folder.glob('program_*')))}.m"
         file.write_text(_BEGIN + program, encoding="utf-8")
-        hidden = ("DISPLAY", "WAYLAND_DISPLAY", "KIKS_COMMAND", "KIKS_TRANSPORT")
-        own = {name: value for name, value in os.environ.items() if name not in hidden}
-        own |= {"KIKS_COMMAND": " ".join(kiks_command()), "KIKS_WINDOW": "0", "XDG_RUNTIME_DIR": str(self.doors)}
-        self._process = subprocess.Popen(
-            [OCTAVE, "--no-gui", "-qf", file.name],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            cwd=folder,
-            env=own | dict(environment or {}),
-            text=True,
-            # So that all of it can be killed at once.
-            start_new_session=True,
-            errors="replace",
-        )
+        own = {"KIKS_COMMAND": " ".join(kiks_command()), "KIKS_WINDOW": "0", "XDG_RUNTIME_DIR": str(self.doors)}
+        options: dict[str, Any] = {"cwd": folder, "env": {**os.environ, **own, **(environment or {})}}
+        options |= {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
+        # In a process group of its own, so that all of it can be killed at once.
+        options |= {"text": True, "errors": "replace", "start_new_session": True}
+        self._process = subprocess.Popen([OCTAVE, "--no-gui", "-qf", file.name], **options)
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
 
@@ -214,7 +204,7 @@ def run(program: str, folder: Path, environment: Mapping[str, str] | None = None
         if line[2] == "~":
             assert re.fullmatch(line[3], said, re.DOTALL), (line[0], said)
             continue
-        value = ast.literal_eval(line[3])
+        value = eval(line[3], {})
         if isinstance(value, list):
             assert said.shape == np.shape(value), (line[0], said)
             value = np.array(value)

@@ -41,14 +41,12 @@ class Terminal:
         assert OCTAVE is not None
         self.doors = folder / "doors"
         self.doors.mkdir(mode=0o700)
-        hidden = ("DISPLAY", "WAYLAND_DISPLAY", "KIKS_COMMAND", "KIKS_TRANSPORT")
-        own = {name: value for name, value in os.environ.items() if name not in hidden}
-        own |= {"KIKS_WINDOW": "0", "XDG_RUNTIME_DIR": str(self.doors), **(environment or {})}
+        own = {"KIKS_WINDOW": "0", "XDG_RUNTIME_DIR": str(self.doors), **(environment or {})}
         self.number, self.end = pty.fork()
         if self.number == 0:
             os.chdir(folder)
             plain = [] if edits_lines else ["--no-line-editing"]
-            os.execve(OCTAVE, [OCTAVE, "--no-gui", "-qf", *plain, "--no-history"], own)
+            os.execve(OCTAVE, [OCTAVE, "--no-gui", "-qf", *plain, "--no-history"], os.environ | own)
         self._text = ""
         self._questions = 0
         self.type(BEGIN)

@@ -87,41 +87,27 @@ clean
 say('cylinders', kiks_siminfo_objects())
 maze
 ref = kiks_kopen();
-say('light', kAmbient(ref))
-say('robot', kiks_siminfo_robotpos())
-say('lamp', kiks_siminfo_objects())
+min(kAmbient(ref)) < 75  %= 1
+norm(kiks_siminfo_robotpos()(1:2) - kiks_siminfo_objects()(1, 2:3)) < 50  %= 1
 kiks_kclose(ref)
 football(-1, 9600, seconds)
-say('port', kiks_ktime(-1))
+size(kiks_ktime(-1))  %= [[0, 0]]
 """,
         tmp_path,
     )
-    turns, tidy, tidy_before = map(
-        int, re.findall(r"back (\d+) times.*\nclean: (\d+) of 12 .* start it was (\d+)", done.text)[0]
-    )
+    found = re.findall(r"back (\d+) times.*\nclean: (\d+) of 12 .* start it was (\d+)", done.text)[0]
+    turns, tidy, tidy_before = map(int, found)
     assert turns > 10
-    assert tidy >= 7
-    assert tidy > tidy_before
+    assert tidy > max(6, tidy_before)
     places = done.said["cylinders"][:, 1:3]
     assert places.shape == (12, 2)
     assert (np.minimum(places, 501 - places).min(axis=1) <= 60).sum() == tidy
     assert int(re.findall(r"at the light after .* reads (\d+)", done.line("maze: "))[0]) <= 55
-    assert done.said["light"].min() < 75
-    assert np.hypot(*(done.said["robot"][0, :2] - done.said["lamp"][0, 1:3])) < 50
     assert int(re.findall(r"football: (\d+) goals", done.text)[0]) >= share(1, 3)
-    assert done.said["port"].size == 0, "the port is closed"
 
 
 def test_cameras_show_bands_and_guns_hit_robots(tmp_path: Path) -> None:
-    done = run(
-        WITH_DEMOS
-        + """
-camera(-1, 19200, seconds)
-kiks_quit
-battle(-1, 9600, seconds)
-""",
-        tmp_path,
-    )
+    done = run(f"{WITH_DEMOS}camera(-1, 19200, seconds)\nkiks_quit\nbattle(-1, 9600, seconds)\n", tmp_path)
     pictures = re.findall(r"camera: +[\d.]+ s \[(.{64})\]", done.text)
     assert len(pictures) == SECONDS // 5
     assert all(len(set(picture)) >= 3 for picture in pictures)
@@ -156,14 +142,10 @@ def test_demos_drive_robots_on_real_ports(tmp_path: Path) -> None:
     need_tcp()
     endpoint = TcpEndpoint(0)
     with served([endpoint]) as real:
-        done = run(
-            WITH_DEMOS
-            + f"mv80mm('{endpoint.name}')\nfollow('{endpoint.name}', 9600, 2)\nsay('session', session_number())",
-            tmp_path,
-        )
+        demos = f"mv80mm('{endpoint.name}')\nfollow('{endpoint.name}', 9600, 2)\n"
+        done = run(f"{WITH_DEMOS}{demos}session_number()  %= 0", tmp_path)  # nothing is simulated here
         real.wait_free()
         assert real.sim.travelled_mm(1) > 100
-    assert done.said["session"] == 0, "nothing is simulated here"
     by_counters = float(re.findall(r"([\d.]+) mm with kMoveTo", done.text)[0])
     assert by_counters == pytest.approx(80, abs=2)
     assert re.search(r"follow: \d+ mm in 2\.\d s, and no wall\.", done.text)

@@ -29,6 +29,7 @@ arena(150, 250) = 4;
 greys = 60 * (arena == 1);
 greys(60:80, 100:103) = 200;
 kiks(arena, greys)
+poses = kept = [];
 objects = kiks_siminfo_objects();
 objects(:, 1:3)  %= [[1, 40, 40], [2, 200, 100], [3, 250, 150]]
 kiks_save('octave.kad')
@@ -40,14 +41,13 @@ say('walls', data.walls)
 say('drawn', double(walls) .* double(colours))
 [class(walls) ' ' class(colours)]  %= "logical uint8"
 kiks_arena
-kiks_load('octave.kad')
-kiks_siminfo_robotpos()  %= [[50, 150, 1.5708]] +- 1e-4
-isequal(kiks_siminfo_objects(), objects)  %= 1
-kiks_load('octave.kiks')
-kiks_siminfo_robotpos()  %= [[50, 150, 1.5708]] +- 1e-4
-isequal(kiks_siminfo_objects(), objects)  %= 1
-kiks_load('octave.toml')
-kiks_siminfo_robotpos()  %= [[50, 150, 1.5708]] +- 1e-4
+for name = {'octave.kad', 'octave.kiks', 'octave.toml'}
+    kiks_load(name{1})
+    poses(end + 1, :) = kiks_siminfo_robotpos();
+    kept(end + 1) = isequal(kiks_siminfo_objects()(:, 1:3), objects(:, 1:3));
+end
+poses  %= [[50, 150, 1.5708]] * 3 +- 1e-4
+kept  %= [[1, 1, 1]]
 for name = {'python.kad', 'octave.kad', 'plain.tif', 'packed.tif', 'octave.toml'}
     [walls, colours] = kiks_tif2arena(name{1});
     say(strtok(strrep(name{1}, '.', '_')), double(colours))
@@ -89,8 +89,7 @@ def test_files_of_octave_and_python_are_the_same(tmp_path: Path) -> None:
     for name in ("plain_tif", "packed_tif", "python_kad"):
         assert np.array_equal(said[name], picture), name
         assert said[f"class_{name}"] == "logical uint8"
-    assert np.array_equal(said["octave_kad"], ours)
-    assert np.array_equal(said["octave_toml"], ours)
+    assert all(np.array_equal(said[name], ours) for name in ("octave_kad", "octave_toml"))
     assert np.array_equal(said["python_drawn"], picture)
     assert re.search(r"warning: The arena's file must exist, but 'nowhere\.tif' ", done.text)
     assert np.array_equal(Arena.load(tmp_path / "packed.kad").brightness[::-1], picture)
@@ -134,7 +133,6 @@ KIKS_NOISE = 0;
 arena = zeros(300, 300);
 arena(100:110, :) = 1;
 arena(130 + 28, 150) = -90;
-names = {'white', 'grey', 'black', 'default', 'default_grey'};
 greys = {255, 120, 1, [], []};
 defaults = [255 255 255 255 120];
 for k = 1:5
@@ -145,16 +143,19 @@ for k = 1:5
         kiks_arena(arena, greys{k} * arena .* (arena == 1))
     end
     ref = kiks_kopen;
-    say(names{k}, max(kProximity(ref)))
+    seen(k) = max(kProximity(ref));
 end
+seen(4:5) - seen(1:2)  %= [[0, 0]]
+diff(seen(1:3)) < 0  %= [[1, 1]]
+seen(1) - seen(3) > 100  %= 1
 % An element of 0 in the mask does not make a hole.
 kiks_arena(arena, zeros(size(arena)))
 ref = kiks_kopen;
-say('zero', max(kProximity(ref)))
+max(kProximity(ref)) - seen(3)  %= 0
 % Elements that are shares of white: a picture divided by 255.
 kiks_arena(arena .* (arena < 0) + 120 / 255 * (arena == 1))
 ref = kiks_kopen;
-say('share', max(kProximity(ref)))
+max(kProximity(ref)) - seen(2)  %= 0
 caught(@() kiks_arena(arena, ones(2)))  %~ kiks:argument\|The colormask must be a matrix as large as the arena.*
 
 codes = zeros(200);
@@ -193,16 +194,8 @@ kiks_siminfo_objects()(1:3)  %= [[2, 100, 268]] +- 1e-4
 
 def test_greys_are_seen_and_codes_follow_the_preference(tmp_path: Path) -> None:
     done = run(GREYS, tmp_path)
-    said = done.said
-    assert said["white"] > said["grey"] > said["black"]
-    assert said["white"] - said["black"] > 100
-    assert said["default"] == said["white"]
-    assert said["default_grey"] == said["grey"]
-    assert said["zero"] == said["black"]
-    assert said["share"] == said["grey"]
     assert "warning: An arena must be at least 100 x 100 mm" in done.text
-    moves = [line for line in done.lines if "has no room" in line]
-    assert moves == [
+    assert [line for line in done.lines if "has no room" in line] == [
         "warning: A robot has no room at x = 150, y = 10 and is placed at x = 150, y = 28.",
         "warning: A ball has no room at x = 100, y = 295 and is placed at x = 100, y = 268.",
     ]
@@ -241,10 +234,7 @@ def test_mazes_have_their_size_and_every_cell_can_be_reached(tmp_path: Path) -> 
         pitch = path + wall
         # kiks-behaviour.md 1.9; twice a wall less than its sum of widths, as both outer walls stand on paths.
         assert maze.shape == (rows * pitch - wall, (columns + 2) * path + (columns - 1) * wall)
-        assert maze[:10].all()
-        assert maze[-11:].all()
-        assert maze[:, :10].all()
-        assert maze[:, -11:].all()
+        assert all(edge.all() for edge in (maze[:10], maze[-11:], maze[:, :10], maze[:, -11:]))
         ((y, x),) = np.argwhere(maze == -360)
         assert (y + 1, x + 1) == (round(path / 2), round((wall + path) / 2) - wall)
         ((light_y, light_x),) = np.argwhere(maze == 2)
@@ -293,8 +283,7 @@ def test_a_hostile_preference_file_is_refused_in_a_line(tmp_path: Path) -> None:
     said = run("\n".join(lines), tmp_path).said
     for number, text in enumerate(HOSTILE):
         why = said[f"w{number}"]
-        assert why.startswith("kiks:"), text[:80]
-        assert "must" in why
+        assert re.match(r"kiks:.*must", why), text[:80]
         assert why.isprintable(), text[:80]
         assert len(why) < 400, text[:80]
 

@@ -87,12 +87,8 @@ def test_a_film_ends_with_its_world_and_with_its_program(tmp_path: Path) -> None
     assert "a film must go to a file that can be written" in octave.said["folder"]
     # Port -1 has begun it.
     assert len(pictures(tmp_path / "other.mp4")) == pytest.approx(2 * PICTURES_PER_S, abs=3)
-    assert {path.name for path in tmp_path.iterdir() if path.suffix in (".mp4", ".gif", ".webp")} == {
-        "quit.gif",
-        "arena.webp",
-        "other.mp4",
-        "end.gif",
-    }
+    films = {path.name for path in tmp_path.iterdir() if path.suffix in (".mp4", ".gif", ".webp")}
+    assert films == {"quit.gif", "arena.webp", "other.mp4", "end.gif"}
 
 
 @at_length

@@ -285,14 +285,15 @@ kiks_quit(1)
 # ---- files of Windows: Latin letters in comments, lines that end in CR LF ----
 
 
+WINDOWS = {
+    "kiks_preferences": "function kiks_preferences\n% für alle\nglobal KIKS_NOISE\nKIKS_NOISE = 0; % ohne Rauschen ä\n",
+    "drive": "% Größe\nref = kiks_kopen;\nsay('x', kProximity(ref))\n",
+}
+
+
 def test_files_may_be_those_of_windows(tmp_path: Path) -> None:
-    preferences = (
-        "function kiks_preferences\r\n% f\xfcr alle\r\nglobal KIKS_NOISE\r\nKIKS_NOISE = 0; % ohne Rauschen \xe4\r\n"
-    )
-    (tmp_path / "kiks_preferences.m").write_bytes(preferences.encode("cp1252"))
-    (tmp_path / "drive.m").write_bytes(
-        "% Gr\xf6\xdfe\r\nref = kiks_kopen;\r\nsay('x', kProximity(ref))\r\n".encode("cp1252")
-    )
+    for name, text in WINDOWS.items():
+        (tmp_path / f"{name}.m").write_text(text, encoding="cp1252", newline="\r\n")
     done = run("drive\nkiks_print('done')\n", tmp_path)
     assert (done.said["x"] == done.said["x"][0]).all(), "without noise, in the middle of the arena"
     assert "constants_of" not in done.text, "nothing but what Octave says of any such file"

@@ -38,7 +38,7 @@ def write(file: Path, *, turn_deg: int = 0, function: str = "", after: str = "")
 
 
 FORMS = """
-global KIKS_ROBOT
+global KIKS_ROBOT KIKS_RESPONSE
 name = 'a variable of mine';
 kiks
 for robot = {'mine.m', 'mine', 'quarter'}
@@ -47,6 +47,7 @@ for robot = {'mine.m', 'mine', 'quarter'}
     kiks_save([robot{1} '.kiks'])
 end
 name  %= "a variable of mine"
+KIKS_ROBOT = 'mine'; KIKS_RESPONSE = 'thesis'; kiks_arena, kiks_arena
 """
 
 
@@ -63,6 +64,8 @@ def test_scripts_and_functions_describe_robots(tmp_path: Path) -> None:
         assert spec.proximity.mount_angle_deg == tuple(place + turn_deg for place in PLACES)
         assert spec.proximity.direction_deg == tuple(direction + turn_deg for direction in DIRECTIONS)
         assert spec.proximity.range_mm == RobotSpec.load("khepera").proximity.range_mm
+    told = "has places, directions and a range of its own for the sensors: those of the robot's file have no effect."
+    assert [line for line in octave.lines if "KIKS_RESPONSE" in line] == [f"KIKS_RESPONSE = 'thesis' {told}"]
 
 
 WRONG = {
@@ -121,10 +124,3 @@ def test_constants_of_the_old_simulator_change_robots(tmp_path: Path) -> None:
     assert "KIKS_K213_NOISE must be a share [%] from 0 to 100, but it was 101." in octave.said["noise"]
     assert "a number of stripes from -1 to -100, or [], but it was -101." in octave.said["stripes"]
     assert not [line for line in octave.lines if "effect" in line]
-
-
-def test_a_response_with_sensors_of_its_own_says_so(tmp_path: Path) -> None:
-    write(tmp_path / "mine.m")
-    octave = run("global KIKS_ROBOT KIKS_RESPONSE\nKIKS_ROBOT = 'mine'; KIKS_RESPONSE = 'thesis'; kiks, kiks", tmp_path)
-    told = "has places, directions and a range of its own for the sensors: those of the robot's file have no effect."
-    assert [line for line in octave.lines if "KIKS_RESPONSE" in line] == [f"KIKS_RESPONSE = 'thesis' {told}"]

@@ -81,33 +81,32 @@ kiks_quit(1)
     assert "kiks_preferences:" not in done.text
 
 
-READINGS = """\
+PREFERENCES = """\
 file = fopen('readings', 'a');
 fprintf(file, 'x');
 fclose(file);
 """
 
-
-def test_the_opening_of_a_port_reads_them_once(tmp_path: Path) -> None:
-    """With and without a session."""
-    (tmp_path / "kiks_preferences.m").write_text(READINGS, encoding="utf-8")
-    run(
-        """
+READ = """
 kiks_kopen([-1 9600 1]);
 numel(fileread('readings'))  %= 1
-kiks_kopen([-2 9600 1]);
+kiks_kopen([-2 9600 1]);  % with a session
 numel(fileread('readings'))  %= 2
-""",
-        tmp_path,
-    )
+kiks_quit(1)
+cd wrong
+before = path();  % its copy leaves it
+say('why', caught(@() kiks()))
+strcmp(before, path())  %= 1
+"""
 
 
-def test_a_function_that_fails_is_named(tmp_path: Path) -> None:
-    (tmp_path / "kiks_preferences.m").write_text("function kiks_preferences\nnothing_like_that(1);\n", encoding="utf-8")
-    said = run("before = path();\nsay('why', caught(@() kiks()))\nsay('same', strcmp(before, path()))", tmp_path).said
-    assert said["why"].startswith(f"kiks:argument|kiks_preferences.m in {tmp_path} must run, but it did not: ")
-    assert "'nothing_like_that' undefined" in said["why"]
-    assert said["same"] == 1, "its copy has left the path"
+def test_the_opening_of_a_port_reads_them_once_and_a_function_that_fails_is_named(tmp_path: Path) -> None:
+    (tmp_path / "wrong").mkdir()
+    for folder, text in ((".", PREFERENCES), ("wrong", "function kiks_preferences\nnothing_like_that(1);\n")):
+        (tmp_path / folder / "kiks_preferences.m").write_text(text, encoding="utf-8")
+    why = run(READ, tmp_path).said["why"]
+    assert why.startswith(f"kiks:argument|kiks_preferences.m in {tmp_path / 'wrong'} must run, but it did not: ")
+    assert "'nothing_like_that' undefined" in why
 
 
 PULSES = """

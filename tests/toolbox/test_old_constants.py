@@ -23,11 +23,8 @@ ROOM = Arena.box(400, 400, wall_mm=10)
 
 
 def figures(
-    diameter_mm: float = 55.0,
-    range_mm: float = 50.0,
-    places: tuple[float, ...] = PLACES,
-    directions: tuple[float, ...] = DIRECTIONS,
-) -> tuple[float, ...]:
+    diameter_mm: float = 55.0, range_mm: float = 50.0, places: Any = PLACES, directions: Any = DIRECTIONS
+) -> Any:
     return (diameter_mm, 53.0, range_mm, *places, *directions)
 
 
@@ -41,15 +38,20 @@ def at(x_mm: float, y_mm: float, heading_deg: float, **parts: Any) -> Arena:
     return replace(ROOM, starts=(Pose(x_mm, y_mm, math.radians(heading_deg)),), **parts)
 
 
-def counts(sim: Simulation, readings: int = 200) -> Any:
-    """Return noisy readings, each of another round of the sensors, int64 [reading, 8]."""
+def replies(sim: Simulation, command: bytes, count: int, pause_s: float) -> Any:
+    """Return the numbers of noisy replies, int64 [reply, number]."""
     port = sim.port(1)
     rows = []
-    for _ in range(readings):
-        port.write(b"N\n")
-        rows.append([int(word) for word in port.readline().split(b",")[1:]])
-        sim.run(0.02)
+    for _ in range(count):
+        sim.run(pause_s)
+        port.write(command)
+        rows.append([int(word) for word in port.readline().split(b",")[1:] if word.strip().isdigit()])
     return np.array(rows)
+
+
+def counts(sim: Simulation) -> Any:
+    """Return noisy readings, each of another round of the sensors, int64 [reading, 8]."""
+    return replies(sim, b"N\n", 200, 0.02)
 
 
 # ---- robot definition files ----
@@ -124,14 +126,8 @@ def test_a_larger_exponent_widens_the_view_of_light_sensors() -> None:
 
 def test_the_camera_is_as_noisy_as_its_constant_says() -> None:
     def spread(percent: float) -> float:
-        sim = world(camera_noise_percent=percent)
-        pictures = []
-        for _ in range(30):
-            sim.run(0.2)
-            port = sim.port(1)
-            port.write(b"T,2,N\n")
-            pictures.append([int(word) for word in port.readline().split(b",")[3:]])
-        return float(np.array(pictures).std(axis=0).mean())
+        pictures = replies(world(camera_noise_percent=percent), b"T,2,N\n", 30, 0.2)[:, 1:]
+        return float(pictures.std(axis=0).mean())
 
     clean, usual, noisy = spread(0), spread(10), spread(60)
     assert clean < usual < noisy

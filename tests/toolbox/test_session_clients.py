@@ -118,16 +118,13 @@ def test_a_session_equals_a_port_in_memory(session: Session) -> None:
     assert ask("state") == sim.state_hash()
 
 
-@pytest.mark.parametrize("poll", ["time 1", "pose 1"])
-def test_polling_lets_time_pass(ask: Asker, poll: str) -> None:
+def test_polling_lets_time_pass_and_nothing_moves_without_a_port(ask: Asker) -> None:
     ask("ask 1 D,5,5")
-    y = ask.numbers("pose 1")[1]
-    ask(*[poll] * 3000)
-    assert ask.numbers("pose 1")[1] < y - 10
-
-
-def test_nothing_moves_without_a_request(ask: Asker) -> None:
-    ask("ask 1 D,5,5", "close 1")
+    for poll in ("time 1", "pose 1"):
+        y = ask.numbers("pose 1")[1]
+        ask(*[poll] * 3000)
+        assert ask.numbers("pose 1")[1] < y - 10
+    ask("close 1")
     state = ask("state")
     ask(*["objects"] * 100)
     assert ask("state") == state
@@ -141,12 +138,7 @@ def test_thinking_time_passes_live_in_a_window(session: Session) -> None:
     session.desk.gate.set_speed(1.0, begin_ns)
     ask("open 1 9600", "ask 1 D,5,5")
     driven_ns = begin_ns + 500_000_000
-    guard = threading.Event()
-    for _ in range(1000):
-        if session.world.now_ns >= driven_ns:
-            break
-        guard.wait(GUARD_S / 1000)
-    assert session.world.now_ns >= driven_ns, "time passes without a request"
+    wait_until(lambda: session.world.now_ns >= driven_ns)  # time passes without a request
     ask("ask 1 H")
     end_ns = session.world.now_ns
     thought_s = time.monotonic() - begin_s
@@ -272,11 +264,7 @@ def cancelled(session: Session, ask: Asker, number: int, request: str, then: str
     thread.start()
     assert is_paused.wait(GUARD_S)
     awaited.is_cancelled = True
-    for _ in range(1000):
-        if told:
-            break
-        ask.client.cancel()
-        thread.join(GUARD_S / 1000)
+    wait_until(lambda: told or ask.client.cancel())
     thread.join(GUARD_S)
     assert not thread.is_alive()
     return told
@@ -306,11 +294,8 @@ def test_waiting_for_other_programs_can_be_cancelled(session: Session) -> None:
     told: list[str] = []
     thread = threading.Thread(target=lambda: told.append(ask.told("open 1 9600")))
     thread.start()
-    for _ in range(1000):
-        if told:
-            break
-        awaited.is_cancelled = True
-        thread.join(GUARD_S / 1000)
+    wait_until(lambda: told or setattr(awaited, "is_cancelled", True))
+    thread.join(GUARD_S)
     assert "the program was interrupted" in told[0]
 
 
