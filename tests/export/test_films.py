@@ -2,8 +2,8 @@
 
 import re
 from pathlib import Path
+from typing import Any
 
-import av
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -43,13 +43,19 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
     return Recording(file)
 
 
+def frames_of(file: Path) -> list[Any]:
+    import av
+
+    with av.open(str(file)) as container:
+        return list(container.decode(video=0))
+
+
 def pictures(file: Path) -> list[Pixels]:
     """Return the pictures of a film, decoded by a library of its own for each kind."""
     if file.suffix == ".webp":  # FFmpeg decodes no WebP that moves
         with Image.open(file) as image:
             return [np.asarray(each.convert("RGB")) for each in ImageSequence.Iterator(image)]
-    with av.open(str(file)) as container:
-        return [frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)]
+    return [frame.to_ndarray(format="rgb24") for frame in frames_of(file)]
 
 
 def pixel(picture: Pixels, x_mm: float, y_mm: float) -> tuple[float, float]:
@@ -99,8 +105,7 @@ def test_a_film_lasts_as_long_as_its_pictures(
     file = tmp_path / f"film.{ending}"
     count = save_film(recording, file, size=size, fps=fps, speed=speed, end_s=2.0)
     assert count == int(2.0 / speed * fps) + 1
-    with av.open(str(file)) as container:
-        frames = list(container.decode(video=0))
+    frames = frames_of(file)
     assert len(frames) == count
     even = 2 if ending == "mp4" else 1
     assert (frames[-1].width, frames[-1].height) == tuple(length // even * even for length in size)

@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
-from scipy.io import loadmat
 
 from kiks import Arena, Khepera, ParameterError, Recording, Simulation
 from kiks.export.kinds import ENDINGS, KINDS, kind_of, options_of
@@ -62,6 +61,8 @@ def test_lines_stay_sharp_and_a_caption_says_what_is_seen(recording: Recording, 
 
 
 def test_tables_are_the_same_in_each_kind_of_file(recording: Recording, tmp_path: Path) -> None:
+    from scipy.io import loadmat
+
     for name in ("poses", "wire", "events"):
         wanted = recording.table(name, 1)
         for ending in (".csv", ".parquet", ".mat"):

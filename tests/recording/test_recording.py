@@ -10,10 +10,8 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, ClassVar
 
-import jsonschema
 import numpy as np
 import pytest
-from mcap.reader import make_reader
 from tests.at_length import cases
 from tests.demos.shown import run, shown, world_of
 
@@ -383,6 +381,9 @@ def test_a_score_in_a_file_keeps_the_rules_of_one_that_is_set(data: str) -> None
 
 def test_foxglove_opens_it(file: Path) -> None:
     """The library's reader finds all messages, and each keeps its schema."""
+    import jsonschema
+    from mcap.reader import make_reader
+
     sim = Simulation(Arena.box(300, 200), robots=2, seed=1)
     sim.add_ball(50, 50)
     with sim.record(file) as recorder:
