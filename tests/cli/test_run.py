@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 from tests import forked
+from tests.at_length import cases
 from tests.cli.test_cli import state_of
 from tests.served import GUARD_S, PROGRAMS, fresh
 
@@ -156,11 +157,10 @@ def endless(tmp_path: Path) -> Path:
 
 
 @pytest.mark.parametrize(
-    "words",
-    [*((name + ".py",) for name in FOR_EVER), ("talks.py", "sleeps.py"), ("long.py", "reads.py"), ("three.kiks",)],
+    "line", cases([*(f"{name}.py" for name in FOR_EVER), "three.kiks", "talks.py sleeps.py", "long.py reads.py"], 7)
 )
-def test_seconds_end_programs_at_that_simulated_time_and_the_same_each_time(words: tuple[str], endless: Path) -> None:
-    results = [forked.run("run", "--seconds", "20.5", *words, cwd=endless) for _ in range(2)]
+def test_seconds_end_programs_at_that_simulated_time_and_the_same_each_time(line: str, endless: Path) -> None:
+    results = [forked.run("run", "--seconds", "20.5", *line.split(), cwd=endless) for _ in range(2)]
     for result in results:
         *_, said, last = [line for line in result.stderr.splitlines() if " driven, " not in line]
         assert (result.returncode, said) == (0, ENDED)
@@ -193,10 +193,10 @@ def test_a_program_that_fails_before_the_end_fails(endless: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "words", [("spins.py",), ("spins.py", "sleeps.py"), ("talks.py",), ("talks.py", "long.py"), ("long.py",)]
+    "line", cases(["spins.py", "spins.py sleeps.py", "talks.py", "talks.py long.py", "long.py"], 3)
 )
-def test_max_wall_ends_whatever_runs(words: tuple[str], endless: Path) -> None:
-    result = forked.run("run", "--max-wall", "0.5", *words, cwd=endless)
+def test_max_wall_ends_whatever_runs(line: str, endless: Path) -> None:
+    result = forked.run("run", "--max-wall", "0.5", *line.split(), cwd=endless)
     *_, said, last = [line for line in result.stderr.splitlines() if " driven, " not in line]
     assert (result.returncode, said) == (124, "kiks: --max-wall has ended the run after 0.5 s of real time.")
     assert last.endswith("s simulated, seed 0, not repeatable: --max-wall has ended it")

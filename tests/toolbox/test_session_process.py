@@ -88,12 +88,6 @@ class Session:
     def wait(self) -> int:
         return self.process.wait(GUARD_S)
 
-    def _read_until(self, end: str) -> str:
-        heard = ""
-        while not heard.endswith(end):
-            heard += self._read(1)
-        return heard
-
     def _read(self, count: int) -> str:
         data = b""
         while len(data) < count:
@@ -308,7 +302,9 @@ def test_a_slow_answer_is_announced_and_can_be_cancelled(tmp_path: Path) -> None
             session.say("")
         session.say("\x18!")
         session.say("time 1")
-        stale = session._read_until("\x02")
+        stale = session._read(1)
+        while not stale.endswith("\x02"):
+            stale += session._read(1)
         assert session._read(1) == "!"
         assert stale.endswith("\x01" * 190 + "\x02")
         assert 0 < float(session.hear()[20:]) < 1e6
