@@ -418,9 +418,13 @@ class ProgramsPanel(Panel):
         return None if script is None else Command(script, arguments)
 
     async def _run(self) -> None:
-        """Check the program, save it and run it."""
+        """Check the program, save it and run it, unless Halt is pressed meanwhile."""
+        halt_count = self._desk.halt_count
         if not self._check() and (command := await self.command()) is not None:
-            await self._start(command, self._robot.value or 1)
+            if self._desk.halt_count == halt_count:
+                await self._start(command, self._robot.value or 1)
+            else:
+                ui.notify(f"{command.name} was not started: Halt was pressed.")
 
     async def _start(self, command: Command, robot: int) -> None:
         """Start a program on a robot after stopping the one that runs there."""

@@ -110,6 +110,7 @@ class Desk:
         programs_ended: Called with the locked world when all of them have ended: a run of an exercise is over then.
         is_seen: Set when a page has shown it for the first time.
         scene: Counts up whenever a thing appears, disappears or changes its looks.
+        halt_count: How often Halt was pressed.
         outside: The programs in the world that this desk has not started.
         news: Messages to people, the newest last.
         log: These and what programs of Octave and MATLAB tell, each line with the time of day, the newest last.
@@ -151,6 +152,7 @@ class Desk:
         self.has_old_coordinates = has_old_coordinates
         self.project_of = project_of
         self.scene = 0
+        self.halt_count = 0
         self.news: RingBuffer[str] = RingBuffer(NEWS_LIMIT)
         self.log: RingBuffer[str] = RingBuffer(log_limit)
         self.outside = OutsidePrograms()
@@ -529,6 +531,7 @@ class Desk:
 
     async def halt(self) -> None:
         """Stop all programs and all robots."""
+        self.halt_count += 1
         self.check_present()
         for handle in list(self.programs.handles):
             self.programs.stop(handle)
