@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import select
 import socket
+import threading
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
@@ -294,16 +295,33 @@ def test_dead_client_does_not_delay_others(thinking: str, caplog: pytest.LogCapt
         assert not warnings(caplog)
 
 
+@contextmanager
+def flooding(client: Client, data: bytes) -> Iterator[list[int]]:
+    """Send the same data repeatedly and never read; yield a list whose one item is the number of characters sent."""
+    sent, is_over = [0], threading.Event()
+
+    def send() -> None:
+        with suppress(OSError):
+            while not is_over.is_set():
+                sent[0] += client.socket.send(data * (READ_SIZE // len(data)))
+
+    thread = threading.Thread(target=send)
+    thread.start()
+    try:
+        yield sent
+    finally:
+        is_over.set()
+        client.socket.shutdown(socket.SHUT_RDWR)
+        thread.join(GUARD_S)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("thinking", ["none", "live"])
 @pytest.mark.parametrize("data", [b"H\n", b"x", b"\n", b"\r\n"])
 def test_flooding_client_does_not_delay_others(thinking: str, data: bytes, caplog: pytest.LogCaptureFixture) -> None:
-    with clients(thinking=thinking) as (run, (one, flooder)):
-        flooder.socket.setblocking(False)
-        exchanges = sent = 0
-        while exchanges < 40 or sent < 4 * BACKLOG_LIMIT:
-            with suppress(BlockingIOError):
-                sent += flooder.socket.send(data * (READ_SIZE // len(data)))
+    with clients(thinking=thinking) as (run, (one, flooder)), flooding(flooder, data) as sent:
+        exchanges = 0
+        while exchanges < 40 or sent[0] < 4 * BACKLOG_LIMIT:
             one.send(b"N\n")
             if thinking == "live":
                 run.later(0.1)
