@@ -124,7 +124,7 @@ def test_every_figure_has_a_name_of_its_own(card):
 def run(command, *arguments):
     app = typer.Typer()
     app.command()(command)
-    return CliRunner().invoke(app, list(arguments))
+    return CliRunner(env={"COLUMNS": "100"}).invoke(app, list(arguments))
 
 
 @pytest.fixture

@@ -23,7 +23,7 @@ from kiks.fit.samples import Samples
 from kiks.model.robot import robot_toml, save_robot
 from kiks.sim.simulation import SimPort
 
-app = typer.Typer()
+app, runner = typer.Typer(), CliRunner(env={"COLUMNS": "200"})
 app.command(cls=Command)(command)
 
 BASE = kiks.RobotSpec.load("khepera")
@@ -90,7 +90,7 @@ def test_command_measures_and_writes_a_robot_file(tmp_path: Path) -> None:
     sim = kiks.Simulation(robot=hidden)
     # In the open: placed, repeated, placed, accepted. At the nearest gap: a typing error, a negative gap, then 6 mm.
     answers = ["", "y", "", "n", "six", "-1", "6", "n", *["", "n"] * 4]
-    result = CliRunner().invoke(app, ["--port", sim.url(1), "--out", str(out)], input="\n".join(answers) + "\n")
+    result = runner.invoke(app, ["--port", sim.url(1), "--out", str(out)], input="\n".join(answers) + "\n")
     assert result.exit_code == 0, result.output + repr(result.exception)
     assert "1. Put the robot in the open" in result.output
     assert "7. Put the robot before the wall, facing it squarely, its rim at the 500 mm mark." in result.output
@@ -115,7 +115,7 @@ def test_command_checks_its_options_before_it_measures(tmp_path: Path) -> None:
         (["--out", str(tmp_path / "x.toml"), "--gaps", "5"], "at least two different numbers from 2 to"),
         (["--out", str(tmp_path / "x.toml"), "--base", "kephera"], "Did you mean 'khepera'"),
     ):
-        result = CliRunner().invoke(app, ["--port", sim.url(1), "--yes", *arguments])
+        result = runner.invoke(app, ["--port", sim.url(1), "--yes", *arguments])
         assert words in str(result.exception)
     assert out.read_text() == "precious"
     assert [path.name for path in tmp_path.iterdir()] == ["mine.toml"]
@@ -124,7 +124,7 @@ def test_command_checks_its_options_before_it_measures(tmp_path: Path) -> None:
 def test_failed_calibration_writes_nothing(tmp_path: Path) -> None:
     out = tmp_path / "mine.toml"
     sim = kiks.Simulation(kiks.Arena.box(500, 650), robot=BASE.with_changes(proximity__range_mm=2.0))
-    result = CliRunner().invoke(app, ["--port", sim.url(1), "--out", str(out), "--yes"])
+    result = runner.invoke(app, ["--port", sim.url(1), "--out", str(out), "--yes"])
     assert isinstance(result.exception, CalibrationError)
     assert list(tmp_path.iterdir()) == []
 
