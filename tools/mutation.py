@@ -33,7 +33,7 @@ from typing import Any, NamedTuple
 ROOT = Path(__file__).resolve().parents[1]
 TABLE = Path(__file__).with_name("planted_faults.toml")
 
-NEAR_S, WHOLE_S = 900, 7200
+NEAR_S, WHOLE_S = 1800, 7200
 """Time limits of the near tests of a fault, and of all tests [s]: with a fault that hangs, they are over."""
 
 NEAR = ("-x", "-n", "2")
