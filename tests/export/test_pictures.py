@@ -86,7 +86,7 @@ def test_trails_show_where_everything_was(tmp_path: Path) -> None:
 
 
 def test_a_scale_bar_has_a_round_length() -> None:
-    for width_mm, text in ((99, "10 mm"), (300, "50 mm"), (1000, "200 mm"), (20_000, "2 m")):
+    for width_mm, text in ((99, "10 mm"), (300, "50 mm"), (1000, "200 mm"), (5000, "1 m"), (20_000, "2 m")):
         sign = scale_bar(width_mm, width_mm / 40)
         assert sign.text == text
         assert width_mm / 15 < sign.width_mm <= width_mm / 5
