@@ -57,9 +57,6 @@ def test_every_method(sim: kiks.Simulation) -> None:
         robot.set_profile(10, 32)
         robot.move_to(600, 400, wait=True)
         assert robot.encoders() == pytest.approx((600, 400), abs=8)
-        robot.set_profile()
-        robot.set_speed_gains()
-        robot.set_position_gains()
         robot.set_pwm(40, 40)
         assert robot.status()[1].mode == 2
         robot.led(0, 2)
@@ -130,6 +127,25 @@ def test_quantities_are_rounded_and_speeds_are_cut() -> None:
     robot.set_encoders(0.6, np.int16(7))
     robot.set_pwm(12.4, -254.7)
     assert port.sent == b"D,127,-127\nC,2,-3\nG,1,7\nP,12,-255\n"
+
+
+def test_settings_that_are_left_out_are_those_of_a_robot_at_its_start(sim: kiks.Simulation) -> None:
+    robot = kiks.Khepera(sim.port(1))
+
+    def settings() -> list[list[int]]:
+        state: Any = sim.world.state.robots[0, 0]
+        names = "profile_speed", "profile_acceleration", "speed_gains", "position_gains"
+        return [*(state[name].tolist() for name in names), list(robot.encoders())]
+
+    at_start = settings()
+    robot.set_profile(1, 2)
+    robot.set_speed_gains(1, 2, 3)
+    robot.set_position_gains(4, 5, 6)
+    robot.set_encoders(7, 8)
+    assert settings() == [[1, 1], [2, 2], [1, 2, 3], [4, 5, 6], [7, 8]]
+    for set_again in (robot.set_profile, robot.set_speed_gains, robot.set_position_gains, robot.set_encoders):
+        set_again()
+    assert settings() == at_start
 
 
 def test_the_robot_takes_the_largest_arguments_as_they_are(sim: kiks.Simulation) -> None:

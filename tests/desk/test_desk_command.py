@@ -24,6 +24,8 @@ from tests.guard import GUARD_S
 from tests.served import PROGRAMS
 from websockets.sync.client import connect
 
+from kiks.desk.screen import has_screen
+
 pytestmark = pytest.mark.slow
 DRIVE = str(PROGRAMS / "drive.py")
 KIKS = (sys.executable, "-m", "kiks")
@@ -49,6 +51,14 @@ def started(
         finally:
             with suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGKILL)
+
+
+@pytest.mark.skipif(sys.platform in ("win32", "darwin"), reason="here each process has a screen")
+@pytest.mark.parametrize("names", [(), ("DISPLAY",), ("WAYLAND_DISPLAY",), ("DISPLAY", "WAYLAND_DISPLAY")])
+def test_a_screen_of_either_kind_is_found(names: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.setenv(name, ":0" if name in names else "")
+    assert has_screen() == bool(names)
 
 
 def line_with(output: IO[str], text: str) -> str:

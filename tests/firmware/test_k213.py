@@ -2,6 +2,7 @@
 
 import math
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
@@ -134,11 +135,15 @@ def test_the_view_begins_50_mm_from_the_centre() -> None:
     assert high >= 6  # dark
 
 
-def moving(left: int, right: int) -> list[float]:
-    sim = scene((230, 480, 70, 10, 1), (300, 480, 70, 10, 255), SPECK)
+EDGE = (230, 480, 70, 10, 1), (300, 480, 70, 10, 255)
+STRIPE = (200, 480, 200, 10, 255), (280, 480, 40, 10, 1)
+
+
+def moving(left: int, right: int, bars: Any = EDGE, y_mm: int = 300) -> list[float]:
+    sim = scene(*bars, SPECK)
     kiks.Khepera(sim.port(1)).set_speed(left, right)
     sim.run(0.5)
-    sim.place(1, 300, 300, math.pi / 2)
+    sim.place(1, 300, y_mm, math.pi / 2)
     sim.run(0.03)  # then the trail knows how it moves
     return sim.image(1)
 
@@ -148,6 +153,13 @@ def test_motion_smears_and_turning_smears_more() -> None:
     assert contrast(turning) < contrast(driving) < contrast(still)
     assert contrast(turning) < 0.5 * contrast(still)
     assert contrast(moving(10, -10)) < contrast(turning)
+
+
+def test_the_side_to_which_a_robot_drives_a_curve_is_the_sharper_half_of_its_picture() -> None:
+    """Driving moves what is on the left to the left of the picture, and a left turn moves it back."""
+    to_left, to_right = (moving(*speeds, STRIPE, 400) for speeds in ((20, 24), (24, 20)))
+    assert contrast(to_left[:32]) > 1.2 * contrast(to_left[32:])
+    assert contrast(to_right[32:]) > 1.2 * contrast(to_right[:32])
 
 
 def test_pictures_are_taken_at_whole_periods() -> None:

@@ -75,6 +75,15 @@ def test_a_stroke_is_its_segments_together(stroke, width):
     assert np.array_equal(whole > 0, np.any([part > 0 for part in parts], axis=0)) or (whole > 0).all()
 
 
+def test_a_freehand_stroke_lies_on_top_of_all_that_it_crosses():
+    walls = brush.disc(brush.rectangle(FLOOR, 10, 10, 50, 90, "wood"), (80, 50), 25, 120)
+    stroke = [(0, 20), (70, 60), (110, 30)]
+    covered = brush.line(FLOOR, stroke, width_mm=6).brightness > 0
+    assert len({*walls.brightness[covered].tolist()}) == 3, "it crosses floor and both walls"
+    shown = brush.line(walls, stroke, width_mm=6, brightness=200).brightness
+    assert np.array_equal(shown, np.where(covered, 200, walls.brightness))
+
+
 def test_a_wide_arena_is_drawn_in_pieces():
     wide = Arena.from_array(np.zeros((150, 20_000), np.uint8))
     shown = brush.line(wide, [(10, 20), (19_990, 130)], width_mm=20).brightness

@@ -48,6 +48,17 @@ def test_headings_are_wrapped_at_every_door() -> None:
     assert kiks.Batch(turned, 1).state_hash(0) == Simulation(turned).state_hash()
 
 
+@pytest.mark.parametrize(("width_mm", "height_mm"), [(600, 200), (200, 600)])
+def test_a_lamp_that_is_dragged_out_of_the_arena_stays_at_its_edge(width_mm: int, height_mm: int) -> None:
+    sim = Simulation(Arena.box(width_mm, height_mm), seed=1)
+    sim.add_lamp(50, 50)
+    hands = Drags(sim)
+    hands.grab("a", "lamp", 0)
+    for x_mm, y_mm in ((0, 0), (width_mm, 0), (0, height_mm), (width_mm, height_mm)):
+        hands.move("a", 1e6 if x_mm else -1e6, 1e6 if y_mm else -1e6)
+        assert sim.lamps[0, :2].tolist() == [x_mm, y_mm]
+
+
 def test_a_heading_in_degrees_is_refused_at_every_door() -> None:
     sim, batch = Simulation(ARENA, seed=1), kiks.Batch(ARENA, 1)
     ball = sim.add_ball(100, 100)

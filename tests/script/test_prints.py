@@ -50,6 +50,21 @@ print('main')
 > main
 > timer
 > last 2.5
+=== a thread holds a lock as often after a wait at its condition as before
+import threading
+changed = threading.Condition()
+def change():
+    with changed:
+        print('changed')
+        changed.notify()
+with changed, changed, changed:
+    threading.Thread(target=change).start()
+    changed.wait()
+    print('woken')
+print('free', changed.acquire(False))
+> changed
+> woken
+> free True
 === locals, identities and names are those of each thread
 own = threading.local()
 def work(number):

@@ -65,6 +65,20 @@ def test_programs_and_what_is_typed_hear_nothing_of_each_other(waits: bool) -> N
         assert port.readline() == b"e,0,0\r\n"
 
 
+def test_a_client_that_goes_takes_its_late_commands_and_replies_with_it_and_no_typed_command() -> None:
+    sim = fresh()
+    (wire,) = sim.wires
+    wire.send(b"N\n", 0)
+    sim.run(0.02)  # its reply is on the line
+    wire.send(b"D,3,4\n" * 100, sim.now_ns)
+    (typed,) = type_lines(sim, 1, "B")
+    wire.drop_after(wire.pending[1][0], sim.now_ns)
+    assert [line for _, line, _ in wire.pending] == [b"D,3,4", b"D,3,4", b"B"]
+    assert wire.line.carry(1, sim.now_ns) == sim.now_ns, "the line is free for replies"
+    sim.run(1)
+    assert (typed.reply or "").startswith("b,")
+
+
 @pytest.mark.parametrize("text", ["", " \n ", "D,5,5 ☺", "D" * 257, "D,5\t,5"])
 def test_nonsense_is_refused_before_it_is_sent(text: str) -> None:
     sim = fresh()

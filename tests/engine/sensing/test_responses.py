@@ -77,6 +77,20 @@ def test_a_dark_wall_looks_farther(response: str) -> None:
     assert black < 0.7 * white
 
 
+@pytest.mark.parametrize("response", RESPONSES)
+def test_the_sensor_that_is_nearest_to_a_post_reads_most(response: str) -> None:
+    kind = "khepera_ii" if response == "curve" else "khepera"
+    sim = kiks.Simulation(kiks.Arena.box(600, 600), robot=RobotSpec.load(kind, response=response))
+    sim.place(1, 300, 300, 0.0)
+    post = sim.add_cylinder(100, 100, radius_mm=10)
+    from_centre_mm = sim.spec.body.radius_mm + 16
+    for sensor, angle_deg in enumerate((75, 45, 12, -12, -45, -75, -160, 160)):
+        ahead, left = math.cos(math.radians(angle_deg)), math.sin(math.radians(angle_deg))
+        sim.move_body(post, 300 + from_centre_mm * ahead, 300 + from_centre_mm * left)
+        above = np.subtract(sim.proximity(1), sim.spec.proximity.baseline_counts)
+        assert above.argmax() == sensor
+
+
 def test_a_response_is_picked_in_python_or_in_a_file(tmp_path: Path) -> None:
     save_robot(KHEPERA.with_changes(proximity__response="thesis"), tmp_path / "mine.toml")
     given = [
