@@ -11,6 +11,7 @@ import msgpack
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.ports.helpers import wheels
 from tests.served import fresh
 
 from kiks.clock.serial_timing import BACKLOG_LIMIT
@@ -144,6 +145,13 @@ def two_in_a_match() -> Iterator[tuple[Programs, Elsewhere, Elsewhere]]:
         yield programs, one, two
 
 
+def run_until_answered(programs: Programs, program: Elsewhere, count: int) -> None:
+    for _ in range(1000):
+        if len(program.answers) == count:
+            return
+        programs.round(0)
+
+
 @given(st.lists(BREACHES, max_size=12))
 def test_whatever_a_program_sends_the_world_goes_on_and_its_neighbour_is_not_touched(pieces: list[bytes]) -> None:
     with two_in_a_match() as (programs, hostile, neighbour):
@@ -156,10 +164,7 @@ def test_whatever_a_program_sends_the_world_goes_on_and_its_neighbour_is_not_tou
             Request(Kind.SEND, 2, 0, 0, 0, (b"D,3,4\n",)),
             Request(Kind.READ, 2, 0, 2, 0, (None, b"\n", None, 0)),
         )
-        for _ in range(1000):
-            programs.round(0)
-            if len(neighbour.answers) == 2:
-                break
+        run_until_answered(programs, neighbour, 2)
         assert [answer.result for answer in neighbour.answers[1:]] == [(b"d\r\n", neighbour.answers[1].now_ns)]
 
 
@@ -187,6 +192,23 @@ def test_program_that_breaks_a_rule_is_ended_and_its_reason_says_which(reason: s
         hostile.send(*requests)
         programs.round(0)
         assert (hostile.reason, hostile.has_left, hostile.has_hung_up) == (reason, True, True)
+
+
+@pytest.mark.parametrize(("is_stopped", "reason"), [(False, ""), (True, ""), (False, "it has broken a rule")])
+def test_end_of_a_program_stops_no_robot_that_another_one_has_taken_over(is_stopped: bool, reason: str) -> None:
+    with two_in_a_match() as (programs, first, second):
+        first.send(CLAIM, Request(Kind.HANG_UP, 1, 0, 0, 0, (True,)))
+        programs.round(0)
+        first.send(Request(Kind.REACHED, 0, 10**9))  # so that the world goes on without it
+        first.is_stopped, first.reason = is_stopped, reason
+        reading = Request(Kind.READ, 1, 0, 2, 0, (None, b"\n", None, 0))
+        second.send(CLAIM, Request(Kind.SEND, 1, 0, 0, 0, (b"D,3,4\n",)), reading)
+        run_until_answered(programs, second, 2)
+        first.disconnect()
+        second.send(Request(Kind.SEND, 1, 0, 0, 0, (b"B\n",)), reading)
+        run_until_answered(programs, second, 3)
+        assert [answer.result[0][:1] for answer in second.answers[1:]] == [b"d", b"b"]
+        assert wheels(programs.sim) == [3, 4]
 
 
 def test_in_a_match_no_program_takes_the_robot_of_another_one() -> None:
