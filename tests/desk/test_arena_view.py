@@ -40,6 +40,24 @@ def test_a_frame_is_read_as_it_was_written(visitor: Visitor) -> None:
     assert visitor.feed(sizes) == [64, None, 56]
 
 
+def test_between_two_frames_a_robot_turns_the_short_way_from_the_one_to_the_other(visitor: Visitor) -> None:
+    headings_rad = visitor.feed(
+        """[[0.5, 1.0], [1.0, 0.5], [3.0, -3.0]].map(([begin_rad, end_rad]) => {
+            const { constructor: Frame, buffer } = feed.frame, heading_at = 32 + 4 * 2;
+            const [before, frame] = [begin_rad, end_rad].map((heading_rad) => {
+                const copy = buffer.slice(0);
+                new DataView(copy).setFloat32(heading_at, heading_rad, true);
+                return new Frame(copy, 1000);
+            });
+            Object.assign(frame, { previous: before, interval_ms: 100 });
+            return [1000, 1050, 1100].map((now_ms) => frame.pose(0, now_ms).heading_rad);
+        })"""
+    )
+    assert headings_rad[0] == pytest.approx([0.5, 0.75, 1.0], abs=1e-6)
+    assert headings_rad[1] == pytest.approx([1.0, 0.75, 0.5], abs=1e-6)
+    assert headings_rad[2] == pytest.approx([3.0 - 2 * math.pi, -math.pi, -3.0], abs=1e-6)
+
+
 # ---- hands ----
 
 

@@ -88,6 +88,25 @@ def test_a_program_that_ran_is_saved_with_the_project_and_shown_when_that_is_ope
     expect(visitor.at("name")).to_have_value("exercise1.py")
 
 
+def test_a_program_is_not_started_when_halt_is_pressed_while_it_is_saved(
+    visitor: Visitor, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from kiks.desk.panels.programs import ProgramsPanel
+
+    command = ProgramsPanel.command
+
+    async def halted(panel: ProgramsPanel) -> object:
+        saved = await command(panel)
+        await panel._desk.halt()
+        return saved
+
+    begin_program(visitor, "late", FOR_EVER)
+    monkeypatch.setattr(ProgramsPanel, "command", halted)
+    visitor.click("run-program", told="late.py was not started: Halt was pressed.")
+    assert (visitor.desk.folder / "late.py").read_text() == FOR_EVER
+    assert visitor.desk.programs.handles == []
+
+
 def test_mistake_is_marked_as_it_is_typed_and_before_anything_runs(visitor: Visitor) -> None:
     begin_program(visitor, "wrong.py", "x = 1\nif x = 2:\n    pass\n")
     expect(visitor.at("mistake")).to_contain_text("Line 2: invalid syntax")

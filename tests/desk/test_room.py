@@ -7,6 +7,7 @@ import json
 import re
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlencode
@@ -24,8 +25,10 @@ from kiks.desk.room.entrance import Guesses, check_code
 from kiks.desk.room.names import folder_name, read_names
 from kiks.desk.room.page import open_room
 from kiks.desk.room.room import SPEED_MAX, Room
+from kiks.desk.server import fair_share
+from kiks.desk.server.access import KEY
 from kiks.desk.server.server import SERVER
-from kiks.desk.server.token import COOKIE
+from kiks.desk.server.token import COOKIE, Token
 from kiks.errors import KiksError, ParameterError
 from kiks.model.arena import Arena
 from kiks.model.exercise import Cases, Exercise
@@ -197,6 +200,28 @@ def test_a_student_who_asks_too_much_is_refused_and_a_guesser_has_to_wait(room: 
     assert answers[:10] == [403] * 10
     assert answers[-1] == 429
     assert guesser.enter("Ada") == 429
+
+
+def test_a_browser_that_goes_on_asking_too_much_is_served_at_its_rate(monkeypatch: pytest.MonkeyPatch) -> None:
+    now, served = [0.0], []
+    monkeypatch.setattr(fair_share, "Bucket", partial(fair_share.Bucket, wall_s=lambda: now[0]))
+
+    async def page(*_: object) -> None:
+        served.append(now[0])
+
+    async def refuse(message: object) -> None:
+        pass
+
+    async def ask() -> None:
+        key, share = Token(desk=1), fair_share.FairShare(page)
+        for second in range(10):
+            now[0] = float(second)
+            for _ in range(100):
+                await share({KEY: key, "type": "http", "path": f"{key.place}/desk/1"}, refuse, refuse)
+
+    asyncio.run(ask())
+    (at_once, per_s), cost = fair_share.REQUESTS, fair_share.PAGE_COST
+    assert [served.count(second) for second in range(10)] == [at_once / cost, *[per_s / cost] * 9]
 
 
 def test_wrong_codes_are_few() -> None:
