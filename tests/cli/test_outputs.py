@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -13,7 +15,7 @@ import typer
 from tests.cli.test_cli import RESULTS, WANDER
 
 from kiks.cli import app
-from kiks.cli.outputs import BEGINNINGS
+from kiks.cli.outputs import _RESULTS, BEGINNINGS, _alone
 from kiks.errors import ParameterError
 from kiks.model.arena import Arena
 from kiks.model.arena_file import save_arena
@@ -180,6 +182,19 @@ def test_the_place_of_an_output_that_is_left_out_is_checked_too(
 def test_an_option_that_has_one_value_is_given_once(line: str, option: str) -> None:
     with pytest.raises(ParameterError, match=f"{option} must be given once, but it was given 2 times"):
         told(*line.split())
+
+
+def test_results_for_a_script_are_all_that_reaches_the_output(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """What a command has printed may wait in a buffer, as it does where the output is a pipe."""
+    with open(1, "w", closefd=False) as buffered:
+        monkeypatch.setattr(sys, "stdout", buffered)
+        print("earlier")
+        with _alone(SimpleNamespace(meta={_RESULTS: {"path_mm": 5}})):
+            print("meanwhile")
+        monkeypatch.undo()
+    assert capfd.readouterr() == ('earlier\n{\n  "path_mm": 5\n}\n', "meanwhile\n")
 
 
 def test_some_options_have_several_values() -> None:
