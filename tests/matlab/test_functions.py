@@ -48,7 +48,12 @@ kStatus(ref)
 kStop(ref)  %= 0
 kiks_pause(0.5)
 kGetSpeed(ref)  %= [[0], [0]]
-kSetProfile(ref, 20, 64, 20, 64)  %= 0
+kSetProfile(ref, 5, 200, 15, 250)  %= 0
+kMoveTo(ref, -5000, 5000)  %= 0
+kiks_pause(0.5)
+kGetSpeed(ref)  %= [[-5], [15]] +- 1
+kStop(ref)  %= 0
+kiks_pause(0.5)
 kSetProfile(ref)  %= 0
 kSetEncoders(ref)  %= 0
 kMoveTo(ref, 200.4, 200.4)  %= 0
