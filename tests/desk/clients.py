@@ -1,7 +1,5 @@
 """Clients of a desk's server that are no browsers, with the token and without."""
 
-from __future__ import annotations
-
 import http.client
 from contextlib import closing
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Abuse of the desk's server: malformed requests, too many connections, misused sockets."""
 
-from __future__ import annotations
-
 import logging
 import random
 import socket

@@ -1,7 +1,5 @@
 """Access control of the desk."""
 
-from __future__ import annotations
-
 import asyncio
 import os
 import re

@@ -1,7 +1,5 @@
 """The arena view and its feed in a real browser: hands, keys, fingers, zoom, and connections."""
 
-from __future__ import annotations
-
 import math
 import re
 from pathlib import Path

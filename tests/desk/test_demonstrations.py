@@ -1,7 +1,5 @@
 """Demonstrations on a desk: their programs and supervisors come with them, where that is allowed."""
 
-from __future__ import annotations
-
 import asyncio
 import threading
 from collections.abc import Iterator

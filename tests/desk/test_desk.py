@@ -1,7 +1,5 @@
 """The desk in a real browser: time, drags and views, compared with the state of the engine."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

@@ -1,7 +1,5 @@
 """`kiks desk`, and `--desk` of the other commands."""
 
-from __future__ import annotations
-
 import os
 import re
 import signal

@@ -1,7 +1,5 @@
 """Accessibility of the desk: keyboard, screen readers, contrast, small screens, and many pages."""
 
-from __future__ import annotations
-
 import gc
 import threading
 from collections.abc import Iterator

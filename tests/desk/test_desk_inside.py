@@ -1,7 +1,5 @@
 """The desk in a real browser: the tabs beside the arena, compared with the state of the engine."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections import deque

@@ -1,7 +1,5 @@
 """The arena panel in a real browser: edits and files, compared with the engine and the folder."""
 
-from __future__ import annotations
-
 import io
 from dataclasses import replace
 from pathlib import Path

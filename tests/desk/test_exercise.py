@@ -1,7 +1,5 @@
 """An exercise on the desk: its text, its lock, and a run of it."""
 
-from __future__ import annotations
-
 import io
 import json
 import re

@@ -1,7 +1,5 @@
 """The desk films the run that it shows, and gives the film to the browser."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

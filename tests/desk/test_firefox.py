@@ -4,8 +4,6 @@ The package for that, marionette_driver, brings twelve others, needs telnetlib, 
 leaves a folder behind for each Firefox that it starts.
 """
 
-from __future__ import annotations
-
 import base64
 import json
 import shutil

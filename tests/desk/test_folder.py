@@ -1,7 +1,5 @@
 """Projects and programs of a desk: no name leads out of its folder, and invalid files are refused."""
 
-from __future__ import annotations
-
 import io
 import os
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """Frames to browsers and drags from them, over a real socket."""
 
-from __future__ import annotations
-
 import asyncio
 import gc
 import json

@@ -1,7 +1,5 @@
 """Names from outside are text on the desk, whatever they look like: in a real browser, in every panel."""
 
-from __future__ import annotations
-
 import ast
 from collections.abc import Iterator
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Drawing in a running world: edits act at once, refused edits change nothing, and all edits can be undone."""
 
-from __future__ import annotations
-
 import asyncio
 import math
 from collections.abc import Awaitable, Callable, Iterator

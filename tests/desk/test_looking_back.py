@@ -1,7 +1,5 @@
 """Looking back on a desk, without a browser: the past equals what was, and the present does not notice."""
 
-from __future__ import annotations
-
 import asyncio
 import os
 import threading

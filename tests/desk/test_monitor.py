@@ -1,7 +1,5 @@
 """The monitor in a real browser, compared with the state of the engine."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 

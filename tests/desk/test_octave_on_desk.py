@@ -1,7 +1,5 @@
 """The desk of a session in a real browser, with a real Octave at a terminal."""
 
-from __future__ import annotations
-
 import os
 import re
 import sys

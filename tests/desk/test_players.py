@@ -1,7 +1,5 @@
 """Programs on other computers that drive robots of a desk: `kiks host`, `kiks run --join` and `kiks://HOST:PORT/1`."""
 
-from __future__ import annotations
-
 import json
 import re
 import signal

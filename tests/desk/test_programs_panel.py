@@ -1,7 +1,5 @@
 """The panels of programs and of the wire in a real browser, compared with the state of the engine."""
 
-from __future__ import annotations
-
 from contextlib import closing
 from pathlib import Path
 

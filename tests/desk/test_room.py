@@ -1,7 +1,5 @@
 """A room: students come in by code and name, and nothing of one reaches another."""
 
-from __future__ import annotations
-
 import asyncio
 import json
 import re

@@ -1,7 +1,5 @@
 """A room in Chromium: three students and the lecturer, from the first click to what is handed in."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

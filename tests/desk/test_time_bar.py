@@ -1,7 +1,5 @@
 """The time bar in a real browser: what it shows is compared with the state of the engine."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

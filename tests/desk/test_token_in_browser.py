@@ -1,7 +1,5 @@
 """The token in a real browser: it leaves the address, lasts for the page, and works within a notebook's page."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Iterator
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer

@@ -1,7 +1,5 @@
 """A tournament on the desk: its games are played one after the other, with the table between them."""
 
-from __future__ import annotations
-
 from contextlib import closing
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A program tried in all cases from the desk: in the visible ones, until a person stops it, or with a message."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

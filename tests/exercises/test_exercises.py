@@ -1,7 +1,5 @@
 """The exercises that come with KiKS: a solution solves each case, a naive program earns a part, the template less."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The page of a recording: it holds what was recorded, needs no network, and plays in a browser from a file."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from html.parser import HTMLParser

@@ -1,7 +1,5 @@
 """`kiks grade` from its words to its files: good, broken and hostile programs side by side."""
 
-from __future__ import annotations
-
 import csv
 import json
 import re

@@ -1,7 +1,5 @@
 """The runner: the same outcomes on any number of workers, in any order, after a kill; no trial costs another."""
 
-from __future__ import annotations
-
 import re
 import signal
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """What is handed in: files, folders, archives of platforms; and what a stranger may put into an archive."""
 
-from __future__ import annotations
-
 import os
 import zipfile
 from pathlib import Path

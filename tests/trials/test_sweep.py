@@ -1,7 +1,5 @@
 """Sweeps: what varies, up to where a program holds, and which case is the worst."""
 
-from __future__ import annotations
-
 import pytest
 
 from kiks.errors import ParameterError

@@ -1,7 +1,5 @@
 """Tournaments: who meets whom, who has won, and a table that depends on nothing else."""
 
-from __future__ import annotations
-
 import re
 import sys
 from itertools import combinations
