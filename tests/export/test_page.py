@@ -200,7 +200,7 @@ def test_frames_keep_to_the_recording_where_the_run_differs(short: Path, monkeyp
     monkeypatch.setattr(Replay, "_apply", lambda self, it: None if it.data.startswith(b"D") else apply(self, it))
     recording = Recording(short)
     run = RunFrames(recording.log)
-    assert run.equal_count < 10
+    assert run.replay.equal_count < 10
     assert len(run.scenes) == 1
     poses = recording.table("poses")
     for second in (2, 5, 11):
