@@ -1,7 +1,5 @@
 """Clients of a desk's server that are no browsers, with the token and without."""
 
-from __future__ import annotations
-
 import http.client
 from contextlib import closing
 from dataclasses import dataclass
@@ -18,12 +16,7 @@ from kiks.desk.server.token import COOKIE
 
 @dataclass
 class Client:
-    """A browser without a person: it keeps one cookie.
-
-    Attributes:
-        cookie: The cookie.
-        home: What the addresses of its pages begin with.
-    """
+    """A browser without a person: it keeps one cookie, and its pages have addresses that begin with its home."""
 
     cookie: str = ""
     home: str = ""

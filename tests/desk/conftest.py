@@ -47,16 +47,14 @@ def playwright() -> Iterator[Playwright]:
 
 @pytest.fixture(scope="module")
 def browser(playwright: Playwright) -> Iterator[Browser]:
-    browser = playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS)
-    yield browser
-    browser.close()
+    with playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS) as browser:
+        yield browser
 
 
 @pytest.fixture
 def browser_without_3d(playwright: Playwright) -> Iterator[Browser]:
-    browser = playwright.chromium.launch(executable_path=CHROMIUM, args=[*ARGUMENTS, "--disable-3d-apis"])
-    yield browser
-    browser.close()
+    with playwright.chromium.launch(executable_path=CHROMIUM, args=[*ARGUMENTS, "--disable-3d-apis"]) as browser:
+        yield browser
 
 
 @pytest.fixture(scope="module")

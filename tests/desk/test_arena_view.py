@@ -1,7 +1,5 @@
 """The arena view and its feed in a real browser: hands, keys, fingers, zoom, and connections."""
 
-from __future__ import annotations
-
 import math
 import re
 from pathlib import Path
@@ -23,17 +21,11 @@ def test_a_frame_is_read_as_it_was_written(visitor: Visitor) -> None:
     visitor.pause()
     visitor.until(lambda: visitor.feed("feed.frame.isPaused && feed.frame.time_s") == visitor.sim.time_s)
     sim, record = visitor.sim, visitor.sim.world.state.robots[0, 1]
-    robot = visitor.feed(
-        """(({ speeds, commanded, encoders, ambient, proximity, arm, jaws, leds }) => ({
-            speeds: [...speeds], commanded: [...commanded], encoders: [...encoders], ambient: [...ambient],
-            proximity: [...proximity], arm, jaws, leds,
-        }))(feed.frame.robot(1))"""
-    )
-    assert robot["commanded"] == [3, -4]
-    assert robot["encoders"] == (record["pulse_count"] + record["counter_offset"]).tolist()
-    assert robot["leds"] == [False, True]
-    assert robot["proximity"] == sim.proximity(2, noise=True)
-    assert robot["ambient"] == pytest.approx(sim.ambient(2, noise=True))
+    counted = (record["pulse_count"] + record["counter_offset"]).tolist()
+    read = [sim.proximity(2, noise=True), pytest.approx(sim.ambient(2, noise=True))]
+    names = ["commanded", "encoders", "leds", "proximity", "ambient"]
+    robot = visitor.feed(f"{names}.map((name) => [...feed.frame.robot(1)[name]])")
+    assert robot == [[3, -4], counted, [False, True], *read]
     assert visitor.feed("feed.frame.lamp(1)") == {"x_mm": 100, "y_mm": 50, "power_w": 3, "isOn": False}
     assert visitor.feed("feed.frame.body(0)") == {"x_mm": 300, "y_mm": 100, "isGripped": False, "isLifted": False}
     sizes = "[feed.frame.camera(0).pixels.length, feed.frame.camera(1), feed.frame.rays(1).length]"
@@ -73,7 +65,7 @@ def test_a_robot_is_turned(visitor: Visitor, how: str) -> None:
     visitor.until(lambda: visitor.sim.pose(1) == pytest.approx((x_mm, y_mm, math.pi / 2), abs=0.01))
 
 
-def test_bodies_and_lamps_are_dragged_and_escape_moves_them_back(visitor: Visitor) -> None:
+def test_bodies_and_lamps_are_dragged_escape_moves_them_back_and_delete_removes_them(visitor: Visitor) -> None:
     def is_shown() -> bool:
         seen = visitor.feed("[feed.frame.body(0).x_mm, feed.frame.body(1).x_mm]")
         return bool(seen == pytest.approx(visitor.sim.bodies()["x_mm"].tolist(), abs=0.01))
@@ -85,10 +77,12 @@ def test_bodies_and_lamps_are_dragged_and_escape_moves_them_back(visitor: Visito
         visitor.pull(there_mm, place_mm)
         visitor.page.keyboard.press("Escape")
         visitor.let_go()
-    bodies = visitor.sim.bodies()
-    assert bodies["x_mm"].tolist() == pytest.approx([320, 470], abs=0.6)
-    assert bodies["y_mm"].tolist() == pytest.approx([70, 70], abs=0.6)
-    assert visitor.sim.lamps[0, :2].tolist() == pytest.approx([100, 310], abs=0.6)
+    bodies, lamp = visitor.sim.bodies(), visitor.sim.lamps[0]
+    assert [*bodies["x_mm"], *bodies["y_mm"], *lamp[:2]] == pytest.approx([320, 470, 70, 70, 100, 310], abs=0.6)
+    visitor.page.mouse.click(*visitor.on_page(320, 70))
+    visitor.page.keyboard.press("Delete")
+    visitor.until(lambda: visitor.sim.bodies()["x_mm"].tolist() == pytest.approx([470], abs=0.6))
+    assert visitor.sim.robot_count == 2
 
 
 def test_keys_select_move_and_turn_and_tab_leaves_the_view(visitor: Visitor) -> None:
@@ -166,7 +160,6 @@ def test_a_snapshot_is_a_picture_of_what_is_seen(visitor: Visitor, tmp_path: Pat
     assert re.fullmatch(r"room \dm\d\d\.\d\ds\.png", downloaded.value.suggested_filename)
     downloaded.value.save_as(tmp_path / "snapshot.png")
     box = visitor.at("arena").bounding_box()
-    assert box is not None
     with Image.open(tmp_path / "snapshot.png") as picture:
         assert picture.size == pytest.approx((box["width"], box["height"]), abs=1)
         assert len(picture.convert("RGB").getcolors(1_000_000) or ()) > 100  # not blank
@@ -185,20 +178,14 @@ def test_a_new_scene_replaces_the_old_one(visitor: Visitor) -> None:
     drawn = visitor.answer("kiksDesk.stats().solid_frames")
     wait("(drawn) => kiksDesk.stats().solid_frames > drawn + 1", arg=drawn)
     assert visitor.feed("feed.frame.scene === feed.scene.scene")
-    grown = visitor.answer("kiksDesk.stats().solid_parts") - parts
-    assert grown <= 2, "the graphics card keeps what one more robot needs, and nothing of the old scene"
+    # The graphics card keeps what one more robot needs, and nothing of the old scene.
+    assert visitor.answer("kiksDesk.stats().solid_parts") <= parts + 2
 
 
 def cut(page: Page) -> None:
     """Cut the connection of a page, whose feed is `window.feed` from now on."""
-    page.evaluate(
-        """import('kiks-desk').then(({ pageFeed }) => {
-            window.heard = [];
-            window.feed = pageFeed();
-            feed.on('connection', (now) => window.heard.push(now));
-            feed._socket.close();
-        })"""
-    )
+    page.evaluate("import('kiks-desk').then(({ pageFeed }) => { window.heard = []; window.feed = pageFeed(); })")
+    page.evaluate("{ feed.on('connection', (now) => window.heard.push(now)); feed._socket.close(); }")
 
 
 def test_a_lost_connection_is_restored(visitor: Visitor) -> None:
@@ -238,7 +225,7 @@ def test_a_hidden_page_gets_no_frames(visitor: Visitor) -> None:
         document.dispatchEvent(new Event('visibilitychange'));
     }"""
     visitor.answer(hide, True)
-    visitor.answer("import('kiks-desk').then(({ pageFeed }) => { window.feed = pageFeed(); })")
+    visitor.feed("window.feed = feed, 0")
     visitor.page.wait_for_function("() => feed._owed === 3")
     received = visitor.answer("feed.frames_received")
     visitor.answer(hide, False)

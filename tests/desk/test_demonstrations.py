@@ -1,7 +1,5 @@
 """Demonstrations on a desk: their programs and supervisors come with them, where that is allowed."""
 
-from __future__ import annotations
-
 import asyncio
 import threading
 from collections.abc import Iterator
@@ -35,21 +33,18 @@ def desk_in(folder: Path, project: Project, home: Path | None = None, *, is_free
 def test_a_demonstration_begins_with_its_program_and_supervisor_also_again_and_after_a_change(tmp_path: Path) -> None:
     with desk_in(tmp_path, Project.load(CLEAN), CLEAN.parent) as desk:
         places = desk.sim.bodies()["x_mm"].tolist()
-        assert len(places) == 12
-        assert desk.has_beginners
+        assert (len(places), desk.has_beginners) == (12, True)
         asyncio.run(desk.start_over())
         assert desk.sim.bodies()["x_mm"].tolist() == places
         asyncio.run(desk.replace(asyncio.run(desk.present_project())))
-        assert desk.sim.bodies()["x_mm"].tolist() == pytest.approx(places, abs=1e-3)
-        assert desk.has_beginners
+        assert (desk.sim.bodies()["x_mm"].tolist(), desk.has_beginners) == (pytest.approx(places, abs=1e-3), True)
         saved = asyncio.run(desk.project_to_save("mine"))
         assert (saved.supervisor, saved.robots[0].program, len(saved.arena.cylinders)) == (None, None, 12)
 
 
 def test_a_page_without_that_right_opens_the_world_alone(tmp_path: Path) -> None:
     with desk_in(tmp_path, Project.load(CLEAN), CLEAN.parent, is_free=False) as desk:
-        assert len(desk.sim.bodies()) == 0
-        assert not desk.has_beginners
+        assert (len(desk.sim.bodies()), desk.has_beginners) == (0, False)
         assert [text.partition(":")[0] for text in desk.news.since(0)[1]] == ["A program was left out"] * 2
 
 
@@ -69,9 +64,8 @@ def test_the_world_pauses_when_the_project_has_ended_and_may_go_on(how: dict[str
 
 
 def test_a_desk_that_closes_lets_its_supervisor_end(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "referee.py").write_text(
-        "def supervise(sim):\n    try:\n        yield 9.0\n    finally:\n        print('1:0')\n"
-    )
+    supervise = "def supervise(sim):\n    try:\n        yield 9.0\n    finally:\n        print('1:0')\n"
+    (tmp_path / "referee.py").write_text(supervise)
     with desk_in(tmp_path, Project(supervisor="referee.py")) as desk:
         asyncio.run(desk.start_over())
         desk.clear_away()
@@ -80,8 +74,7 @@ def test_a_desk_that_closes_lets_its_supervisor_end(tmp_path: Path, capsys: pyte
 
 
 def test_a_score_calls_a_side_by_its_robot_or_else_by_its_program(tmp_path: Path) -> None:
-    robots = (ProjectRobot(name="Reds"), *(ProjectRobot() for _ in range(3)))
-    project = Project(robots=robots)
+    project = Project(robots=(ProjectRobot(name="Reds"), *(ProjectRobot() for _ in range(3))))
     commands = [Command(tmp_path / f"{name}.py") for name in ("player", "player", "chaser")]
     desk = Desk(simulation_of(project, tmp_path), project=project, folder=tmp_path, commands=commands, is_held=True)
     assert desk.sides() == ["Reds", "player", "chaser", "robot 4"]

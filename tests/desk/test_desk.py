@@ -1,7 +1,5 @@
 """The desk in a real browser: time, drags and views, compared with the state of the engine."""
 
-from __future__ import annotations
-
 import math
 
 import pytest
@@ -18,11 +16,7 @@ def clock_text(now_ns: int) -> str:
 
 def centre_of_view(visitor: Visitor) -> tuple[float, float]:
     box = visitor.at("arena-top").bounding_box()
-    assert box is not None
     return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
-
-
-# ---- time ----
 
 
 def test_time_passes_at_the_chosen_speed(visitor: Visitor) -> None:
@@ -32,14 +26,11 @@ def test_time_passes_at_the_chosen_speed(visitor: Visitor) -> None:
     visitor.until(lambda: visitor.sim.now_ns > begun_ns + 200_000_000)
     expect(visitor.at("rate")).to_contain_text("1.0 x now")
     visitor.picture("first_picture")
-    visitor.choose("speed", "10 x")
-    visitor.until(lambda: visitor.desk.gate.speed == 10)
-    visitor.choose("speed", "full speed")
-    visitor.until(lambda: visitor.desk.gate.speed is None)
+    for text, speed in (("10 x", 10), ("0.1 x", 0.1), ("full speed", None)):
+        visitor.choose("speed", text)
+        visitor.until(lambda speed=speed: visitor.desk.gate.speed == speed)
     visitor.until(lambda: visitor.desk.shown.meter.momentary > 10)
     visitor.picture("as_fast_as_it_can")
-    visitor.choose("speed", "0.1 x")
-    visitor.until(lambda: visitor.desk.gate.speed == 0.1)
 
 
 def test_run_pause_and_step(visitor: Visitor) -> None:
@@ -83,9 +74,6 @@ def test_checkpoint_and_reset(visitor: Visitor) -> None:
     visitor.picture("reset")
 
 
-# ---- hands ----
-
-
 def test_robot_is_dragged_and_slides_along_a_wall(visitor: Visitor) -> None:
     visitor.pull((150, 200), (250, 250))
     assert visitor.until(lambda: visitor.sim.pose(1)[:2] == pytest.approx((250, 250), abs=1))
@@ -96,13 +84,7 @@ def test_robot_is_dragged_and_slides_along_a_wall(visitor: Visitor) -> None:
     visitor.picture("dragged_along_a_wall")
     visitor.let_go()
     assert visitor.is_free(1)
-    x_mm, y_mm, heading_rad = visitor.sim.pose(1)
-    assert y_mm == pytest.approx(37.5, abs=1)
-    assert x_mm == pytest.approx(150, abs=1)
-    assert heading_rad == 0
-
-
-# ---- views ----
+    assert visitor.sim.pose(1) == (pytest.approx(150, abs=1), pytest.approx(37.5, abs=1), 0)
 
 
 def test_robot_is_followed_and_layers_are_chosen(visitor: Visitor) -> None:

@@ -1,7 +1,5 @@
 """`kiks desk`, and `--desk` of the other commands."""
 
-from __future__ import annotations
-
 import os
 import re
 import signal
@@ -32,20 +30,11 @@ KIKS = (sys.executable, "-m", "kiks")
 
 
 @contextmanager
-def started(
-    *words: str, folder: Path, command: Sequence[str] = KIKS
-) -> Iterator[tuple[subprocess.Popen[str], IO[str]]]:
+def started(*words: str, folder: Path, command: Sequence[str] = KIKS) -> Iterator[tuple[subprocess.Popen, IO[str]]]:
     """Start the command; its processes end with the test."""
-    with subprocess.Popen(
-        [*command, *words],
-        start_new_session=True,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        cwd=folder,
-        env={**os.environ, "PYTHONUNBUFFERED": "1", "DISPLAY": "", "WAYLAND_DISPLAY": ""},
-    ) as process:
-        assert process.stdout is not None
+    env = {**os.environ, "PYTHONUNBUFFERED": "1", "DISPLAY": "", "WAYLAND_DISPLAY": ""}
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
+    with subprocess.Popen([*command, *words], start_new_session=True, cwd=folder, env=env, **pipes) as process:
         try:
             yield process, process.stdout
         finally:
@@ -68,10 +57,15 @@ def line_with(output: IO[str], text: str) -> str:
     raise AssertionError(f"nothing was said of {text!r}")
 
 
-def url_of(output: IO[str]) -> str:
-    found = re.search(r"http://\S+", line_with(output, "http://"))
-    assert found is not None
-    return found[0]
+def url_of(output: IO[str], scheme: str = "http") -> str:
+    return re.search(rf"{scheme}://\S+", line_with(output, f"{scheme}://"))[0]
+
+
+def stop(process: subprocess.Popen[str], told: str = "Stopped after") -> None:
+    """Press Ctrl-C, and check that the command says so and ends well."""
+    process.send_signal(signal.SIGINT)
+    assert line_with(process.stdout, told)
+    assert process.wait(GUARD_S) == 0
 
 
 @pytest.mark.parametrize("host", cases(["127.0.0.1", "0.0.0.0"]))
@@ -80,9 +74,8 @@ def test_desk_serves_a_page_to_the_token_alone_and_ends_with_ctrl_c(host: str, t
     for name in ("own", "set"):
         (tmp_path / name).mkdir()
     (tmp_path / "set" / "judge.py").write_text("def supervise(sim):\n    yield 1\n")
-    (tmp_path / "set" / "it.kiks").write_text(
-        'kiks = 1\nsupervisor = "judge.py"\n[walls]\nsize_mm = [400, 400]\n[[robot]]\n'
-    )
+    project = 'kiks = 1\nsupervisor = "judge.py"\n[walls]\nsize_mm = [400, 400]\n[[robot]]\n'
+    (tmp_path / "set" / "it.kiks").write_text(project)
     words = ("desk", "set/it.kiks", "--folder", "own", "--no-browser", "--port", "0", "--host", host)
     with started(*words, folder=tmp_path) as (process, output):
         url = url_of(output)
@@ -96,9 +89,7 @@ def test_desk_serves_a_page_to_the_token_alone_and_ends_with_ctrl_c(host: str, t
             assert answer.status == 200
             assert "token" not in answer.url
             assert b"KiKS" in answer.read()
-        process.send_signal(signal.SIGINT)
-        assert line_with(output, "Stopped after")
-        assert process.wait(GUARD_S) == 0
+        stop(process)
 
 
 def test_run_with_a_desk_equals_run_without(tmp_path: Path) -> None:
@@ -134,10 +125,8 @@ def test_programs_begin_when_a_page_shows_the_world(words: tuple[str, ...], tmp_
         if words[0] == "run":
             assert line_with(output, "1.000 s simulated")
             assert (tmp_path / "begun").exists()
-        process.send_signal(signal.SIGINT)
         # The last state stays until a person lets the world go on.
-        assert line_with(output, "Stopped after 1.0 s" if words[0] == "run" else "Stopped after")
-        assert process.wait(GUARD_S) == 0
+        stop(process, "Stopped after 1.0 s" if words[0] == "run" else "Stopped after")
 
 
 @at_length
@@ -145,19 +134,14 @@ def test_programs_begin_when_a_page_shows_the_world(words: tuple[str, ...], tmp_
 def test_ctrl_c_ends_waiting_for_a_page(words: tuple[str, ...], tmp_path: Path) -> None:
     with started(*words, folder=tmp_path) as (process, output):
         assert line_with(output, "The run begins when a page shows it")
-        process.send_signal(signal.SIGINT)
-        assert line_with(output, "Stopped after 0.0 s")
-        assert process.wait(GUARD_S) == 0
+        stop(process, "Stopped after 0.0 s")
 
 
 @pytest.mark.parametrize("name", cases(["soccer", "avoid"]))
 def test_demonstration_on_a_desk(name: str, tmp_path: Path) -> None:
     words, opener = ("demo", name, "--desk", "--no-wait"), build_opener(HTTPCookieProcessor())
-    with (
-        started(*words, folder=tmp_path, command=kiks_command()) as (_, output),
-        opener.open(url_of(output), timeout=GUARD_S) as answer,
-    ):
-        assert answer.status == 200
+    with started(*words, folder=tmp_path, command=kiks_command()) as (_, output):
+        assert opener.open(url_of(output), timeout=GUARD_S).status == 200
 
 
 @pytest.mark.parametrize("thinking", cases(["live", "none"]))
@@ -167,14 +151,10 @@ def test_served_robots_on_a_desk(thinking: str, tmp_path: Path) -> None:
     words = ("serve", "--desk", "--thinking", thinking, "--tcp", "0", "--no-pty")
     with started(*words, folder=tmp_path) as (process, output):
         url_of(output)
-        found = re.search(r"socket://\S+", line_with(output, "socket://"))
-        assert found is not None
-        with serial.serial_for_url(found[0], timeout=GUARD_S) as port:
+        with serial.serial_for_url(url_of(output, "socket"), timeout=GUARD_S) as port:
             port.write(b"H\n")
             assert port.readline() == b"h,0,0\r\n"
-        process.send_signal(signal.SIGINT)
-        assert line_with(output, "Stopped after")
-        assert process.wait(GUARD_S) == 0
+        stop(process)
 
 
 @pytest.mark.parametrize(
@@ -192,9 +172,7 @@ def test_served_robots_on_a_desk(thinking: str, tmp_path: Path) -> None:
         4,
     ),
 )
-def test_errors_are_one_clear_line_before_a_page_is_waited_for(
-    words: tuple[str, ...], message: str, tmp_path: Path
-) -> None:
+def test_errors_are_one_clear_line_before_a_page_is_waited_for(words: tuple, message: str, tmp_path: Path) -> None:
     command = ("run", "--desk") if words[0] == "run" else ("desk", "--no-browser", "--port", "0", words[0])
     result = forked.run(*command, *words[1:], cwd=tmp_path)
     assert result.returncode == 2
@@ -211,9 +189,7 @@ def test_a_recording_is_shown_from_a_time_on(tmp_path: Path) -> None:
         url = url_of(output)
         assert line_with(output, "The run begins when a page shows it")
         show_page(url)
-        process.send_signal(signal.SIGINT)
-        assert line_with(output, "Stopped after")
-        assert process.wait(GUARD_S) == 0
+        stop(process)
     late = forked.run("replay", "run.mcap", "--start", "99", cwd=tmp_path)
     assert late.returncode == 2
     assert "time_s must be from 0 to" in late.stderr

@@ -1,18 +1,14 @@
 """Accessibility of the desk: keyboard, screen readers, contrast, small screens, and many pages."""
 
-from __future__ import annotations
-
 import gc
 import threading
 from collections.abc import Iterator
 
 import pytest
 from tests.at_length import at_length, cases, share
-from tests.desk.visitor import COLOURS, NewPage, Shown, Visitor, check_access, check_reach, expect
+from tests.desk.visitor import COLOURS, INSIDE, NewPage, Shown, Visitor, check_access, check_reach, expect
 
 pytestmark = pytest.mark.slow
-
-TABS = ("robot", "wire", "arena", "programs", "settings")
 
 FOCUS = """() => {
     const each = document.activeElement, style = getComputedStyle(each);
@@ -69,7 +65,7 @@ def test_axe_finds_nothing_serious(visitor: Visitor) -> None:
     for theme, rules in (("Light", None), ("Dark", share(COLOURS, None))):
         visitor.choose("dark", theme)
         expect(visitor.page.locator("body.body--dark .kiks-arena.kiks-dark")).to_have_count(int(theme == "Dark"))
-        for tab in TABS:
+        for tab in INSIDE:
             visitor.tab(tab)
             visitor.page.mouse.move(5, 400)
             if tab == "robot":
@@ -107,7 +103,7 @@ def test_readers_of_screens_hear_what_happens(visitor: Visitor) -> None:
 )
 def test_fingers_reach_everything_on_small_screens(new_page: NewPage, shown: Shown, width: int, height: int) -> None:
     visitor = Visitor(new_page(width, height, has_touch=True, is_mobile=True), shown)
-    for tab in TABS:
+    for tab in INSIDE:
         visitor.tab(tab)
         visitor.picture(f"{tab}_{width}x{height}")
         assert visitor.answer("document.documentElement.scrollWidth") == width
@@ -129,7 +125,7 @@ def test_closed_pages_leave_nothing_behind(new_page: NewPage, shown: Shown) -> N
     page = new_page()
     for _ in range(share(2, 4)):
         visitor = Visitor(page, shown)
-        for tab in TABS:
+        for tab in INSIDE:
             visitor.tab(tab)
     page.goto("about:blank")
     visitor.until(lambda: not any(client.has_socket_connection for client in Client.instances.values()))
@@ -154,6 +150,5 @@ def forget_all() -> None:
             client.delete()
         done.set()
 
-    assert SERVER._loop is not None
     SERVER._loop.call_soon_threadsafe(forget)
     assert done.wait(20)

@@ -1,8 +1,7 @@
 """The arena panel in a real browser: edits and files, compared with the engine and the folder."""
 
-from __future__ import annotations
-
 import io
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -36,6 +35,12 @@ def click(visitor: Visitor, x_mm: float, y_mm: float) -> None:
     visitor.page.mouse.click(*visitor.on_page(x_mm, y_mm))
 
 
+def use(visitor: Visitor, tool: str, *places: tuple[float, float]) -> None:
+    """Click a place with a tool, or draw with it from one place to another."""
+    visitor.take(tool)
+    click(visitor, *places[0]) if len(places) == 1 else visitor.drag(*places)
+
+
 def wait_for_step(visitor: Visitor, *, undo: bool = True, redo: bool = False) -> None:
     for name, is_there in (("undo", undo), ("redo", redo)):
         expect(visitor.at(name)).to_be_enabled(enabled=is_there)
@@ -47,8 +52,7 @@ def test_walls_are_drawn_and_undone(visitor: Visitor) -> None:
     def brightness(x_mm: int, y_mm: int) -> int:
         return int(desk.sim.arena.brightness[y_mm, x_mm])
 
-    visitor.take("rectangle")
-    visitor.drag((250, 250), (330, 330))
+    use(visitor, "rectangle", (250, 250), (330, 330))
     wait_for_step(visitor)
     visitor.until(lambda: brightness(290, 290) == 255)
     visitor.choose("material", "wood")
@@ -56,23 +60,17 @@ def test_walls_are_drawn_and_undone(visitor: Visitor) -> None:
     visitor.pull((400, 100), (450, 200))
     page.mouse.move(*visitor.on_page(520, 150), steps=8)
     visitor.let_go()
-    visitor.take("line")
-    visitor.drag((400, 400), (550, 400))
-    visitor.take("erase")
-    visitor.drag((290, 200), (290, 400))
-    visitor.take("ball")
-    click(visitor, 150, 400)
-    visitor.take("lamp")
-    click(visitor, 50, 300)
+    use(visitor, "line", (400, 400), (550, 400))
+    use(visitor, "erase", (290, 200), (290, 400))
+    use(visitor, "ball", (150, 400))
+    use(visitor, "lamp", (50, 300))
     visitor.until(lambda: len(desk.sim.lamps) == 1)
     visitor.picture("arena_drawn")
     assert (brightness(450, 200), brightness(475, 400), brightness(290, 290)) == (190, 190, 0)
     assert len(desk.sim.bodies()) == 1
-    visitor.take("remove")
-    click(visitor, 150, 405)
+    use(visitor, "remove", (150, 405))
     visitor.until(lambda: len(desk.sim.bodies()) == 0)
-    visitor.take("rectangle")
-    visitor.drag((100, 100), (140, 140))
+    use(visitor, "rectangle", (100, 100), (140, 140))
     visitor.told("robot 1")
     visitor.picture("arena_refused")
     assert brightness(120, 120) == 0
@@ -102,11 +100,9 @@ def test_strokes_snap_to_the_grid_end_at_the_arena_and_are_dropped_with_escape(v
     visitor.page.mouse.up()
     visitor.drag((400, 300), (620, 300))
     wait_for_step(visitor)
-    visitor.take("rectangle")
-    visitor.drag((198, 382), (263, 417))
+    use(visitor, "rectangle", (198, 382), (263, 417))
     visitor.until(lambda: np.array_equal(desk.sim.arena.brightness, walls))
-    visitor.take("ball")
-    click(visitor, 303, 198)
+    use(visitor, "ball", (303, 198))
     visitor.until(lambda: desk.sim.bodies()["x_mm"].tolist() == [300])
 
 
@@ -117,14 +113,12 @@ def test_worlds_are_created_saved_and_opened(visitor: Visitor) -> None:
     visitor.picture("arena_new")
     visitor.at("dialog-yes").click()
     visitor.until(lambda: desk.sim.arena.width_mm == 700)
-    visitor.take("robot")
-    click(visitor, 400, 300)
+    use(visitor, "robot", (400, 300))
     visitor.until(lambda: desk.sim.robot_count == 2)
     for bad, words in (("../out", "folder"), ("/etc/out", "folder"), ("con", "device")):
         visitor.at("save-name").fill(bad)
         visitor.click("save", told=words)
-    visitor.take("hand")
-    visitor.drag(desk.sim.pose(2)[:2], (500, 350))
+    use(visitor, "hand", desk.sim.pose(2)[:2], (500, 350))
     poses = desk.sim.poses()
     saved = visitor.save_as("mine")
     assert [path.name for path in desk.folder.iterdir()] == ["mine.kiks"]
@@ -158,24 +152,23 @@ def test_files_are_uploaded(visitor: Visitor) -> None:
         visitor.until(fact)
     chooser.set_input_files({"name": "c.kad", "mimeType": "text/plain", "buffer": b"nothing"})
     visitor.told("level 5")
-    assert desk.sim.arena.width_mm == 450
-    assert list(desk.folder.iterdir()) == []
+    assert (desk.sim.arena.width_mm, [*desk.folder.iterdir()]) == (450, [])
 
 
 def test_properties_are_set_by_a_double_click(visitor: Visitor) -> None:
     desk = visitor.desk
 
-    def put(name: str, text: str) -> None:
+    def put(name: str, text: str, fact: Callable[[], bool]) -> None:
         visitor.at(f"property-{name}").fill(text)
         visitor.at(f"property-{name}").press("Enter")
+        visitor.until(fact)
 
     def double(x_mm: float, y_mm: float) -> None:
         visitor.page.mouse.dblclick(*visitor.on_page(x_mm, y_mm))
 
     expect(visitor.at("properties")).to_contain_text("Double-click a robot")
     for tool, place in (("lamp", (300, 300)), ("ball", (450, 150))):
-        visitor.take(tool)
-        click(visitor, *place)
+        use(visitor, tool, place)
         wait_for_step(visitor)
     visitor.take("disc")
     visitor.pull((200, 400), (230, 400))
@@ -184,31 +177,25 @@ def test_properties_are_set_by_a_double_click(visitor: Visitor) -> None:
     visitor.take("hand")
     double(300, 300)
     expect(visitor.at("properties")).to_contain_text("Lamp")
-    put("power_w", "2.5")
-    visitor.until(lambda: desk.sim.lamps[0, 2] == 2.5)
-    put("power_w", "-1")
-    expect(visitor.at("refused")).to_contain_text("power_w must be greater than 0, but it was -1")
-    put("power_w", "4")
-    visitor.until(lambda: desk.sim.lamps[0, 2] == 4)
+    put("power_w", "2.5", lambda: desk.sim.lamps[0, 2] == 2.5)
+    refusal = "power_w must be greater than 0, but it was -1"
+    put("power_w", "-1", lambda: refusal in visitor.at("refused").inner_text())
+    put("power_w", "4", lambda: desk.sim.lamps[0, 2] == 4)
     expect(visitor.at("refused")).to_have_text("")
     visitor.at("property-is_on").click()
     visitor.until(lambda: desk.sim.lamps[0, 3] == 0)
     click(visitor, 450, 150)
     expect(visitor.at("properties")).to_contain_text("Ball")
-    put("radius_mm", "20")
-    visitor.until(lambda: desk.sim.bodies()["radius_mm"].tolist() == [20])
+    put("radius_mm", "20", lambda: desk.sim.bodies()["radius_mm"].tolist() == [20])
     click(visitor, 200, 400)
     expect(visitor.at("property-disc_mm")).to_have_value("200, 400")
     visitor.picture("properties_of_a_wall")
-    put("disc_mm", "220, 400")
-    visitor.until(lambda: desk.sim.arena.walls == (Wall(disc_mm=(220, 400), radius_mm=30),))
+    put("disc_mm", "220, 400", lambda: desk.sim.arena.walls == (Wall(disc_mm=(220, 400), radius_mm=30),))
     visitor.tab("robot")
     double(120, 120)
     expect(visitor.at("property-name")).to_be_focused()
-    put("name", "Ada")
-    visitor.until(lambda: desk.names() == ["Ada"])
-    put("heading_deg", "90")
-    visitor.until(lambda: desk.sim.pose(1)[2] == pytest.approx(np.pi / 2))
+    put("name", "Ada", lambda: desk.names() == ["Ada"])
+    put("heading_deg", "90", lambda: desk.sim.pose(1)[2] == pytest.approx(np.pi / 2))
     visitor.picture("properties")
     visitor.page.keyboard.press("Escape")
     visitor.click("close-properties", "undo")

@@ -1,7 +1,5 @@
 """An exercise on the desk: its text, its lock, and a run of it."""
 
-from __future__ import annotations
-
 import io
 import json
 import re
@@ -45,14 +43,11 @@ with serial.Serial("/dev/ttyUSB0", 9600, timeout=1) as port:
 
 def make_exercise() -> Project:
     """Return an exercise in which a robot drives to a lamp, with two seeds and a hidden one."""
-    arena = Arena.box(800, 400)
-    return Project(
-        Arena(arena.brightness, arena.mm_per_cell, "room", starts=(Pose(100, 200, 0.0),), lamps=(Lamp(700, 200),)),
-        seconds=20.0,
-        cases=(Cases(seed=(1, 2)), Cases("hidden", is_hidden=True)),
-        goal=Goal("Reach the lamp", solved="light_mm < 120", failed="contacts > 0", points="10 * is_solved"),
-        exercise=Exercise("To the lamp", text=TEXT, template=DRIVE.replace("30,30", "0,0")),
-    )
+    box, cases = Arena.box(800, 400), (Cases(seed=(1, 2)), Cases("hidden", is_hidden=True))
+    arena = Arena(box.brightness, box.mm_per_cell, "room", starts=(Pose(100, 200, 0.0),), lamps=(Lamp(700, 200),))
+    goal = Goal("Reach the lamp", solved="light_mm < 120", failed="contacts > 0", points="10 * is_solved")
+    exercise = Exercise("To the lamp", text=TEXT, template=DRIVE.replace("30,30", "0,0"))
+    return Project(arena, seconds=20.0, cases=cases, goal=goal, exercise=exercise)
 
 
 def test_text_loads_and_runs_nothing_and_takes_no_time() -> None:
@@ -80,21 +75,17 @@ def test_exercise_is_read_solved_tried_and_handed_in(visitor: Visitor, tmp_path:
     visitor.at("hint").click()
     expect(hint).to_be_visible()
     assert visitor.page.title() == "KiKS"
-    assert visitor.desk.is_paused
-    assert visitor.sim.now_ns == 0
+    assert (visitor.desk.is_paused, visitor.sim.now_ns) == (True, 0)
 
     visitor.tab("programs")
     expect(visitor.page.locator(".cm-content")).to_contain_text("D,0,0")
-    visitor.write(DRIVE.replace("sleep(5)", "sleep(0.4)"))
-    visitor.at("run-program").click()
-    expect(visitor.at("board-result")).to_contain_text("not solved after 0.4")
-    visitor.told("All programs have ended. Goal not solved")
-    visitor.write(DRIVE)
-    visitor.at("run-program").click()
-    expect(visitor.at("board-result")).to_contain_text("solved after 2.")
+    for text, result in ((DRIVE.replace("sleep(5)", "sleep(0.4)"), "not solved after 0.4"), (DRIVE, "solved after 2.")):
+        visitor.write(text)
+        visitor.click("run-program", shows={"board-result": result})
+        if text != DRIVE:
+            visitor.told("All programs have ended. Goal not solved")
     expect(visitor.at("board-points")).to_have_text("10 points")
-    assert (tmp_path / "to_the_lamp.py").read_text() == DRIVE
-    assert visitor.desk.is_paused
+    assert ((tmp_path / "to_the_lamp.py").read_text(), visitor.desk.is_paused) == (DRIVE, True)
 
     visitor.click("tab-exercise", "try-all")
     expect(visitor.at("tries-state")).to_have_text("2 of 2 solved, 10 points.")
@@ -110,10 +101,9 @@ def test_exercise_is_read_solved_tried_and_handed_in(visitor: Visitor, tmp_path:
     file = download.value.path().read_bytes()
     assert download.value.suggested_filename == "to_the_lamp.zip"
     with zipfile.ZipFile(io.BytesIO(file)) as archive:
-        assert archive.read(PROGRAM) == DRIVE.encode()
-        assert json.loads(archive.read(SCORE))["points"] == 10
+        assert (archive.read(PROGRAM), json.loads(archive.read(SCORE))["points"]) == (DRIVE.encode(), 10)
         assert archive.read(PAGE).startswith(b"<!DOCTYPE html>")
-    given: list[tuple[str, bytes]] = []
+    given = []
     visitor.desk.hand_in = lambda data, name: given.append((name, data))
     visitor.click("hand-in", told="Handed in: 2 of 2 solved")
     assert given == [("to_the_lamp.zip", file)]
@@ -137,6 +127,12 @@ def test_formulas_of_the_page_can_be_judged() -> None:
     sim = simulation_of(replace(make_project(), seconds=1.0))
     for formula in formulas:
         Judge(sim, Goal(solved=formula))
+
+
+def open_file(visitor: Visitor, typed: str, name: str) -> None:
+    visitor.at("open-name").fill(typed)
+    visitor.page.locator(".q-menu .q-item").get_by_text(name).click()
+    visitor.at("open").click()
 
 
 @pytest.mark.slow
@@ -171,15 +167,12 @@ def test_lecturer_saves_a_world_as_an_exercise_and_opens_it(visitor: Visitor, tm
     visitor.click("dialog-yes", told="Saved as find.kiks and find-students.kiks.")
 
     made = Project.load(tmp_path / "find.kiks")
-    assert made.goal is not None
     assert made.exercise == Exercise("Find it", text=TEXT, template=DRIVE)
     assert (made.goal.solved, made.seconds) == ("light_mm < 80", 30)
     assert [len(cases_of([each])) for each in made.cases] == [40, 2]
     assert Project.load(tmp_path / "find-students.kiks").cases == made.cases[:1]
 
-    visitor.at("open-name").fill("find-s")
-    visitor.page.locator(".q-menu .q-item").get_by_text("find-students.kiks").click()
-    visitor.at("open").click()
+    open_file(visitor, "find-s", "find-students.kiks")
     expect(visitor.page.get_by_role("heading", name="Find it")).to_be_visible()
     visitor.tab("arena")
     visitor.click("save-exercise", told="it is locked")
@@ -189,7 +182,5 @@ def test_lecturer_saves_a_world_as_an_exercise_and_opens_it(visitor: Visitor, tm
     folder.mkdir()
     made.for_students().save(folder / "exercise.kiks")
     (folder / "text.md").write_text("Here is **another** text.")
-    visitor.at("open-name").fill("third")
-    visitor.page.locator(".q-menu .q-item").get_by_text("third/exercise.kiks").click()
-    visitor.at("open").click()
+    open_file(visitor, "third", "third/exercise.kiks")
     expect(visitor.at("exercise-text")).to_contain_text("Here is another text.")

@@ -4,8 +4,6 @@ The package for that, marionette_driver, brings twelve others, needs telnetlib, 
 leaves a folder behind for each Firefox that it starts.
 """
 
-from __future__ import annotations
-
 import base64
 import json
 import shutil
@@ -41,11 +39,7 @@ PROGRAM = """import serial; print(serial.Serial("/dev/ttyUSB0").write(b"D,3,3\\n
 
 
 class Firefox:
-    """A Firefox without a window.
-
-    Args:
-        profile: An empty folder for its settings.
-    """
+    """A Firefox without a window, which keeps its settings in an empty folder."""
 
     def __init__(self, profile: Path) -> None:
         (profile / "user.js").write_text('user_pref("marionette.port", 0);')
@@ -114,7 +108,7 @@ class Firefox:
     def faults(self) -> list[str]:
         """Return the errors of pages, which are on the console of the browser."""
         self.tell("Marionette:SetContext", value="chrome")
-        found: list[str] = self.tell("WebDriver:ExecuteScript", script=FAULTS, args=[])
+        found = self.tell("WebDriver:ExecuteScript", script=FAULTS, args=[])
         self.tell("Marionette:SetContext", value="content")
         return found
 

@@ -1,11 +1,10 @@
 """Projects and programs of a desk: no name leads out of its folder, and invalid files are refused."""
 
-from __future__ import annotations
-
 import io
-import os
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -15,16 +14,9 @@ from hypothesis import strategies as st
 from PIL import Image
 from tests.at_length import share
 
+from kiks.desk.server import scripts
 from kiks.desk.server.folder import LISTED_MAX, OPENED, Folder, decode, encode
-from kiks.desk.server.scripts import (
-    EXAMPLES,
-    ProgramFolder,
-    encode_script,
-    find_mistake,
-    offered,
-    read_script,
-    split_arguments,
-)
+from kiks.desk.server.scripts import ProgramFolder, encode_script, find_mistake, offered, read_script
 from kiks.errors import ArenaError, KiksError, ParameterError
 from kiks.model.arena import Arena, Lamp
 from kiks.model.limits import PROGRAM_BYTES_MAX, UPLOAD_BYTES_MAX
@@ -59,11 +51,9 @@ def home(tmp_path: Path) -> Path:
 def test_names_outside_the_folder_are_refused(home):
     folder, before = Folder(home), {*home.parent.rglob("*")}
     for name in BAD_NAMES:
-        for each in (name, f"{name}/x.kiks"):
+        for each, act in product((name, f"{name}/x.kiks"), (read, partial(save, may_replace=True))):
             with pytest.raises(KiksError):
-                save(folder, each, may_replace=True)
-            with pytest.raises(KiksError):
-                read(folder, each)
+                act(folder, each)
         assert {*home.parent.rglob("*")} <= before, name
 
 
@@ -80,16 +70,13 @@ def test_random_names_stay_in_the_folder(tmp_path_factory, name):
 
 
 def test_links_do_not_lead_out(home):
-    os.symlink(home.parent, home / "up")
-    os.symlink(home.parent / "secret.kiks", home / "secret.kiks")
-    os.symlink(home.parent / "secret.kiks", home / "link.py")
-    os.symlink(home / "loop", home / "loop")
-    folder = Folder(home)
+    folder, secret = Folder(home), home.parent / "secret.kiks"
+    for name, place in {"up": home.parent, "secret.kiks": secret, "link.py": secret, "loop": home / "loop"}.items():
+        (home / name).symlink_to(place)
     for name in ("up/secret.kiks", "secret.kiks", "up/new.kiks"):
-        with pytest.raises(ParameterError, match="elsewhere"):
-            read(folder, name)
-        with pytest.raises(ParameterError, match="elsewhere"):
-            save(folder, name, may_replace=True)
+        for act in (read, partial(save, may_replace=True)):
+            with pytest.raises(ParameterError, match="elsewhere"):
+                act(folder, name)
     with pytest.raises(ParameterError, match="leads elsewhere"):
         read_script(home / "link.py")
     assert folder.names() == []
@@ -101,14 +88,12 @@ def test_files_are_kept_and_listed(home):
     (home / "sub").mkdir()
     (home / "b.txt").write_text("")
     (home / ".hidden.kiks").write_text("")
-    assert save(folder, " room ", project) == "room.kiks"
-    assert save(folder, "sub/other.kiks", project) == "sub/other.kiks"
-    assert save(folder, "old.KAD", project) == "old.KAD"
+    names = " room ", "sub/other.kiks", "old.KAD"
+    assert [save(folder, name, project) for name in names] == ["room.kiks", *names[1:]]
     assert folder.names() == ["old.KAD", "room.kiks", "sub/other.kiks"]
     assert read(folder, "room.kiks").to_bytes() == project.to_bytes()
     assert read(folder, "old.KAD").arena.width_mm == 300
-    assert folder.question("room") == "room.kiks exists. Replace it?"
-    assert folder.question("rooms") == ""
+    assert (folder.question("room"), folder.question("rooms")) == ("room.kiks exists. Replace it?", "")
     with pytest.raises(ParameterError, match="exists"):
         save(folder, "room", project)
     save(folder, "room", replace(project, seed=6), may_replace=True)
@@ -148,8 +133,7 @@ def test_long_lists_are_cut_and_a_folder_has_at_most_so_many_files(home):
         folder.save(b"1", "c", "a program")
     for number in range(LISTED_MAX + 20):
         (home / f"{number}.kiks").touch()
-    assert len(Folder(home).names()) == LISTED_MAX
-    assert Folder(home / "none").names() == []
+    assert (len(Folder(home).names()), Folder(home / "none").names()) == (LISTED_MAX, [])
 
 
 def test_uploads_become_projects_or_are_refused():
@@ -163,8 +147,7 @@ def test_uploads_become_projects_or_are_refused():
         ("a.png", picture.getvalue(), 150),
     ]:
         arena = decode(name, data).arena
-        assert arena.width_mm == width_mm
-        assert arena.name in ("a", "box")
+        assert (arena.width_mm, arena.name in ("a", "box")) == (width_mm, True)
     for name, data, words in [
         ("a.exe", b"", "end in"),
         ("", b"", "name of a file"),
@@ -217,26 +200,22 @@ def test_syntax_errors_have_their_line_and_their_place_in_it() -> None:
     ):
         for text in texts:
             mistake = find_mistake(text)
-            assert mistake is not None
             assert mistake.line == line, text[:99]
             assert str(mistake).startswith(f"Line {line}: ")
-    text = "# größer 🤖\nif größe = 2:\n    pass\n"
-    mistake = find_mistake(text)
-    assert mistake is not None
+    mistake = find_mistake(text := "# größer 🤖\nif größe = 2:\n    pass\n")
     assert text[mistake.begin : mistake.end] == "größe = 2"
-    for script in EXAMPLES.glob("[!_]*.py"):
+    for script in scripts.EXAMPLES.glob("[!_]*.py"):
         assert not find_mistake(read_script(script))
 
 
 @given(st.text(max_size=200))
 def test_any_text_is_a_program_or_has_a_mistake(text: str) -> None:
-    mistake = find_mistake(text)
-    if mistake is not None:
+    if (mistake := find_mistake(text)) is not None:
         assert 0 <= mistake.begin <= mistake.end <= len(text)
         assert 1 <= mistake.line <= text.count("\n") + 1
 
 
 def test_arguments_are_words() -> None:
-    assert split_arguments("""1 "two words" -x 'it'""") == ["1", "two words", "-x", "it"]
+    assert scripts.split_arguments("""1 "two words" -x 'it'""") == ["1", "two words", "-x", "it"]
     with pytest.raises(ParameterError, match=r"no closing quotation. Close the quotes"):
-        split_arguments("'it")
+        scripts.split_arguments("'it")

@@ -1,14 +1,13 @@
 """Frames to browsers and drags from them, over a real socket."""
 
-from __future__ import annotations
-
 import asyncio
 import gc
 import json
 import struct
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
+from dataclasses import dataclass, field
 from typing import Any
 
 import pytest
@@ -30,26 +29,24 @@ def shown() -> Iterator[Shown]:
     sim.place(1, 100, 100, 0)
     sim.place(2, 300, 100, 0)
     sim.add_lamp(50, 350)
-    shown = show(sim, port=0, browser=False)
-    yield shown
-    shown.close()
+    with closing(show(sim, port=0, browser=False)) as shown:
+        yield shown
 
 
+@dataclass
 class Browser:
     """A browser without a screen."""
 
-    def __init__(self, socket: ClientConnection) -> None:
-        self.socket = socket
-        self.told: dict[str, dict[str, Any]] = {}
+    socket: ClientConnection
+    told: dict[str, dict[str, Any]] = field(default_factory=dict)
 
     def say(self, kind: str, **words: object) -> None:
         self.socket.send(json.dumps({"kind": kind, **words}))
 
     def hear(self) -> bytes | dict[str, Any]:
-        message = self.socket.recv(GUARD_S)
-        if isinstance(message, bytes):
+        if isinstance(message := self.socket.recv(GUARD_S), bytes):
             return message
-        told: dict[str, Any] = json.loads(message)
+        told = json.loads(message)
         self.told[told["kind"]] = told
         return told
 
@@ -96,8 +93,7 @@ def test_scene_comes_before_its_frames(shown: Shown) -> None:
         browser.hear()
         first = browser.told["scene"]["scene"]
         frame = browser.frame()
-        assert struct.unpack_from("<I", frame, 4)[0] == first
-        assert pose(frame) == (100, 100, 0)
+        assert (struct.unpack_from("<I", frame, 4)[0], pose(frame)) == (first, (100, 100, 0))
         shown.desk.sim.add_ball(500, 300)
         browser.wait_for(lambda frame: struct.unpack_from("<I", frame, 4)[0] > first)
         assert [body["what"] for body in browser.told["scene"]["bodies"]] == ["ball"]
@@ -105,10 +101,9 @@ def test_scene_comes_before_its_frames(shown: Shown) -> None:
 
 def test_a_browser_without_acknowledgements_gets_three_frames(shown: Shown) -> None:
     with browsing(shown) as sleeper, browsing(shown) as other:
-        got = []
-        while len(got) < IN_FLIGHT:
-            heard = sleeper.hear()
-            got += [heard] if isinstance(heard, bytes) else []
+        count = 0
+        while count < IN_FLIGHT:
+            count += isinstance(sleeper.hear(), bytes)
         for _ in range(10):
             other.frame()
         with pytest.raises(TimeoutError):
@@ -121,7 +116,7 @@ def test_a_browser_that_does_not_read_is_disconnected() -> None:
     viewer = Viewer("somebody")
     for _ in range(100):
         viewer.tell({})
-    asyncio.run(viewer.send_all(None))  # type: ignore[arg-type]
+    asyncio.run(viewer.send_all(None))
 
 
 def test_drags_move_things_in_the_engine_also_from_two_browsers_at_once(shown: Shown) -> None:
@@ -164,8 +159,7 @@ def test_of_the_moves_of_a_page_only_the_newest_counts(monkeypatch: pytest.Monke
         await gateway._obey(viewer, '{"kind": "drop"}')
 
     asyncio.run(drag())
-    assert moves == [299]
-    assert sim.pose(1) == pytest.approx((299, 200, 1.0))
+    assert (moves, sim.pose(1)) == ([299], pytest.approx((299, 200, 1.0)))
     desk.close()
 
 
@@ -208,8 +202,7 @@ def test_a_seek_shows_the_past_and_all_browsers_are_told(shown: Shown) -> None:
                 assert (bar["is_past"], bar["begin_s"], bar["end_s"]) == (True, 0.0, 2.0)
         one.say("grab", what="robot", index=0)
         assert "which cannot be changed" in one.error()
-    assert shown.desk.present.sim is sim
-    assert sim.now_ns == 2_000_000_000
+    assert (shown.desk.present.sim is sim, sim.now_ns) == (True, 2_000_000_000)
 
 
 def course(sim: kiks.Simulation) -> str:

@@ -1,7 +1,5 @@
 """Names from outside are text on the desk, whatever they look like: in a real browser, in every panel."""
 
-from __future__ import annotations
-
 import ast
 from collections.abc import Iterator
 from dataclasses import replace
@@ -34,9 +32,9 @@ def shown(tmp_path: Path) -> Iterator[Shown]:
     folder.mkdir()
     program = folder / f"{HOSTILE}.py"
     program.write_text(f"print({HOSTILE!r})\n")
-    project = make_project()
-    robots = tuple(replace(robot, name=HOSTILE) for robot in project.robots)
-    project = replace(project, arena=replace(project.arena, name=HOSTILE), robots=robots)
+    plain = make_project()
+    robots = tuple(replace(robot, name=HOSTILE) for robot in plain.robots)
+    project = replace(plain, arena=replace(plain.arena, name=HOSTILE), robots=robots)
     project.save(folder / f"{FILE}.kiks")
     (folder / f"{FILE}.py").write_text("pass\n")
     shown = open_desk(folder, project, commands=[Command(program)])

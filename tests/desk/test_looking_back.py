@@ -1,16 +1,15 @@
 """Looking back on a desk, without a browser: the past equals what was, and the present does not notice."""
 
-from __future__ import annotations
-
 import asyncio
 import os
+import re
 import threading
-from collections.abc import Coroutine, Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, TypeVar
+from typing import Any
 
 import pytest
 from tests.guard import GUARD_S, wait_until
@@ -31,20 +30,14 @@ from kiks.sim.from_project import simulation_of
 from kiks.units import NS_PER_S, s_from_ns
 
 ROUND = """
-import sys, serial
+import serial
 port = serial.Serial("kiks", timeout=1)
-for step in range(200):
-    port.write(b"N\\n")
-    counts = [int(word) for word in port.readline().split(b",")[1:]]
-    port.write(b"D,%d,%d\\n" % (9 - counts[3] // 60, 9 - counts[2] // 70))
+for step in range(400):
+    port.write(b"D,%d,3\\n" % (step % 9))
     port.readline()
 """
 
-Fact = TypeVar("Fact")
-
-
-def run(work: Coroutine[Any, Any, Fact]) -> Fact:
-    return asyncio.run(work)
+run = asyncio.run
 
 
 def drive(sim: Simulation, seconds: float, hashes: dict[int, str] | None = None) -> None:
@@ -61,10 +54,9 @@ def drive(sim: Simulation, seconds: float, hashes: dict[int, str] | None = None)
 
 @contextmanager
 def desk_of(sim: Simulation, **options: Any) -> Iterator[Desk]:
-    desk = Desk(sim, speed=None, **options)
-    desk.keep_past()
-    yield desk
-    desk.close()
+    with closing(Desk(sim, speed=None, **options)) as desk:
+        desk.keep_past()
+        yield desk
 
 
 def make_sim() -> Simulation:
@@ -113,14 +105,12 @@ def test_the_past_equals_what_was_and_the_present_goes_on_unchanged() -> None:
         run(desk.looking.look_at(10**15))
         assert state_of(desk) == (now_ns, now_hash)
         run(desk.looking.back_to_now())
-        assert desk.sim is sim
-        assert not desk.is_paused
+        assert (desk.sim is sim, desk.is_paused) == (True, False)
         drive(sim, 1.0)
         assert sim.state_hash() == alone.state_hash()
         run(desk.looking.look_at(sim.now_ns - 500_000_000))
         assert desk.sim.now_ns == sim.now_ns - 500_000_000
-    assert sim.loop.recorder is None
-    assert sim.loop.gate is None
+    assert sim.loop.recorder is sim.loop.gate is None
 
 
 def test_a_program_that_waits_at_the_gate_goes_on_as_if_nothing_had_been() -> None:
@@ -159,8 +149,7 @@ def test_the_past_is_played_up_to_the_present_and_of_seeks_at_once_the_last_one_
         assert desk.sim.now_ns == sim.now_ns
         # Where the past ends, the present goes on.
         run(desk.go_on())
-        assert desk.sim is sim
-        assert not desk.is_paused
+        assert (desk.sim is sim, desk.is_paused) == (True, False)
         run(seek_at_once(desk))
         assert desk.sim.now_ns == 1_490_000_000
 
@@ -200,8 +189,7 @@ def test_a_recording_of_the_user_goes_on_beside_the_past(tmp_path: Path) -> None
         check_past(desk, hashes, list(hashes)[::9])
         assert "change" not in {mark.kind for mark in desk.looking.marks}
     recording = Recording(tmp_path / "run.mcap")
-    assert recording.is_whole
-    assert check_recording(recording.log).differs_ns is None
+    assert (recording.is_whole, check_recording(recording.log).differs_ns) == (True, None)
     assert 0.9 < recording.duration_s < 1.1
     assert Recording(tmp_path / "other.mcap").table("poses").tolist() == recording.table("poses").tolist()
 
@@ -219,10 +207,8 @@ def test_of_a_long_past_the_oldest_goes(monkeypatch: pytest.MonkeyPatch) -> None
             assert os.fstat(ring._file).st_size <= 16_000
             run(desk.looking.tend())
         (message,) = told(desk)
-        assert "The time bar now begins at" in message
-        assert "--record FILE" in message
+        assert re.search(r"(?s)The time bar now begins at.*--record FILE", message)
         span = desk.looking.span
-        assert span is not None
         assert NS_PER_S < span.begin_ns < span.end_ns - NS_PER_S
         assert span.end_ns == sim.now_ns
         assert all(mark.time_s >= span.begin_ns / 1e9 for mark in desk.looking.marks)
@@ -239,9 +225,7 @@ def test_of_a_long_past_the_oldest_goes(monkeypatch: pytest.MonkeyPatch) -> None
         assert recording.table("poses")["time_s"].max() == pytest.approx(sim.time_s, abs=0.02)
 
 
-def test_when_other_programs_fill_the_disk_the_past_is_recorded_no_more_nor_by_a_new_desk(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_when_others_fill_the_disk_the_past_is_recorded_no_more_nor_by_a_new_desk(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr("kiks.recording.recorder.CHUNK_S", 0.0)
     free_bytes = 10**9
     monkeypatch.setattr("kiks.recording.ring.room_of", lambda _folder: Room(free_bytes, 128 << 20))
@@ -263,8 +247,7 @@ def test_when_other_programs_fill_the_disk_the_past_is_recorded_no_more_nor_by_a
     with desk_of(make_sim()) as desk:
         (message,) = told(desk)
         assert "must have 128 MiB free, but it has 127 MiB" in message
-        assert desk.looking.span is None
-        assert desk.sim.loop.recorder is None
+        assert desk.looking.span is desk.sim.loop.recorder is None
 
 
 def test_when_the_file_of_the_user_is_full_the_desk_records_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -288,17 +271,9 @@ def test_when_the_file_of_the_user_is_full_the_desk_records_on(tmp_path: Path, m
 # ---- a recording ----
 
 
-@dataclass
-class Tape:
-    """A recording, and the states of its world."""
-
-    file: Path
-    hashes: dict[int, str]
-    times: list[int]
-
-
 @pytest.fixture(scope="module")
-def tape(tmp_path_factory: pytest.TempPathFactory) -> Tape:
+def tape(tmp_path_factory: pytest.TempPathFactory) -> SimpleNamespace:
+    """A recording, and the states of its world."""
     sim, hashes, file = make_sim(), {}, tmp_path_factory.mktemp("tape") / "run.mcap"
     with sim.record(file) as recorder:
         drive(sim, 1.5, hashes)
@@ -310,7 +285,7 @@ def tape(tmp_path_factory: pytest.TempPathFactory) -> Tape:
         Khepera(sim.port(1)).set_speed(20, 20)
         sim.run(3.0)
         hashes[sim.now_ns] = sim.state_hash()
-    return Tape(file, hashes, list(hashes))
+    return SimpleNamespace(file=file, hashes=hashes, times=[*hashes])
 
 
 @contextmanager
@@ -334,7 +309,7 @@ def replaying(file: Path, time_ns: int = 0) -> Iterator[Desk]:
         yield desk
 
 
-def test_a_recording_is_shown_played_and_begun_again_at_its_end(tape: Tape) -> None:
+def test_a_recording_is_shown_played_and_begun_again_at_its_end(tape: SimpleNamespace) -> None:
     with replaying(tape.file, tape.times[5]) as desk:
         assert state_of(desk) == (tape.times[5], tape.hashes[tape.times[5]])
         desk.begin()
@@ -347,12 +322,11 @@ def test_a_recording_is_shown_played_and_begun_again_at_its_end(tape: Tape) -> N
             run(desk.looking.back_to_now())
 
 
-def test_events_are_found_on_the_way(tape: Tape) -> None:
+def test_events_are_found_on_the_way(tape: SimpleNamespace) -> None:
     with replaying(tape.file) as desk:
         marks = desk.looking.marks
-        kinds = [mark.kind for mark in marks]
-        assert kinds.count("bookmark") == kinds.count("output") == kinds.count("change") == 1
-        assert "contact" in kinds
+        kinds = Counter(mark.kind for mark in marks)
+        assert kinds["bookmark"] == kinds["output"] == kinds["change"] == 1 <= kinds["contact"]
         texts = {"half", "robot 1: hello", "changed by hand or by a program", "robot 1 touches something"}
         assert texts <= {mark.text for mark in marks}
         found: list[Mark] = []
@@ -367,12 +341,11 @@ def test_events_are_found_on_the_way(tape: Tape) -> None:
         assert next_mark(marks, 0, is_before=True) is None
 
 
-def test_what_a_killed_run_has_left_is_shown(tape: Tape, tmp_path: Path) -> None:
+def test_what_a_killed_run_has_left_is_shown(tape: SimpleNamespace, tmp_path: Path) -> None:
     hashes, last = tape.hashes, McapReader(tape.file).chunks[-1]
     (tmp_path / "cut.mcap").write_bytes(tape.file.read_bytes()[: last.offset + last.length // 2])
     with replaying(tmp_path / "cut.mcap") as desk:
         span = desk.looking.span
-        assert span is not None
         times = [time_ns for time_ns in hashes if time_ns <= span.end_ns]
         assert 0 < len(times) < len(hashes)
         check_past(desk, hashes, times[-1:])
@@ -383,13 +356,11 @@ def test_what_a_killed_run_has_left_is_shown(tape: Tape, tmp_path: Path) -> None
 # ---- branches ----
 
 
-def test_from_a_time_of_a_recording_a_person_goes_on(tape: Tape) -> None:
+def test_from_a_time_of_a_recording_a_person_goes_on(tape: SimpleNamespace) -> None:
     hashes, time_ns, state_hash = tape.hashes, tape.times[30], tape.hashes[tape.times[30]]
     with replaying(tape.file, time_ns) as desk:
         run(desk.go_on_from_here())
-        assert desk.past is None
-        assert desk.is_paused
-        assert state_of(desk) == (time_ns, state_hash)
+        assert (desk.past, desk.is_paused, state_of(desk)) == (None, True, (time_ns, state_hash))
         sim = desk.sim
         assert sim is desk.present.sim
         run(desk.grab("hand", "robot", 0))
@@ -428,9 +399,7 @@ def test_before_a_branch_a_person_reads_from_when_it_goes_on_and_how_far_the_run
 
 
 @pytest.mark.parametrize(("at_s", "begin_s"), [(0.0, 0.0), (0.5, 0.0), (2.0, 0.0), (3.7, 0.0), (3.7, 3.7)])
-def test_a_branch_is_filmed_from_where_it_can_be(
-    at_s: float, begin_s: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_branch_is_filmed_from_where_it_can_be(at_s, begin_s, tmp_path, monkeypatch):
     monkeypatch.setattr("kiks.recording.recorder.CHUNK_S", 0.0)  # a chunk begins before its first entry
     if begin_s:
         monkeypatch.setattr("kiks.recording.ring.COPY_BYTES_MAX", 1)
@@ -465,7 +434,7 @@ def test_bookmarks_are_set_in_the_present_and_in_the_past_and_kept(tmp_path: Pat
     assert sorted(events[events["kind"] == "bookmark"]["text"].tolist()) == ["early", "early, too", "late"]
 
 
-def test_bookmarks_of_a_finished_recording_go_on_with_a_branch(tape: Tape) -> None:
+def test_bookmarks_of_a_finished_recording_go_on_with_a_branch(tape: SimpleNamespace) -> None:
     time_ns = tape.times[30]
     with replaying(tape.file, time_ns) as desk:
         run(desk.looking.bookmark(time_ns, "here"))
@@ -488,15 +457,12 @@ def test_another_world_has_another_past(tmp_path: Path) -> None:
         first = desk.sim
         wait_until(lambda: first.now_ns > NS_PER_S)
         run(desk.start_over())
-        assert desk.sim is not first
-        assert first.loop.recorder is None
+        assert (desk.sim is first, first.loop.recorder) == (False, None)
         wait_until(lambda: desk.sim.now_ns > NS_PER_S)
         assert not desk.is_paused
         run(desk.looking.look_at(NS_PER_S // 2))
         run(desk.start_over())
-        assert desk.past is None
-        assert not desk.is_paused
-        assert desk.looking.span[0] == 0  # type: ignore[index]
+        assert (desk.past, desk.is_paused, desk.looking.span[0]) == (None, False, 0)
 
 
 def test_robots_that_came_are_gone_before_they_came() -> None:

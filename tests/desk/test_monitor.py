@@ -1,7 +1,5 @@
 """The monitor in a real browser, compared with the state of the engine."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 
@@ -20,8 +18,7 @@ def project() -> Project:
     project = make_project()
     starts = (Pose(45, 240, 2.9), *project.arena.starts[1:])
     arena = replace(project.arena, starts=starts, lamps=(Lamp(200, 60, 2.0), Lamp(30, 330, 1.0)))
-    robots = (ProjectRobot(turrets=("k213", "radio")), *project.robots[1:])
-    return replace(project, arena=arena, robots=robots)
+    return replace(project, arena=arena, robots=(ProjectRobot(turrets=("k213", "radio")), *project.robots[1:]))
 
 
 @pytest.fixture
@@ -46,7 +43,7 @@ def drawn(visitor: Visitor, more: int) -> None:
 
 def painted(visitor: Visitor, selector: str) -> int:
     """Return how many different colours are on a canvas."""
-    count: int = visitor.answer(
+    return visitor.answer(
         """(selector) => {
             const canvas = document.querySelector(selector);
             const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
@@ -54,7 +51,6 @@ def painted(visitor: Visitor, selector: str) -> int:
         }""",
         selector,
     )
-    return count
 
 
 def test_readings_on_the_page_equal_the_simulations(visitor: Visitor) -> None:
@@ -66,17 +62,15 @@ def test_readings_on_the_page_equal_the_simulations(visitor: Visitor) -> None:
         for sensor in range(8):
             expect(visitor.at(f"{name}-{sensor}")).to_have_text(f"{readings[sensor]:.0f}")
     assert max(sim.proximity(1)) > 100
-    expect(visitor.at("facts")).to_contain_text(f"Clock0:{int(sim.time_s * 100 + 1e-6) / 100:05.2f}")
-    expect(visitor.at("speed-left")).to_contain_text(", set 4")
+    visitor.shows({"facts": f"Clock0:{int(sim.time_s * 100 + 1e-6) / 100:05.2f}", "speed-left": ", set 4"})
     assert painted(visitor, ".kiks-monitor-robot canvas") > 20
 
 
 def test_a_click_or_a_key_explains_a_reading(visitor: Visitor) -> None:
     visitor.pause()
     why = visitor.sim.explain(1, 2)
-    visitor.at("proximity-2").click()
     answer = visitor.at("explanation")
-    expect(answer).to_contain_text(f"Why does it read {why.count}?")
+    visitor.click("proximity-2", shows={"explanation": f"Why does it read {why.count}?"})
     expect(answer).to_contain_text(f"Sensor 2 (left 10) of robot 1 reads {why.count}.")
     rows = visitor.at("explanation-table").locator("tbody tr")
     expect(rows).to_have_count(7)
@@ -85,8 +79,7 @@ def test_a_click_or_a_key_explains_a_reading(visitor: Visitor) -> None:
     assert any(ray.brightness for ray in why.rays)
     expect(visitor.at("explanation-drawing").locator("svg")).to_have_attribute("aria-label", re.compile("wall at"))
     expect(visitor.at("proximity-2")).to_have_attribute("aria-pressed", "true")
-    visitor.at("ambient-5").click()
-    expect(answer).to_contain_text("Light sensor 5 (right 90) of robot 1 reads")
+    visitor.click("ambient-5", shows={"explanation": "Light sensor 5 (right 90) of robot 1 reads"})
     expect(answer).to_contain_text("Lamp 2 (1 W)")
     expect(rows).to_have_count(2)
     visitor.at("close-explanation").click()

@@ -1,7 +1,5 @@
 """The desk of a session in a real browser, with a real Octave at a terminal."""
 
-from __future__ import annotations
-
 import os
 import re
 import sys
@@ -33,14 +31,13 @@ def terminal(tmp_path: Path) -> Iterator[Terminal]:
         yield each
 
 
-def begin(terminal: Terminal, new_page: NewPage) -> Page:
-    """Start a session with an open port, and open its desk."""
-    terminal.type("kiks")
-    url = terminal.wait_for(r"shown at http\S+").split()[-1]
+def begin(terminal: Terminal, new_page: NewPage, command="kiks", fact=FIRST_PICTURE, then="ref = kiks_kopen;") -> Page:
+    """Open the desk that a command shows, here that of a session; wait for a fact of it, and type another command."""
+    terminal.type(command)
     page = new_page()
-    page.goto(url)
-    page.wait_for_function(FIRST_PICTURE)
-    terminal.type("ref = kiks_kopen;")
+    page.goto(terminal.wait_for(r"shown at http\S+").split()[-1])
+    page.wait_for_function(fact)
+    terminal.type(then)
     return page
 
 
@@ -151,11 +148,8 @@ def test_log_places_and_sensors_are_those_of_octave(terminal: Terminal, new_page
 
 @at_length
 def test_desk_shows_a_world_without_a_robot_and_then_the_robot(terminal: Terminal, new_page: NewPage) -> None:
-    terminal.type("kiks_arena([], [], 1)")
-    url = terminal.wait_for(r"shown at http\S+").split()[-1]
-    page = new_page()
-    page.goto(url)
-    page.wait_for_function("() => window.kiksDesk?.stats().frames_drawn > 3")
+    drawn = "() => window.kiksDesk?.stats().frames_drawn > 3"
+    page = begin(terminal, new_page, "kiks_arena([], [], 1)", drawn, "")
     for tab in ("wire", "programs", "settings", "robot"):
         page.get_by_test_id(f"tab-{tab}").click()
         # The page ignores a click on the tab that it shows until the server has answered the click before it.

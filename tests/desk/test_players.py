@@ -1,14 +1,11 @@
 """Programs on other computers that drive robots of a desk: `kiks host`, `kiks run --join` and `kiks://HOST:PORT/1`."""
 
-from __future__ import annotations
-
 import json
 import re
-import signal
 import socket
 import threading
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Sequence
+from contextlib import closing, suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -19,7 +16,7 @@ from urllib.request import Request, urlopen
 import pytest
 from tests import forked
 from tests.at_length import cases, share
-from tests.desk.test_desk_command import line_with, started
+from tests.desk.test_desk_command import line_with, started, stop
 from tests.guard import GUARD_S, wait_until
 from tests.matlab.octave import Octave, needs_octave
 from tests.served import BOX, PROGRAMS, fresh
@@ -46,18 +43,17 @@ pytestmark = pytest.mark.slow
 class Host:
     """A world whose robots programs elsewhere drive."""
 
-    def __init__(self, robots: int, thinking: str) -> None:
+    def __init__(self, robots: int = 1, thinking: str = "none") -> None:
         self.sim = fresh(robots)
         self.said: list[str] = []
         numbers = range(1, robots + 1)
 
         def new_programs(sim: Simulation, commands: Sequence[Command | None], gate: Gate) -> Programs:
-            options: dict[str, Any] = {"patience_s": GUARD_S, "say": self.said.append}
-            return Programs(sim, commands, thinking=thinking, players=numbers, gate=gate, **options)
+            options = {"thinking": thinking, "players": numbers, "patience_s": GUARD_S, "say": self.said.append}
+            return Programs(sim, commands, gate=gate, **options)
 
-        self.desk = Desk(
-            self.sim, speed=1.0 if thinking == "live" else None, new_programs=new_programs, owns_world=True
-        )
+        speed = 1.0 if thinking == "live" else None
+        self.desk = Desk(self.sim, speed=speed, new_programs=new_programs, owns_world=True)
         self.shown = Shown(self.desk, port=0)
         self.players = Players(self.desk, numbers, self.said.append)
         SERVER.let_in(self.players)
@@ -81,15 +77,6 @@ class Host:
 
     def wait_said(self, text: str) -> None:
         wait_until(lambda: any(text in line for line in self.said))
-
-
-@contextmanager
-def hosted(robots: int = 1, thinking: str = "none") -> Iterator[Host]:
-    host = Host(robots, thinking)
-    try:
-        yield host
-    finally:
-        host.close()
 
 
 def at_once(*acts: Any) -> list[Any]:
@@ -130,15 +117,11 @@ def opened(url: str, *words: str) -> str:
     return printed(code=f"import sys; sys.argv = {['drive.py', url, *words]}\n{Path(DRIVE).read_text()}")
 
 
-def run_here(
-    folder: Path, thinking: str, words: Sequence[Sequence[str]], program: str = DRIVE
-) -> tuple[list[str], tuple[int, str]]:
+def run_here(folder: Path, thinking: str, words: Sequence[Sequence[str]], program: str = DRIVE) -> tuple:
     """Run a program in each robot of this computer; return what each prints, and time and state at the end."""
     here, files = fresh(len(words)), [folder / f"{number}.txt" for number in range(len(words))]
-    commands = [
-        Command(PROGRAMS / "into_file.py", [str(file), program, "COM1", *each])
-        for file, each in zip(files, words, strict=True)
-    ]
+    argument_lists = ([str(file), program, "COM1", *each] for file, each in zip(files, words, strict=True))
+    commands = [Command(PROGRAMS / "into_file.py", each) for each in argument_lists]
     assert Programs(here, commands, thinking=thinking, patience_s=GUARD_S).run() == 0
     return [file.read_text() for file in files], (here.now_ns, here.state_hash())
 
@@ -146,7 +129,7 @@ def run_here(
 @pytest.mark.parametrize("thinking", cases(["fixed:2.5", "none"]))
 def test_robots_of_a_host_run_as_those_of_kiks_run(thinking: str, tmp_path: Path) -> None:
     words = [("20", "5", "3"), ("15", "-4", "7")]
-    with hosted(2, thinking) as host:
+    with closing(Host(2, thinking)) as host:
         heard = at_once(lambda: joined(host.url(1), *words[0]), lambda: opened(host.url(2), *words[1]))
         there = wait_until(lambda: host.ends)[0]
         assert not host.desk.programs.doubt
@@ -184,7 +167,7 @@ exec(open({DRIVE!r}).read())
 def test_octave_and_python_run_together_as_python_alone_under_kiks_run(tmp_path: Path) -> None:
     count = max(2, share(2, 8))
     words = [[str(8 - number), str(3 + number), str(5 - number)] for number in range(count)]
-    with hosted(count, "fixed:1.5") as host:
+    with closing(Host(count, "fixed:1.5")) as host:
 
         def octave(number: int) -> Octave:
             last, left, right = int(words[number][0]) - 1, words[number][1], words[number][2]
@@ -215,17 +198,12 @@ def test_octave_and_python_run_together_as_python_alone_under_kiks_run(tmp_path:
 # ---- programs that get lost, come back, or do what they may not ----
 
 
-def link_to(host: Host, robot: int = 1) -> HostLink:
-    return HostLink(Address.parse(host.url(robot)))
-
-
-def break_off(link: HostLink) -> None:
-    """Let the connection of a program break, as when its computer loses the network or it is killed."""
-    link._socket.socket.shutdown(socket.SHUT_RDWR)
+def link_to(host: Host) -> HostLink:
+    return HostLink(Address.parse(host.url()))
 
 
 def test_a_lost_program_leaves_its_robot_standing_and_comes_back() -> None:
-    with hosted(2) as host:
+    with closing(Host(2)) as host:
 
         def other() -> tuple[int, int]:
             with kiks.Khepera(host.url(2)) as robot:
@@ -240,7 +218,8 @@ def test_a_lost_program_leaves_its_robot_standing_and_comes_back() -> None:
             robot.set_speed(9, 9)
             robot.pause(1)
             robot.encoders()
-            break_off(port._link)
+            # As when the computer of the program loses the network, or when the program is killed.
+            port._link._socket.socket.shutdown(socket.SHUT_RDWR)
             with pytest.raises(LinkError) as error:
                 robot.encoders()
             return str(error.value)
@@ -259,7 +238,7 @@ def test_a_lost_program_leaves_its_robot_standing_and_comes_back() -> None:
 
 
 def test_another_program_takes_the_robot_and_halt_and_a_new_world_end_it() -> None:
-    with hosted() as host:
+    with closing(Host()) as host:
         first = HostedPort(host.url())
         assert first.ask_ns() == 0
         second = kiks.Khepera(host.url())
@@ -281,7 +260,7 @@ def test_another_program_takes_the_robot_and_halt_and_a_new_world_end_it() -> No
 
 
 def test_a_world_with_live_thinking_waits_for_no_program() -> None:
-    with hosted(2, "live") as host:
+    with closing(Host(2, "live")) as host:
         silent = HostedPort(host.url(1))
         _, robot = at_once(lambda: silent.claim(""), lambda: kiks.Khepera(host.url(2)))
         robot.set_speed(2, 2)
@@ -292,7 +271,7 @@ def test_a_world_with_live_thinking_waits_for_no_program() -> None:
 
 
 def test_a_person_begins_without_those_who_have_not_come_and_a_world_without_their_robots_lets_none_in() -> None:
-    with hosted(3) as host:
+    with closing(Host(3)) as host:
         assert host.desk.is_paused
         with pytest.raises(ParameterError, match="robot 1 must be for programs of this computer"):
             host.desk.programs.start(Command(Path(DRIVE)), 1)
@@ -316,13 +295,8 @@ def hostile(*messages: object) -> bytes:
 
 
 CLAIM = (Kind.CLAIM, 1, 0, 1, 0, ("me",))
-READ = (Kind.READ, 1, 0, 2, 0, (1, None, None, 0))
-FOREIGN = [
-    (Kind.CLAIM, 2, 0, 1, 0, ("me",)),
-    (Kind.FIND, 0, 0, 1, 0, ("kiks://2",)),
-    (Kind.FIND, 0, 0, 1, 0, ("kiks://127.0.0.1:22/1?token=x",)),
-    (Kind.FIND, 0, 0, 1, 0, ("kiks://127.0.0.1:22/1",)),
-]
+PLACES = "kiks://2", "kiks://127.0.0.1:22/1?token=x", "kiks://127.0.0.1:22/1"
+FOREIGN = [(Kind.CLAIM, 2, 0, 1, 0, ("me",)), *((Kind.FIND, 0, 0, 1, 0, (place,)) for place in PLACES)]
 BROKEN = {
     "garbage": b"GET / HTTP/1.1\r\n\r\n" * 100,
     "a huge length": b"\xff\xff\xff\xff",
@@ -336,39 +310,36 @@ BROKEN = {
 
 
 def test_hostile_programs_end_alone() -> None:
-    with hosted(3, "live") as host:
+    with closing(Host(3, "live")) as host:
         ports = [HostedPort(host.url(robot)) for robot in (1, 2)]
         good, *_ = at_once(lambda: kiks.Khepera(host.url(3)), *(partial(port.claim, "") for port in ports))
         for port in ports:
             port.close()
         good.set_speed(2, 2)
         for request in FOREIGN:
-            link = link_to(host)
-            link.sendall(hostile(request))
-            (answer,) = Inbox(1 << 20).take(link.recv(timeout_s=GUARD_S))
-            assert answer[4], request
-            link.close()
+            with closing(link_to(host)) as link:
+                link.sendall(hostile(request))
+                (answer,) = Inbox(1 << 20).take(link.recv(timeout_s=GUARD_S))
+                assert answer[4], request
         for name, data in BROKEN.items():
-            link = link_to(host)
-            with suppress(OSError):
-                for begin in range(0, len(data), 1 << 16):
-                    link.sendall(data[begin : begin + (1 << 16)])
-            host.wait_said("The program of robot 1 was disconnected: The program ")
-            host.said.clear()
+            with closing(link_to(host)) as link:
+                with suppress(OSError):
+                    for begin in range(0, len(data), 1 << 16):
+                        link.sendall(data[begin : begin + (1 << 16)])
+                host.wait_said("The program of robot 1 was disconnected: The program ")
+                host.said.clear()
+                good.pause(0.1)
+                assert good.encoders() > (0, 0), name
+        with closing(link_to(host)) as slow:
+            slow.sendall(b"\x00")
             good.pause(0.1)
-            assert good.encoders() > (0, 0), name
-            link.close()
-        slow = link_to(host)
-        slow.sendall(b"\x00")
-        good.pause(0.1)
-        slow.close()
         with host.sim.lock:
             assert host.sim.travelled_mm(2) == 0
         good.close()
 
 
 def test_a_wrong_token_is_refused_and_that_of_a_robot_opens_no_page() -> None:
-    with hosted() as host:
+    with closing(Host()) as host:
         for token in ("", "x", "\xe9", "%0d%0aX:%20y", "a" * 5000, SERVER.key.token):
             with pytest.raises(LinkError, match=r"must (know the token|let the program in|be named as)"):
                 kiks.Khepera(host.url(token=token))
@@ -394,28 +365,24 @@ def test_kiks_host_runs_a_project_with_programs_elsewhere_and_its_own(tmp_path: 
         line_with(output, "The run begins when")
         assert joined(address, "20", "5", "3").count("\n") == 60
         state = line_with(output, "s simulated, seed 7, state ").split()[-1]
-        process.send_signal(signal.SIGINT)
-        assert "Stopped after" in line_with(output, "Stopped after")
-        assert process.wait(GUARD_S) == 0
+        stop(process)
     done = forked.run("run", str(tmp_path / "match.kiks"), DRIVE, "COM1", "20", "5", "3")
     assert f"state {state}" in done.stderr
 
 
 def test_wrong_words_are_told() -> None:
+    no_places = "kiks://1", "kiks://[::1:8123/1?token=x", "kiks://127.0.0.1:99999/1?token=x"
     for words, message in (
         ("run --join kiks://127.0.0.1:1/1?token=x DRIVE", "must let the program in, but it does not: "),
-        ("run --join kiks://1 DRIVE", "must be named as kiks host prints it"),
-        ("run --join kiks://[::1:8123/1?token=x DRIVE", "must be named as kiks host prints it"),
-        ("run --join kiks://127.0.0.1:99999/1?token=x DRIVE", "must be named as kiks host prints it"),
+        *((f"run --join {place} DRIVE", "must be named as kiks host prints it") for place in no_places),
         ("run --join x --seed 3 DRIVE", "--seed must be left out with --join, as the host has the world"),
         ("run --join x DRIVE DRIVE", "--join must have one program, for its address is that of one robot"),
         ("host --thinking replay:x", "thinking must be none, fixed:MS or live for programs elsewhere"),
         ("host --thinking live --patience 3", "--patience must be left out with --thinking live"),
     ):
         done = forked.run(*(DRIVE if word == "DRIVE" else word for word in words.split()))
-        assert done.returncode == 2
+        assert (done.returncode, done.stderr.count("\n")) == (2, 1)
         assert message in done.stderr
-        assert done.stderr.count("\n") == 1
         assert "token=" not in done.stderr or "TOKEN" in done.stderr
 
 
@@ -429,7 +396,6 @@ def test_a_program_in_simulated_time_opens_no_robot_elsewhere(tmp_path: Path) ->
 
 WELCOME = {"version": __version__, "robot": 1, "is_late": False, "end_ns": 1 << 63, "thinking": "none"}
 WELCOME |= {"offered": ["COM1"], "seed": "0 1", "pulse_mm": 0.08}
-
 
 LIES: list[tuple[list[str | bytes], str]] = [
     ([b"no text"], "both computers must have the same KiKS, but"),

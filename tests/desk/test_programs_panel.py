@@ -1,7 +1,5 @@
 """The panels of programs and of the wire in a real browser, compared with the state of the engine."""
 
-from __future__ import annotations
-
 from contextlib import closing
 from pathlib import Path
 
@@ -32,26 +30,22 @@ def begin_program(visitor: Visitor, name: str, text: str) -> None:
 @at_length
 def test_loop_that_asks_for_nothing_is_told_on_the_page_while_time_stands_still(visitor: Visitor) -> None:
     begin_program(visitor, "endless", "print('begun', flush=True)\nready = False\nwhile not ready:\n    pass\n")
-    visitor.at("run-program").click()
-    expect(visitor.at("output")).to_contain_text("begun")
+    visitor.click("run-program", shows={"output": "begun"})
     expect(visitor.at("output")).to_contain_text("has computed for 6 s without waiting for a time or a robot")
-    visitor.at("stop").click()
-    expect(visitor.at("programs")).to_contain_text("stopped")
+    visitor.click("stop", shows={"programs": "stopped"})
 
 
 def test_program_is_written_saved_run_and_stopped(visitor: Visitor) -> None:
     begin_program(visitor, "mine", FOR_EVER)
     visitor.page.keyboard.press("Control+Enter")
     expect(visitor.at("output")).to_contain_text("begun b'd\\r\\n'")
-    assert (visitor.desk.folder / "mine.py").read_text() == FOR_EVER
-    assert visitor.setpoints() == [5, 5]
+    assert ((visitor.desk.folder / "mine.py").read_text(), visitor.setpoints()) == (FOR_EVER, [5, 5])
     visitor.tab("wire")
     expect(visitor.at("share-link")).not_to_contain_text("Link 0.0 %")
     visitor.send("H")
     visitor.told("line of robot 1 must be free")
     visitor.tab("programs")
-    visitor.at("stop").click()
-    expect(visitor.at("programs")).to_contain_text("mine.py on robot 1: stopped")
+    visitor.click("stop", shows={"programs": "mine.py on robot 1: stopped"})
     visitor.until(lambda: visitor.setpoints() == [0, 0])
     visitor.tab("wire")
     visitor.send("H")
@@ -64,15 +58,13 @@ def test_a_program_that_ran_is_saved_with_the_project_and_shown_when_that_is_ope
     expect(visitor.at("attached")).to_contain_text("no program yet")
     begin_program(visitor, "exercise1", FOR_EVER)
     visitor.at("arguments").fill("--fast 'a b'")
-    visitor.at("run-program").click()
-    expect(visitor.at("attached")).to_contain_text("exercise1.py starts with this world on robot 1.")
+    visitor.click("run-program", shows={"attached": "exercise1.py starts with this world on robot 1."})
     visitor.tab("arena")
     saved = visitor.save_as("lesson")
     robot = saved.robots[0]
     assert (saved.arena.name, robot.program, robot.arguments) == ("lesson", "exercise1.py", ("--fast", "a b"))
     visitor.tab("programs")
-    visitor.at("leave-out").click()
-    expect(visitor.at("attached")).to_contain_text("no program yet")
+    visitor.click("leave-out", shows={"attached": "no program yet"})
     visitor.at("new-program").click()
     visitor.tab("arena")
     visitor.choose("open-name", "lesson.kiks")
@@ -113,15 +105,13 @@ def test_mistake_is_marked_as_it_is_typed_and_before_anything_runs(visitor: Visi
     expect(visitor.page.locator(".program-wrong-line")).to_have_text("if x = 2:")
     expect(visitor.page.locator(".program-wrong")).to_have_text("x = 2")
     visitor.picture("mistake")
-    visitor.at("run-program").click()
-    expect(visitor.at("mistake")).to_contain_text("Line 2: invalid syntax")
+    visitor.click("run-program", shows={"mistake": "Line 2: invalid syntax"})
     check_access(visitor.page, "a mistake")
     assert not (visitor.desk.folder / "wrong.py").exists()
     visitor.write("x = 1\n1 / 0\n")
     expect(visitor.at("mistake")).to_have_text("")
     expect(visitor.page.locator(".program-wrong-line")).to_have_count(0)
-    visitor.at("run-program").click()
-    expect(visitor.at("output")).to_contain_text("ZeroDivisionError: division by zero")
+    visitor.click("run-program", shows={"output": "ZeroDivisionError: division by zero"})
     expect(visitor.at("output")).to_contain_text("line 2, in <module>")
 
 
@@ -138,8 +128,7 @@ def test_console_has_history_and_suggestions_and_the_wire_is_filtered_held_and_c
     expect(visitor.at("console-log")).to_contain_text("→ D,3,4")
     visitor.told("Time is paused")
     expect(visitor.at("console-log")).not_to_contain_text("←")
-    visitor.at("run").click()
-    expect(visitor.at("console-log")).to_contain_text("← d")
+    visitor.click("run", shows={"console-log": "← d"})
     assert visitor.setpoints() == [3, 4]
     console.fill("D,0,0")
     console.press("Enter")
@@ -180,13 +169,10 @@ def test_console_has_history_and_suggestions_and_the_wire_is_filtered_held_and_c
     ("owns_world", "reason", "other"),
     [(True, "the desk is open to other computers", ""), (False, "Another program owns this world", "No program runs")],
 )
-def test_a_page_that_may_not_start_programs_tells_why(
-    owns_world: bool, reason: str, other: str, new_page: NewPage, tmp_path: Path
-) -> None:
+def test_a_page_that_may_not_start_programs_tells_why(owns_world, reason, other, new_page: NewPage, tmp_path: Path):
     with closing(open_desk(tmp_path, may_run_programs=False, owns_world=owns_world)) as shown:
         visitor = Visitor(new_page(), shown)
-        visitor.at("tab-programs").click()
-        expect(visitor.at("may-not")).to_contain_text(reason)
+        visitor.click("tab-programs", shows={"may-not": reason})
         if other:
             expect(visitor.at("programs")).not_to_contain_text(other)
         assert visitor.at("run-program").count() == 0

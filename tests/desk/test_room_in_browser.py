@@ -1,18 +1,14 @@
 """A room in Chromium: three students and the lecturer, from the first click to what is handed in."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.desk import visitor
 from tests.desk.test_exercise import DRIVE, make_exercise
 from tests.desk.visitor import FIRST_PICTURE, Browser, NewPage, Page, check_access, check_reach, expect, leave_picture
 
 NAMES = ["Ada Lovelace", "Alan Turing", "Grace <b>Hopper</b>", "J\xf6rg M\xfcller"]
-
-LOOKS = ((1366, 768, "light"), (1280, 800, "dark"))
-"""Screens and colours of two students."""
 
 
 def come_in(page: Page, room: Any, name: str) -> None:
@@ -30,17 +26,10 @@ def come_in(page: Page, room: Any, name: str) -> None:
     page.wait_for_function(FIRST_PICTURE)
 
 
-def write(page: Page, text: str) -> None:
-    """Replace the program in the editor."""
-    page.locator(".cm-content").click()
-    page.keyboard.press("Control+a")
-    page.keyboard.insert_text(text)
-
-
 def solve(page: Page) -> None:
     """Write a program and run it until the goal is reached."""
     page.get_by_test_id("tab-programs").click()
-    write(page, DRIVE)
+    visitor.write(page, DRIVE)
     page.get_by_test_id("run-program").click()
     expect(page.get_by_test_id("board-result")).to_contain_text("solved after 2.")
 
@@ -65,7 +54,7 @@ def test_a_class_comes_solves_and_hands_in(tmp_path: Path, new_page: NewPage, br
         leave_picture(lecturer, "room-code")
         lecturer.get_by_role("button", name="Close").click()
 
-        students = [new_page(width, height, color_scheme=look) for width, height, look in LOOKS]
+        students = [new_page(1366, 768, color_scheme="light"), new_page(1280, 800, color_scheme="dark")]
         # This one is refused at times, which Chromium reports as an error.
         students.append(browser.new_page(color_scheme="dark"))
         students[2].set_viewport_size({"width": 390, "height": 844})
@@ -87,7 +76,7 @@ def test_a_class_comes_solves_and_hands_in(tmp_path: Path, new_page: NewPage, br
         for width, height in ((1366, 768), (390, 844)):
             lecturer.set_viewport_size({"width": width, "height": height})
             for look in ("light", "dark"):
-                lecturer.emulate_media(color_scheme=look)  # type: ignore[arg-type]
+                lecturer.emulate_media(color_scheme=look)
                 check_access(lecturer, f"room, {look}, {width}")
                 leave_picture(lecturer, f"room-{look}-{width}")
             check_reach(lecturer, f"room, {width}")
@@ -97,15 +86,15 @@ def test_a_class_comes_solves_and_hands_in(tmp_path: Path, new_page: NewPage, br
         expect(students[1].get_by_test_id("hand-in")).to_be_disabled()
         with lecturer.context.expect_page() as opened:
             lecturer.get_by_role("link", name=f"Open the desk of {NAMES[1]}").click()
-        expect(opened.value.get_by_test_id("board-result")).to_contain_text("solved after 2.")
-        assert opened.value.url.endswith(f"/desk/{room.seats[NAMES[1]].number}")
         helper = opened.value
+        expect(helper.get_by_test_id("board-result")).to_contain_text("solved after 2.")
+        assert helper.url.endswith(f"/desk/{room.seats[NAMES[1]].number}")
         for page in (helper, students[1]):
             page.get_by_test_id("tab-programs").click()
             expect(page.locator(".cm-content")).to_contain_text("D,30,30")
-        write(helper, "print('helped')")
+        visitor.write(helper, "print('helped')")
         expect(students[1].locator(".cm-content")).to_have_text("print('helped')")
-        write(students[1], "print('thanks')")
+        visitor.write(students[1], "print('thanks')")
         expect(helper.locator(".cm-content")).to_have_text("print('thanks')")
         assert (room.folder / "desks" / NAMES[1] / "to_the_lamp.py").read_text() == "print('thanks')"
         helper.close()

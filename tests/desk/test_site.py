@@ -1,7 +1,5 @@
 """The site of the documentation in the browser: it builds without a warning, fits a phone and shows its pictures."""
 
-from __future__ import annotations
-
 import functools
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """The time bar in a real browser: what it shows is compared with the state of the engine."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -54,8 +52,6 @@ def replay(played: Shown, new_page: NewPage) -> Visitor:
 def drag_to(visitor: Visitor, share: float) -> None:
     """Drag the thumb from where it is to a share of the bar."""
     track, thumb = visitor.at("time-slider").bounding_box(), visitor.page.locator(".kiks-bar-thumb").bounding_box()
-    assert track is not None
-    assert thumb is not None
     mouse, y = visitor.page.mouse, thumb["y"] + thumb["height"] / 2
     mouse.move(thumb["x"] + thumb["width"] / 2, y)
     mouse.down()
@@ -105,7 +101,6 @@ def test_a_recording_is_played_stepped_and_jumped_through(replay: Visitor) -> No
     at_time(visitor, times[1])
     expect(visitor.at("bar-event")).to_contain_text(marks[1].text)
     box = page.locator(".kiks-bar-bookmark").bounding_box()
-    assert box is not None
     page.mouse.move(box["x"] + box["width"] / 2, box["y"] + 10)
     expect(visitor.at("bar-tip")).to_contain_text("look here")
     page.keyboard.press("b")
@@ -119,9 +114,7 @@ def test_a_recording_is_played_stepped_and_jumped_through(replay: Visitor) -> No
     expect(visitor.at("bar-now")).to_have_text("0:04.00")
     visitor.page.mouse.move(5, 300)
     visitor.drag_refused()
-    visitor.at("hall").click()
-    expect(visitor.at("board-clock")).to_contain_text("0:04.0")
-    expect(visitor.at("board")).to_contain_text("robot 1")
+    visitor.click("hall", shows={"board-clock": "0:04.0", "board": "robot 1"})
     expect(visitor.at("run")).to_be_hidden()
     visitor.picture("hall")
     check_access(page, "the hall view")
@@ -135,15 +128,13 @@ def test_a_person_goes_on_from_a_recording(replay: Visitor) -> None:
     drag_to(visitor, 0.25)
     at_time(visitor, 1.0, 0.05)
     poses, time_s = visitor.sim.poses(), visitor.sim.time_s
-    visitor.at("go-on-from-here").click()
-    expect(visitor.at("dialog-text")).to_contain_text("have hung up")
+    visitor.click("go-on-from-here", shows={"dialog-text": "have hung up"})
     visitor.picture("go_on_from_a_recording")
     scene = visitor.answer("kiksDesk.scene().scene")
     visitor.click("dialog-yes", told="The world is yours.")
     expect(visitor.page.locator(".q-dialog__backdrop")).to_have_count(0)
     expect(visitor.at("bar-state")).to_have_text("Now")
-    assert visitor.sim.time_s == time_s
-    assert visitor.sim.poses() == pytest.approx(poses)
+    assert (visitor.sim.time_s, visitor.sim.poses()) == (time_s, pytest.approx(poses))
     visitor.until(lambda: visitor.answer("kiksDesk.scene().scene") > scene)
     x_mm, y_mm, _ = visitor.sim.pose(1)
     visitor.drag((x_mm, y_mm), (250, 60))
@@ -181,8 +172,8 @@ def test_a_living_world_is_looked_back_at_and_goes_on(visitor: Visitor, new_page
     visitor.until(lambda: visitor.sim.time_s < present.time_s - 1)
     assert present.now_ns == now_ns, "it stands still meanwhile"
     visitor.at("back-to-now").click()
-    expect(visitor.at("bar-state")).to_have_text("Now")
-    expect(other.at("bar-state")).to_have_text("Now")
+    for each in (visitor, other):
+        expect(each.at("bar-state")).to_have_text("Now")
     assert visitor.sim is present
     visitor.until(lambda: present.now_ns > now_ns)
     visitor.pause()

@@ -1,15 +1,14 @@
 """The token in a real browser: it leaves the address, lasts for the page, and works within a notebook's page."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Iterator
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from typing import Any
 from urllib.parse import urlsplit
 
 import pytest
 from tests.at_length import at_length
-from tests.desk.visitor import FIRST_PICTURE, Browser, NewPage, Shown, Visitor, expect, leave_picture
+from tests.desk.visitor import FIRST_PICTURE, Browser, NewPage, Shown, Visitor, expect, leave_picture, open_page
 
 pytestmark = pytest.mark.slow
 
@@ -42,13 +41,10 @@ def test_a_ticket_opens_the_desk_once(new_page: NewPage, browser: Browser, shown
 
     url = SERVER.url_for_once(shown.gateway.number)
     page = new_page()
-    page.goto(url)
-    page.wait_for_function(FIRST_PICTURE)
+    open_page(page, url)
     assert "ticket" not in page.url
     other = browser.new_page()
-    answer = other.goto(url)
-    assert answer is not None
-    assert answer.status == 403
+    assert other.goto(url).status == 403
     other.close()
 
 
@@ -77,9 +73,7 @@ def notebook(shown: Shown) -> Iterator[tuple[int, list[str]]]:
 
 @at_length
 @pytest.mark.parametrize("host", ["localhost", "127.0.0.1"])
-def test_a_notebook_shows_the_desk(
-    browser: Browser, new_page: NewPage, shown: Shown, notebook: tuple[int, list[str]], host: str
-) -> None:
+def test_a_notebook_shows_the_desk(browser: Browser, new_page: NewPage, shown: Shown, notebook: Any, host: str) -> None:
     page = new_page(by=browser)
     page.goto(f"http://{host}:{notebook[0]}/")
     frame = next(each for each in page.frames if each.parent_frame is not None)

@@ -1,7 +1,5 @@
 """A tournament on the desk: its games are played one after the other, with the table between them."""
 
-from __future__ import annotations
-
 from contextlib import closing
 from pathlib import Path
 
@@ -34,14 +32,13 @@ def test_games_are_shown_one_after_the_other_with_the_table_between(tmp_path: Pa
         board = visitor.at("board-hall")
         expect(board).to_have_text("Game 1 of 2")
         expect(visitor.at("board-match")).to_be_visible()
-        visitor.at("hall").click()
-        expect(visitor.at("board-clock")).to_contain_text("of 0:02")
+        visitor.click("hall", shows={"board-clock": "of 0:02"})
         table = visitor.at("board-table")
         expect(table).to_contain_text("bob")
         expect(board).to_contain_text("Next: bob – ann")
         check_access(page, "the table between games")
         for scheme in ("light", "dark"):
-            page.emulate_media(color_scheme=scheme)  # type: ignore[arg-type]
+            page.emulate_media(color_scheme=scheme)
             leave_picture(page, f"tournament-{scheme}")
         # The break lasts until the clock says so.
         assert shown.desk.past is not None

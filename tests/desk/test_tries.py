@@ -1,7 +1,5 @@
 """A program tried in all cases from the desk: in the visible ones, until a person stops it, or with a message."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,13 +14,9 @@ from kiks.model.goal import Goal
 from kiks.model.project import Project
 from kiks.ports.program_process import Command
 
-PROJECT = Project(
-    Arena.box(400, 400),
-    seconds=2.0,
-    goal=Goal(solved="path_mm > 20"),
-    exercise=Exercise("Drive"),
-    cases=(Cases(seed=(1, 2)), Cases("mine", is_hidden=True)),
-)
+CASES = Cases(seed=(1, 2)), Cases("mine", is_hidden=True)
+GOAL = Goal(solved="path_mm > 20")
+PROJECT = Project(Arena.box(400, 400), seconds=2.0, goal=GOAL, exercise=Exercise("Drive"), cases=CASES)
 
 DRIVE = "import kiks\nkiks.Khepera('/dev/ttyUSB0').set_speed(10, 10)\nimport time\ntime.sleep(1)\nprint('there')\n"
 
@@ -40,9 +34,8 @@ def test_tries_are_those_of_a_program_wait_for_others_and_can_be_stopped(tmp_pat
     wait_until(lambda: tries.is_waiting)
     _TURNS.release(turns)
     tries.wait()
-    assert (tries.is_waiting, tries.is_whole) == (False, True)
-    assert (tries.error, [case.seed for case in tries.cases]) == ("", [1, 2])
-    assert (tries.grade.points, tries.grade.solved) == (1, 2)
+    assert (tries.is_waiting, tries.is_whole, tries.error) == (False, True, "")
+    assert ([case.seed for case in tries.cases], tries.grade.points, tries.grade.solved) == ([1, 2], 1, 2)
     assert tries.is_of(PROJECT, drive)
     assert tries.recording(1).is_file()
 

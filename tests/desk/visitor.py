@@ -92,16 +92,9 @@ def expect(what: Locator | Page) -> Any:
 
 def make_project() -> Project:
     """Return two robots, of which the second has stripes, a ball, a cylinder and a lamp in a room of 600 by 400 mm."""
-    plain = Arena.box(600, 400)
-    arena = Arena(
-        plain.brightness,
-        plain.mm_per_cell,
-        "room",
-        starts=(Pose(150, 200, 0.0), Pose(450, 300, 2.0)),
-        lamps=(Lamp(80, 340, 2.0),),
-        balls=(Ball(300, 100),),
-        cylinders=(Cylinder(450, 100),),
-    )
+    plain, starts = Arena.box(600, 400), (Pose(150, 200, 0.0), Pose(450, 300, 2.0))
+    things = {"lamps": (Lamp(80, 340, 2.0),), "balls": (Ball(300, 100),), "cylinders": (Cylinder(450, 100),)}
+    arena = Arena(plain.brightness, plain.mm_per_cell, "room", starts=starts, **things)
     striped = ProjectRobot(turrets=("gripper",), changes={"body": {"stripe_count": 8}})
     return Project(arena, robots=(ProjectRobot(turrets=("k213",)), striped), seed=3)
 
@@ -128,13 +121,7 @@ def leave_picture(page: Page, name: str, **options: Any) -> None:
 
 
 def check_access(page: Page, where: str, rules: list[str] | None = None) -> None:
-    """Let axe-core look for what keeps people out: contrast, names, roles. Nothing it finds may be serious.
-
-    Args:
-        page: The page.
-        where: What it shows.
-        rules: The names of rules; all if left out.
-    """
+    """Let axe-core look for what keeps people out, by some of its rules or all. Nothing it finds may be serious."""
     from axe_playwright_python.base import AXE_SCRIPT
 
     page.wait_for_function(STILL)
@@ -148,18 +135,25 @@ def check_reach(page: Page, where: str) -> None:
     assert not (far := page.evaluate(OUT_OF_REACH)), f"{where}: {far}"
 
 
-class Visitor:
-    """A page of a desk.
+def open_page(page: Page, url: str) -> None:
+    """Go to a page of a desk, and wait until it has drawn the world."""
+    page.goto(url)
+    page.wait_for_function(FIRST_PICTURE)
 
-    Args:
-        page: An empty page.
-        shown: The desk.
-    """
+
+def write(page: Page, text: str) -> None:
+    """Put a text into the editor as if it were pasted."""
+    page.locator(".cm-content").click()
+    page.keyboard.press("Control+a")
+    page.keyboard.insert_text(text)
+
+
+class Visitor:
+    """A desk in an empty page."""
 
     def __init__(self, page: Page, shown: Shown) -> None:
         self.page, self.shown, self.desk = page, shown, shown.desk
-        page.goto(shown.url)
-        page.wait_for_function(FIRST_PICTURE)
+        open_page(page, shown.url)
 
     @property
     def sim(self) -> Simulation:
@@ -168,10 +162,16 @@ class Visitor:
     def at(self, name: str) -> Locator:
         return self.page.get_by_test_id(name)
 
-    def click(self, *names: str, told: str = "") -> None:
-        """Click one thing after the other, and wait for a message if that is given."""
+    def shows(self, texts: dict[str, str]) -> None:
+        """Wait until things have these texts in them."""
+        for name, text in texts.items():
+            expect(self.at(name)).to_contain_text(text)
+
+    def click(self, *names: str, shows: dict[str, str] | None = None, told: str = "") -> None:
+        """Click one thing after the other, and wait for texts in things and for a message if these are given."""
         for name in names:
             self.at(name).click()
+        self.shows(shows or {})
         if told:
             self.told(told)
 
@@ -220,8 +220,7 @@ class Visitor:
         self.at("console").press("Enter")
 
     def setpoints(self, robot: int = 1) -> list[int]:
-        found: list[int] = self.sim.world.state.robots["speed_setpoint"][0, robot - 1].tolist()
-        return found
+        return self.sim.world.state.robots["speed_setpoint"][0, robot - 1].tolist()
 
     def pause(self) -> None:
         self.at("run").click()
@@ -246,9 +245,8 @@ class Visitor:
 
     def feed(self, expression: str) -> Any:
         """Return the value of an expression in JavaScript that may use the page's `feed`."""
-        return self.answer(
-            f"import('kiks-desk').then(({{ pageFeed }}) => {{ const feed = pageFeed(); return {expression}; }})"
-        )
+        work = f"const feed = pageFeed(); return {expression};"
+        return self.answer(f"import('kiks-desk').then(({{ pageFeed }}) => {{ {work} }})")
 
     def pull(self, start: tuple[float, float], end: tuple[float, float], button: Any = "left") -> None:
         """Press the mouse at a place, and bring it to another one without letting go."""
@@ -280,10 +278,7 @@ class Visitor:
         self.page.mouse.up()
 
     def write(self, text: str) -> None:
-        """Put a text into the editor as if it were pasted."""
-        self.page.locator(".cm-content").click()
-        self.page.keyboard.press("Control+a")
-        self.page.keyboard.insert_text(text)
+        write(self.page, text)
 
     def is_free(self, robot: int) -> bool:
         with self.sim.lock:

@@ -1,7 +1,5 @@
 """The exercises that come with KiKS: a solution solves each case, a naive program earns a part, the template less."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -65,11 +63,10 @@ def test_solutions_solve_them_and_less_than_that_earns_less(tmp_path: Path) -> N
         name, program, _ = outcome.name.split("/")
         outcomes.setdefault((name, program), []).append(outcome)
     for name in NAMES:
-        assert [each for each in outcomes[name, "solution"] if not each.is_solved] == []
-        assert [each for each in outcomes[name, "template"] if each.is_solved] == []
-        template, naive, solution = (
-            sum(each.points for each in outcomes[name, program]) for program in ("template", "naive", "solution")
-        )
+        for program, is_solved in (("solution", True), ("template", False)):
+            assert [each for each in outcomes[name, program] if each.is_solved is not is_solved] == []
+        programs = ("template", "naive", "solution")
+        template, naive, solution = (sum(each.points for each in outcomes[name, program]) for program in programs)
         assert template < naive, name
         # In one case a naive program may have luck, in all cases it has not.
         assert naive < solution or not AT_LENGTH, name
@@ -80,12 +77,8 @@ def test_it_has_what_a_class_needs(name: str) -> None:
     folder = FOLDER / name
     project = Project.load(folder)
     exercise, goal, cases = project.exercise, project.goal, cases_of(project.cases)
-    assert exercise is not None
     assert exercise.title == project.arena.name
-    assert exercise.title
-    assert goal is not None
-    assert goal.text
-    assert project.seconds is not None
+    assert all((exercise.title, goal.text, project.seconds))
     assert "\n## Hint" in exercise.text
     assert all(len(line) <= 150 for line in exercise.text.splitlines())
     assert 3 <= sum(not case.is_hidden for case in cases) <= 6

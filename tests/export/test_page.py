@@ -1,7 +1,5 @@
 """The page of a recording: it holds what was recorded, needs no network, and plays in a browser from a file."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from html.parser import HTMLParser
@@ -19,10 +17,12 @@ from kiks.export import page_contents as contents
 from kiks.export.bundle import bundle
 from kiks.export.page import WEB, save_page
 from kiks.export.run_frames import RunFrames
-from kiks.recording.entries import Entry
 from kiks.recording.mcap_file import McapReader
 from kiks.recording.recorder import RunRecorder
 from kiks.recording.replay import Replay
+
+Visit = Callable[..., Page]
+Files = tuple[Path, Path]
 
 END_S = share(60.0, 300.0)
 
@@ -41,9 +41,10 @@ def drive(sim: Simulation, seconds: float) -> None:
 
 
 @pytest.fixture(scope="module")
-def plain(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A recording of one robot, which is not short."""
-    return recorded(tmp_path_factory.mktemp("plain") / "run.mcap", END_S)
+def plain(tmp_path_factory: pytest.TempPathFactory) -> Files:
+    """A recording of one robot, which is not short, and its page."""
+    file = recorded(tmp_path_factory.mktemp("plain") / "run.mcap", END_S)
+    return file, page_of(file, file.parent)
 
 
 def recorded(file: Path, seconds: float) -> Path:
@@ -54,18 +55,13 @@ def recorded(file: Path, seconds: float) -> Path:
 
 
 @pytest.fixture(scope="module")
-def plain_page(plain: Path) -> Path:
-    return page_of(plain, plain.parent)
-
-
-@pytest.fixture(scope="module")
 def short(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return recorded(tmp_path_factory.mktemp("short") / "short.mcap", 12)
 
 
 @pytest.fixture(scope="module")
-def rich(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A recording with turrets, balls, lamps, other walls, another robot, notes, and hostile texts."""
+def rich(tmp_path_factory: pytest.TempPathFactory) -> Files:
+    """A recording with turrets, balls, lamps, other walls, another robot, notes, and hostile texts; and its page."""
     file = tmp_path_factory.mktemp("rich") / "rich.mcap"
     sim = Simulation(Arena.from_array(np.zeros((400, 600), np.uint8), name=EVIL), seed=5, robots=2, thinking="fixed:3")
     sim.fit(1, "k213")
@@ -85,12 +81,7 @@ def rich(tmp_path_factory: pytest.TempPathFactory) -> Path:
         drive(sim, 2)
         sim.add_robot()
         drive(sim, 3)
-    return file
-
-
-@pytest.fixture(scope="module")
-def rich_page(rich: Path) -> Path:
-    return page_of(rich, rich.parent, title=EVIL, robot=2)
+    return file, page_of(file, file.parent, title=EVIL, robot=2)
 
 
 class Tags(HTMLParser):
@@ -116,17 +107,14 @@ def page_of(file: Path, folder: Path, **options: Any) -> Path:
 
 
 @at_length
-def test_five_minutes_of_a_robot_are_small_and_load_nothing(plain: Path, plain_page: Path) -> None:
-    assert plain_page.stat().st_size < 3_000_000
-    found = Tags(plain_page)
+def test_five_minutes_of_a_robot_are_small_and_load_nothing(plain: Files) -> None:
+    assert plain[1].stat().st_size < 3_000_000
+    found, recording = Tags(plain[1]), Recording(plain[0])
     links = [value for _, attrs in found.tags for name, value in attrs.items() if name in ("src", "href", "srcset")]
     assert len(links) == 6
     assert all(link is not None and link.startswith("data:") for link in links)
-    style = re.search(r"<style>(.*?)</style>", plain_page.read_text(), re.DOTALL)
-    assert style is not None
-    assert "url(" not in style[1]
-    assert "@import" not in style[1]
-    recording = Recording(plain)
+    style = re.search(r"<style>(.*?)</style>", plain[1].read_text(), re.DOTALL)[1]
+    assert not [each for each in ("url(", "@import") if each in style]
     for told in ("kiks replay --check run.mcap", recording.world_at(recording.duration_s).state_hash(), "box, 500"):
         assert told in found.text
 
@@ -141,8 +129,8 @@ def test_the_same_recording_gives_the_same_page(short: Path, tmp_path: Path) -> 
     assert (half[-1], len(half)) == (1, 4)
 
 
-def test_no_text_becomes_markup(rich_page: Path) -> None:
-    found = Tags(rich_page)
+def test_no_text_becomes_markup(rich: Files) -> None:
+    found = Tags(rich[1])
     assert [tag for tag, _ in found.tags].count("script") == 3
     assert all(str(attrs["src"]).startswith("data:") for tag, attrs in found.tags if tag == "img")
     assert not [attrs for _, attrs in found.tags if any(name.startswith("on") for name in attrs)]
@@ -165,34 +153,31 @@ def test_long_texts_are_cut(tmp_path: Path) -> None:
 
 def test_programs_have_colours_up_to_a_limit_and_none_where_that_takes_minutes(monkeypatch: pytest.MonkeyPatch) -> None:
     texts = {"1-a.py": "if x: pass\n" * 2000, "2-b.py": "if y: pass\n" * 4000, "3-c.txt": "if z: pass\n"}
-    first, second, third = (each["text"] for each in contents._programs(SimpleNamespace(programs=texts)))  # type: ignore[arg-type]
-    assert "<span" in first
-    assert "<span" not in second
-    assert "<span" not in third
+    first, second, third = (each["text"] for each in contents._programs(SimpleNamespace(programs=texts)))
+    assert ["<span" in each for each in (first, second, third)] == [True, False, False]
     assert second.unescape().startswith("if y: pass\nif y")
     seen: list[str] = []
     monkeypatch.setattr(contents, "highlight", lambda code, *_: seen.append(code) or "")
     for text in (" \n" * 90_000, "x = 1\n" + "\r \x0c" * 60_000 + "y"):
-        contents._programs(SimpleNamespace(programs={"1-a.py": text}))  # type: ignore[arg-type]
+        contents._programs(SimpleNamespace(programs={"1-a.py": text}))
         assert not any(line and line.isspace() for line in seen.pop().split("\n"))
     assert not seen
 
 
-def test_the_numbers_are_those_of_the_run(rich: Path, rich_page: Path) -> None:
-    recording, found = Recording(rich), Tags(rich_page)
+def test_the_numbers_are_those_of_the_run(rich: Files) -> None:
+    recording, found = Recording(rich[0]), Tags(rich[1])
     sim = recording.world_at(recording.duration_s)
     for number in (1, 2):
         replies = recording.table("wire", number)
         told = f"{sim.travelled_mm(number) / 1000:.2f} m", f"{sim.contacts(number)}{(~replies['is_sent']).sum()}"
         assert all(each in found.text for each in told)
     assert "2 x Khepera" not in found.text
-    assert "3 x Khepera" in found.text
-    assert "1 ball, 1 lamp" in found.text
-    assert "K213 linear vision on robot 1" in found.text
+    for told in ("3 x Khepera", "1 ball, 1 lamp", "K213 linear vision on robot 1"):
+        assert told in found.text
 
 
-def test_there_is_a_scene_for_each_change(rich: Path) -> None:
-    run = RunFrames(Recording(rich).log)
+def test_there_is_a_scene_for_each_change(rich: Files) -> None:
+    run = RunFrames(Recording(rich[0]).log)
     counts = [(len(scene["robots"]), len(scene["bodies"]), scene["arena"]["picture"]) for scene in run.scenes]
     assert counts == [(2, 1, 0), (2, 2, 0), (2, 2, 1), (3, 2, 1)]
     assert run.replay.equal_count == run.replay.check_count > 10
@@ -209,20 +194,13 @@ def test_a_long_run_has_a_longer_period(short: Path, monkeypatch: pytest.MonkeyP
 
 
 @at_length
-def test_frames_keep_to_the_recording_where_the_run_differs(
-    short: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_frames_keep_to_the_recording_where_the_run_differs(short: Path, monkeypatch, tmp_path: Path) -> None:
     """Another version of KiKS might make another run; here robots get no speeds."""
-    apply: Callable[[Replay, Entry], None] = Replay._apply
-
-    def apply_some(self: Replay, entry: Entry) -> None:
-        if not entry.data.startswith(b"D"):
-            apply(self, entry)
-
-    monkeypatch.setattr(Replay, "_apply", apply_some)
+    apply = Replay._apply
+    monkeypatch.setattr(Replay, "_apply", lambda self, it: None if it.data.startswith(b"D") else apply(self, it))
     recording = Recording(short)
     run = RunFrames(recording.log)
-    assert run.equal_count < 10
+    assert run.replay.equal_count < 10
     assert len(run.scenes) == 1
     poses = recording.table("poses")
     for second in (2, 5, 11):
@@ -278,7 +256,7 @@ def test_a_bundle_takes_no_module_that_it_does_not_understand(tmp_path: Path) ->
 
 
 @pytest.fixture
-def visit(new_page: NewPage) -> Callable[..., Page]:
+def visit(new_page: NewPage) -> Visit:
     """Open a page of a file, without a network; nothing but the file itself may be asked for."""
 
     def open_file(file: Path, width: int = 1280, height: int = 800, **options: Any) -> Page:
@@ -294,23 +272,14 @@ def visit(new_page: NewPage) -> Callable[..., Page]:
 
 
 def shown_pose(page: Page, time_s: float, robot: int = 0) -> list[float]:
-    pose: list[float] = page.evaluate(
-        """([time_s, robot]) => {
-            const { feed } = kiksPage;
-            feed.show(time_s);
-            const { x_mm, y_mm, heading_rad } = feed.frame.pose(robot);
-            return [x_mm, y_mm, heading_rad];
-        }""",
-        [time_s, robot],
-    )
-    return pose
+    page.evaluate("(time_s) => kiksPage.feed.show(time_s)", time_s)
+    pose = page.evaluate("(robot) => kiksPage.feed.frame.pose(robot)", robot)
+    return [pose["x_mm"], pose["y_mm"], pose["heading_rad"]]
 
 
 @pytest.mark.slow
-def test_the_player_shows_the_recording_plays_jumps_and_ends(
-    plain: Path, plain_page: Path, visit: Callable[..., Page]
-) -> None:
-    page, recording = visit(plain_page), Recording(plain)
+def test_the_player_shows_the_recording_plays_jumps_and_ends(plain: Files, visit: Visit) -> None:
+    page, recording = visit(plain[1]), Recording(plain[0])
     poses = recording.table("poses")
     # Near and far, forwards and backwards, at frames and between them.
     for time_s in (0.0, 0.04, 0.1, 7.0, END_S - 10, END_S - 9.98, 12.34, 12.3, END_S - 0.01):
@@ -351,20 +320,20 @@ def test_the_player_shows_the_recording_plays_jumps_and_ends(
 
 
 @pytest.mark.slow
-def test_axe_finds_nothing_serious(rich_page: Path, visit: Callable[..., Page]) -> None:
-    page = visit(rich_page)
+def test_axe_finds_nothing_serious(rich: Files, visit: Visit) -> None:
+    page = visit(rich[1])
     for colours, rules in (("light", None), ("dark", COLOURS)):
         page.emulate_media(color_scheme=colours)
         check_access(page, colours, rules)
-    page = visit(rich_page, 390, 844, has_touch=True, is_mobile=True)
+    page = visit(rich[1], 390, 844, has_touch=True, is_mobile=True)
     check_access(page, "phone")
     check_reach(page, "phone")
 
 
 @at_length
 @pytest.mark.slow
-def test_a_page_shows_changes_robots_and_events(rich: Path, rich_page: Path, visit: Callable[..., Page]) -> None:
-    page = visit(rich_page, color_scheme="dark")
+def test_a_page_shows_changes_robots_and_events(rich: Files, visit: Visit) -> None:
+    page, recording = visit(rich[1], color_scheme="dark"), Recording(rich[0])
     title = page.title()
     assert "evil" not in title.split("'")[0]
     assert title == page.locator("h1").text_content()
@@ -397,25 +366,21 @@ def test_a_page_shows_changes_robots_and_events(rich: Path, rich_page: Path, vis
     lines = page.locator("#list li.output button")
     lines.click()
     page.wait_for_function("() => document.querySelector('#list .now')?.parentElement.className === 'output'")
-    time_s = Recording(rich).table("events")["time_s"][Recording(rich).table("events")["kind"] == "output"][0]
-    assert page.evaluate("kiksPage.player.time_s") == pytest.approx(time_s)
+    events = recording.table("events")
+    assert page.evaluate("kiksPage.player.time_s") == pytest.approx(events["time_s"][events["kind"] == "output"][0])
     page.locator("#kinds input[name=output]").uncheck()
     lines.wait_for(state="hidden")
     with page.expect_download() as saved:
         page.locator("button[data-save=program-1]").click()
     assert saved.value.suggested_filename == "drive.py"
-    assert saved.value.path().read_text() == Recording(rich).programs["1-drive.py"]
+    assert saved.value.path().read_text() == recording.programs["1-drive.py"]
     assert page.title() == title
 
 
 @at_length
-def test_pages_that_are_narrow_or_without_time_or_robots_fit(
-    tmp_path: Path, rich_page: Path, lonely: Path, visit: Callable[..., Page]
-) -> None:
-    sim = Simulation(Arena.box(300, 300), seed=1)
-    with sim.record(tmp_path / "none.mcap"):
-        pass
-    for file in (page_of(tmp_path / "none.mcap", tmp_path), rich_page):
+def test_narrow_pages_and_pages_without_time_or_robots_fit(tmp_path, rich: Files, lonely: Path, visit: Visit) -> None:
+    none = recorded(tmp_path / "none.mcap", 0)
+    for file in (page_of(none, tmp_path), rich[1]):
         page = visit(file, 380, 700)
         assert page.evaluate("document.documentElement.scrollWidth") <= 380
         page.locator("#play").click()
@@ -426,8 +391,7 @@ def test_pages_that_are_narrow_or_without_time_or_robots_fit(
         )
     page = visit(page_of(lonely, lonely.parent))
     assert "There was no robot in this run." in page.locator("#monitor").inner_text()
-    assert not page.locator("#robot").is_visible()
-    assert not page.locator("#follow").is_visible()
+    assert not any(page.locator(name).is_visible() for name in ("#robot", "#follow"))
     page.evaluate("kiksPage.player.seek(kiksPage.feed.end_s)")
     page.wait_for_function("() => kiksPage.player._shown_s === kiksPage.feed.end_s")
     leave_picture(page, "page_without_a_robot", full_page=True)

@@ -1,7 +1,5 @@
 """`kiks grade` from its words to its files: good, broken and hostile programs side by side."""
 
-from __future__ import annotations
-
 import csv
 import json
 import re
@@ -116,12 +114,11 @@ def test_a_class_is_graded(graded: Path) -> None:
     assert [each["name"] for each in told["submissions"]] == ["ann", "bob", "carl", "dora", "frank"]
     assert told["alike"] == [{"first": "ann", "second": "bob", "share": 1.0}]
     rows = rows_of(graded)
-    assert rows["ann"]["solved"] == "2"
+    assert (rows["ann"]["solved"], rows["carl"]["crashed"], rows["dora"]["out of time"]) == ("2", "2", "2")
     assert float(rows["ann"]["points"]) > 7
-    assert rows["ann"]["said_last"].startswith("encoders")
-    assert (rows["carl"]["crashed"], rows["dora"]["out of time"]) == ("2", "2")
     assert rows["carl"]["said_last"] == "ValueError: =1+1 <b>what</b>"
-    assert rows["frank"]["said_last"].startswith("it must have one program")
+    for name, words in (("ann", "encoders"), ("frank", "it must have one program")):
+        assert rows[name]["said_last"].startswith(words)
     for number in (1, 2):
         assert (graded / "runs" / "ann" / f"{number}.mcap").is_file()
     results = json.loads((graded / "results" / "ann.json").read_text())
@@ -130,8 +127,7 @@ def test_a_class_is_graded(graded: Path) -> None:
     assert [entry.get("order") for entry in results["leaderboard"]] == [None, None, "asc"]
     report = (graded / "report.html").read_text()
     assert "Ten &lt;centimetres&gt;" in report
-    assert "<b>what" not in report
-    assert "<script>alert" not in report
+    assert not re.search("<b>what|<script>alert", report)
     assert not re.search(r"(?:src|href)=.?https?:", report)
     first, *columns = table(graded, "moodle.csv")[0]
     assert first == "Identifier"
@@ -141,15 +137,14 @@ def test_a_class_is_graded(graded: Path) -> None:
 def test_the_report_opens_what_belongs_to_a_name(graded: Path, new_page: NewPage) -> None:
     page = new_page(1366, 768)
     for colours, width in (("light", 1366), ("dark", 390)):
-        page.emulate_media(color_scheme=colours)  # type: ignore[arg-type]
+        page.emulate_media(color_scheme=colours)
         page.set_viewport_size({"width": width, "height": 800})
         page.goto((graded / "report.html").as_uri())
         check_access(page, colours)
         for name in ("ann", "carl"):
             page.get_by_role("button", name=name, exact=True).click()
             expect(page.locator(".details:visible h2")).to_contain_text(name)
-            frame = page.frame_locator("iframe")
-            frame.get_by_role("button", name="Play").click()
+            page.frame_locator("iframe").get_by_role("button", name="Play").click()
             expect(page.locator("iframe")).to_have_count(1)
         assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
         leave_picture(page, f"grades_{colours}_{width}", full_page=True)
@@ -174,8 +169,8 @@ def test_hostile_programs_are_named_and_cost_the_others_nothing(tmp_path: Path, 
     for name, words in (("mallory", "processes"), ("oscar", "MB of memory"), ("trudy", "printed more than")):
         assert rows[name]["stopped"] == "1", rows[name]
         assert words in rows[name]["said_last"]
-    assert float(rows["victor"]["points"]) == 0
-    assert int(rows["victor"]["crashed"]) + int(rows["victor"]["stopped"]) == 1
+    points, crashed, stopped = (float(rows["victor"][column]) for column in ("points", "crashed", "stopped"))
+    assert (points, crashed + stopped) == (0, 1)
     if AT_LENGTH:
         # In the same place: a traceback that a program prints names it.
         out.rename(before)
@@ -228,7 +223,5 @@ def test_no_cell_begins_a_formula() -> None:
 def test_without_a_sandbox_nothing_runs(tmp_path: Path) -> None:
     programs = write(tmp_path / "class", {"ann": GOOD})
     done = grade(exercise(tmp_path), programs, "--out", tmp_path / "out", PATH=str(tmp_path))
-    assert done.returncode == 2
-    assert "bubblewrap" in done.stderr
-    assert "--trusted" in done.stderr
+    assert (done.returncode, "bubblewrap" in done.stderr, "--trusted" in done.stderr) == (2, True, True)
     assert not (tmp_path / "out").exists()

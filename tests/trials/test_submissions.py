@@ -1,7 +1,5 @@
 """What is handed in: files, folders, archives of platforms; and what a stranger may put into an archive."""
 
-from __future__ import annotations
-
 import os
 import zipfile
 from pathlib import Path
@@ -37,10 +35,7 @@ def test_files_and_folders(tmp_path: Path) -> None:
     (home / "link.py").symlink_to("/etc/passwd")
     *single, dora, eve = found = found_in(tmp_path, tmp_path / "ann.py", home)
     assert [each.name for each in found] == ["ann", "bob", "carl", "dora", "eve"]
-    for each in single:
-        assert each.command is not None
-        assert each.command.file.read_text() == TEXT
-    assert dora.command is not None
+    assert {each.command.file.read_text() for each in single} == {TEXT}
     assert dora.command.program.is_dir()
     assert set(dora.files) == {"__main__.py", "own/helper.py"}
     assert eve.command is None
@@ -79,7 +74,6 @@ def test_a_file_of_the_page_alone_and_within_an_export(tmp_path: Path) -> None:
     (tmp_path / "ann.zip").write_bytes(data)
     export = zipped(tmp_path / "all.zip", {"Bob_7_assignsubmission_file_/lamp.zip": data})
     for each in found_in(tmp_path, tmp_path / "ann.zip", export):
-        assert each.command is not None
         assert each.command.file.read_bytes() == TEXT.encode()
 
 
@@ -134,28 +128,17 @@ def test_a_folder_that_grade_has_not_made_is_not_deleted(tmp_path: Path) -> None
 def test_programs_are_alike_whatever_their_names_comments_and_layout_are() -> None:
     given = "import kiks\nrobot = kiks.Khepera('/dev/ttyUSB0')\nwhile True:\n    values = robot.proximity()\n"
     lines = (
-        "left = values[0] + 2 * values[1]",
-        "right = values[5] * 2 - values[4]",
-        "if left > right and left > 300:",
-        "    robot.set_speed(-3, 4)",
-        "    robot.pause(0.2)",
-        "elif values[6] > 100:",
-        "    robot.stop()",
-        "else:",
-        "    robot.set_speed(8, min(8, right // 10))",
-        "for step in range(3):",
-        "    print(step, robot.encoders()[0])",
+        *("left = values[0] + 2 * values[1]", "right = values[5] * 2 - values[4]", "if left > right and left > 300:"),
+        *("    robot.set_speed(-3, 4)", "    robot.pause(0.2)", "elif values[6] > 100:", "    robot.stop()", "else:"),
+        *("    robot.set_speed(8, min(8, right // 10))", "for step in range(3):", "    print(robot.encoders()[0])"),
     )
     one = given + "".join(f"    {line}\n" for line in lines)
     other = "# mine\n" + one.replace("values", "w").replace("left", "l").replace("    ", "\t")
     added = one + "    print('something else')\n"
-    own = (
-        given
-        + "    left, right = sum(values[:3]), sum(values[3:6])\n    robot.set_speed(5 - left // 99, 5 - right // 99)\n"
-    )
-    found = {
-        (each.first, each.second): each.share for each in alike({"a": one, "b": other, "c": added, "d": own}, given)
-    }
+    lines = "left, right = sum(values[:3]), sum(values[3:6])", "robot.set_speed(5 - left // 99, 5 - right // 99)"
+    own = given + "".join(f"    {line}\n" for line in lines)
+    pairs = alike({"a": one, "b": other, "c": added, "d": own}, given)
+    found = {(each.first, each.second): each.share for each in pairs}
     assert found[("a", "b")] == 1
     assert 0.8 <= found[("a", "c")] < 1
     assert not any("d" in pair for pair in found)

@@ -1,7 +1,5 @@
 """Sweeps: what varies, up to where a program holds, and which case is the worst."""
 
-from __future__ import annotations
-
 import pytest
 
 from kiks.errors import ParameterError
@@ -10,9 +8,7 @@ from kiks.trials.sweep import Axes, Sweep, Tried
 from kiks.trials.trial import CRASHED, RUNNING, Outcome, ProgramEnd
 
 
-def tried(
-    thinking_ms: float, points: float = 1.0, *, baud: int | None = 9600, robot: int = 1, end: str = RUNNING
-) -> Tried:
+def tried(thinking_ms: float, points: float = 1.0, *, baud=9600, robot: int = 1, end: str = RUNNING) -> Tried:
     """Return a case, solved if it has points."""
     ends = (ProgramEnd(1, "drive.py", end, "no wall" if end == CRASHED else ""),)
     name, time_s = f"{baud}/{thinking_ms}/{robot}", 9.0 if points else 3.0
@@ -24,10 +20,8 @@ def test_it_holds_up_to_the_last_time_before_the_first_that_fails() -> None:
     points = {0: 2, 10: 1, 20: 0, 30: 3}
     found = Sweep(tuple(tried(time, value) for time, value in points.items()))
     assert found.holds_up_to_ms(9600) == 10
-    assert found.verdict == (
-        "holds up to 10 ms of thinking at 9600 baud; "
-        "worst: seed 0, robot 1 with 20 ms at 9600 baud (failed after 3.0 s)"
-    )
+    worst = "worst: seed 0, robot 1 with 20 ms at 9600 baud (failed after 3.0 s)"
+    assert found.verdict == f"holds up to 10 ms of thinking at 9600 baud; {worst}"
     assert [row.share for row in found.rows] == [1, 1, 0, 1]
 
 
@@ -51,10 +45,9 @@ def test_a_share_of_the_runs_may_fail_if_a_person_says_so() -> None:
 
 
 def test_a_program_that_crashes_has_not_solved_anything() -> None:
-    found = Sweep((tried(0, 5.0, end=CRASHED, baud=None),))
-    assert found.verdict == (
-        "does not hold, not even with 0 ms of thinking; worst: seed 0, robot 1 with 0 ms (drive.py crashed: no wall)"
-    )
+    verdict = Sweep((tried(0, 5.0, end=CRASHED, baud=None),)).verdict
+    worst = "worst: seed 0, robot 1 with 0 ms (drive.py crashed: no wall)"
+    assert verdict == f"does not hold, not even with 0 ms of thinking; {worst}"
 
 
 def test_the_worst_of_what_holds_everywhere_has_the_fewest_points() -> None:
