@@ -1,7 +1,5 @@
 """A batch: the same whatever the number of threads and the blocks; and clear words for what is wrong."""
 
-from __future__ import annotations
-
 import pickle
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any

@@ -1,7 +1,5 @@
 """A batch and a wire: the same controller, seed and timing, the same run to the bit."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Actuators: what a batch does is what commands do on the wire, to the bit and in time."""
 
-from __future__ import annotations
-
 import pickle
 from dataclasses import replace
 from itertools import product

@@ -1,7 +1,5 @@
 """Controllers that come with KiKS against plain NumPy, and what is promised of a user's own."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from typing import Any

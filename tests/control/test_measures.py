@@ -1,7 +1,5 @@
 """Measures that come with KiKS against plain NumPy over all that they saw."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any

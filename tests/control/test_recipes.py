@@ -1,7 +1,5 @@
 """Recipes: what a file says of a controller makes the same one again."""
 
-from __future__ import annotations
-
 import json
 import runpy
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Algorithms and their options: deterministic, resumed by telling, better with time; what cannot be is refused."""
 
-from __future__ import annotations
-
 import random
 from pathlib import Path
 from typing import Any

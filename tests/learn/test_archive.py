@@ -1,7 +1,5 @@
 """Archives: the best candidate of each cell, kept in a file; algorithms that look for many behaviours."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A champion's file carries its world and its robot, and gives both back to the bit."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Evolution: reproducible by its seed, resumable when killed; champions drive on a serial line as in the batch."""
 
-from __future__ import annotations
-
 import signal
 from pathlib import Path
 from typing import Any

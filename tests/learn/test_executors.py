@@ -1,7 +1,5 @@
 """The same values on any executor, with or without lost workers."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

@@ -1,7 +1,5 @@
 """Finals: the best of the finalists wins, however it is evaluated, and a resumed evolution has the same champion."""
 
-from __future__ import annotations
-
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from functools import cache, partial
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Laws of fingerprints: they differ if and only if something differs on which values depend."""
 
-from __future__ import annotations
-
 import ctypes
 import functools
 import itertools

@@ -1,7 +1,5 @@
 """Football: what counts in a game, as a contest and as an environment for two agents."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any

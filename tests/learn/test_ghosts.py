@@ -1,7 +1,5 @@
 """Whole generations as ghosts: each candidate drives as in its evaluation, and all are seen in one arena."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

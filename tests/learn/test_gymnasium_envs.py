@@ -1,7 +1,5 @@
 """Environments pass the checks of Gymnasium, and have the same episodes with the same seeds."""
 
-from __future__ import annotations
-
 import copy
 import importlib
 import pickle

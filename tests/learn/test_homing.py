@@ -1,7 +1,5 @@
 """Homing (Floreano and Mondada 1996): the battery, what a life is worth, and the same robot on a line."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

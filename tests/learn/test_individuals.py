@@ -1,7 +1,5 @@
 """Any candidate of a saved evolution drives again as in its evaluation, to the bit."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any, ClassVar
 

@@ -1,7 +1,5 @@
 """A policy that another library learnt drives as it does there, and what cannot be a controller is refused."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace

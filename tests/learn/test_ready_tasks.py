@@ -1,7 +1,5 @@
 """Tasks that come with KiKS: what their fitness and their exams are for."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import replace

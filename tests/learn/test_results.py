@@ -1,7 +1,5 @@
 """Results of several evolutions: files, curves, statistics, comparisons."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

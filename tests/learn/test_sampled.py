@@ -1,7 +1,5 @@
 """Sensors that read tables of samples: beside one wall they read what the whole sensors read."""
 
-from __future__ import annotations
-
 import copy
 import math
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Tasks of two sides: values of pairs depend on the pair and its seed alone, evolutions resume to the bit."""
 
-from __future__ import annotations
-
 import pickle
 from dataclasses import replace
 from pathlib import Path

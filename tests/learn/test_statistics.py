@@ -1,7 +1,5 @@
 """Statistics with answers that are known."""
 
-from __future__ import annotations
-
 import tracemalloc
 from itertools import combinations
 from typing import Any

@@ -1,7 +1,5 @@
 """Task files: a ready-made task with changes, in TOML."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Robots, links and arenas that vary within the worlds of a candidate, or from one generation to the next."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import product
 from typing import Any
