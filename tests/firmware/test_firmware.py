@@ -214,8 +214,7 @@ def test_restart_puts_all_to_defaults() -> None:
     sim.run(0.5)
     sim.sync()
     lines = robot.execute(b"restart", sim.now_ns).decode().split("\r\n")
-    assert lines[-1] == ""
-    assert lines[-2] == "Serial Communication Protocol"
+    assert (lines[-1], lines[-2]) == ("", "Serial Communication Protocol")
     assert "ROM of minirobot KII" in lines[-3]
     assert "Rev. 6.01" in lines[-3]
     assert settings() == fresh

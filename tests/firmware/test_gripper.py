@@ -97,8 +97,7 @@ def test_it_grips_carries_and_puts_down() -> None:
     sim = a_simulation()
     assert ask(sim, "G") == [0]  # the arm is up
     act(sim, "E,255", 0.6)
-    assert ask(sim, "G") == [255]
-    assert ask(sim, "F") == [int(sim.bodies()["brightness"][0])]
+    assert (ask(sim, "G"), ask(sim, "F")) == ([255], [int(sim.bodies()["brightness"][0])])
     act(sim, "D,1", 0.6)
     assert held_by(sim) == 1
     assert ask(sim, "H,0") == [115]  # 200 (16 - 0.5)/27
@@ -243,8 +242,7 @@ def test_it_puts_down_only_where_there_is_room() -> None:
     sim.run(1.0)
     assert held_by(sim) == 0
     assert sim.bodies()["is_lifted"][0] == 0
-    assert ask(sim, "H,0") == [200]
-    assert ask(sim, "H,1") == [255]
+    assert (ask(sim, "H,0"), ask(sim, "H,1")) == ([200], [255])
 
 
 def test_what_fell_beyond_the_edge_is_neither_seen_nor_gripped_again() -> None:

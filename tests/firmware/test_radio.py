@@ -69,15 +69,13 @@ def test_busy_a_second_message_is_dropped_and_at_an_overrun_the_older_one_stays(
     send(sim, 1, 2, [1])
     send(sim, 1, 2, [2])
     sim.run(0.5)
-    assert read(sim, 2)[:3] == [1, 1, 1]
-    assert read(sim, 2)[0] == 0
+    assert (read(sim, 2)[:3], read(sim, 2)[0]) == ([1, 1, 1], 0)
     send(sim, 1, 2, [1])
     sim.run(0.1)
     send(sim, 3, 2, [3])
     sim.run(0.8)
     assert status(sim, 3) == READY | FAILED, "the sender learns it"
-    assert read(sim, 2)[:3] == [1, 1, 1]
-    assert read(sim, 2)[0] == 0
+    assert (read(sim, 2)[:3], read(sim, 2)[0]) == ([1, 1, 1], 0)
     # A program that reads in time gets the message that is being repeated.
     send(sim, 1, 2, [1])
     sim.run(0.1)
@@ -110,8 +108,7 @@ def test_a_message_into_a_transmission_that_just_ended_is_missed() -> None:
     run_ns(sim, attempt_ns(1) // 2)
     send(sim, 1, 2, [1])
     run_ns(sim, attempt_ns(1))
-    assert status(sim, 1) == 0
-    assert status(sim, 2) == READY
+    assert (status(sim, 1), status(sim, 2)) == (0, READY)
     sim.run(0.3)
     assert read(sim, 2)[:3] == [1, 1, 1]
 

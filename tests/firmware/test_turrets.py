@@ -124,8 +124,7 @@ def test_general_io_is_wired_to_the_outside() -> None:
     assert sim.state_hash() != digest
     robot.send("restart")
     sim.run(0.1)
-    assert io.outputs == 0
-    assert io.inputs == 0b1000_0100
+    assert (io.outputs, io.inputs) == (0, 0b1000_0100)
 
 
 def test_general_io_minds_its_numbers() -> None:
@@ -155,8 +154,7 @@ def test_what_it_remembers_stands_in_the_state() -> None:
     assert execute(sim, "T,24,C,5") == "t,24,c,5"
     snapshot = sim.world.state.snapshot()
     digest = sim.state_hash()
-    assert execute(sim, "T,24,C,5") == "t,24,c,10"
-    assert execute(sim, "T,24,C,1", 2) == "t,24,c,1"
+    assert (execute(sim, "T,24,C,5"), execute(sim, "T,24,C,1", 2)) == ("t,24,c,10", "t,24,c,1")
     assert sim.state_hash() != digest
     sim.world.state.restore(snapshot)
     assert sim.state_hash() == digest
@@ -174,8 +172,7 @@ def test_two_of_them_do_not_share_their_numbers() -> None:
     sim.fit(1, Counter())
     sim.fit(1, a_turret(number=25, memory_count=MEMORY_COUNT - 2))
     execute(sim, "T,24,C,5")
-    assert execute(sim, "T,25,C,7") == "t,25,c,7"
-    assert execute(sim, "T,24,C,0") == "t,24,c,5"
+    assert (execute(sim, "T,25,C,7"), execute(sim, "T,24,C,0")) == ("t,25,c,7", "t,24,c,5")
     words = r"memory_count of a turret must be .* from 0 to 0, but it was 1"
     refused(words, sim.fit, 1, a_turret(number=26, memory_count=1))
 
@@ -221,8 +218,7 @@ def test_a_ray_finds_what_is_there() -> None:
     assert site.ray() == site.ray(0.0)
     assert site.poses() == [pytest.approx((300, 300, 0)), pytest.approx((300, 400, 0))]
     assert len(site.bodies()) == 1
-    assert site.arena_mm == (600, 600)
-    assert site.robot == 1
+    assert (site.arena_mm, site.robot) == ((600, 600), 1)
 
 
 def test_what_is_no_turret_is_refused_and_nothing_is_fitted_twice() -> None:

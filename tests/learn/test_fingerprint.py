@@ -185,8 +185,7 @@ HELPER = "GAIN = 1.0\nWEIGHT = 2.0\nOTHER = 3\ndef score(x): return WEIGHT * x\n
 def test_a_helper_beside_a_task_counts_and_its_folder_and_process_do_not(tmp_path: Path) -> None:
     here, there = tmp_path / "here", tmp_path / "there"
     first = own_task(here, HELPER, "2")
-    assert own_task(there, HELPER) == first
-    assert own_task(there, HELPER.replace("OTHER = 3", "OTHER = 4")) == first
+    assert (own_task(there, HELPER), own_task(there, HELPER.replace("OTHER = 3", "OTHER = 4"))) == (first, first)
     assert differing(own_task(there, HELPER.replace("GAIN = 1.0", "GAIN = 0.0")), first) == "controller, fitness"
     assert differing(own_task(there, HELPER.replace("2.0", "3.0")), first) == "fitness"
     assert differing(own_task(there, HELPER.replace("len", "sum")), first) == "fitness"

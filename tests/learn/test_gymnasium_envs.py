@@ -171,8 +171,7 @@ def test_autoreset_modes(name: str) -> None:
             seen, rewards, terminations, _, infos = envs.step(actions)
             assert rewards[0] == 0.0
             assert not terminations.any()
-    assert infos["path_mm"][0] == 0.0
-    assert infos["time_s"][0] == 0.0
+    assert infos["path_mm"][0] == infos["time_s"][0] == 0.0
     assert infos["time_s"][1] > 0.0
     assert seen in envs.observation_space
 

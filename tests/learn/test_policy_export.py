@@ -163,8 +163,7 @@ def test_the_champion_drives_the_episode_of_the_policy(tmp_path: Path) -> None:
     path = tmp_path / "learnt.toml"
     kiks.champion_of_policy(layers, spec, activation="relu").save(path)
     champion = kiks.Champion.load(path)
-    assert champion.timing == spec.timing
-    assert champion.task == "Maze"
+    assert (champion.timing, champion.task) == (spec.timing, "Maze")
     by_policy, by_champion = Episodes(spec, 1, threads=1), Episodes(spec, 1, threads=1)
     for episodes in (by_policy, by_champion):
         episodes.begin([0], [1])

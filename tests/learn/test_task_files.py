@@ -53,8 +53,7 @@ def test_all_keys(folder: Path) -> None:
     assert (task.name, task.seconds, task.worlds, task.starts) == ("in a room", 2.0, 4, "arena")
     assert [arena.width_mm for arena in task.arenas] == [400, 500]
     assert [arena.width_mm for arena in task.exam.arenas] == [500]
-    assert task.robot == str((folder / "my.toml").resolve())
-    assert task.timing == kiks.Timing(0.05, 38400, 0.0025)
+    assert (task.robot, task.timing) == (str((folder / "my.toml").resolve()), kiks.Timing(0.05, 38400, 0.0025))
     assert task.controller is kiks.controllers.gru(units=2)
     assert load(folder, 'base = "avoid"\nbaud = 0\n').timing.baud is None
     assert kiks.tasks.load(str(folder / "mine.toml"), kiks.controllers.linear()).controller.name == "linear"

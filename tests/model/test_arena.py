@@ -163,8 +163,7 @@ def test_a_robot_starts_at_the_first_start_pose_or_in_the_middle_of_the_widest_p
     raster = arena.brightness.copy()
     raster[:, 130] = 255
     pose = replace(arena, ground=raster).find_start(ROBOT_MM)
-    assert pose.x_mm == pytest.approx(261, abs=10)
-    assert pose.y_mm == 150.5
+    assert (pose.x_mm, pose.y_mm) == (pytest.approx(261, abs=10), 150.5)
     narrow = np.zeros((200, 200), np.uint8)
     narrow[:, ::40] = 255
     words = r"'array' must have room for a robot 55 mm across, but its widest place has room for \d+"
@@ -229,7 +228,5 @@ def test_entries_stand_where_they_can():
 
 def test_entries_become_places():
     arena = replace(Arena.box(200, 300), lamps=[(5, 5)], balls=[(50, 60)], cylinders=[(50, 70)], starts=[(50, 80, 1)])
-    assert arena.lamps == (Lamp(5.0, 5.0, 1.0, True),)
-    assert arena.balls == (Ball(50.0, 60.0),)
-    assert arena.cylinders == (Cylinder(50.0, 70.0),)
-    assert arena.starts == (Pose(50.0, 80.0, 1.0),)
+    assert (arena.lamps, arena.balls) == ((Lamp(5.0, 5.0, 1.0, True),), (Ball(50.0, 60.0),))
+    assert (arena.cylinders, arena.starts) == ((Cylinder(50.0, 70.0),), (Pose(50.0, 80.0, 1.0),))

@@ -63,8 +63,7 @@ def test_there_is_a_case_for_each_choice_of_values_and_no_two_share_a_name(found
         assert {case.family for case in mine} == set(table.family or (0,))
         assert all(case.is_hidden == table.is_hidden for case in mine)
         count += choices
-    assert len(cases) == (count or 1)
-    assert len({case.name for case in cases}) == len(cases)
+    assert (len(cases), len({case.name for case in cases})) == (count or 1, len(cases))
     assert all(case.name for case in cases)
 
 

@@ -68,8 +68,7 @@ def test_pieces_are_those_of_the_matlab_kiks(grain, scale):
     picture = np.pad(picture, ((0, max(100 - len(picture), 0)), (0, max(100 - picture.shape[1], 0))))
     data = encode_kad(Arena.from_array(picture))
     walls = walls_of(data)
-    assert walls.dtype == np.uint16
-    assert walls.shape == (1, walls.size)
+    assert (walls.dtype, walls.shape) == (np.uint16, (1, walls.size))
     assert walls[0].tolist() == greedy(picture)
     assert np.array_equal(decode_kad(data).brightness[::-1], picture)
 

@@ -87,8 +87,7 @@ def test_every_maze_is_as_likely():
 def test_sizes_and_places_are_those_of_the_matlab_maze_demo():
     # kiks-behaviour.md, section 1.9: 640 rows x 880 columns, start (55, 60), light (830, 580), y counted from the top.
     arena = Arena.maze(columns=5, rows=5)
-    assert arena.brightness.shape == (640, 880)
-    assert arena.starts == (Pose(55.0, 640.0 - 60.0, 0.0),)
+    assert (arena.brightness.shape, arena.starts) == ((640, 880), (Pose(55.0, 640.0 - 60.0, 0.0),))
     assert arena.lamps == (Lamp(830.0, 640.0 - 580.0),)
 
 
