@@ -120,7 +120,7 @@ def test_it_grips_carries_and_puts_down() -> None:
     assert ask(sim, "G") == [0]
 
 
-def test_what_stands_between_the_jaws_is_gripped() -> None:
+def test_what_stands_between_the_jaws_is_gripped_unless_it_is_too_wide_or_far_below() -> None:
     for ahead_mm, aside_mm, is_gripped in (
         (TOUCHING_MM + 0.1, 0.0, True),
         (RIM_MM + 36.5, 0.0, True),
@@ -140,9 +140,6 @@ def test_what_stands_between_the_jaws_is_gripped() -> None:
             assert aside == pytest.approx(0.0, abs=0.02)
             assert ahead >= TOUCHING_MM
         assert deepest_overlap_mm(sim) < 0.02
-
-
-def test_what_is_too_wide_or_far_above_is_not_gripped() -> None:
     sim = a_simulation()
     act(sim, "E,200", 0.5)
     act(sim, "D,1", 0.6)
@@ -181,7 +178,7 @@ def test_it_drags_what_it_holds_as_fast_as_it_drives() -> None:
     assert seen_from(sim) == pytest.approx((TOUCHING_MM + 1, 0.0), abs=0.01)
 
 
-def test_a_wall_stops_both() -> None:
+def test_a_wall_stops_both_and_one_beside_the_load_the_turn() -> None:
     sim = holding()
     drive(sim, 20, 20, 8.0)
     x, y = place_of(sim)
@@ -190,9 +187,6 @@ def test_a_wall_stops_both() -> None:
     assert sim.contacts(1) == 1
     assert max(kiks.Khepera(sim.port(1)).speed()) <= 5  # wheels slip, as a robot's at a wall
     assert deepest_overlap_mm(sim) < 0.02
-
-
-def test_a_wall_beside_the_load_stops_the_turn() -> None:
     sim = holding()
     act(sim, "E,150", 0.6)
     sim.place(1, 861, 300, math.pi / 2)  # almost at the wall at its right, which the load meets after 0.3 rad

@@ -121,13 +121,10 @@ def test_what_a_function_holds_counts(make: Callable[[float], Any]) -> None:
     assert ", without" not in of(make(1.0))
 
 
-def test_different_things_differ() -> None:
+def test_different_things_differ_and_equal_ones_are_equal_whether_they_are_one_or_two() -> None:
     numbers = [1, 1.0, "1", True, None, (1,), [1], {1: 1}, {1}]
     things = [*numbers, np.mean, np.sum, len, int, kiks, np, of, Scaled, Scaled(1)]
     assert all(of(one) != of(other) for one, other in itertools.combinations(things, 2))
-
-
-def test_equal_things_are_equal_whether_they_are_one_or_two() -> None:
     one, two = [1.5], [1.5]
     assert of([one, one]) == of([one, two])
 
@@ -203,9 +200,6 @@ def test_a_worker_gets_what_was_sent_or_says_what_differs() -> None:
     subprocess.run([sys.executable, "-c", code], input=pickle.dumps(sent), check=True)
     with pytest.raises(kiks.ParameterError, match=r"the same modules of yours, but on one these differ: fitness\."):
         _evaluate_chunk(own, _identity(own) | {"fitness": "0"}, np.zeros((1, 18)), np.zeros(1, np.int64))
-
-
-# ---- what cannot be seen ----
 
 
 OPENED = "def f(values):\n    return open('table.csv').read()\n"

@@ -75,13 +75,10 @@ def test_environments_pass_the_checks_of_gymnasium(name: str) -> None:
     check_env(env.unwrapped)
 
 
-def test_a_module_in_the_name_registers_the_environments() -> None:
+def test_a_module_in_the_name_registers_the_environments_and_import_kiks_alone_does_not_import_gymnasium() -> None:
     code = "import gymnasium; print(gymnasium.make('kiks.learn.gymnasium_envs:kiks/Avoid-v0').unwrapped)"
     found = forked.run(code=code)
     assert "KheperaEnv" in found.stdout, found.stderr
-
-
-def test_import_kiks_does_not_import_gymnasium() -> None:
     code = "import sys, kiks; assert not {'gymnasium', 'pettingzoo', 'numba'} & set(sys.modules)"
     subprocess.run([sys.executable, "-c", code], check=True)
 
@@ -121,7 +118,7 @@ def test_single_and_vector_environments_have_the_same_episodes(name: str) -> Non
     assert hashes[0] == hashes[1]
 
 
-def test_reset_with_a_seed_repeats_an_episode_and_without_one_continues() -> None:
+def test_reset_with_a_seed_repeats_an_episode_and_worlds_have_different_ones_or_those_of_a_list() -> None:
     env = single()
 
     def episode(seed: int | None) -> list[float]:
@@ -132,9 +129,6 @@ def test_reset_with_a_seed_repeats_an_episode_and_without_one_continues() -> Non
     assert first != second
     assert [episode(7), episode(None)] == [first, second]
     assert episode(8) != first
-
-
-def test_worlds_have_different_seeds_or_those_of_a_list() -> None:
     envs = vector()
     envs.reset(seed=[4, 9, 4])
     one, two, three = (envs.episodes.batch.poses[k].tolist() for k in range(3))
@@ -210,13 +204,10 @@ def test_wrappers_of_gymnasium_accept_the_vector_environment() -> None:
     assert infos["episode"]["l"].tolist() == [3, 3]
 
 
-def test_the_sum_of_rewards_is_the_measure() -> None:
+def test_the_sum_of_rewards_is_the_measure_and_a_contact_lowers_it() -> None:
     envs = begun(vector(4, threads=1), 2)
     total = sum(envs.step(action)[1] for action in random_actions(12, 4))
     np.testing.assert_allclose(total / 12, envs.episodes.batch.values[:, 0, 0])
-
-
-def test_a_contact_lowers_the_reward() -> None:
     free, costly = (single(reward=without_contacts(kiks.measures.path_mm, cost)) for cost in (0.0, 7.0))
     totals = []
     for env in (begun(free), begun(costly)):

@@ -94,11 +94,15 @@ def test_where_arenas_are_drawn_a_lone_robot_draws_its_start_too() -> None:
     assert task_of(arenas=arenas, worlds=3, robots=2, starts="arena").start_poses(np.array([1])) is None
 
 
-def test_many_arenas_need_no_multiple_of_worlds() -> None:
+def test_many_arenas_need_no_multiple_of_worlds_and_the_digest_depends_on_them_robots_and_timings() -> None:
     task = task_of(arenas=many(7), worlds=6, exam=None)
     assert task.world().arena.width_mm in {arena.width_mm for arena in task.arenas_of(0)}
     refused("worlds must be a multiple of the number of arenas, 5, but it was 6", task_of, arenas=many(5), worlds=6)
     assert task.digest() != task_of(arenas=many(8), worlds=6).digest()
+    robots = ["khepera_ii", *(family(KHEPERA, 2, seed=seed) for seed in (1, 2))]
+    changed = [{"robot": robot} for robot in robots] + [{"timing": timing} for timing in (TIMINGS, TIMINGS[1])]
+    tasks = [task_of(), *(task_of(**changes) for changes in changed)]
+    assert len({tuple(task.digest().items()) for task in tasks}) == len(tasks)
 
 
 def test_an_evolution_in_many_arenas_resumes(tmp_path: Any) -> None:
@@ -110,13 +114,6 @@ def test_an_evolution_in_many_arenas_resumes(tmp_path: Any) -> None:
     again.run(generations=3)
     assert again.champion.parameters == whole.champion.parameters
     refused("arenas", kiks.Evolution, task_of(arenas=many(8), worlds=2), "ga", seed=4, population=6, folder=tmp_path)
-
-
-def test_the_digest_depends_on_robots_and_timings() -> None:
-    robots = ["khepera_ii", *(family(KHEPERA, 2, seed=seed) for seed in (1, 2))]
-    changed = [{"robot": robot} for robot in robots] + [{"timing": timing} for timing in (TIMINGS, TIMINGS[1])]
-    tasks = [task_of(), *(task_of(**changes) for changes in changed)]
-    assert len({tuple(task.digest().items()) for task in tasks}) == len(tasks)
 
 
 def test_wrong_lists_are_errors() -> None:
