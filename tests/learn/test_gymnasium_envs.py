@@ -75,7 +75,7 @@ def test_environments_pass_the_checks_of_gymnasium(name: str) -> None:
     check_env(env.unwrapped)
 
 
-def test_a_module_in_the_name_registers_the_environments_and_import_kiks_alone_does_not_import_gymnasium() -> None:
+def test_a_module_in_the_name_registers_the_environments_and_kiks_alone_imports_no_gymnasium() -> None:
     code = "import gymnasium; print(gymnasium.make('kiks.learn.gymnasium_envs:kiks/Avoid-v0').unwrapped)"
     found = forked.run(code=code)
     assert "KheperaEnv" in found.stdout, found.stderr
@@ -260,7 +260,7 @@ def test_pictures_show_the_robot() -> None:
     np.testing.assert_array_equal(pictures[0], before)
 
 
-def test_a_team_of_one_has_the_episodes_of_the_single_environment() -> None:
+def test_a_team_of_one_has_the_episodes_of_the_single_environment_and_those_of_all_robots_end_at_once() -> None:
     alone, env = team(robots=1), single()
     seen, _ = alone.reset(seed=3)
     expected, _ = env.reset(seed=3)
@@ -269,9 +269,6 @@ def test_a_team_of_one_has_the_episodes_of_the_single_environment() -> None:
         seen, rewards, *_, infos = alone.step({"robot_1": action})
         expected, reward, *_, info = env.step(action)
         assert (rewards["robot_1"], infos["robot_1"]) == (reward, info)
-
-
-def test_an_episode_of_a_team_ends_for_all_robots_at_once() -> None:
     pair = begun(team(small_task(), robots=2))
     actions = {"robot_1": np.ones(2, np.float32), "robot_2": np.zeros(2, np.float32)}
     for _ in range(20):

@@ -23,16 +23,13 @@ def load(folder: Path, text: str, name: str = "mine.toml") -> kiks.Task:
     return kiks.tasks.load(str(folder / name))
 
 
-def test_keys_left_out_keep_the_values_of_the_ready_made_task(folder: Path) -> None:
+def test_keys_left_out_keep_the_ready_made_values_and_the_second_side_has_a_controller_of_its_own(folder: Path) -> None:
     base = kiks.tasks.load("gather")
     task = load(folder, 'base = "gather"\n')
     assert task.name == "mine"
     for name in ("measures", "fitness", "seconds", "worlds", "axes", "robot", "robots", "timing", "starts"):
         assert getattr(task, name) == getattr(base, name), name
     assert task.controller is base.controller
-
-
-def test_the_second_side_has_a_controller_of_its_own(folder: Path) -> None:
     task = load(folder, 'base = "pursuit"\n[against]\nkind = "gru"\nunits = 2\n')
     base = kiks.tasks.pursuit()
     assert task.against.controller is kiks.controllers.gru(units=2)

@@ -25,12 +25,15 @@ def values_of(task: kiks.Task, seeds: tuple[int, ...] = (5,)) -> np.ndarray:
     return task.evaluate(parameters, np.array(seeds), 1)
 
 
-def test_a_list_of_one_is_that_robot_and_that_timing() -> None:
+def test_a_list_of_one_is_that_robot_and_that_timing_and_wrong_lists_are_errors() -> None:
     alone = values_of(task_of())
     for changes in ({"robot": KHEPERA}, {"robot": ["khepera"]}, {"timing": [task_of().timing]}):
         task = task_of(**changes)
         assert (values_of(task) == alone).all()
         assert task.digest() == task_of().digest()
+    for changes in ({"robot": []}, {"robot": 3}, {"robot": ["khepera", 3]}, {"timing": []}, {"timing": "fast"}):
+        (name,) = changes
+        refused(f"^{name}.* must be .* or a list of them, but it was", task_of, **changes)
 
 
 def test_worlds_take_all_combinations_in_turn() -> None:
@@ -114,12 +117,6 @@ def test_an_evolution_in_many_arenas_resumes(tmp_path: Any) -> None:
     again.run(generations=3)
     assert again.champion.parameters == whole.champion.parameters
     refused("arenas", kiks.Evolution, task_of(arenas=many(8), worlds=2), "ga", seed=4, population=6, folder=tmp_path)
-
-
-def test_wrong_lists_are_errors() -> None:
-    for changes in ({"robot": []}, {"robot": 3}, {"robot": ["khepera", 3]}, {"timing": []}, {"timing": "fast"}):
-        (name,) = changes
-        refused(f"^{name}.* must be .* or a list of them, but it was", task_of, **changes)
 
 
 @pytest.mark.slow
