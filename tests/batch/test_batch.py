@@ -1,7 +1,5 @@
 """A batch: the same whatever the number of threads and the blocks; and clear words for what is wrong."""
 
-from __future__ import annotations
-
 import pickle
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -97,15 +95,12 @@ def test_threads_that_share_a_batch_take_turns():
     assert batch.state_hash(0) == fresh.state_hash(0)
 
 
-def test_a_world_is_the_same_among_others_and_alone(expected: list[str]) -> None:
+def test_a_world_is_the_same_among_others_and_alone_and_in_a_second_run(expected: list[str]) -> None:
     robots = family(kiks.RobotSpec.load("khepera"), 37, seed=4, dead_share=0.1)
     for world in (0, 13, 36):
         alone = make(1, arena=arenas()[world % 2], robot=[robots[world]], seed=21 + world)
         alone.run(vehicle, [np.linspace(2, 15, 37)[world], np.linspace(0.001, 0.02, 37)[world]], seconds=6.0)
         assert alone.state_hash(0) == expected[world]
-
-
-def test_a_second_run_starts_from_the_initial_state(expected: list[str]) -> None:
     batch = make(threads=1)
     hashes(batch, seconds=1.0)
     assert hashes(batch) == expected
@@ -168,6 +163,8 @@ def test_wrong_arguments_are_errors() -> None:
         ("senses must be some of", {"senses": ("smell",)}),
     ):
         refused(words, kiks.Batch, arenas()[0], **{"worlds": 4} | options)
+    with_ball = kiks.Arena(arenas()[0].brightness, 1.0, "b", balls=(Ball(330, 100),))
+    refused("same number of balls and cylinders", kiks.Batch, [arenas()[0], with_ball], 2)
 
 
 def test_an_arena_may_come_in_several_turns() -> None:
@@ -183,17 +180,12 @@ def test_an_arena_may_come_in_several_turns() -> None:
             assert each.state_hash(world) == alone.state_hash(0)
 
 
-def test_arenas_must_hold_as_many_bodies() -> None:
-    with_ball = kiks.Arena(arenas()[0].brightness, 1.0, "b", balls=(Ball(330, 100),))
-    refused("same number of balls and cylinders", kiks.Batch, [arenas()[0], with_ball], 2)
-
-
 @kiks.controller(senses=("ambient",))
 def light_only(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
     """Stand still."""
 
 
-def test_a_run_rejects_wrong_arguments() -> None:
+def test_runs_and_steps_reject_wrong_arguments() -> None:
     alone, pair = (kiks.Batch(kiks.Arena.box(400, 400), 4, robots=robots).run for robots in (1, 2))
     given = [1.0, 0.0]
     refused("must be given 2 parameters", alone, vehicle, [1.0], seconds=1.0)
@@ -211,6 +203,11 @@ def test_a_run_rejects_wrong_arguments() -> None:
     refused("must be given 2 parameters", pair, [vehicle] * 2, [given, [1.0]], seconds=1.0)
     words = r"those of robot 2 had the shape \(3, 2\)"
     refused(words, pair, [vehicle] * 2, [given, np.zeros((3, 2))], seconds=1.0)
+    batch = make(2)
+    refused(r"reset\(\) must be called", batch.step, np.zeros((2, 1, 2)))
+    batch.reset()
+    refused("wheels must be", batch.step, np.zeros((2, 2)))
+    refused("world must be a whole number from 0 to 1", batch.state_hash, 2)
 
 
 def test_the_same_controller_for_each_robot_is_one_for_all() -> None:
@@ -236,27 +233,16 @@ def seen(moment: Any, notes: Any) -> None:
     notes[3] = moment.wheels[0]
 
 
-def test_controllers_get_their_own_counts_of_numbers() -> None:
+def test_controllers_get_their_own_counts_of_numbers_and_measures_see_all_robots() -> None:
     large = kiks.controller(senses=("proximity", "ambient"), memory=3, parameters=1)(counts)
     small = kiks.controller(memory=1)(counts)
     batch = kiks.Batch(kiks.Arena.box(400, 400), 1, robots=3)
     rollouts = batch.run([small, large, small], [[1, 2.0], [-1.0], [1, 2, 3]], seconds=0.1, measures=[seen])
     assert rollouts.values[0, :, 3].tolist() == [8 + 10 + 2 + 2, 16 + 30 + 1 - 1, 8 + 10 + 3 + 3]
-
-
-def test_measures_see_all_robots_of_their_world() -> None:
     batch = kiks.Batch(kiks.Arena.box(500, 500), 10, robots=3, seed=2)
     values = batch.run(vehicle, [1.0, 0.01], seconds=2.0, measures=[seen]).values
     assert (values[..., 0] == 0.0).all()
     assert np.array_equal(values[..., 1], np.roll(values[..., 2], -1, axis=1))
-
-
-def test_steps_reject_wrong_arguments() -> None:
-    batch = make(2)
-    refused(r"reset\(\) must be called", batch.step, np.zeros((2, 1, 2)))
-    batch.reset()
-    refused("wheels must be", batch.step, np.zeros((2, 2)))
-    refused("world must be a whole number from 0 to 1", batch.state_hash, 2)
 
 
 def test_commands_act_in_the_order_of_their_lengths() -> None:

@@ -1,7 +1,5 @@
 """A batch and a wire: the same controller, seed and timing, the same run to the bit."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -155,8 +153,7 @@ def test_a_trial_ends_with_its_robots_first_note_and_leaves_the_world_as_a_wire_
     batch = kiks.Batch(arena(), 3, robots=2, seed=5, timing=timing)
     endless = batch.run(wander, speeds, seconds=8.0, measures=[bumped])
     until = batch.run(wander, speeds, seconds=8.0, measures=[kiks.measures.path_mm], until=bumped)
-    assert until.measures == ("path_mm",)
-    assert until.values.shape == (3, 2, 1)
+    assert (until.measures, until.values.shape) == (("path_mm",), (3, 2, 1))
     assert (until.step_counts < endless.step_counts).tolist() == [True, False, True]  # robots of speed 0 touch nothing
     for world, steps in enumerate(until.step_counts.tolist()):
         sim = kiks.Simulation(arena(), robots=2, seed=5 + world)

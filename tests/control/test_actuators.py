@@ -1,7 +1,5 @@
 """Actuators: what a batch does is what commands do on the wire, to the bit and in time."""
 
-from __future__ import annotations
-
 import pickle
 from dataclasses import replace
 from itertools import product
@@ -114,9 +112,10 @@ def test_step_by_step_is_the_same_as_at_once() -> None:
     np.testing.assert_array_equal(alone.times_s, stepped.times_s)
 
 
-def test_outputs_are_rounded_and_cut() -> None:
+def test_outputs_are_rounded_and_cut_at_the_limits_of_the_table() -> None:
     for wanted, sent, expected in ((3.4, 0.0, 3.0), (-7.0, 0.0, 0.0), (300.0, 0.0, 255.0), (np.nan, 12.0, 12.0)):
         assert value_of(wanted, 0.0, 255.0, sent) == expected
+    assert [(each.least, each.most) for each in ACTUATORS["gripper"]] == [(0, 255), (0, 1)]
 
 
 def test_actuators_survive_pickles() -> None:
@@ -162,7 +161,3 @@ def test_mistakes_are_refused() -> None:
     with pytest.raises(kiks.KiksError, match=r"T,1,G.*not supported") as caught:
         kiks.drive(kiks.Simulation(arena()).port(1), clutch, [0, 0], seconds=1)
     assert "\n" not in str(caught.value)
-
-
-def test_limits_are_those_of_the_table() -> None:
-    assert [(each.least, each.most) for each in ACTUATORS["gripper"]] == [(0, 255), (0, 1)]

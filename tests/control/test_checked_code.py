@@ -1,7 +1,5 @@
 """Functions of users stay within their arrays, or one line says which line leaves which array."""
 
-from __future__ import annotations
-
 import re
 from types import ModuleType
 from typing import Any

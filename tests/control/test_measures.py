@@ -1,7 +1,5 @@
 """Measures that come with KiKS against plain NumPy over all that they saw."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -211,12 +209,15 @@ def test_following_a_wall_scores_and_standing_shuttling_or_leaving_it_does_not()
     assert crossing < 0.1
 
 
-def test_lamps_that_do_not_burn_are_none() -> None:
+def test_lamps_that_do_not_burn_are_none_and_measures_of_a_drive_without_steps_zero() -> None:
     lamps = np.array([[10.0, 0.0, 1.0, 0.0], [30.0, 40.0, 1.0, 1.0]])
     assert after(kiks.measures.light_mm, moment(lamps=lamps)) == 50.0
     assert after(kiks.measures.light_mm, moment(lamps=lamps[:1])) == np.inf
     assert after(kiks.measures.light_approach, moment(lamps=lamps[:1])) == 0.0
     assert after(kiks.measures.light_stay_s(RADIUS_MM), moment(lamps=lamps[:1])) == 0.0
+    for measure in (kiks.measures.avoidance, kiks.measures.straightness, kiks.measures.touching_share):
+        assert after(measure) == 0.0
+    assert after(kiks.measures.spread_mm, moment()) == 0.0
 
 
 @given(st.lists(st.tuples(st.floats(-500, 500), st.floats(-500, 500)), max_size=8), st.sampled_from((60.0, 150.0)))
@@ -231,12 +232,6 @@ def test_groups_and_closeness_follow_from_the_distances_of_pairs(places_mm: Any,
     assert after(kiks.measures.closeness, moment(bodies=bodies)) == pytest.approx(wanted)
 
 
-def test_measures_of_a_drive_without_steps_are_zero() -> None:
-    for measure in (kiks.measures.avoidance, kiks.measures.straightness, kiks.measures.touching_share):
-        assert after(measure) == 0.0
-    assert after(kiks.measures.spread_mm, moment()) == 0.0
-
-
 def test_the_same_arguments_make_the_same_measure() -> None:
     measures = kiks.measures
     assert measures.coverage(kiks.Arena.box(500, 300)) is measures.coverage(kiks.Arena.box(450, 250), square_mm=100)
@@ -247,25 +242,19 @@ def test_the_same_arguments_make_the_same_measure() -> None:
     assert measures.reached_s(1, 2) is not measures.reached_s(1, 3)
 
 
-def test_what_a_measure_needs_must_be_sensed() -> None:
+def test_arguments_out_of_range_and_what_is_not_sensed_are_refused() -> None:
+    measures = kiks.measures
+    refused("side must be 'left' or 'right', but it was 'top'", measures.wall_following, "top")
+    refused("at most 1000000 squares, but 1 mm", measures.coverage, kiks.Arena.box(2000, 2000), square_mm=1)
+    refused("x_mm must be a number, but it was 'here'", measures.goal_mm, "here", 0)
+    refused("radius_mm must be at least 0", measures.largest_group, -1)
     batch = kiks.Batch(kiks.Arena.box(300, 300), worlds=1)
     controller = kiks.controllers.linear(senses=("ambient", "proximity"))
     with pytest.raises(kiks.ParameterError, match=r"'avoidance' must find proximity first .* 'linear' senses ambient"):
         batch.run(controller, np.zeros(34), seconds=1, measures=[kiks.measures.avoidance])
 
 
-def test_arguments_out_of_range() -> None:
-    measures = kiks.measures
-    refused("side must be 'left' or 'right', but it was 'top'", measures.wall_following, "top")
-    refused("at most 1000000 squares, but 1 mm", measures.coverage, kiks.Arena.box(2000, 2000), square_mm=1)
-    refused("x_mm must be a number, but it was 'here'", measures.goal_mm, "here", 0)
-    refused("radius_mm must be at least 0", measures.largest_group, -1)
-
-
-# ---- several values ----
-
-
-def test_a_trajectory_is_the_last_pose_of_each_interval(trace: Trace) -> None:
+def test_a_trajectory_is_the_last_pose_of_each_interval_and_stays_where_a_trial_has_ended(trace: Trace) -> None:
     for way, values in zip(WAYS, trace.ways, strict=False):
         assert len(way.value_names) == len(values)
         ways = values.reshape(-1, 3, WORLDS)
@@ -275,9 +264,6 @@ def test_a_trajectory_is_the_last_pose_of_each_interval(trace: Trace) -> None:
             for world in range(WORLDS):
                 step = np.flatnonzero((trace.times_s[world] < ends_s) | (k == len(ways) - 1)).max()
                 assert (ways[k, :2, world] == trace.places_mm[world, step]).all()
-
-
-def test_a_trial_that_has_ended_stays_where_it_was() -> None:
     parameters = np.zeros(FULL.parameter_count)
     parameters[:2] = 0.5
     rollouts = kiks.Batch(arena(), worlds=2, seed=1).run(FULL, parameters, seconds=2, measures=[WAYS[2]])

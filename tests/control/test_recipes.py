@@ -1,7 +1,5 @@
 """Recipes: what a file says of a controller makes the same one again."""
 
-from __future__ import annotations
-
 import json
 import runpy
 from pathlib import Path
@@ -57,7 +55,7 @@ def test_a_module(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert kiks.controllers.recipe_for(found, tmp_path) == recipe
 
 
-def test_a_controller_inside_a_function_cannot_be_named() -> None:
+def test_a_controller_or_sense_inside_a_function_cannot_be_named() -> None:
     @kiks.controller
     def inner(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
         wheels[0] = 1.0
@@ -65,8 +63,6 @@ def test_a_controller_inside_a_function_cannot_be_named() -> None:
     assert inner.recipe is None
     refused("'inner' must be defined at the top of a module or file", kiks.controllers.recipe_for, inner)
 
-
-def test_a_sense_inside_a_function_cannot_be_named() -> None:
     @kiks.sense(command="N", readings=8, most=1023)
     def inner(view: Any, readings: Any) -> None:
         readings[:] = 0.0

@@ -1,7 +1,5 @@
 """Senses: what a batch reads is what a command reads on the wire, to the bit and in time."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import pickle

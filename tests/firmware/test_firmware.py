@@ -90,7 +90,7 @@ def test_an_error_changes_nothing() -> None:
         assert robot.demo_wakes_ns is None, line
 
 
-def test_numbers_are_clamped() -> None:
+def test_numbers_are_clamped_counters_keep_the_low_32_bits_and_the_bus_8() -> None:
     robot = a_robot()
     for line, field, values in (
         (b"A,1,2,99999", "speed_gains", [1, 2, 32767]),
@@ -112,9 +112,6 @@ def test_numbers_are_clamped() -> None:
         robot.execute(b"D,1,1", 0)
         assert robot.execute(line, 0) == line[:1].lower() + b"\r\n", line
         assert getattr(robot.view, field).tolist() == values, line
-
-
-def test_counters_keep_the_low_32_bits_and_the_bus_8() -> None:
     robot = a_robot()
     for number in (2**31, -(2**31) - 1, 2**32 + 5, -(2**32) - 5, 10**200, -(10**200) + 1):
         assert robot.execute(b"G,%d,0" % number, 0) == b"g\r\n"
@@ -125,7 +122,7 @@ def test_counters_keep_the_low_32_bits_and_the_bus_8() -> None:
         assert robot.execute(b"R,%d" % address, 0) == b"r,0\r\n"
 
 
-def test_channels_1_and_2_follow_the_scan() -> None:
+def test_channels_1_and_2_follow_the_scan_and_6_the_motors() -> None:
     robot = a_robot()
     assert robot.scanned_sensor() == 0
     robot.sense_proximity = lambda: list(range(10, 18))
@@ -133,9 +130,6 @@ def test_channels_1_and_2_follow_the_scan() -> None:
     for sensor, time_ns in ((0, 0), (0, 2_499_999), (1, 2_500_000), (7, 19_999_999), (0, 20_000_000)):
         assert robot.execute(b"I,1", time_ns) == b"i,%d\r\n" % (10 + sensor)
         assert robot.execute(b"I,2", time_ns) == b"i,%d\r\n" % (20 + sensor)
-
-
-def test_current_follows_the_motors() -> None:
     sim = a_simulation()
     robot = sim.wires[0].firmware
     assert robot.execute(b"I,6", 0) == b"i,100\r\n"
@@ -160,7 +154,7 @@ def test_a_turret_gets_numbers_that_fit_64_bits() -> None:
     assert listener.heard == (5, -(2**62))
 
 
-def test_help_for_every_letter() -> None:
+def test_there_is_help_for_every_letter_and_flash_in_the_second_khepera_alone() -> None:
     names, robot = {command.letter: command.name for command in COMMANDS}, a_robot()
     for letter in "ABCDEFGHIJKLMNOPQRSTUVWXYZ":
         reply = robot.execute(f"help {letter}".encode(), 0)
@@ -169,9 +163,6 @@ def test_help_for_every_letter() -> None:
             assert reply.endswith(f": {names[letter]}\r\n".encode())
         else:
             assert reply == NO_HELP
-
-
-def test_only_the_second_khepera_has_flash() -> None:
     for name, has_flash in (("khepera", False), ("khepera_ii", True)):
         robot = a_robot(name)
         assert (robot.execute(b"flash E", 0) == b"Flash erased\r\n") == has_flash
@@ -214,8 +205,7 @@ def test_restart_puts_all_to_defaults() -> None:
     sim.run(0.5)
     sim.sync()
     lines = robot.execute(b"restart", sim.now_ns).decode().split("\r\n")
-    assert lines[-1] == ""
-    assert lines[-2] == "Serial Communication Protocol"
+    assert (lines[-1], lines[-2]) == ("", "Serial Communication Protocol")
     assert "ROM of minirobot KII" in lines[-3]
     assert "Rev. 6.01" in lines[-3]
     assert settings() == fresh

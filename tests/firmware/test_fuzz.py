@@ -90,14 +90,11 @@ def test_pieces_make_no_difference(pairs: list[tuple[bytes, bytes]], cuts: list[
     assert answers("khepera_ii", data, cuts) == answers("khepera_ii", data, [])
 
 
-def test_at_most() -> None:
+def test_the_oracle_notices_and_counts() -> None:
     for limit in (1, 6, 9, 10, 63, 255, 999, 1000, 1023, 1203):
         pattern = re.compile(at_most(limit))
         assert [n for n in range(2000) if pattern.fullmatch(str(n).encode())] == list(range(limit + 1))
         assert not pattern.fullmatch(b"01")
-
-
-def test_the_oracle_notices_and_counts() -> None:
     for line, reply in (
         (b"N", b"n,0,0,0,0,0,0,0\r\n"),
         (b"N", b"n,0,0,0,0,0,0,0,1024\r\n"),

@@ -97,8 +97,7 @@ def test_it_grips_carries_and_puts_down() -> None:
     sim = a_simulation()
     assert ask(sim, "G") == [0]  # the arm is up
     act(sim, "E,255", 0.6)
-    assert ask(sim, "G") == [255]
-    assert ask(sim, "F") == [int(sim.bodies()["brightness"][0])]
+    assert (ask(sim, "G"), ask(sim, "F")) == ([255], [int(sim.bodies()["brightness"][0])])
     act(sim, "D,1", 0.6)
     assert held_by(sim) == 1
     assert ask(sim, "H,0") == [115]  # 200 (16 - 0.5)/27
@@ -121,7 +120,7 @@ def test_it_grips_carries_and_puts_down() -> None:
     assert ask(sim, "G") == [0]
 
 
-def test_what_stands_between_the_jaws_is_gripped() -> None:
+def test_what_stands_between_the_jaws_is_gripped_unless_it_is_too_wide_or_far_below() -> None:
     for ahead_mm, aside_mm, is_gripped in (
         (TOUCHING_MM + 0.1, 0.0, True),
         (RIM_MM + 36.5, 0.0, True),
@@ -141,9 +140,6 @@ def test_what_stands_between_the_jaws_is_gripped() -> None:
             assert aside == pytest.approx(0.0, abs=0.02)
             assert ahead >= TOUCHING_MM
         assert deepest_overlap_mm(sim) < 0.02
-
-
-def test_what_is_too_wide_or_far_above_is_not_gripped() -> None:
     sim = a_simulation()
     act(sim, "E,200", 0.5)
     act(sim, "D,1", 0.6)
@@ -182,7 +178,7 @@ def test_it_drags_what_it_holds_as_fast_as_it_drives() -> None:
     assert seen_from(sim) == pytest.approx((TOUCHING_MM + 1, 0.0), abs=0.01)
 
 
-def test_a_wall_stops_both() -> None:
+def test_a_wall_stops_both_and_one_beside_the_load_the_turn() -> None:
     sim = holding()
     drive(sim, 20, 20, 8.0)
     x, y = place_of(sim)
@@ -191,9 +187,6 @@ def test_a_wall_stops_both() -> None:
     assert sim.contacts(1) == 1
     assert max(kiks.Khepera(sim.port(1)).speed()) <= 5  # wheels slip, as a robot's at a wall
     assert deepest_overlap_mm(sim) < 0.02
-
-
-def test_a_wall_beside_the_load_stops_the_turn() -> None:
     sim = holding()
     act(sim, "E,150", 0.6)
     sim.place(1, 861, 300, math.pi / 2)  # almost at the wall at its right, which the load meets after 0.3 rad
@@ -243,8 +236,7 @@ def test_it_puts_down_only_where_there_is_room() -> None:
     sim.run(1.0)
     assert held_by(sim) == 0
     assert sim.bodies()["is_lifted"][0] == 0
-    assert ask(sim, "H,0") == [200]
-    assert ask(sim, "H,1") == [255]
+    assert (ask(sim, "H,0"), ask(sim, "H,1")) == ([200], [255])
 
 
 def test_what_fell_beyond_the_edge_is_neither_seen_nor_gripped_again() -> None:

@@ -20,7 +20,7 @@ def port_at(baud: int) -> SimPort:
     return port
 
 
-def test_a_single_command(baud: int) -> None:
+def test_a_single_command_whole_or_in_pieces(baud: int) -> None:
     port = port_at(baud)
     for command in (b"D,0,0\n", b"N\n", b"H\r", b"B\n", b"M\n", b"T,1,B\n", b"D,5\n"):
         begin_ns = port.sim.now_ns
@@ -31,6 +31,12 @@ def test_a_single_command(baud: int) -> None:
         # The formula; rounding may take a part of a nanosecond from each character.
         formula_ns = Fraction(11 * count * 10**9, baud) + PROCESSING_NS
         assert formula_ns - count <= passed_ns <= formula_ns
+    port = port_at(baud)
+    port.write(b"H")
+    port.sleep(1.0)
+    port.write(b"\n")
+    port.readline()
+    assert port.sim.now_ns == 1_000_000_000 + (1 + 7) * character_ns(baud) + PROCESSING_NS
 
 
 def test_pipelined_commands(baud: int) -> None:
@@ -46,12 +52,3 @@ def test_pipelined_commands(baud: int) -> None:
             acted_ns = max(arrived_ns, acted_ns) + PROCESSING_NS
             answered_ns = max(acted_ns, answered_ns) + len(port.readline()) * character
             assert port.sim.now_ns == answered_ns, command
-
-
-def test_pieces_of_a_command_wait_for_each_other(baud: int) -> None:
-    port = port_at(baud)
-    port.write(b"H")
-    port.sleep(1.0)
-    port.write(b"\n")
-    port.readline()
-    assert port.sim.now_ns == 1_000_000_000 + (1 + 7) * character_ns(baud) + PROCESSING_NS

@@ -104,7 +104,7 @@ def test_all_of_them_can_be_drawn() -> None:
     assert min(farthest[0]) > 60 > 0 > max(farthest[1])
 
 
-def test_general_io_is_wired_to_the_outside() -> None:
+def test_general_io_is_wired_to_the_outside_and_minds_its_numbers() -> None:
     sim = kiks.Simulation()
     io = sim.fit(1, "io")
     assert isinstance(io, GeneralIO)
@@ -124,11 +124,7 @@ def test_general_io_is_wired_to_the_outside() -> None:
     assert sim.state_hash() != digest
     robot.send("restart")
     sim.run(0.1)
-    assert io.outputs == 0
-    assert io.inputs == 0b1000_0100
-
-
-def test_general_io_minds_its_numbers() -> None:
+    assert (io.outputs, io.inputs) == (0, 0b1000_0100)
     io: Any = kiks.Simulation().fit(1, "io")
     for call, words in (
         (lambda: setattr(io, "inputs", 256), "inputs must be a whole number from 0 to 255, but it was 256"),
@@ -148,36 +144,31 @@ def test_the_example_runs(capsys: pytest.CaptureFixture[str]) -> None:
     assert len(path.read_text(encoding="utf-8").splitlines()) < 60
 
 
-def test_what_it_remembers_stands_in_the_state() -> None:
+def test_what_it_remembers_stands_in_the_state_apart_from_what_others_do() -> None:
     sim = kiks.Simulation(robots=2)
     for robot in (1, 2):
         sim.fit(robot, Counter())
     assert execute(sim, "T,24,C,5") == "t,24,c,5"
     snapshot = sim.world.state.snapshot()
     digest = sim.state_hash()
-    assert execute(sim, "T,24,C,5") == "t,24,c,10"
-    assert execute(sim, "T,24,C,1", 2) == "t,24,c,1"
+    assert (execute(sim, "T,24,C,5"), execute(sim, "T,24,C,1", 2)) == ("t,24,c,10", "t,24,c,1")
     assert sim.state_hash() != digest
     sim.world.state.restore(snapshot)
     assert sim.state_hash() == digest
     assert execute(sim, "T,24,C,5") == "t,24,c,10"
     execute(sim, "restart")
     assert execute(sim, "T,24,C,5") == "t,24,c,5"
-
-
-def a_turret(**changes: Any) -> Turret:
-    return type("Odd", (Counter,), changes)()
-
-
-def test_two_of_them_do_not_share_their_numbers() -> None:
     sim = kiks.Simulation()
     sim.fit(1, Counter())
     sim.fit(1, a_turret(number=25, memory_count=MEMORY_COUNT - 2))
     execute(sim, "T,24,C,5")
-    assert execute(sim, "T,25,C,7") == "t,25,c,7"
-    assert execute(sim, "T,24,C,0") == "t,24,c,5"
+    assert (execute(sim, "T,25,C,7"), execute(sim, "T,24,C,0")) == ("t,25,c,7", "t,24,c,5")
     words = r"memory_count of a turret must be .* from 0 to 0, but it was 1"
     refused(words, sim.fit, 1, a_turret(number=26, memory_count=1))
+
+
+def a_turret(**changes: Any) -> Turret:
+    return type("Odd", (Counter,), changes)()
 
 
 def test_chance_repeats() -> None:
@@ -221,8 +212,7 @@ def test_a_ray_finds_what_is_there() -> None:
     assert site.ray() == site.ray(0.0)
     assert site.poses() == [pytest.approx((300, 300, 0)), pytest.approx((300, 400, 0))]
     assert len(site.bodies()) == 1
-    assert site.arena_mm == (600, 600)
-    assert site.robot == 1
+    assert (site.arena_mm, site.robot) == ((600, 600), 1)
 
 
 def test_what_is_no_turret_is_refused_and_nothing_is_fitted_twice() -> None:
@@ -273,7 +263,7 @@ def test_the_battle_turret_knows_where_it_is() -> None:
         assert (percent, points, hits) == (100, 27, 0)
 
 
-def test_a_shot_costs_and_a_hit_hurts() -> None:
+def test_a_shot_costs_a_hit_hurts_and_energy_comes_back_a_point_a_second() -> None:
     sim = a_battle()
     sim.place(1, 100, 300, 0.0)
     sim.place(2, 300, 310, 0.0)
@@ -288,9 +278,6 @@ def test_a_shot_costs_and_a_hit_hurts() -> None:
     assert ask(sim, "S", 2)[4:] == [0, 0, 2]  # 27.5 - 3 * 10
     assert ask(sim, "F", 2) == [-1, -1]
     assert ask(sim, "S", 1)[5] == 12
-
-
-def test_energy_comes_back_a_point_a_second() -> None:
     sim = a_battle(1, (1,))
     assert [ask(sim, "F")[0] for _ in range(5)] == [-1] * 5
     assert ask(sim, "S")[5] == 2

@@ -1,7 +1,5 @@
 """The large arenas of tasks: few rooms for `light`, and none left in memory after the tests of a file."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import pytest

@@ -1,7 +1,5 @@
 """What many tests of learning, controllers and batches share, so that a process compiles it once."""
 
-from __future__ import annotations
-
 import ctypes
 import gc
 import sys

@@ -1,7 +1,5 @@
 """Algorithms and their options: deterministic, resumed by telling, better with time; what cannot be is refused."""
 
-from __future__ import annotations
-
 import random
 from pathlib import Path
 from typing import Any
@@ -122,9 +120,6 @@ def test_strategies_of_a_race_take_turns_until_the_best_goes_on() -> None:
     assert set(asked[12:]) == {asked[1]}
 
 
-# ---- bits ----
-
-
 @pytest.mark.parametrize("bits", [1, 5, 8])
 def test_parameters_in_bits_lie_on_a_scale_between_the_limits(bits: int) -> None:
     for candidates in told(made(f"sga:bits={bits},limit=4,mutation=0.2", count=3), 4):
@@ -133,7 +128,7 @@ def test_parameters_in_bits_lie_on_a_scale_between_the_limits(bits: int) -> None
         assert np.abs(candidates).max() <= 4.0
 
 
-def test_without_crossover_and_mutation_the_best_fifth_has_five_children_each() -> None:
+def test_the_best_fifth_has_five_children_each_and_with_the_roulette_the_worst_none() -> None:
     algorithm = made("sga:crossover=0,mutation=0", count=8)
     candidates, fitness = algorithm.ask(), np.arange(20.0)
     algorithm.tell(fitness, np.zeros((20, 0)))
@@ -141,9 +136,6 @@ def test_without_crossover_and_mutation_the_best_fifth_has_five_children_each() 
     best = {tuple(each) for each in candidates[-4:].tolist()}
     counts = {parent: sum(tuple(child) == parent for child in children.tolist()) for parent in best}
     assert set(counts.values()) == {5}
-
-
-def test_the_roulette_gives_the_best_twice_the_mean_share_and_the_worst_none() -> None:
     algorithm = made("sga:bits=8,selection=roulette,crossover=0,mutation=0", count=8, population=4000)
     candidates, fitness = algorithm.ask(), np.repeat([0.0, 1.0], 2000)
     algorithm.tell(fitness, np.zeros((4000, 0)))
@@ -151,10 +143,7 @@ def test_the_roulette_gives_the_best_twice_the_mean_share_and_the_worst_none() -
     assert not any(tuple(child) in worst for child in algorithm.ask().tolist())
 
 
-# ---- several objectives ----
-
-
-def test_nsga2_finds_the_front_of_two_parabolas() -> None:
+def test_the_front_is_what_no_other_surpasses_and_nsga2_finds_that_of_two_parabolas() -> None:
     # Schaffer's problem: x^2 and (x - 2)^2 are both small between 0 and 2 only, where their roots add up to 2.
     algorithm = made("nsga2", count=1, population=40)
     for _ in range(40):
@@ -165,9 +154,6 @@ def test_nsga2_finds_the_front_of_two_parabolas() -> None:
     assert np.allclose(np.sqrt(front).sum(axis=1), 2.0, atol=0.01)
     assert len(front) > 20
     assert front[:, 0].max() > 3.0 and front[:, 1].max() > 3.0  # noqa: PT018
-
-
-def test_the_front_is_what_no_other_surpasses() -> None:
     rng = np.random.default_rng(1)
     for count in (1, 7, 60):
         points = rng.integers(0, 6, (count, 3)).astype(float)
@@ -198,9 +184,6 @@ def test_the_front_of_an_evolution_is_made_of_champions_of_its_last_generation(t
     assert (tmp_path / "front.png").read_bytes().startswith(b"\x89PNG")
 
 
-# ---- networks that grow ----
-
-
 def test_the_parameters_of_a_graph_drive_as_the_network_of_the_library_does() -> None:
     import math
 
@@ -225,9 +208,6 @@ def test_the_parameters_of_a_graph_drive_as_the_network_of_the_library_does() ->
     assert max(hidden_counts) == 3
 
 
-# ---- options ----
-
-
 def test_the_name_of_an_algorithm_has_the_options_that_differ_from_the_usual_ones() -> None:
     assert whole_name("cma:active=true,restarts=none") == "cma"
     assert whole_name("sga: mutation = 0.02 ,bits=8, crossover=0") == "sga:bits=8,crossover=0.0,mutation=0.02"
@@ -249,6 +229,9 @@ def test_wrong_options_and_tasks_are_refused_in_one_line() -> None:
         ("neat", "must be a graph for neat, but it was linear"),
     ):
         refused(message, kiks.Evolution, small(), text)
+    refused("an objective must name one of fitness, ", small, objectives=("path",))
+    refused("must be one of cma, ga", small, algorithm="cm")
+    refused("at least two objectives", lambda: kiks.Evolution(small(), "ga", population=8).front)
 
 
 def test_an_evolution_with_other_options_is_another_one(tmp_path: Path) -> None:
@@ -258,9 +241,3 @@ def test_an_evolution_with_other_options_is_another_one(tmp_path: Path) -> None:
     refused(words, kiks.Evolution, small(), "sga", seed=1, population=8, folder=tmp_path)
     again = kiks.Evolution(small(), "sga:limit=10,bits=8", seed=1, population=8, folder=tmp_path)
     assert (again.ask() == evolution.ask()).all()
-
-
-def test_wrong_tasks_are_refused() -> None:
-    refused("an objective must name one of fitness, ", small, objectives=("path",))
-    refused("must be one of cma, ga", small, algorithm="cm")
-    refused("at least two objectives", lambda: kiks.Evolution(small(), "ga", population=8).front)

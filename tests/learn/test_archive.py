@@ -1,7 +1,5 @@
 """Archives: the best candidate of each cell, kept in a file; algorithms that look for many behaviours."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -40,14 +38,8 @@ def told(evolution: kiks.Evolution, seed: int, generations: int = 6) -> kiks.Evo
     return evolution
 
 
-# ---- algorithms ----
-
-
-def test_each_algorithm_has_a_name() -> None:
+def test_each_algorithm_has_a_name_and_those_for_many_behaviours_need_axes_and_measures() -> None:
     assert list(ALGORITHMS) == list(AlgorithmName)
-
-
-def test_algorithms_for_many_behaviours_need_axes_and_measures() -> None:
     for algorithm in DIVERSE:
         refused("must have axes", kiks.Evolution, small(axes=()), algorithm)
         evolution = kiks.Evolution(small(), algorithm, population=8)
@@ -85,9 +77,6 @@ def test_the_champion_is_the_elite_that_does_best_on_trial(algorithm: str) -> No
     assert evolution.champion.fitness == pytest.approx(max(fitness_of[each.tobytes()] for each in tried))
 
 
-# ---- cells ----
-
-
 def test_each_cell_holds_the_first_of_the_best_that_fell_into_it() -> None:
     evolution = told(kiks.Evolution(small(), "ga", seed=1, population=60), 1)
     archive, names = evolution.archive, evolution.task.value_names
@@ -122,15 +111,14 @@ def test_the_elite_of_a_place_is_that_of_the_nearest_filled_cell() -> None:
     assert sum(k**2 for k in corner.cell) == min(sum(k**2 for k in elite.cell) for elite in archive.elites)
 
 
-def test_wrong_places_are_errors() -> None:
+def test_wrong_places_and_too_many_cells_are_errors() -> None:
     evolution = kiks.Evolution(small(), "ga", population=8)
     refused("must hold an elite, but it is empty", evolution.archive.elite_at, 1, 1)
     archive = told(evolution, 1).archive
     refused(r"must be 2 numbers \(path_mm, straightness\), but it was", archive.elite_at, 1)
     refused("straightness must be a finite number", archive.champion_at, 1, float("nan"))
-
-
-# ---- files ----
+    axes = tuple(kiks.Axis(name, 0, 1, 10_000) for name in ("path_mm", "straightness", "avoidance", "roaming"))
+    refused("at most 2\\^53 cells", kiks.Evolution, small(axes=axes), "ga")
 
 
 def test_an_archive_equals_the_one_loaded_from_its_folder(tmp_path: Path) -> None:
@@ -156,14 +144,6 @@ def test_generations_with_fitness_alone_are_not_in_the_archive(tmp_path: Path) -
     told(evolution, 1, generations=2)
     evolution.save_log()
     assert kiks.Archive.load(tmp_path).elites == evolution.archive.elites != ()
-
-
-def test_too_many_cells_are_an_error() -> None:
-    axes = tuple(kiks.Axis(name, 0, 1, 10_000) for name in ("path_mm", "straightness", "avoidance", "roaming"))
-    refused("at most 2\\^53 cells", kiks.Evolution, small(axes=axes), "ga")
-
-
-# ---- commands ----
 
 
 def test_an_elite_becomes_a_champion(tmp_path: Path) -> None:

@@ -1,7 +1,5 @@
 """A champion's file carries its world and its robot, and gives both back to the bit."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
@@ -69,12 +67,17 @@ def test_the_world_begins_where_the_exam_does() -> None:
     assert task.with_changes(exam=None).world().arena.brightness is task.arenas[0].brightness
 
 
-def test_a_champion_without_a_world_drives_in_the_default_box(tmp_path: Path) -> None:
+def test_robots_and_seed_may_be_others_than_those_of_the_world_or_of_the_default_box(tmp_path: Path) -> None:
     kiks.Champion(LINEAR, PARAMETERS).save(tmp_path / "champion.toml")
     champion = kiks.Champion.load(tmp_path / "champion.toml")
     assert champion.world is None
     sim, ports = champion.simulation()
     assert (sim.arena.name, len(ports), sim.seed) == (kiks.Arena.default().name, 1, 0)
+    champion = kiks.Champion(LINEAR, PARAMETERS, world=Project(furnished(), seed=7))
+    sim, ports = champion.simulation(robots=3, seed=8)
+    assert (len(ports), sim.seed, sim.arena.name) == (3, 8, "furnished")
+    sim, ports = champion.simulation(kiks.Arena.box(300, 300))
+    assert (len(ports), sim.seed, sim.arena.width_mm) == (1, 0, 300)
 
 
 def test_wrong_files_are_errors(tmp_path: Path) -> None:
@@ -101,14 +104,6 @@ def test_wrong_files_are_errors(tmp_path: Path) -> None:
         (tmp_path / "one.toml").write_text(text.replace(before, after))
         with pytest.raises(kiks.KiksError, match=message):
             kiks.Champion.load(tmp_path / "one.toml")
-
-
-def test_robots_and_seed_may_be_others_than_those_of_the_world() -> None:
-    champion = kiks.Champion(LINEAR, PARAMETERS, world=Project(furnished(), seed=7))
-    sim, ports = champion.simulation(robots=3, seed=8)
-    assert (len(ports), sim.seed, sim.arena.name) == (3, 8, "furnished")
-    sim, ports = champion.simulation(kiks.Arena.box(300, 300))
-    assert (len(ports), sim.seed, sim.arena.width_mm) == (1, 0, 300)
 
 
 def test_a_champion_whose_controller_has_changed_is_told(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:

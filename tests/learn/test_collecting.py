@@ -1,7 +1,5 @@
 """Nolfi's task: a gripper carries cylinders out of an arena, in batches as on the wire."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

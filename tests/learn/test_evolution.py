@@ -1,7 +1,5 @@
 """Evolution: reproducible by its seed, resumable when killed; champions drive on a serial line as in the batch."""
 
-from __future__ import annotations
-
 import signal
 from pathlib import Path
 from typing import Any
@@ -27,9 +25,6 @@ def run(folder: Path | None = None, algorithm: Any = "cma") -> kiks.Evolution:
     return evolution
 
 
-# ---- seeds ----
-
-
 def test_worlds_differ_between_generations_but_trial_worlds_do_not() -> None:
     evolution = run(algorithm="ga")
     before = evolution.seeds
@@ -38,9 +33,6 @@ def test_worlds_differ_between_generations_but_trial_worlds_do_not() -> None:
     assert before[0] != evolution.seeds[0]
     assert (before[8:] == evolution.seeds[8:]).all()
     assert len(before) > 8
-
-
-# ---- files ----
 
 
 KILLED = """
@@ -82,17 +74,16 @@ def test_the_log_has_a_row_for_each_evaluation(tmp_path: Path) -> None:
     assert again[:, 0].tolist() == log["fitness"]
 
 
-def test_a_folder_of_another_evolution_is_an_error(tmp_path: Path) -> None:
+def test_the_folder_of_another_evolution_or_of_none_is_an_error(tmp_path: Path) -> None:
     run(tmp_path)
     words = "must have the same seed, but they have 3 and 4"
     refused(words, kiks.Evolution, small(), "cma", population=8, seed=4, folder=tmp_path)
     refused("but these differ: seconds", evolution_of, tmp_path, seconds=2.0)
-
-
-def test_a_champion_of_no_evolution_is_not_replaced(tmp_path: Path) -> None:
-    (tmp_path / "champion.toml").write_text("the best of all")
-    refused(r"must hold an evolution or no champion\.toml", evolution_of, tmp_path)
-    assert [path.name for path in tmp_path.iterdir()] == ["champion.toml"]
+    alone = tmp_path / "alone"
+    alone.mkdir()
+    (alone / "champion.toml").write_text("the best of all")
+    refused(r"must hold an evolution or no champion\.toml", evolution_of, alone)
+    assert [path.name for path in alone.iterdir()] == ["champion.toml"]
 
 
 def test_the_error_names_a_broken_generation_file(tmp_path: Path) -> None:
@@ -113,9 +104,6 @@ def test_the_error_names_a_broken_generation_file(tmp_path: Path) -> None:
         refused(r"000002.npz' must be a whole .npz file", evolution_of, tmp_path)
     np.savez(file, **good)
     assert len(evolution_of(tmp_path).generations) == 4
-
-
-# ---- algorithms ----
 
 
 def test_an_evolution_maximises_fitness() -> None:
@@ -149,7 +137,7 @@ class OwnWithFavourite(Own):
         return self.given.get("best", np.full(18, 0.5))
 
 
-def test_an_object_with_ask_and_tell_is_an_algorithm(tmp_path: Path) -> None:
+def test_an_object_with_ask_and_tell_is_an_algorithm_whose_favourite_is_tried(tmp_path: Path) -> None:
     own = Own()
     evolution = kiks.Evolution(small(), own, folder=tmp_path)
     evolution.run(generations=3)
@@ -168,15 +156,12 @@ def test_an_object_with_ask_and_tell_is_an_algorithm(tmp_path: Path) -> None:
     different = Own()
     different.rng = np.random.default_rng(2)
     refused("would have other candidates here", kiks.Evolution, small(), different, folder=tmp_path)
-
-
-def test_the_favourite_of_an_own_algorithm_is_tried() -> None:
     evolution = kiks.Evolution(small(), OwnWithFavourite(), population=8)
     evolution.tell(np.zeros(len(evolution.ask())))
     assert (evolution.ask()[8:] == 0.5).all()
 
 
-def test_wrong_arguments_are_errors() -> None:
+def test_wrong_arguments_answers_of_an_algorithm_and_orders_of_calls_are_errors() -> None:
     for message, given in (
         ("Did you mean 'cma'", {"algorithm": "cna"}),
         ("population must be a whole number from 4", {"population": 3}),
@@ -190,9 +175,6 @@ def test_wrong_arguments_are_errors() -> None:
         ("algorithm must be", {"algorithm": 3}),
     ):
         refused(message, kiks.Evolution, small(), **given)
-
-
-def test_wrong_later_answers_of_an_algorithm_are_errors() -> None:
     refused(r"finite numbers \[4, 18\], but it had the shape \[8, 18\]", kiks.Evolution, small(), Own(), population=4)
     own = Own()
     evolution = kiks.Evolution(small(), own)
@@ -202,18 +184,12 @@ def test_wrong_later_answers_of_an_algorithm_are_errors() -> None:
     for best in (np.zeros(17), np.full(18, np.nan)):
         evolution = kiks.Evolution(small(), OwnWithFavourite(best=best))
         refused(r"parameters of favourite\(\) must be", evolution.tell, np.zeros(8))
-
-
-def test_calls_in_the_wrong_order_are_errors() -> None:
     evolution = kiks.Evolution(small(), "ga", population=8)
     refused("before there is a champion", lambda: evolution.champion)
     refused("ask\\(\\) must come before", evolution.tell, np.zeros(8))
     assert (evolution.ask() == evolution.ask()).all()
     refused("values must be finite numbers", evolution.tell, np.full(8, np.nan))
     refused("generations or seconds must be given", evolution.run)
-
-
-# ---- tasks ----
 
 
 OWN = """
@@ -245,23 +221,17 @@ def test_a_champion_does_not_need_the_python_file_of_its_task(tmp_path: Path) ->
     assert sim.travelled_mm(1) > 0
 
 
-def test_files_without_a_task_are_errors(tmp_path: Path) -> None:
+def test_wrong_tasks_and_files_without_one_are_errors(tmp_path: Path) -> None:
     (tmp_path / "none.py").write_text("task = 1\n")
     refused("must hold a `task", kiks.tasks.load, str(tmp_path / "none.py"))
     (tmp_path / "bad.py").write_text("1 / 0\n")
     refused("ZeroDivisionError", kiks.tasks.load, str(tmp_path / "bad.py"))
     refused("Did you mean 'avoid'", kiks.tasks.load, "avoyd")
-
-
-def test_wrong_tasks_are_errors() -> None:
     refused("worlds must be a multiple of the number of arenas, 4", small, worlds=6)
     refused("an axis must name one of", small, axes=(kiks.Axis("nothing", 0, 1),))
     task = small(fitness=lambda values: values["contacts"])
     words = "fitness must return a finite number for each of 1"
     refused(words, task.evaluate, np.zeros((1, task.parameter_count)), np.zeros(1, np.int64))
-
-
-# ---- all together ----
 
 
 def test_obstacle_avoidance_evolves_and_works_on_a_serial_line() -> None:

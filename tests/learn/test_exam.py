@@ -1,7 +1,5 @@
 """Exams: their starts are those of the wire."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The same values on any executor, with or without lost workers."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess
@@ -93,7 +91,7 @@ def test_what_a_task_raises_is_an_error_that_names_its_candidates() -> None:
         refused(r"^measures must be finite\.$", evaluate, Sums("refuse"), *drawn(9, marked=True), threads)
 
 
-def test_wrong_arguments_are_errors() -> None:
+def test_wrong_arguments_and_a_missing_ray_are_errors(monkeypatch: pytest.MonkeyPatch) -> None:
     candidates, seeds = drawn(5)
     for given, message in (
         ((candidates[0], seeds), r"candidates must be finite numbers \[any, any\], but it had the shape \[3\]"),
@@ -102,9 +100,8 @@ def test_wrong_arguments_are_errors() -> None:
         ((candidates, seeds, "threads"), r"executor must have submit\(\) .* but it was 'threads'"),
     ):
         refused(message, evaluate, Sums(), *given)
-
-
-# ---- Ray ----
+    monkeypatch.setitem(sys.modules, "ray", None)
+    refused(r"pip install 'kiks\[ray\]'", RayExecutor)
 
 
 @pytest.fixture(scope="module")
@@ -118,11 +115,6 @@ def ray():
         patch.setenv("RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER", "0")
         patch.setenv("PYTHONPATH", str(ROOT))
         yield pytest.importorskip("ray", reason="Ray is not installed: pip install 'kiks[ray]'")
-
-
-def test_the_error_without_ray_says_how_to_install_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "ray", None)
-    refused(r"pip install 'kiks\[ray\]'", RayExecutor)
 
 
 def test_an_address_without_a_server_is_an_error(ray: Any) -> None:

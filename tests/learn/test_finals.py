@@ -1,7 +1,5 @@
 """Finals: the best of the finalists wins, however it is evaluated, and a resumed evolution has the same champion."""
 
-from __future__ import annotations
-
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from functools import cache, partial
 from pathlib import Path
@@ -65,9 +63,6 @@ def noisy(candidates: Any, seeds: Any, noise: float = 1.0) -> Any:
     return np.column_stack([number + 2.0 * noise * drawn, number])
 
 
-# ---- rounds ----
-
-
 def slow_winner(count: int, evaluations: int, seed: int, noise: float) -> tuple[int, list[float]]:
     """Return the winner and its mean values: each finalist by itself, each world by itself, plain lists."""
     sizes = [count]
@@ -100,18 +95,12 @@ def test_the_winner_is_that_of_a_slow_count(count: int, evaluations: int, seed: 
     assert driven == len(finals.values) <= max(SHARE * evaluations, sum(sizes) * 2 ** len(sizes))
 
 
-def test_the_first_of_equal_finalists_wins() -> None:
+def test_each_finalist_is_there_once_and_the_first_of_equal_ones_wins() -> None:
     assert rounds_of(16, 2880) == ([16, 8, 4, 2], [4, 8, 16, 32])
     assert hold_finals(contenders(7), 1, 0, lambda asked, _: np.zeros((len(asked), 1))).winner == 0
-
-
-def test_each_finalist_is_there_once() -> None:
     evolution = evolution_of()
     evolution._tried = {Contender((float(number // 2),), number): -number for number in range(60)}
     assert [each.generation for each in evolution._finalists()] == [*range(0, 2 * FINALISTS, 2)]
-
-
-# ---- evolutions ----
 
 
 class Scripted(Executor):
@@ -221,12 +210,6 @@ def test_an_interrupted_evolution_holds_no_finals(when: str, tmp_path: Path) -> 
     assert outcome(run(folder=tmp_path)) == outcome(whole())
 
 
-def test_one_rival_alone_has_no_finals() -> None:
-    evolution = run(generations=2, each_round=never)
-    assert evolution.finals is None
-    assert evolution.champion.fitness == evolution.generations[-1].champion_fitness
-
-
 def test_elites_take_part_where_an_algorithm_prefers_none() -> None:
     evolution = evolution_of("map-elites", seed=2)
     rng = np.random.default_rng(1)
@@ -245,7 +228,7 @@ def test_elites_take_part_where_an_algorithm_prefers_none() -> None:
     assert not others & {each.parameters for each in whole().archive.elites}
 
 
-def test_finals_after_ask_and_tell() -> None:
+def test_finals_after_ask_and_tell_and_none_for_one_rival_alone() -> None:
     evolution = evolution_of()
     refused("before there is a champion", evolution.hold_finals)
     for _ in range(6):
@@ -255,6 +238,9 @@ def test_finals_after_ask_and_tell() -> None:
     assert rounds == rounds_of(len(evolution.finals.finalists), 0)[0]
     assert champion.parameters == evolution.champion.parameters == whole().champion.parameters
     evolution.tell(np.zeros(len(evolution.ask())))
+    assert evolution.finals is None
+    assert evolution.champion.fitness == evolution.generations[-1].champion_fitness
+    evolution = run(generations=2, each_round=never)
     assert evolution.finals is None
     assert evolution.champion.fitness == evolution.generations[-1].champion_fitness
 

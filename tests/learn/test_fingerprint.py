@@ -1,7 +1,5 @@
 """Laws of fingerprints: they differ if and only if something differs on which values depend."""
 
-from __future__ import annotations
-
 import ctypes
 import functools
 import itertools
@@ -123,13 +121,10 @@ def test_what_a_function_holds_counts(make: Callable[[float], Any]) -> None:
     assert ", without" not in of(make(1.0))
 
 
-def test_different_things_differ() -> None:
+def test_different_things_differ_and_equal_ones_are_equal_whether_they_are_one_or_two() -> None:
     numbers = [1, 1.0, "1", True, None, (1,), [1], {1: 1}, {1}]
     things = [*numbers, np.mean, np.sum, len, int, kiks, np, of, Scaled, Scaled(1)]
     assert all(of(one) != of(other) for one, other in itertools.combinations(things, 2))
-
-
-def test_equal_things_are_equal_whether_they_are_one_or_two() -> None:
     one, two = [1.5], [1.5]
     assert of([one, one]) == of([one, two])
 
@@ -187,8 +182,7 @@ HELPER = "GAIN = 1.0\nWEIGHT = 2.0\nOTHER = 3\ndef score(x): return WEIGHT * x\n
 def test_a_helper_beside_a_task_counts_and_its_folder_and_process_do_not(tmp_path: Path) -> None:
     here, there = tmp_path / "here", tmp_path / "there"
     first = own_task(here, HELPER, "2")
-    assert own_task(there, HELPER) == first
-    assert own_task(there, HELPER.replace("OTHER = 3", "OTHER = 4")) == first
+    assert (own_task(there, HELPER), own_task(there, HELPER.replace("OTHER = 3", "OTHER = 4"))) == (first, first)
     assert differing(own_task(there, HELPER.replace("GAIN = 1.0", "GAIN = 0.0")), first) == "controller, fitness"
     assert differing(own_task(there, HELPER.replace("2.0", "3.0")), first) == "fitness"
     assert differing(own_task(there, HELPER.replace("len", "sum")), first) == "fitness"
@@ -206,9 +200,6 @@ def test_a_worker_gets_what_was_sent_or_says_what_differs() -> None:
     subprocess.run([sys.executable, "-c", code], input=pickle.dumps(sent), check=True)
     with pytest.raises(kiks.ParameterError, match=r"the same modules of yours, but on one these differ: fitness\."):
         _evaluate_chunk(own, _identity(own) | {"fitness": "0"}, np.zeros((1, 18)), np.zeros(1, np.int64))
-
-
-# ---- what cannot be seen ----
 
 
 OPENED = "def f(values):\n    return open('table.csv').read()\n"

@@ -1,7 +1,5 @@
 """Football: what counts in a game, as a contest and as an environment for two agents."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -55,12 +53,9 @@ def test_a_goal_counts_for_the_side_that_attacks_there(side: int) -> None:
     assert values_of(before_goal(side), speeds, 8.0)[side, 1] > place
 
 
-def test_nothing_counts_while_nobody_moves_the_ball() -> None:
+def test_nothing_counts_while_nobody_moves_the_ball_or_there_is_none() -> None:
     for arena in kick_offs():
         np.testing.assert_array_equal(values_of(arena, (0.0, 0.0), 2.0), 0.0)
-
-
-def test_arenas_without_a_ball_have_no_goals() -> None:
     np.testing.assert_array_equal(values_of(Arena.box(800, 600), (10.0, -5.0), 1.0), 0.0)
 
 
@@ -88,9 +83,6 @@ def test_champions_play_until_a_goal(tmp_path: Path) -> None:
     save_arena(replace(before_goal(0), balls=(goal,)), tmp_path / "goal.toml")
     scored = forked.run("run", "out", "--arena", "goal.toml", cwd=tmp_path)
     assert scored.stdout.startswith("left scored after 0."), scored.stderr
-
-
-# ---- the environment ----
 
 
 def team(**changes: Any) -> Any:

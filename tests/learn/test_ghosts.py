@@ -1,7 +1,5 @@
 """Whole generations as ghosts: each candidate drives as in its evaluation, and all are seen in one arena."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -96,8 +94,5 @@ def test_what_cannot_be_shown_is_refused_in_one_line(folder: Path, tmp_path: Pat
     task = kiks.tasks.pursuit(seconds=1)
     kiks.Evolution(task, seed=1, population=4, opponents=2, folder=tmp_path / "two").run(generations=1)
     refused("must have one side and a generation for ghosts", ghosts_of, tmp_path / "two", [1], task=task)
-
-
-def test_no_generation_is_an_error(tmp_path: Path) -> None:
     for save, name in ((save_ghosts, "ghosts.png"), (save_ghosts, "ghosts.gif"), (save_ghost_page, "ghosts.html")):
         refused("ghosts must be of one generation at least", save, [], tmp_path / name)

@@ -1,7 +1,5 @@
 """Environments pass the checks of Gymnasium, and have the same episodes with the same seeds."""
 
-from __future__ import annotations
-
 import copy
 import importlib
 import pickle
@@ -77,13 +75,10 @@ def test_environments_pass_the_checks_of_gymnasium(name: str) -> None:
     check_env(env.unwrapped)
 
 
-def test_a_module_in_the_name_registers_the_environments() -> None:
+def test_a_module_in_the_name_registers_the_environments_and_kiks_alone_imports_no_gymnasium() -> None:
     code = "import gymnasium; print(gymnasium.make('kiks.learn.gymnasium_envs:kiks/Avoid-v0').unwrapped)"
     found = forked.run(code=code)
     assert "KheperaEnv" in found.stdout, found.stderr
-
-
-def test_import_kiks_does_not_import_gymnasium() -> None:
     code = "import sys, kiks; assert not {'gymnasium', 'pettingzoo', 'numba'} & set(sys.modules)"
     subprocess.run([sys.executable, "-c", code], check=True)
 
@@ -123,7 +118,7 @@ def test_single_and_vector_environments_have_the_same_episodes(name: str) -> Non
     assert hashes[0] == hashes[1]
 
 
-def test_reset_with_a_seed_repeats_an_episode_and_without_one_continues() -> None:
+def test_reset_with_a_seed_repeats_an_episode_and_worlds_have_different_ones_or_those_of_a_list() -> None:
     env = single()
 
     def episode(seed: int | None) -> list[float]:
@@ -134,9 +129,6 @@ def test_reset_with_a_seed_repeats_an_episode_and_without_one_continues() -> Non
     assert first != second
     assert [episode(7), episode(None)] == [first, second]
     assert episode(8) != first
-
-
-def test_worlds_have_different_seeds_or_those_of_a_list() -> None:
     envs = vector()
     envs.reset(seed=[4, 9, 4])
     one, two, three = (envs.episodes.batch.poses[k].tolist() for k in range(3))
@@ -173,8 +165,7 @@ def test_autoreset_modes(name: str) -> None:
             seen, rewards, terminations, _, infos = envs.step(actions)
             assert rewards[0] == 0.0
             assert not terminations.any()
-    assert infos["path_mm"][0] == 0.0
-    assert infos["time_s"][0] == 0.0
+    assert infos["path_mm"][0] == infos["time_s"][0] == 0.0
     assert infos["time_s"][1] > 0.0
     assert seen in envs.observation_space
 
@@ -213,13 +204,10 @@ def test_wrappers_of_gymnasium_accept_the_vector_environment() -> None:
     assert infos["episode"]["l"].tolist() == [3, 3]
 
 
-def test_the_sum_of_rewards_is_the_measure() -> None:
+def test_the_sum_of_rewards_is_the_measure_and_a_contact_lowers_it() -> None:
     envs = begun(vector(4, threads=1), 2)
     total = sum(envs.step(action)[1] for action in random_actions(12, 4))
     np.testing.assert_allclose(total / 12, envs.episodes.batch.values[:, 0, 0])
-
-
-def test_a_contact_lowers_the_reward() -> None:
     free, costly = (single(reward=without_contacts(kiks.measures.path_mm, cost)) for cost in (0.0, 7.0))
     totals = []
     for env in (begun(free), begun(costly)):
@@ -272,7 +260,7 @@ def test_pictures_show_the_robot() -> None:
     np.testing.assert_array_equal(pictures[0], before)
 
 
-def test_a_team_of_one_has_the_episodes_of_the_single_environment() -> None:
+def test_a_team_of_one_has_the_episodes_of_the_single_environment_and_those_of_all_robots_end_at_once() -> None:
     alone, env = team(robots=1), single()
     seen, _ = alone.reset(seed=3)
     expected, _ = env.reset(seed=3)
@@ -281,9 +269,6 @@ def test_a_team_of_one_has_the_episodes_of_the_single_environment() -> None:
         seen, rewards, *_, infos = alone.step({"robot_1": action})
         expected, reward, *_, info = env.step(action)
         assert (rewards["robot_1"], infos["robot_1"]) == (reward, info)
-
-
-def test_an_episode_of_a_team_ends_for_all_robots_at_once() -> None:
     pair = begun(team(small_task(), robots=2))
     actions = {"robot_1": np.ones(2, np.float32), "robot_2": np.zeros(2, np.float32)}
     for _ in range(20):

@@ -1,7 +1,5 @@
 """Homing (Floreano and Mondada 1996): the battery, what a life is worth, and the same robot on a line."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -32,12 +30,9 @@ def lived(parameters: Any, starts: Any, **options: Any) -> Any:
     return batch.run(homing_network, parameters, seconds=LIFE_S, measures=watched, **options).values[:, 0]
 
 
-def test_a_life_ends_with_the_battery_unless_it_is_charged() -> None:
+def test_a_life_ends_with_the_battery_unless_it_is_charged_and_turning_earns_far_from_walls_alone() -> None:
     still = lived(np.zeros(102), [FAR, ZONE], until=battery_empty)
     np.testing.assert_array_equal(still, [[FULL_ACTIONS, 0, 0], [LIFE_ACTIONS, 1, 0]])
-
-
-def test_turning_earns_far_from_walls_and_nothing_on_the_zone() -> None:
     parameters = np.zeros(102)
     parameters[90:92] = 10.0, -10.0  # the wheels' biases: it turns on the spot
     off, on = lived(parameters, [(220.0, 245.0, 0.0), ZONE], until=battery_empty)[:, 2]

@@ -1,7 +1,5 @@
 """Any candidate of a saved evolution drives again as in its evaluation, to the bit."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -112,7 +110,7 @@ def test_the_task_is_found_again(tmp_path: Path) -> None:
     assert individual_of(tmp_path / "gru", 3)[0].controller is kiks.controllers.gru()
 
 
-def test_a_task_that_cannot_be_found_is_an_error(tmp_path: Path) -> None:
+def test_numbers_out_of_range_and_a_task_that_cannot_be_found_are_errors(tmp_path: Path) -> None:
     evolved(small(), tmp_path / "changed")
     refused("must be the one that was evolved, but it differs now", individual_of, tmp_path / "changed", 1)
     evolved(small(name="mine"), tmp_path / "own")
@@ -125,14 +123,11 @@ def test_a_task_that_cannot_be_found_is_an_error(tmp_path: Path) -> None:
     (tmp_path / "nothing").mkdir()
     refused("nothing' must be the folder of an evolution", individual_of, tmp_path / "nothing", 1)
     assert not list((tmp_path / "nothing").iterdir())
-
-
-def test_numbers_out_of_range_are_errors(tmp_path: Path) -> None:
     task = small()
-    evolved(task, tmp_path)
+    evolved(task, tmp_path / "range")
     for given, message in (
         ({"generation": 4}, "generation must be a whole number from 1 to 3"),
         ({"generation": 1, "rank": 7}, "rank must be a whole number from 1 to 6"),
         ({"generation": 1, "world": 4}, "world must be a whole number from 0 to 3"),
     ):
-        refused(message, individual_of, tmp_path, task=task, **given)
+        refused(message, individual_of, tmp_path / "range", task=task, **given)

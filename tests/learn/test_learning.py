@@ -1,7 +1,5 @@
 """Rewards of the environments are for robots that do what is wanted."""
 
-from __future__ import annotations
-
 import importlib.util
 import itertools
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A policy that another library learnt drives as it does there, and what cannot be a controller is refused."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
@@ -165,8 +163,7 @@ def test_the_champion_drives_the_episode_of_the_policy(tmp_path: Path) -> None:
     path = tmp_path / "learnt.toml"
     kiks.champion_of_policy(layers, spec, activation="relu").save(path)
     champion = kiks.Champion.load(path)
-    assert champion.timing == spec.timing
-    assert champion.task == "Maze"
+    assert (champion.timing, champion.task) == (spec.timing, "Maze")
     by_policy, by_champion = Episodes(spec, 1, threads=1), Episodes(spec, 1, threads=1)
     for episodes in (by_policy, by_champion):
         episodes.begin([0], [1])
@@ -183,22 +180,7 @@ def test_the_champion_drives_the_episode_of_the_policy(tmp_path: Path) -> None:
     assert np.hypot(*(batch.poses[0, 0, :2] - start[:2])) > 10.0
 
 
-def test_exploration_changed_spaces_and_other_functions_are_refused() -> None:
-    policy = PPO.policy
-    wide = SimpleNamespace(low=-3 * np.ones(2), high=3 * np.ones(2))
-    normalizing = SimpleNamespace(
-        policy=policy, get_vec_normalize_env=lambda: SimpleNamespace(norm_obs=True, norm_reward=True)
-    )
-    for changed, message in (
-        (SimpleNamespace(policy=SimpleNamespace(**vars(policy) | {"use_sde": True})), "it explores by use_sde"),
-        (SimpleNamespace(**vars(policy) | {"action_space": wide}), "must have actions from -1 to 1"),
-        (normalizing, "a VecNormalize changes them"),
-        (algorithm({}, ELU), "Tanh or ReLU, but it has 'ELU'"),
-    ):
-        refused(message, kiks.champion_of_policy, changed, "Avoid")
-
-
-def test_what_is_no_policy_is_an_error() -> None:
+def test_what_is_no_policy_or_does_not_fit_is_refused() -> None:
     for policy, message in (
         (None, "policy must be a model or a policy .* but it was None"),
         ("model.zip", "policy must be a model or a policy .* but it was 'model.zip'"),
@@ -217,9 +199,18 @@ def test_what_is_no_policy_is_an_error() -> None:
         ({3: np.zeros(2)}, "policy must be a model or a policy"),
     ):
         refused(message, kiks.champion_of_policy, policy, "Avoid")
-
-
-def test_options_that_do_not_fit_are_errors() -> None:
+    policy = PPO.policy
+    wide = SimpleNamespace(low=-3 * np.ones(2), high=3 * np.ones(2))
+    normalizing = SimpleNamespace(
+        policy=policy, get_vec_normalize_env=lambda: SimpleNamespace(norm_obs=True, norm_reward=True)
+    )
+    for changed, message in (
+        (SimpleNamespace(policy=SimpleNamespace(**vars(policy) | {"use_sde": True})), "it explores by use_sde"),
+        (SimpleNamespace(**vars(policy) | {"action_space": wide}), "must have actions from -1 to 1"),
+        (normalizing, "a VecNormalize changes them"),
+        (algorithm({}, ELU), "Tanh or ReLU, but it has 'ELU'"),
+    ):
+        refused(message, kiks.champion_of_policy, changed, "Avoid")
     for options, message in (
         ({"activation": "relu"}, "activation must be 'tanh', as the policy has it, but it was 'relu'"),
         ({"output": "hard"}, "output must be 'clip', as the policy has it, but it was 'hard'"),

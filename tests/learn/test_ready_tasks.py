@@ -1,7 +1,5 @@
 """Tasks that come with KiKS: what their fitness and their exams are for."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import replace
@@ -60,9 +58,6 @@ def test_cautious_mean_weights_the_worse_half() -> None:
     assert cautious_mean(scores, 1.0).tolist() == [1.0, 0.5]
 
 
-# ---- light ----
-
-
 def test_standing_still_earns_nothing() -> None:
     task = kiks.tasks.light(seconds=1.0)
     still = np.zeros((20, task.parameter_count))
@@ -79,7 +74,7 @@ def test_light_trains_from_starts_behind_walls_and_far_from_the_lamp() -> None:
         assert any(arena.clearance_at_mm(*place) <= 0 for place in ray_mm)
 
 
-def test_the_exam_starts_far_from_the_lamp_where_no_sensor_sees_it() -> None:
+def test_the_exam_starts_where_no_sensor_sees_the_lamp_and_is_solved_by_staying_at_it_for_half_a_minute() -> None:
     arena = shipped_arena("training/lit_unseen")
     lamp = arena.lamps[0]
     assert len(set(arena.starts)) == 20
@@ -90,16 +85,10 @@ def test_the_exam_starts_far_from_the_lamp_where_no_sensor_sees_it() -> None:
         for heading_rad in np.arange(8) * math.pi / 4:
             sim.place(1, start.x_mm, start.y_mm, heading_rad)
             assert set(sim.ambient(1)) == {dark_counts}
-
-
-def test_a_start_is_solved_by_staying_at_the_lamp_for_the_last_half_minute() -> None:
     exam = ready_tasks.light().exam
     assert [each.name for each in exam.measures] == ["light_stay_s"]
     solved = exam.solved({"light_stay_s": np.array([0.0, 29.9, 30.0, 170.0])})
     assert solved.tolist() == [False, False, True, True]
-
-
-# ---- maze ----
 
 
 def test_the_fitness_of_the_maze_puts_the_goal_before_thrift_and_thrift_before_nothing() -> None:
@@ -113,9 +102,6 @@ def test_the_fitness_of_the_maze_puts_the_goal_before_thrift_and_thrift_before_n
     order = [task.fitness(arrays(*each))[0] for each in ((near, cheap), (near, dear), (far, cheap))]
     assert order == sorted(order, reverse=True)
     assert order[1] > order[2] + 1
-
-
-# ---- gather ----
 
 
 def test_the_camera_tells_a_cylinder_from_a_wall_where_proximity_tells_nothing() -> None:

@@ -1,7 +1,5 @@
 """Results of several evolutions: files, curves, statistics, comparisons."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -52,23 +50,14 @@ def put(result: results.Result, folder: Path, generations: int = 3) -> None:
     result.save(folder)
 
 
-# ---- figures of several ----
-
-
-def test_curves_go_as_far_as_all_evolutions() -> None:
+def test_curves_go_as_far_as_all_evolutions_and_medians_and_solved_exams_are_of_all() -> None:
     longer = replace(RESULTS[2], evaluations=(10, 30, 50), champion_fitness=(1.0, 2.0, 3.0))
     evaluations, fitness = results.curves([RESULTS[2], longer])
     assert evaluations.tolist() == [10, 24, 30, 40]
     assert fitness.tolist() == [[0.0, 0.1, 0.1, 0.2], [1.0, 1.0, 2.0, 2.0]]
-
-
-def test_medians_and_solved_exams() -> None:
     assert results.quartiles(RESULTS) == pytest.approx((0.075, 0.15, 0.225))
     assert results.passed_count(RESULTS) == 3
     assert results.passed_count([replace(RESULTS[0], exam=None), RESULTS[1]]) is None
-
-
-# ---- files ----
 
 
 def test_results_come_back_from_their_files(tmp_path: Path) -> None:
@@ -78,8 +67,7 @@ def test_results_come_back_from_their_files(tmp_path: Path) -> None:
     assert results.load_results(results.seed_folder(tmp_path, 3)) == RESULTS[3:]
     results.save_summary(RESULTS, tmp_path)
     summary = json.loads((tmp_path / "summary.json").read_text())
-    assert summary["exams_passed"] == 3
-    assert summary["median_fitness"] == pytest.approx(0.15)
+    assert (summary["exams_passed"], summary["median_fitness"]) == (3, pytest.approx(0.15))
     assert [each["evaluations"] for each in summary["evolutions"]] == [52] * 4
     assert summary["exams_passed_interval"] == pytest.approx((0.301, 0.954), abs=1e-3)
 
@@ -219,9 +207,6 @@ def test_the_result_of_an_evolution(tmp_path: Path) -> None:
     assert (result.exam.starts, result.exam.imperfect_starts) == (20, 200)
     evolution.run(generations=4)
     assert results.load_result(tmp_path) is None
-
-
-# ---- baselines ----
 
 
 @pytest.mark.slow

@@ -1,7 +1,5 @@
 """Sensors that read tables of samples: beside one wall they read what the whole sensors read."""
 
-from __future__ import annotations
-
 import copy
 import math
 from pathlib import Path
@@ -25,31 +23,25 @@ def seen(sense: Any, pose: tuple[float, float, float], arena: Arena = BOX) -> np
     return kiks.Batch(arena, 1, robot=robot, seed=1, starts=[[pose]], senses=[sense]).reset()[0, 0]
 
 
-def test_beside_a_wall_it_reads_what_the_sensors_read() -> None:
+def test_beside_a_wall_or_an_obstacle_it_reads_what_the_sensors_read() -> None:
     for angle in (0, 30, 171):
         pose = (610.0 - 27.5 - FIRST_MM - 3 * STEP_MM, 185.0, math.radians(-2.0 * angle))
         there = seen("proximity", pose)
         assert seen(sampled_sense("none"), pose) == pytest.approx(there, abs=1.0)
         assert there.max() > 100
-
-
-def test_beside_an_obstacle_it_reads_what_the_sensors_read() -> None:
     pose = (330.0 - 27.0 - 27.5 - FIRST_MM - 2 * STEP_MM, 250.0, math.radians(40.0))
     there = seen("proximity", pose, box_with_obstacles())
     assert seen(sampled_sense("none"), pose, box_with_obstacles()) == pytest.approx(there, abs=25.0)
     assert there.max() > 100
 
 
-def test_kinds_of_noise_differ_and_repeat() -> None:
+def test_kinds_of_noise_differ_and_repeat_and_a_look_without_noise_is_free_of_it() -> None:
     pose = (560.0, 185.0, 0.3)
     quiet, uniform, conservative = (seen(sampled_sense(noise), pose) for noise in NOISES)
     assert (seen(sampled_sense("uniform"), pose) == uniform).all()
     assert (seen(sampled_sense("conservative"), pose) == conservative).all()
     assert (uniform != quiet).any()
     assert (conservative != quiet).any()
-
-
-def test_a_look_without_noise_is_free_of_it() -> None:
     sim = kiks.Simulation(BOX, seed=1)
     sim.place(1, 560.0, 185.0, 0.3)
     looks = [
@@ -77,13 +69,10 @@ def test_nothing_near_is_nothing_read() -> None:
     assert not seen(sampled_sense("none"), (100.0, 250.0, 0.0)).any()
 
 
-def test_a_table_is_a_ring_of_headings() -> None:
+def test_a_table_is_a_ring_of_headings_and_the_rough_angle_is_near_the_true_one() -> None:
     table = sampled_table(math.inf)
     assert table.shape == (20, 180, 8)
     assert (table[:-1].max(axis=(1, 2)) >= table[1:].max(axis=(1, 2)) - 1).all()  # nearer is no less
-
-
-def test_the_rough_angle_is_near_the_true_one() -> None:
     for angle in np.linspace(-3.1, 3.1, 97):
         assert rough_angle.py_func(math.sin(angle), math.cos(angle)) == pytest.approx(angle, abs=0.005)
 

@@ -1,7 +1,5 @@
 """Tasks of two sides: values of pairs depend on the pair and its seed alone, evolutions resume to the bit."""
 
-from __future__ import annotations
-
 import pickle
 from dataclasses import replace
 from pathlib import Path
@@ -51,9 +49,6 @@ def ahead_then(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
     wheels[:] = 10.0 if memory[0] < 20.0 else parameters[0]
 
 
-# ---- tasks ----
-
-
 def test_values_of_pairs_depend_on_the_pair_and_its_seed_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     task = small(worlds=2)
     pairs, seeds = pairs_of(task, 12), np.arange(12) // 3
@@ -92,15 +87,12 @@ def test_later_motion_does_not_count() -> None:
     assert values[0, 4] == pytest.approx((200 - CAUGHT_MM) / 160 / 6.0, abs=0.03)
 
 
-def test_starts_are_apart_and_the_same_for_the_same_seed() -> None:
+def test_starts_are_apart_and_repeat_and_sides_may_have_several_robots_of_different_kinds() -> None:
     poses = small(worlds=2, apart_mm=100.0).start_poses(np.array([5, 6, 5]))
     assert poses.shape == (6, 2, 3)
     np.testing.assert_array_equal(poses[:2], poses[4:])
     assert (poses[:2] != poses[2:4]).any()
     assert (np.hypot(*(poses[:, 0, :2] - poses[:, 1, :2]).T) > 55 + 100).all()
-
-
-def test_sides_may_have_several_robots_of_different_kinds() -> None:
     task = small(robots=2, robot="khepera_ii", apart_mm=20.0)
     values = task.evaluate(pairs_of(task, 3), np.arange(3), 1)
     assert values.shape == (3, len(task.value_names))
@@ -109,7 +101,7 @@ def test_sides_may_have_several_robots_of_different_kinds() -> None:
     assert differing(task.digest(), small().digest()) == "robot, robots, apart_mm"
 
 
-def test_wrong_tasks_are_errors() -> None:
+def test_wrong_tasks_and_calls_are_errors() -> None:
     prey = small().sides[1]
     for changes, message in (
         ({"worlds": 3, "arenas": [kiks.Arena.box(500, 500)] * 2}, "worlds must be a multiple of the number of arenas"),
@@ -127,9 +119,17 @@ def test_wrong_tasks_are_errors() -> None:
         ({"apart_mm": 600.0}, (1, 76), "must have room for 2 robots"),
     ):
         refused(message, small(**changes).evaluate, np.zeros(shape), np.zeros(shape[0], np.int64), 1)
-
-
-# ---- evolution ----
+    refused("opponents must be a whole number from 1", evolution_of, opponents=0)
+    evolution = evolution_of(population=4, opponents=2)
+    refused("before there is a champion", evolution.champion_of, "prey")
+    refused("before a tournament", evolution.master_tournament)
+    evolution.ask()
+    refused(r"here \(16,\) or \(16, 8\), but their shape was \(16, 1\)", evolution.tell, np.zeros(16))
+    evolution.tell(np.zeros((16, 8)))
+    refused("side must be 0, 1 or one of predator, prey", evolution.champion_of, "pray")
+    refused("generation must be a whole number from 1 to 1", evolution.champion_of, "prey", 2)
+    with pytest.raises(ParameterError, match="a tournament must have two sides, but the task 'avoid' has one"):
+        kiks.Evolution(kiks.tasks.avoid()).master_tournament()
 
 
 def test_candidates_meet_the_champions_of_the_last_generations() -> None:
@@ -186,24 +186,7 @@ def test_each_side_has_an_archive_along_the_axes(tmp_path: Path) -> None:
         assert len(archive.elites[0].parameters) == side.parameter_count
 
 
-def test_wrong_calls_are_errors() -> None:
-    refused("opponents must be a whole number from 1", evolution_of, opponents=0)
-    evolution = evolution_of(population=4, opponents=2)
-    refused("before there is a champion", evolution.champion_of, "prey")
-    refused("before a tournament", evolution.master_tournament)
-    evolution.ask()
-    refused(r"here \(16,\) or \(16, 8\), but their shape was \(16, 1\)", evolution.tell, np.zeros(16))
-    evolution.tell(np.zeros((16, 8)))
-    refused("side must be 0, 1 or one of predator, prey", evolution.champion_of, "pray")
-    refused("generation must be a whole number from 1 to 1", evolution.champion_of, "prey", 2)
-    with pytest.raises(ParameterError, match="a tournament must have two sides, but the task 'avoid' has one"):
-        kiks.Evolution(kiks.tasks.avoid()).master_tournament()
-
-
-# ---- tournament ----
-
-
-def test_the_tournament_equals_a_loop_over_all_pairs() -> None:
+def test_the_tournament_equals_a_loop_over_all_pairs_in_a_latin_square_of_seeds() -> None:
     evolution = run()
     tournament = evolution.tournament
     assert [each.generation for each in evolution.champions] == [*tournament.best]
@@ -222,9 +205,6 @@ def test_the_tournament_equals_a_loop_over_all_pairs() -> None:
     some = evolution.master_tournament(trials=2, every=2)
     np.testing.assert_array_equal(some.generations, [2, 4])
     assert some.scores.shape == (2, 2, 2)
-
-
-def test_each_row_and_column_of_a_latin_square_holds_each_number_once() -> None:
     square = latin_square(7, 1)
     np.testing.assert_array_equal(np.sort(square, axis=0), np.tile(np.arange(7)[:, None], 7))
     np.testing.assert_array_equal(np.sort(square, axis=1), np.tile(np.arange(7), (7, 1)))
@@ -241,9 +221,6 @@ def test_a_tournament_knows_the_best_and_the_winner(tmp_path: Path) -> None:
     ]
     save_tournament_plot(tournament, tmp_path / "tournament.png")
     assert (tmp_path / "tournament.png").read_bytes().startswith(b"\x89PNG")
-
-
-# ---- strangers ----
 
 
 def test_strangers_meet_from_the_same_starts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

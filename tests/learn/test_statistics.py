@@ -1,7 +1,5 @@
 """Statistics with answers that are known."""
 
-from __future__ import annotations
-
 import tracemalloc
 from itertools import combinations
 from typing import Any
@@ -12,17 +10,12 @@ from tests.learn.small import refused
 
 from kiks.learn import statistics
 
-# ---- intervals ----
-
 
 def test_wilsons_interval_is_that_of_newcombe() -> None:
     """Newcombe, Two-sided confidence intervals for the single proportion, Statistics in Medicine 17 (1998), table I."""
     known = {(81, 263): (0.2553, 0.3662), (15, 148): (0.0624, 0.1605), (0, 20): (0, 0.1611), (1, 29): (0.0061, 0.1718)}
     for (count, total), interval in known.items():
         assert statistics.wilson_interval(count, total) == pytest.approx(interval, abs=5e-5)
-
-
-def test_a_share_is_of_something() -> None:
     refused("count must be a whole number from 0 to 2, but it was 3", statistics.wilson_interval, 3, 2)
     refused("count must be a whole number from 0 to 2, but it was -1", statistics.wilson_interval, -1, 2)
     refused("count must be a whole number from 0 to 3, but it was 1.5", statistics.wilson_interval, 1.5, 3)
@@ -40,17 +33,11 @@ def test_the_bootstrap_covers_the_median_as_often_as_it_says() -> None:
     assert statistics.wilson_interval(covered, 60).high > 0.95 > statistics.wilson_interval(covered, 60).low
 
 
-# ---- tests ----
-
-
-def test_the_exact_p_is_that_of_the_tables() -> None:
+def test_the_exact_p_is_that_of_the_tables_and_a_counts_pairs() -> None:
     """U of 5 and 5 values is at most 2 in 4 of 252 orders: two-sided p is 0.0317 (Mann and Whitney 1947, table I)."""
     found = statistics.mann_whitney([1.0, 2.0, 3.0, 4.0, 7.0], [5.0, 6.0, 8.0, 9.0, 10.0])
     assert (found.method, found.statistic) == (statistics.MANN_WHITNEY_EXACT, 2.0)
     assert found.p == pytest.approx(8 / 252)
-
-
-def test_a_counts_pairs() -> None:
     rng = np.random.default_rng(1)
     for sizes in ((1, 1), (3, 5), (10, 10)):
         first, second = (rng.integers(0, 6, size).astype(float).tolist() for size in sizes)
@@ -58,8 +45,7 @@ def test_a_counts_pairs() -> None:
         wins = sum((one > two) + (one == two) / 2 for one in first for two in second)
         assert (found.test.statistic, found.a) == (wins, wins / (len(first) * len(second)))
         (other,) = statistics.compare({"b": second, "a": first}).pairs
-        assert other.a == pytest.approx(1 - found.a)
-        assert other.p == pytest.approx(found.p)
+        assert (other.a, other.p) == (pytest.approx(1 - found.a), pytest.approx(found.p))
         if min(sizes) > 1:
             assert found.a_interval.low <= found.a <= found.a_interval.high
 
@@ -74,9 +60,7 @@ def test_effects_have_names() -> None:
         ([1.0] * 29 + [-1.0] * 71, [0.0], 0.29, "large"),
     ):
         (found,) = statistics.compare({"a": first, "b": second}).pairs
-        assert found.a == pytest.approx(a)
-        assert found.effect == effect
-        assert found.test.method == statistics.MANN_WHITNEY
+        assert (found.a, found.effect, found.test.method) == (pytest.approx(a), effect, statistics.MANN_WHITNEY)
 
 
 @pytest.mark.parametrize("bad", [[1.0, float("nan")], [], ["a"], [[1.0]]])
@@ -120,11 +104,8 @@ def test_all_settings_together_and_each_two() -> None:
 def test_holms_correction() -> None:
     """The smallest p counts as many times as there are tests; none becomes smaller than the one before it."""
     assert statistics.holm([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02])
-    assert statistics.holm([0.9, 0.8]) == [1.0, 1.0]
-    assert statistics.holm([]) == []
+    assert (statistics.holm([0.9, 0.8]), statistics.holm([])) == ([1.0, 1.0], [])
 
-
-# ---- survival ----
 
 TREATED = statistics.Solved(
     (6, 6, 6, 6, 7, 9, 10, 10, 11, 13, 16, 17, 19, 20, 22, 23, 25, 32, 32, 34, 35),
@@ -134,8 +115,11 @@ PLACEBO = statistics.Solved((1, 1, 2, 2, 3, 4, 4, 5, 5, 8, 8, 8, 8, 11, 11, 12, 
 """Weeks of remission with 6-mercaptopurine and without (Freireich et al., Blood 21, 1963)."""
 
 
-def test_survival_is_that_of_the_textbooks() -> None:
-    """Kalbfleisch and Prentice, The statistical analysis of failure time data, table 1.1 and section 1.4."""
+def test_survival_and_the_log_rank_test_are_those_of_the_textbooks() -> None:
+    """Kalbfleisch and Prentice, The statistical analysis of failure time data, table 1.1 and section 1.4.
+
+    Chi squared of these data is 16.79.
+    """
     found = statistics.survival(TREATED)
     steps = np.searchsorted(found.evaluations, [6, 7, 10, 13, 16, 22, 23, 35])
     known = [0.857, 0.807, 0.753, 0.690, 0.627, 0.538, 0.448, 0.448]
@@ -143,10 +127,6 @@ def test_survival_is_that_of_the_textbooks() -> None:
     assert (found.low[steps] < found.share[steps]).all()
     assert (found.share[steps] < found.high[steps]).all()
     assert statistics.survival(PLACEBO).share[-1] == 1.0
-
-
-def test_the_log_rank_test_is_that_of_the_textbooks() -> None:
-    """Chi squared of these data is 16.79."""
     (found,) = statistics.compare_solved({"treated": TREATED, "placebo": PLACEBO}).pairs
     assert found.test.statistic**2 == pytest.approx(16.79, abs=5e-3)
     assert found.p == pytest.approx(4.17e-5, abs=1e-7)

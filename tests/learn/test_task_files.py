@@ -1,7 +1,5 @@
 """Task files: a ready-made task with changes, in TOML."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
@@ -25,16 +23,13 @@ def load(folder: Path, text: str, name: str = "mine.toml") -> kiks.Task:
     return kiks.tasks.load(str(folder / name))
 
 
-def test_keys_left_out_keep_the_values_of_the_ready_made_task(folder: Path) -> None:
+def test_keys_left_out_keep_the_ready_made_values_and_the_second_side_has_a_controller_of_its_own(folder: Path) -> None:
     base = kiks.tasks.load("gather")
     task = load(folder, 'base = "gather"\n')
     assert task.name == "mine"
     for name in ("measures", "fitness", "seconds", "worlds", "axes", "robot", "robots", "timing", "starts"):
         assert getattr(task, name) == getattr(base, name), name
     assert task.controller is base.controller
-
-
-def test_the_second_side_has_a_controller_of_its_own(folder: Path) -> None:
     task = load(folder, 'base = "pursuit"\n[against]\nkind = "gru"\nunits = 2\n')
     base = kiks.tasks.pursuit()
     assert task.against.controller is kiks.controllers.gru(units=2)
@@ -55,8 +50,7 @@ def test_all_keys(folder: Path) -> None:
     assert (task.name, task.seconds, task.worlds, task.starts) == ("in a room", 2.0, 4, "arena")
     assert [arena.width_mm for arena in task.arenas] == [400, 500]
     assert [arena.width_mm for arena in task.exam.arenas] == [500]
-    assert task.robot == str((folder / "my.toml").resolve())
-    assert task.timing == kiks.Timing(0.05, 38400, 0.0025)
+    assert (task.robot, task.timing) == (str((folder / "my.toml").resolve()), kiks.Timing(0.05, 38400, 0.0025))
     assert task.controller is kiks.controllers.gru(units=2)
     assert load(folder, 'base = "avoid"\nbaud = 0\n').timing.baud is None
     assert kiks.tasks.load(str(folder / "mine.toml"), kiks.controllers.linear()).controller.name == "linear"

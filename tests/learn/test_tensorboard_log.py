@@ -1,7 +1,5 @@
 """The log for TensorBoard: TensorBoard's own reader finds the curves in it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

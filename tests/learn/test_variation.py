@@ -1,7 +1,5 @@
 """Robots, links and arenas that vary within the worlds of a candidate, or from one generation to the next."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import product
 from typing import Any
@@ -27,12 +25,15 @@ def values_of(task: kiks.Task, seeds: tuple[int, ...] = (5,)) -> np.ndarray:
     return task.evaluate(parameters, np.array(seeds), 1)
 
 
-def test_a_list_of_one_is_that_robot_and_that_timing() -> None:
+def test_a_list_of_one_is_that_robot_and_that_timing_and_wrong_lists_are_errors() -> None:
     alone = values_of(task_of())
     for changes in ({"robot": KHEPERA}, {"robot": ["khepera"]}, {"timing": [task_of().timing]}):
         task = task_of(**changes)
         assert (values_of(task) == alone).all()
         assert task.digest() == task_of().digest()
+    for changes in ({"robot": []}, {"robot": 3}, {"robot": ["khepera", 3]}, {"timing": []}, {"timing": "fast"}):
+        (name,) = changes
+        refused(f"^{name}.* must be .* or a list of them, but it was", task_of, **changes)
 
 
 def test_worlds_take_all_combinations_in_turn() -> None:
@@ -96,11 +97,15 @@ def test_where_arenas_are_drawn_a_lone_robot_draws_its_start_too() -> None:
     assert task_of(arenas=arenas, worlds=3, robots=2, starts="arena").start_poses(np.array([1])) is None
 
 
-def test_many_arenas_need_no_multiple_of_worlds() -> None:
+def test_many_arenas_need_no_multiple_of_worlds_and_the_digest_depends_on_them_robots_and_timings() -> None:
     task = task_of(arenas=many(7), worlds=6, exam=None)
     assert task.world().arena.width_mm in {arena.width_mm for arena in task.arenas_of(0)}
     refused("worlds must be a multiple of the number of arenas, 5, but it was 6", task_of, arenas=many(5), worlds=6)
     assert task.digest() != task_of(arenas=many(8), worlds=6).digest()
+    robots = ["khepera_ii", *(family(KHEPERA, 2, seed=seed) for seed in (1, 2))]
+    changed = [{"robot": robot} for robot in robots] + [{"timing": timing} for timing in (TIMINGS, TIMINGS[1])]
+    tasks = [task_of(), *(task_of(**changes) for changes in changed)]
+    assert len({tuple(task.digest().items()) for task in tasks}) == len(tasks)
 
 
 def test_an_evolution_in_many_arenas_resumes(tmp_path: Any) -> None:
@@ -112,19 +117,6 @@ def test_an_evolution_in_many_arenas_resumes(tmp_path: Any) -> None:
     again.run(generations=3)
     assert again.champion.parameters == whole.champion.parameters
     refused("arenas", kiks.Evolution, task_of(arenas=many(8), worlds=2), "ga", seed=4, population=6, folder=tmp_path)
-
-
-def test_the_digest_depends_on_robots_and_timings() -> None:
-    robots = ["khepera_ii", *(family(KHEPERA, 2, seed=seed) for seed in (1, 2))]
-    changed = [{"robot": robot} for robot in robots] + [{"timing": timing} for timing in (TIMINGS, TIMINGS[1])]
-    tasks = [task_of(), *(task_of(**changes) for changes in changed)]
-    assert len({tuple(task.digest().items()) for task in tasks}) == len(tasks)
-
-
-def test_wrong_lists_are_errors() -> None:
-    for changes in ({"robot": []}, {"robot": 3}, {"robot": ["khepera", 3]}, {"timing": []}, {"timing": "fast"}):
-        (name,) = changes
-        refused(f"^{name}.* must be .* or a list of them, but it was", task_of, **changes)
 
 
 @pytest.mark.slow

@@ -35,16 +35,13 @@ def from_zeros(shape: tuple[int, int], mm_per_pixel: float) -> Arena:
     return Arena.from_array(np.zeros(shape, np.uint8), mm_per_pixel=mm_per_pixel)
 
 
-def test_row_zero_of_a_picture_is_on_top_and_integers_of_any_type_are_taken():
+def test_row_zero_is_on_top_integers_of_any_type_are_taken_and_coarse_pixels_cut_without_moving_a_wall():
     picture = random_picture(1) % 128
     for dtype in (np.uint8, np.int8, np.uint16, np.int64):
         arena = Arena.from_array(picture.astype(dtype))
         assert np.array_equal(arena.brightness, picture[::-1])
         assert (arena.width_mm, arena.height_mm, arena.mm_per_cell) == (101, 104, 1)
     assert np.array_equal(Arena.from_array(picture > 0).brightness, (picture[::-1] > 0) * 255)
-
-
-def test_coarse_pixels_are_cut_without_moving_a_wall():
     picture = random_picture(4, (220, 230))
     for mm_per_pixel, cells in ((0.5, 1), (1, 1), (1.01, 2), (2, 2), (2.5, 3), (7, 7)):
         arena = Arena.from_array(picture, mm_per_pixel=mm_per_pixel)
@@ -56,13 +53,20 @@ def test_coarse_pixels_are_cut_without_moving_a_wall():
             assert np.array_equal(arena.brightness[row::cells, column::cells], picture[::-1])
 
 
-def test_clearance_to_a_straight_wall_does_not_depend_on_the_cells():
+def test_clearance_to_a_straight_wall_does_not_depend_on_the_cells_and_the_world_outside_is_wall():
     picture = np.zeros((60, 60), np.uint8)
     picture[:, :20] = 255
     arena = Arena.from_array(picture, mm_per_pixel=2.5)
     # The wall ends at x = 50 mm; the opposite border begins at 150 mm.
     for x_mm in (51.0, 60.0, 83.3):
         assert arena.clearance_at_mm(x_mm, 75) == pytest.approx(x_mm - 50, abs=1e-4)
+    arena = Arena.from_array(np.zeros((100, 120), np.uint8))
+    assert arena.surface.shape == arena.clearance.shape == (100 + 2 * PAD, 120 + 2 * PAD)
+    assert (arena.surface == 255).sum() == (100 + 2 * PAD) * (120 + 2 * PAD) - 100 * 120
+    assert arena.clearance_at_mm(10, 50) == 10
+    for place in ((-1, 50), (121, 50), (60, -1e6), (60, 1e6)):
+        assert arena.clearance_at_mm(*place) < 0
+        assert not arena.free_for(*place, ROBOT_MM)
 
 
 @settings(max_examples=share(10, 20))
@@ -86,16 +90,6 @@ def test_clearance_leap_and_room_of_cells_are_those_of_geometry(seed, shape, sha
         rows_of, columns_of = (slice(ROOM_CELLS * index, ROOM_CELLS * (index + 1)) for index in block)
         assert room == arena.clearance[rows_of, columns_of].min()
     assert arena.rooms.shape == tuple(-(-side // ROOM_CELLS) for side in arena.clearance.shape)
-
-
-def test_the_world_outside_is_wall():
-    arena = Arena.from_array(np.zeros((100, 120), np.uint8))
-    assert arena.surface.shape == arena.clearance.shape == (100 + 2 * PAD, 120 + 2 * PAD)
-    assert (arena.surface == 255).sum() == (100 + 2 * PAD) * (120 + 2 * PAD) - 100 * 120
-    assert arena.clearance_at_mm(10, 50) == 10
-    for place in ((-1, 50), (121, 50), (60, -1e6), (60, 1e6)):
-        assert arena.clearance_at_mm(*place) < 0
-        assert not arena.free_for(*place, ROBOT_MM)
 
 
 def test_arrays_are_read_only_shared_and_computed_once_and_copies_are_equal():
@@ -129,7 +123,7 @@ def test_the_default_arena_is_the_classic_one():
     assert (corner == 0).sum() == pytest.approx(math.pi * 100**2 / 4, rel=0.005)
 
 
-def test_a_box_keeps_its_rules():
+def test_a_box_keeps_its_rules_and_has_its_walls_of_a_brightness_or_a_material():
     for change, words in (
         ({"width_mm": 300.5}, "width_mm must be a whole number, but it was 300.5"),
         ({"height_mm": "1"}, "height_mm must be a whole number, but it was '1'"),
@@ -140,15 +134,12 @@ def test_a_box_keeps_its_rules():
         ({"brightness": "woods"}, r"one of \['white', 'wood', .*\], but it was 'woods'. Did you mean 'wood'"),
     ):
         refused(words, partial(Arena.box, **({"width_mm": 300, "height_mm": 200} | change)))
-
-
-def test_a_box_has_its_walls_of_a_brightness_or_a_material():
-    """A material's is the brightness c whose reflectance is 0.02 + 0.98 c/255, to half a step of c."""
     arena = Arena.box(300, 200, wall_mm=20, brightness=7)
     assert (arena.brightness[20:-20, 20:-20] == 0).all()
     assert (arena.brightness == 7).sum() == 300 * 200 - 260 * 160
     assert not Arena.box(300, 200, wall_mm=0).brightness.any()
     assert Arena.box(300, 200, rounded_mm=90).brightness.any(axis=1).all()
+    # A material's is the brightness c whose reflectance is 0.02 + 0.98 c/255, to half a step of c.
     for name, reflectance in REFLECTANCES.items():
         brightness = int(Arena.box(300, 200, brightness=name).brightness.max())
         assert 0.02 + 0.98 * brightness / 255 == pytest.approx(reflectance, abs=0.004)
@@ -163,8 +154,7 @@ def test_a_robot_starts_at_the_first_start_pose_or_in_the_middle_of_the_widest_p
     raster = arena.brightness.copy()
     raster[:, 130] = 255
     pose = replace(arena, ground=raster).find_start(ROBOT_MM)
-    assert pose.x_mm == pytest.approx(261, abs=10)
-    assert pose.y_mm == 150.5
+    assert (pose.x_mm, pose.y_mm) == (pytest.approx(261, abs=10), 150.5)
     narrow = np.zeros((200, 200), np.uint8)
     narrow[:, ::40] = 255
     words = r"'array' must have room for a robot 55 mm across, but its widest place has room for \d+"
@@ -202,7 +192,7 @@ def test_from_array_and_the_constructor_keep_their_rules():
     refused(r"must have floor, but every cell is wall. Black", Arena.from_array, full, error=ArenaError)
 
 
-def test_entries_stand_where_they_can():
+def test_entries_stand_where_they_can_and_become_places():
     box = Arena.box(200, 300)
     for name, places, error, words in (
         (
@@ -225,11 +215,6 @@ def test_entries_stand_where_they_can():
         ("balls", [("a", 50)], ParameterError, r"ball 1: x_mm must be a number, but it was 'a'"),
     ):
         refused(words, partial(replace, box, **{name: places}), error=error)
-
-
-def test_entries_become_places():
     arena = replace(Arena.box(200, 300), lamps=[(5, 5)], balls=[(50, 60)], cylinders=[(50, 70)], starts=[(50, 80, 1)])
-    assert arena.lamps == (Lamp(5.0, 5.0, 1.0, True),)
-    assert arena.balls == (Ball(50.0, 60.0),)
-    assert arena.cylinders == (Cylinder(50.0, 70.0),)
-    assert arena.starts == (Pose(50.0, 80.0, 1.0),)
+    assert (arena.lamps, arena.balls) == ((Lamp(5.0, 5.0, 1.0, True),), (Ball(50.0, 60.0),))
+    assert (arena.cylinders, arena.starts) == ((Cylinder(50.0, 70.0),), (Pose(50.0, 80.0, 1.0),))

@@ -79,7 +79,7 @@ def test_a_tif_may_count_from_white_to_black(tmp_path):
         assert np.array_equal(read(path), walls * 255)
 
 
-def test_a_colour_never_becomes_floor_and_a_palette_is_read_as_its_colours(tmp_path):
+def test_a_palette_is_read_as_its_colours_no_colour_becomes_floor_but_what_is_transparent_does(tmp_path):
     colours = np.zeros((120, 150, 3), np.uint8)
     colours[10, 10:13] = [(0, 0, 1), (0, 1, 0), (1, 0, 0)]
     colours[11, 10:13] = [(255, 255, 255), (0, 0, 255), (100, 100, 100)]
@@ -98,9 +98,6 @@ def test_a_colour_never_becomes_floor_and_a_palette_is_read_as_its_colours(tmp_p
             palette.save(tmp_path / name)
             found = read(tmp_path / name)
             assert (found[5, 5], found[6, 6], np.count_nonzero(found)) == (1, 200, 2)
-
-
-def test_what_is_transparent_is_floor(tmp_path):
     for mode, colour in (("LA", (90,)), ("RGBA", (90, 90, 90))):
         layered = Image.new(mode, (150, 120), 0)
         for x, opacity in ((3, 255), (4, 1), (5, 0)):
@@ -143,7 +140,7 @@ def test_the_first_frame_counts_and_a_picture_gives_the_name_and_the_scale(tmp_p
     refused("mm_per_pixel must be from", Arena.from_image, tmp_path / "yard.tif", 0)
 
 
-def test_what_is_no_lossless_picture_is_refused(tmp_path):
+def test_what_is_no_lossless_picture_or_a_part_of_one_is_refused(tmp_path):
     for content in (b"", b"hello", b"\x89PNG\r\n\x1a\n", b"P5 0 0 255 ", b"BM" + bytes(60)):
         (tmp_path / "a.png").write_bytes(content)
         refused(r"Picture '.*a.png' must be", Arena.load, tmp_path / "a.png", error=ArenaError)
@@ -155,9 +152,6 @@ def test_what_is_no_lossless_picture_is_refused(tmp_path):
     ):
         Image.fromarray(grey_picture()).save(tmp_path / name, **options)
         refused(words, Arena.load, tmp_path / name, error=ArenaError)
-
-
-def test_truncated_pictures_are_refused(tmp_path):
     picture = np.random.default_rng(0).integers(0, 256, (120, 150), np.uint8)
     for name, options in [*GREY_FORMATS, ("a.tif", {"compression": "group4"})]:
         path = tmp_path / name
@@ -212,16 +206,13 @@ def write(folder: Path, text: str) -> Path:
     return folder / "a.toml"
 
 
-def test_an_arena_file_says_everything(folder):
+def test_an_arena_file_says_everything_and_may_be_a_box(folder, tmp_path):
     arena = Arena.load(write(folder, FULL))
     assert np.array_equal(arena.brightness[::-2, ::2], grey_picture())
     assert (arena.name, arena.width_mm) == ("Maze", 300)
     assert arena.starts == (Pose(55, 20, math.pi), Pose(60.5, 20, math.pi / 2))
     assert arena.lamps == (Lamp(200, 10, 2.0, False), Lamp(0, 0, 1.0, True))
     assert (arena.balls, arena.cylinders) == ((Ball(250, 50),), (Cylinder(20, 50),))
-
-
-def test_an_arena_file_may_be_a_box(tmp_path):
     arena = Arena.load(write(tmp_path, "size_mm = [500, 650]\nrounded_mm = 100"))
     assert np.array_equal(arena.brightness, Arena.default().brightness)
     assert arena.name == "a"
@@ -317,7 +308,7 @@ def test_a_picture_with_black_walls_is_turned_round(tmp_path, caplog):
     refused("invert must come with a picture", Arena.load, file, error=ArenaError)
 
 
-def test_what_a_map_of_ros_does_not_know_to_be_free_is_wall(tmp_path):
+def test_what_a_map_of_ros_does_not_know_to_be_free_is_wall_and_a_damaged_one_one_line(tmp_path):
     walls = with_black_walls(tmp_path)
     (tmp_path / "map.yaml").write_text(
         "image: room.png\nresolution: 0.002\norigin: [0.0, 0.0, 0.0]\n"
@@ -326,9 +317,6 @@ def test_what_a_map_of_ros_does_not_know_to_be_free_is_wall(tmp_path):
     arena = Arena.load(tmp_path / "map.yaml")
     assert (arena.width_mm, arena.height_mm, arena.name) == (300, 240, "map")
     assert np.array_equal(arena.brightness[::2, ::2] > 0, walls)
-
-
-def test_a_damaged_map_of_ros_is_one_line(tmp_path):
     rest = "resolution: 0.01\noccupied_thresh: 0.65\nfree_thresh:"
     for text, words in (
         ("image: [room.png\n", "must be YAML, but: while parsing a flow sequence"),

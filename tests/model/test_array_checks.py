@@ -61,7 +61,7 @@ def test_what_numpy_saves_is_read(tmp_path: Path) -> None:
         }
 
 
-def test_what_breaks_a_rule_is_told(tmp_path: Path) -> None:
+def test_what_breaks_a_rule_is_told_and_what_is_no_array_of_numbers_is_refused(tmp_path: Path) -> None:
     for name, values, words in (
         ("row", [1.5, np.nan, 7], "row must be finite numbers from -10 to 1e6 [row], but it was nan at [1]. Count"),
         ("row", [1.5, 7, -np.inf], "but it was -inf at [2]."),
@@ -86,6 +86,9 @@ def test_what_breaks_a_rule_is_told(tmp_path: Path) -> None:
     ):
         (tmp_path / "a.npz").write_bytes(saved(True, **(good() | {name: np.array(values)})))
         refused(f"^File 'a'.*{re.escape(words)}", read_arrays, tmp_path / "a.npz", RULES, "File 'a'")
+    words = r"^row must be finite numbers \[row\], but it (was|had) "
+    for values in (None, "abc", {}, [[1], [2, 3]], 10**400, [10**400], [1j], object(), [[[]]], b"\0"):
+        refused(words, check_array, values, Numbers(("row",)), "row")
 
 
 def rewritten(data: bytes, place: int, value: bytes) -> bytes:
@@ -147,9 +150,3 @@ def test_the_gate_is_its_rule(values: np.ndarray, is_whole: bool) -> None:
         assert check_array(values, rule, "row").tolist() == listed
     else:
         refused("row", check_array, values, rule, "row")
-
-
-def test_what_is_no_array_of_numbers_is_refused() -> None:
-    words = r"^row must be finite numbers \[row\], but it (was|had) "
-    for values in (None, "abc", {}, [[1], [2, 3]], 10**400, [10**400], [1j], object(), [[[]]], b"\0"):
-        refused(words, check_array, values, Numbers(("row",)), "row")

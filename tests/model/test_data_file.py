@@ -91,7 +91,7 @@ def test_messages_show_what_python_cannot() -> None:
     assert len(shown(Silent())) <= SHOWN_MAX
 
 
-def test_long_dotted_keys_cost_no_memory() -> None:
+def test_long_dotted_keys_cost_no_memory_and_what_cannot_be_parsed_is_refused_in_one_line() -> None:
     for key in ("a" + ".a" * 20_000, "[" + "a." * 60_000 + "a]", '"a"' + ' . "b c"' * 20):
         with traced() as peak_bytes:
             refused("a key has more than 16 parts", parse_toml, f"{key} = 1".encode(), "x")
@@ -99,9 +99,6 @@ def test_long_dotted_keys_cost_no_memory() -> None:
     dots = ".".join("abcdefghijklmnopqrstuvwxyz")
     text = f'a = "{dots}"\nb = \'\'\'\n{dots}\'\'\'\nc = [{"1.5, " * 50}] # {dots}\nd = """x""{dots}"""\n'
     assert set(parse_toml(text.encode(), "x")) == set("abcd"), "dots that are no keys are read"
-
-
-def test_what_cannot_be_parsed_is_refused_in_one_line() -> None:
     for data in (b"\xff", b"a = " + b"[" * 50_000, b"[" * 50_000, b"a = 1" + b"0" * 5000, b'{"a":', b"{]"):
         for parse in (parse_toml, parse_json):
             words = r"^File 'x' must be (TOML|JSON) in UTF-8, but: .*\. Correct"

@@ -63,8 +63,7 @@ def test_there_is_a_case_for_each_choice_of_values_and_no_two_share_a_name(found
         assert {case.family for case in mine} == set(table.family or (0,))
         assert all(case.is_hidden == table.is_hidden for case in mine)
         count += choices
-    assert len(cases) == (count or 1)
-    assert len({case.name for case in cases}) == len(cases)
+    assert (len(cases), len({case.name for case in cases})) == (count or 1, len(cases))
     assert all(case.name for case in cases)
 
 
@@ -80,7 +79,7 @@ def test_cases_are_named_by_what_differs() -> None:
     assert [case.name for case in cases_of([Cases("a"), Cases("a")])] == ["a", "a (2)"]
 
 
-def test_a_case_changes_the_project_and_nothing_else(tmp_path: Path) -> None:
+def test_a_case_changes_the_project_alone_and_has_an_arena_of_kiks_or_of_its_folder(tmp_path: Path) -> None:
     arena = replace(Arena.box(300, 300), starts=(Pose(100, 100, 0.0), Pose(200, 200, 0.0)))
     project = Project(arena, seed=1, thinking="fixed:3", cases=(Cases("a"),), exercise=Exercise("b"))
     same = in_case(project, Case("a"), tmp_path)
@@ -93,9 +92,6 @@ def test_a_case_changes_the_project_and_nothing_else(tmp_path: Path) -> None:
     assert sim.pose(1)[:2] == (150, 150)
     assert sim.spec != RobotSpec.load("khepera")
     assert simulation_of(in_case(project, replace(case, family=3), tmp_path)).spec != sim.spec
-
-
-def test_a_case_has_an_arena_of_kiks_or_of_its_folder(tmp_path: Path) -> None:
     (tmp_path / "small.toml").write_text("size_mm = [200, 250]")
     assert in_case(Project(), Case(arena="small.toml"), tmp_path).arena.width_mm == 200
     assert in_case(Project(), Case(arena="maze"), tmp_path).arena.name == Arena.load("maze").name

@@ -47,7 +47,7 @@ def test_it_has_the_value_that_python_gives(text: str, numbers: list[int]) -> No
     assert formula.value(given) == expected
 
 
-def test_its_terms_tell_their_arguments() -> None:
+def test_its_terms_tell_their_arguments_and_it_computes_with_numbers_alone() -> None:
     formula = Formula("goal_mm(800, -5.5) + reached_s(1, 2, radius_mm=30) + held_s(contacts == 0 and time_s > 3)")
     place, reached, held = formula.terms
     assert (place.name, place.arguments, place.named) == ("goal_mm", (800, -5.5), ())
@@ -59,9 +59,6 @@ def test_its_terms_tell_their_arguments() -> None:
         "held_s(contacts == 0 and time_s > 3)",
     ]
     assert [str(term) for term in held.condition.terms] == ["contacts", "time_s"]
-
-
-def test_it_computes_with_numbers_and_a_name_is_only_a_term() -> None:
     for text, value in (
         ("round(2.567, 2)", 2.57),
         ("round(7.4)", 7),

@@ -29,7 +29,7 @@ ARENA = Arena.box(500, 500)
 floats = st.one_of(st.floats(-60, 60), st.floats(allow_nan=False, allow_infinity=False))
 
 
-def test_headings_are_wrapped_at_every_door() -> None:
+def test_headings_are_wrapped_at_every_door_and_a_robot_can_be_put_back_after_many_turns() -> None:
     sim = Simulation(ARENA, seed=1)
     for heading_rad in (1e20, -1e20, 1e308, HEADING_KEPT_RAD + 1.0, 2.0**63):
         turn_rad = math.remainder(heading_rad, 2 * math.pi)
@@ -46,6 +46,13 @@ def test_headings_are_wrapped_at_every_door() -> None:
         assert (batch.reset([1], starts=(250, 250, heading_rad)) >= 0).all()
     turned = Arena(ARENA.brightness, 1.0, "turned", starts=[(250, 250, 3e6)])  # type: ignore[arg-type]
     assert kiks.Batch(turned, 1).state_hash(0) == Simulation(turned).state_hash()
+    sim = Simulation(ARENA, seed=1)
+    robot = kiks.Khepera(sim.port(1))
+    robot.set_speed(-40, 40)
+    for _ in range(20):
+        robot.pause(0.5)
+        sim.place(1, *sim.pose(1))
+    assert sim.pose(1)[2] > 3 * math.tau
 
 
 @pytest.mark.parametrize(("width_mm", "height_mm"), [(600, 200), (200, 600)])
@@ -75,16 +82,6 @@ def test_a_heading_in_degrees_is_refused_at_every_door() -> None:
         for door in doors:
             refused(rf"heading_rad must be in radians.*math.radians\({degrees:g}\)", door, degrees)
     assert sim.robot_count == 1
-
-
-def test_a_robot_can_be_put_back_where_it_was_after_many_turns() -> None:
-    sim = Simulation(ARENA, seed=1)
-    robot = kiks.Khepera(sim.port(1))
-    robot.set_speed(-40, 40)
-    for _ in range(20):
-        robot.pause(0.5)
-        sim.place(1, *sim.pose(1))
-    assert sim.pose(1)[2] > 3 * math.tau
 
 
 @given(st.floats(allow_nan=True, allow_infinity=True))

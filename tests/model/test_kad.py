@@ -68,8 +68,7 @@ def test_pieces_are_those_of_the_matlab_kiks(grain, scale):
     picture = np.pad(picture, ((0, max(100 - len(picture), 0)), (0, max(100 - picture.shape[1], 0))))
     data = encode_kad(Arena.from_array(picture))
     walls = walls_of(data)
-    assert walls.dtype == np.uint16
-    assert walls.shape == (1, walls.size)
+    assert (walls.dtype, walls.shape) == (np.uint16, (1, walls.size))
     assert walls[0].tolist() == greedy(picture)
     assert np.array_equal(decode_kad(data).brightness[::-1], picture)
 
@@ -91,16 +90,13 @@ def test_everything_else_comes_along(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["room.kad"]
 
 
-def test_numbers_of_any_type_are_read():
+def test_numbers_of_any_type_and_byte_order_are_read():
     walls = np.array([120, 110, 4, 11, 15, 15, 11, 21, 21, 23, 23, 99])
     other = {"note": "hello", "cells": np.array([1, "a"], object), "z": np.ones(3) * 1j, "walls2": np.eye(3)}
     for kind in ("u1", "i2", "u2", "i4", "u4", "i8", "u8", "f4", "f8"):
         for numbers, compress in ((walls[None, :], False), (walls[:, None], True)):
             arena = decode_kad(mat(compress=compress, walls=numbers.astype(kind), **other))
             assert arena.brightness.sum() == 15 * 99
-
-
-def test_files_of_the_other_byte_order_are_read():
     walls = np.array([120, 110, 4, 11, 15, 15, 11, 21, 21, 23, 23, 99], ">u2").tobytes()
     parts = [(6, struct.pack(">II", 11, 0)), (5, struct.pack(">ii", 1, 12)), (1, b"walls"), (4, walls)]
     body = b"".join(struct.pack(">II", kind, len(part)) + part + bytes(-len(part) % 8) for kind, part in parts)
@@ -127,7 +123,7 @@ def row(*numbers: float) -> np.ndarray:
     return np.array(numbers, np.float64)
 
 
-def test_bad_walls_and_things_are_refused():
+def test_bad_walls_and_things_and_files_that_are_none_are_refused(tmp_path):
     whole = [120, 110, 4, 1, 5, 5, 1, 1, 1, 3, 3, 99]
     for walls, words in (
         (np.zeros((1, 0)), "width and height"),
@@ -163,9 +159,6 @@ def test_bad_walls_and_things_are_refused():
     ):
         data = mat(walls=np.array(whole, np.uint16), **{name: np.array(things)})
         refused(words, decode_kad, data, error=ArenaError)
-
-
-def test_files_that_are_none_are_refused(tmp_path):
     whole = encode_kad(Arena.box(200, 150, rounded_mm=30))
     for data, words in (
         (b"", "level 5"),

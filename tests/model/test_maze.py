@@ -84,15 +84,11 @@ def test_every_maze_is_as_likely():
     assert all(65 <= count <= 135 for count in counts.values()), counts
 
 
-def test_sizes_and_places_are_those_of_the_matlab_maze_demo():
+def test_sizes_and_places_are_those_of_the_matlab_maze_demo_and_the_frame_is_wall():
     # kiks-behaviour.md, section 1.9: 640 rows x 880 columns, start (55, 60), light (830, 580), y counted from the top.
     arena = Arena.maze(columns=5, rows=5)
-    assert arena.brightness.shape == (640, 880)
-    assert arena.starts == (Pose(55.0, 640.0 - 60.0, 0.0),)
+    assert (arena.brightness.shape, arena.starts) == ((640, 880), (Pose(55.0, 640.0 - 60.0, 0.0),))
     assert arena.lamps == (Lamp(830.0, 640.0 - 580.0),)
-
-
-def test_the_frame_is_wall():
     picture = Arena.maze(columns=3, rows=2).brightness[::-1]
     for frame in (picture[:10], picture[-11:], picture[:, :10], picture[:, -11:]):
         assert (frame == 255).all()
@@ -102,14 +98,17 @@ def test_the_frame_is_wall():
     assert picture[:125, -120:].all()
 
 
-def test_the_same_seed_is_the_same_maze_on_every_computer():
+def test_the_same_seed_is_the_same_maze_or_room_on_every_computer():
     arena = Arena.maze(columns=6, rows=5, seed=7)
     assert np.array_equal(arena.brightness, Arena.maze(columns=6, rows=5, seed=7).brightness)
     assert not np.array_equal(arena.brightness, Arena.maze(columns=6, rows=5, seed=8).brightness)
     assert hashlib.sha256(arena.brightness.tobytes()).hexdigest()[:16] == "de27aa544cbcf8d3"
+    digests = [hashlib.sha256(repr(draw_room(1100, 900, 4, 3, 1, seed)).encode()).hexdigest() for seed in range(30)]
+    assert len(set(digests)) == 30
+    assert digests[3][:16] == "5cebfcfc44d13d6c"
 
 
-def test_bad_numbers_are_named():
+def test_bad_numbers_and_rooms_that_cannot_be_drawn_are_named():
     for given, words in (
         ({"columns": 0}, "columns must be a whole number from 1 to 100, but it was 0. It counts the cells side by"),
         ({"rows": 101}, "rows must be a whole number from 1 to 100, but it was 101. It counts the cells one above"),
@@ -121,6 +120,13 @@ def test_bad_numbers_are_named():
         refused(words, partial(Arena.maze, **given))
     refused("at most 64 million cells", partial(Arena.maze, columns=100, rows=100), error=ArenaError)
     refused("at least 100 x 100 mm", partial(Arena.maze, rows=1, path_mm=97), error=ArenaError)
+    for wrong, words in (
+        ({"walls": 9, "width_mm": 500, "height_mm": 500}, "rooms of 500 x 500 mm were full before they had 9 walls"),
+        ({"width_mm": 300}, "width_mm must be a whole number from 500 to 3000"),
+        ({"lamps": -1}, "lamps must be a whole number from 0 to 20"),
+        ({"seed": -1}, "seed must be a whole number"),
+    ):
+        refused(words, partial(Arena.room, **wrong))
 
 
 WITH_ROOM_MM = 27.5 + 20
@@ -149,19 +155,3 @@ def test_free_standing_things_are_as_far_apart_as_promised() -> None:
     for number, (x_mm, y_mm, radius_mm) in enumerate(discs):
         for other_x_mm, other_y_mm, other_mm in discs[:number]:
             assert np.hypot(x_mm - other_x_mm, y_mm - other_y_mm) >= GAP_MM + radius_mm + other_mm
-
-
-def test_a_seed_always_gives_the_same_room() -> None:
-    digests = [hashlib.sha256(repr(draw_room(1100, 900, 4, 3, 1, seed)).encode()).hexdigest() for seed in range(30)]
-    assert len(set(digests)) == 30
-    assert digests[3][:16] == "5cebfcfc44d13d6c"
-
-
-def test_rooms_that_cannot_be_drawn_are_named() -> None:
-    for wrong, words in (
-        ({"walls": 9, "width_mm": 500, "height_mm": 500}, "rooms of 500 x 500 mm were full before they had 9 walls"),
-        ({"width_mm": 300}, "width_mm must be a whole number from 500 to 3000"),
-        ({"lamps": -1}, "lamps must be a whole number from 0 to 20"),
-        ({"seed": -1}, "seed must be a whole number"),
-    ):
-        refused(words, partial(Arena.room, **wrong))

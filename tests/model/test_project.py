@@ -134,7 +134,7 @@ def test_arenas_are_projects(tmp_path):
 BASE = "kiks = 1\n[walls]\nsize_mm = [300, 300]\n"
 
 
-def test_bad_files_are_refused(tmp_path):
+def test_bad_files_and_names_and_links_that_leave_the_folder_are_refused(tmp_path):
     for text, words in (
         ("", "kiks must be 1, the version of this format, but it is not there"),
         ("kiks = 2\n", "newer"),
@@ -167,9 +167,6 @@ def test_bad_files_are_refused(tmp_path):
     refused("at most", partial(Project.from_bytes, bytes_max=1000), bytes(2000), error=ArenaError)
     refused(r"\.kiks", Project().save, tmp_path / "none.toml")
     refused("can be written", Project().save, tmp_path / "none" / "a.kiks")
-
-
-def test_names_and_links_that_leave_the_folder_are_refused(tmp_path):
     names = ["", "..", "/a", "a/../../b", "a//b", "../a", "a/", "C:a", "C:\\a", "a\\b", "a\0b", "a\nb", "x" * 2000]
     for name in (*names, 3, None):
         refused("folder", check_relative, name, "program")
@@ -267,7 +264,7 @@ def test_what_a_gripper_holds_up_is_put_down():
     assert sim.arena.free_for(cylinder.x_mm, cylinder.y_mm, 15.99)
 
 
-def test_equal_walls_change_nothing():
+def test_equal_walls_change_nothing_and_others_can_be_put_around_everything():
     """In the middle of a run the walls are replaced by the same ones."""
     hashes = set()
     for arena_at in (5.0, 0.0, None):
@@ -282,9 +279,6 @@ def test_equal_walls_change_nothing():
                 sim.set_arena(Arena.box(300, 260, rounded_mm=60))
         hashes.add(sim.state_hash())
     assert len(hashes) == 1
-
-
-def test_walls_can_be_replaced_around_everything():
     sim = Simulation(Arena.box(400, 400), seed=1)
     sim.place(1, 100, 200, 0.0)
     sim.add_cylinder(300, 300)

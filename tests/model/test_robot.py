@@ -26,8 +26,7 @@ def test_ours_differ_where_the_robots_do() -> None:
     assert (first.body.diameter_mm, second.body.diameter_mm) == (55.0, 70.0)
     assert first.body.wheel_base_mm == second.body.wheel_base_mm == 53.0
     assert (first.proximity.maximum_counts, second.proximity.maximum_counts) == (1023, 1020)
-    assert first.motor == second.motor
-    assert first.reset == second.reset
+    assert (first.motor, first.reset) == (second.motor, second.reset)
 
 
 @pytest.mark.slow

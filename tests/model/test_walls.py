@@ -77,7 +77,7 @@ def test_files_and_copies_keep_shapes_and_what_is_below_them(tmp_path: Path) -> 
         assert again.lamps == arena.lamps
 
 
-def test_a_bad_shape_is_refused_in_one_line() -> None:
+def test_bad_shapes_and_walls_that_would_take_minutes_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     for keys, words in (
         ("box_mm = [[50, 50], [50, 80]]", r"wall 1 must cover a part .* covers no cell .* 400 x 300 mm"),
         ("disc_mm = [900, 80]\nradius_mm = 5", r"wall 1 must cover a part of the arena"),
@@ -100,9 +100,14 @@ def test_a_bad_shape_is_refused_in_one_line() -> None:
     words = r"the number of walls must be .* 1000, but it was 1001"
     refused(words, lambda: replace(BOX, walls=many), error=KiksError)
     refused("walls must be a list of Wall, but it has 3", lambda: replace(BOX, walls=(3,)))  # type: ignore[arg-type]
+    monkeypatch.setattr("kiks.model.walls.EXAMINED_MAX", 3 * BOX.ground.size)
+    wide = Wall(line_mm=((10, 10), (390, 290)), width_mm=1000, brightness=0)
+    replace(BOX, walls=(wide,) * 3)
+    words = r"at most \d+ cells together, but these have more"
+    refused(words, lambda: replace(BOX, walls=(wide,) * 4), error=ArenaError)
 
 
-def test_drawing_makes_shapes_and_hides_those_below() -> None:
+def test_drawing_makes_shapes_that_hide_those_below_and_a_freehand_stroke_a_part_of_the_picture() -> None:
     arena = brush.rectangle(BOX, 50, 50, 100, 80)
     arena = brush.line(arena, [(200, 20), (200, 200)], width_mm=6, brightness="wood")
     arena = brush.line(arena, [(300, 100)], width_mm=20)
@@ -118,9 +123,6 @@ def test_drawing_makes_shapes_and_hides_those_below() -> None:
     assert erased.walls == arena.walls[1:]
     door = brush.rectangle(arena, 190, 40, 210, 90, 0)
     assert door.walls == (*arena.walls, Wall(box_mm=((190, 40), (210, 90)), brightness=0))
-
-
-def test_a_freehand_stroke_becomes_a_part_of_the_picture_with_the_walls_below_it() -> None:
     arena = brush.rectangle(BOX, 50, 50, 100, 80)
     arena = brush.line(arena, [(200, 20), (200, 200)], width_mm=6, brightness=9)
     arena = brush.disc(arena, (300, 200), 30, 7)
@@ -134,14 +136,6 @@ def test_a_freehand_stroke_becomes_a_part_of_the_picture_with_the_walls_below_it
     beside = brush.line(arena, [(20, 200), (30, 220), (40, 200)], width_mm=5)
     assert beside.walls == arena.walls
     assert np.count_nonzero(beside.ground != arena.ground) > 50
-
-
-def test_walls_that_would_take_minutes_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("kiks.model.walls.EXAMINED_MAX", 3 * BOX.ground.size)
-    wide = Wall(line_mm=((10, 10), (390, 290)), width_mm=1000, brightness=0)
-    replace(BOX, walls=(wide,) * 3)
-    words = r"at most \d+ cells together, but these have more"
-    refused(words, lambda: replace(BOX, walls=(wide,) * 4), error=ArenaError)
 
 
 def test_an_arena_with_the_same_walls_has_the_same_raster_and_one_with_others_has_its_own() -> None:
