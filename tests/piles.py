@@ -3,8 +3,6 @@
 The oracle knows discs, and walls as the rectangles they are drawn as; it asks the engine nothing.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any
@@ -73,7 +71,7 @@ class Pile:
     """Largest speed that robots are told [pulses/10 ms]."""
 
     @staticmethod
-    def make(number: int) -> Pile:
+    def make(number: int) -> "Pile":
         """Return pile-up `number`, always the same one; one in four has things of all sizes, one in four is slow."""
         rng = np.random.default_rng([3006, number])
         arena, walls = boxed_arena(rng)

@@ -1,7 +1,5 @@
 """Ctrl-C always works: wherever it comes while a command loads, and when a callback drops it later."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

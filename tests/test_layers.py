@@ -1,7 +1,5 @@
 """Imports point down only, folder by folder and file by file (docs/explanation/design.md, section 2)."""
 
-from __future__ import annotations
-
 import ast
 import functools
 from graphlib import CycleError, TopologicalSorter

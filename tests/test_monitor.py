@@ -1,7 +1,5 @@
 """Monitoring a robot: the samples, the log and the command."""
 
-from __future__ import annotations
-
 import csv
 import errno
 import importlib

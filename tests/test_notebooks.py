@@ -1,7 +1,5 @@
 """What notebooks, terminals and plain Python show: of the desk, and of simulations, arenas and results of a batch."""
 
-from __future__ import annotations
-
 import io
 import json
 import subprocess

@@ -1,7 +1,5 @@
 """What is published: an archive with all sources, a wheel with all its parts, and the same version everywhere."""
 
-from __future__ import annotations
-
 import email.message
 import email.parser
 import re

@@ -1,7 +1,5 @@
 """Every public name is explained: an example that runs, shapes of arrays, units, and errors that exist."""
 
-from __future__ import annotations
-
 import builtins
 import dataclasses
 import functools

@@ -1,7 +1,5 @@
 """The torture campaigns: a few cases of each with fixed seeds; and they notice faults that are planted."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """The commands, as a person calls them."""
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -1,7 +1,5 @@
 """The current folder may be an unpacked hand-in: KiKS runs no file of it, and takes no settings from it."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

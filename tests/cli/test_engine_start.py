@@ -1,7 +1,5 @@
 """The first start: processes that compile side by side."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """`kiks evolve`, and what champions do in `kiks run`."""
 
-from __future__ import annotations
-
 import json
 import re
 import shutil

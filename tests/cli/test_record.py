@@ -1,7 +1,5 @@
 """`--record` of the commands, `kiks replay --check` and `kiks export`: runs of foreign programs are made again."""
 
-from __future__ import annotations
-
 import csv
 import signal
 import subprocess

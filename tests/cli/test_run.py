@@ -1,7 +1,5 @@
 """`kiks run`: a project runs like a program, and a run leaves a recording, a file of it, and a line for each robot."""
 
-from __future__ import annotations
-
 import csv
 import os
 import pty

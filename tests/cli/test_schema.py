@@ -1,7 +1,5 @@
 """`kiks schema`: whole JSON schemas that accept our own files and refuse broken ones."""
 
-from __future__ import annotations
-
 import json
 import tomllib
 from functools import cache

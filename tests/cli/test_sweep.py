@@ -1,7 +1,5 @@
 """`kiks sweep`: a program in its cases, its folder and its last line."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """`kiks tournament`: the same table with any number of workers and after a stop, and pages for people."""
 
-from __future__ import annotations
-
 import csv
 import json
 import shutil

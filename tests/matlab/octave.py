@@ -5,8 +5,6 @@ are in `support`. What a call must return stands beside it (`run`): `kGetSpeed(r
 has a folder of its own, for its files and for what tells where its session is found.
 """
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os
@@ -82,7 +80,7 @@ class Octave:
     """
 
     def __init__(
-        self, program: str, folder: Path, environment: Mapping[str, str] | None = None, *, shares: Octave | None = None
+        self, program: str, folder: Path, environment: Mapping[str, str] | None = None, *, shares: "Octave | None" = None
     ) -> None:
         assert OCTAVE is not None
         self.lines: list[str] = []
@@ -102,7 +100,7 @@ class Octave:
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
 
-    def __enter__(self) -> Octave:
+    def __enter__(self) -> "Octave":
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -137,7 +135,7 @@ class Octave:
         """Kill Octave, and nothing else."""
         self._process.kill()
 
-    def finish(self, status: int = 0) -> Octave:
+    def finish(self, status: int = 0) -> "Octave":
         """Wait until Octave and all its children have ended."""
         try:
             assert self._process.wait(GUARD_S) == status, self.text

@@ -1,7 +1,5 @@
 """Octave at a terminal: tests type lines, press Ctrl-C and wait for output."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import pty
@@ -52,7 +50,7 @@ class Terminal:
         self.type(BEGIN)
         self.wait_for("begun")
 
-    def __enter__(self) -> Terminal:
+    def __enter__(self) -> "Terminal":
         return self
 
     def __exit__(self, *_: object) -> None:

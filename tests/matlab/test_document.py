@@ -1,7 +1,5 @@
 """docs/howto/matlab.md is correct: its functions exist, and its constants are preferences."""
 
-from __future__ import annotations
-
 import re
 
 from tests.matlab.octave import ROOT, TOOLBOX

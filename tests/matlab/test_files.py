@@ -1,7 +1,5 @@
 """Arenas in files and matrices: files survive a round trip, sensors see greys, and mazes are connected."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

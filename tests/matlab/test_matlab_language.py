@@ -4,8 +4,6 @@
 functions that are called exist in MATLAB.
 """
 
-from __future__ import annotations
-
 import functools
 from pathlib import Path
 

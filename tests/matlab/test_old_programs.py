@@ -1,7 +1,5 @@
 """Programs in the style of those for the Matlab KiKS (kiks-behaviour.md 4.3) run unchanged."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

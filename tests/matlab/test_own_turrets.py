@@ -1,7 +1,5 @@
 """Turrets that are functions of Octave in the folder `turrets`."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """kiks_preferences.m in the user's folder, a script or a function of KiKS 2.2.0; pulses that follow from the robot."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Sessions: nothing gets lost or is left behind, programs share one, runs are repeatable, errors have reasons."""
 
-from __future__ import annotations
-
 import os
 import re
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Arenas of the Matlab KiKS, and the text format of matrices."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

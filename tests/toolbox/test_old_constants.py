@@ -1,7 +1,5 @@
 """Constants and robot definition files of KiKS 2.2.0 change robots as they did there."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any

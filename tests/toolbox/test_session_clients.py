@@ -1,7 +1,5 @@
 """Clients of a session, with requests as the toolbox sends them."""
 
-from __future__ import annotations
-
 import asyncio
 import threading
 import time

@@ -1,7 +1,5 @@
 """The process of a session: access, and that nothing is left after the last client."""
 
-from __future__ import annotations
-
 import os
 import resource
 import select
