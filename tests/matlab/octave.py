@@ -17,7 +17,7 @@ import threading
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import pytest
@@ -80,7 +80,7 @@ class Octave:
     """
 
     def __init__(
-        self, program: str, folder: Path, environment: Mapping[str, str] | None = None, *, shares: "Octave | None" = None
+        self, program: str, folder: Path, environment: Mapping[str, str] | None = None, *, shares: Self | None = None
     ) -> None:
         assert OCTAVE is not None
         self.lines: list[str] = []
@@ -100,7 +100,7 @@ class Octave:
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
 
-    def __enter__(self) -> "Octave":
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -135,7 +135,7 @@ class Octave:
         """Kill Octave, and nothing else."""
         self._process.kill()
 
-    def finish(self, status: int = 0) -> "Octave":
+    def finish(self, status: int = 0) -> Self:
         """Wait until Octave and all its children have ended."""
         try:
             assert self._process.wait(GUARD_S) == status, self.text

@@ -314,20 +314,14 @@ WITHOUT_SESSION = calls(
     "kiks_spawn(2)  kiks_save('x.kad')  kiks_checkpoint()  kiks_reset()  kProximity(-ones(1, 4))  kiks_arena(ones(200))"
 )
 
-PREFERENCES = {
-    "KIKS_SEED": "-1",
-    "KIKS_THINKING": "'slowly'",
-    "KIKS_EMULATED_CPU": "'abacus'",
-    "KIKS_ROBOT": "'Roomba'",
-    "KIKS_RESPONSE": "'guess'",
-    "KIKS_NOISE": "2",
-    "KIKS_MOVIENAME": "5",
-    "KIKS_TURRETS": "'laser'",
-    "KIKS_ROBOTS": "0.5",
-    "KIKS_ARENA_CODING": "'other'",
-    "KIKS_COLOR_BALL": "300",
-    "KIKS_ARENA_DEFAULT_COLOR": "0",
-}
+PREFERENCES = re.findall(
+    r"(\S+) (\S+)",
+    """
+    KIKS_SEED -1  KIKS_THINKING 'slowly'  KIKS_EMULATED_CPU 'abacus'  KIKS_ROBOT 'Roomba'  KIKS_RESPONSE 'guess'
+    KIKS_NOISE 2  KIKS_MOVIENAME 5  KIKS_TURRETS 'laser'  KIKS_ROBOTS 0.5  KIKS_ARENA_CODING 'other'
+    KIKS_COLOR_BALL 300  KIKS_ARENA_DEFAULT_COLOR 0
+    """,
+)
 
 # Missing arguments and arguments of a wrong kind.
 FORGOTTEN = [f"{name}{arguments}" for name in ONLY_REF.split() for arguments in ("()", "({1, 2, 3, 4})")] + calls(
@@ -346,12 +340,12 @@ def test_wrong_arguments_get_messages_of_kiks(tmp_path: Path) -> None:
     lines = [f"say('w{number}', caught(@() {call}))" for number, call in enumerate(tried)]
     lines.insert(len(WITHOUT_SESSION), "ref = kiks_kopen([-1 9600 1]);")
     lines.append("size(kProximity(ref))  %= [[8, 1]]\nkiks_quit(1)")
-    for name, value in PREFERENCES.items():
+    for name, value in PREFERENCES:
         lines += [f"global {name}", f"before = {name};", f"{name} = {value};"]
         lines += [f"say('{name}', caught(@() kiks_arena()))", f"{name} = before;"]
     said = run("\n".join([*lines, "kiks_arena\nsize(kiks_siminfo_robotpos())  %= [[1, 3]]"]), tmp_path).said
     answers = {call: said[f"w{number}"] for number, call in enumerate(tried)}
-    answers |= {name: said[name] for name in PREFERENCES}
+    answers |= {name: said[name] for name, _ in PREFERENCES}
     clear = re.compile(r"\b(must|needs)\b.*\.$")
     vague = {call: words for call, words in answers.items() if not clear.search(words) and call not in FORGOTTEN}
     foreign = {call: words for call, words in answers.items() if not re.match(r"kiks:\w+\|", words)}
