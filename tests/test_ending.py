@@ -71,6 +71,13 @@ def test_a_command_ends_wherever_it_is_interrupted_while_it_loads(command: str, 
     assert all(line.removeprefix("kiks: ").startswith("Compiling ") for line in before)
 
 
+ENDED = """
+    while True:
+        signal.pause()
+except KeyboardInterrupt:
+    print("ended", signal.getsignal(signal.SIGINT) is signal.SIG_IGN)
+"""
+
 IN_A_CALLBACK = """
 import ctypes, signal
 import kiks
@@ -85,12 +92,7 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 call = ctypes.CFUNCTYPE(None)(back)
 try:
     call()
-    while True:
-        signal.pause()
-except KeyboardInterrupt:
-    print("ended")
 """
-
 
 IN_THE_HOOK = """
 import signal, sys
@@ -109,12 +111,7 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 send_again_what_is_dropped()
 try:
     Broken()
-    while True:
-        signal.pause()
-except KeyboardInterrupt:
-    print("ended")
 """
-
 
 IN_A_DESTRUCTOR = """
 import signal
@@ -134,12 +131,7 @@ send_again_what_is_dropped()
 Broken()
 try:
     Dropping()
-    while True:
-        signal.pause()
-except KeyboardInterrupt:
-    print("ended", signal.getsignal(signal.SIGINT) is signal.SIG_IGN)
 """
-
 
 IGNORED = """
 import signal
@@ -169,8 +161,12 @@ kiks.cli.main()
 @pytest.mark.parametrize(
     ("script", "expected"),
     [
-        pytest.param(IN_A_CALLBACK, (0, "dropped\nended\n", ""), id="what a callback drops is sent again"),
-        pytest.param(IN_THE_HOOK, (0, "shown\nended\n", ""), id="so is what comes while another error is shown"),
+        pytest.param(
+            IN_A_CALLBACK + ENDED, (0, "dropped\nended False\n", ""), id="what a callback drops is sent again"
+        ),
+        pytest.param(
+            IN_THE_HOOK + ENDED, (0, "shown\nended False\n", ""), id="so is what comes while another error is shown"
+        ),
         pytest.param(IGNORED, (130, "here\n", "kiks: stopped.\n"), id="what is ignored stays ignored"),
         pytest.param(HELPER_IS_STUCK, (130, "summary\n", ""), id="an interrupted command waits for no thread"),
     ],
@@ -180,7 +176,7 @@ def test_signals_are_heard(script: str, expected: tuple[int, str, str]) -> None:
 
 
 def test_what_a_destructor_drops_is_sent_again_and_other_errors_are_shown_as_ever() -> None:
-    code, out, errors = python(IN_A_DESTRUCTOR)
+    code, out, errors = python(IN_A_DESTRUCTOR + ENDED)
     assert (code, out, errors.count("Traceback")) == (0, "ended True\n", 1)
     assert "ValueError: mine" in errors
 

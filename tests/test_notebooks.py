@@ -176,13 +176,10 @@ def test_an_evolution_shows_what_it_has_found() -> None:
     assert size_of(evolution.task)[1]["height"] == 240
 
 
-def test_the_result_of_an_exam_is_a_table_of_its_starts() -> None:
+def test_results_say_what_they_are_and_that_of_an_exam_is_a_table_of_its_starts() -> None:
     result: Any = ExamResult(np.array([True, False]), np.array([[31.0], [2.5]]), ("path_mm",), "drives")
     assert repr(result) == "<Exam: not solved, 1 of 2 starts (drives)>"
     assert "<th>start</th><th>solved</th><th>path_mm</th>" in result._repr_mimebundle_()[0]["text/html"]
-
-
-def test_what_is_short_says_what_it_is() -> None:
     arena = kiks.Arena.load("pillars")
     assert repr(arena) == "<Arena 'Pillars': 600 x 600 mm, 1 start, 1 ball, 1 cylinder>"
     batch = kiks.Batch(arena, 3)
@@ -219,14 +216,11 @@ def test_a_short_table_shows_all_robots() -> None:
     assert lines[7].split()[0] == "mean"
 
 
-def test_numbers_that_are_none_are_shown_so() -> None:
+def test_numbers_that_are_none_are_shown_so_and_without_measures_there_are_still_steps() -> None:
     values = np.array([[[np.nan, 1e12]], [[np.inf, -1e-9]]])
     lines = str(Rollouts(values, np.ones(2, np.int64), ("a", "b"))).splitlines()
     assert [line.split()[2] for line in lines[1:]] == ["nan", "inf", "nan", "nan", "nan", "nan"]
     assert lines[1].split()[3] == "1.000e+12"
-
-
-def test_without_measures_there_are_still_steps() -> None:
     nothing = Rollouts(np.zeros((2, 1, 0)), np.array([3, 4]), ())
     assert repr(nothing) == "<Rollouts: 2 worlds of 1 robot, no measures>"
     assert [line.split() for line in str(nothing).splitlines()[:3]] == [["world", "steps"], ["0", "3"], ["1", "4"]]

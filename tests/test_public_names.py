@@ -62,8 +62,8 @@ def test_every_name_has_an_example() -> None:
     assert not without, "\n".join(without)
 
 
-def test_arrays_have_shapes() -> None:
-    without = []
+def test_arrays_have_shapes_and_quantities_have_units_and_errors_exist() -> None:
+    wrong = []
     for name, each in public().items():
         sections = sections_of(each)
         explained = entries_of(sections, "Args", "Attributes")
@@ -73,15 +73,8 @@ def test_arrays_have_shapes() -> None:
             # A docstring without sections describes arguments and result in its text.
             meaning = sections.get("Returns") if argument == "return" else explained.get(argument)
             if ARRAY.search(str(annotation)) and not SHAPE.search(meaning or sections[""]):
-                without.append(f"{name}: {argument}")
-    assert not without, "\n".join(without)
-
-
-def test_quantities_have_units_and_errors_exist() -> None:
-    wrong = []
-    for name, each in public().items():
-        sections = sections_of(each)
-        for argument, meaning in entries_of(sections, "Args", "Attributes").items():
+                wrong.append(f"{name}: {argument}: no shape")
+        for argument, meaning in explained.items():
             unit = UNITS.get(argument.rpartition("_")[2]) if "_" in argument else None
             if unit and not re.search(rf"\[({unit})[\];,]|\[[^\]]*\b({unit})\b", meaning):
                 wrong.append(f"{name}: {argument}: no unit in {meaning!r}")

@@ -15,14 +15,7 @@ PIECE_COUNT = 6
 
 def pieces_noting(done: list[int]) -> list[Callable[[], None]]:
     """Return pieces that do nothing but note their numbers."""
-
-    def piece(number: int) -> Callable[[], None]:
-        def note() -> None:
-            done.append(number)
-
-        return note
-
-    return [piece(number) for number in range(PIECE_COUNT)]
+    return [lambda number=number: done.append(number) for number in range(PIECE_COUNT)]
 
 
 def test_one_processor_gets_no_second_process(monkeypatch: pytest.MonkeyPatch) -> None:

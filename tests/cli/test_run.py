@@ -69,9 +69,6 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-# ---- projects ----
-
-
 def test_a_project_starts_its_programs(folder: Path) -> None:
     result = forked.run("run", "exercise.kiks", "--export", "rows.csv", cwd=folder)
     assert result.returncode == 0, result.stderr
@@ -119,8 +116,6 @@ def test_a_robot_without_a_program_is_an_error(folder: Path) -> None:
     with pytest.raises(KiksError, match="a project must name a program for a robot, but"):
         app(["run", str(folder / "exercise.kiks"), "--robots", "1"], standalone_mode=False)
 
-
-# ---- how long a run takes ----
 
 FOR_EVER = {
     "sleeps": "import time\nwhile True: time.sleep(0.37)\n",
@@ -200,9 +195,6 @@ def test_max_wall_ends_whatever_runs(line: str, endless: Path) -> None:
     assert last.endswith("s simulated, seed 0, not repeatable: --max-wall has ended it")
 
 
-# ---- what a run leaves ----
-
-
 def test_the_last_lines_are_one_for_each_robot_and_that_of_the_state() -> None:
     result = forked.run("run", "--robots", "2", DRIVE, "COM1", "40", "7", "6")
     *_, first, second, last = result.stderr.splitlines()
@@ -273,9 +265,6 @@ def test_paths_stay_whole_if_ctrl_c_comes_while_a_point_is_kept() -> None:
     assert sim.paths().tolist() == before
 
 
-# ---- whose line it is ----
-
-
 def test_each_line_says_which_program_it_is_from(tmp_path: Path) -> None:
     (tmp_path / "a.py").write_text("import sys\nprint('one')\nprint('no end', end='')\nsys.stderr.write('wrong\\n')\n")
     (tmp_path / "other.py").write_text("import os\nos.write(1, b'\\xff' * 100_000 + b'\\nlast')\n")
@@ -312,14 +301,11 @@ def at_a_terminal(folder: Path, **environment: str) -> str:
     return text.replace("\r\n", "\n")
 
 
-def test_at_a_terminal_labels_are_coloured_and_questions_are_seen(tmp_path: Path) -> None:
+def test_at_a_terminal_labels_are_coloured_unless_no_color_is_set_and_questions_are_seen(tmp_path: Path) -> None:
     text = at_a_terminal(tmp_path, NO_COLOR="")
     assert "\033[36m1 asks.py |\033[0m go? yes\n" in text
     assert "\033[36m1 asks.py |\033[0m got yes\n" in text
     assert "\033[33m2 b.py    |\033[0m here\n" in text
-
-
-def test_no_color_is_heeded(tmp_path: Path) -> None:
     text = at_a_terminal(tmp_path, NO_COLOR="1")
     assert "1 asks.py | got yes\n" in text
     assert "\033" not in text

@@ -10,8 +10,6 @@ from tests.matlab.octave import needs_octave, run
 
 pytestmark = [needs_octave, pytest.mark.slow]
 
-# ---- programs of one loop, ended by the clock, with conditions on vectors ----
-
 LOOPS = """
 clear all
 close all
@@ -100,8 +98,6 @@ def test_loops_end_by_the_clock_and_compare_vectors(tmp_path: Path) -> None:
     assert said["drove_on"][0, :2] == pytest.approx(said["closed_at"][0, :2], abs=5)
 
 
-# ---- scripts that print what they get, with commands of text and the number 10 ----
-
 PRINTING = """
 ref = kiks_kopen([-1 9600 1])
 kiks_ksend(['D,10,10' 10], ref)
@@ -130,8 +126,6 @@ def test_scripts_without_semicolons_print_replies_and_opening_twice_ends_them(tm
     assert re.match(r"kiks:\w+\|port -1 must be closed before it is opened.*kiks_kclose\(\[\]\)", done.said["why"])
     assert done.said["opens"].tolist() == [[-1, -1, -1, -1]]
 
-
-# ---- arenas from pictures, windows with buttons: one session after the other ----
 
 PICTURES = r"""
 ARENA = imread('corridors.tif');
@@ -202,8 +196,6 @@ def test_pictures_are_arenas_and_sessions_follow_each_other(tmp_path: Path) -> N
     assert re.search(rf"warning: The arena's file must exist, but 'robot_wars' with one of the .*: {there}", done.text)
 
 
-# ---- functions spelled with other capitals, which neither kMatlab nor MATLAB on Windows distinguished ----
-
 SPELLINGS = r"""
 clear all
 ref = kiks_kopen([-1 9600 1]);
@@ -233,8 +225,6 @@ def test_capitals_of_functions_do_not_matter(tmp_path: Path) -> None:
     text = "\n".join(line for line in done.lines if line)
     assert re.match(r"ans = 0\nans =\n( +\d+\n){8}left  wheel: speed mode, error", text)
 
-
-# ---- programs that are run again and again, and never close their port ----
 
 AGAIN = """
 clear all; close all
@@ -278,9 +268,6 @@ kiks_quit(1)
     assert 0.3 < said["first"][0, 3] < 0.5, "pauses below 0 take no time"
     assert sum("A session is active" in line for line in done.lines) == 1, "that of the prompt, without clear all"
     assert said["same_world"][0] == pytest.approx(said["second"][0, :3], abs=2), "while the port opened, it drove on"
-
-
-# ---- files of Windows: Latin letters in comments, lines that end in CR LF ----
 
 
 WINDOWS = {

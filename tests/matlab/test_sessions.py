@@ -12,8 +12,6 @@ from tests.matlab.test_functions import NAMES
 
 pytestmark = [needs_octave, pytest.mark.slow]
 
-# ---- ends ----
-
 KILLED = """
 ref = kiks_kopen([-1 9600 1]);
 why = '';
@@ -92,9 +90,6 @@ fread(stdin, 1);
         assert has_ended(another)
 
 
-# ---- several programs ----
-
-
 def test_two_programs_share_a_world_and_see_each_other(tmp_path: Path) -> None:
     first_program = """
 arena = zeros(300, 600);
@@ -171,8 +166,6 @@ def test_leaving_a_session_says_whether_it_goes_on(transport: str, tmp_path: Pat
     assert first.lines[-1] == "The KiKS session has ended."
 
 
-# ---- repeatable runs ----
-
 SAME = """
 global KIKS_THINKING KIKS_SEED
 KIKS_THINKING = '%s';
@@ -230,8 +223,6 @@ def test_the_speed_of_octave_changes_nothing(tmp_path: Path) -> None:
     quick, slow = (line for line in run(SLOW, tmp_path).lines if re.match(r"[\d.]+ ", line))
     assert quick == slow
 
-
-# ---- errors ----
 
 TAKES_ANYTHING = """
     kiks_setup kiks_quit kiks_kiksnet kiks_preferences kiks_siminfo_objects kiks_siminfo_speed kiks_tif2arena kiks_mm2p
@@ -350,9 +341,6 @@ def test_wrong_arguments_get_messages_of_kiks(tmp_path: Path) -> None:
     vague = {call: words for call, words in answers.items() if not clear.search(words) and call not in FORGOTTEN}
     foreign = {call: words for call, words in answers.items() if not re.match(r"kiks:\w+\|", words)}
     assert foreign == vague == {}
-
-
-# ---- inside ----
 
 
 def transport_variables(transport: str) -> dict[str, str]:

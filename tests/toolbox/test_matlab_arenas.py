@@ -38,26 +38,28 @@ def test_frames_contain_their_length(text: str) -> None:
     assert sent[8 : 8 + length].decode() == text.replace("\x02", "?"), "that character ends the answer to Ctrl-C"
 
 
-def test_malformed_matrices_are_refused() -> None:
+def test_malformed_matrices_and_wrong_counts_of_numbers_are_refused() -> None:
     short = ["", "2", "2 2", "2 2 1 0", "1 1 2 0", "2 2 5 0", "2 2 4 x"]
     for words in (*short, "2 2 0 1 4 1", "-1 2 1 1", "99999 99999 1 1"):
         with pytest.raises(ParameterError, match="a matrix must be"):
             matrices_of(words)
-
-
-def test_a_wrong_count_of_numbers_is_refused() -> None:
     assert numbers_of(["1", "NaN"], 2, "both")[0] == 1
     for words in (["1"], ["1", "x"], ["1", "inf"]):
         with pytest.raises(ParameterError, match="both must be 2 finite numbers"):
             numbers_of(words, 2, "both")
 
 
-def test_rows_count_downwards_and_columns_to_the_right() -> None:
+def codes_with(elements: dict[tuple[int, int], int]) -> np.ndarray:
+    """Return an arena of 400 x 300 mm with some elements in it."""
     codes = np.zeros((300, 400))
+    codes[*zip(*elements, strict=True)] = [*elements.values()]
+    return codes
+
+
+def test_rows_count_downwards_and_columns_to_the_right() -> None:
+    codes = codes_with({(19, 49): 2, (149, 199): -90})
     codes[0] = 1  # the upper edge
     codes[:, 0] = 1  # the left edge
-    codes[19, 49] = 2
-    codes[149, 199] = -90
     arena = arena_of(codes)
     assert arena.brightness[-1].all()  # rows of arenas begin at the bottom
     assert arena.brightness[:, 0].all()
@@ -68,17 +70,13 @@ def test_rows_count_downwards_and_columns_to_the_right() -> None:
 
 
 def test_the_most_negative_element_is_the_first_robots() -> None:
-    codes = np.zeros((300, 400))
-    codes[99, 99], codes[99, 299] = -90, -360
-    starts = arena_of(codes).starts
+    starts = arena_of(codes_with({(99, 99): -90, (99, 299): -360})).starts
     assert [start.x_mm for start in starts] == [299.5, 99.5]
     assert starts[0].heading_rad == 0.0
 
 
 def test_things_leave_the_floor_empty() -> None:
-    codes = np.zeros((300, 400))
-    codes[99, 99], codes[99, 199], codes[199, 199] = 2, 3, 4
-    arena = arena_of(codes, ball=40, cylinder=90)
+    arena = arena_of(codes_with({(99, 99): 2, (99, 199): 3, (199, 199): 4}), ball=40, cylinder=90)
     assert not arena.brightness.any()
     assert (len(arena.lamps), len(arena.balls), len(arena.cylinders)) == (1, 1, 1)
     assert (arena.balls[0].brightness, arena.cylinders[0].brightness) == (40, 90)
@@ -94,9 +92,7 @@ def test_a_colour_mask_sets_the_brightness_of_walls() -> None:
 
 
 def test_what_has_room_stays_where_it_is() -> None:
-    codes = np.zeros((300, 400))
-    codes[99, 99], codes[99, 199], codes[199, 199], codes[0, 0] = -90, 3, 4, 2
-    arena = arena_of(codes)
+    arena = arena_of(codes_with({(99, 99): -90, (99, 199): 3, (199, 199): 4, (0, 0): 2}))
     there, moves = settled(arena, 27.5)
     assert moves == []
     for part in ("starts", "balls", "cylinders", "lamps"):
@@ -104,9 +100,8 @@ def test_what_has_room_stays_where_it_is() -> None:
 
 
 def test_what_has_no_room_goes_to_the_nearest_free_place() -> None:
-    codes = np.zeros((300, 400))
+    codes = codes_with({(119, 199): -90, (151, 199): 4, (199, 29): 3})
     codes[:100] = 1
-    codes[119, 199], codes[151, 199], codes[199, 29] = -90, 4, 3
     arena, moves = settled(arena_of(codes), 27.5)
     sim = kiks.Simulation(arena)
     x, y = user_place(arena, *sim.pose(1)[:2])

@@ -52,9 +52,6 @@ def counts(sim: Simulation) -> Any:
     return replies(sim, b"N\n", 200, 0.02)
 
 
-# ---- robot definition files ----
-
-
 def test_a_file_that_describes_the_khepera_makes_a_khepera() -> None:
     spec = world(figures=figures()).specs[0]
     assert spec == KHEPERA.with_changes(ambient__direction_deg=DIRECTIONS)
@@ -86,9 +83,6 @@ def test_sensors_of_twice_the_range_read_the_same_at_twice_the_distance(gap_mm: 
     assert min(usual) > 20
     assert read(80, 100) == pytest.approx(usual, rel=0.01)
     assert read(60, 200) == pytest.approx(usual, rel=0.01)
-
-
-# ---- constants ----
 
 
 def test_the_values_of_the_old_simulator_change_nothing() -> None:

@@ -178,13 +178,16 @@ def test_a_long_path_keeps_its_ends_in_few_points(session: Session) -> None:
     assert 23 <= matrices_of(ask("path 1"))[0].shape[1] <= 27
 
 
-def test_a_late_reply_answers_nothing_else(ask: Asker) -> None:
+def test_a_late_reply_answers_nothing_else_and_replies_of_several_lines_are_read_completely(ask: Asker) -> None:
     assert ask(r"send 1 N\nH\n").startswith("n,")
     assert ask("ask 1 H").startswith("h,")
     assert ask("send 1 H").startswith("h,"), "each call is a command of its own, even without a terminator"
     assert ask("send 1 D,5,5") == "d"
     assert ask(r"send 1 \n") == "", "empty lines are not answered"
     assert ask("ask 1 E").startswith("e,")
+    assert ask("ask 1 help")
+    assert ask("listen 1").count(r"\n") > 3
+    assert ask("ask 1 H").startswith("h,")
 
 
 def test_fractions_are_rounded(ask: Asker) -> None:
@@ -207,29 +210,18 @@ def test_the_pace_stays_after_the_ports_are_closed(session: Session) -> None:
     assert ask("state") == before, "to be asked takes no time"
 
 
-def test_replies_of_several_lines_are_read_completely(ask: Asker) -> None:
-    first = ask("ask 1 help")
-    rest = ask("listen 1")
-    assert first
-    assert rest.count(r"\n") > 3
-    assert ask("ask 1 H").startswith("h,")
-
-
-def test_every_port_has_its_own_robot(session: Session) -> None:
+def test_every_port_has_its_own_robot_and_is_opened_once(session: Session) -> None:
     ask = begun(session)
+    for request, why in {"open 2 7": "baudrate must be", "open 0 9600": "must be -1, -2"}.items():
+        assert why in ask.refused(request)
     ask("open 1 9600", "open 2 9600", "open 3 9600")
     poses = {ask(f"pose {port}") for port in (1, 2, 3)}
     assert len(poses) == 3
     ask("close 0", "open 2 9600")
     assert ask("pose 2") in poses
     assert session.world.robot_count == 3
-
-
-def test_a_port_is_opened_once(ask: Asker) -> None:
-    assert "use kiks_kclose([])" in ask.refused("open 1 9600").lower()
-    ask("close 1", "close 1", "open 1 19200")
-    assert "baudrate must be" in ask.refused("open 2 7")
-    assert "must be -1, -2" in ask.refused("open 0 9600")
+    assert "use kiks_kclose([])" in ask.refused("open 2 9600").lower()
+    ask("close 2", "close 2", "open 2 19200")
 
 
 def test_a_new_world_closes_ports_with_an_error(session: Session, ask: Asker) -> None:
@@ -357,7 +349,7 @@ def test_objects_are_listed_lights_first_and_can_be_moved(session: Session) -> N
     assert "row must be one of the 3" in ask.refused("set_object 4 1 1 1 1")
 
 
-def test_objects_are_deleted_by_their_rows(session: Session) -> None:
+def test_objects_are_deleted_by_their_rows_and_those_without_a_place_get_one(session: Session) -> None:
     ask = begun(session, world=floor(500, 600))
     ask("spawn 2 100 400", "spawn 1 50 60", "spawn 3 200 400", "spawn 1 80 90", "spawn 2 300 400")
     assert "row must be one of the 5" in ask.refused("delete 1 6")
@@ -368,11 +360,7 @@ def test_objects_are_deleted_by_their_rows(session: Session) -> None:
     assert matrices_of(ask("objects"))[0].tolist() == objects.tolist()
     ask("delete")
     assert matrices_of(ask("objects"))[0].tolist() == objects.tolist()
-
-
-def test_objects_spawned_without_a_place_get_one(session: Session) -> None:
-    ask = begun(session, world=floor(500, 600))
-    ask(*["spawn 3 NaN NaN"] * 5, "spawn 1 NaN NaN")
+    ask(f"world {floor(500, 600)}", *["spawn 3 NaN NaN"] * 5, "spawn 1 NaN NaN")
     objects = matrices_of(ask("objects"))[0]
     assert objects[:, 0].tolist() == [1, 3, 3, 3, 3, 3]
     assert len({tuple(place) for place in objects[:, 1:3].tolist()}) == 6
@@ -442,17 +430,14 @@ world matrix 2 2 4 0|set_robot 1 2|spawn 1|set x 1|save|read|
 """
 
 
-def test_bad_requests_get_an_error(session: Session) -> None:
+def test_bad_requests_and_those_without_a_world_get_an_error(session: Session) -> None:
+    for request in ("pose 1", "path 1", "objects", "state", "save x.kad", "checkpoint", "reset"):
+        told = Asker(session).told(request)
+        assert (told[0] == "+" and told[HEAD:] == "") or "there must be a world first" in told, request
     ask = begun(session)
     for request in REFUSED.strip("\n").replace("\n", "|").split("|"):
         assert "KiKS itself has failed" not in ask.refused(request)
     assert ask("active") == "1"
-
-
-def test_requests_without_a_world_get_an_error(session: Session) -> None:
-    for request in ("pose 1", "path 1", "objects", "state", "save x.kad", "checkpoint", "reset"):
-        told = Asker(session).told(request)
-        assert (told[0] == "+" and told[HEAD:] == "") or "there must be a world first" in told, request
 
 
 HOSTILE = (
@@ -531,9 +516,6 @@ def test_a_robot_may_be_a_file(session: Session, tmp_path: Path) -> None:
     assert "none.toml" in ask.refused("world default")
 
 
-# ---- films ----
-
-
 def test_a_film_shows_the_time_in_which_it_was_made(session: Session, ask: Asker, tmp_path: Path) -> None:
     ask("pause 1", f"film 1 {tmp_path}/run.webp", "pause 2")
     assert ask("film_save") == "51"
@@ -566,9 +548,6 @@ def test_an_interrupted_film_is_given_up(tmp_path: Path) -> None:
         pending.is_cancelled = True
         assert "The program was interrupted; the film was discarded" in ask.refused("film_save")
         assert not list(tmp_path.iterdir())
-
-
-# ---- what people do on the desk ----
 
 
 def halt(session: Session) -> None:

@@ -226,9 +226,6 @@ def test_kiks_matlab_prints_the_folder_of_the_toolbox() -> None:
     assert str(shipped("matlab")) in forked.run("matlab").stdout
 
 
-# ---- unauthenticated connections ----
-
-
 def test_running_out_of_descriptors_ends_no_session(tmp_path: Path) -> None:
     with started(folder=tmp_path) as session, ExitStack() as friends:
         session.ask("world default")
@@ -286,9 +283,6 @@ def test_an_existing_file_is_not_replaced(tmp_path: Path) -> None:
     assert "must be a new file" in done.stdout
     assert file.read_text(encoding="ascii") == "mine"
     assert list(tmp_path.glob(".there*")) == []
-
-
-# ---- waiting ----
 
 
 def test_a_slow_answer_is_announced_and_can_be_cancelled(tmp_path: Path) -> None:
