@@ -220,8 +220,6 @@ def never_returning(limit_s: float, *signals: signal.Signals) -> tuple[int, list
     words = [sys.executable, "-c", NEVER_RETURNS, str(limit_s)]
     with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         try:
-            assert process.stdout is not None
-            assert process.stderr is not None
             said, errors = [process.stdout.readline()], []
             for number in signals:
                 process.send_signal(number)
@@ -270,7 +268,6 @@ print("ended")
 
 def test_who_hears_each_signal_may_have_any_number_of_them() -> None:
     with subprocess.Popen([sys.executable, "-c", HEARS], stdout=subprocess.PIPE, text=True) as process:
-        assert process.stdout is not None
         for number in (signal.SIGINT, signal.SIGINT, signal.SIGTERM):
             assert process.stdout.readline() == "ready\n"
             process.send_signal(number)
@@ -293,7 +290,6 @@ print(sys.stdin.read())
 def test_who_notes_a_signal_and_waits_on_has_heard_it() -> None:
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
     with subprocess.Popen([sys.executable, "-c", NOTES], text=True, **pipes) as process:
-        assert process.stdout is not None
         assert process.stdout.readline() == "ready\n"
         for _ in range(3):
             process.terminate()

@@ -184,7 +184,6 @@ def test_a_demo_is_the_same_in_two_processes(behaviour: str, tmp_path: Path) -> 
 def test_a_cold_start_says_at_once_that_it_compiles(tmp_path: Path) -> None:
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
     with subprocess.Popen([*KIKS, "warmup"], stderr=subprocess.PIPE, text=True, env=environment) as process:
-        assert process.stderr is not None
         assert "Compiling the engine" in process.stderr.readline()
         assert process.poll() is None
         process.kill()

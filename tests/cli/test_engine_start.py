@@ -41,8 +41,6 @@ def test_a_helper_answers_each_order_and_ends_with_its_input() -> None:
     with subprocess.Popen(
         [sys.executable, "-c", HELP], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
     ) as helper:
-        assert helper.stdin is not None
-        assert helper.stdout is not None
         for _ in range(2):
             print(engine_start._read_light.__name__, file=helper.stdin, flush=True)
             assert helper.stdout.readline() == "\n"

@@ -317,10 +317,8 @@ def test_a_program_gets_an_error_when_its_output_is_closed(tmp_path: Path) -> No
     command = [*forked.kiks_command(), "run", "talks.py", "silent.py"]
     pipes: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     with subprocess.Popen(command, cwd=tmp_path, text=True, **pipes) as process:
-        assert process.stdout is not None
         assert process.stdout.readline() == "1 talks.py  | more\n"
         process.stdout.close()
-        assert process.stderr is not None
         said = process.stderr.read()
         assert process.wait(GUARD_S) == 1
     assert "1 talks.py  | BrokenPipeError" in said

@@ -40,7 +40,6 @@ needs_octave = pytest.mark.skipif(OCTAVE is None, reason="octave-cli is not here
 @cache
 def has_tcp() -> bool:
     """Return whether Octave can open TCP connections."""
-    assert OCTAVE is not None
     command = [OCTAVE, "-qf", "--eval", "exit(isempty(pkg('list', 'instrument-control')))"]
     return subprocess.run(command, capture_output=True, timeout=GUARD_S, check=False).returncode == 0
 
@@ -82,7 +81,6 @@ class Octave:
     def __init__(
         self, program: str, folder: Path, environment: Mapping[str, str] | None = None, *, shares: Self | None = None
     ) -> None:
-        assert OCTAVE is not None
         self.lines: list[str] = []
         self.said: dict[str, Any] = {}
         self._news = threading.Condition()
@@ -127,7 +125,6 @@ class Octave:
 
     def tell(self) -> None:
         """Let a program go on that waits in fread(stdin, 1); fgetl would wait for what comes after the line, too."""
-        assert self._process.stdin is not None
         self._process.stdin.write(".")
         self._process.stdin.flush()
 
@@ -152,7 +149,6 @@ class Octave:
             os.killpg(self._process.pid, signal.SIGKILL)
         self._process.wait(GUARD_S)
         self._reader.join(GUARD_S)
-        assert self._process.stdin is not None
         self._process.stdin.close()
 
     def line(self, begin: str) -> str:
@@ -168,7 +164,6 @@ class Octave:
             return "\n".join(self.lines)
 
     def _read(self) -> None:
-        assert self._process.stdout is not None
         with self._process.stdout as output:
             for line in output:
                 with self._news:

@@ -36,7 +36,6 @@ class Terminal:
     """
 
     def __init__(self, folder: Path, environment: dict[str, str] | None = None, *, edits_lines: bool = False) -> None:
-        assert OCTAVE is not None
         self.doors = folder / "doors"
         self.doors.mkdir(mode=0o700)
         own = {"KIKS_WINDOW": "0", "XDG_RUNTIME_DIR": str(self.doors), **(environment or {})}

@@ -41,8 +41,6 @@ class Session:
         command = [*(command or forked.kiks_command()), "session", *words]
         environment = {**os.environ, "XDG_RUNTIME_DIR": str(folder)}
         self.process = subprocess.Popen(command, bufsize=0, env=environment, stdin=PIPE, stdout=PIPE)
-        assert self.process.stdin is not None
-        assert self.process.stdout is not None
         self.to, self.out = self.process.stdin.fileno(), self.process.stdout.fileno()
         # select.select() refuses descriptors from 1024 on, and a test opens a thousand first.
         self.poll = select.poll()
@@ -80,7 +78,6 @@ class Session:
         self.ask("set thinking none", "world default", "open 1 9600")
 
     def hang_up(self) -> None:
-        assert self.process.stdin is not None
         self.process.stdin.close()
 
     def wait(self) -> int:
