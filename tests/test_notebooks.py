@@ -130,12 +130,14 @@ def size_of(thing: Any) -> tuple[tuple[int, int], dict[str, int]]:
     return Image.open(io.BytesIO(png)).size, shown
 
 
-def test_pictures_are_sharp() -> None:
+def test_pictures_are_sharp_and_several_arenas_stand_side_by_side() -> None:
     arena = kiks.Arena.box(300, 200)
     for thing in (arena, kiks.Simulation(arena)):
         (width, height), shown = size_of(thing)
         assert (width, height // 2, shown["width"]) == (600, shown["height"], 300)
         assert height > 400  # with a caption
+    arenas = [arena, kiks.Arena.box(200, 300)]
+    assert size_of(kiks.Batch(arenas, 4)) == ((480 + 24 + 320, 480), {"width": 412, "height": 240})
 
 
 def test_the_picture_of_an_arena_is_that_of_a_simulation_that_begins_there() -> None:
@@ -156,11 +158,6 @@ def test_looking_at_a_picture_changes_nothing() -> None:
     for sim in (looked_at, alone):
         sim.run(0.5)
     assert looked_at.state_hash() == alone.state_hash()
-
-
-def test_what_has_several_arenas_shows_them_side_by_side() -> None:
-    arenas = [kiks.Arena.box(300, 200), kiks.Arena.box(200, 300)]
-    assert size_of(kiks.Batch(arenas, 4)) == ((480 + 24 + 320, 480), {"width": 412, "height": 240})
 
 
 def test_an_evolution_shows_what_it_has_found() -> None:

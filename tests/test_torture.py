@@ -23,7 +23,7 @@ def torture(*words: str) -> tuple[int, dict[str, float], str]:
     return done.returncode, figures, done.stderr
 
 
-def test_what_is_planted_is_found_with_its_cause_and_ends_no_other_case() -> None:
+def test_what_is_planted_is_found_with_its_cause_and_ends_no_other_case_and_can_be_played_alone() -> None:
     code, figures, table = torture("--only", "planted")
     assert code == 1
     for figure, count in {"deaths": 4, "hangs": 3, "files_lost": 3, "foreign_exceptions": 4 + 3 + 2}.items():
@@ -38,9 +38,6 @@ def test_what_is_planted_is_found_with_its_cause_and_ends_no_other_case() -> Non
         assert words in table
     tried = {name.rpartition(".")[2]: count for name, count in figures.items() if ".tried." in name}
     assert tried == {"raises": 12, "dies": 12, "eats": 12, "tells": 12, "loses": 12, "refuses": 12, "hangs": 3}, table
-
-
-def test_a_case_can_be_played_alone() -> None:
     code, _, table = torture("--only", "planted.raises", "--case", "1")
     assert code == 1
     assert "ZeroDivisionError: planted" in table

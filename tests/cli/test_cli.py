@@ -63,16 +63,13 @@ def test_every_command_that_people_call_has_help_with_an_example() -> None:
     assert [name for name in people if not re.search(f"Example: .*kiks {name}", kiks(*name.split(), "-h").stdout)] == []
 
 
-def test_the_command_alone_says_what_to_try() -> None:
+def test_the_command_alone_says_what_to_try_and_demonstrations_are_listed() -> None:
     assert re.findall("^  (kiks .*?)  ", kiks().stdout, flags=re.MULTILINE) == [
         "kiks demo avoid --desk",
         "kiks run my_program.py",
         "kiks examples first",
     ]
     assert kiks("-h").stdout == kiks("--help").stdout
-
-
-def test_demonstrations_are_listed() -> None:
     listed = kiks("demo").stdout
     assert listed == kiks("demo", "--list").stdout
     assert re.findall(r"^  (\w+) +\S", listed, flags=re.MULTILINE) == [*demonstrations()]

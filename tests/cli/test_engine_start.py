@@ -38,9 +38,8 @@ def test_a_process_that_fails_takes_one_piece_from_the_end(processors: int, monk
 
 
 def test_a_helper_answers_each_order_and_ends_with_its_input() -> None:
-    with subprocess.Popen(
-        [sys.executable, "-c", HELP], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-    ) as helper:
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+    with subprocess.Popen([sys.executable, "-c", HELP], text=True, **pipes) as helper:
         for _ in range(2):
             print(engine_start._read_light.__name__, file=helper.stdin, flush=True)
             assert helper.stdout.readline() == "\n"

@@ -105,14 +105,11 @@ def test_a_project_as_an_arena_brings_its_robots_and_says_that_its_programs_stay
     assert "seed 5, state" in result.stderr
 
 
-def test_an_arena_in_place_of_the_project_s(folder: Path) -> None:
+def test_an_arena_stands_in_place_of_the_project_s_but_no_robot_without_a_program(folder: Path) -> None:
     (folder / "wide.toml").write_text("size_mm = [900, 900]\nwall_mm = 10\n[[start]]\nat_mm = [800, 800]\n")
     result = forked.run("run", "exercise.kiks", "--arena", "wide.toml", "--export", "rows.csv", cwd=folder)
     assert "teacher b,6.01,6.01" in result.stdout, result.stderr
     assert "\n0.0,1,800.0,800.0," in (folder / "rows.csv").read_text()
-
-
-def test_a_robot_without_a_program_is_an_error(folder: Path) -> None:
     with pytest.raises(KiksError, match="a project must name a program for a robot, but"):
         app(["run", str(folder / "exercise.kiks"), "--robots", "1"], standalone_mode=False)
 
@@ -162,12 +159,14 @@ def test_seconds_end_programs_at_that_simulated_time_and_the_same_each_time(line
     assert results[0].stdout == results[1].stdout == ""
 
 
-def test_nothing_is_printed_after_the_end(endless: Path) -> None:
+def test_nothing_is_printed_after_the_end_and_a_program_that_fails_before_it_fails(endless: Path) -> None:
     (endless / "tells.py").write_text("import time\nwhile True:\n    print(time.monotonic())\n    time.sleep(0.5)\n")
     result = forked.run("run", "--seconds", "20.5", "tells.py", cwd=endless)
     assert result.stdout.splitlines() == [str(k / 2) for k in range(42)]
     both = forked.run("run", "--seconds", "20.5", "tells.py", "talks.py", cwd=endless)
     assert both.stdout.splitlines() == [f"1 tells.py | {k / 2}" for k in range(42)]
+    (endless / "fails.py").write_text("raise SystemExit(3)")
+    assert forked.run("run", "--seconds", "20.5", "fails.py", "sleeps.py", cwd=endless).returncode == 3
 
 
 def test_seconds_change_nothing_before_and_nothing_for_a_program_that_ends_before(endless: Path) -> None:
@@ -178,11 +177,6 @@ def test_seconds_change_nothing_before_and_nothing_for_a_program_that_ends_befor
     again = forked.run("run", "--seconds", "20.5", "talks.py", cwd=endless)
     assert state_of(recorded_run.stderr) == state_of(again.stderr)
     assert forked.run("replay", "--check", "run.mcap", cwd=endless).returncode == 0
-
-
-def test_a_program_that_fails_before_the_end_fails(endless: Path) -> None:
-    (endless / "fails.py").write_text("raise SystemExit(3)")
-    assert forked.run("run", "--seconds", "20.5", "fails.py", "sleeps.py", cwd=endless).returncode == 3
 
 
 @pytest.mark.parametrize(

@@ -23,15 +23,11 @@ def test_matrices_survive_a_round_trip(matrix: np.ndarray) -> None:
     assert np.array_equal(again, matrix / 2)
 
 
-@given(st.text())
-def test_texts_survive_a_round_trip_as_one_line(text: str) -> None:
+@given(st.text(max_size=300))
+def test_texts_survive_a_round_trip_as_one_line_and_frames_contain_their_length(text: str) -> None:
     assert unescape(escape(text)) == text
     assert "\n" not in escape(text)
     assert "\r" not in escape(text)
-
-
-@given(st.text(max_size=300))
-def test_frames_contain_their_length(text: str) -> None:
     sent = frame(text)
     length = int(sent[:8])
     assert len(sent) == max(FRAME_MIN, length + 8)
@@ -56,7 +52,7 @@ def codes_with(elements: dict[tuple[int, int], int]) -> np.ndarray:
     return codes
 
 
-def test_rows_count_downwards_and_columns_to_the_right() -> None:
+def test_rows_count_downwards_and_columns_to_the_right_and_the_most_negative_is_the_first_robots() -> None:
     codes = codes_with({(19, 49): 2, (149, 199): -90})
     codes[0] = 1  # the upper edge
     codes[:, 0] = 1  # the left edge
@@ -67,22 +63,16 @@ def test_rows_count_downwards_and_columns_to_the_right() -> None:
     assert user_place(arena, *arena.lamps[0][:2]) == (50, 20)
     assert place_mm(arena, 200, 150) == arena.starts[0][:2]
     assert arena.starts[0].heading_rad == pytest.approx(math.pi / 2)
-
-
-def test_the_most_negative_element_is_the_first_robots() -> None:
     starts = arena_of(codes_with({(99, 99): -90, (99, 299): -360})).starts
     assert [start.x_mm for start in starts] == [299.5, 99.5]
     assert starts[0].heading_rad == 0.0
 
 
-def test_things_leave_the_floor_empty() -> None:
+def test_things_leave_the_floor_empty_and_a_colour_mask_sets_the_brightness_of_walls() -> None:
     arena = arena_of(codes_with({(99, 99): 2, (99, 199): 3, (199, 199): 4}), ball=40, cylinder=90)
     assert not arena.brightness.any()
     assert (len(arena.lamps), len(arena.balls), len(arena.cylinders)) == (1, 1, 1)
     assert (arena.balls[0].brightness, arena.cylinders[0].brightness) == (40, 90)
-
-
-def test_a_colour_mask_sets_the_brightness_of_walls() -> None:
     codes, greys = np.zeros((200, 200)), np.zeros((200, 200))
     codes[:10], greys[:10, :100], greys[100, 100] = 1, 61, 99
     brightness = arena_of(codes, greys, wall=200).brightness[::-1]
@@ -149,15 +139,12 @@ INVALID = {
 }
 
 
-def test_invalid_settings_are_refused() -> None:
+def test_invalid_settings_are_refused_and_an_empty_one_is_the_default() -> None:
     for name, values in INVALID.items():
         for value in values:
             with pytest.raises(KiksError, match=r"^kiks_preferences: .* must (be|have|match)") as caught:
                 Settings().changed(name, value)
             assert len(str(caught.value)) < 600
-
-
-def test_an_empty_setting_is_the_default() -> None:
     changed = Settings().changed("ball", "40").changed("turrets", "gripper k213")
     assert (changed.ball, changed.turrets) == (40, ("gripper", "k213"))
     assert changed.changed("ball", "").ball is None

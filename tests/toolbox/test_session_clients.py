@@ -401,7 +401,7 @@ def test_worlds_are_saved_and_read(session: Session, tmp_path: Path) -> None:
     assert "no such file" in ask.refused(f"read {tmp_path / 'none.kad'}").lower()
 
 
-def test_settings_hold_for_the_next_world(session: Session) -> None:
+def test_settings_hold_for_the_next_world_and_for_arenas_of_the_desk(session: Session) -> None:
     ask = begun(session, "robot khepera_ii", "robots 2", "turrets gripper", "noise 0", "brightness 7", "ball 40")
     sim = session.world
     assert sim.robot_count == 2
@@ -414,6 +414,9 @@ def test_settings_hold_for_the_next_world(session: Session) -> None:
     ask("set robot nobody")
     assert "nobody" in ask.refused("world default")
     assert session.world is sim, "the old world is still there"
+    begun(session, "robot ", "turrets gripper", "seed 9")
+    project = session.desk.project_of(Arena.box(300, 300))
+    assert (project.seed, project.robots[0].turrets, session.desk.has_old_coordinates) == (9, ("gripper",), True)
 
 
 def test_latency_of_a_calibration_is_added(session: Session) -> None:
@@ -516,18 +519,7 @@ def test_a_robot_may_be_a_file(session: Session, tmp_path: Path) -> None:
     assert "none.toml" in ask.refused("world default")
 
 
-def test_a_film_shows_the_time_in_which_it_was_made(session: Session, ask: Asker, tmp_path: Path) -> None:
-    ask("pause 1", f"film 1 {tmp_path}/run.webp", "pause 2")
-    assert ask("film_save") == "51"
-    assert (tmp_path / "run.webp").stat().st_size > 1000
-    assert ask("film_save") == "0"
-    assert session.world.loop.recorder is None
-    ask(f"film 1 {tmp_path}/left.webp", "pause 1")
-    ask.client.leave()
-    assert (tmp_path / "left.webp").stat().st_size > 1000, "a client that leaves has its film"
-
-
-def test_films_that_cannot_be_made_are_refused(session: Session, tmp_path: Path) -> None:
+def test_a_film_shows_the_time_in_which_it_was_made_or_is_refused(session: Session, tmp_path: Path) -> None:
     ask = begun(session)
     assert "port -1 must be open" in ask.refused(f"film 1 {tmp_path}/run.webp")
     ask("open 1 9600")
@@ -537,6 +529,14 @@ def test_films_that_cannot_be_made_are_refused(session: Session, tmp_path: Path)
     assert "a program must make one film at a time" in ask.refused(f"film 1 {tmp_path}/two.mp4")
     assert not list(tmp_path.iterdir())
     ask("film_save")
+    ask("pause 1", f"film 1 {tmp_path}/run.webp", "pause 2")
+    assert ask("film_save") == "51"
+    assert (tmp_path / "run.webp").stat().st_size > 1000
+    assert ask("film_save") == "0"
+    assert session.world.loop.recorder is None
+    ask(f"film 1 {tmp_path}/left.webp", "pause 1")
+    ask.client.leave()
+    assert (tmp_path / "left.webp").stat().st_size > 1000, "a client that leaves has its film"
 
 
 def test_an_interrupted_film_is_given_up(tmp_path: Path) -> None:
@@ -656,12 +656,6 @@ def test_polls_let_no_time_pass(session: Session) -> None:
     with session.world.lock:
         ask(*["poll"] * 100)
         assert session.world.now_ns == before_ns
-
-
-def test_an_arena_of_the_desk_gets_the_settings_of_the_session(session: Session) -> None:
-    begun(session, "turrets gripper", "seed 9")
-    project = session.desk.project_of(Arena.box(300, 300))
-    assert (project.seed, project.robots[0].turrets, session.desk.has_old_coordinates) == (9, ("gripper",), True)
 
 
 def test_a_program_is_not_disturbed_by_people_who_look_back(session: Session, tmp_path: Path) -> None:

@@ -131,10 +131,15 @@ def test_a_joined_session_ends_when_both_programs_have_left(tmp_path: Path) -> N
         assert first.wait() == 0
 
 
-def test_joining_without_a_session_is_an_error(tmp_path: Path) -> None:
+def test_joining_without_a_session_and_listening_at_an_existing_file_are_errors(tmp_path: Path) -> None:
     for number, told in (("0", "must run before it is joined"), ("7", "session 7 must run")):
         process = ended("--join", number, folder=tmp_path)
         assert (process.returncode, told in process.stdout) == (2, True)
+    file = tmp_path / "there"
+    file.write_text("mine", encoding="ascii")
+    assert "must be a new file" in ended("--listen", str(file), folder=tmp_path).stdout
+    assert file.read_text(encoding="ascii") == "mine"
+    assert list(tmp_path.glob(".there*")) == []
 
 
 def test_a_killed_session_is_noticed_by_a_joined_program_and_its_file_is_removed(tmp_path: Path) -> None:
@@ -271,15 +276,6 @@ def test_a_session_is_announced_when_a_client_takes_part(tmp_path: Path) -> None
         session.hang_up()
         assert session.wait() == 0
         assert not list((tmp_path / "kiks").iterdir()), "it leaves nothing"
-
-
-def test_an_existing_file_is_not_replaced(tmp_path: Path) -> None:
-    file = tmp_path / "there"
-    file.write_text("mine", encoding="ascii")
-    done = ended("--listen", str(file), folder=tmp_path)
-    assert "must be a new file" in done.stdout
-    assert file.read_text(encoding="ascii") == "mine"
-    assert list(tmp_path.glob(".there*")) == []
 
 
 def test_a_slow_answer_is_announced_and_can_be_cancelled(tmp_path: Path) -> None:
