@@ -148,8 +148,7 @@ def rush(pile: Pile, tick_count: int) -> tuple[float, float]:
         if tick % REDRAWN_EVERY == 0:
             pile.drive()
         pile.tick()
-        overlap_now, depth_now = pile.worst_mm()
-        overlap, depth = max(overlap, overlap_now), max(depth, depth_now)
+        overlap, depth = map(max, (overlap, depth), pile.worst_mm())
     return overlap, depth
 
 
@@ -170,7 +169,6 @@ def calm(pile: Pile, tick_count: int) -> tuple[float, float, float]:
         pile.tick()
         assert pile.energy() <= energy * (1 + 1e-12), f"tick {tick}: energy {energy} became {pile.energy()}"
         energy = pile.energy()
-        overlap_now, depth_now = pile.worst_mm()
-        overlap, depth = max(overlap, overlap_now), max(depth, depth_now)
+        overlap, depth = map(max, (overlap, depth), pile.worst_mm())
     moved = pile.discs()[:EACH] - before
     return overlap, depth, float(np.hypot(moved[:, 0], moved[:, 1]).max())

@@ -191,7 +191,7 @@ def rollouts(worlds: int, robots: int = 1) -> Rollouts:
     return Rollouts(values, np.arange(worlds), ("contacts", "<path>"))
 
 
-def test_a_long_table_shows_the_first_and_sums_up_all() -> None:
+def test_a_long_table_shows_the_first_and_sums_up_all_and_a_short_one_shows_all_robots() -> None:
     shown = rollouts(1000)
     lines = str(shown).splitlines()
     assert lines[0].split() == ["world", "steps", "contacts", "<path>"]
@@ -204,9 +204,6 @@ def test_a_long_table_shows_the_first_and_sums_up_all() -> None:
     assert html.count("<tr>") == len(lines)
     assert "&lt;path&gt;" in html
     assert "<path>" not in html
-
-
-def test_a_short_table_shows_all_robots() -> None:
     lines = str(rollouts(2, robots=3)).splitlines()
     assert lines[0].split()[:2] == ["world", "robot"]
     assert [line.split()[:2] for line in lines[1:7]] == [[str(k // 3), str(k % 3)] for k in range(6)]

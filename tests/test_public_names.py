@@ -86,9 +86,8 @@ def test_arrays_have_shapes_and_quantities_have_units_and_errors_exist() -> None
 
 @pytest.mark.parametrize("name", MODULES)
 def test_a_module_of_names_can_be_imported(name: str) -> None:
-    found = forked.run(
-        code=f"import kiks.{name}; from kiks.{name} import *; print(dir(kiks.{name})); kiks.{name}.wrong"
-    )
+    code = f"import kiks.{name}; from kiks.{name} import *; print(dir(kiks.{name})); kiks.{name}.wrong"
+    found = forked.run(code=code)
     assert found.stdout == f"{dir(getattr(kiks, name))}\n"
     assert "has no attribute 'wrong'" in found.stderr
     assert importlib.import_module(f"kiks.{name}") is getattr(kiks, name)

@@ -194,11 +194,15 @@ def test_a_warm_start_compiles_nothing() -> None:
     assert "Compiling" not in again.stderr
 
 
-def test_a_program_runs_unchanged_in_simulated_time() -> None:
+def test_a_program_runs_unchanged_in_simulated_time_and_is_told_if_it_uses_no_robot(tmp_path: Path) -> None:
     result = forked.run("run", "--seed", "3", WANDER)
     assert result.returncode == 0, result.stderr
     version, counters = result.stdout.splitlines()
     assert version == "b,5.02,5.01"
+    advice = "kiks: nothing was sent to a robot, and no time has passed."
+    assert advice not in result.stderr
+    (tmp_path / "own.py").write_text("import kiks\nkiks.Khepera(kiks.Simulation().port(1)).proximity()\n")
+    assert advice in forked.run("run", "own.py", cwd=tmp_path).stderr
     assert re.fullmatch(r"h,-?\d+,-?\d+", counters)
     assert re.search(r"kiks: 2[01]\.\d{3} s simulated, seed 3, state", result.stderr)
     words = ("run", "--seed", "3", "--map", "/dev/ttyUSB0=1", WANDER)
@@ -231,14 +235,6 @@ def test_an_option_behind_a_program_is_the_program_s_and_that_is_said(tmp_path: 
     assert "goes to" not in forked.run("run", "--", "words.py", "--export", "x.html", cwd=tmp_path).stderr
     assert "goes to" not in forked.run("run", "words.py", "--gain", "3", cwd=tmp_path).stderr
     assert not (tmp_path / "x.html").exists()
-
-
-def test_a_program_that_uses_no_robot_is_told_so(tmp_path: Path) -> None:
-    program = tmp_path / "own.py"
-    program.write_text("import kiks\nkiks.Khepera(kiks.Simulation().port(1)).proximity()\n")
-    advice = "kiks: nothing was sent to a robot, and no time has passed."
-    assert advice in forked.run("run", str(program)).stderr
-    assert advice not in forked.run("run", WANDER).stderr
 
 
 def test_a_programs_exit_code_and_errors_are_its_own(tmp_path: Path) -> None:

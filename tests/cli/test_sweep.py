@@ -38,7 +38,6 @@ at_mm = [100.0, 200.0]
 size_mm = [400, 400]
 """
 
-
 SWEEP = "sweep brake.py --arena wall.kiks --seeds 1"
 
 

@@ -49,6 +49,13 @@ def need_tcp() -> None:
         pytest.skip("Octave's instrument-control is not here: apt-get install octave-instrument-control")
 
 
+def transport_variables(transport: str) -> dict[str, str]:
+    if transport == "pipes":
+        return {}
+    need_tcp()
+    return {"KIKS_TRANSPORT": "tcp"}
+
+
 _BEGIN = f"""\
 1;
 more off

@@ -15,9 +15,8 @@ def test_every_function_and_demo_is_listed_and_every_listed_function_exists() ->
 
 
 def test_every_constant_of_the_table_is_a_preference() -> None:
-    known = set(
-        re.findall(r"^(KIKS_\w+) =", (TOOLBOX / "kiks_preferences.m").read_text(encoding="utf-8"), re.MULTILINE)
-    )
+    preferences = (TOOLBOX / "kiks_preferences.m").read_text(encoding="utf-8")
+    known = set(re.findall(r"^(KIKS_\w+) =", preferences, re.MULTILINE))
     named = set(re.findall(r"`(KIKS_\w+)`", PAGE[PAGE.index("| constant") : PAGE.index("The other constants")]))
     assert named <= known
     new = {"KIKS_SEED", "KIKS_THINKING", "KIKS_ROBOT", "KIKS_TURRETS", "KIKS_PROGRAMS", "KIKS_WINDOW"}

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests.at_length import at_length, cases
-from tests.matlab.octave import A_PROCESS, Octave, has_ended, need_tcp, needs_octave, run
+from tests.matlab.octave import A_PROCESS, Octave, has_ended, needs_octave, run, transport_variables
 from tests.matlab.test_functions import NAMES
 
 pytestmark = [needs_octave, pytest.mark.slow]
@@ -341,10 +341,3 @@ def test_wrong_arguments_get_messages_of_kiks(tmp_path: Path) -> None:
     vague = {call: words for call, words in answers.items() if not clear.search(words) and call not in FORGOTTEN}
     foreign = {call: words for call, words in answers.items() if not re.match(r"kiks:\w+\|", words)}
     assert foreign == vague == {}
-
-
-def transport_variables(transport: str) -> dict[str, str]:
-    if transport == "pipes":
-        return {}
-    need_tcp()
-    return {"KIKS_TRANSPORT": "tcp"}

@@ -20,7 +20,6 @@ from kiks.model.shipped import shipped
 
 pytestmark = pytest.mark.slow
 
-
 KIKS = [sys.executable, "-m", "kiks"]
 """The command as a process of its own, for what a fork does in its own way: start, signals, parents."""
 
