@@ -93,6 +93,7 @@ kiks_kclose(ref);
 
 
 def test_loops_end_by_the_clock_and_compare_vectors(tmp_path: Path) -> None:
+    (tmp_path / "kiks_preferences.m").write_text("KIKS_THINKING = 'none';\n")  # also after `clear all`
     said = run(LOOPS, tmp_path).said
     assert said["drove_on"][0, 2] - said["closed_at"][0, 2] < -0.5
     assert said["drove_on"][0, :2] == pytest.approx(said["closed_at"][0, :2], abs=5)
