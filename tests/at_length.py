@@ -1,7 +1,5 @@
 """How much the tests do: `make test` and `.ci/run` test each feature once, `make test-all` everything."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterable
 from typing import Any, TypeVar

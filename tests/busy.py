@@ -1,7 +1,5 @@
 """A busy computer, on which the operating system runs programs in an ever different order."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from collections.abc import Iterator

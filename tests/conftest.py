@@ -1,7 +1,5 @@
 """Setup for all tests: which of them run, the engine compiled before they start, and how a failed one runs alone."""
 
-from __future__ import annotations
-
 import ctypes
 import gc
 import os

@@ -1,7 +1,5 @@
 """Does what a page shows: runs its blocks one after the other in one folder, and compares what they print."""
 
-from __future__ import annotations
-
 import functools
 import os
 import re

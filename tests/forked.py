@@ -4,8 +4,6 @@ A process that has imported KiKS and loaded its compiled code forks for each cal
 and of terminals begin a real process.
 """
 
-from __future__ import annotations
-
 import atexit
 import contextlib
 import gc

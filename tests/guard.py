@@ -1,7 +1,5 @@
 """The time limit of all waits of tests: only what hangs reaches it, however busy the computer is."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from typing import TypeVar

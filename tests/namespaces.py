@@ -1,7 +1,5 @@
 """Whether bubblewrap is here and can make namespaces, without which there is no sandbox."""
 
-from __future__ import annotations
-
 import functools
 import shutil
 import subprocess

@@ -4,8 +4,6 @@ Arguments: the file to write, in JSON; then that of another Python, if there is 
 Those are the names of their outcomes.
 """
 
-from __future__ import annotations
-
 import gc
 import json
 import signal

@@ -3,8 +3,6 @@
 The oracle knows discs, and walls as the rectangles they are drawn as; it asks the engine nothing.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any
@@ -73,7 +71,7 @@ class Pile:
     """Largest speed that robots are told [pulses/10 ms]."""
 
     @staticmethod
-    def make(number: int) -> Pile:
+    def make(number: int) -> "Pile":
         """Return pile-up `number`, always the same one; one in four has things of all sizes, one in four is slow."""
         rng = np.random.default_rng([3006, number])
         arena, walls = boxed_arena(rng)
@@ -150,8 +148,7 @@ def rush(pile: Pile, tick_count: int) -> tuple[float, float]:
         if tick % REDRAWN_EVERY == 0:
             pile.drive()
         pile.tick()
-        overlap_now, depth_now = pile.worst_mm()
-        overlap, depth = max(overlap, overlap_now), max(depth, depth_now)
+        overlap, depth = map(max, (overlap, depth), pile.worst_mm())
     return overlap, depth
 
 
@@ -172,7 +169,6 @@ def calm(pile: Pile, tick_count: int) -> tuple[float, float, float]:
         pile.tick()
         assert pile.energy() <= energy * (1 + 1e-12), f"tick {tick}: energy {energy} became {pile.energy()}"
         energy = pile.energy()
-        overlap_now, depth_now = pile.worst_mm()
-        overlap, depth = max(overlap, overlap_now), max(depth, depth_now)
+        overlap, depth = map(max, (overlap, depth), pile.worst_mm())
     moved = pile.discs()[:EACH] - before
     return overlap, depth, float(np.hypot(moved[:, 0], moved[:, 1]).max())

@@ -1,7 +1,5 @@
 """A server in a thread, for tests that are clients: nothing sleeps; waiting ends with an event, or a guard fails."""
 
-from __future__ import annotations
-
 import os
 import select
 import subprocess

@@ -1,7 +1,5 @@
 """Another user of this computer, who has no rights here."""
 
-from __future__ import annotations
-
 import encodings.idna  # noqa: F401  (sockets need it, and another user may not be able to read it)
 import os
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """What the tests, and all that they start, find around them: the same under nohup, cron, CI, git and a desktop."""
 
-from __future__ import annotations
-
 import contextlib
 import locale
 import os

@@ -1,7 +1,5 @@
 """Documents tell the truth: their programs run, their commands exist, their links lead somewhere."""
 
-from __future__ import annotations
-
 import ast
 import functools
 import re

@@ -1,7 +1,5 @@
 """Ctrl-C always works: wherever it comes while a command loads, and when a callback drops it later."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess
@@ -73,6 +71,13 @@ def test_a_command_ends_wherever_it_is_interrupted_while_it_loads(command: str, 
     assert all(line.removeprefix("kiks: ").startswith("Compiling ") for line in before)
 
 
+ENDED = """
+    while True:
+        signal.pause()
+except KeyboardInterrupt:
+    print("ended", signal.getsignal(signal.SIGINT) is signal.SIG_IGN)
+"""
+
 IN_A_CALLBACK = """
 import ctypes, signal
 import kiks
@@ -87,12 +92,7 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 call = ctypes.CFUNCTYPE(None)(back)
 try:
     call()
-    while True:
-        signal.pause()
-except KeyboardInterrupt:
-    print("ended")
 """
-
 
 IN_THE_HOOK = """
 import signal, sys
@@ -111,12 +111,7 @@ signal.signal(signal.SIGINT, signal.default_int_handler)
 send_again_what_is_dropped()
 try:
     Broken()
-    while True:
-        signal.pause()
-except KeyboardInterrupt:
-    print("ended")
 """
-
 
 IN_A_DESTRUCTOR = """
 import signal
@@ -136,12 +131,7 @@ send_again_what_is_dropped()
 Broken()
 try:
     Dropping()
-    while True:
-        signal.pause()
-except KeyboardInterrupt:
-    print("ended", signal.getsignal(signal.SIGINT) is signal.SIG_IGN)
 """
-
 
 IGNORED = """
 import signal
@@ -171,8 +161,12 @@ kiks.cli.main()
 @pytest.mark.parametrize(
     ("script", "expected"),
     [
-        pytest.param(IN_A_CALLBACK, (0, "dropped\nended\n", ""), id="what a callback drops is sent again"),
-        pytest.param(IN_THE_HOOK, (0, "shown\nended\n", ""), id="so is what comes while another error is shown"),
+        pytest.param(
+            IN_A_CALLBACK + ENDED, (0, "dropped\nended False\n", ""), id="what a callback drops is sent again"
+        ),
+        pytest.param(
+            IN_THE_HOOK + ENDED, (0, "shown\nended False\n", ""), id="so is what comes while another error is shown"
+        ),
         pytest.param(IGNORED, (130, "here\n", "kiks: stopped.\n"), id="what is ignored stays ignored"),
         pytest.param(HELPER_IS_STUCK, (130, "summary\n", ""), id="an interrupted command waits for no thread"),
     ],
@@ -182,7 +176,7 @@ def test_signals_are_heard(script: str, expected: tuple[int, str, str]) -> None:
 
 
 def test_what_a_destructor_drops_is_sent_again_and_other_errors_are_shown_as_ever() -> None:
-    code, out, errors = python(IN_A_DESTRUCTOR)
+    code, out, errors = python(IN_A_DESTRUCTOR + ENDED)
     assert (code, out, errors.count("Traceback")) == (0, "ended True\n", 1)
     assert "ValueError: mine" in errors
 
@@ -226,8 +220,6 @@ def never_returning(limit_s: float, *signals: signal.Signals) -> tuple[int, list
     words = [sys.executable, "-c", NEVER_RETURNS, str(limit_s)]
     with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         try:
-            assert process.stdout is not None
-            assert process.stderr is not None
             said, errors = [process.stdout.readline()], []
             for number in signals:
                 process.send_signal(number)
@@ -276,7 +268,6 @@ print("ended")
 
 def test_who_hears_each_signal_may_have_any_number_of_them() -> None:
     with subprocess.Popen([sys.executable, "-c", HEARS], stdout=subprocess.PIPE, text=True) as process:
-        assert process.stdout is not None
         for number in (signal.SIGINT, signal.SIGINT, signal.SIGTERM):
             assert process.stdout.readline() == "ready\n"
             process.send_signal(number)
@@ -299,7 +290,6 @@ print(sys.stdin.read())
 def test_who_notes_a_signal_and_waits_on_has_heard_it() -> None:
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
     with subprocess.Popen([sys.executable, "-c", NOTES], text=True, **pipes) as process:
-        assert process.stdout is not None
         assert process.stdout.readline() == "ready\n"
         for _ in range(3):
             process.terminate()

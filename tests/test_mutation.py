@@ -1,7 +1,5 @@
 """The table of planted faults: each can be planted, its near tests are there, and each folder of KiKS has one."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from tools.mutation import load_faults

@@ -1,7 +1,5 @@
 """What notebooks, terminals and plain Python show: of the desk, and of simulations, arenas and results of a batch."""
 
-from __future__ import annotations
-
 import io
 import json
 import subprocess
@@ -132,12 +130,14 @@ def size_of(thing: Any) -> tuple[tuple[int, int], dict[str, int]]:
     return Image.open(io.BytesIO(png)).size, shown
 
 
-def test_pictures_are_sharp() -> None:
+def test_pictures_are_sharp_and_several_arenas_stand_side_by_side() -> None:
     arena = kiks.Arena.box(300, 200)
     for thing in (arena, kiks.Simulation(arena)):
         (width, height), shown = size_of(thing)
         assert (width, height // 2, shown["width"]) == (600, shown["height"], 300)
         assert height > 400  # with a caption
+    arenas = [arena, kiks.Arena.box(200, 300)]
+    assert size_of(kiks.Batch(arenas, 4)) == ((480 + 24 + 320, 480), {"width": 412, "height": 240})
 
 
 def test_the_picture_of_an_arena_is_that_of_a_simulation_that_begins_there() -> None:
@@ -160,11 +160,6 @@ def test_looking_at_a_picture_changes_nothing() -> None:
     assert looked_at.state_hash() == alone.state_hash()
 
 
-def test_what_has_several_arenas_shows_them_side_by_side() -> None:
-    arenas = [kiks.Arena.box(300, 200), kiks.Arena.box(200, 300)]
-    assert size_of(kiks.Batch(arenas, 4)) == ((480 + 24 + 320, 480), {"width": 412, "height": 240})
-
-
 def test_an_evolution_shows_what_it_has_found() -> None:
     evolution: Any = kiks.Evolution(kiks.tasks.avoid(seconds=1, worlds=4), "map-elites", seed=1, population=8)
     archive: Any = evolution.archive
@@ -178,13 +173,10 @@ def test_an_evolution_shows_what_it_has_found() -> None:
     assert size_of(evolution.task)[1]["height"] == 240
 
 
-def test_the_result_of_an_exam_is_a_table_of_its_starts() -> None:
+def test_results_say_what_they_are_and_that_of_an_exam_is_a_table_of_its_starts() -> None:
     result: Any = ExamResult(np.array([True, False]), np.array([[31.0], [2.5]]), ("path_mm",), "drives")
     assert repr(result) == "<Exam: not solved, 1 of 2 starts (drives)>"
     assert "<th>start</th><th>solved</th><th>path_mm</th>" in result._repr_mimebundle_()[0]["text/html"]
-
-
-def test_what_is_short_says_what_it_is() -> None:
     arena = kiks.Arena.load("pillars")
     assert repr(arena) == "<Arena 'Pillars': 600 x 600 mm, 1 start, 1 ball, 1 cylinder>"
     batch = kiks.Batch(arena, 3)
@@ -199,7 +191,7 @@ def rollouts(worlds: int, robots: int = 1) -> Rollouts:
     return Rollouts(values, np.arange(worlds), ("contacts", "<path>"))
 
 
-def test_a_long_table_shows_the_first_and_sums_up_all() -> None:
+def test_a_long_table_shows_the_first_and_sums_up_all_and_a_short_one_shows_all_robots() -> None:
     shown = rollouts(1000)
     lines = str(shown).splitlines()
     assert lines[0].split() == ["world", "steps", "contacts", "<path>"]
@@ -212,23 +204,17 @@ def test_a_long_table_shows_the_first_and_sums_up_all() -> None:
     assert html.count("<tr>") == len(lines)
     assert "&lt;path&gt;" in html
     assert "<path>" not in html
-
-
-def test_a_short_table_shows_all_robots() -> None:
     lines = str(rollouts(2, robots=3)).splitlines()
     assert lines[0].split()[:2] == ["world", "robot"]
     assert [line.split()[:2] for line in lines[1:7]] == [[str(k // 3), str(k % 3)] for k in range(6)]
     assert lines[7].split()[0] == "mean"
 
 
-def test_numbers_that_are_none_are_shown_so() -> None:
+def test_numbers_that_are_none_are_shown_so_and_without_measures_there_are_still_steps() -> None:
     values = np.array([[[np.nan, 1e12]], [[np.inf, -1e-9]]])
     lines = str(Rollouts(values, np.ones(2, np.int64), ("a", "b"))).splitlines()
     assert [line.split()[2] for line in lines[1:]] == ["nan", "inf", "nan", "nan", "nan", "nan"]
     assert lines[1].split()[3] == "1.000e+12"
-
-
-def test_without_measures_there_are_still_steps() -> None:
     nothing = Rollouts(np.zeros((2, 1, 0)), np.array([3, 4]), ())
     assert repr(nothing) == "<Rollouts: 2 worlds of 1 robot, no measures>"
     assert [line.split() for line in str(nothing).splitlines()[:3]] == [["world", "steps"], ["0", "3"], ["1", "4"]]

@@ -1,7 +1,5 @@
 """Without what only POSIX systems have, all can be imported but what is for them alone, and worlds run."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What is published: an archive with all sources, a wheel with all its parts, and the same version everywhere."""
 
-from __future__ import annotations
-
 import email.message
 import email.parser
 import re
@@ -87,9 +85,8 @@ def test_the_readme_of_a_package_needs_no_files_beside_it(metadata: email.messag
 
 def test_all_places_have_the_same_version(metadata: email.message.Message) -> None:
     assert metadata["Version"] == kiks.__version__
-    versions = re.findall(
-        r"^## (\S+)(?: \((.+)\))?$", (ROOT / "CHANGELOG.md").read_text(encoding="utf-8"), re.MULTILINE
-    )
+    changes = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    versions = re.findall(r"^## (\S+)(?: \((.+)\))?$", changes, re.MULTILINE)
     assert versions[0][0] == kiks.__version__.partition(".dev")[0]
     released = next((version, day) for version, day in versions if day)
     cited = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))

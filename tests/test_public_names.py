@@ -1,7 +1,5 @@
 """Every public name is explained: an example that runs, shapes of arrays, units, and errors that exist."""
 
-from __future__ import annotations
-
 import builtins
 import dataclasses
 import functools
@@ -64,8 +62,8 @@ def test_every_name_has_an_example() -> None:
     assert not without, "\n".join(without)
 
 
-def test_arrays_have_shapes() -> None:
-    without = []
+def test_arrays_have_shapes_and_quantities_have_units_and_errors_exist() -> None:
+    wrong = []
     for name, each in public().items():
         sections = sections_of(each)
         explained = entries_of(sections, "Args", "Attributes")
@@ -75,15 +73,8 @@ def test_arrays_have_shapes() -> None:
             # A docstring without sections describes arguments and result in its text.
             meaning = sections.get("Returns") if argument == "return" else explained.get(argument)
             if ARRAY.search(str(annotation)) and not SHAPE.search(meaning or sections[""]):
-                without.append(f"{name}: {argument}")
-    assert not without, "\n".join(without)
-
-
-def test_quantities_have_units_and_errors_exist() -> None:
-    wrong = []
-    for name, each in public().items():
-        sections = sections_of(each)
-        for argument, meaning in entries_of(sections, "Args", "Attributes").items():
+                wrong.append(f"{name}: {argument}: no shape")
+        for argument, meaning in explained.items():
             unit = UNITS.get(argument.rpartition("_")[2]) if "_" in argument else None
             if unit and not re.search(rf"\[({unit})[\];,]|\[[^\]]*\b({unit})\b", meaning):
                 wrong.append(f"{name}: {argument}: no unit in {meaning!r}")
@@ -95,9 +86,8 @@ def test_quantities_have_units_and_errors_exist() -> None:
 
 @pytest.mark.parametrize("name", MODULES)
 def test_a_module_of_names_can_be_imported(name: str) -> None:
-    found = forked.run(
-        code=f"import kiks.{name}; from kiks.{name} import *; print(dir(kiks.{name})); kiks.{name}.wrong"
-    )
+    code = f"import kiks.{name}; from kiks.{name} import *; print(dir(kiks.{name})); kiks.{name}.wrong"
+    found = forked.run(code=code)
     assert found.stdout == f"{dir(getattr(kiks, name))}\n"
     assert "has no attribute 'wrong'" in found.stderr
     assert importlib.import_module(f"kiks.{name}") is getattr(kiks, name)

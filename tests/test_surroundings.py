@@ -1,7 +1,5 @@
 """The tests find the same around them however they are started, and so does all that they start."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """The torture campaigns: a few cases of each with fixed seeds; and they notice faults that are planted."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys
@@ -25,15 +23,7 @@ def torture(*words: str) -> tuple[int, dict[str, float], str]:
     return done.returncode, figures, done.stderr
 
 
-def check(*words: str) -> None:
-    code, _, table = torture(*words)
-    assert code == 0, table
-
-
-# ---- the tool itself ----
-
-
-def test_what_is_planted_is_found_with_its_cause_and_ends_no_other_case() -> None:
+def test_what_is_planted_is_found_with_its_cause_and_ends_no_other_case_and_can_be_played_alone() -> None:
     code, figures, table = torture("--only", "planted")
     assert code == 1
     for figure, count in {"deaths": 4, "hangs": 3, "files_lost": 3, "foreign_exceptions": 4 + 3 + 2}.items():
@@ -48,43 +38,33 @@ def test_what_is_planted_is_found_with_its_cause_and_ends_no_other_case() -> Non
         assert words in table
     tried = {name.rpartition(".")[2]: count for name, count in figures.items() if ".tried." in name}
     assert tried == {"raises": 12, "dies": 12, "eats": 12, "tells": 12, "loses": 12, "refuses": 12, "hangs": 3}, table
-
-
-def test_a_case_can_be_played_alone() -> None:
     code, _, table = torture("--only", "planted.raises", "--case", "1")
     assert code == 1
     assert "ZeroDivisionError: planted" in table
 
 
-def test_what_is_refused_breaks_nothing() -> None:
-    check("--only", "planted.refuses")
-
-
-# ---- KiKS ----
-
-
-def test_hostile_files_and_arguments_break_no_promise() -> None:
-    check("--only", "files", "--only", "calls", "--cases", "8", "--seed", "12")
-
-
-@at_length
 @pytest.mark.parametrize(
     "words",
     [
-        "--only wire --cases 2 --seed 11",
-        "--only compiled --cases 4 --seed 17",
-        "--only names --cases 4 --seed 17",
-        pytest.param("--only users --cases 1 --seed 18", marks=needs_root),
-        "--only files --only calls --cases 400 --seed 19",
-        "--only messages --cases 3 --seed 12",
-        "--only faults.kill_writer --only faults.fill_disk --only faults.no_descriptors --cases 4 --seed 13",
-        *(f"--only faults.kill_{scene} --cases 1 --seed 14" for scene in ("server", "desk")),
-        *(f"--only crowd.{group} --cases 1 --seed 15" for group in ("serve", "session")),
+        "planted.refuses",
+        "files --only calls --cases 8 --seed 12",
         *(
-            pytest.param(f"--only octave.{kind} --cases 1 --seed 16", marks=needs_octave)
+            pytest.param(words, marks=at_length)
+            for words in (
+                *("wire --cases 2 --seed 11", "compiled --cases 4 --seed 17", "names --cases 4 --seed 17"),
+                *("files --only calls --cases 400 --seed 19", "messages --cases 3 --seed 12"),
+                "faults.kill_writer --only faults.fill_disk --only faults.no_descriptors --cases 4 --seed 13",
+                *(f"faults.kill_{scene} --cases 1 --seed 14" for scene in ("server", "desk")),
+                *(f"crowd.{group} --cases 1 --seed 15" for group in ("serve", "session")),
+            )
+        ),
+        pytest.param("users --cases 1 --seed 18", marks=[at_length, needs_root]),
+        *(
+            pytest.param(f"octave.{kind} --cases 1 --seed 16", marks=[at_length, needs_octave])
             for kind in ("joined_window", "start")
         ),
     ],
 )
 def test_a_few_cases_break_no_promise(words: str) -> None:
-    check(*words.split())
+    code, _, table = torture("--only", *words.split())
+    assert code == 0, table

@@ -1,7 +1,5 @@
 """A wheel that brings compiled kernels: they are used where they fit, and quietly ignored elsewhere."""
 
-from __future__ import annotations
-
 import os
 import pickle
 import shutil

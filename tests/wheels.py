@@ -1,7 +1,5 @@
 """Builds packages of KiKS and installs them in environments of their own."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -72,28 +72,23 @@ def test_info_of_an_example():
 
 
 def test_info_tells_all_that_stands_in_it(tmp_path):
-    box = Arena.box(300, 201, wall_mm=0)
-    arena = Arena(
-        box.brightness,
-        0.5,
-        "room",
-        starts=(Pose(75, 50, 0), Pose(20, 50, 1.5)),
-        lamps=(Lamp(10, 20, 2.5, False),),
-        balls=(Ball(30, 40),),
-        cylinders=(Cylinder(50, 60),),
-        walls=(Wall(box_mm=((100, 90), (120, 95))),),
-    )
+    parts = {"starts": (Pose(75, 50, 0), Pose(20, 50, 1.5)), "lamps": (Lamp(10, 20, 2.5, False),)}
+    parts |= {"balls": (Ball(30, 40),), "cylinders": (Cylinder(50, 60),)}
+    walls = (Wall(box_mm=((100, 90), (120, 95))),)
+    arena = Arena(Arena.box(300, 201, wall_mm=0).brightness, 0.5, "room", walls=walls, **parts)
     save_arena(arena, tmp_path / "room.toml")
-    said = kiks_arena("info", tmp_path / "room.toml").splitlines()
-    assert said[0] == "room: 150 x 100.5 mm, cells of 0.5 mm, 1 % of it wall"
-    assert said[1].startswith("Widest place: room for ")
-    assert said[2].endswith("a Khepera (55 mm) fits")
-    assert said[3].startswith("Start 2: (20, 50) mm")
-    assert said[3].endswith("room for 40.0 mm across: a Khepera (55 mm) does not fit")
-    assert said[4] == "Lamp 1: (10, 20) mm, 2.5 W, off"
-    assert said[5] == "Ball 1: (30, 40) mm, radius 32 mm, brightness 255"
-    assert said[6] == "Cylinder 1: (50, 60) mm, radius 16 mm, brightness 190"
-    assert said[7] == "Wall 1: box_mm = [[100.0, 90.0], [120.0, 95.0]], brightness = 255"
+    room, widest, first, second, *things = kiks_arena("info", tmp_path / "room.toml").splitlines()
+    assert room == "room: 150 x 100.5 mm, cells of 0.5 mm, 1 % of it wall"
+    assert widest.startswith("Widest place: room for ")
+    assert first.endswith("a Khepera (55 mm) fits")
+    assert second.startswith("Start 2: (20, 50) mm")
+    assert second.endswith("room for 40.0 mm across: a Khepera (55 mm) does not fit")
+    assert things == [
+        "Lamp 1: (10, 20) mm, 2.5 W, off",
+        "Ball 1: (30, 40) mm, radius 32 mm, brightness 255",
+        "Cylinder 1: (50, 60) mm, radius 16 mm, brightness 190",
+        "Wall 1: box_mm = [[100.0, 90.0], [120.0, 95.0]], brightness = 255",
+    ]
 
 
 @pytest.mark.parametrize(

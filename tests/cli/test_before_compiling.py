@@ -1,7 +1,5 @@
 """What is wrong with the words of a command, and its help, are told before anything is compiled."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

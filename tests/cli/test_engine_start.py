@@ -1,7 +1,5 @@
 """The first start: processes that compile side by side."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys
@@ -17,14 +15,7 @@ PIECE_COUNT = 6
 
 def pieces_noting(done: list[int]) -> list[Callable[[], None]]:
     """Return pieces that do nothing but note their numbers."""
-
-    def piece(number: int) -> Callable[[], None]:
-        def note() -> None:
-            done.append(number)
-
-        return note
-
-    return [piece(number) for number in range(PIECE_COUNT)]
+    return [lambda number=number: done.append(number) for number in range(PIECE_COUNT)]
 
 
 def test_one_processor_gets_no_second_process(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -47,11 +38,8 @@ def test_a_process_that_fails_takes_one_piece_from_the_end(processors: int, monk
 
 
 def test_a_helper_answers_each_order_and_ends_with_its_input() -> None:
-    with subprocess.Popen(
-        [sys.executable, "-c", HELP], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-    ) as helper:
-        assert helper.stdin is not None
-        assert helper.stdout is not None
+    pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+    with subprocess.Popen([sys.executable, "-c", HELP], text=True, **pipes) as helper:
         for _ in range(2):
             print(engine_start._read_light.__name__, file=helper.stdin, flush=True)
             assert helper.stdout.readline() == "\n"

@@ -1,7 +1,5 @@
 """`kiks evolve`, and what champions do in `kiks run`."""
 
-from __future__ import annotations
-
 import json
 import re
 import shutil
@@ -74,12 +72,6 @@ def test_champions_run_and_are_shown(folder: Path, tmp_path: Path) -> None:
     assert (tmp_path / "out.png").exists()
     before = ran("run", "--seconds", "2", "--seed", "5", "--robots", "2", champion, cwd=tmp_path)
     assert after.stderr == before.stderr
-
-
-def test_the_tasks_are_listed() -> None:
-    listed = kiks("evolve", "--list").output
-    assert "touch nothing" in listed
-    assert "a predator and a prey" in listed
 
 
 @pytest.fixture
@@ -197,7 +189,10 @@ def test_seeds_evolve_one_after_another_and_are_compared(folder: Path, tmp_path:
     assert (tmp_path / "compared.pdf").read_bytes().startswith(b"%PDF")
 
 
-def test_folders_that_cannot_be_compared_are_errors(tmp_path: Path) -> None:
+def test_the_tasks_are_listed_and_folders_that_cannot_be_compared_are_errors(tmp_path: Path) -> None:
+    listed = kiks("evolve", "--list").output
+    assert "touch nothing" in listed
+    assert "a predator and a prey" in listed
     for folders in ((tmp_path, tmp_path), (tmp_path,)):
         with pytest.raises(KiksError, match="FOLDERS must be two or more, all different, but they were"):
             kiks("compare", *folders)

@@ -1,7 +1,5 @@
 """No command writes over what it reads or over a file of another kind, and none ignores an option."""
 
-from __future__ import annotations
-
 import re
 import sys
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """`--record` of the commands, `kiks replay --check` and `kiks export`: runs of foreign programs are made again."""
 
-from __future__ import annotations
-
 import csv
 import signal
 import subprocess
@@ -81,7 +79,6 @@ def test_what_a_killed_server_has_recorded_is_made_again(tmp_path: Path) -> None
     """A foreign client in real time; the server has no chance to end the file."""
     link, command = tmp_path / "robot", [*KIKS, "serve", "--link", "robot", "--record", "run.mcap", "--tcp", "0"]
     with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, text=True) as process:
-        assert process.stdout is not None
         while "repeatable" not in (line := process.stdout.readline()).lower():
             assert line
         with serial.Serial(str(link), timeout=GUARD_S) as port:

@@ -1,7 +1,5 @@
 """`kiks run`: a project runs like a program, and a run leaves a recording, a file of it, and a line for each robot."""
 
-from __future__ import annotations
-
 import csv
 import os
 import pty
@@ -71,9 +69,6 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-# ---- projects ----
-
-
 def test_a_project_starts_its_programs(folder: Path) -> None:
     result = forked.run("run", "exercise.kiks", "--export", "rows.csv", cwd=folder)
     assert result.returncode == 0, result.stderr
@@ -110,19 +105,14 @@ def test_a_project_as_an_arena_brings_its_robots_and_says_that_its_programs_stay
     assert "seed 5, state" in result.stderr
 
 
-def test_an_arena_in_place_of_the_project_s(folder: Path) -> None:
+def test_an_arena_stands_in_place_of_the_project_s_but_no_robot_without_a_program(folder: Path) -> None:
     (folder / "wide.toml").write_text("size_mm = [900, 900]\nwall_mm = 10\n[[start]]\nat_mm = [800, 800]\n")
     result = forked.run("run", "exercise.kiks", "--arena", "wide.toml", "--export", "rows.csv", cwd=folder)
     assert "teacher b,6.01,6.01" in result.stdout, result.stderr
     assert "\n0.0,1,800.0,800.0," in (folder / "rows.csv").read_text()
-
-
-def test_a_robot_without_a_program_is_an_error(folder: Path) -> None:
     with pytest.raises(KiksError, match="a project must name a program for a robot, but"):
         app(["run", str(folder / "exercise.kiks"), "--robots", "1"], standalone_mode=False)
 
-
-# ---- how long a run takes ----
 
 FOR_EVER = {
     "sleeps": "import time\nwhile True: time.sleep(0.37)\n",
@@ -169,12 +159,14 @@ def test_seconds_end_programs_at_that_simulated_time_and_the_same_each_time(line
     assert results[0].stdout == results[1].stdout == ""
 
 
-def test_nothing_is_printed_after_the_end(endless: Path) -> None:
+def test_nothing_is_printed_after_the_end_and_a_program_that_fails_before_it_fails(endless: Path) -> None:
     (endless / "tells.py").write_text("import time\nwhile True:\n    print(time.monotonic())\n    time.sleep(0.5)\n")
     result = forked.run("run", "--seconds", "20.5", "tells.py", cwd=endless)
     assert result.stdout.splitlines() == [str(k / 2) for k in range(42)]
     both = forked.run("run", "--seconds", "20.5", "tells.py", "talks.py", cwd=endless)
     assert both.stdout.splitlines() == [f"1 tells.py | {k / 2}" for k in range(42)]
+    (endless / "fails.py").write_text("raise SystemExit(3)")
+    assert forked.run("run", "--seconds", "20.5", "fails.py", "sleeps.py", cwd=endless).returncode == 3
 
 
 def test_seconds_change_nothing_before_and_nothing_for_a_program_that_ends_before(endless: Path) -> None:
@@ -187,11 +179,6 @@ def test_seconds_change_nothing_before_and_nothing_for_a_program_that_ends_befor
     assert forked.run("replay", "--check", "run.mcap", cwd=endless).returncode == 0
 
 
-def test_a_program_that_fails_before_the_end_fails(endless: Path) -> None:
-    (endless / "fails.py").write_text("raise SystemExit(3)")
-    assert forked.run("run", "--seconds", "20.5", "fails.py", "sleeps.py", cwd=endless).returncode == 3
-
-
 @pytest.mark.parametrize(
     "line", cases(["spins.py", "spins.py sleeps.py", "talks.py", "talks.py long.py", "long.py"], 3)
 )
@@ -200,9 +187,6 @@ def test_max_wall_ends_whatever_runs(line: str, endless: Path) -> None:
     *_, said, last = [line for line in result.stderr.splitlines() if " driven, " not in line]
     assert (result.returncode, said) == (124, "kiks: --max-wall has ended the run after 0.5 s of real time.")
     assert last.endswith("s simulated, seed 0, not repeatable: --max-wall has ended it")
-
-
-# ---- what a run leaves ----
 
 
 def test_the_last_lines_are_one_for_each_robot_and_that_of_the_state() -> None:
@@ -275,9 +259,6 @@ def test_paths_stay_whole_if_ctrl_c_comes_while_a_point_is_kept() -> None:
     assert sim.paths().tolist() == before
 
 
-# ---- whose line it is ----
-
-
 def test_each_line_says_which_program_it_is_from(tmp_path: Path) -> None:
     (tmp_path / "a.py").write_text("import sys\nprint('one')\nprint('no end', end='')\nsys.stderr.write('wrong\\n')\n")
     (tmp_path / "other.py").write_text("import os\nos.write(1, b'\\xff' * 100_000 + b'\\nlast')\n")
@@ -314,14 +295,11 @@ def at_a_terminal(folder: Path, **environment: str) -> str:
     return text.replace("\r\n", "\n")
 
 
-def test_at_a_terminal_labels_are_coloured_and_questions_are_seen(tmp_path: Path) -> None:
+def test_at_a_terminal_labels_are_coloured_unless_no_color_is_set_and_questions_are_seen(tmp_path: Path) -> None:
     text = at_a_terminal(tmp_path, NO_COLOR="")
     assert "\033[36m1 asks.py |\033[0m go? yes\n" in text
     assert "\033[36m1 asks.py |\033[0m got yes\n" in text
     assert "\033[33m2 b.py    |\033[0m here\n" in text
-
-
-def test_no_color_is_heeded(tmp_path: Path) -> None:
     text = at_a_terminal(tmp_path, NO_COLOR="1")
     assert "1 asks.py | got yes\n" in text
     assert "\033" not in text
@@ -333,10 +311,8 @@ def test_a_program_gets_an_error_when_its_output_is_closed(tmp_path: Path) -> No
     command = [*forked.kiks_command(), "run", "talks.py", "silent.py"]
     pipes: dict[str, Any] = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
     with subprocess.Popen(command, cwd=tmp_path, text=True, **pipes) as process:
-        assert process.stdout is not None
         assert process.stdout.readline() == "1 talks.py  | more\n"
         process.stdout.close()
-        assert process.stderr is not None
         said = process.stderr.read()
         assert process.wait(GUARD_S) == 1
     assert "1 talks.py  | BrokenPipeError" in said

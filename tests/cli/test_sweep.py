@@ -1,7 +1,5 @@
 """`kiks sweep`: a program in its cases, its folder and its last line."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
@@ -39,7 +37,6 @@ at_mm = [100.0, 200.0]
 [walls]
 size_mm = [400, 400]
 """
-
 
 SWEEP = "sweep brake.py --arena wall.kiks --seeds 1"
 

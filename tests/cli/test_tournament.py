@@ -1,7 +1,5 @@
 """`kiks tournament`: the same table with any number of workers and after a stop, and pages for people."""
 
-from __future__ import annotations
-
 import csv
 import json
 import shutil
@@ -69,7 +67,10 @@ def tournament(place: Path, *words: str) -> dict[str, Any]:
     return found
 
 
-def test_the_table_is_the_same_with_any_workers_and_after_a_stop(place: Path) -> None:
+def test_one_player_is_an_error_and_the_table_is_the_same_with_any_workers_and_after_a_stop(place: Path) -> None:
+    alone = forked.run("tournament", "race.kiks", "players/ann.py", "--trusted", cwd=place)
+    assert alone.returncode == 2
+    assert "PLAYERS must be at least 2, for so many meet, but there are 1. Add another one." in alone.stderr
     found = tournament(place, "--trusted", "--seeds", "1", "--workers", "1", "--out", "one")
     assert [each["name"] for each in found["table"]] == ["bob", "ann", "=eve"]
     assert len(found["games"]) == 6
@@ -97,9 +98,3 @@ def test_in_the_swiss_system_one_rests_in_each_round_of_three(place: Path) -> No
     assert [each["round"] for each in found["games"]] == [1, 1, 2, 2, 3, 3]
     assert {each["played"] for each in found["table"]} == {4}
     assert Path(place / "tournament-race/tournament.html").exists()
-
-
-def test_one_player_alone_is_an_error(place: Path) -> None:
-    result = forked.run("tournament", "race.kiks", "players/ann.py", "--trusted", cwd=place)
-    assert result.returncode == 2
-    assert "PLAYERS must be at least 2, for so many meet, but there are 1. Add another one." in result.stderr

@@ -5,8 +5,6 @@ are in `support`. What a call must return stands beside it (`run`): `kGetSpeed(r
 has a folder of its own, for its files and for what tells where its session is found.
 """
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os
@@ -19,7 +17,7 @@ import threading
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import pytest
@@ -42,7 +40,6 @@ needs_octave = pytest.mark.skipif(OCTAVE is None, reason="octave-cli is not here
 @cache
 def has_tcp() -> bool:
     """Return whether Octave can open TCP connections."""
-    assert OCTAVE is not None
     command = [OCTAVE, "-qf", "--eval", "exit(isempty(pkg('list', 'instrument-control')))"]
     return subprocess.run(command, capture_output=True, timeout=GUARD_S, check=False).returncode == 0
 
@@ -50,6 +47,13 @@ def has_tcp() -> bool:
 def need_tcp() -> None:
     if not has_tcp():
         pytest.skip("Octave's instrument-control is not here: apt-get install octave-instrument-control")
+
+
+def transport_variables(transport: str) -> dict[str, str]:
+    if transport == "pipes":
+        return {}
+    need_tcp()
+    return {"KIKS_TRANSPORT": "tcp"}
 
 
 _BEGIN = f"""\
@@ -82,9 +86,8 @@ class Octave:
     """
 
     def __init__(
-        self, program: str, folder: Path, environment: Mapping[str, str] | None = None, *, shares: Octave | None = None
+        self, program: str, folder: Path, environment: Mapping[str, str] | None = None, *, shares: Self | None = None
     ) -> None:
-        assert OCTAVE is not None
         self.lines: list[str] = []
         self.said: dict[str, Any] = {}
         self._news = threading.Condition()
@@ -102,7 +105,7 @@ class Octave:
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
 
-    def __enter__(self) -> Octave:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -129,7 +132,6 @@ class Octave:
 
     def tell(self) -> None:
         """Let a program go on that waits in fread(stdin, 1); fgetl would wait for what comes after the line, too."""
-        assert self._process.stdin is not None
         self._process.stdin.write(".")
         self._process.stdin.flush()
 
@@ -137,7 +139,7 @@ class Octave:
         """Kill Octave, and nothing else."""
         self._process.kill()
 
-    def finish(self, status: int = 0) -> Octave:
+    def finish(self, status: int = 0) -> Self:
         """Wait until Octave and all its children have ended."""
         try:
             assert self._process.wait(GUARD_S) == status, self.text
@@ -154,7 +156,6 @@ class Octave:
             os.killpg(self._process.pid, signal.SIGKILL)
         self._process.wait(GUARD_S)
         self._reader.join(GUARD_S)
-        assert self._process.stdin is not None
         self._process.stdin.close()
 
     def line(self, begin: str) -> str:
@@ -170,7 +171,6 @@ class Octave:
             return "\n".join(self.lines)
 
     def _read(self) -> None:
-        assert self._process.stdout is not None
         with self._process.stdout as output:
             for line in output:
                 with self._news:

@@ -1,7 +1,5 @@
 """Octave at a terminal: tests type lines, press Ctrl-C and wait for output."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import pty
@@ -38,7 +36,6 @@ class Terminal:
     """
 
     def __init__(self, folder: Path, environment: dict[str, str] | None = None, *, edits_lines: bool = False) -> None:
-        assert OCTAVE is not None
         self.doors = folder / "doors"
         self.doors.mkdir(mode=0o700)
         own = {"KIKS_WINDOW": "0", "XDG_RUNTIME_DIR": str(self.doors), **(environment or {})}
@@ -52,7 +49,7 @@ class Terminal:
         self.type(BEGIN)
         self.wait_for("begun")
 
-    def __enter__(self) -> Terminal:
+    def __enter__(self) -> "Terminal":
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -1,7 +1,5 @@
 """Ctrl-C at Octave's prompt: it interrupts all waits, leaves nothing behind, and later answers are in step."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator
 from pathlib import Path

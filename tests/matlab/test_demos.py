@@ -1,7 +1,5 @@
 """The demos: each runs with its usual arguments and does what its help says."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Moves and turns that are calculated by kiks_mm2p go as far as they should, with no wall about."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """docs/howto/matlab.md is correct: its functions exist, and its constants are preferences."""
 
-from __future__ import annotations
-
 import re
 
 from tests.matlab.octave import ROOT, TOOLBOX
@@ -9,25 +7,17 @@ from tests.matlab.octave import ROOT, TOOLBOX
 PAGE = (ROOT / "docs" / "howto" / "matlab.md").read_text(encoding="utf-8")
 
 
-def public_functions() -> set[str]:
-    return {path.stem for path in TOOLBOX.glob("*.m")}
-
-
-def test_every_function_is_listed_and_every_listed_one_exists() -> None:
+def test_every_function_and_demo_is_listed_and_every_listed_function_exists() -> None:
     listed = set(re.findall(r"`(k\w+)`", PAGE[PAGE.index("## Functions") : PAGE.index("`kiks('--version')`")]))
-    assert listed == public_functions()
+    assert listed == {path.stem for path in TOOLBOX.glob("*.m")}
+    named = set(re.findall(r"`(\w+)`", PAGE[PAGE.index("**Demos**") : PAGE.index("**Real robots.**")]))
+    assert {path.stem for path in (TOOLBOX / "demos").glob("*.m")} <= named
 
 
 def test_every_constant_of_the_table_is_a_preference() -> None:
-    known = set(
-        re.findall(r"^(KIKS_\w+) =", (TOOLBOX / "kiks_preferences.m").read_text(encoding="utf-8"), re.MULTILINE)
-    )
+    preferences = (TOOLBOX / "kiks_preferences.m").read_text(encoding="utf-8")
+    known = set(re.findall(r"^(KIKS_\w+) =", preferences, re.MULTILINE))
     named = set(re.findall(r"`(KIKS_\w+)`", PAGE[PAGE.index("| constant") : PAGE.index("The other constants")]))
     assert named <= known
     new = {"KIKS_SEED", "KIKS_THINKING", "KIKS_ROBOT", "KIKS_TURRETS", "KIKS_PROGRAMS", "KIKS_WINDOW"}
     assert new <= named
-
-
-def test_demos_are_named() -> None:
-    named = set(re.findall(r"`(\w+)`", PAGE[PAGE.index("**Demos**") : PAGE.index("**Real robots.**")]))
-    assert {path.stem for path in (TOOLBOX / "demos").glob("*.m")} <= named

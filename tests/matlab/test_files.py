@@ -1,7 +1,5 @@
 """Arenas in files and matrices: files survive a round trip, sensors see greys, and mazes are connected."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 
@@ -255,18 +253,9 @@ def test_mazes_have_their_size_and_every_cell_can_be_reached(tmp_path: Path) -> 
 
 
 HOSTILE = (
-    "KIKS_SEED = 1e400;",
-    "KIKS_SEED = " + "9" * 5000 + ";",
-    "KIKS_SEED = struct();",
-    "KIKS_THINKING = ones(3000);",
-    "KIKS_ROBOT = '" + "x" * 5000 + "';",
-    "KIKS_ROBOT = char(zeros(1, 300));",
-    "KIKS_ARENA_CODING = '" + "x" * 5000 + "';",
-    "KIKS_TURRETS = {1, 2};",
-    "x = [",
-    "\0\x01",
-    "error('no\nsuch\nluck')",
-    'error("no\\nsuch\\nluck")',
+    *("KIKS_SEED = 1e400;", f"KIKS_SEED = {'9' * 5000};", "KIKS_SEED = struct();", "KIKS_THINKING = ones(3000);"),
+    *(f"KIKS_ROBOT = '{'x' * 5000}';", "KIKS_ROBOT = char(zeros(1, 300));", f"KIKS_ARENA_CODING = '{'x' * 5000}';"),
+    *("KIKS_TURRETS = {1, 2};", "x = [", "\0\x01", "error('no\nsuch\nluck')", 'error("no\\nsuch\\nluck")'),
     "error(repmat('x', 1, 5000))",
 )
 

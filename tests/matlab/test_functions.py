@@ -1,7 +1,5 @@
 """Every function of the toolbox exists, has help, and does on a simulated robot what its help says."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

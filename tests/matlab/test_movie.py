@@ -1,7 +1,5 @@
 """kiks_recordmovie makes a film from the opening of a port to its closing."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import av

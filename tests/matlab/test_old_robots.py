@@ -1,7 +1,5 @@
 """Robot definition files of KiKS 2.2.0, its constants of noise, light and camera, and striped robots, in Octave."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

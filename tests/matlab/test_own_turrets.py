@@ -1,12 +1,10 @@
 """Turrets that are functions of Octave in the folder `turrets`."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
 from tests.at_length import at_length
-from tests.matlab.octave import Octave, need_tcp, needs_octave, run
+from tests.matlab.octave import Octave, needs_octave, run, transport_variables
 
 from kiks import Recording
 from kiks.recording.replay import check_recording
@@ -71,16 +69,14 @@ kiks_kclose(ref)
 """
 
 
-@pytest.mark.parametrize("transport", ["", "tcp"])
+@pytest.mark.parametrize("transport", ["pipes", "tcp"])
 def test_functions_carry_out_the_orders_for_their_turrets(tmp_path: Path, transport: str) -> None:
-    if transport == "tcp":
-        need_tcp()
     folder = tmp_path / "turrets"
     folder.mkdir()
     (folder / "compass.m").write_text(COMPASS)
     (folder / "my_eye.m").write_text(EYE)
     (folder / "broken.m").write_text("function reply = broken(letter, args)\nreply = 'no number';\n")
-    octave = run(PROGRAM, tmp_path, {"KIKS_TRANSPORT": transport} if transport else {})
+    octave = run(PROGRAM, tmp_path, transport_variables(transport))
     said = octave.said
     unknown, refused = "z,Turret order not supported", "z,Protocol error"
     expected = ["t,24,s,3.5", "t,24,s,-3", "t,24,b,1,0", "t,24,n,8", unknown, unknown, unknown, refused]

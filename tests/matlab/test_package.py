@@ -1,7 +1,5 @@
 """The package for Octave that `make octave-package` builds is installed in a new home, and programs run from there."""
 
-from __future__ import annotations
-
 import re
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """kiks_preferences.m in the user's folder, a script or a function of KiKS 2.2.0; pulses that follow from the robot."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
@@ -74,9 +72,8 @@ kiks_quit(1)
     assert [len(Project.load(tmp_path / f"{name}.kiks").robots) for name in ("first", "second", "third")] == [2, 3, 4]
     things = Project.load(tmp_path / "things.toml").arena
     assert [each.brightness for each in (*things.balls, *things.cylinders)] == [255, 200]
-    assert Project.load(tmp_path / "first.kiks").robots[0].brightness is None, (
-        "the user did not choose the grey of 2.2.0"
-    )
+    grey = Project.load(tmp_path / "first.kiks").robots[0].brightness
+    assert grey is None, "the user did not choose that of 2.2.0"
     assert "warning" not in done.text
     assert "kiks_preferences:" not in done.text
 

@@ -1,7 +1,5 @@
 """kiks_record keeps the world of a session, with all its programs, and the run can be made again."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

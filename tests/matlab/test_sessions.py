@@ -1,7 +1,5 @@
 """Sessions: nothing gets lost or is left behind, programs share one, runs are repeatable, errors have reasons."""
 
-from __future__ import annotations
-
 import os
 import re
 from pathlib import Path
@@ -9,12 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from tests.at_length import at_length, cases
-from tests.matlab.octave import A_PROCESS, Octave, has_ended, need_tcp, needs_octave, run
+from tests.matlab.octave import A_PROCESS, Octave, has_ended, needs_octave, run, transport_variables
 from tests.matlab.test_functions import NAMES
 
 pytestmark = [needs_octave, pytest.mark.slow]
-
-# ---- ends ----
 
 KILLED = """
 ref = kiks_kopen([-1 9600 1]);
@@ -94,9 +90,6 @@ fread(stdin, 1);
         assert has_ended(another)
 
 
-# ---- several programs ----
-
-
 def test_two_programs_share_a_world_and_see_each_other(tmp_path: Path) -> None:
     first_program = """
 arena = zeros(300, 600);
@@ -173,8 +166,6 @@ def test_leaving_a_session_says_whether_it_goes_on(transport: str, tmp_path: Pat
     assert first.lines[-1] == "The KiKS session has ended."
 
 
-# ---- repeatable runs ----
-
 SAME = """
 global KIKS_THINKING KIKS_SEED
 KIKS_THINKING = '%s';
@@ -232,8 +223,6 @@ def test_the_speed_of_octave_changes_nothing(tmp_path: Path) -> None:
     quick, slow = (line for line in run(SLOW, tmp_path).lines if re.match(r"[\d.]+ ", line))
     assert quick == slow
 
-
-# ---- errors ----
 
 TAKES_ANYTHING = """
     kiks_setup kiks_quit kiks_kiksnet kiks_preferences kiks_siminfo_objects kiks_siminfo_speed kiks_tif2arena kiks_mm2p
@@ -316,20 +305,14 @@ WITHOUT_SESSION = calls(
     "kiks_spawn(2)  kiks_save('x.kad')  kiks_checkpoint()  kiks_reset()  kProximity(-ones(1, 4))  kiks_arena(ones(200))"
 )
 
-PREFERENCES = {
-    "KIKS_SEED": "-1",
-    "KIKS_THINKING": "'slowly'",
-    "KIKS_EMULATED_CPU": "'abacus'",
-    "KIKS_ROBOT": "'Roomba'",
-    "KIKS_RESPONSE": "'guess'",
-    "KIKS_NOISE": "2",
-    "KIKS_MOVIENAME": "5",
-    "KIKS_TURRETS": "'laser'",
-    "KIKS_ROBOTS": "0.5",
-    "KIKS_ARENA_CODING": "'other'",
-    "KIKS_COLOR_BALL": "300",
-    "KIKS_ARENA_DEFAULT_COLOR": "0",
-}
+PREFERENCES = re.findall(
+    r"(\S+) (\S+)",
+    """
+    KIKS_SEED -1  KIKS_THINKING 'slowly'  KIKS_EMULATED_CPU 'abacus'  KIKS_ROBOT 'Roomba'  KIKS_RESPONSE 'guess'
+    KIKS_NOISE 2  KIKS_MOVIENAME 5  KIKS_TURRETS 'laser'  KIKS_ROBOTS 0.5  KIKS_ARENA_CODING 'other'
+    KIKS_COLOR_BALL 300  KIKS_ARENA_DEFAULT_COLOR 0
+    """,
+)
 
 # Missing arguments and arguments of a wrong kind.
 FORGOTTEN = [f"{name}{arguments}" for name in ONLY_REF.split() for arguments in ("()", "({1, 2, 3, 4})")] + calls(
@@ -348,23 +331,13 @@ def test_wrong_arguments_get_messages_of_kiks(tmp_path: Path) -> None:
     lines = [f"say('w{number}', caught(@() {call}))" for number, call in enumerate(tried)]
     lines.insert(len(WITHOUT_SESSION), "ref = kiks_kopen([-1 9600 1]);")
     lines.append("size(kProximity(ref))  %= [[8, 1]]\nkiks_quit(1)")
-    for name, value in PREFERENCES.items():
+    for name, value in PREFERENCES:
         lines += [f"global {name}", f"before = {name};", f"{name} = {value};"]
         lines += [f"say('{name}', caught(@() kiks_arena()))", f"{name} = before;"]
     said = run("\n".join([*lines, "kiks_arena\nsize(kiks_siminfo_robotpos())  %= [[1, 3]]"]), tmp_path).said
     answers = {call: said[f"w{number}"] for number, call in enumerate(tried)}
-    answers |= {name: said[name] for name in PREFERENCES}
+    answers |= {name: said[name] for name, _ in PREFERENCES}
     clear = re.compile(r"\b(must|needs)\b.*\.$")
     vague = {call: words for call, words in answers.items() if not clear.search(words) and call not in FORGOTTEN}
     foreign = {call: words for call, words in answers.items() if not re.match(r"kiks:\w+\|", words)}
     assert foreign == vague == {}
-
-
-# ---- inside ----
-
-
-def transport_variables(transport: str) -> dict[str, str]:
-    if transport == "pipes":
-        return {}
-    need_tcp()
-    return {"KIKS_TRANSPORT": "tcp"}

@@ -1,7 +1,5 @@
 """Arenas of the Matlab KiKS, and the text format of matrices."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -25,41 +23,39 @@ def test_matrices_survive_a_round_trip(matrix: np.ndarray) -> None:
     assert np.array_equal(again, matrix / 2)
 
 
-@given(st.text())
-def test_texts_survive_a_round_trip_as_one_line(text: str) -> None:
+@given(st.text(max_size=300))
+def test_texts_survive_a_round_trip_as_one_line_and_frames_contain_their_length(text: str) -> None:
     assert unescape(escape(text)) == text
     assert "\n" not in escape(text)
     assert "\r" not in escape(text)
-
-
-@given(st.text(max_size=300))
-def test_frames_contain_their_length(text: str) -> None:
     sent = frame(text)
     length = int(sent[:8])
     assert len(sent) == max(FRAME_MIN, length + 8)
     assert sent[8 : 8 + length].decode() == text.replace("\x02", "?"), "that character ends the answer to Ctrl-C"
 
 
-def test_malformed_matrices_are_refused() -> None:
+def test_malformed_matrices_and_wrong_counts_of_numbers_are_refused() -> None:
     short = ["", "2", "2 2", "2 2 1 0", "1 1 2 0", "2 2 5 0", "2 2 4 x"]
     for words in (*short, "2 2 0 1 4 1", "-1 2 1 1", "99999 99999 1 1"):
         with pytest.raises(ParameterError, match="a matrix must be"):
             matrices_of(words)
-
-
-def test_a_wrong_count_of_numbers_is_refused() -> None:
     assert numbers_of(["1", "NaN"], 2, "both")[0] == 1
     for words in (["1"], ["1", "x"], ["1", "inf"]):
         with pytest.raises(ParameterError, match="both must be 2 finite numbers"):
             numbers_of(words, 2, "both")
 
 
-def test_rows_count_downwards_and_columns_to_the_right() -> None:
+def codes_with(elements: dict[tuple[int, int], int]) -> np.ndarray:
+    """Return an arena of 400 x 300 mm with some elements in it."""
     codes = np.zeros((300, 400))
+    codes[*zip(*elements, strict=True)] = [*elements.values()]
+    return codes
+
+
+def test_rows_count_downwards_and_columns_to_the_right_and_the_most_negative_is_the_first_robots() -> None:
+    codes = codes_with({(19, 49): 2, (149, 199): -90})
     codes[0] = 1  # the upper edge
     codes[:, 0] = 1  # the left edge
-    codes[19, 49] = 2
-    codes[149, 199] = -90
     arena = arena_of(codes)
     assert arena.brightness[-1].all()  # rows of arenas begin at the bottom
     assert arena.brightness[:, 0].all()
@@ -67,26 +63,16 @@ def test_rows_count_downwards_and_columns_to_the_right() -> None:
     assert user_place(arena, *arena.lamps[0][:2]) == (50, 20)
     assert place_mm(arena, 200, 150) == arena.starts[0][:2]
     assert arena.starts[0].heading_rad == pytest.approx(math.pi / 2)
-
-
-def test_the_most_negative_element_is_the_first_robots() -> None:
-    codes = np.zeros((300, 400))
-    codes[99, 99], codes[99, 299] = -90, -360
-    starts = arena_of(codes).starts
+    starts = arena_of(codes_with({(99, 99): -90, (99, 299): -360})).starts
     assert [start.x_mm for start in starts] == [299.5, 99.5]
     assert starts[0].heading_rad == 0.0
 
 
-def test_things_leave_the_floor_empty() -> None:
-    codes = np.zeros((300, 400))
-    codes[99, 99], codes[99, 199], codes[199, 199] = 2, 3, 4
-    arena = arena_of(codes, ball=40, cylinder=90)
+def test_things_leave_the_floor_empty_and_a_colour_mask_sets_the_brightness_of_walls() -> None:
+    arena = arena_of(codes_with({(99, 99): 2, (99, 199): 3, (199, 199): 4}), ball=40, cylinder=90)
     assert not arena.brightness.any()
     assert (len(arena.lamps), len(arena.balls), len(arena.cylinders)) == (1, 1, 1)
     assert (arena.balls[0].brightness, arena.cylinders[0].brightness) == (40, 90)
-
-
-def test_a_colour_mask_sets_the_brightness_of_walls() -> None:
     codes, greys = np.zeros((200, 200)), np.zeros((200, 200))
     codes[:10], greys[:10, :100], greys[100, 100] = 1, 61, 99
     brightness = arena_of(codes, greys, wall=200).brightness[::-1]
@@ -96,9 +82,7 @@ def test_a_colour_mask_sets_the_brightness_of_walls() -> None:
 
 
 def test_what_has_room_stays_where_it_is() -> None:
-    codes = np.zeros((300, 400))
-    codes[99, 99], codes[99, 199], codes[199, 199], codes[0, 0] = -90, 3, 4, 2
-    arena = arena_of(codes)
+    arena = arena_of(codes_with({(99, 99): -90, (99, 199): 3, (199, 199): 4, (0, 0): 2}))
     there, moves = settled(arena, 27.5)
     assert moves == []
     for part in ("starts", "balls", "cylinders", "lamps"):
@@ -106,9 +90,8 @@ def test_what_has_room_stays_where_it_is() -> None:
 
 
 def test_what_has_no_room_goes_to_the_nearest_free_place() -> None:
-    codes = np.zeros((300, 400))
+    codes = codes_with({(119, 199): -90, (151, 199): 4, (199, 29): 3})
     codes[:100] = 1
-    codes[119, 199], codes[151, 199], codes[199, 29] = -90, 4, 3
     arena, moves = settled(arena_of(codes), 27.5)
     sim = kiks.Simulation(arena)
     x, y = user_place(arena, *sim.pose(1)[:2])
@@ -156,15 +139,12 @@ INVALID = {
 }
 
 
-def test_invalid_settings_are_refused() -> None:
+def test_invalid_settings_are_refused_and_an_empty_one_is_the_default() -> None:
     for name, values in INVALID.items():
         for value in values:
             with pytest.raises(KiksError, match=r"^kiks_preferences: .* must (be|have|match)") as caught:
                 Settings().changed(name, value)
             assert len(str(caught.value)) < 600
-
-
-def test_an_empty_setting_is_the_default() -> None:
     changed = Settings().changed("ball", "40").changed("turrets", "gripper k213")
     assert (changed.ball, changed.turrets) == (40, ("gripper", "k213"))
     assert changed.changed("ball", "").ball is None

@@ -1,7 +1,5 @@
 """Constants and robot definition files of KiKS 2.2.0 change robots as they did there."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any
@@ -54,9 +52,6 @@ def counts(sim: Simulation) -> Any:
     return replies(sim, b"N\n", 200, 0.02)
 
 
-# ---- robot definition files ----
-
-
 def test_a_file_that_describes_the_khepera_makes_a_khepera() -> None:
     spec = world(figures=figures()).specs[0]
     assert spec == KHEPERA.with_changes(ambient__direction_deg=DIRECTIONS)
@@ -90,13 +85,11 @@ def test_sensors_of_twice_the_range_read_the_same_at_twice_the_distance(gap_mm: 
     assert read(60, 200) == pytest.approx(usual, rel=0.01)
 
 
-# ---- constants ----
-
-
-def test_the_values_of_the_old_simulator_change_nothing() -> None:
+def test_the_values_of_the_old_simulator_change_nothing_and_other_stripes_reach_the_robots() -> None:
     for kind in ("khepera", "khepera_ii"):
         assert OldConstants().changes(RobotSpec.load(kind)) == {}
     assert world().specs[0] == KHEPERA
+    assert world(stripes=16).specs[0].body.stripe_count == 16
 
 
 def test_background_noise_grows_in_proportion() -> None:
@@ -139,7 +132,3 @@ def test_a_fixed_shutter_leaves_a_dark_scene_dark() -> None:
     dark = replace(Arena.box(400, 400, wall_mm=10, brightness=60), starts=(Pose(200.0, 200.0, 0.0),))
     adapted, fixed = (np.array(world(dark, fixed_shutter=is_fixed).image(1)) for is_fixed in (False, True))
     assert adapted[32] > fixed[32] + 100
-
-
-def test_stripes_reach_the_robots() -> None:
-    assert world(stripes=16).specs[0].body.stripe_count == 16

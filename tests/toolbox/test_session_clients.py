@@ -1,7 +1,5 @@
 """Clients of a session, with requests as the toolbox sends them."""
 
-from __future__ import annotations
-
 import asyncio
 import threading
 import time
@@ -180,13 +178,16 @@ def test_a_long_path_keeps_its_ends_in_few_points(session: Session) -> None:
     assert 23 <= matrices_of(ask("path 1"))[0].shape[1] <= 27
 
 
-def test_a_late_reply_answers_nothing_else(ask: Asker) -> None:
+def test_a_late_reply_answers_nothing_else_and_replies_of_several_lines_are_read_completely(ask: Asker) -> None:
     assert ask(r"send 1 N\nH\n").startswith("n,")
     assert ask("ask 1 H").startswith("h,")
     assert ask("send 1 H").startswith("h,"), "each call is a command of its own, even without a terminator"
     assert ask("send 1 D,5,5") == "d"
     assert ask(r"send 1 \n") == "", "empty lines are not answered"
     assert ask("ask 1 E").startswith("e,")
+    assert ask("ask 1 help")
+    assert ask("listen 1").count(r"\n") > 3
+    assert ask("ask 1 H").startswith("h,")
 
 
 def test_fractions_are_rounded(ask: Asker) -> None:
@@ -209,15 +210,7 @@ def test_the_pace_stays_after_the_ports_are_closed(session: Session) -> None:
     assert ask("state") == before, "to be asked takes no time"
 
 
-def test_replies_of_several_lines_are_read_completely(ask: Asker) -> None:
-    first = ask("ask 1 help")
-    rest = ask("listen 1")
-    assert first
-    assert rest.count(r"\n") > 3
-    assert ask("ask 1 H").startswith("h,")
-
-
-def test_every_port_has_its_own_robot(session: Session) -> None:
+def test_every_port_has_its_own_robot_and_is_opened_once(session: Session) -> None:
     ask = begun(session)
     ask("open 1 9600", "open 2 9600", "open 3 9600")
     poses = {ask(f"pose {port}") for port in (1, 2, 3)}
@@ -225,12 +218,9 @@ def test_every_port_has_its_own_robot(session: Session) -> None:
     ask("close 0", "open 2 9600")
     assert ask("pose 2") in poses
     assert session.world.robot_count == 3
-
-
-def test_a_port_is_opened_once(ask: Asker) -> None:
-    assert "use kiks_kclose([])" in ask.refused("open 1 9600").lower()
-    ask("close 1", "close 1", "open 1 19200")
-    assert "baudrate must be" in ask.refused("open 2 7")
+    assert "use kiks_kclose([])" in ask.refused("open 2 9600").lower()
+    ask("close 2", "close 2", "open 2 19200")
+    assert "baudrate must be" in ask.refused("open 4 7")
     assert "must be -1, -2" in ask.refused("open 0 9600")
 
 
@@ -359,7 +349,7 @@ def test_objects_are_listed_lights_first_and_can_be_moved(session: Session) -> N
     assert "row must be one of the 3" in ask.refused("set_object 4 1 1 1 1")
 
 
-def test_objects_are_deleted_by_their_rows(session: Session) -> None:
+def test_objects_are_deleted_by_their_rows_and_those_without_a_place_get_one(session: Session) -> None:
     ask = begun(session, world=floor(500, 600))
     ask("spawn 2 100 400", "spawn 1 50 60", "spawn 3 200 400", "spawn 1 80 90", "spawn 2 300 400")
     assert "row must be one of the 5" in ask.refused("delete 1 6")
@@ -370,11 +360,7 @@ def test_objects_are_deleted_by_their_rows(session: Session) -> None:
     assert matrices_of(ask("objects"))[0].tolist() == objects.tolist()
     ask("delete")
     assert matrices_of(ask("objects"))[0].tolist() == objects.tolist()
-
-
-def test_objects_spawned_without_a_place_get_one(session: Session) -> None:
-    ask = begun(session, world=floor(500, 600))
-    ask(*["spawn 3 NaN NaN"] * 5, "spawn 1 NaN NaN")
+    ask(f"world {floor(500, 600)}", *["spawn 3 NaN NaN"] * 5, "spawn 1 NaN NaN")
     objects = matrices_of(ask("objects"))[0]
     assert objects[:, 0].tolist() == [1, 3, 3, 3, 3, 3]
     assert len({tuple(place) for place in objects[:, 1:3].tolist()}) == 6
@@ -415,7 +401,7 @@ def test_worlds_are_saved_and_read(session: Session, tmp_path: Path) -> None:
     assert "no such file" in ask.refused(f"read {tmp_path / 'none.kad'}").lower()
 
 
-def test_settings_hold_for_the_next_world(session: Session) -> None:
+def test_settings_hold_for_the_next_world_and_for_arenas_of_the_desk(session: Session) -> None:
     ask = begun(session, "robot khepera_ii", "robots 2", "turrets gripper", "noise 0", "brightness 7", "ball 40")
     sim = session.world
     assert sim.robot_count == 2
@@ -428,6 +414,9 @@ def test_settings_hold_for_the_next_world(session: Session) -> None:
     ask("set robot nobody")
     assert "nobody" in ask.refused("world default")
     assert session.world is sim, "the old world is still there"
+    begun(session, "robot ", "turrets gripper", "seed 9")
+    project = session.desk.project_of(Arena.box(300, 300))
+    assert (project.seed, project.robots[0].turrets, session.desk.has_old_coordinates) == (9, ("gripper",), True)
 
 
 def test_latency_of_a_calibration_is_added(session: Session) -> None:
@@ -444,17 +433,14 @@ world matrix 2 2 4 0|set_robot 1 2|spawn 1|set x 1|save|read|
 """
 
 
-def test_bad_requests_get_an_error(session: Session) -> None:
+def test_bad_requests_and_those_without_a_world_get_an_error(session: Session) -> None:
+    for request in ("pose 1", "path 1", "objects", "state", "save x.kad", "checkpoint", "reset"):
+        told = Asker(session).told(request)
+        assert (told[0] == "+" and told[HEAD:] == "") or "there must be a world first" in told, request
     ask = begun(session)
     for request in REFUSED.strip("\n").replace("\n", "|").split("|"):
         assert "KiKS itself has failed" not in ask.refused(request)
     assert ask("active") == "1"
-
-
-def test_requests_without_a_world_get_an_error(session: Session) -> None:
-    for request in ("pose 1", "path 1", "objects", "state", "save x.kad", "checkpoint", "reset"):
-        told = Asker(session).told(request)
-        assert (told[0] == "+" and told[HEAD:] == "") or "there must be a world first" in told, request
 
 
 HOSTILE = (
@@ -533,21 +519,7 @@ def test_a_robot_may_be_a_file(session: Session, tmp_path: Path) -> None:
     assert "none.toml" in ask.refused("world default")
 
 
-# ---- films ----
-
-
-def test_a_film_shows_the_time_in_which_it_was_made(session: Session, ask: Asker, tmp_path: Path) -> None:
-    ask("pause 1", f"film 1 {tmp_path}/run.webp", "pause 2")
-    assert ask("film_save") == "51"
-    assert (tmp_path / "run.webp").stat().st_size > 1000
-    assert ask("film_save") == "0"
-    assert session.world.loop.recorder is None
-    ask(f"film 1 {tmp_path}/left.webp", "pause 1")
-    ask.client.leave()
-    assert (tmp_path / "left.webp").stat().st_size > 1000, "a client that leaves has its film"
-
-
-def test_films_that_cannot_be_made_are_refused(session: Session, tmp_path: Path) -> None:
+def test_a_film_shows_the_time_in_which_it_was_made_or_is_refused(session: Session, tmp_path: Path) -> None:
     ask = begun(session)
     assert "port -1 must be open" in ask.refused(f"film 1 {tmp_path}/run.webp")
     ask("open 1 9600")
@@ -557,6 +529,14 @@ def test_films_that_cannot_be_made_are_refused(session: Session, tmp_path: Path)
     assert "a program must make one film at a time" in ask.refused(f"film 1 {tmp_path}/two.mp4")
     assert not list(tmp_path.iterdir())
     ask("film_save")
+    ask("pause 1", f"film 1 {tmp_path}/run.webp", "pause 2")
+    assert ask("film_save") == "51"
+    assert (tmp_path / "run.webp").stat().st_size > 1000
+    assert ask("film_save") == "0"
+    assert session.world.loop.recorder is None
+    ask(f"film 1 {tmp_path}/left.webp", "pause 1")
+    ask.client.leave()
+    assert (tmp_path / "left.webp").stat().st_size > 1000, "a client that leaves has its film"
 
 
 def test_an_interrupted_film_is_given_up(tmp_path: Path) -> None:
@@ -568,9 +548,6 @@ def test_an_interrupted_film_is_given_up(tmp_path: Path) -> None:
         pending.is_cancelled = True
         assert "The program was interrupted; the film was discarded" in ask.refused("film_save")
         assert not list(tmp_path.iterdir())
-
-
-# ---- what people do on the desk ----
 
 
 def halt(session: Session) -> None:
@@ -679,12 +656,6 @@ def test_polls_let_no_time_pass(session: Session) -> None:
     with session.world.lock:
         ask(*["poll"] * 100)
         assert session.world.now_ns == before_ns
-
-
-def test_an_arena_of_the_desk_gets_the_settings_of_the_session(session: Session) -> None:
-    begun(session, "turrets gripper", "seed 9")
-    project = session.desk.project_of(Arena.box(300, 300))
-    assert (project.seed, project.robots[0].turrets, session.desk.has_old_coordinates) == (9, ("gripper",), True)
 
 
 def test_a_program_is_not_disturbed_by_people_who_look_back(session: Session, tmp_path: Path) -> None:

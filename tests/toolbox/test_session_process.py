@@ -1,7 +1,5 @@
 """The process of a session: access, and that nothing is left after the last client."""
 
-from __future__ import annotations
-
 import os
 import resource
 import select
@@ -21,7 +19,6 @@ from tests.guard import GUARD_S, wait_until
 from kiks.model.shipped import shipped
 
 pytestmark = pytest.mark.slow
-
 
 KIKS = [sys.executable, "-m", "kiks"]
 """The command as a process of its own, for what a fork does in its own way: start, signals, parents."""
@@ -43,8 +40,6 @@ class Session:
         command = [*(command or forked.kiks_command()), "session", *words]
         environment = {**os.environ, "XDG_RUNTIME_DIR": str(folder)}
         self.process = subprocess.Popen(command, bufsize=0, env=environment, stdin=PIPE, stdout=PIPE)
-        assert self.process.stdin is not None
-        assert self.process.stdout is not None
         self.to, self.out = self.process.stdin.fileno(), self.process.stdout.fileno()
         # select.select() refuses descriptors from 1024 on, and a test opens a thousand first.
         self.poll = select.poll()
@@ -82,7 +77,6 @@ class Session:
         self.ask("set thinking none", "world default", "open 1 9600")
 
     def hang_up(self) -> None:
-        assert self.process.stdin is not None
         self.process.stdin.close()
 
     def wait(self) -> int:
@@ -136,10 +130,15 @@ def test_a_joined_session_ends_when_both_programs_have_left(tmp_path: Path) -> N
         assert first.wait() == 0
 
 
-def test_joining_without_a_session_is_an_error(tmp_path: Path) -> None:
+def test_joining_without_a_session_and_listening_at_an_existing_file_are_errors(tmp_path: Path) -> None:
     for number, told in (("0", "must run before it is joined"), ("7", "session 7 must run")):
         process = ended("--join", number, folder=tmp_path)
         assert (process.returncode, told in process.stdout) == (2, True)
+    file = tmp_path / "there"
+    file.write_text("mine", encoding="ascii")
+    assert "must be a new file" in ended("--listen", str(file), folder=tmp_path).stdout
+    assert file.read_text(encoding="ascii") == "mine"
+    assert list(tmp_path.glob(".there*")) == []
 
 
 def test_a_killed_session_is_noticed_by_a_joined_program_and_its_file_is_removed(tmp_path: Path) -> None:
@@ -228,9 +227,6 @@ def test_kiks_matlab_prints_the_folder_of_the_toolbox() -> None:
     assert str(shipped("matlab")) in forked.run("matlab").stdout
 
 
-# ---- unauthenticated connections ----
-
-
 def test_running_out_of_descriptors_ends_no_session(tmp_path: Path) -> None:
     with started(folder=tmp_path) as session, ExitStack() as friends:
         session.ask("world default")
@@ -279,18 +275,6 @@ def test_a_session_is_announced_when_a_client_takes_part(tmp_path: Path) -> None
         session.hang_up()
         assert session.wait() == 0
         assert not list((tmp_path / "kiks").iterdir()), "it leaves nothing"
-
-
-def test_an_existing_file_is_not_replaced(tmp_path: Path) -> None:
-    file = tmp_path / "there"
-    file.write_text("mine", encoding="ascii")
-    done = ended("--listen", str(file), folder=tmp_path)
-    assert "must be a new file" in done.stdout
-    assert file.read_text(encoding="ascii") == "mine"
-    assert list(tmp_path.glob(".there*")) == []
-
-
-# ---- waiting ----
 
 
 def test_a_slow_answer_is_announced_and_can_be_cancelled(tmp_path: Path) -> None:
