@@ -1,7 +1,5 @@
 """kiks.Khepera and the functions of the Matlab KiKS."""
 
-from __future__ import annotations
-
 import fcntl
 import math
 import os

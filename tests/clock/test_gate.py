@@ -1,7 +1,5 @@
 """The gate: pauses and slows simulated time while a person watches."""
 
-from __future__ import annotations
-
 import math
 import threading
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Thinking time: the cost of the program's own computing."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -4,8 +4,6 @@ Each begins with a `port` that has just been opened and ends with `said`, or wit
 that knows `H`, `G` and `B`. A character takes a tenth of a second, and no timeout ends near the arrival of one.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """Several programs on real ports, in lockstep and live."""
 
-from __future__ import annotations
-
 import select
 import socket
 import threading

@@ -1,7 +1,5 @@
 """The port in memory, and simulated ports by name: the bytes and times that a program sees."""
 
-from __future__ import annotations
-
 import threading
 from pathlib import Path
 

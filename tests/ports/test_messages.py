@@ -1,7 +1,5 @@
 """Messages between processes: however a stream is cut, the same requests come out, and garbage is refused."""
 
-from __future__ import annotations
-
 import socket
 import struct
 from collections.abc import Iterator

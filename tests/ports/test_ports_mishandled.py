@@ -1,7 +1,5 @@
 """Mistakes and attacks at a robot's port: browsers, floods, too many clients, no descriptors."""
 
-from __future__ import annotations
-
 import os
 import socket
 from contextlib import ExitStack, suppress

@@ -1,7 +1,5 @@
 """Which programs a desk may start for a project, another world, a restart, or the page."""
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import Callable
 from contextlib import closing, nullcontext

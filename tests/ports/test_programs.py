@@ -1,7 +1,5 @@
 """Several unchanged programs in one world: `kiks run A.py B.py`."""
 
-from __future__ import annotations
-
 import os
 import select
 import signal

@@ -1,7 +1,5 @@
 """Simulated ports against pyserial itself on a plain driver, method by method: bytes, exceptions and times."""
 
-from __future__ import annotations
-
 import errno
 import fcntl
 import os

@@ -1,7 +1,5 @@
 """Programs of strangers: whatever one does, it is stopped, its reason is named, and no other program notices it."""
 
-from __future__ import annotations
-
 import json
 import os
 import socket

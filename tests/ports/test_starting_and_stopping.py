@@ -1,7 +1,5 @@
 """Programs that start and stop in a running world, as on the desk."""
 
-from __future__ import annotations
-
 import os
 import select
 import threading

@@ -1,7 +1,5 @@
 """Programs, given as their text, that run in this process in simulated time."""
 
-from __future__ import annotations
-
 import textwrap
 from collections.abc import Callable
 from pathlib import Path

@@ -4,8 +4,6 @@ time.
 Each is in `tests/programs/corpus` and prints what does not depend on milliseconds.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import shlex

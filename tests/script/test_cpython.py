@@ -1,7 +1,5 @@
 """The insides of CPython: what a program changes there comes back, and is safe meanwhile."""
 
-from __future__ import annotations
-
 import asyncio
 import ctypes
 import gc

@@ -1,7 +1,5 @@
 """A program sees the same names and paths under `kiks run` as under Python."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess

@@ -1,7 +1,5 @@
 """Whole programs in simulated time: what `kiks run` does with their threads, clocks, signals and files."""
 
-from __future__ import annotations
-
 import re
 import signal
 import subprocess

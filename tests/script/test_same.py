@@ -1,7 +1,5 @@
 """A program finds Python's own functions and classes, and leaves them as they were."""
 
-from __future__ import annotations
-
 import pytest
 from tests.script import same
 from tests.script.conftest import Run

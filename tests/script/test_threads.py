@@ -1,7 +1,5 @@
 """Threads of a program in simulated time: what they do is what a plain discrete-event simulation says."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
