@@ -223,8 +223,7 @@ def test_the_command(recording: Recording, tmp_path: Path, capsys: pytest.Captur
     app([*words, "--size", "200x100", "--start", "1", "--end", "1.4"], standalone_mode=False)
     assert re.fullmatch(rf"Film: {tmp_path}/film.mp4, \d+ kB\n", capsys.readouterr().out)
     seen = pictures(tmp_path / "film.mp4")
-    assert len(seen) == 11
-    assert seen[0].shape == (100, 200, 3)
+    assert (len(seen), seen[0].shape) == (11, (100, 200, 3))
     np.testing.assert_allclose(seen[0][0, 0], OUTSIDE, atol=4)
     for size in ("200", "x", "axb", "-1x5", "1280x720x3"):
         with pytest.raises(ParameterError, match="--size must be a width and a height like 1280x720"):

@@ -87,8 +87,7 @@ def test_a_frame_contains_the_state_of_the_simulation():
     for number, robot in enumerate(frame.robots, 1):
         record = sim.world.state.robots[0, number - 1]
         assert robot.pose == pytest.approx(sim.pose(number), rel=1e-6)
-        assert robot.measured == record["measured_speed"].tolist()
-        assert robot.contacts == sim.contacts(number)
+        assert (robot.measured, robot.contacts) == (record["measured_speed"].tolist(), sim.contacts(number))
         assert robot.distances == pytest.approx(sim.distances_mm()[number - 1], rel=1e-6)
         assert robot.proximity == sim.proximity(number, noise=True)
         assert robot.ambient == sim.ambient(number, noise=True)
@@ -99,8 +98,7 @@ def test_a_frame_contains_the_state_of_the_simulation():
             for ray, length_mm in enumerate(lengths):
                 packed = robot.rays[sensor][ray]
                 assert packed == NO_HIT if math.isinf(length_mm) else packed / 100 == pytest.approx(length_mm, abs=6e-3)
-    assert frame.robots[0].commanded == [10, -6]
-    assert frame.robots[1].commanded == [7, 9]
+    assert (frame.robots[0].commanded, frame.robots[1].commanded) == ([10, -6], [7, 9])
     assert frame.robots[2].commanded == sim.world.state.robots["trajectory_speed"][0, 2].tolist()
     assert any(ray != NO_HIT for robot in frame.robots for row in robot.rays for ray in row)
 

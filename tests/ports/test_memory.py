@@ -73,8 +73,7 @@ def test_a_closed_port_says_so() -> None:
     ):
         with pytest.raises(kiks.LinkError, match=r"a port must be open to be used, but this one is closed"):
             use()
-    assert sim.time_s == 0.0
-    assert sim.port(1).write(b"N\n") == 2
+    assert (sim.time_s, sim.port(1).write(b"N\n")) == (0.0, 2)
 
 
 def test_close_drops_unread_replies_and_the_robot_drives_on() -> None:
@@ -89,8 +88,7 @@ def test_close_drops_unread_replies_and_the_robot_drives_on() -> None:
     port = sim.port(1)
     port.timeout = 1.0
     port.write(b"\nE\n")
-    assert port.readline() == b"e,5,5\r\n"
-    assert port.read(1) == b""
+    assert (port.readline(), port.read(1)) == (b"e,5,5\r\n", b"")
 
 
 def test_unread_output_is_limited() -> None:

@@ -62,8 +62,7 @@ def test_client_after_a_canonical_one_finds_a_raw_line_without_echo(link: str) -
             iflag, oflag, _, lflag, speed, *_ = termios.tcgetattr(port)
             assert (iflag, oflag, lflag, speed) == (0, 0, 0, termios.B9600)
             # With an echo the robot would receive its own replies, and answer them before the second command.
-            assert ask(port, b"H\n") == b"h,5,6\r\n"
-            assert ask(port, b"B\r") == b"b,5.02,5.01\r\n"
+            assert (ask(port, b"H\n"), ask(port, b"B\r")) == (b"h,5,6\r\n", b"b,5.02,5.01\r\n")
         assert run.sim.wires[0].line.baud == 9600
 
 

@@ -97,8 +97,7 @@ def test_program_joins_at_the_present_time(tmp_path: Path) -> None:
         handle = run.programs.start(first, robot=2)
         assert (handle.name, handle.robot, handle.state) == ("program 1 (program.py)", 2, "running")
         run.wait_for(lambda: not handle.is_running and not run.programs.drive)
-        assert printed(handle) == ["5.0", "8.0"]
-        assert handle.state == "ended with exit code 0"
+        assert (printed(handle), handle.state) == (["5.0", "8.0"], "ended with exit code 0")
         assert sim.time_s == 8
         again = run.programs.start(first, robot=2)
         run.wait_for(lambda: not again.is_running)

@@ -73,8 +73,7 @@ def check_again(recording: Recording, state_hash: str) -> None:
         if not replay.go_to(time_ns):
             assert there.sim.robot_count < replay.sim.robot_count or has_fewer_turrets(there.sim, replay.sim)
             replay = there
-        assert replay.sim.now_ns == time_ns
-        assert replay.sim.state_hash() == there.sim.state_hash()
+        assert (replay.sim.now_ns, replay.sim.state_hash()) == (time_ns, there.sim.state_hash())
     for each in (*replays, replay):
         while each.advance():
             pass
@@ -295,8 +294,7 @@ def test_events_of_a_recording_that_grows_are_read_as_they_come(file: Path) -> N
             recorder.flush()
             found += [*reader.contacts(), *reader.notes()]
             assert found[-1].kind == "bookmark"
-            assert log.end_ns == sim.now_ns
-            assert Replay(log, sim.now_ns).sim.state_hash() == sim.state_hash()
+            assert (log.end_ns, Replay(log, sim.now_ns).sim.state_hash()) == (sim.now_ns, sim.state_hash())
     RunWriter.of(sim).flush()
     found += [*reader.contacts(), *reader.notes()]
     table = Recording(file).table("events")
@@ -351,8 +349,7 @@ def test_another_run_is_told_with_its_first_second(file: Path) -> None:
 
     recording.log.next_input = other  # type: ignore[method-assign]
     checked = check_recording(recording.log)
-    assert checked.equal_count == 2
-    assert checked.differs_ns == 3_000_000_000
+    assert (checked.equal_count, checked.differs_ns) == (2, 3_000_000_000)
     assert check_recording(Recording(file).log).equal_count == 5
 
 

@@ -261,8 +261,7 @@ def test_a_class_comes_back(owner: type, name: str) -> None:
     change_class(owner, name, lambda _: 7, undo)
     assert vars(owner)[name](None) == 7
     undo()
-    assert dict(vars(owner)) == before
-    assert words(owner, TYPE_WORDS) == structure
+    assert (dict(vars(owner)), words(owner, TYPE_WORDS)) == (before, structure)
 
 
 # ---- objects that outlive a run, and garbage ----

@@ -125,8 +125,7 @@ def test_shares_give_each_instant_to_the_first_who_claims_it(window: Span, claim
         claims = (any(begin <= instant < end for begin, end in spans) for spans in claimed)
         counts[[*claims, True].index(True)] += 1
     found = share_time(window, **dict(zip(("link", "robot", "thinking"), claimed, strict=True)))
-    assert found == TimeShares(*counts)
-    assert found.window_ns == max(window[1] - window[0], 0)
+    assert (found, found.window_ns) == (TimeShares(*counts), max(window[1] - window[0], 0))
 
 
 PROGRAM = """
@@ -155,8 +154,7 @@ def test_shares_of_a_program_add_up(is_near: bool, tmp_path: Path) -> None:
     found = shares(sim)
     assert found.window_ns == sim.now_ns
     assert found.link_ns == sum(len(piece.data) for piece in pieces(log)) * CHARACTER_NS
-    assert found.robot_ns == 10 * PROCESSING_NS
-    assert found.thinking_ns == 10 * round(2.5 * MS)
+    assert (found.robot_ns, found.thinking_ns) == (10 * PROCESSING_NS, 10 * round(2.5 * MS))
     assert found.waiting_ns == 10 * 50 * MS + 10 * MS
 
 
@@ -172,6 +170,5 @@ def test_gaps_of_a_real_program_are_thinking() -> None:
     assert shares(sim).thinking_ns == 1000 * MS - busy_ns
     wire.leave_client(sim.now_ns)
     sim.run(1)
-    assert shares(sim).thinking_ns == 1000 * MS - busy_ns
-    assert shares(sim).waiting_ns == 2000 * MS
+    assert (shares(sim).thinking_ns, shares(sim).waiting_ns) == (1000 * MS - busy_ns, 2000 * MS)
     assert shares(sim, sim.now_ns - MS) == TimeShares(0, 0, 0, MS)

@@ -229,8 +229,7 @@ def striped_world(turn_rad: float, **body) -> Simulation:
 @pytest.mark.parametrize(("turn_rad", "brightness"), [(0.0, 1), (math.pi, 255), (7 * math.pi, 255), (-8 * math.pi, 1)])
 def test_a_robot_of_one_black_and_one_white_half_looks_like_the_half_that_is_seen(turn_rad, brightness):
     striped, plain = striped_world(turn_rad, stripe_count=1), striped_world(turn_rad, brightness=brightness)
-    assert striped.proximity(1) == plain.proximity(1)
-    assert striped.image(1) == plain.image(1)
+    assert (striped.proximity(1), striped.image(1)) == (plain.proximity(1), plain.image(1))
     assert striped.fit(1, Aim()).met() == plain.fit(1, Aim()).met()
 
 
