@@ -6,7 +6,6 @@ import os
 import resource
 import socket
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -204,9 +203,7 @@ def test_functions_of_the_matlab_kiks(sim: kiks.Simulation) -> None:
     assert sim.time_s > 2
 
 
-def test_functions_of_the_matlab_kiks_reach_real_ports_under_kiks_run(
-    sim: kiks.Simulation, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_functions_of_the_matlab_kiks_reach_real_ports_under_kiks_run(sim, tmp_path, capsys):
     program = tmp_path / "program.py"
     program.write_text("import kiks\nref = kiks.kopen([0])\nprint(kiks.ksend('H\\n', ref, 2))\nkiks.kclose(ref)\n")
     assert run_here(sim, program, [], {}) == 0

@@ -48,9 +48,7 @@ def test_no_program_is_taken_for_a_browser(lines: list[bytes], end: bytes) -> No
 
 @pytest.mark.parametrize("kind", [TcpEndpoint, Rfc2217Endpoint])
 @pytest.mark.parametrize("thinking", ["none", "live"])
-def test_a_page_in_a_browser_drives_no_robot(
-    kind: type[TcpEndpoint], thinking: str, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_a_page_in_a_browser_drives_no_robot(kind, thinking, caplog):
     endpoint = kind(0)
     form = b"POST / HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 18\r\n\r\nD,10,10\nG,7,7\n\n\n"
     options = {"pace": Pace(wall_ns=WallClock())} if thinking == "live" else {}

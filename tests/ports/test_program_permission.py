@@ -70,9 +70,7 @@ WAYS: tuple[Callable[[Desk, Project], None], ...] = (upload, restart, draw, star
 @pytest.mark.slow
 @pytest.mark.parametrize("may", [False, True], ids=["without", "with"])
 @pytest.mark.parametrize("way", WAYS)
-def test_desk_starts_programs_with_permission_only(
-    way: Callable[[Desk, Project], None], may: bool, tmp_path: Path
-) -> None:
+def test_desk_starts_programs_with_permission_only(way, may, tmp_path):
     _, trace = program(tmp_path)
     with desk_of(tmp_path, may_run_programs=may) as desk:
         way(desk, project_with("x.py", trace))

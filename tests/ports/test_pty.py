@@ -33,9 +33,7 @@ def link(tmp_path: Path) -> str:
     return str(tmp_path / "robot")
 
 
-def test_c_program_gives_the_same_run_as_the_python_program(
-    link: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_c_program_gives_the_same_run_as_the_python_program(link, tmp_path, capsys):
     compiler = shutil.which("gcc")
     if compiler is None:
         pytest.skip("there is no gcc to compile the C program with")

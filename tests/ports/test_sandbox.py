@@ -264,9 +264,7 @@ def alone(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[Command, str, 
 
 
 @pytest.mark.parametrize("is_trusted", [False, True], ids=["sandbox", "trusted"])
-def test_program_is_the_same_as_in_a_process_of_its_own(
-    is_trusted: bool, alone: list[tuple[Command, str, End]]
-) -> None:
+def test_program_is_the_same_as_in_a_process_of_its_own(is_trusted, alone):
     with Sandbox([alone[0][0].program.parent, PROGRAMS], is_trusted=is_trusted) as sandbox:
         for command, thinking, end in (*alone, alone[0]):
             assert run(command, sandbox, thinking=thinking) == end
@@ -289,9 +287,7 @@ def test_each_start_finds_an_empty_working_folder_with_the_files_of_the_program(
     [("", "is not installed"), ("#!/bin/sh\necho 'bwrap: No permissions' >&2\nexit 1\n", "'bwrap: No permissions'")],
     ids=["not installed", "without namespaces"],
 )
-def test_without_bubblewrap_one_line_says_what_to_do(
-    bwrap: str, message: str, good: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_bubblewrap_one_line_says_what_to_do(bwrap, message, good, tmp_path, monkeypatch):
     if bwrap:
         (tmp_path / "bwrap").write_text(bwrap)
         (tmp_path / "bwrap").chmod(0o755)

@@ -108,9 +108,7 @@ def test_program_joins_at_the_present_time(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("text", [FOR_EVER, STUBBORN], ids=["friendly", "stubborn"])
 @pytest.mark.parametrize("is_paused", [False, True], ids=["running", "paused"])
-def test_robot_of_a_stopped_program_stands_still_and_is_free(
-    text: str, is_paused: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_robot_of_a_stopped_program_stands_still_and_is_free(text, is_paused, tmp_path, monkeypatch):
     monkeypatch.setattr(module, "GRACE_S", 0.1)
     sim = fresh()
     gate = PausedGate(sim)

@@ -416,9 +416,7 @@ def test_mistakes_get_a_clear_error(file: Path) -> None:
             act()
 
 
-def test_a_file_that_can_grow_no_more_is_read_up_to_there(
-    file: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_a_file_that_can_grow_no_more_is_read_up_to_there(file, monkeypatch, caplog):
     """The system refuses the middle of a chunk, as a full disk does."""
     monkeypatch.setattr("kiks.recording.recorder.CHUNK_S", 0.0)
     sim, alone = Simulation(seed=1), Simulation(seed=1)
@@ -456,9 +454,7 @@ def disk(folder: Path, total: int, room: int) -> Callable[[Path], SimpleNamespac
     return usage
 
 
-def test_a_recording_leaves_a_reserve_of_its_disk_free(
-    file: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_a_recording_leaves_a_reserve_of_its_disk_free(file, monkeypatch, caplog):
     size = 5_000
     monkeypatch.setattr("kiks.recording.recorder.CHUNK_S", 0.0)
     monkeypatch.setattr("shutil.disk_usage", disk(file.parent, 1 << 40, (128 << 20) + size))
@@ -514,9 +510,7 @@ def test_a_recording_has_one_writer(file: Path) -> None:
     assert sorted(file.parent.iterdir()) == [link, file]
 
 
-def test_until_something_has_happened_for_a_second_the_recording_of_before_stays(
-    file: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_until_something_has_happened_for_a_second_the_recording_of_before_stays(file, monkeypatch, caplog):
     monkeypatch.setattr("kiks.recording.recorder.CHUNK_S", 0.0)
     with (sim := Simulation(seed=1)).record(file):
         drive(sim, 4.0)

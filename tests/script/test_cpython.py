@@ -313,9 +313,7 @@ def test_wrong_arguments_get_pythons_own_words() -> None:
         (lambda patch: patch.setattr(cpython, "_FLAGS_OFFSET", 0), "whose structures are not those of its version"),
     ],
 )
-def test_an_interpreter_that_is_not_known_gets_one_line(
-    change: Callable[[pytest.MonkeyPatch], None], lacks: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_interpreter_that_is_not_known_gets_one_line(change, lacks, monkeypatch):
     check_interpreter()
     change(monkeypatch)
     with pytest.raises(KiksError) as caught:

@@ -285,34 +285,29 @@ time.sleep(float(sys.argv[2]))
 """
 
 
-@pytest.mark.parametrize(
-    ("words", "goal"),
-    [
+def test_kiks_run_tells_and_records_the_same_judgement(tmp_path: Path) -> None:
+    (tmp_path / "game.kiks").write_text(GAME)
+    (tmp_path / "drives.py").write_text(DRIVES)
+    for words, goal in (
         (("10", "60"), {"is_solved": True, "is_failed": False, "points": 10, "time_s": 2.6}),
         (("1", "60"), {"is_solved": False, "is_failed": False, "points": 3.2, "time_s": 8.0}),
         (("1", "2"), {"is_solved": False, "is_failed": False, "points": 0.8, "time_s": 2.0}),
-    ],
-    ids=["solved", "out of time", "ends before"],
-)
-def test_kiks_run_tells_and_records_the_same_judgement(words: tuple[str, str], goal: Any, tmp_path: Path) -> None:
-    (tmp_path / "game.kiks").write_text(GAME)
-    (tmp_path / "drives.py").write_text(DRIVES)
-    result = forked.run("run", "--json", "--record", "run.mcap", "game.kiks", "drives.py", *words, cwd=tmp_path)
-    assert result.returncode == 0, result.stderr
-    told = json.loads(result.stdout)["goal"]
-    assert told == pytest.approx(goal, abs=0.06)
-    line = f"Goal {'solved' if goal['is_solved'] else 'not solved'} after {told['time_s']:.1f} s"
-    assert line in result.stderr
-    game = Project.load(tmp_path / "game.kiks").goal
-    with kiks.Recording(tmp_path / "run.mcap") as recording:
-        end = recording.world_at(recording.duration_s)
-        assert end.score["points"] == told["points"]
-        assert str(end.score["result"]).endswith(f"solved after {told['time_s']:.1f} s")
-        # Another judge sees the same when the run is made again.
-        replay = recording.replay(0)
-        judge = Judge(replay.sim, game)
-        for wait_s in judge.supervise(replay.sim):
-            if replay.sim.time_s + wait_s > recording.duration_s:
-                break
-            replay.go_to(round(1e9 * (replay.sim.time_s + wait_s)))
-        assert vars(judge.end()) == pytest.approx(told, abs=0.1)
+    ):
+        result = forked.run("run", "--json", "--record", "run.mcap", "game.kiks", "drives.py", *words, cwd=tmp_path)
+        assert result.returncode == 0, result.stderr
+        told = json.loads(result.stdout)["goal"]
+        assert told == pytest.approx(goal, abs=0.06)
+        line = f"Goal {'solved' if goal['is_solved'] else 'not solved'} after {told['time_s']:.1f} s"
+        assert line in result.stderr
+        with kiks.Recording(tmp_path / "run.mcap") as recording:
+            end = recording.world_at(recording.duration_s)
+            assert end.score["points"] == told["points"]
+            assert str(end.score["result"]).endswith(f"solved after {told['time_s']:.1f} s")
+            # Another judge sees the same when the run is made again.
+            replay = recording.replay(0)
+            judge = Judge(replay.sim, Project.load(tmp_path / "game.kiks").goal)
+            for wait_s in judge.supervise(replay.sim):
+                if replay.sim.time_s + wait_s > recording.duration_s:
+                    break
+                replay.go_to(round(1e9 * (replay.sim.time_s + wait_s)))
+            assert vars(judge.end()) == pytest.approx(told, abs=0.1)
