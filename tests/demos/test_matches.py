@@ -10,9 +10,8 @@ from tests.at_length import at_length
 from tests.cli.test_cli import state_of
 from tests.demos.shown import world_of
 
-from kiks import Khepera
+from kiks import Khepera, Simulation
 from kiks.model.shipped import demonstrations
-from kiks.sim.simulation import Simulation
 from kiks.sim.supervision import Supervision
 
 # Whole matches.

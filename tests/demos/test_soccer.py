@@ -18,9 +18,8 @@ from tests.cli.test_cli import state_of
 from tests.demos.shown import world_of
 from whereabouts import Whereabouts
 
-from kiks import Khepera
+from kiks import Khepera, Simulation
 from kiks.model import pitch
-from kiks.sim.simulation import Simulation
 from kiks.sim.supervision import Supervision
 from kiks.units import ns_from_s
 

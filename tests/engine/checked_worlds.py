@@ -13,11 +13,10 @@ from tests.batch.test_batch import all_hashes
 from tests.engine.test_determinism import run_record
 
 import kiks
+from kiks import Arena, Simulation
 from kiks.engine.state import BODY, ROBOT
-from kiks.model.arena import Arena
 from kiks.model.arena_objects import Ball, Cylinder, Lamp
 from kiks.model.robot import RESPONSES
-from kiks.sim.simulation import Simulation
 
 WILD = (math.nan, math.inf, -1e308, 1e20, -3e9)
 """Numbers that no kernel is ever given."""

@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from kiks import Arena, Simulation
 from kiks.export.frames import NO_HIT, arena_picture, describe_scene, describe_shapes, pack_frame
-from kiks.model.arena import Arena
 from kiks.model.arena_objects import Ball, Cylinder, Lamp, Pose
-from kiks.sim.simulation import Simulation
 
 WALL_MM = 10.0
 """Thickness of the walls of a box."""

@@ -15,11 +15,10 @@ from tools.sensors import models, train_networks
 from tools.sensors.card import FOUND, HALVES, TOLD, Score, data_folder, half_distances_mm, load_tables, make_card, page
 from typer.testing import CliRunner
 
+from kiks import ParameterError, RobotSpec
 from kiks.cli.fit import fit, parse_file
-from kiks.errors import ParameterError
 from kiks.fit.robot_fit import active_pairs, fit_robot
 from kiks.fit.samples import RIG_OFFSET_DEG, Samples
-from kiks.model.robot import RobotSpec
 
 pytestmark = pytest.mark.slow
 

@@ -6,11 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kiks.errors import ParameterError
+from kiks import ParameterError, RobotSpec
 from kiks.fit.robot_fit import Rig, find_rigs, fit_robot, predict
 from kiks.fit.samples import Samples
 from kiks.fit.umbmark import square_test
-from kiks.model.robot import RobotSpec
 
 GAPS_MM = np.arange(5.0, 41.0, 4.0)
 ANGLES_DEG = np.tile(np.arange(0.0, 360.0, 8.0), (len(GAPS_MM), 1))

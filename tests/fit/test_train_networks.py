@@ -7,14 +7,13 @@ import numpy as np
 import pytest
 from tools.sensors import train_networks
 
+from kiks import ParameterError, RobotSpec
 from kiks.engine import numbers
 from kiks.engine.compiling import callable_kernel
 from kiks.engine.parameters import pack
 from kiks.engine.sensing import thesis_networks as kernels
 from kiks.engine.sensing.responses import respond_all
-from kiks.errors import ParameterError
 from kiks.fit.samples import Samples
-from kiks.model.robot import RobotSpec
 from kiks.model.thesis_networks import THESIS, NetworkResponse
 
 SIZES = sorted(train_networks.SIZES)

@@ -9,10 +9,9 @@ from pathlib import Path
 import pytest
 from tests.ports.helpers import write
 
+from kiks import Arena, ParameterError
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.scripts import EXAMPLES
-from kiks.errors import ParameterError
-from kiks.model.arena import Arena
 from kiks.model.project import Project, ProjectRobot
 from kiks.ports.program_process import Command, Permission, commands_of
 from kiks.sim.from_project import simulation_of

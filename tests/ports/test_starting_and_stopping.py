@@ -13,13 +13,12 @@ import pytest
 from tests.ports.helpers import printed, wheels, write
 from tests.served import GUARD_S, PROGRAMS, Rounds, fresh
 
+from kiks import KiksError, ParameterError, Simulation
 from kiks.clock.gate import Gate
 from kiks.clock.patience import Patience
-from kiks.errors import KiksError, ParameterError
 from kiks.ports import programs as module
 from kiks.ports.program_process import OUTPUT_LIMIT, Command
 from kiks.ports.programs import Programs
-from kiks.sim.simulation import Simulation
 
 pytestmark = pytest.mark.slow
 

@@ -7,9 +7,8 @@ from typing import NamedTuple
 
 import pytest
 
-from kiks.model.arena import Arena
+from kiks import Arena, Simulation
 from kiks.script.runner import run_here
-from kiks.sim.simulation import Simulation
 
 BOX = Arena.box(200, 200)
 

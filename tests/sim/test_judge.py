@@ -12,12 +12,11 @@ import pytest
 from tests import forked
 
 import kiks
-from kiks.errors import ParameterError
+from kiks import ParameterError, Simulation
 from kiks.model.arena import Arena, Cylinder, Lamp, Pose
 from kiks.model.goal import Goal
 from kiks.model.project import Project
 from kiks.sim.judge import LOOK_S, Judge, Judgement
-from kiks.sim.simulation import Simulation
 from kiks.sim.supervision import Supervision
 
 PLACE_MM, LAMP_MM = (250.0, 200.0), (100.0, 350.0)

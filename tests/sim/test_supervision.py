@@ -5,8 +5,7 @@ from pathlib import Path
 import pytest
 from tests import forked
 
-from kiks.errors import ParameterError
-from kiks.sim.simulation import Simulation
+from kiks import ParameterError, Simulation
 from kiks.sim.supervision import Supervision
 
 TICKS = """

@@ -7,10 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kiks import Arena, Khepera, ParameterError, Simulation
-from kiks.errors import ArenaError
+from kiks import Arena, ArenaError, Khepera, ParameterError, RobotSpec, Simulation
 from kiks.model.arena import Ball, Cylinder, Lamp, Pose
-from kiks.model.robot import RobotSpec
 
 
 @pytest.fixture

@@ -9,10 +9,9 @@ from tests.at_length import cases, share
 from tests.engine.same_walls import wide_floor, with_things
 from tests.piles import DEEPEST_MM, SHOVED_MM, Pile, calm, rush
 
+from kiks import Arena, Simulation
 from kiks.engine.physics import motor
-from kiks.model.arena import Arena
 from kiks.model.arena_objects import Ball, Cylinder, Pose
-from kiks.sim.simulation import Simulation
 
 PULSE_MM = 0.08
 ROBOT_MM, BALL_MM, CYLINDER_MM = 27.5, 32.0, 16.0

@@ -12,12 +12,10 @@ from tests.at_length import share
 from tests.engine.same_walls import with_things
 from tests.engine.sensing.followed_rays import meet_discs_alone, meet_discs_of
 
+from kiks import Arena, RobotSpec, Simulation
 from kiks.engine.simd.lanes import LANES
 from kiks.firmware.turret import Turret
-from kiks.model.arena import Arena
 from kiks.model.arena_objects import Ball, Lamp, Pose
-from kiks.model.robot import RobotSpec
-from kiks.sim.simulation import Simulation
 from kiks.units import SENSOR_SLOT_NS, TICK_NS
 
 ROBOT_MM = 27.5
