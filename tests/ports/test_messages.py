@@ -37,10 +37,9 @@ ARGUMENTS = {
     Kind.SET_BAUD: st.tuples(st.integers(75, 4_000_000)),
     Kind.WAIT: st.tuples(READS, st.just(NEVER_NS) | SPANS),
 }
+HEADS = st.integers(0, 3), st.integers(0, 10**9), COUNTS, COUNTS
 REQUESTS = st.sampled_from(sorted(ARGUMENTS)).flatmap(
-    lambda kind: st.builds(
-        Request, st.just(kind), st.integers(0, 3), st.integers(0, 10**9), COUNTS, COUNTS, ARGUMENTS[kind]
-    )
+    lambda kind: st.builds(Request, st.just(kind), *HEADS, ARGUMENTS[kind])
 )
 """Requests of the right form: what they ask for may be forbidden."""
 

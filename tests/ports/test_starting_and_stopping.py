@@ -88,9 +88,8 @@ def test_programs_that_begin_together_give_the_run_of_kiks_run() -> None:
 def test_program_joins_at_the_present_time(tmp_path: Path) -> None:
     sim = fresh(2)
     sim.run(5)
-    first = write(
-        tmp_path / "program.py", "import time\nprint(time.monotonic())\ntime.sleep(3)\nprint(time.monotonic())\n"
-    )
+    text = "import time\nprint(time.monotonic())\ntime.sleep(3)\nprint(time.monotonic())\n"
+    first = write(tmp_path / "program.py", text)
     with driven(sim) as run:
         assert not run.programs.drive
         handle = run.programs.start(first, robot=2)

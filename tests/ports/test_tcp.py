@@ -101,9 +101,8 @@ def test_client_that_does_not_read_gets_all_its_replies_later() -> None:
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "192.168.1.5", "::", "example.com"])
 def test_host_must_be_a_loopback_address(host: str) -> None:
-    with pytest.raises(
-        LinkError, match=r"host must be an address that only this computer reaches, but it was .*Use 127"
-    ):
+    words = r"host must be an address that only this computer reaches, but it was .*Use 127"
+    with pytest.raises(LinkError, match=words):
         TcpEndpoint(0, host=host)
 
 

@@ -97,9 +97,7 @@ EXPECTED: dict[str, Callable[[Looks], float]] = {
     "held_s(light_mm < 300)": lambda looks: last_run_s(away_mm(looks, *LAMP_MM) < 300),
     "total_s(goal_mm(250, 200) < 90)": lambda looks: LOOK_S * (away_mm(looks, *PLACE_MM) < 90).sum(),
     "total_s(held_s(path_mm > 50) > 1)": lambda looks: LOOK_S * max(sum(each.path_mm > 50 for each in looks) - 10, 0),
-    "wall_mm": lambda looks: (
-        min(looks[-1].x_mm, 500 - looks[-1].x_mm, looks[-1].y_mm, 400 - looks[-1].y_mm) - 10 - 27.5
-    ),
+    "wall_mm": lambda looks: min(looks[-1].x_mm, 500 - looks[-1].x_mm, looks[-1].y_mm, 400 - looks[-1].y_mm) - 37.5,
     'score("laps") + score(2)': lambda looks: 10,
     "is_solved + 1": lambda looks: 1,
 }  # fmt: skip

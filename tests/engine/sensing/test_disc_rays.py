@@ -119,9 +119,8 @@ def test_a_camera_sees_discs_as_it_sees_walls(draw):
 
 def test_a_sensor_sees_a_ball_where_it_was_when_it_looked():
     """A ball passes at 1 m/s: within the 20 ms of a round it moves by 20 mm."""
-    floor = replace(
-        Arena.box(800, 800), starts=(Pose(400.0, 400.0, math.pi / 2),), balls=(Ball(300.0, 480.0, 32.0, 0.0),)
-    )
+    starts, balls = (Pose(400.0, 400.0, math.pi / 2),), (Ball(300.0, 480.0, 32.0, 0.0),)
+    floor = replace(Arena.box(800, 800), starts=starts, balls=balls)
     sim, still = (Simulation(floor, robot=EXACT) for _ in range(2))
     sim.world.state.bodies["velocity_x"] = 1000.0
     different = 0
