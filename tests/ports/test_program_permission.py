@@ -16,8 +16,6 @@ from kiks.model.project import Project, ProjectRobot
 from kiks.ports.program_process import Command, Permission, commands_of
 from kiks.sim.from_project import simulation_of
 
-TRACE = "import sys, pathlib; pathlib.Path(sys.argv[1]).touch()"
-
 
 def desk_of(folder: Path, *, may_run_programs: bool, granted: tuple[Command | None, ...] = ()) -> closing[Desk]:
     project = Project(Arena.box(300, 300))
@@ -27,7 +25,7 @@ def desk_of(folder: Path, *, may_run_programs: bool, granted: tuple[Command | No
 
 def program(folder: Path, name: str = "x.py") -> tuple[Path, Path]:
     """Write a program that creates a file; return the paths of both."""
-    return write(folder / name, TRACE).program, folder / "trace"
+    return write(folder / name, "import sys, pathlib; pathlib.Path(sys.argv[1]).touch()").program, folder / "trace"
 
 
 def project_with(path: str, trace: Path) -> Project:

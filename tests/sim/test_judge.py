@@ -24,8 +24,6 @@ PLACE_MM, LAMP_MM = (250.0, 200.0), (100.0, 350.0)
 TURNS = {0: (6, 5), 25: (-3, 4), 40: (9, 9), 80: (2, -8), 100: (7, 8)}
 """Speeds of robot 1 by the look after which they are sent."""
 
-LOOKS = 130
-
 
 def world() -> Simulation:
     arena = replace(
@@ -114,7 +112,7 @@ def run() -> tuple[Simulation, Looks, dict[str, float]]:
     for each in watching:
         next(each)
     looks, wheels = [], (0, 0)
-    for number in range(LOOKS):
+    for number in range(130):
         if number in TURNS:
             wheels = TURNS[number]
             sim.port(1).write("D,{},{}\n".format(*wheels).encode())
