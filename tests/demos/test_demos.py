@@ -60,9 +60,6 @@ def number(pattern: str, text: str) -> float:
     return float(found[1])
 
 
-# ---- what they achieve -----------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("name", ["avoid", "follow"])
 def test_one_robot_about_walls_goes_far_and_touches_nothing(name: str) -> None:
     for seed in SEEDS:
@@ -169,9 +166,6 @@ def test_pictures(capsys: pytest.CaptureFixture[str]) -> None:
     assert len(set("".join(pictures))) > 3
 
 
-# ---- how they are made -----------------------------------------------------------------------------------------------
-
-
 def test_programs_know_only_what_a_robot_tells() -> None:
     player = [ROOT / "examples/soccer" / f"{name}.py" for name in ("player", "sight", "whereabouts")]
     for path in (*DEMOS.glob("*.py"), *player):
@@ -201,9 +195,6 @@ def test_a_demonstration_takes_another_arena_if_there_is_room() -> None:
     assert len(sim.bodies()) == 12
     with pytest.raises(ArenaError, match=r"must have room for 12 cylinders, .* Take a larger one"):
         Supervision(world_of("clean", arena=Arena.box(250, 200)), supervisor)
-
-
-# ---- the command -----------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

@@ -52,9 +52,6 @@ def test_a_whole_match_of_equals_has_points_on_both_sides(name: str, tmp_path: P
     assert min(points) >= 1, result.stdout
 
 
-# ---- sumo ----
-
-
 def test_the_robot_that_touches_the_wall_has_lost_the_round() -> None:
     sim = match("sumo")
     sim.place(1, 320, 38, 0.0)
@@ -91,9 +88,6 @@ def test_the_faster_pushes_the_other_out() -> None:
     assert sim.score == {1: 1, 2: 0}
 
 
-# ---- battle ----
-
-
 def test_three_hits_knock_a_robot_out_and_it_recovers_far_away() -> None:
     sim = match("battle")
     sim.place(1, 100, 300, 0.0)
@@ -127,9 +121,6 @@ def test_a_robot_that_shoots_with_its_last_points_is_out() -> None:
     robot.turret(99, "F")
     sim.run(0.3)
     assert sim.score == {1: 0, 2: 1}
-
-
-# ---- hide and seek ----
 
 
 def test_the_hider_is_caught_where_the_seeker_is_near_and_sees_it() -> None:

@@ -97,9 +97,6 @@ def test_a_picture_that_cannot_be_written_says_so(tmp_path: Path) -> None:
             Picture.of_simulation(world()).save(tmp_path / name)
 
 
-# ---- light on the floor ----
-
-
 KHEPERA = kiks.RobotSpec.load("khepera")
 
 

@@ -84,9 +84,6 @@ def test_what_cannot_be_fitted_is_said():
         fit_robot([empty], RobotSpec.load("khepera", response="thesis"))
 
 
-# ---- the square test ----
-
-
 def end_of_square(turn: int, *, side_mm: float, believed_mm: float, track_mm: float, ratio: float) -> list[float]:
     """Return where a robot ends that drives by its wheels' ways: arcs, added up in small steps."""
     factors = 2 / (ratio + 1), 2 * ratio / (ratio + 1)

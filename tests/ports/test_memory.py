@@ -136,9 +136,6 @@ def test_two_threads_may_drive_at_the_same_time() -> None:
     assert sim.time_s > 1
 
 
-# ---- by name ----
-
-
 def test_number_alone_means_the_newest_simulation() -> None:
     older, newer = kiks.Simulation(), kiks.Simulation()
     for url, sim in (("kiks://1", newer), (older.url(1), older)):

@@ -25,8 +25,6 @@ from kiks.ports.rfc2217 import Rfc2217Endpoint
 from kiks.ports.tcp import HTTP_REQUEST, TcpEndpoint
 from kiks.units import NS_PER_S
 
-# ---- browsers ----
-
 
 @given(
     lines=st.lists(
@@ -70,9 +68,6 @@ def test_a_page_in_a_browser_drives_no_robot(kind, thinking, caplog):
         f"a client of {endpoint.name} must speak as to a serial port, but one spoke HTTP and was disconnected: a page "
         "in a browser may have tried to drive the robot. Do not open this port in a browser."
     ]
-
-
-# ---- floods ----
 
 
 @pytest.mark.parametrize("command", cases([b"N\n", b"D,5,5\n", b"H\n", b"B\n"], 2))
@@ -163,9 +158,6 @@ def test_lockstep_logs_how_long_the_next_client_waits(caplog: pytest.LogCaptureF
     (warning,) = [text for text in warnings(caplog) if "left" in text]
     assert warning.startswith("the client of robot 1 has gone and left 99")
     assert "the next client may come after that, at most" in warning
-
-
-# ---- descriptors ----
 
 
 def test_clients_wait_without_descriptors_and_the_server_goes_on(caplog: pytest.LogCaptureFixture) -> None:

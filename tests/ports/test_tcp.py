@@ -115,9 +115,6 @@ def test_port_must_be_valid_and_free() -> None:
         TcpEndpoint(65536)
 
 
-# ---- RFC 2217 ----
-
-
 def test_speed_purge_and_control_lines() -> None:
     endpoint = Rfc2217Endpoint(0)
     with served([endpoint]) as run:

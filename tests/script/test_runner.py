@@ -14,8 +14,6 @@ from tests.script.conftest import Run, programs_of
 
 from kiks.script import watchdog
 
-# ---- threads ----
-
 
 @pytest.mark.slow
 def test_thread_that_only_polls_yields(run: Run) -> None:
@@ -89,15 +87,9 @@ def test_thinking_of_threads_is_charged(run: Run) -> None:
     assert fixed == pytest.approx(none + 10 * 0.010)
 
 
-# ---- clocks, signals, files ----
-
-
 def test_alarm_without_a_handler_ends_the_program(run: Run) -> None:
     ran = run("import signal, time\nsignal.signal(14, signal.SIG_DFL)\nsignal.alarm(2)\ntime.sleep(10)\n")
     assert (ran.code, ran.time_s) == (128 + signal.SIGALRM, 2.0)
-
-
-# ---- what simulated time does not reach ----
 
 
 def test_program_that_leaves_simulated_time_ends_with_one_line(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -222,8 +214,6 @@ def test_thread_may_compute_from_its_first_moment(when: str, run: Run, monkeypat
     monkeypatch.setattr(watchdog, "SPINNING_S", 0.05)
     assert run(COMPUTES[when][0]).code == 0
 
-
-# ---- errors of the program ----
 
 CHAIN = """
 import serial, sys, threading
