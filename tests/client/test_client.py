@@ -237,10 +237,10 @@ def test_a_wrong_timeout_leaves_no_reply_unread(sim: kiks.Simulation, timeout: f
 REFUSED: list[tuple[Callable[[kiks.Simulation], object], str]] = [
     *(
         (
-            lambda _, robots=robots: kiks.Simulation(robots=robots),
+            lambda _, count=count: kiks.Simulation(robots=count),
             "robots must be a whole number from 0 to 1000, but it was",
         )
-        for robots in (-1, 1001, 1.5, "2")
+        for count in (-1, 1001, 1.5, "2")
     ),
     (lambda _: kiks.Simulation("maze.png"), r"arena must be a kiks.Arena, but it was 'maze.png'. Give kiks.Arena.load"),
     (lambda sim: sim.place(1, 20, 300, 0), r"at \(20, 300\) mm a wall is 17.5 mm inside it"),

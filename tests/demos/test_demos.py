@@ -197,16 +197,14 @@ def test_a_demonstration_takes_another_arena_if_there_is_room() -> None:
         Supervision(world_of("clean", arena=Arena.box(250, 200)), supervisor)
 
 
-@pytest.mark.parametrize(
-    ("name", "words"),
-    cases(
-        [
-            ("swarm", r"nearest neighbours \d+ mm apart, 66 mm at the start"),
-            ("clean", r"\d+ of 12 cylinders at the walls, \d at the start"),
-            ("race", r"1 laps, the best in \d\.\d\d s"),
-        ]
-    ),
-)
+PRINTED = [
+    ("swarm", r"nearest neighbours \d+ mm apart, 66 mm at the start"),
+    ("clean", r"\d+ of 12 cylinders at the walls, \d at the start"),
+    ("race", r"1 laps, the best in \d\.\d\d s"),
+]
+
+
+@pytest.mark.parametrize(("name", "words"), cases(PRINTED))
 def test_the_command_prints_a_result_and_leaves_a_picture(name: str, words: str, tmp_path: Path) -> None:
     result = forked.run("demo", name, "--seconds", "3", cwd=tmp_path)
     assert result.returncode == 0, result.stderr

@@ -201,14 +201,11 @@ MISTAKES = [
 ]
 
 
-def test_mistakes_get_a_clear_error(recording: Recording, tmp_path: Path) -> None:
+def test_mistakes_get_a_clear_error(recording: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for name, values, words in MISTAKES:
         with pytest.raises(ParameterError, match=words):
             save_film(recording, tmp_path / name, **values)
         assert not list(tmp_path.iterdir())
-
-
-def test_a_film_without_end_is_refused(recording: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(film_of_recording, "PICTURES_MAX", 100)
     with pytest.raises(ParameterError, match="a film must have at most 100 pictures, but it would have 151"):
         save_film(recording, tmp_path / "film.mp4", start_s=0.5, end_s=2.0, fps=100)

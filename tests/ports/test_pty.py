@@ -47,14 +47,9 @@ def test_c_program_gives_the_same_run_as_the_python_program(link, tmp_path, caps
         assert run.sim.state_hash() == here.state_hash()
 
 
-def test_canonical_client_is_served_like_a_raw_one(link: str) -> None:
-    with served([PtyEndpoint(link)]):
-        assert run_python(CANONICAL, link).split() == [r"b'g\n'", r"b'h,5,6\n'", r"b'h,5,6\n'"]
-
-
-def test_client_after_a_canonical_one_finds_a_raw_line_without_echo(link: str) -> None:
+def test_canonical_client_is_served_like_a_raw_one_and_the_next_finds_a_raw_line_without_echo(link: str) -> None:
     with served([PtyEndpoint(link)]) as run:
-        run_python(CANONICAL, link)
+        assert run_python(CANONICAL, link).split() == [r"b'g\n'", r"b'h,5,6\n'", r"b'h,5,6\n'"]
         run.wait_free()
         with opened(link) as port:
             iflag, oflag, _, lflag, speed, *_ = termios.tcgetattr(port)
