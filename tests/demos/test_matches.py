@@ -17,8 +17,7 @@ from kiks.sim.supervision import Supervision
 # Whole matches.
 pytestmark = pytest.mark.slow
 
-ROOT = Path(__file__).parents[2]
-MATCHES = ROOT / "examples/matches"
+MATCHES = Path(__file__).parents[2] / "examples/matches"
 
 # The state after thirty seconds with seed 1.
 HASHES = {"sumo": "061966340c04ce31", "battle": "09a7fc9544a8bbcd", "hide_and_seek": "cd3b789acf09b4e0"}

@@ -48,14 +48,10 @@ def read_frame(data: bytes) -> SimpleNamespace:
 
 def busy_world(**changes) -> Simulation:
     """Return a world with all there is to be packed, some seconds into its run."""
-    arena = replace(
-        Arena.box(600, 400, rounded_mm=50),
-        name="busy",
-        starts=(Pose(80, 100, 0.3), Pose(200, 100, 2.0), Pose(300, 300, -1.0), Pose(480, 200, 4.0)),
-        lamps=(Lamp(50, 350, 2.0), Lamp(550, 50, 1.0, False)),
-        balls=(Ball(160, 240),),
-        cylinders=(Cylinder(400, 100), Cylinder(520, 320, 12.0)),
-    )
+    starts = (Pose(80, 100, 0.3), Pose(200, 100, 2.0), Pose(300, 300, -1.0), Pose(480, 200, 4.0))
+    bodies = {"balls": (Ball(160, 240),), "cylinders": (Cylinder(400, 100), Cylinder(520, 320, 12.0))}
+    lamps = (Lamp(50, 350, 2.0), Lamp(550, 50, 1.0, False))
+    arena = replace(Arena.box(600, 400, rounded_mm=50), name="busy", starts=starts, lamps=lamps, **bodies)
     kinds = ["khepera", "khepera_ii", "khepera", "khepera_ii"]
     sim = Simulation(arena, seed=4, robot=kinds, **changes)
     for robot, turret in enumerate(("radio", "k213", "gripper", "k213"), 1):
@@ -145,7 +141,6 @@ def test_encoders_equal_the_robots_reply():
 
 @pytest.mark.parametrize("response", [None, "fast"])
 def test_watching_does_not_change_the_run(response):
-    """A run of which frames, paths, logs, views and explanations are taken every 37 ms ends like a run without them."""
     hashes = []
     for is_seen in (False, True):
         sim = busy_world(response=response)

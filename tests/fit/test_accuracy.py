@@ -95,7 +95,6 @@ def test_the_robot_of_the_file_is_the_one_that_is_found(card):
 
 @at_length
 def test_what_is_learnt_from_one_object_helps_with_the_other(card):
-    """The response is fitted to one object alone and then asked about the other, which it never saw."""
     for name in card.tables:
         for poses, largest in ((FOUND, 55), (TOLD, 75)):
             score = card.unseen[poses][name]

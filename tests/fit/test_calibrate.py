@@ -52,9 +52,7 @@ def check(found: kiks.RobotSpec, hidden: kiks.RobotSpec) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("base", "seed"), [pytest.param(BASE, 2, marks=at_length), (KHEPERA_II, 3)], ids=["khepera", "khepera_ii"]
-)
+@pytest.mark.parametrize(("base", "seed"), [pytest.param(BASE, 2, marks=at_length), (KHEPERA_II, 3)])
 def test_calibration_finds_hidden_parameters(base: kiks.RobotSpec, seed: int) -> None:
     hidden = hidden_robot(seed, base)
     sim = kiks.Simulation(robot=hidden, seed=seed)
@@ -157,7 +155,6 @@ def stands_still(sim: kiks.Simulation) -> bool:
         ({5: 155.0}, "some sensor must see the wall at 5 mm, but none reads more than 0 counts above its baseline"),
         pytest.param({15: 27.0}, "must agree with each other, but those at the .*Check the marks", marks=at_length),
     ],
-    ids=["in the open", "out of sight", "contradictory"],
 )
 def test_error_for_a_robot_in_a_wrong_place(wrong_mm: dict[float | None, float], words: str) -> None:
     sim = kiks.Simulation(robot=BASE.with_changes(proximity__jitter_counts=(0.0,)))

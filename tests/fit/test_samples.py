@@ -112,10 +112,7 @@ def test_a_radius_is_positive(tmp_path):
             load_samples(write(tmp_path, GOOD), radius_mm=radius_mm)
 
 
-def test_active_readings():
+def test_active_readings_and_nothing_in_range():
     assert is_active(np.array([0, 19, 20, 1000, 1001, 1023])).tolist() == [False, False, True, True, False, False]
-
-
-def test_nothing_in_range_is_nothing():
     samples = Samples("wall", math.inf, np.array([60.0]), np.arange(0.0, 360.0, 10.0)[None], np.zeros((1, 36, 8), int))
     assert nearnesses(samples, Fan.spread(*PLACES["rim"])).max() == 0.0

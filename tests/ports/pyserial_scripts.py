@@ -18,13 +18,7 @@ THREADS, DESCRIPTOR, SETTINGS = "threads", "descriptor", "settings"
 
 
 class Script(NamedTuple):
-    """A program.
-
-    Attributes:
-        text: Its source.
-        takes_s: How long it takes by pyserial's rules [s].
-        needs: What it needs besides the methods.
-    """
+    """The source of a program, how long it takes by pyserial's rules [s], and what it needs besides the methods."""
 
     text: str
     takes_s: float = 0

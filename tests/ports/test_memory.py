@@ -13,8 +13,6 @@ import kiks
 from kiks.clock.serial_timing import OUTPUT_LIMIT
 from kiks.units import character_ns
 
-ARENAS = Path(__file__).parents[2] / "examples" / "arenas"
-
 
 def test_exchange_takes_the_time_of_its_characters_plus_one_millisecond() -> None:
     sim = kiks.Simulation()
@@ -147,7 +145,8 @@ def test_number_alone_means_the_newest_simulation() -> None:
 
 
 def test_options_create_a_simulation() -> None:
-    url = f"kiks://2?arena={ARENAS / 'maze.toml'}&robots=2&seed=7&thinking=fixed:1&robot=khepera_ii"
+    maze = Path(__file__).parents[2] / "examples" / "arenas" / "maze.toml"
+    url = f"kiks://2?arena={maze}&robots=2&seed=7&thinking=fixed:1&robot=khepera_ii"
     with serial.serial_for_url(url, timeout=1) as port:
         port.write(b"B\n")
         assert port.readline() == b"b,6.01,6.01\r\n"

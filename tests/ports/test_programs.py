@@ -41,7 +41,6 @@ os.write(2, port.readline())
 while True: pass
 """
 
-
 ENDS = """
 import serial, sys
 port = serial.Serial('COM1', timeout=1)

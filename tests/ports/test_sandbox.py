@@ -63,7 +63,6 @@ HOSTILE = {
     "sent something to the world that is no message": SENDS.replace("DATA", r'b"\x02\0\0\0\x01\x02"'),
 }
 
-
 End = tuple[str, int, list[str]]
 """State of the world, exit code and output of a program."""
 
@@ -109,14 +108,8 @@ def around_hostile(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[P
 
 @pytest.mark.parametrize(("reason", "text"), HOSTILE.items(), ids=HOSTILE)
 def test_hostile_program_is_stopped_and_named_and_no_other_one_notices(
-    reason: str,
-    text: str,
-    good: Command,
-    usual: End,
-    usual_second: list[str],
-    beside: Sandbox,
-    around_hostile: tuple[Path, Sandbox],
-) -> None:
+    reason, text, good, usual, usual_second, beside, around_hostile
+):
     path, sandbox = around_hostile
     with ExitStack() as stack:
         if "waited" in reason:

@@ -53,7 +53,6 @@ with sim.record(sys.argv[1]):
         print(sim.now_ns, flush=True)
 """
 
-
 SHOWS = "save_figures", "save_page", "save_film"
 DRAWINGS = {name: share(lambda *_, **__: None, getattr(recordings, name)) for name in SHOWS}
 

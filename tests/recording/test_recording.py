@@ -377,7 +377,6 @@ def test_a_score_in_a_file_keeps_the_rules_of_one_that_is_set(data: str) -> None
 
 
 def test_foxglove_opens_it(file: Path) -> None:
-    """The library's reader finds all messages, and each keeps its schema."""
     import jsonschema
     from mcap.reader import make_reader
 

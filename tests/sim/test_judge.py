@@ -26,12 +26,9 @@ TURNS = {0: (6, 5), 25: (-3, 4), 40: (9, 9), 80: (2, -8), 100: (7, 8)}
 
 
 def world() -> Simulation:
-    arena = replace(
-        Arena.box(500, 400),
-        cylinders=(Cylinder(150, 100), Cylinder(300, 300), Cylinder(350, 150)),
-        lamps=(Lamp(*LAMP_MM), Lamp(400, 50, 1.0, False)),
-        starts=(Pose(200, 150, 0.3), Pose(80, 330, 2.0)),
-    )
+    cylinders = Cylinder(150, 100), Cylinder(300, 300), Cylinder(350, 150)
+    lamps, starts = (Lamp(*LAMP_MM), Lamp(400, 50, 1.0, False)), (Pose(200, 150, 0.3), Pose(80, 330, 2.0))
+    arena = replace(Arena.box(500, 400), cylinders=cylinders, lamps=lamps, starts=starts)
     return Simulation(arena, robots=2, seed=4)
 
 

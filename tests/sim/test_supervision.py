@@ -19,7 +19,6 @@ def supervise(sim):
         print("moved", number + 1, "times at", sim.time_s)
 """
 
-
 FAILED = r"able to begin, but referee\.py has failed"
 
 

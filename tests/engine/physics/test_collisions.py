@@ -16,7 +16,6 @@ from kiks.model.arena_objects import Ball, Cylinder, Pose
 PULSE_MM = 0.08
 ROBOT_MM, BALL_MM, CYLINDER_MM = 27.5, 32.0, 16.0
 
-
 STEADY_S = 0.5
 """After this long, a motor turns at the speed it was told."""
 
@@ -89,7 +88,6 @@ def test_things_in_a_pile_up_do_not_overlap(number):
 
 @pytest.mark.slow
 def test_bodies_at_rest_stay_at_rest():
-    """Once the last body has stopped, not a bit of a place changes."""
     pile = Pile.make(5)
     rush(pile, 1000)
     calm(pile, 100)

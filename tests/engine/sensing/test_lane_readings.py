@@ -81,7 +81,6 @@ def check_random_world(arena, kinds, networks, robots, bodies, rng):
 
 @pytest.mark.parametrize("response", RESPONSES)
 def test_lanes_read_the_same_as_single_sensors(make_random_arena, response):
-    """Alone, with other robots, and with balls as well."""
     kinds, networks = kinds_of(response)
     for robots, bodies in ((1, 0), (9, 0), (6, 12)):
         rng, highest = np.random.default_rng([RESPONSES.index(response), robots]), 0
