@@ -1,14 +1,11 @@
 """kiks.Khepera and the functions of the Matlab KiKS."""
 
-from __future__ import annotations
-
 import fcntl
 import math
 import os
 import resource
 import socket
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -66,8 +63,7 @@ def test_every_method(sim: kiks.Simulation) -> None:
         assert 100 < robot.analog(6) < 400
         assert robot.version() == ("5.02", "5.01")
         robot.write_bus(170, 32)
-        assert robot.read_bus(5) == 0
-        assert robot.send("M") == "Command not found"
+        assert (robot.read_bus(5), robot.send("M")) == (0, "Command not found")
         assert robot.time_s == pytest.approx(sim.time_s)
 
 
@@ -199,8 +195,7 @@ def test_error_shows_what_a_robot_or_a_port_does_wrong(sim: kiks.Simulation) -> 
 def test_functions_of_the_matlab_kiks(sim: kiks.Simulation) -> None:
     ref = kiks.kopen([-1, 19200, 1])
     assert tuple(ref) == (-1.0, -1.0, -1.0, -1.0)
-    assert kiks.ksend("D,5,5\n", ref) == "d"
-    assert kiks.ksend("D,5,5\r", ref) == "d"
+    assert (kiks.ksend("D,5,5\n", ref), kiks.ksend("D,5,5\r", ref)) == ("d", "d")
     before_s = kiks.ktime(-1)
     kiks.pause(2.0)
     assert kiks.ktime(ref) == pytest.approx(before_s + 2.0, abs=1e-3)
@@ -224,9 +219,7 @@ def test_functions_of_the_matlab_kiks(sim: kiks.Simulation) -> None:
     assert sim.time_s > 2
 
 
-def test_functions_of_the_matlab_kiks_reach_real_ports_under_kiks_run(
-    sim: kiks.Simulation, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_functions_of_the_matlab_kiks_reach_real_ports_under_kiks_run(sim, tmp_path, capsys):
     program = tmp_path / "program.py"
     program.write_text("import kiks\nref = kiks.kopen([0])\nprint(kiks.ksend('H\\n', ref, 2))\nkiks.kclose(ref)\n")
     assert run_here(sim, program, [], {}) == 0
@@ -260,10 +253,10 @@ def test_a_wrong_timeout_leaves_no_reply_unread(sim: kiks.Simulation, timeout: f
 REFUSED: list[tuple[Callable[[kiks.Simulation], object], str]] = [
     *(
         (
-            lambda _, robots=robots: kiks.Simulation(robots=robots),
+            lambda _, count=count: kiks.Simulation(robots=count),
             "robots must be a whole number from 0 to 1000, but it was",
         )
-        for robots in (-1, 1001, 1.5, "2")
+        for count in (-1, 1001, 1.5, "2")
     ),
     (lambda _: kiks.Simulation("maze.png"), r"arena must be a kiks.Arena, but it was 'maze.png'. Give kiks.Arena.load"),
     (lambda sim: sim.place(1, 20, 300, 0), r"at \(20, 300\) mm a wall is 17.5 mm inside it"),

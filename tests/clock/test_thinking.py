@@ -1,7 +1,5 @@
 """Thinking time: the cost of the program's own computing."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest
@@ -54,8 +52,7 @@ def test_live_thinking_charges_measured_time_and_replay_repeats_it(tmp_path: Pat
     assert sum(measured) > 0
     save_thinking(measured, tmp_path / "times.txt")
     replay = kiks.Simulation(thinking=f"replay:{tmp_path / 'times.txt'}", seed=5)
-    assert course(replay) == state
-    assert replay.now_ns == live.now_ns
+    assert (course(replay), replay.now_ns) == (state, live.now_ns)
 
 
 def test_factor_zero_costs_nothing() -> None:
@@ -64,32 +61,27 @@ def test_factor_zero_costs_nothing() -> None:
     assert policy.enter(is_command=True) == 0
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
+def test_errors_name_the_rule_and_the_value() -> None:
+    for text, words in (
         ("nonee", "Did you mean 'none'"),
         ("fixed", "milliseconds from 0"),
         ("fixed:-1", "'fixed:-1'"),
         ("live:nan", "a factor from 0"),
         ("replay:", "must be 'none'"),
         ("replay:/no/such/file", "must exist, but there is no such file"),
-    ],
-)
-def test_errors_name_the_rule_and_the_value(text: str, words: str) -> None:
-    with pytest.raises(kiks.ParameterError, match="must") as caught:
-        parse_thinking(text)
-    assert words in str(caught.value)
+    ):
+        with pytest.raises(kiks.ParameterError, match="must") as caught:
+            parse_thinking(text)
+        assert words in str(caught.value)
 
 
-@pytest.mark.parametrize(
-    "line", ["hunter2", "-1", "1.5", "1" * 19, "1" * 5000, "\u0663", "\u00b2", "", "1 2", "\0", "nan"]
-)
-def test_error_gives_the_number_of_a_bad_replay_line_but_not_its_text(line: str, tmp_path: Path) -> None:
-    path = tmp_path / "times.txt"
-    path.write_text(f"100\n{line}\n7\n", encoding="utf-8")
-    with pytest.raises(kiks.ParameterError, match=r"line 2, must be a whole number of ns") as caught:
-        parse_thinking(f"replay:{path}")
-    assert str(caught.value).replace(str(path), "") == (
-        "replay file '', line 2, must be a whole number of ns of at most 13 digits, but it is something else. "
-        "Record a run again with thinking 'live'."
-    )
+def test_error_gives_the_number_of_a_bad_replay_line_but_not_its_text(tmp_path: Path) -> None:
+    for line in ("hunter2", "-1", "1.5", "1" * 19, "1" * 5000, "\u0663", "\u00b2", "", "1 2", "\0", "nan"):
+        path = tmp_path / "times.txt"
+        path.write_text(f"100\n{line}\n7\n", encoding="utf-8")
+        with pytest.raises(kiks.ParameterError, match=r"line 2, must be a whole number of ns") as caught:
+            parse_thinking(f"replay:{path}")
+        assert str(caught.value).replace(str(path), "") == (
+            "replay file '', line 2, must be a whole number of ns of at most 13 digits, but it is something else. "
+            "Record a run again with thinking 'live'."
+        )

@@ -70,16 +70,10 @@ def test_a_script_is_a_command(monkeypatch: pytest.MonkeyPatch) -> None:
         runpy.run_path(str(SCRIPTS["floreano_mondada_1994"]), run_name="__main__")
 
 
-# ---- what they share ----
-
-
 def test_a_table_has_a_row_for_each_finding() -> None:
     text = table_of([Finding("speed", "48", [40.0, 42.0, 44.0], 1), Finding("a word", "", "so")])
     assert [line.split("  ")[0] for line in text.splitlines()] == ["what", "speed", "a word"]
     assert "42.0 (37.0 to 47.0, 3 seeds)" in text
-
-
-# ---- Floreano and Mondada 1994 ----
 
 
 MIDDLE = replace(kiks.Arena.box(2000, 2000), starts=(Pose(1000, 1000, 0.0),))
@@ -107,9 +101,6 @@ def test_shuttling_earns_only_where_speed_is_counted_without_its_sign() -> None:
         values[shuttling] = float(task.evaluate(back_and_forth, np.array([1]), 1)[0, 0])
     assert values[True] > 0.5
     assert values[False] < 0.1
-
-
-# ---- Floreano and Nolfi 1997 ----
 
 
 def test_the_predator_sees_the_prey_in_five_sectors() -> None:

@@ -60,9 +60,6 @@ def number(pattern: str, text: str) -> float:
     return float(found[1])
 
 
-# ---- what they achieve -----------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("name", ["avoid", "follow"])
 def test_one_robot_about_walls_goes_far_and_touches_nothing(name: str) -> None:
     for seed in SEEDS:
@@ -169,9 +166,6 @@ def test_pictures(capsys: pytest.CaptureFixture[str]) -> None:
     assert len(set("".join(pictures))) > 3
 
 
-# ---- how they are made -----------------------------------------------------------------------------------------------
-
-
 def test_programs_know_only_what_a_robot_tells() -> None:
     player = [ROOT / "examples/soccer" / f"{name}.py" for name in ("player", "sight", "whereabouts")]
     for path in (*DEMOS.glob("*.py"), *player):
@@ -203,19 +197,14 @@ def test_a_demonstration_takes_another_arena_if_there_is_room() -> None:
         Supervision(world_of("clean", arena=Arena.box(250, 200)), supervisor)
 
 
-# ---- the command -----------------------------------------------------------------------------------------------------
+PRINTED = [
+    ("swarm", r"nearest neighbours \d+ mm apart, 66 mm at the start"),
+    ("clean", r"\d+ of 12 cylinders at the walls, \d at the start"),
+    ("race", r"1 laps, the best in \d\.\d\d s"),
+]
 
 
-@pytest.mark.parametrize(
-    ("name", "words"),
-    cases(
-        [
-            ("swarm", r"nearest neighbours \d+ mm apart, 66 mm at the start"),
-            ("clean", r"\d+ of 12 cylinders at the walls, \d at the start"),
-            ("race", r"1 laps, the best in \d\.\d\d s"),
-        ]
-    ),
-)
+@pytest.mark.parametrize(("name", "words"), cases(PRINTED))
 def test_the_command_prints_a_result_and_leaves_a_picture(name: str, words: str, tmp_path: Path) -> None:
     result = forked.run("demo", name, "--seconds", "3", cwd=tmp_path)
     assert result.returncode == 0, result.stderr

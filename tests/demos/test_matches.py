@@ -10,16 +10,14 @@ from tests.at_length import at_length
 from tests.cli.test_cli import state_of
 from tests.demos.shown import world_of
 
-from kiks import Khepera
+from kiks import Khepera, Simulation
 from kiks.model.shipped import demonstrations
-from kiks.sim.simulation import Simulation
 from kiks.sim.supervision import Supervision
 
 # Whole matches.
 pytestmark = pytest.mark.slow
 
-ROOT = Path(__file__).parents[2]
-MATCHES = ROOT / "examples/matches"
+MATCHES = Path(__file__).parents[2] / "examples/matches"
 
 # The state after thirty seconds with seed 1.
 HASHES = {"sumo": "061966340c04ce31", "battle": "09a7fc9544a8bbcd", "hide_and_seek": "cd3b789acf09b4e0"}
@@ -51,9 +49,6 @@ def test_a_whole_match_of_equals_has_points_on_both_sides(name: str, tmp_path: P
     result = forked.run("demo", name, "--seed", "1", cwd=tmp_path)
     points = [int(value) for value in re.findall(r"\d+", result.stdout.splitlines()[-1])[:2]]
     assert min(points) >= 1, result.stdout
-
-
-# ---- sumo ----
 
 
 def test_the_robot_that_touches_the_wall_has_lost_the_round() -> None:
@@ -92,9 +87,6 @@ def test_the_faster_pushes_the_other_out() -> None:
     assert sim.score == {1: 1, 2: 0}
 
 
-# ---- battle ----
-
-
 def test_three_hits_knock_a_robot_out_and_it_recovers_far_away() -> None:
     sim = match("battle")
     sim.place(1, 100, 300, 0.0)
@@ -128,9 +120,6 @@ def test_a_robot_that_shoots_with_its_last_points_is_out() -> None:
     robot.turret(99, "F")
     sim.run(0.3)
     assert sim.score == {1: 0, 2: 1}
-
-
-# ---- hide and seek ----
 
 
 def test_the_hider_is_caught_where_the_seeker_is_near_and_sees_it() -> None:

@@ -18,9 +18,8 @@ from tests.cli.test_cli import state_of
 from tests.demos.shown import world_of
 from whereabouts import Whereabouts
 
-from kiks import Khepera
+from kiks import Khepera, Simulation
 from kiks.model import pitch
-from kiks.sim.simulation import Simulation
 from kiks.sim.supervision import Supervision
 from kiks.units import ns_from_s
 
@@ -79,9 +78,6 @@ def test_a_program_that_ends_leaves_the_other_to_play(tmp_path: Path) -> None:
     assert "robot 1: 0.00 m driven" in result.stderr
     assert "8.000 s simulated" in result.stderr
     assert "robot 2: 0.00 m driven" not in result.stderr
-
-
-# ---- the eye ---------------------------------------------------------------------------------------------------------
 
 
 def take(scene: list[float], *, shift: float = 0.0) -> list[int]:
@@ -148,9 +144,6 @@ def test_the_constants_are_those_of_the_camera() -> None:
         assert mean == pytest.approx(grey, abs=12)
 
 
-# ---- the place -------------------------------------------------------------------------------------------------------
-
-
 def whereabouts(at: list[int], *pose: float) -> Whereabouts:
     """Return the place of a robot whose wheels have turned by the pulses of a list."""
     return Whereabouts(SimpleNamespace(encoders=lambda: tuple(at)), *pose)  # type: ignore[arg-type]
@@ -194,9 +187,6 @@ def test_a_player_alone_scores_and_knows_where_it_is(capsys: pytest.CaptureFixtu
     assert re.search(r" [1-9]:\d   left\n", capsys.readouterr().out)
     x_mm, y_mm, _ = sim.pose(1)
     assert math.hypot(one.place.x + 615 - x_mm, one.place.y + 350 - y_mm) < 80
-
-
-# ---- the referee -----------------------------------------------------------------------------------------------------
 
 
 def test_all_of_the_ball_must_be_behind_the_line() -> None:

@@ -6,6 +6,7 @@ into the state and the lamps themselves, behind the checks that guard every entr
 
 import logging
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,11 +14,10 @@ from tests.batch.test_batch import all_hashes
 from tests.engine.test_determinism import run_record
 
 import kiks
+from kiks import Arena, Simulation
 from kiks.engine.state import BODY, ROBOT
-from kiks.model.arena import Arena
 from kiks.model.arena_objects import Ball, Cylinder, Lamp
 from kiks.model.robot import RESPONSES
-from kiks.sim.simulation import Simulation
 
 WILD = (math.nan, math.inf, -1e308, 1e20, -3e9)
 """Numbers that no kernel is ever given."""
@@ -28,15 +28,9 @@ BODY_PLACES = ("x_mm", "y_mm", "trail", "velocity_x", "velocity_y")
 
 def furnished() -> Simulation:
     """Return a world with all that a robot senses, grips and meets."""
+    lamps, balls, cylinders = (Lamp(60, 60), Lamp(250, 200, 3.0)), (Ball(60, 60, 20.0),), (Cylinder(230, 200),)
     box = Arena.box(300, 260, rounded_mm=40)
-    arena = Arena(
-        box.brightness,
-        box.mm_per_cell,
-        "furnished",
-        lamps=(Lamp(60, 60), Lamp(250, 200, 3.0)),
-        balls=(Ball(60, 60, 20.0),),
-        cylinders=(Cylinder(230, 200),),
-    )
+    arena = replace(box, name="furnished", lamps=lamps, balls=balls, cylinders=cylinders)
     sim = Simulation(arena, seed=3, robots=2)
     for turret in ("k213", "gripper", "battle"):
         sim.fit(1, turret)

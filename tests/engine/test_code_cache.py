@@ -360,9 +360,8 @@ def test_what_a_wheel_brings_for_another_version_is_quietly_ignored(caplog):
     assert not caplog.records
 
 
-@pytest.mark.parametrize(
-    ("right", "is_folder"), [(0, False), (0o020, False), (0o002, False), (0o020, True), (0o002, True)]
-)
+@pytest.mark.parametrize("right", [0, 0o020, 0o002])
+@pytest.mark.parametrize("is_folder", [False, True])
 def test_what_is_damaged_or_others_can_write_in_a_wheel_stays_and_is_quietly_ignored(right, is_folder, shipped, caplog):
     path = shipped.parent if is_folder else shipped
     path.chmod(stat.S_IMODE(path.stat().st_mode) | right)

@@ -85,9 +85,6 @@ print('/'.join(processor()), end='')
 """
 
 
-COMPILED_BEFORE = "from numba import njit\nassert njit(lambda x: x + 1)(1) == 2\n"
-
-
 def test_a_processor_has_a_level_if_it_has_all_its_features() -> None:
     for level, needed in LEVELS.items():
         assert level_of(dict.fromkeys(needed, True)) == level
@@ -102,7 +99,7 @@ def test_kernels_are_compiled_for_the_level_of_this_computer_unless_the_user_has
         (SHOWN, {}, f"{level_of(features)}/"),
         (SHOWN, {"NUMBA_CPU_NAME": "x86-64", "NUMBA_CPU_FEATURES": "+sse3"}, "x86-64/+sse3"),
         (SHOWN, {"NUMBA_CPU_NAME": "generic"}, "generic/"),
-        (COMPILED_BEFORE + SHOWN, {}, f"{here}/{features.flatten()}"),
+        ("from numba import njit\nassert njit(lambda x: x + 1)(1) == 2\n" + SHOWN, {}, f"{here}/{features.flatten()}"),
     ):
         has_level = settings or program != SHOWN or level_of(features)
         if has_level and (AT_LENGTH or shown != "generic/"):
@@ -131,10 +128,7 @@ def test_a_command_refuses_settings_with_which_kiks_cannot_work_in_one_line(sett
 
 
 def test_settings_that_numba_takes_and_kiks_cannot_work_with_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name, value, why in (
-        ("DISABLE_JIT", 1, "without its compiler"),
-        ("CPU_FEATURES", "avx", "with [+] or -"),
-    ):
+    for name, value, why in (("DISABLE_JIT", 1, "without its compiler"), ("CPU_FEATURES", "avx", "with [+] or -")):
         with monkeypatch.context() as context:
             context.setenv(f"NUMBA_{name}", str(value))
             context.setattr(numba.config, name, value)

@@ -8,10 +8,9 @@ from llvmlite import binding
 from tests.at_length import at_length
 from tests.engine.processes import python
 
-from kiks.model.arena import Arena
+from kiks import Arena, Simulation
 from kiks.model.arena_objects import Ball, Cylinder, Pose
 from kiks.model.robot import RESPONSES
-from kiks.sim.simulation import Simulation
 
 SCRIPT = (b"D,60,57\n", b"P,-255,200\n", b"D,-5,90\n", b"G,0,0\n", b"C,3000,-2000\n", b"D,127,127\n", b"C,-900,-900\n")
 LAMPS = ((60.0, 250.0, 1.0), (330.0, 90.0, 4.0), (200.0, 5.0, 2.0))

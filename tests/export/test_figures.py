@@ -9,11 +9,10 @@ import pytest
 from PIL import Image
 from tests.at_length import cases
 
-from kiks import Arena, Khepera, ParameterError, Recording
+from kiks import Arena, Khepera, ParameterError, Recording, Simulation
 from kiks.export.figures import NO_ROBOT, PANELS, figure_of, panels_of, save_figures
 from kiks.recording.analysis import odometry, time_shares
 from kiks.recording.recorder import RunRecorder
-from kiks.sim.simulation import Simulation
 
 
 @pytest.fixture(scope="module")

@@ -96,22 +96,18 @@ def test_the_robot_is_where_the_recording_has_it(ending: str, recording: Recordi
 
 
 @pytest.mark.parametrize("ending", ["mp4", "gif"])
-@pytest.mark.parametrize(
-    ("fps", "speed", "size"), [(25, 1.0, (65, 333)), (30, 4.0, (333, 65)), (7, 0.5, (96, 64))], ids=str
-)
-def test_a_film_lasts_as_long_as_its_pictures(
-    ending: str, fps: int, speed: float, size: tuple[int, int], recording: Recording, tmp_path: Path
-) -> None:
-    file = tmp_path / f"film.{ending}"
-    count = save_film(recording, file, size=size, fps=fps, speed=speed, end_s=2.0)
-    assert count == int(2.0 / speed * fps) + 1
-    frames = frames_of(file)
-    assert len(frames) == count
-    even = 2 if ending == "mp4" else 1
-    assert (frames[-1].width, frames[-1].height) == tuple(length // even * even for length in size)
-    # The clock of a GIF has hundredths.
-    times_s = [float(frame.pts * frame.time_base) for frame in frames]
-    np.testing.assert_allclose(times_s, np.arange(count) / fps, atol=0.0051 if ending == "gif" else 1e-4)
+def test_a_film_lasts_as_long_as_its_pictures(ending: str, recording: Recording, tmp_path: Path) -> None:
+    for fps, speed, size in ((25, 1.0, (65, 333)), (30, 4.0, (333, 65)), (7, 0.5, (96, 64))):
+        file = tmp_path / f"film.{ending}"
+        count = save_film(recording, file, size=size, fps=fps, speed=speed, end_s=2.0)
+        assert count == int(2.0 / speed * fps) + 1
+        frames = frames_of(file)
+        assert len(frames) == count
+        even = 2 if ending == "mp4" else 1
+        assert (frames[-1].width, frames[-1].height) == tuple(length // even * even for length in size)
+        # The clock of a GIF has hundredths.
+        times_s = [float(frame.pts * frame.time_base) for frame in frames]
+        np.testing.assert_allclose(times_s, np.arange(count) / fps, atol=0.0051 if ending == "gif" else 1e-4)
 
 
 def test_a_webp_lasts_as_long_as_its_pictures(recording: Recording, tmp_path: Path) -> None:
@@ -205,14 +201,11 @@ MISTAKES = [
 ]
 
 
-def test_mistakes_get_a_clear_error(recording: Recording, tmp_path: Path) -> None:
+def test_mistakes_get_a_clear_error(recording: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for name, values, words in MISTAKES:
         with pytest.raises(ParameterError, match=words):
             save_film(recording, tmp_path / name, **values)
         assert not list(tmp_path.iterdir())
-
-
-def test_a_film_without_end_is_refused(recording: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(film_of_recording, "PICTURES_MAX", 100)
     with pytest.raises(ParameterError, match="a film must have at most 100 pictures, but it would have 151"):
         save_film(recording, tmp_path / "film.mp4", start_s=0.5, end_s=2.0, fps=100)
@@ -223,8 +216,7 @@ def test_the_command(recording: Recording, tmp_path: Path, capsys: pytest.Captur
     app([*words, "--size", "200x100", "--start", "1", "--end", "1.4"], standalone_mode=False)
     assert re.fullmatch(rf"Film: {tmp_path}/film.mp4, \d+ kB\n", capsys.readouterr().out)
     seen = pictures(tmp_path / "film.mp4")
-    assert len(seen) == 11
-    assert seen[0].shape == (100, 200, 3)
+    assert (len(seen), seen[0].shape) == (11, (100, 200, 3))
     np.testing.assert_allclose(seen[0][0, 0], OUTSIDE, atol=4)
     for size in ("200", "x", "axb", "-1x5", "1280x720x3"):
         with pytest.raises(ParameterError, match="--size must be a width and a height like 1280x720"):

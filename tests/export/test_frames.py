@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from kiks import Arena, Simulation
 from kiks.export.frames import NO_HIT, arena_picture, describe_scene, describe_shapes, pack_frame
-from kiks.model.arena import Arena
 from kiks.model.arena_objects import Ball, Cylinder, Lamp, Pose
-from kiks.sim.simulation import Simulation
 
 WALL_MM = 10.0
 """Thickness of the walls of a box."""
@@ -49,14 +48,10 @@ def read_frame(data: bytes) -> SimpleNamespace:
 
 def busy_world(**changes) -> Simulation:
     """Return a world with all there is to be packed, some seconds into its run."""
-    arena = replace(
-        Arena.box(600, 400, rounded_mm=50),
-        name="busy",
-        starts=(Pose(80, 100, 0.3), Pose(200, 100, 2.0), Pose(300, 300, -1.0), Pose(480, 200, 4.0)),
-        lamps=(Lamp(50, 350, 2.0), Lamp(550, 50, 1.0, False)),
-        balls=(Ball(160, 240),),
-        cylinders=(Cylinder(400, 100), Cylinder(520, 320, 12.0)),
-    )
+    starts = (Pose(80, 100, 0.3), Pose(200, 100, 2.0), Pose(300, 300, -1.0), Pose(480, 200, 4.0))
+    bodies = {"balls": (Ball(160, 240),), "cylinders": (Cylinder(400, 100), Cylinder(520, 320, 12.0))}
+    lamps = (Lamp(50, 350, 2.0), Lamp(550, 50, 1.0, False))
+    arena = replace(Arena.box(600, 400, rounded_mm=50), name="busy", starts=starts, lamps=lamps, **bodies)
     kinds = ["khepera", "khepera_ii", "khepera", "khepera_ii"]
     sim = Simulation(arena, seed=4, robot=kinds, **changes)
     for robot, turret in enumerate(("radio", "k213", "gripper", "k213"), 1):
@@ -87,8 +82,7 @@ def test_a_frame_contains_the_state_of_the_simulation():
     for number, robot in enumerate(frame.robots, 1):
         record = sim.world.state.robots[0, number - 1]
         assert robot.pose == pytest.approx(sim.pose(number), rel=1e-6)
-        assert robot.measured == record["measured_speed"].tolist()
-        assert robot.contacts == sim.contacts(number)
+        assert (robot.measured, robot.contacts) == (record["measured_speed"].tolist(), sim.contacts(number))
         assert robot.distances == pytest.approx(sim.distances_mm()[number - 1], rel=1e-6)
         assert robot.proximity == sim.proximity(number, noise=True)
         assert robot.ambient == sim.ambient(number, noise=True)
@@ -99,8 +93,7 @@ def test_a_frame_contains_the_state_of_the_simulation():
             for ray, length_mm in enumerate(lengths):
                 packed = robot.rays[sensor][ray]
                 assert packed == NO_HIT if math.isinf(length_mm) else packed / 100 == pytest.approx(length_mm, abs=6e-3)
-    assert frame.robots[0].commanded == [10, -6]
-    assert frame.robots[1].commanded == [7, 9]
+    assert (frame.robots[0].commanded, frame.robots[1].commanded) == ([10, -6], [7, 9])
     assert frame.robots[2].commanded == sim.world.state.robots["trajectory_speed"][0, 2].tolist()
     assert any(ray != NO_HIT for robot in frame.robots for row in robot.rays for ray in row)
 
@@ -148,7 +141,6 @@ def test_encoders_equal_the_robots_reply():
 
 @pytest.mark.parametrize("response", [None, "fast"])
 def test_watching_does_not_change_the_run(response):
-    """A run of which frames, paths, logs, views and explanations are taken every 37 ms ends like a run without them."""
     hashes = []
     for is_seen in (False, True):
         sim = busy_world(response=response)

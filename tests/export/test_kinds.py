@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from kiks import Arena, Khepera, ParameterError, Recording, Simulation
-from kiks.export.kinds import ENDINGS, KINDS, kind_of, options_of
+from kiks.export.kinds import ENDINGS, KINDS, export, kind_of, options_of
 from kiks.export.pictures import Picture
 
 
@@ -93,8 +93,6 @@ def test_mistakes_get_a_clear_error(recording: Recording, tmp_path: Path) -> Non
     ):
         with pytest.raises(ParameterError, match=words):
             recording.export(tmp_path / name, **options)
-    from kiks.export.kinds import export
-
     with pytest.raises(ParameterError, match="a picture must be of one recording, but there are 2"):
         export([recording, recording], tmp_path / "run.png")
     assert not list(tmp_path.iterdir())

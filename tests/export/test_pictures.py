@@ -35,8 +35,7 @@ def pixel(image, x_mm: float, y_mm: float) -> tuple[int, int, int]:
 
 def test_everything_is_where_it_is() -> None:
     image = Picture.of_simulation(world()).image()
-    assert image.size == (800, 600)
-    assert pixel(image, 40, 30) == FLOOR
+    assert (image.size, pixel(image, 40, 30)) == ((800, 600), FLOOR)
     assert max(pixel(image, 4, 150)) < 200  # a wall
     red, _, blue = pixel(image, 100, 210)
     assert red > blue + 100  # the ball
@@ -96,9 +95,6 @@ def test_a_picture_that_cannot_be_written_says_so(tmp_path: Path) -> None:
     for name, words in (("no/such/folder/x.png", "a picture must go to a file"), ("x.nothing", "must end in .png")):
         with pytest.raises(ParameterError, match=words):
             Picture.of_simulation(world()).save(tmp_path / name)
-
-
-# ---- light on the floor ----
 
 
 KHEPERA = kiks.RobotSpec.load("khepera")

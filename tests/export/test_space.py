@@ -113,9 +113,6 @@ def test_boxes_of_walls_cover_what_is_wall(name: str) -> None:
     assert (cells <= grown).all()
 
 
-# ---- photos ----
-
-
 @pytest.fixture(scope="module")
 def lit(tmp_path_factory: pytest.TempPathFactory) -> Recording:
     """A ball on the left; a lamp on the right goes out after a second."""

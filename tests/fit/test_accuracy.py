@@ -15,11 +15,10 @@ from tools.sensors import models, train_networks
 from tools.sensors.card import FOUND, HALVES, TOLD, Score, data_folder, half_distances_mm, load_tables, make_card, page
 from typer.testing import CliRunner
 
+from kiks import ParameterError, RobotSpec
 from kiks.cli.fit import fit, parse_file
-from kiks.errors import ParameterError
 from kiks.fit.robot_fit import active_pairs, fit_robot
 from kiks.fit.samples import RIG_OFFSET_DEG, Samples
-from kiks.model.robot import RobotSpec
 
 pytestmark = pytest.mark.slow
 
@@ -27,26 +26,22 @@ PAGE = Path(__file__).parents[2] / "docs" / "explanation" / "accuracy.md"
 NUMBER = re.compile(r"[+-]?\d+(?:\.\d+)?")
 TOLERANCE = 1.0  # counts or mm: what rounding and another processor's last bits may change
 
-try:
-    FOLDER = data_folder()
-except ParameterError as error:
-    FOLDER = None
-    REASON = str(error)
-needs_data = pytest.mark.skipif(FOLDER is None, reason=REASON if FOLDER is None else "")
-
 
 @pytest.fixture(scope="module")
 def card():
     """The card, in `make test` without what is learnt from one object about the other, which takes half of the time."""
+    try:
+        folder = data_folder()
+    except ParameterError as error:
+        pytest.skip(str(error))
     with pytest.MonkeyPatch.context() as patch:
         if not AT_LENGTH:
             nothing = dict.fromkeys(("wall", "cylinder"), Score.of(np.zeros(1)))
             patch.setattr(cards, "_unseen", lambda tables: dict.fromkeys((FOUND, TOLD), nothing))
-        return make_card(load_tables(FOLDER))
+        return make_card(load_tables(folder))
 
 
 @at_length
-@needs_data
 def test_the_page_tells_the_truth(card):
     written, found = PAGE.read_text(encoding="utf-8"), page(card)
     advice = "run python tools/accuracy.py --page docs/explanation/accuracy.md"
@@ -56,7 +51,6 @@ def test_the_page_tells_the_truth(card):
 
 
 @at_length
-@needs_data
 def test_the_floor_and_the_competitors_stand_where_others_measured_them(card):
     floor, enki, thesis = card.score("floor"), card.score("enki", poses=TOLD), card.score("thesis")
     assert (floor.median, floor.mean) == pytest.approx((30, 34), abs=1)
@@ -71,7 +65,6 @@ def test_the_floor_and_the_competitors_stand_where_others_measured_them(card):
     assert measured_mm["cylinder"].mean() == pytest.approx(19.3, abs=0.2)
 
 
-@needs_data
 def test_the_default_is_true_to_the_real_robot(card):
     score = card.score("default")
     assert score.median <= 37
@@ -89,7 +82,6 @@ def test_the_default_is_true_to_the_real_robot(card):
 
 
 @at_length
-@needs_data
 def test_the_robot_of_the_file_is_the_one_that_is_found(card):
     """The constants of the robot's file are a minimum of the fit, or as good as one."""
     learn = [table.at_angles(HALVES["even"]) for table in card.tables.values()]
@@ -102,9 +94,7 @@ def test_the_robot_of_the_file_is_the_one_that_is_found(card):
 
 
 @at_length
-@needs_data
 def test_what_is_learnt_from_one_object_helps_with_the_other(card):
-    """The response is fitted to one object alone and then asked about the other, which it never saw."""
     for name in card.tables:
         for poses, largest in ((FOUND, 55), (TOLD, 75)):
             score = card.unseen[poses][name]
@@ -113,7 +103,6 @@ def test_what_is_learnt_from_one_object_helps_with_the_other(card):
                 assert score.median < 0.6 * card.score(competitor, [name], poses=poses).median
 
 
-@needs_data
 def test_every_figure_has_a_name_of_its_own(card):
     figures = {figure.name: figure for figure in card.figures()}
     assert len(figures) == len(list(card.figures()))
@@ -134,7 +123,6 @@ def made_card(card, monkeypatch):
 
 
 @at_length
-@needs_data
 @pytest.mark.usefixtures("made_card")
 def test_the_command_prints_json_and_draws(tmp_path):
     result = run(accuracy, "--json", "--plots", str(tmp_path / "card"))
@@ -145,7 +133,6 @@ def test_the_command_prints_json_and_draws(tmp_path):
     assert {file.name for file in (tmp_path / "card").iterdir()} >= {"errors-thesis.png", "curves-wall.png"}
 
 
-@needs_data
 @pytest.mark.usefixtures("made_card")
 def test_the_command_prints_a_table(tmp_path):
     result = run(accuracy, "--page", str(tmp_path / "page.md"))

@@ -15,7 +15,7 @@ import kiks
 from kiks.cli.calibrate import calibrate as command
 from kiks.cli.calibrate import parse_gaps
 from kiks.cli.outputs import Command
-from kiks.fit.calibrate import Calibration, calibrate, checked_gaps, default_gaps_mm, one_turn_deg
+from kiks.fit.calibrate import calibrate, checked_gaps, default_gaps_mm, one_turn_deg
 from kiks.fit.measurements import CalibrationError, processing_ms, rest
 from kiks.fit.placements import SimPlacements
 from kiks.fit.robot_fit import DIRECTION, predict
@@ -51,18 +51,13 @@ def check(found: kiks.RobotSpec, hidden: kiks.RobotSpec) -> None:
     assert idle(found)[1] == pytest.approx(zero_share, abs=0.1)
 
 
-def measured(hidden: kiks.RobotSpec, base: kiks.RobotSpec = BASE, seed: int = 0, skew_rad: float = 0.05) -> Calibration:
-    sim = kiks.Simulation(robot=hidden, seed=seed)
-    return calibrate(kiks.Khepera(sim.port(1)), SimPlacements(sim, skew_rad=skew_rad), base)
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("base", "seed"), [pytest.param(BASE, 2, marks=at_length), (KHEPERA_II, 3)], ids=["khepera", "khepera_ii"]
-)
+@pytest.mark.parametrize(("base", "seed"), [pytest.param(BASE, 2, marks=at_length), (KHEPERA_II, 3)])
 def test_calibration_finds_hidden_parameters(base: kiks.RobotSpec, seed: int) -> None:
     hidden = hidden_robot(seed, base)
-    found = measured(hidden, base, seed=seed, skew_rad=math.radians(6 * (-1) ** seed))
+    sim = kiks.Simulation(robot=hidden, seed=seed)
+    placements = SimPlacements(sim, skew_rad=math.radians(6 * (-1) ** seed))
+    found = calibrate(kiks.Khepera(sim.port(1)), placements, base)
     check(found.spec, hidden)
     assert found.fit.deviations[DIRECTION].max() < 2.0
     assert found.pulse_deviation_mm < 0.005 * hidden.body.pulse_mm
@@ -160,7 +155,6 @@ def stands_still(sim: kiks.Simulation) -> bool:
         ({5: 155.0}, "some sensor must see the wall at 5 mm, but none reads more than 0 counts above its baseline"),
         pytest.param({15: 27.0}, "must agree with each other, but those at the .*Check the marks", marks=at_length),
     ],
-    ids=["in the open", "out of sight", "contradictory"],
 )
 def test_error_for_a_robot_in_a_wrong_place(wrong_mm: dict[float | None, float], words: str) -> None:
     sim = kiks.Simulation(robot=BASE.with_changes(proximity__jitter_counts=(0.0,)))

@@ -6,11 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kiks.errors import ParameterError
+from kiks import ParameterError, RobotSpec
 from kiks.fit.robot_fit import Rig, find_rigs, fit_robot, predict
 from kiks.fit.samples import Samples
 from kiks.fit.umbmark import square_test
-from kiks.model.robot import RobotSpec
 
 GAPS_MM = np.arange(5.0, 41.0, 4.0)
 ANGLES_DEG = np.tile(np.arange(0.0, 360.0, 8.0), (len(GAPS_MM), 1))
@@ -79,13 +78,21 @@ def test_a_rig_moves_poses_and_nothing_else():
 
 def test_what_cannot_be_fitted_is_said():
     empty = Samples("wall", math.inf, GAPS_MM, ANGLES_DEG, np.zeros((*ANGLES_DEG.shape, 8), np.int64))
-    with pytest.raises(ParameterError, match="readings between 20 and 1000, but there are none"):
-        fit_robot([empty], BASE)
-    with pytest.raises(ParameterError, match="must have the response 'reflection', but 'Khepera' has 'thesis'"):
-        fit_robot([empty], RobotSpec.load("khepera", response="thesis"))
-
-
-# ---- the square test ----
+    thesis, far, one = RobotSpec.load("khepera", response="thesis"), [[-1e6, 0.0]], [[1.0, 1.0]]
+    for ask, words in (
+        (lambda: fit_robot([empty], BASE), "readings between 20 and 1000, but there are none"),
+        (lambda: fit_robot([empty], thesis), "must have the response 'reflection', but 'Khepera' has 'thesis'"),
+        (
+            lambda: square_test(np.empty((0, 2)), one, side_mm=500.0, track_mm=53.0),
+            "clockwise_mm must have the end of one",
+        ),
+        (
+            lambda: square_test(far, far, side_mm=500.0, track_mm=53.0),
+            "must lie nearer to the start of squares of 500 mm",
+        ),
+    ):
+        with pytest.raises(ParameterError, match=words):
+            ask()
 
 
 def end_of_square(turn: int, *, side_mm: float, believed_mm: float, track_mm: float, ratio: float) -> list[float]:
@@ -120,10 +127,3 @@ def test_it_gives_the_published_constants_of_a_larger_robot() -> None:
     assert test.ratio == pytest.approx(1.00084, abs=5e-5)
     assert test.track_mm == pytest.approx(336.17, rel=4e-4)
     assert test.error_mm == pytest.approx(311.0, abs=0.5)
-
-
-def test_squares_must_be_there() -> None:
-    with pytest.raises(ParameterError, match="clockwise_mm must have the end of one square"):
-        square_test(np.empty((0, 2)), [[1.0, 1.0]], side_mm=500.0, track_mm=53.0)
-    with pytest.raises(ParameterError, match="ends must lie nearer to the start of squares of 500 mm"):
-        square_test([[-1e6, 0.0]], [[-1e6, 0.0]], side_mm=500.0, track_mm=53.0)

@@ -26,8 +26,7 @@ def test_text_files_are_read(tmp_path, text):
     assert (samples.name, samples.radius_mm) == ("post", 12.5)
     assert samples.gap_mm.tolist() == [5, 7, 9]
     assert (samples.angle_deg[0] + RIG_OFFSET_DEG).tolist() == [0, 180]
-    assert samples.counts.shape == (3, 2, 8)
-    assert samples.counts[0, 0].tolist() == [0, 1, 2, 3, 4, 5, 6, 1023]
+    assert (samples.counts.shape, samples.counts[0, 0].tolist()) == ((3, 2, 8), [0, 1, 2, 3, 4, 5, 6, 1023])
     assert samples.counts[2, 1].tolist() == [9] * 8
     assert samples.at_angles(slice(1, None, 2)).counts.shape == (3, 1, 8)
 
@@ -113,10 +112,7 @@ def test_a_radius_is_positive(tmp_path):
             load_samples(write(tmp_path, GOOD), radius_mm=radius_mm)
 
 
-def test_active_readings():
+def test_active_readings_and_nothing_in_range():
     assert is_active(np.array([0, 19, 20, 1000, 1001, 1023])).tolist() == [False, False, True, True, False, False]
-
-
-def test_nothing_in_range_is_nothing():
     samples = Samples("wall", math.inf, np.array([60.0]), np.arange(0.0, 360.0, 10.0)[None], np.zeros((1, 36, 8), int))
     assert nearnesses(samples, Fan.spread(*PLACES["rim"])).max() == 0.0

@@ -7,14 +7,13 @@ import numpy as np
 import pytest
 from tools.sensors import train_networks
 
+from kiks import ParameterError, RobotSpec
 from kiks.engine import numbers
 from kiks.engine.compiling import callable_kernel
 from kiks.engine.parameters import pack
 from kiks.engine.sensing import thesis_networks as kernels
 from kiks.engine.sensing.responses import respond_all
-from kiks.errors import ParameterError
 from kiks.fit.samples import Samples
-from kiks.model.robot import RobotSpec
 from kiks.model.thesis_networks import THESIS, NetworkResponse
 
 SIZES = sorted(train_networks.SIZES)
@@ -150,14 +149,12 @@ def test_kernels_against_numpy():
 
 
 def test_networks_have_their_shape(tmp_path):
+    zeros = [[0.0] * 8]
     for change, words in (
         (None, r"must be a table, but it was \[\]. `python tools/accuracy.py"),
         ({"hidden": [[1.0]]}, r"hidden\[0\]\[0\] must be a list, but it was 1.0"),
         ({"hidden": []}, "hidden must have at least 8 items"),
-        (
-            {"hidden": [[[0.0] * 8] * 13] * 7 + [[[0.0] * 8] * 12 + [[1e7] * 8]]},
-            r"hidden\[7\]\[12\]\[0\] must be at most 1000000",
-        ),
+        ({"hidden": [zeros * 13] * 7 + [zeros * 12 + [[1e7] * 8]]}, r"hidden\[7\]\[12\]\[0\] must be at most 1000000"),
         ({"field_of_view_deg": 1e9}, "field_of_view_deg must be at most 180"),
     ):
         data = [] if change is None else json.loads(THESIS.read_text()) | change

@@ -1,7 +1,5 @@
 """Clients that do not sleep."""
 
-from __future__ import annotations
-
 import time
 from types import SimpleNamespace
 

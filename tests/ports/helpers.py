@@ -1,7 +1,5 @@
 """Helpers of several tests of ports."""
 
-from __future__ import annotations
-
 import os
 import resource
 import socket

@@ -1,7 +1,5 @@
 """The port in memory, and simulated ports by name: the bytes and times that a program sees."""
 
-from __future__ import annotations
-
 import threading
 from pathlib import Path
 
@@ -14,8 +12,6 @@ from tests.at_length import share
 import kiks
 from kiks.clock.serial_timing import OUTPUT_LIMIT
 from kiks.units import character_ns
-
-ARENAS = Path(__file__).parents[2] / "examples" / "arenas"
 
 
 def test_exchange_takes_the_time_of_its_characters_plus_one_millisecond() -> None:
@@ -75,8 +71,7 @@ def test_a_closed_port_says_so() -> None:
     ):
         with pytest.raises(kiks.LinkError, match=r"a port must be open to be used, but this one is closed"):
             use()
-    assert sim.time_s == 0.0
-    assert sim.port(1).write(b"N\n") == 2
+    assert (sim.time_s, sim.port(1).write(b"N\n")) == (0.0, 2)
 
 
 def test_close_drops_unread_replies_and_the_robot_drives_on() -> None:
@@ -91,8 +86,7 @@ def test_close_drops_unread_replies_and_the_robot_drives_on() -> None:
     port = sim.port(1)
     port.timeout = 1.0
     port.write(b"\nE\n")
-    assert port.readline() == b"e,5,5\r\n"
-    assert port.read(1) == b""
+    assert (port.readline(), port.read(1)) == (b"e,5,5\r\n", b"")
 
 
 def test_unread_output_is_limited() -> None:
@@ -140,9 +134,6 @@ def test_two_threads_may_drive_at_the_same_time() -> None:
     assert sim.time_s > 1
 
 
-# ---- by name ----
-
-
 def test_number_alone_means_the_newest_simulation() -> None:
     older, newer = kiks.Simulation(), kiks.Simulation()
     for url, sim in (("kiks://1", newer), (older.url(1), older)):
@@ -154,15 +145,15 @@ def test_number_alone_means_the_newest_simulation() -> None:
 
 
 def test_options_create_a_simulation() -> None:
-    url = f"kiks://2?arena={ARENAS / 'maze.toml'}&robots=2&seed=7&thinking=fixed:1&robot=khepera_ii"
+    maze = Path(__file__).parents[2] / "examples" / "arenas" / "maze.toml"
+    url = f"kiks://2?arena={maze}&robots=2&seed=7&thinking=fixed:1&robot=khepera_ii"
     with serial.serial_for_url(url, timeout=1) as port:
         port.write(b"B\n")
         assert port.readline() == b"b,6.01,6.01\r\n"
 
 
-@pytest.mark.parametrize(
-    ("url", "words"),
-    [
+def test_errors_explain_bad_names() -> None:
+    for url, words in (
         ("kiks://", "must be named like 'kiks://1'"),
         ("kiks://one", "must be named like 'kiks://1'"),
         ("kiks://9", "names robot 9 and the simulation has robot 1 only"),
@@ -171,11 +162,9 @@ def test_options_create_a_simulation() -> None:
         ("kiks://1?seed=x", "must be a whole number, but it was 'x'"),
         ("kiks://1?arena=/no/where.toml", "/no/where.toml"),
         ("kiks://1?robot=kephera", "Did you mean 'khepera'"),
-    ],
-)
-def test_errors_explain_bad_names(url: str, words: str) -> None:
-    sim = kiks.Simulation()
-    with pytest.raises(serial.SerialException) as caught:
-        serial.serial_for_url(url)
-    assert words in str(caught.value)
-    assert sim.robot_count == 1
+    ):
+        sim = kiks.Simulation()
+        with pytest.raises(serial.SerialException) as caught:
+            serial.serial_for_url(url)
+        assert words in str(caught.value)
+        assert sim.robot_count == 1

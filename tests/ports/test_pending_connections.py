@@ -1,7 +1,5 @@
 """Pending connections: only the token gives access, and their number and time are limited."""
 
-from __future__ import annotations
-
 import queue
 import select
 import socket

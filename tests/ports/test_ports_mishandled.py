@@ -1,7 +1,5 @@
 """Mistakes and attacks at a robot's port: browsers, floods, too many clients, no descriptors."""
 
-from __future__ import annotations
-
 import os
 import socket
 from contextlib import ExitStack, suppress
@@ -27,8 +25,6 @@ from kiks.ports.rfc2217 import Rfc2217Endpoint
 from kiks.ports.tcp import HTTP_REQUEST, TcpEndpoint
 from kiks.units import NS_PER_S
 
-# ---- browsers ----
-
 
 @given(
     lines=st.lists(
@@ -50,9 +46,7 @@ def test_no_program_is_taken_for_a_browser(lines: list[bytes], end: bytes) -> No
 
 @pytest.mark.parametrize("kind", [TcpEndpoint, Rfc2217Endpoint])
 @pytest.mark.parametrize("thinking", ["none", "live"])
-def test_a_page_in_a_browser_drives_no_robot(
-    kind: type[TcpEndpoint], thinking: str, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_a_page_in_a_browser_drives_no_robot(kind, thinking, caplog):
     endpoint = kind(0)
     form = b"POST / HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Length: 18\r\n\r\nD,10,10\nG,7,7\n\n\n"
     options = {"pace": Pace(wall_ns=WallClock())} if thinking == "live" else {}
@@ -74,9 +68,6 @@ def test_a_page_in_a_browser_drives_no_robot(
         f"a client of {endpoint.name} must speak as to a serial port, but one spoke HTTP and was disconnected: a page "
         "in a browser may have tried to drive the robot. Do not open this port in a browser."
     ]
-
-
-# ---- floods ----
 
 
 @pytest.mark.parametrize("command", cases([b"N\n", b"D,5,5\n", b"H\n", b"B\n"], 2))
@@ -167,9 +158,6 @@ def test_lockstep_logs_how_long_the_next_client_waits(caplog: pytest.LogCaptureF
     (warning,) = [text for text in warnings(caplog) if "left" in text]
     assert warning.startswith("the client of robot 1 has gone and left 99")
     assert "the next client may come after that, at most" in warning
-
-
-# ---- descriptors ----
 
 
 def test_clients_wait_without_descriptors_and_the_server_goes_on(caplog: pytest.LogCaptureFixture) -> None:

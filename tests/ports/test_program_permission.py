@@ -1,7 +1,5 @@
 """Which programs a desk may start for a project, another world, a restart, or the page."""
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import Callable
 from contextlib import closing, nullcontext
@@ -11,15 +9,12 @@ from pathlib import Path
 import pytest
 from tests.ports.helpers import write
 
+from kiks import Arena, ParameterError
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.scripts import EXAMPLES
-from kiks.errors import ParameterError
-from kiks.model.arena import Arena
 from kiks.model.project import Project, ProjectRobot
 from kiks.ports.program_process import Command, Permission, commands_of
 from kiks.sim.from_project import simulation_of
-
-TRACE = "import sys, pathlib; pathlib.Path(sys.argv[1]).touch()"
 
 
 def desk_of(folder: Path, *, may_run_programs: bool, granted: tuple[Command | None, ...] = ()) -> closing[Desk]:
@@ -30,7 +25,7 @@ def desk_of(folder: Path, *, may_run_programs: bool, granted: tuple[Command | No
 
 def program(folder: Path, name: str = "x.py") -> tuple[Path, Path]:
     """Write a program that creates a file; return the paths of both."""
-    return write(folder / name, TRACE).program, folder / "trace"
+    return write(folder / name, "import sys, pathlib; pathlib.Path(sys.argv[1]).touch()").program, folder / "trace"
 
 
 def project_with(path: str, trace: Path) -> Project:
@@ -72,9 +67,7 @@ WAYS: tuple[Callable[[Desk, Project], None], ...] = (upload, restart, draw, star
 @pytest.mark.slow
 @pytest.mark.parametrize("may", [False, True], ids=["without", "with"])
 @pytest.mark.parametrize("way", WAYS)
-def test_desk_starts_programs_with_permission_only(
-    way: Callable[[Desk, Project], None], may: bool, tmp_path: Path
-) -> None:
+def test_desk_starts_programs_with_permission_only(way, may, tmp_path):
     _, trace = program(tmp_path)
     with desk_of(tmp_path, may_run_programs=may) as desk:
         way(desk, project_with("x.py", trace))

@@ -1,7 +1,5 @@
 """The scheduler: the simulated run does not depend on the order in which requests arrive in real time."""
 
-from __future__ import annotations
-
 import heapq
 import logging
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """Several unchanged programs in one world: `kiks run A.py B.py`."""
 
-from __future__ import annotations
-
 import os
 import select
 import signal
@@ -42,7 +40,6 @@ port.write(b'L,0,1\\n')
 os.write(2, port.readline())
 while True: pass
 """
-
 
 ENDS = """
 import serial, sys
@@ -96,9 +93,7 @@ ALONE = (
 
 @pytest.mark.parametrize("thinking", ["none", "fixed:2.5"])
 @pytest.mark.parametrize("words", cases([(words,) for words in ALONE], 3), ids=lambda words: Path(" ".join(words)).name)
-def test_program_gives_the_same_run_in_its_own_process_and_in_this_one(
-    words: tuple[str, ...], thinking: str, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_program_gives_the_same_run_in_its_own_process_and_in_this_one(words, thinking, capfd):
     state, now_ns, code, _, doubt = run([words], thinking=thinking)
     there = capfd.readouterr().out
     sim = fresh(thinking=thinking)
@@ -139,29 +134,24 @@ def program_warnings(caplog: pytest.LogCaptureFixture) -> list[str]:
     return [text for text in warnings(caplog) if not text.startswith("the world begins when")]
 
 
-@pytest.mark.parametrize(
-    ("ending", "code", "how"),
-    [
+def test_end_of_a_program_does_not_affect_others(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    for ending, code, how in (
         ("1 / 0", 1, "with exit code 1"),
         ("raise SystemExit(7)", 7, "with exit code 7"),
         ("import os; os._exit(3)", 3, "with exit code 3"),
         ("import os; os.kill(os.getpid(), 9)", 137, "by signal 9"),
-    ],
-)
-def test_end_of_a_program_does_not_affect_others(
-    ending: str, code: int, how: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
-    program = write(tmp_path, "ends.py", f"import serial\nserial.Serial('COM1').write(b'L,0,1\\nH')\n{ending}\n")
-    states = set()
-    for _ in range(2):
-        state, _, found, ends, doubt = run([[program], [DRIVE, "COM1", "20", "3", "3"]])
-        assert found == code
-        assert ends == [f"program 1 (ends.py) has ended {how}.", "program 2 (drive.py) has ended with exit code 0."]
-        assert not doubt
-        states.add(state)
-        out = capfd.readouterr().out
-        assert out.count("\nn,") == 19
-    assert len(states) == 1
+    ):
+        program = write(tmp_path, "ends.py", f"import serial\nserial.Serial('COM1').write(b'L,0,1\\nH')\n{ending}\n")
+        states = set()
+        for _ in range(2):
+            state, _, found, ends, doubt = run([[program], [DRIVE, "COM1", "20", "3", "3"]])
+            assert found == code
+            assert ends == [f"program 1 (ends.py) has ended {how}.", "program 2 (drive.py) has ended with exit code 0."]
+            assert not doubt
+            states.add(state)
+            out = capfd.readouterr().out
+            assert out.count("\nn,") == 19
+        assert len(states) == 1
 
 
 def test_program_without_a_port_takes_part(tmp_path: Path) -> None:
@@ -192,9 +182,7 @@ def test_hanging_program_is_ignored_and_named(tmp_path: Path, caplog: pytest.Log
     assert still == "program 1 (hangs.py), which the world does not wait for, still runs. Ctrl-C ends it."
 
 
-def test_hanging_program_is_dropped_and_is_not_called_running_if_it_ends_late(
-    tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_hanging_program_is_dropped_and_is_not_called_running_if_it_ends_late(tmp_path, caplog, monkeypatch):
     send, has_ended = OwnChild.signal, threading.Event()
 
     def send_late(self: OwnChild, number: int) -> None:

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import errno
 import os
 import shutil
@@ -35,9 +33,7 @@ def link(tmp_path: Path) -> str:
     return str(tmp_path / "robot")
 
 
-def test_c_program_gives_the_same_run_as_the_python_program(
-    link: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_c_program_gives_the_same_run_as_the_python_program(link, tmp_path, capsys):
     compiler = shutil.which("gcc")
     if compiler is None:
         pytest.skip("there is no gcc to compile the C program with")
@@ -51,21 +47,15 @@ def test_c_program_gives_the_same_run_as_the_python_program(
         assert run.sim.state_hash() == here.state_hash()
 
 
-def test_canonical_client_is_served_like_a_raw_one(link: str) -> None:
-    with served([PtyEndpoint(link)]):
-        assert run_python(CANONICAL, link).split() == [r"b'g\n'", r"b'h,5,6\n'", r"b'h,5,6\n'"]
-
-
-def test_client_after_a_canonical_one_finds_a_raw_line_without_echo(link: str) -> None:
+def test_canonical_client_is_served_like_a_raw_one_and_the_next_finds_a_raw_line_without_echo(link: str) -> None:
     with served([PtyEndpoint(link)]) as run:
-        run_python(CANONICAL, link)
+        assert run_python(CANONICAL, link).split() == [r"b'g\n'", r"b'h,5,6\n'", r"b'h,5,6\n'"]
         run.wait_free()
         with opened(link) as port:
             iflag, oflag, _, lflag, speed, *_ = termios.tcgetattr(port)
             assert (iflag, oflag, lflag, speed) == (0, 0, 0, termios.B9600)
             # With an echo the robot would receive its own replies, and answer them before the second command.
-            assert ask(port, b"H\n") == b"h,5,6\r\n"
-            assert ask(port, b"B\r") == b"b,5.02,5.01\r\n"
+            assert (ask(port, b"H\n"), ask(port, b"B\r")) == (b"h,5,6\r\n", b"b,5.02,5.01\r\n")
         assert run.sim.wires[0].line.baud == 9600
 
 

@@ -1,7 +1,5 @@
 """Simulated ports against pyserial itself on a plain driver, method by method: bytes, exceptions and times."""
 
-from __future__ import annotations
-
 import errno
 import fcntl
 import os
@@ -289,9 +287,8 @@ def said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Said:
     return said
 
 
-@pytest.mark.parametrize(
-    "port",
-    [
+def test_class_of_pyserial(said: Said) -> None:
+    for port in (
         "serial.VTIMESerial('/dev/ttyUSB0', timeout=1)",
         "serial.VTIMESerial('/dev/ttyUSB0', timeout=0.19)",
         "serial.PosixPollSerial('/dev/ttyUSB0', timeout=1)",
@@ -303,20 +300,18 @@ def said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Said:
         "serial.serial_for_url('kiks://1')",
         "serial.serial_for_url('loop://', timeout=1)",
         "type('Loud', (serial.Serial,), {})('COM3')",
-    ],
-)
-def test_class_of_pyserial(port: str, said: Said) -> None:
-    before = dict(vars(serial.Serial))
-    ran = said(f"""
+    ):
+        before = dict(vars(serial.Serial))
+        ran = said(f"""
 before = time.monotonic()
 port = {port}
 port.write(b"D,0,0\\n")
 print(port.read(3), round(time.monotonic() - before, 3))
 """)
-    assert ran.out == ("b'D,0' 0.0\n" if "loop" in port else "b'd\\r\\n' 0.011\n")
-    assert dict(vars(serial.Serial)) == before
-    if "spy" in port:  # each line of pyserial's: time, direction, ...
-        assert [line.split()[1] for line in ran.err.splitlines()] == ["TX", "RX"]
+        assert ran.out == ("b'D,0' 0.0\n" if "loop" in port else "b'd\\r\\n' 0.011\n")
+        assert dict(vars(serial.Serial)) == before
+        if "spy" in port:  # each line of pyserial's: time, direction, ...
+            assert [line.split()[1] for line in ran.err.splitlines()] == ["TX", "RX"]
 
 
 def test_timeout_of_the_driver_begins_anew_with_each_piece(said: Said) -> None:

@@ -1,7 +1,5 @@
 """Programs of strangers: whatever one does, it is stopped, its reason is named, and no other program notices it."""
 
-from __future__ import annotations
-
 import json
 import os
 import socket
@@ -65,7 +63,6 @@ HOSTILE = {
     "sent something to the world that is no message": SENDS.replace("DATA", r'b"\x02\0\0\0\x01\x02"'),
 }
 
-
 End = tuple[str, int, list[str]]
 """State of the world, exit code and output of a program."""
 
@@ -111,14 +108,8 @@ def around_hostile(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[P
 
 @pytest.mark.parametrize(("reason", "text"), HOSTILE.items(), ids=HOSTILE)
 def test_hostile_program_is_stopped_and_named_and_no_other_one_notices(
-    reason: str,
-    text: str,
-    good: Command,
-    usual: End,
-    usual_second: list[str],
-    beside: Sandbox,
-    around_hostile: tuple[Path, Sandbox],
-) -> None:
+    reason, text, good, usual, usual_second, beside, around_hostile
+):
     path, sandbox = around_hostile
     with ExitStack() as stack:
         if "waited" in reason:
@@ -266,9 +257,7 @@ def alone(tmp_path_factory: pytest.TempPathFactory) -> list[tuple[Command, str, 
 
 
 @pytest.mark.parametrize("is_trusted", [False, True], ids=["sandbox", "trusted"])
-def test_program_is_the_same_as_in_a_process_of_its_own(
-    is_trusted: bool, alone: list[tuple[Command, str, End]]
-) -> None:
+def test_program_is_the_same_as_in_a_process_of_its_own(is_trusted, alone):
     with Sandbox([alone[0][0].program.parent, PROGRAMS], is_trusted=is_trusted) as sandbox:
         for command, thinking, end in (*alone, alone[0]):
             assert run(command, sandbox, thinking=thinking) == end
@@ -276,10 +265,8 @@ def test_program_is_the_same_as_in_a_process_of_its_own(
 
 
 def test_each_start_finds_an_empty_working_folder_with_the_files_of_the_program(tmp_path: Path) -> None:
-    command = write(
-        tmp_path / "first" / "program.py",
-        "import os\nprint(sorted(os.listdir()))\nopen('left', 'w')\nopen('/tmp/left', 'w')",
-    )
+    text = "import os\nprint(sorted(os.listdir()))\nopen('left', 'w')\nopen('/tmp/left', 'w')"
+    command = write(tmp_path / "first" / "program.py", text)
     (tmp_path / "first" / "map.txt").write_text("here")
     with Sandbox([tmp_path / "first"]) as sandbox:
         for _ in range(2):
@@ -291,9 +278,7 @@ def test_each_start_finds_an_empty_working_folder_with_the_files_of_the_program(
     [("", "is not installed"), ("#!/bin/sh\necho 'bwrap: No permissions' >&2\nexit 1\n", "'bwrap: No permissions'")],
     ids=["not installed", "without namespaces"],
 )
-def test_without_bubblewrap_one_line_says_what_to_do(
-    bwrap: str, message: str, good: Command, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_bubblewrap_one_line_says_what_to_do(bwrap, message, good, tmp_path, monkeypatch):
     if bwrap:
         (tmp_path / "bwrap").write_text(bwrap)
         (tmp_path / "bwrap").chmod(0o755)

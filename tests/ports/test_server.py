@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import os
 import signal
 import subprocess
@@ -49,8 +47,7 @@ def test_lockstep_drops_a_line_without_end_as_the_robot_does(tmp_path: Path) -> 
         for _ in range(3 * BACKLOG_LIMIT // 1024):
             os.write(port, b"x" * 1024)
             run.wait_rounds(1)
-        assert ask(port, b"\n") == b"Command not found\r\n"
-        assert ask(port, b"H\n") == b"h,0,0\r\n"
+        assert (ask(port, b"\n"), ask(port, b"H\n")) == (b"Command not found\r\n", b"h,0,0\r\n")
 
 
 def test_live_reply_arrives_on_time(tmp_path: Path) -> None:

@@ -1,7 +1,5 @@
 """The transcripts of tests/sessions give the same bytes over every kind of port."""
 
-from __future__ import annotations
-
 from contextlib import ExitStack
 from itertools import product
 from pathlib import Path

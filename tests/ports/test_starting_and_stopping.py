@@ -1,7 +1,5 @@
 """Programs that start and stop in a running world, as on the desk."""
 
-from __future__ import annotations
-
 import os
 import select
 import threading
@@ -15,13 +13,12 @@ import pytest
 from tests.ports.helpers import printed, wheels, write
 from tests.served import GUARD_S, PROGRAMS, Rounds, fresh
 
+from kiks import KiksError, ParameterError, Simulation
 from kiks.clock.gate import Gate
 from kiks.clock.patience import Patience
-from kiks.errors import KiksError, ParameterError
 from kiks.ports import programs as module
 from kiks.ports.program_process import OUTPUT_LIMIT, Command
 from kiks.ports.programs import Programs
-from kiks.sim.simulation import Simulation
 
 pytestmark = pytest.mark.slow
 
@@ -91,16 +88,14 @@ def test_programs_that_begin_together_give_the_run_of_kiks_run() -> None:
 def test_program_joins_at_the_present_time(tmp_path: Path) -> None:
     sim = fresh(2)
     sim.run(5)
-    first = write(
-        tmp_path / "program.py", "import time\nprint(time.monotonic())\ntime.sleep(3)\nprint(time.monotonic())\n"
-    )
+    text = "import time\nprint(time.monotonic())\ntime.sleep(3)\nprint(time.monotonic())\n"
+    first = write(tmp_path / "program.py", text)
     with driven(sim) as run:
         assert not run.programs.drive
         handle = run.programs.start(first, robot=2)
         assert (handle.name, handle.robot, handle.state) == ("program 1 (program.py)", 2, "running")
         run.wait_for(lambda: not handle.is_running and not run.programs.drive)
-        assert printed(handle) == ["5.0", "8.0"]
-        assert handle.state == "ended with exit code 0"
+        assert (printed(handle), handle.state) == (["5.0", "8.0"], "ended with exit code 0")
         assert sim.time_s == 8
         again = run.programs.start(first, robot=2)
         run.wait_for(lambda: not again.is_running)
@@ -111,9 +106,7 @@ def test_program_joins_at_the_present_time(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("text", [FOR_EVER, STUBBORN], ids=["friendly", "stubborn"])
 @pytest.mark.parametrize("is_paused", [False, True], ids=["running", "paused"])
-def test_robot_of_a_stopped_program_stands_still_and_is_free(
-    text: str, is_paused: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_robot_of_a_stopped_program_stands_still_and_is_free(text, is_paused, tmp_path, monkeypatch):
     monkeypatch.setattr(module, "GRACE_S", 0.1)
     sim = fresh()
     gate = PausedGate(sim)

@@ -1,5 +1,3 @@
-from __future__ import annotations
-
 import socket
 from collections.abc import Callable
 from functools import partial
@@ -103,9 +101,8 @@ def test_client_that_does_not_read_gets_all_its_replies_later() -> None:
 
 @pytest.mark.parametrize("host", ["0.0.0.0", "192.168.1.5", "::", "example.com"])
 def test_host_must_be_a_loopback_address(host: str) -> None:
-    with pytest.raises(
-        LinkError, match=r"host must be an address that only this computer reaches, but it was .*Use 127"
-    ):
+    words = r"host must be an address that only this computer reaches, but it was .*Use 127"
+    with pytest.raises(LinkError, match=words):
         TcpEndpoint(0, host=host)
 
 
@@ -116,9 +113,6 @@ def test_port_must_be_valid_and_free() -> None:
     endpoint.close()
     with pytest.raises(ParameterError, match=r"port must be a whole number from 0 to 65535, but it was 65536"):
         TcpEndpoint(65536)
-
-
-# ---- RFC 2217 ----
 
 
 def test_speed_purge_and_control_lines() -> None:

@@ -74,8 +74,7 @@ def check_again(recording: Recording, state_hash: str) -> None:
         if not replay.go_to(time_ns):
             assert there.sim.robot_count < replay.sim.robot_count or has_fewer_turrets(there.sim, replay.sim)
             replay = there
-        assert replay.sim.now_ns == time_ns
-        assert replay.sim.state_hash() == there.sim.state_hash()
+        assert (replay.sim.now_ns, replay.sim.state_hash()) == (time_ns, there.sim.state_hash())
     for each in (*replays, replay):
         while each.advance():
             pass
@@ -296,8 +295,7 @@ def test_events_of_a_recording_that_grows_are_read_as_they_come(file: Path) -> N
             recorder.flush()
             found += [*reader.contacts(), *reader.notes()]
             assert found[-1].kind == "bookmark"
-            assert log.end_ns == sim.now_ns
-            assert Replay(log, sim.now_ns).sim.state_hash() == sim.state_hash()
+            assert (log.end_ns, Replay(log, sim.now_ns).sim.state_hash()) == (sim.now_ns, sim.state_hash())
     RunWriter.of(sim).flush()
     found += [*reader.contacts(), *reader.notes()]
     table = Recording(file).table("events")
@@ -352,8 +350,7 @@ def test_another_run_is_told_with_its_first_second(file: Path) -> None:
 
     recording.log.next_input = other  # type: ignore[method-assign]
     checked = check_recording(recording.log)
-    assert checked.equal_count == 2
-    assert checked.differs_ns == 3_000_000_000
+    assert (checked.equal_count, checked.differs_ns) == (2, 3_000_000_000)
     assert check_recording(Recording(file).log).equal_count == 5
 
 
@@ -381,7 +378,6 @@ def test_a_score_in_a_file_keeps_the_rules_of_one_that_is_set(data: str) -> None
 
 
 def test_foxglove_opens_it(file: Path) -> None:
-    """The library's reader finds all messages, and each keeps its schema."""
     import jsonschema
     from mcap.reader import make_reader
 
@@ -429,9 +425,7 @@ def test_mistakes_get_a_clear_error(file: Path) -> None:
             act()
 
 
-def test_a_file_that_can_grow_no_more_is_read_up_to_there(
-    file: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_a_file_that_can_grow_no_more_is_read_up_to_there(file, monkeypatch, caplog):
     """The system refuses the middle of a chunk, as a full disk does."""
     monkeypatch.setattr("kiks.recording.recorder.CHUNK_S", 0.0)
     sim, alone = Simulation(seed=1), Simulation(seed=1)
@@ -469,9 +463,7 @@ def disk(folder: Path, total: int, room: int) -> Callable[[Path], SimpleNamespac
     return usage
 
 
-def test_a_recording_leaves_a_reserve_of_its_disk_free(
-    file: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_a_recording_leaves_a_reserve_of_its_disk_free(file, monkeypatch, caplog):
     size = 5_000
     monkeypatch.setattr("kiks.recording.recorder.CHUNK_S", 0.0)
     monkeypatch.setattr("shutil.disk_usage", disk(file.parent, 1 << 40, (128 << 20) + size))
@@ -527,9 +519,7 @@ def test_a_recording_has_one_writer(file: Path) -> None:
     assert sorted(file.parent.iterdir()) == [link, file]
 
 
-def test_until_something_has_happened_for_a_second_the_recording_of_before_stays(
-    file: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_until_something_has_happened_for_a_second_the_recording_of_before_stays(file, monkeypatch, caplog):
     monkeypatch.setattr("kiks.recording.recorder.CHUNK_S", 0.0)
     with (sim := Simulation(seed=1)).record(file):
         drive(sim, 4.0)

@@ -1,7 +1,5 @@
 """Programs, given as their text, that run in this process in simulated time."""
 
-from __future__ import annotations
-
 import textwrap
 from collections.abc import Callable
 from pathlib import Path
@@ -9,9 +7,8 @@ from typing import NamedTuple
 
 import pytest
 
-from kiks.model.arena import Arena
+from kiks import Arena, Simulation
 from kiks.script.runner import run_here
-from kiks.sim.simulation import Simulation
 
 BOX = Arena.box(200, 200)
 

@@ -1,7 +1,5 @@
 """What a program under test is to do, and what it has seen: it looks at the clock without asking for the time."""
 
-from __future__ import annotations
-
 from typing import Any
 
 sim: Any = None

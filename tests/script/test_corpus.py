@@ -4,8 +4,6 @@ time.
 Each is in `tests/programs/corpus` and prints what does not depend on milliseconds.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import shlex
@@ -68,9 +66,6 @@ def test_program_does_the_same_again(name: str) -> None:
     assert name not in AGAIN or run_alone(name) == (out, errors)
 
 
-# ---- together, and on the desk ----
-
-
 def run_together(folder: Path, *, on_desk: bool) -> tuple[dict[str, str], str]:
     """Run all programs in one world; return what each of them printed, and the line with the state at the end."""
     folder.mkdir()
@@ -104,9 +99,6 @@ def test_programs_do_the_same_on_the_desk(alone: dict[str, str], tmp_path: Path)
     assert said == alone
     assert (said, end) == without
     assert "state" in end
-
-
-# ---- in real time ----
 
 
 @contextmanager

@@ -1,7 +1,5 @@
 """The insides of CPython: what a program changes there comes back, and is safe meanwhile."""
 
-from __future__ import annotations
-
 import asyncio
 import ctypes
 import gc
@@ -263,8 +261,7 @@ def test_a_class_comes_back(owner: type, name: str) -> None:
     change_class(owner, name, lambda _: 7, undo)
     assert vars(owner)[name](None) == 7
     undo()
-    assert dict(vars(owner)) == before
-    assert words(owner, TYPE_WORDS) == structure
+    assert (dict(vars(owner)), words(owner, TYPE_WORDS)) == (before, structure)
 
 
 # ---- objects that outlive a run, and garbage ----
@@ -305,22 +302,17 @@ def test_wrong_arguments_get_pythons_own_words() -> None:
 
 
 @pytest.mark.parametrize(
-    ("change", "lacks"),
+    ("owner", "name", "value", "lacks"),
     [
-        (lambda patch: patch.setattr(sys, "version_info", (3, 99, 0)), "whose insides are not known"),
-        (lambda patch: patch.setattr(sys.implementation, "name", "pypy"), "whose insides are not known"),
-        (
-            lambda patch: patch.setattr(sys, "_is_gil_enabled", lambda: False, raising=False),
-            "without its lock of the interpreter",
-        ),
-        (lambda patch: patch.setattr(cpython, "_FLAGS_OFFSET", 0), "whose structures are not those of its version"),
+        (sys, "version_info", (3, 99, 0), "whose insides are not known"),
+        (sys.implementation, "name", "pypy", "whose insides are not known"),
+        (sys, "_is_gil_enabled", lambda: False, "without its lock of the interpreter"),
+        (cpython, "_FLAGS_OFFSET", 0, "whose structures are not those of its version"),
     ],
 )
-def test_an_interpreter_that_is_not_known_gets_one_line(
-    change: Callable[[pytest.MonkeyPatch], None], lacks: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_interpreter_that_is_not_known_gets_one_line(owner, name, value, lacks, monkeypatch):
     check_interpreter()
-    change(monkeypatch)
+    monkeypatch.setattr(owner, name, value, raising=name != "_is_gil_enabled")
     with pytest.raises(KiksError) as caught:
         check_interpreter()
     assert re.fullmatch(

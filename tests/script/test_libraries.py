@@ -1,7 +1,5 @@
 """Libraries whose code in C waits by itself: under `kiks run` they wait in simulated time."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

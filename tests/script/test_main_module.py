@@ -1,7 +1,5 @@
 """A program sees the same names and paths under `kiks run` as under Python."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess
@@ -107,35 +105,29 @@ def test_programs_that_share_a_world_start_as_under_python(home: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "words", [["fails.py"], ["slip.py"], ["-m", "package.relative"], ["-m", "package.slip"]], ids=" ".join
-)
-def test_an_error_has_the_trace_that_python_prints(home: Path, words: list[str]) -> None:
-    python, kiks = run(home, *words), run_kiks(home, *words)
-    assert python.returncode == kiks.returncode == 1
-    assert kiks.stdout == python.stdout
-    assert re.sub("(?m)^kiks: .*\n", "", kiks.stderr) == re.sub('(?m)^  File "<frozen runpy>".*\n', "", python.stderr)
+def test_an_error_has_the_trace_that_python_prints(home: Path) -> None:
+    for words in (["fails.py"], ["slip.py"], ["-m", "package.relative"], ["-m", "package.slip"]):
+        python, kiks = run(home, *words), run_kiks(home, *words)
+        assert python.returncode == kiks.returncode == 1
+        assert kiks.stdout == python.stdout
+        trace = re.sub('(?m)^  File "<frozen runpy>".*\n', "", python.stderr)
+        assert re.sub("(?m)^kiks: .*\n", "", kiks.stderr) == trace
 
 
-@pytest.mark.parametrize(
-    ("module", "message"),
-    [
-        ("nothing", "there is no 'nothing'. Give its name without .py"),
-        ("package.nothing", "there is no 'package.nothing'"),
-        ("show.py", "there is no 'show.py'"),
-        ("sub", "must have a file __main__.py, but 'sub' has none"),
-    ],
-)
-def test_a_module_that_does_not_start_is_one_line(
-    home: Path, module: str, message: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_module_that_does_not_start_is_one_line(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from kiks.cli.options import parse_words
     from kiks.errors import ParameterError
 
     monkeypatch.chdir(home)
-    with pytest.raises(ParameterError, match=re.escape(message)):
-        parse_words(["-m", module])
-    assert "package" not in sys.modules
+    for module, message in (
+        ("nothing", "there is no 'nothing'. Give its name without .py"),
+        ("package.nothing", "there is no 'package.nothing'"),
+        ("show.py", "there is no 'show.py'"),
+        ("sub", "must have a file __main__.py, but 'sub' has none"),
+    ):
+        with pytest.raises(ParameterError, match=re.escape(message)):
+            parse_words(["-m", module])
+        assert "package" not in sys.modules
 
 
 @pytest.mark.slow

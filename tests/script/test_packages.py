@@ -5,8 +5,6 @@ A package that cannot is told of in one line.
 
 # ruff: noqa: E501 (one line of KiKS is longer)
 
-from __future__ import annotations
-
 import re
 from importlib.util import find_spec
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What programs print in simulated time: what they print without KiKS, where times are simulated."""
 
-from __future__ import annotations
-
 import pytest
 from tests.script.conftest import Run, programs_of
 

@@ -1,7 +1,5 @@
 """The same program is the same run, whatever Python draws by chance, and whatever has become of compiled code."""
 
-from __future__ import annotations
-
 import os
 import shutil
 from pathlib import Path

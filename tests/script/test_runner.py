@@ -1,7 +1,5 @@
 """Whole programs in simulated time: what `kiks run` does with their threads, clocks, signals and files."""
 
-from __future__ import annotations
-
 import re
 import signal
 import subprocess
@@ -16,13 +14,10 @@ from tests.script.conftest import Run, programs_of
 
 from kiks.script import watchdog
 
-# ---- threads ----
-
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "loop",
-    [
+def test_thread_that_only_polls_yields(run: Run) -> None:
+    for loop in (
         "while not done: time.time()",
         "while not done: datetime.datetime.now()",
         "while not done: time.sleep(0)",
@@ -31,32 +26,29 @@ from kiks.script import watchdog
         "while not lock.acquire(False): pass",
         "while thread.is_alive(): pass",
         "while lines.empty(): pass",
-    ],
-)
-def test_thread_that_only_polls_yields(run: Run, loop: str) -> None:
-    ran = run(f"""
-        import datetime, queue, serial, threading, time
-        port = serial.Serial('COM1')
-        done, event, lock, lines = False, threading.Event(), threading.Lock(), queue.Queue()
-        lock.acquire()
-        def work():
-            global done
-            time.sleep(0.5)
-            done = True
-            event.set()
-            lock.release()
-            lines.put(1)
-        thread = threading.Thread(target=work)
-        thread.start()
-        {loop}
-    """)
-    assert ran.code == 0
-    assert 0.5 <= ran.time_s < 0.51
+    ):
+        ran = run(f"""
+            import datetime, queue, serial, threading, time
+            port = serial.Serial('COM1')
+            done, event, lock, lines = False, threading.Event(), threading.Lock(), queue.Queue()
+            lock.acquire()
+            def work():
+                global done
+                time.sleep(0.5)
+                done = True
+                event.set()
+                lock.release()
+                lines.put(1)
+            thread = threading.Thread(target=work)
+            thread.start()
+            {loop}
+        """)
+        assert ran.code == 0
+        assert 0.5 <= ran.time_s < 0.51
 
 
-@pytest.mark.parametrize(
-    ("text", "waiting"),
-    [
+def test_threads_that_wait_for_ever_end_with_one_line(run: Run) -> None:
+    for text, waiting in (
         ("lock = threading.Lock()\nlock.acquire()\nlock.acquire()", "MainThread for a lock"),
         (
             "port = serial.Serial('COM1')\nthreading.Thread(target=port.readline).start()",
@@ -65,14 +57,12 @@ def test_thread_that_only_polls_yields(run: Run, loop: str) -> None:
         ("here, there = socket.socketpair()\nhere.recv(1)", "MainThread for files"),
         ("out, into = os.pipe()\nos.read(out, 1)", "MainThread for files"),
         ("here, there = socket.socketpair()\nselect.select([here], [], [])", "MainThread for files"),
-    ],
-)
-def test_threads_that_wait_for_ever_end_with_one_line(text: str, waiting: str, run: Run) -> None:
-    ran = run(f"import os, select, serial, socket, threading\n{text}")
-    assert ran.code == 1
-    assert ran.err.startswith("kiks: some thread of a program must be able to go on, but all wait for ever: ")
-    assert waiting in ran.err
-    assert ran.err.count("\n") == 1
+    ):
+        ran = run(f"import os, select, serial, socket, threading\n{text}")
+        assert ran.code == 1
+        assert ran.err.startswith("kiks: some thread of a program must be able to go on, but all wait for ever: ")
+        assert waiting in ran.err
+        assert ran.err.count("\n") == 1
 
 
 def test_a_child_process_from_before_the_program_holds_none_of_its_pipes(run: Run) -> None:
@@ -97,20 +87,13 @@ def test_thinking_of_threads_is_charged(run: Run) -> None:
     assert fixed == pytest.approx(none + 10 * 0.010)
 
 
-# ---- clocks, signals, files ----
-
-
 def test_alarm_without_a_handler_ends_the_program(run: Run) -> None:
     ran = run("import signal, time\nsignal.signal(14, signal.SIG_DFL)\nsignal.alarm(2)\ntime.sleep(10)\n")
     assert (ran.code, ran.time_s) == (128 + signal.SIGALRM, 2.0)
 
 
-# ---- what simulated time does not reach ----
-
-
-@pytest.mark.parametrize(
-    ("text", "must"),
-    [
+def test_program_that_leaves_simulated_time_ends_with_one_line(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    for text, must in (
         ("import socket\nsocket.create_connection(('127.0.0.1', 9))", "talk to its robots alone, but it used the net"),
         ("import socket\nsocket.getaddrinfo('example.org', 80)", "talk to its robots alone"),
         ("import subprocess, sys\nsubprocess.run([sys.executable, '-c', ''])", "start no process of Python by itself"),
@@ -125,19 +108,15 @@ def test_alarm_without_a_handler_ends_the_program(run: Run) -> None:
             "import sys; sys.modules.pop('time_machine', None)\nimport time_machine",
             "leave the insides of Python's clocks alone, but it imported time_machine",
         ),
-    ],
-)
-def test_program_that_leaves_simulated_time_ends_with_one_line(
-    run: Run, text: str, must: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    # Another test of this process may have loaded it; a program starts in a process that has not.
-    monkeypatch.delitem(sys.modules, "uvloop", raising=False)
-    ran = run(f"try:\n{textwrap.indent(text, '    ')}\nexcept Exception: pass\nprint('wrong')\n")
-    assert (ran.code, ran.out) == (1, "")
-    assert ran.err.startswith(f"kiks: a program in simulated time must {must}")
-    assert "(program.py, line 3)" in ran.err
-    assert ran.err.endswith("kiks serve, where time is real.\n")
-    assert ran.err.count("\n") == 1
+    ):
+        # Another test of this process may have loaded it; a program starts in a process that has not.
+        monkeypatch.delitem(sys.modules, "uvloop", raising=False)
+        ran = run(f"try:\n{textwrap.indent(text, '    ')}\nexcept Exception: pass\nprint('wrong')\n")
+        assert (ran.code, ran.out) == (1, "")
+        assert ran.err.startswith(f"kiks: a program in simulated time must {must}")
+        assert "(program.py, line 3)" in ran.err
+        assert ran.err.endswith("kiks serve, where time is real.\n")
+        assert ran.err.count("\n") == 1
 
 
 def test_loop_that_asks_for_nothing_is_told(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -193,9 +172,7 @@ thread.join()
 
 
 @pytest.mark.parametrize("when", KEEPS)
-def test_loop_that_keeps_others_from_going_on_ends_with_one_line(
-    when: str, run: Run, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_loop_that_keeps_others_from_going_on_ends_with_one_line(when, run, monkeypatch):
     monkeypatch.setattr(watchdog, "SPINNING_S", 0.5)
     ran = run(KEEPS[when][0])
     assert ran.code == 1
@@ -237,8 +214,6 @@ def test_thread_may_compute_from_its_first_moment(when: str, run: Run, monkeypat
     monkeypatch.setattr(watchdog, "SPINNING_S", 0.05)
     assert run(COMPUTES[when][0]).code == 0
 
-
-# ---- errors of the program ----
 
 CHAIN = """
 import serial, sys, threading

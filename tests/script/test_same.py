@@ -1,7 +1,5 @@
 """A program finds Python's own functions and classes, and leaves them as they were."""
 
-from __future__ import annotations
-
 import pytest
 from tests.script import same
 from tests.script.conftest import Run
@@ -39,5 +37,4 @@ def test_no_class_and_no_function_is_replaced(run: Run, monkeypatch: pytest.Monk
     for _ in range(2):
         ran = run(PROGRAM)
         assert (ran.code, ran.out, ran.err) == (0, "the same\n", "")
-        assert same.look() == before
-        assert same.inside() == inside
+        assert (same.look(), same.inside()) == (before, inside)

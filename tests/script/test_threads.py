@@ -1,7 +1,5 @@
 """Threads of a program in simulated time: what they do is what a plain discrete-event simulation says."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -27,9 +25,8 @@ PLAIN = st.one_of(
     st.tuples(st.just("wait"), st.integers(0, 1), TIMES_MS),
     st.tuples(st.just("ask"), st.integers(1, 2), st.sampled_from(["N\n", "D,3,4\n", "H\n", "D,0,0\n"])),
 )
-ANY = st.recursive(
-    PLAIN, lambda steps: st.tuples(st.just("lock"), st.integers(0, 2), TIMES_MS, st.lists(steps, max_size=4))
-)
+LOCK = st.just("lock"), st.integers(0, 2), TIMES_MS
+ANY = st.recursive(PLAIN, lambda steps: st.tuples(*LOCK, st.lists(steps, max_size=4)))
 PROGRAMS = st.lists(st.lists(ANY, max_size=8), min_size=1, max_size=5)
 
 

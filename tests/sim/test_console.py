@@ -33,12 +33,8 @@ def test_several_lines_are_answered_in_their_order() -> None:
     sim = fresh()
     sent = type_lines(sim, 1, "G,7,8\n\n  H \nX\nD,5\n")
     sim.run(1)
-    assert [(typed.text, typed.reply) for typed in sent] == [
-        ("G,7,8", "g"),
-        ("H", "h,7,8"),
-        ("X", "Command not found"),
-        ("D,5", "z,Protocol error"),
-    ]
+    answered = [("G,7,8", "g"), ("H", "h,7,8"), ("X", "Command not found"), ("D,5", "z,Protocol error")]
+    assert [(typed.text, typed.reply) for typed in sent] == answered
 
 
 def test_line_of_a_program_is_its_own() -> None:

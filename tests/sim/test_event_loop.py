@@ -4,11 +4,9 @@ from typing import NoReturn
 
 import pytest
 
-from kiks.client.khepera import Khepera
+from kiks import Arena, Khepera, Simulation
 from kiks.engine import step
-from kiks.model.arena import Arena
 from kiks.sim.saved_state import SavedState, WorldFiles, state_bytes
-from kiks.sim.simulation import Simulation
 from kiks.units import NS_PER_S, TICK_NS
 
 HOUR_S = 3600

@@ -7,12 +7,10 @@ import numpy as np
 import pytest
 from tests.at_length import share
 
+from kiks import Arena, ParameterError, Simulation
 from kiks.engine.sensing.observe import NOTHING, WALL
-from kiks.errors import ParameterError
-from kiks.model.arena import Arena
 from kiks.model.arena_objects import Ball, Cylinder, Lamp, Pose
 from kiks.model.robot import RESPONSES
-from kiks.sim.simulation import Simulation
 
 
 def random_world(seed: int, response: str | None = None) -> Simulation:

@@ -5,8 +5,7 @@ from pathlib import Path
 import pytest
 from tests import forked
 
-from kiks.errors import ParameterError
-from kiks.sim.simulation import Simulation
+from kiks import ParameterError, Simulation
 from kiks.sim.supervision import Supervision
 
 TICKS = """
@@ -19,7 +18,6 @@ def supervise(sim):
     finally:
         print("moved", number + 1, "times at", sim.time_s)
 """
-
 
 FAILED = r"able to begin, but referee\.py has failed"
 

@@ -25,10 +25,6 @@ def pieces(log: WireLog) -> list[Piece]:
     return log.pieces.since(0)[1]
 
 
-def watched(sim: Simulation, robot: int = 1) -> WireLog:
-    return sim.wires[robot - 1].watch(sim.now_ns)
-
-
 def shares(sim: Simulation, from_ns: int = 0, robot: int = 1) -> TimeShares:
     return sim.wires[robot - 1].shares(from_ns, sim.now_ns)
 
@@ -36,7 +32,7 @@ def shares(sim: Simulation, from_ns: int = 0, robot: int = 1) -> TimeShares:
 def test_exchange_has_the_times_of_its_characters() -> None:
     sim = fresh()
     sim.run(1)
-    log, port = watched(sim), sim.port(1)
+    log, port = sim.wires[0].watch(sim.now_ns), sim.port(1)
     begin_ns = sim.now_ns
     port.write(b"D,5,5\n")
     assert port.readline() == b"d\r\n"
@@ -57,7 +53,7 @@ def test_characters_are_cut_into_commands() -> None:
         (b"D,5", [b"D,5"]),
     ):
         sim = fresh()
-        log = watched(sim)
+        log = sim.wires[0].watch(sim.now_ns)
         sim.port(1).write(data)
         sent = pieces(log)
         assert [piece.data for piece in sent] == cut
@@ -85,7 +81,7 @@ def test_tail_keeps_the_newest(comings: list[tuple[int, int]], limit: int) -> No
 
 def test_log_stays_small_and_knows_since_when_it_is_whole() -> None:
     sim = fresh()
-    log, port = watched(sim), sim.port(1)
+    log, port = sim.wires[0].watch(sim.now_ns), sim.port(1)
     for _ in range(PIECE_LIMIT):
         port.write(b"H\n")
         port.readline()
@@ -109,7 +105,7 @@ def test_who_watches_changes_nothing() -> None:
     for is_watched in (False, True):
         sim = fresh(thinking="fixed:2.5")
         if is_watched:
-            watched(sim)
+            sim.wires[0].watch(sim.now_ns)
         assert run_here(sim, PROGRAMS / "drive.py", ["COM1", "40", "3", "7"], {}) == 0
         ends.append((sim.state_hash(), sim.now_ns))
     assert ends[0] == ends[1]
@@ -125,8 +121,7 @@ def test_shares_give_each_instant_to_the_first_who_claims_it(window: Span, claim
         claims = (any(begin <= instant < end for begin, end in spans) for spans in claimed)
         counts[[*claims, True].index(True)] += 1
     found = share_time(window, **dict(zip(("link", "robot", "thinking"), claimed, strict=True)))
-    assert found == TimeShares(*counts)
-    assert found.window_ns == max(window[1] - window[0], 0)
+    assert (found, found.window_ns) == (TimeShares(*counts), max(window[1] - window[0], 0))
 
 
 PROGRAM = """
@@ -147,7 +142,7 @@ def test_shares_of_a_program_add_up(is_near: bool, tmp_path: Path) -> None:
     program = tmp_path / "program.py"
     program.write_text(PROGRAM)
     sim = fresh(thinking="fixed:2.5" if is_near else "none")
-    log = watched(sim)
+    log = sim.wires[0].watch(sim.now_ns)
     if is_near:
         assert run_here(sim, program, [], {}) == 0
     else:
@@ -155,8 +150,7 @@ def test_shares_of_a_program_add_up(is_near: bool, tmp_path: Path) -> None:
     found = shares(sim)
     assert found.window_ns == sim.now_ns
     assert found.link_ns == sum(len(piece.data) for piece in pieces(log)) * CHARACTER_NS
-    assert found.robot_ns == 10 * PROCESSING_NS
-    assert found.thinking_ns == 10 * round(2.5 * MS)
+    assert (found.robot_ns, found.thinking_ns) == (10 * PROCESSING_NS, 10 * round(2.5 * MS))
     assert found.waiting_ns == 10 * 50 * MS + 10 * MS
 
 
@@ -172,6 +166,5 @@ def test_gaps_of_a_real_program_are_thinking() -> None:
     assert shares(sim).thinking_ns == 1000 * MS - busy_ns
     wire.leave_client(sim.now_ns)
     sim.run(1)
-    assert shares(sim).thinking_ns == 1000 * MS - busy_ns
-    assert shares(sim).waiting_ns == 2000 * MS
+    assert (shares(sim).thinking_ns, shares(sim).waiting_ns) == (1000 * MS - busy_ns, 2000 * MS)
     assert shares(sim, sim.now_ns - MS) == TimeShares(0, 0, 0, MS)

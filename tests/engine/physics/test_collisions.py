@@ -9,14 +9,12 @@ from tests.at_length import cases, share
 from tests.engine.same_walls import wide_floor, with_things
 from tests.piles import DEEPEST_MM, SHOVED_MM, Pile, calm, rush
 
+from kiks import Arena, Simulation
 from kiks.engine.physics import motor
-from kiks.model.arena import Arena
 from kiks.model.arena_objects import Ball, Cylinder, Pose
-from kiks.sim.simulation import Simulation
 
 PULSE_MM = 0.08
 ROBOT_MM, BALL_MM, CYLINDER_MM = 27.5, 32.0, 16.0
-
 
 STEADY_S = 0.5
 """After this long, a motor turns at the speed it was told."""
@@ -90,7 +88,6 @@ def test_things_in_a_pile_up_do_not_overlap(number):
 
 @pytest.mark.slow
 def test_bodies_at_rest_stay_at_rest():
-    """Once the last body has stopped, not a bit of a place changes."""
     pile = Pile.make(5)
     rush(pile, 1000)
     calm(pile, 100)

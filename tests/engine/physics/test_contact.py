@@ -13,14 +13,6 @@ from kiks.engine.physics.motion import CONTACT_TICKS
 from kiks.model.arena import Arena
 
 PULSE, HALF_BASE = 0.08, 26.5
-FRICTIONS = (0.0, 0.2, 1.0)
-
-
-def wedge(angle_deg):
-    """Return an arena whose floor is a corner with its tip at (40, 250), open to the right."""
-    rows, columns = np.mgrid[:500, :500] + 0.5
-    is_floor = np.abs(rows - 250) <= (columns - 40) * math.tan(math.radians(angle_deg / 2))
-    return Arena.from_array(np.where(is_floor, 0, 255))
 
 
 def wander(world, rng, ticks):
@@ -37,7 +29,7 @@ def wander(world, rng, ticks):
 
 def check_laws(make_world, arena, draw, ticks, heading_rad=None):
     rng = np.random.default_rng(draw)
-    world = make_world(arena, seed=draw, body__wall_friction=FRICTIONS[draw % 3])
+    world = make_world(arena, seed=draw, body__wall_friction=(0.0, 0.2, 1.0)[draw % 3])
     start = arena.find_start(world.radius)
     world.place(start.x_mm, start.y_mm, rng.uniform(-4, 4) if heading_rad is None else heading_rad)
     pose, asked = np.array(world.pose), world.asked
@@ -153,7 +145,9 @@ def test_without_friction_it_slides_by_the_cosine_and_the_larger_it_is_the_more_
 
 @pytest.mark.parametrize("angle_deg", [90, 60, 30])
 def test_corners_hold_without_jitter_and_let_go(make_world, angle_deg):
-    arena = wedge(angle_deg)
+    rows, columns = np.mgrid[:500, :500] + 0.5
+    is_floor = np.abs(rows - 250) <= (columns - 40) * math.tan(math.radians(angle_deg / 2))
+    arena = Arena.from_array(np.where(is_floor, 0, 255))  # a corner with its tip at (40, 250), open to the right
     for turn, speed in product((0.0, 0.2, -0.5), (5, 127)):
         world = make_world(arena).place(300.0, 250.0, math.pi + turn)
         world.speed(speed, speed, ticks=2000 + 5000 // speed)

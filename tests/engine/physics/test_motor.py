@@ -18,12 +18,6 @@ def world(make_world):
     return make_world(wide_floor(1500)).place(750.0, 750.0, 0.3)
 
 
-@pytest.fixture
-def two(make_world):
-    """The same robot twice."""
-    return [make_world(wide_floor(1500)).place(750.0, 750.0) for _ in range(2)]
-
-
 def spin(world, ticks):
     """Let ticks pass without ever reaching a wall: the robot is carried back to the middle."""
     for _ in range(ticks):
@@ -137,30 +131,21 @@ def test_a_move_to_the_same_place_stirs_nothing_and_a_new_profile_holds_for_the_
         assert world.counters == pytest.approx((3000, -3000), abs=3)
 
 
-def test_setting_the_counters_moves_nothing_while_holding(two):
-    one, other = two
-    for world in two:
-        world.position(300, 300, ticks=300)
-    one.set_counters(0, -12345)
-    assert one.counters == (0, -12345)
-    for _ in range(300):
-        one.tick()
-        other.tick()
-        assert one.pose == other.pose
-        assert (one.status[0], one.status[3]) == (1, 1)
-
-
-def test_setting_the_counters_shifts_a_move(two):
-    one, other = two
-    for world in two:
-        world.position(1500, 900, ticks=40)
-    shift = [7000 - one.counters[0], -9 - one.counters[1]]
-    one.set_counters(7000, -9)
-    for _ in range(300):
-        one.tick()
-        other.tick()
-        assert one.robot["wheel_pulses"].tolist() == other.robot["wheel_pulses"].tolist()
-    assert [a - b for a, b in zip(one.counters, other.counters, strict=True)] == shift
+def test_setting_the_counters_moves_nothing_while_holding_and_shifts_a_move(make_world):
+    for target, ticks, counters in (((300, 300), 300, (0, -12345)), ((1500, 900), 40, (7000, -9))):
+        one, other = (make_world(wide_floor(1500)).place(750.0, 750.0) for _ in range(2))
+        for world in (one, other):
+            world.position(*target, ticks=ticks)
+        shift = [new - old for new, old in zip(counters, one.counters, strict=True)]
+        one.set_counters(*counters)
+        assert one.counters == counters
+        for _ in range(300):
+            one.tick()
+            other.tick()
+            assert one.pose == other.pose
+            assert one.robot["wheel_pulses"].tolist() == other.robot["wheel_pulses"].tolist()
+            assert target == (1500, 900) or (one.status[0], one.status[3]) == (1, 1)
+        assert [a - b for a, b in zip(one.counters, other.counters, strict=True)] == shift
 
 
 def test_full_power_is_the_free_speed_and_little_power_none(world):

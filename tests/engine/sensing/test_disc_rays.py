@@ -12,12 +12,10 @@ from tests.at_length import share
 from tests.engine.same_walls import with_things
 from tests.engine.sensing.followed_rays import meet_discs_alone, meet_discs_of
 
+from kiks import Arena, RobotSpec, Simulation
 from kiks.engine.simd.lanes import LANES
 from kiks.firmware.turret import Turret
-from kiks.model.arena import Arena
 from kiks.model.arena_objects import Ball, Lamp, Pose
-from kiks.model.robot import RobotSpec
-from kiks.sim.simulation import Simulation
 from kiks.units import SENSOR_SLOT_NS, TICK_NS
 
 ROBOT_MM = 27.5
@@ -121,9 +119,8 @@ def test_a_camera_sees_discs_as_it_sees_walls(draw):
 
 def test_a_sensor_sees_a_ball_where_it_was_when_it_looked():
     """A ball passes at 1 m/s: within the 20 ms of a round it moves by 20 mm."""
-    floor = replace(
-        Arena.box(800, 800), starts=(Pose(400.0, 400.0, math.pi / 2),), balls=(Ball(300.0, 480.0, 32.0, 0.0),)
-    )
+    starts, balls = (Pose(400.0, 400.0, math.pi / 2),), (Ball(300.0, 480.0, 32.0, 0.0),)
+    floor = replace(Arena.box(800, 800), starts=starts, balls=balls)
     sim, still = (Simulation(floor, robot=EXACT) for _ in range(2))
     sim.world.state.bodies["velocity_x"] = 1000.0
     different = 0
@@ -229,8 +226,7 @@ def striped_world(turn_rad: float, **body) -> Simulation:
 @pytest.mark.parametrize(("turn_rad", "brightness"), [(0.0, 1), (math.pi, 255), (7 * math.pi, 255), (-8 * math.pi, 1)])
 def test_a_robot_of_one_black_and_one_white_half_looks_like_the_half_that_is_seen(turn_rad, brightness):
     striped, plain = striped_world(turn_rad, stripe_count=1), striped_world(turn_rad, brightness=brightness)
-    assert striped.proximity(1) == plain.proximity(1)
-    assert striped.image(1) == plain.image(1)
+    assert (striped.proximity(1), striped.image(1)) == (plain.proximity(1), plain.image(1))
     assert striped.fit(1, Aim()).met() == plain.fit(1, Aim()).met()
 
 

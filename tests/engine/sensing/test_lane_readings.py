@@ -8,17 +8,15 @@ import pytest
 from tests.at_length import share
 from tests.engine.one_by_one import read_one_by_one
 
+from kiks import Arena, KiksError, Simulation
 from kiks.engine.parameters import pack
 from kiks.engine.physics.motor import set_speed
 from kiks.engine.scene import Scene
 from kiks.engine.sensing.proximity import read_proximity
 from kiks.engine.sensing.thesis_networks import networks_for
 from kiks.engine.state import State
-from kiks.errors import KiksError
-from kiks.model.arena import Arena
 from kiks.model.arena_objects import Ball
 from kiks.model.robot import RESPONSES, RobotSpec
-from kiks.sim.simulation import Simulation
 
 pytestmark = pytest.mark.slow  # they compile the sensors once more
 
@@ -83,7 +81,6 @@ def check_random_world(arena, kinds, networks, robots, bodies, rng):
 
 @pytest.mark.parametrize("response", RESPONSES)
 def test_lanes_read_the_same_as_single_sensors(make_random_arena, response):
-    """Alone, with other robots, and with balls as well."""
     kinds, networks = kinds_of(response)
     for robots, bodies in ((1, 0), (9, 0), (6, 12)):
         rng, highest = np.random.default_rng([RESPONSES.index(response), robots]), 0

@@ -63,15 +63,11 @@ def test_the_table_answers_in_the_arena() -> None:
 
 
 @pytest.mark.parametrize("response", OF_THE_KHEPERA)
-def test_nothing_near_is_nothing(response: str) -> None:
+def test_nothing_near_is_nothing_and_a_dark_wall_looks_farther(response: str) -> None:
+    """Thesis 3.4: black reflects half of what white does."""
     for robot in (KHEPERA, KHEPERA_II) if response != "reflection" else (KHEPERA,):
         sim = kiks.Simulation(kiks.Arena.box(800, 800), robot=robot, response=response)
         assert sim.proximity(1) == list(robot.proximity.baseline_counts)
-
-
-@pytest.mark.parametrize("response", OF_THE_KHEPERA)
-def test_a_dark_wall_looks_farther(response: str) -> None:
-    """Thesis 3.4: black reflects half of what white does."""
     robot = KHEPERA.with_changes(proximity__response=response)
     white, black = (before_wall(robot, 2, 20, brightness=brightness) for brightness in (255, 1))
     assert black < 0.7 * white
