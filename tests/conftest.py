@@ -49,8 +49,9 @@ def pytest_collection_finish() -> None:
 
 @pytest.fixture(scope="module", autouse=True)
 def free_memory_goes_back_to_the_system() -> Iterator[None]:
-    """Return what a module has freed: the C library keeps hundreds of megabytes of large files that tests have read."""
+    """Collect garbage, as a few objects may hold large arenas, and return what the C library would keep."""
     yield
+    gc.collect()
     if trim := getattr(ctypes.CDLL(None), "malloc_trim", None):
         trim(0)
 

@@ -127,6 +127,7 @@ def begin(request: dict, descriptors: list[int]) -> None:
     for descriptor, given in enumerate(descriptors):
         os.dup2(given, descriptor)
         os.close(given)
+    sys.stdout.reconfigure(line_buffering=sys.stdout.isatty())  # as Python does at its start
     os.chdir(request["cwd"])
     os.environ.clear()
     os.environ.update(request["env"])

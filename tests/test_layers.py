@@ -81,9 +81,3 @@ def test_no_files_import_each_other() -> None:
         TopologicalSorter(needed).prepare()
     except CycleError as error:
         pytest.fail(f"imports must lead downwards, but these files form a cycle: {' -> '.join(error.args[1])}")
-
-
-def test_each_public_name_is_there_and_shown() -> None:
-    names = dir(kiks)
-    assert {"Arena", "Khepera", "Simulation", "measures", "tasks", "__version__"} <= set(names)
-    assert all(getattr(kiks, name) is not None for name in names)

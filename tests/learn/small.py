@@ -1,8 +1,5 @@
 """What many tests of learning, controllers and batches share, so that a process compiles it once."""
 
-import ctypes
-import gc
-import sys
 from collections.abc import Callable
 from typing import Any
 
@@ -59,13 +56,10 @@ def refused(message: str, call: Callable[..., Any], *given: Any, **options: Any)
 
 
 def forget_arenas() -> None:
-    """Give back the memory of the arenas that tasks keep, some hundred megabytes."""
+    """Let go of the arenas that tasks keep, some hundred megabytes."""
     from kiks.learn import environments, ready_tasks
     from kiks.model import shipped, wall_tables
 
     kept = ready_tasks.rooms, ready_tasks.dark_rooms, ready_tasks.heap, shipped.shipped_arena, wall_tables._shared
     for each in (*kept, *environments.ENVIRONMENTS.values()):
         each.cache_clear()
-    gc.collect()
-    if sys.platform == "linux":
-        getattr(ctypes.CDLL(None), "malloc_trim", lambda _: None)(0)
