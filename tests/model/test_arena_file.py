@@ -33,24 +33,14 @@ def read(path: Path) -> np.ndarray:
 
 
 GREY_FORMATS = [
-    ("a.png", {}),
-    ("a.pgm", {}),
-    ("a.bmp", {}),
-    ("a.tif", {}),
-    ("a.tif", {"compression": "tiff_lzw"}),
-    ("a.tif", {"compression": "packbits"}),
+    *((name, {}) for name in ("a.png", "a.pgm", "a.bmp", "a.tif")),
+    *(("a.tif", {"compression": each}) for each in ("tiff_lzw", "packbits")),
     ("a.tiff", {"compression": "tiff_adobe_deflate"}),
     ("A.TIF", {"compression": "tiff_deflate"}),
 ]
 BIT_FORMATS = [
-    ("a.png", {}),
-    ("a.pbm", {}),
-    ("a.bmp", {}),
-    ("a.tif", {}),
-    ("a.tif", {"compression": "group4"}),
-    ("a.tif", {"compression": "group3"}),
-    ("a.tif", {"compression": "packbits"}),
-    ("a.tif", {"compression": "tiff_lzw"}),
+    *((name, {}) for name in ("a.png", "a.pbm", "a.bmp", "a.tif")),
+    *(("a.tif", {"compression": each}) for each in ("group4", "group3", "packbits", "tiff_lzw")),
     ("a.tif", {"compression": "group4", "tiffinfo": {262: 0}}),
 ]
 
