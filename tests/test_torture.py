@@ -47,7 +47,7 @@ def test_what_is_planted_is_found_with_its_cause_and_ends_no_other_case_and_can_
     "words",
     [
         "planted.refuses",
-        "files --only calls --cases 8 --seed 12",
+        "files --only calls --cases 3 --seed 12",
         *(
             pytest.param(words, marks=at_length)
             for words in (

@@ -121,8 +121,6 @@ def test_an_authenticated_connection_does_not_time_out(shown: Shown) -> None:
             each.close()
 
 
-# ---- an authenticated browser that misbehaves ----
-
 EVENTS = "_nicegui_ws/socket.io/?EIO=4&transport=websocket"
 """Where a page sends its events."""
 

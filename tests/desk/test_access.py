@@ -175,9 +175,6 @@ def test_a_failure_after_the_client_has_left_is_none() -> None:
     assert come(application=fails, cookie=COOKIE, received="http.disconnect") == []
 
 
-# ---- tickets ----
-
-
 @pytest.fixture(params=["127.0.0.1", "::1"])
 def ends(request: pytest.FixtureRequest) -> Any:
     """Two ends of a connection on this computer: the browser's address, and the desk's."""

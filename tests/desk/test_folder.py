@@ -161,9 +161,6 @@ def test_uploads_become_projects_or_are_refused():
             decode(name, data)
 
 
-# ---- programs ----
-
-
 def test_own_programs_and_examples_are_offered(tmp_path: Path) -> None:
     for name in ("b.py", "a.py", ".hidden.py", "text.txt"):
         (tmp_path / name).write_text("")

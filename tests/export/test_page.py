@@ -252,9 +252,6 @@ def test_a_bundle_takes_no_module_that_it_does_not_understand(tmp_path: Path) ->
     assert '"solid_view.js"] =' not in bundle(WEB / "run_page.js")
 
 
-# ---- in a browser ----
-
-
 @pytest.fixture
 def visit(new_page: NewPage) -> Visit:
     """Open a page of a file, without a network; nothing but the file itself may be asked for."""

@@ -564,9 +564,6 @@ def test_a_world_without_a_robot_is_made_again_with_the_robot_that_comes_or_with
         recording.table("readings", 1)
 
 
-# ---- moments: where everything was, between ticks too ----
-
-
 @pytest.fixture(scope="module")
 def moving(tmp_path_factory: pytest.TempPathFactory) -> Recording:
     """A robot pushes a ball; then a wall and a second robot come, and a lamp goes out. Each second is a chunk."""
