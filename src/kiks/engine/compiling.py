@@ -50,16 +50,6 @@ class _Whole(_Library):  # type: ignore[misc, unused-ignore]
         # What was inlined can be optimized further: batches are a tenth faster.
         super()._optimize_final_module()
 
-    def _get_module_for_linking(self) -> Any:
-        """Return what the cache keeps beside machine code: the names that it defines.
-
-        Numba would keep the code as well, to inline it into other functions. None is made of an entry, and to load
-        that code of the whole engine would take 200 MB.
-        """
-        module = self._final_module
-        defined = [each.name for each in (*module.functions, *module.global_variables) if not each.is_declaration]
-        return binding.parse_assembly("".join(f'@"{name}" = global i8 0\n' for name in defined))
-
 
 class _WholePipeline(_Pipeline):  # type: ignore[misc, unused-ignore]
     def define_pipelines(self) -> Any:
