@@ -41,7 +41,7 @@ AT_LENGTH = {
     *("howto/soccer.md", "howto/sweep.md", "howto/tournaments.md"),
     *("tutorials/class.md", "tutorials/evolution.md", "tutorials/figures.md"),
 }
-"""Pages that take ten seconds and more: `make test` leaves them out, `.ci/run` does what they show."""
+"""Pages that take ten seconds and more: `make test` leaves them out."""
 
 READ = [page for page in PAGES if page.name != "protocol.md"]
 """What is not a page whose blocks the firmware has made (docs/pages/protocol.py)."""
