@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Awaitable, Callable
 from contextlib import suppress
 from functools import partial
@@ -42,8 +43,10 @@ class PropertiesPanel(Panel):
         self._selected: Selected | None = None
         self._record: Any = None
         self._fields: dict[str, ui.input | ui.switch] = {}
+        self._shown: dict[str, Any] = {}
+        """What was last put into each field; where something else stands, a person has typed since."""
         self._in_focus = self._bad = ""
-        self._is_acting = False
+        self._acting = asyncio.Lock()
         self._form = named(ui.column().classes("w-full gap-1"), "properties")
         self._refused = named(ui.label().classes("text-body2 desk-error").props("role=alert"), "refused")
         self._build()
@@ -60,7 +63,7 @@ class PropertiesPanel(Panel):
             next(iter(self._fields.values())).run_method("focus")
 
     async def refresh(self) -> None:
-        """Show the present values, but in a field that a person types into."""
+        """Show the present values, but not in a field that a person is in, or has typed into."""
         if self._selected is None or self._desk.past is not None:
             return
         asked = self._selected
@@ -68,16 +71,15 @@ class PropertiesPanel(Panel):
             record = await self._editing.properties(asked)
         except KiksError:
             return  # by now, the past is shown
-        if self._is_acting or asked != self._selected:
+        if self._acting.locked() or asked != self._selected:
             return  # the answer is about a wall as it was before
         if type(record) is not type(self._record):
             await self.show(None)
             return
-        values, before = values_of(record), values_of(self._record)
         self._record = record
-        for name, field in self._fields.items():
-            if values[name] != before[name] and name != self._in_focus:
-                field.value = _text(values[name])
+        for name, value in values_of(record).items():
+            if name != self._in_focus and self._fields[name].value == self._shown[name]:
+                self._shown[name] = self._fields[name].value = _text(value)
 
     def set_visible(self, is_visible: bool) -> None:
         """Mark the selected wall while the panel is visible."""
@@ -91,6 +93,7 @@ class PropertiesPanel(Panel):
         """Build the form of the selected thing."""
         self._form.clear()
         self._fields.clear()
+        self._shown.clear()
         self._in_focus = self._refused.text = ""
         with self._form:
             if self._record is None:
@@ -120,6 +123,7 @@ class PropertiesPanel(Panel):
             field.on("focus", partial(self._focus, name))
             field.on("blur", lambda event: self._leave(name, event.args), js_handler=TYPED)
             field.on("keydown.enter", lambda event: self._take(name, event.args), js_handler=TYPED)
+        self._shown[name] = field.value
         if isinstance(value, tuple):
             field.classes("desk-wide")
         if tip := rule.get("description", ""):
@@ -143,27 +147,31 @@ class PropertiesPanel(Panel):
                 self._refused.text = ""
             return
         self._bad = name
-        await self._act(lambda selected: self._editing.change(selected, **{name: _value(typed, before)}))
+        changes, taken = {name: _value(typed, before)}, (typed, self._fields[name].value)
+        await self._act(lambda selected: self._editing.change(selected, **changes), name, taken)
 
     async def _remove(self) -> None:
         await self._act(self._editing.remove_selected)
 
-    async def _act(self, act: Callable[[Selected], Awaitable[Selected | None]]) -> None:
-        assert self._selected is not None
-        self._is_acting = True
-        try:
-            self._selected = await act(self._selected)
-            self._refused.text = ""
-        except KiksError as error:
-            self._refused.text = str(error)
-            return
-        finally:
-            self._is_acting = False
-        self._in_focus = ""
+    async def _act(
+        self, act: Callable[[Selected], Awaitable[Selected | None]], name: str = "", taken: tuple[Any, ...] = ()
+    ) -> None:
+        """Change the world, and show what came of it; the field of this name had one of the values `taken` before."""
+        async with self._acting:
+            if (asked := self._selected) is None:
+                return
+            try:
+                after = await act(asked)
+            except KiksError as error:
+                self._refused.text = str(error)
+                return
+            if asked == self._selected:  # a person may have selected something else since
+                self._selected, self._refused.text = after, ""
+        if name in self._fields and self._fields[name].value in taken:  # what has been typed since stays
+            self._shown[name] = self._fields[name].value
+            self._in_focus = "" if self._in_focus == name else self._in_focus
         await (self.show(None) if self._selected is None else self.refresh())
         self._mark()
-        for name, value in values_of(self._record).items() if self._fields else ():
-            self._fields[name].value = _text(value)
         self._changed()
 
 
