@@ -49,9 +49,13 @@ def pytest_collection_finish() -> None:
 
 @pytest.fixture(scope="module", autouse=True)
 def free_memory_goes_back_to_the_system() -> Iterator[None]:
-    """Collect garbage, as a few objects may hold large arenas, and return what the C library would keep."""
+    """Collect garbage, as a few objects may hold large arenas, and return what the C library would keep.
+
+    What is left stays until the end, as nearly all of it does, so that later searches need not look through it.
+    """
     yield
     gc.collect()
+    gc.freeze()
     if trim := getattr(ctypes.CDLL(None), "malloc_trim", None):
         trim(0)
 
