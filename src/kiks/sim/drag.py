@@ -17,7 +17,7 @@ STEP_MM = 0.5
 STEPS_MAX = 2000
 """Most steps of one move; a longer pull takes several moves."""
 
-SIDES_RAD = (0.0, *(sign * math.radians(degrees) for degrees in (25, 50, 75, 87) for sign in (1, -1)))
+SIDES_RAD = (0.0, *(sign * math.radians(degrees) for degrees in (25, 50, 75, 87, 89, 89.7) for sign in (1, -1)))
 """Detour angles tried when the straight way is blocked: a thing never gets farther from where it is wanted."""
 
 KINDS = ("robot", "body", "lamp")
@@ -157,10 +157,11 @@ class Drags:
             left_mm = math.hypot(x_mm - x, y_mm - y)
             if left_mm == 0.0:
                 break
-            step_mm, ahead_rad = min(STEP_MM, left_mm), math.atan2(y_mm - y, x_mm - x)
+            ahead_rad = math.atan2(y_mm - y, x_mm - x)
             for side_rad in SIDES_RAD:
-                to_x = x_mm if side_rad == 0.0 and step_mm == left_mm else x + step_mm * math.cos(ahead_rad + side_rad)
-                to_y = y_mm if side_rad == 0.0 and step_mm == left_mm else y + step_mm * math.sin(ahead_rad + side_rad)
+                step_mm = min(STEP_MM, left_mm * math.cos(side_rad))  # beyond that it gets farther away again
+                to_x = x_mm if step_mm == left_mm else x + step_mm * math.cos(ahead_rad + side_rad)
+                to_y = y_mm if step_mm == left_mm else y + step_mm * math.sin(ahead_rad + side_rad)
                 if math.hypot(x_mm - to_x, y_mm - to_y) < left_mm and is_free(to_x, to_y):
                     x, y = to_x, to_y
                     break
