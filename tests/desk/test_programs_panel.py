@@ -95,6 +95,7 @@ def test_a_program_is_not_started_when_halt_is_pressed_while_it_is_saved(
     begin_program(visitor, "late", FOR_EVER)
     monkeypatch.setattr(ProgramsPanel, "command", halted)
     visitor.click("run-program", told="late.py was not started: Halt was pressed.")
+    assert (visitor.desk.folder / "late.py").read_text() == FOR_EVER
     assert visitor.desk.programs.handles == []
 
 
