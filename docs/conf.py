@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import shutil
 import sys
@@ -58,6 +59,7 @@ sphinx_gallery_conf = {
     "examples_dirs": "../build/gallery",
     "gallery_dirs": gallery.PAGES,
     "filename_pattern": "",
+    "parallel": os.cpu_count(),
     "abort_on_example_error": True,
     "image_scrapers": ("gallery.keep_pictures",),
     "capture_repr": (),
