@@ -206,7 +206,7 @@ class AccessControl:
         if is_page and (key.fits(token) or key.take(ticket, scope.get("client"), scope.get("server"))):
             path = scope["path"].removeprefix(key.place).lstrip("/")
             # Relative, as some proxies put their own path before one that begins with a slash.
-            address = f"{'../' * path.count('/') or './'}{key.place[1:]}/{quote(path)}" + (
+            address = f"{'../' * (scope['path'].count('/') - 1) or './'}{key.place[1:]}/{quote(path)}" + (
                 f"?{urlencode(query)}" if query else ""
             )
             headers = {"set-cookie": self._own_cookie(request.headers), "cache-control": "no-store"}

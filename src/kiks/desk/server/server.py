@@ -136,7 +136,7 @@ class DeskServer:
 
         It leads past a proxy, whose connections are not this user's.
         """
-        return f"http://{self.place()}/{_page(number)}?ticket={self.key.new_ticket()}"
+        return f"http://{self.place()}{self.door.path}/{_page(number)}?ticket={self.key.new_ticket()}"
 
     def address(self) -> str:
         """Return the address under which people reach this server, with a slash at its end."""
