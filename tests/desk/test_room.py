@@ -198,7 +198,7 @@ def test_a_browser_that_goes_on_asking_too_much_is_served_at_its_rate(monkeypatc
         for second in range(10):
             now[0] = float(second)
             for _ in range(100):
-                await share({KEY: key, "type": "http", "path": f"{key.place}/desk/1"}, refuse, refuse)
+                await share({KEY: key, "type": "http", "root_path": "", "path": "/desk/1"}, refuse, refuse)
 
     asyncio.run(ask())
     (at_once, per_s), cost = fair_share.REQUESTS, fair_share.PAGE_COST

@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from kiks.cli.engine_start import ready_engine
-from kiks.cli.options import World, is_project, parse_words
+from kiks.cli.options import Address, World, is_project, parse_words
 from kiks.cli.record import RecordFile, recorded
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import ParameterError
 
 if TYPE_CHECKING:
     from kiks.desk.server.desk import Desk
+    from kiks.desk.server.public_address import PublicAddress
     from kiks.model.project import Project
     from kiks.sim.simulation import Simulation
 
@@ -48,6 +49,7 @@ def desk(
     host: Annotated[
         str, typer.Option(help="Address of the page. All but this computer's own need a token.")
     ] = "127.0.0.1",
+    address: Address = None,
     run_programs: Annotated[
         bool, typer.Option("--run-programs", help="Let browsers on other computers start programs, too.")
     ] = False,
@@ -67,9 +69,11 @@ def desk(
     """
     from kiks.desk.server.access import LOOPBACK
     from kiks.desk.server.desk import Desk
+    from kiks.desk.server.public_address import public_address
     from kiks.ports.program_process import commands_of, supervisor_of
     from kiks.sim.from_project import simulation_of
 
+    public = None if address is None else public_address(address)
     words = list(program or [])
     file = words.pop(0) if words and is_project(words[0]) else None
     begin = parse_words(words)
@@ -94,7 +98,7 @@ def desk(
         folder=folder,
         home=home,
         owns_world=True,
-        may_run_programs=run_programs or host in LOOPBACK,
+        may_run_programs=run_programs or (host in LOOPBACK and public is None),
         commands=commands,
         supervisor=supervisor_of(project, home) if file is not None else None,
         is_held=not no_wait,
@@ -102,7 +106,7 @@ def desk(
     )
     # A new start makes another world: the recording ends with the first one.
     with recorded(sim, record=record, programs=[each.file for each in commands if each is not None]):
-        open_desk(shown, host=host, port=port, browser=browser, waits=not no_wait)
+        open_desk(shown, host=host, port=port, public=public, browser=browser, waits=not no_wait)
 
 
 def with_kinds(project: Project, kinds: list[str]) -> Project:
@@ -121,6 +125,7 @@ def open_desk(
     *,
     host: str = "127.0.0.1",
     port: int | None = None,
+    public: PublicAddress | None = None,
     browser: bool = True,
     waits: bool = True,
     opened: Callable[[], None] = lambda: None,
@@ -132,6 +137,7 @@ def open_desk(
         desk: The desk.
         host: Address of the page.
         port: TCP port of the page.
+        public: The address that people open, if a proxy stands before the page.
         browser: Whether to open a browser.
         waits: Whether programs begin when the first page shows the world; otherwise at once.
         opened: Called when the page can be opened.
@@ -139,7 +145,7 @@ def open_desk(
     """
     from kiks.desk.server.show import Driver, Shown
 
-    shown = Shown(desk, host=host, port=port)
+    shown = Shown(desk, host=host, port=port, public=public)
     end_as_with_ctrl_c()
     typer.echo(f"The desk: {shown.url}   Ctrl-C ends it.")
     opened()

@@ -10,7 +10,7 @@ import typer
 
 from kiks.cli.desk import open_desk
 from kiks.cli.engine_start import ready_engine
-from kiks.cli.options import Silence, World, say, show_log
+from kiks.cli.options import Address, Silence, World, say, show_log
 from kiks.cli.outputs import has_results, leave_out, tell_results
 from kiks.cli.record import RecordFile, recorded, tell_run
 from kiks.errors import ParameterError, shown
@@ -54,6 +54,7 @@ def host(
     port: Annotated[
         int | None, typer.Option(help="TCP port, 0 for a free one; 8123 if left out.", min=0, max=65535)
     ] = None,
+    address: Address = None,
     browser: Annotated[bool, typer.Option(help="Open a browser.")] = True,
     record: RecordFile = None,
 ) -> None:
@@ -68,6 +69,7 @@ def host(
     from kiks.desk.server.access import LOOPBACK
     from kiks.desk.server.desk import Desk
     from kiks.desk.server.players import Players
+    from kiks.desk.server.public_address import public_address
     from kiks.desk.server.server import SERVER
     from kiks.ports.program_process import commands_of, supervisor_of
     from kiks.ports.program_scheduler import check_policy
@@ -75,6 +77,7 @@ def host(
     from kiks.sim.from_project import simulation_of
 
     show_log()
+    public = None if address is None else public_address(address)
     read, home = world.project(project, programs=players or 0, fills_starts=True)
     robots = range(1, (players or len(read.robots)) + 1)
     policy = thinking or read.thinking
@@ -124,7 +127,7 @@ def host(
         speed=read.speed,
         folder=home,
         owns_world=True,
-        may_run_programs=host in LOOPBACK,
+        may_run_programs=host in LOOPBACK and public is None,
         commands=own,
         supervisor=supervisor_of(read, home) if project is not None else None,
         new_programs=new_programs,
@@ -132,5 +135,14 @@ def host(
     )
     door = Players(desk, robots, tell)
     with recorded(desk.sim, record=record):
-        open_desk(desk, host=host, port=port, browser=browser, waits=False, opened=open_door, programs_ended=end)
+        open_desk(
+            desk,
+            host=host,
+            port=port,
+            public=public,
+            browser=browser,
+            waits=False,
+            opened=open_door,
+            programs_ended=end,
+        )
     tell_results(context, {"runs": runs})

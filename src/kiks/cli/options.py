@@ -24,6 +24,10 @@ if TYPE_CHECKING:
     from kiks.ports.program_process import Command
 
 Seed = Annotated[int, typer.Option(help="Seed: the same seed, the same run.", min=0)]
+Address = Annotated[
+    str | None,
+    typer.Option(metavar="URL", help="The address that people open, behind a proxy: https://school.example/robots/."),
+]
 SeedOrOwn = Annotated[
     int | None,
     typer.Option(help="Seed: the same seed, the same run; the own one of a project or champion, else 0.", min=0),

@@ -5,15 +5,13 @@ from __future__ import annotations
 import threading
 from pathlib import Path
 from typing import Annotated
-from urllib.parse import urlsplit
 
 import typer
 
 from kiks.cli.desk import wait_for
 from kiks.cli.engine_start import ready_engine
-from kiks.cli.options import Trusted
+from kiks.cli.options import Address, Trusted
 from kiks.ending import end_as_with_ctrl_c
-from kiks.errors import ParameterError, shown
 
 
 def room(
@@ -31,10 +29,7 @@ def room(
     folder: Annotated[
         Path, typer.Option(metavar="FOLDER", help="Where students' files and what they hand in are kept.")
     ] = Path("room"),
-    address: Annotated[
-        str,
-        typer.Option(metavar="URL", help="The address that people open, behind a proxy: https://kiks.school.example."),
-    ] = "",
+    address: Address = None,
     trusted: Trusted = False,
 ) -> None:
     """Open a room: one address for a class, and a desk for each student.
@@ -46,10 +41,11 @@ def room(
     """
     from kiks.desk.room.entrance import check_code
     from kiks.desk.room.names import read_names
+    from kiks.desk.server.public_address import public_address
     from kiks.model.project import Project, project_file
 
     names, code = read_names(students), check_code(code) if code is not None else ""
-    _check_address(address)
+    public = None if address is None else public_address(address)
     project, home = Project.load(exercise), project_file(exercise).parent
     ready_engine()
     from kiks.desk.room.page import open_room
@@ -59,23 +55,9 @@ def room(
 
     if project.goal is not None:
         Judge(simulation_of(project, home), project.goal)  # says what is wrong with the goal before a class has come
-    opened = Room(project, home, names, folder, code=code, address=address, is_trusted=trusted)
+    opened = Room(project, home, names, folder, code=code, address=public, is_trusted=trusted)
     with open_room(opened, host=host, port=port):
         end_as_with_ctrl_c()
         typer.echo(f"For the class: {opened.address}   The code: {opened.code}")
         typer.echo(f"For you alone: {opened.lecturer_address}   Ctrl-C ends the room.")
         wait_for(threading.Event())
-
-
-def _check_address(address: str) -> None:
-    try:
-        url = urlsplit(address)
-        is_right = url.scheme in ("http", "https") and url.hostname and url.path in ("", "/") and not url.query
-        url.port  # noqa: B018 # raises if it is none
-    except ValueError:
-        is_right = False
-    if address and not is_right:
-        raise ParameterError(
-            f"--address must be that of the proxy, without a path, but it was {shown(address)}. For example "
-            "https://kiks.school.example."
-        )

@@ -999,7 +999,13 @@ class Simulation:
             return world.state.hash()
 
     def show(
-        self, *, speed: float | None = 1.0, is_alive: bool = False, port: int | None = None, browser: bool = True
+        self,
+        *,
+        speed: float | None = 1.0,
+        is_alive: bool = False,
+        port: int | None = None,
+        browser: bool = True,
+        address: str | None = None,
     ) -> View:
         """Show this simulation in a browser and print its address; in a notebook, below the cell.
 
@@ -1010,6 +1016,9 @@ class Simulation:
             is_alive: Whether time passes by itself, in a thread; else only when the program lets it.
             port: TCP port of the page, on this computer only; 8123, or a free one, if left out.
             browser: False for its address alone.
+            address: The address under which a browser reaches the page, if the program runs on another computer, such
+                as `https://school.example/user/ada/proxy/{port}/`; the variable `KIKS_ADDRESS`, or that of
+                `jupyter-server-proxy` on a JupyterHub, if left out.
 
         Returns:
             What is shown, with its `url`; `close()` ends it.
@@ -1026,7 +1035,7 @@ class Simulation:
             True
             >>> shown.close()
         """
-        view: View = show_in_browser(self, speed=speed, is_alive=is_alive, port=port, browser=browser)
+        view: View = show_in_browser(self, speed=speed, is_alive=is_alive, port=port, browser=browser, address=address)
         return view
 
 

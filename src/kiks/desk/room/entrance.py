@@ -151,18 +151,19 @@ class Entrance:
             key = await self._take(name)
         except ParameterError as error:
             return self._page("names", fault=str(error), status=409)
-        return self._page("welcome", home=f"{key.place}/", name=name, cookie=self._door.cookie(key))
+        return self._page("welcome", home=f"{self._door.path}{key.place}/", name=name, cookie=self._door.cookie(key))
 
     def _page(self, step: str, *, fault: str = "", status: int = 200, cookie: str = "", **more: str) -> Response:
         headers = {"cache-control": "no-store"} | ({"set-cookie": cookie} if cookie else {})
         names = self._names() if step == "names" else {}
-        text = _PAGE.render(step=step, title=self._title, code=self._code, names=names, fault=fault, **more)
+        texts = {"title": self._title, "code": self._code, "path": self._door.path, "fault": fault, **more}
+        text = _PAGE.render(step=step, names=names, **texts)
         return HTMLResponse(text, status, headers)
 
     def _address(self, request: Request) -> str:
         """Return whose guess it is: the connection's other end, or what a proxy of this computer says of its own."""
         address = request.client.host if request.client is not None else ""
-        if self._door.name is not None and address in LOOPBACK:
+        if self._door.public is not None and address in LOOPBACK:
             return request.headers.get("x-forwarded-for", address).rpartition(",")[2].strip()[:50]
         return address
 

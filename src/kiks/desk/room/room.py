@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path, PurePosixPath
-from urllib.parse import urlsplit
 
 from nicegui import background_tasks
 
@@ -20,6 +19,7 @@ from kiks.desk.room.pictures import Pictures
 from kiks.desk.room.seats import Seat, read_seats, write_seats
 from kiks.desk.server.access import ADVICE
 from kiks.desk.server.desk import Desk
+from kiks.desk.server.public_address import PublicAddress
 from kiks.desk.server.scripts import EXAMPLES
 from kiks.desk.server.server import SERVER
 from kiks.desk.server.show import Shown
@@ -79,7 +79,7 @@ class Room:
         folder: Path,
         *,
         code: str = "",
-        address: str = "",
+        address: PublicAddress | None = None,
         is_trusted: bool = False,
     ) -> None:
         if not is_trusted:
@@ -116,10 +116,7 @@ class Room:
         """
         door = SERVER.door
         door.advice = STUDENT_ADVICE
-        if self._public:
-            url = urlsplit(self._public)
-            door.name, door.is_secure = url.hostname, url.scheme == "https"
-        SERVER.start(host=host, port=port)
+        SERVER.start(host=host, port=port, public=self._public)
         for seat in self.seats.values():
             if seat.number:
                 self._open(seat)
@@ -137,7 +134,7 @@ class Room:
         """Close all desks, and let no student in."""
         self._is_over = True
         door = SERVER.door
-        door.entrance, door.advice, door.name, door.is_secure = None, ADVICE, None, False
+        door.entrance, door.advice, door.public = None, ADVICE, None
         self._starter.shutdown(cancel_futures=True)
         if SERVER.is_running:
             SERVER.run(self._leave())
@@ -153,7 +150,7 @@ class Room:
     @property
     def address(self) -> str:
         """The address for students, without the code."""
-        return f"{self._public.rstrip('/')}/" if self._public else SERVER.address()
+        return SERVER.address()
 
     @property
     def address_with_code(self) -> str:

@@ -19,6 +19,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocketClose
 from uvicorn.protocols.http.h11_impl import H11Protocol
 
+from kiks.desk.server.public_address import PublicAddress
 from kiks.desk.server.token import COOKIE, Token
 from kiks.errors import shown
 from kiks.model.limits import REQUEST_BYTES_MAX
@@ -71,8 +72,7 @@ class Door:
         bearers: The tokens of programs, which send them in the header `Authorization`, by the paths that they open.
         entrance: Answers requests for `/` without a token; None: they are refused.
         advice: What the page of a refusal advises; HTML.
-        name: Name of the computer in the address that people open, if a proxy stands before the server.
-        is_secure: Whether that proxy speaks TLS.
+        public: The address that people open, if a proxy stands before the server.
         max_age_s: How long browsers keep cookies of others [s].
     """
 
@@ -80,10 +80,14 @@ class Door:
     bearers: dict[str, list[Token]] = field(default_factory=dict)
     entrance: ASGIApp | None = None
     advice: str = ADVICE
-    name: str | None = None
-    is_secure: bool = False
+    public: PublicAddress | None = None
     max_age_s: int = 30 * 24 * 3600
     _sockets: dict[str, set[Callable[[], Awaitable[None]]]] = field(default_factory=dict)
+
+    @property
+    def path(self) -> str:
+        """The path that a proxy has put before those of this server."""
+        return "" if self.public is None else self.public.path
 
     def add(self, key: Token) -> None:
         """Let a token in."""
@@ -107,7 +111,13 @@ class Door:
 
     def cookie(self, key: Token) -> str:
         """Return the cookie with the token of somebody who has come in by the entrance."""
-        return f"{_cookie(key, 'SameSite=Strict', is_secure=self.is_secure)}; Max-Age={self.max_age_s}"
+        return f"{self.short_cookie(key)}; Max-Age={self.max_age_s}"
+
+    def short_cookie(self, key: Token, rule: str = "SameSite=Strict") -> str:
+        """Return a cookie with a token, until the browser is closed; only the key's own place gets it."""
+        is_secure = self.public is not None and self.public.is_secure
+        cookie = f"{COOKIE}={key.token}; Path={self.path}{key.place}; HttpOnly; {rule}"
+        return f"{cookie}; Secure" if is_secure and "Secure" not in rule else cookie
 
 
 class LimitedConnection(H11Protocol):
@@ -176,7 +186,8 @@ class AccessControl:
     def _checked(self, request: HTTPConnection) -> ASGIApp:
         """Return what answers a request: the application, or a way to it; else raise the refusal."""
         self._check(request)
-        scope, is_page = request.scope, request.scope["type"] == "http"
+        scope, is_page, before = request.scope, request.scope["type"] == "http", self._door.path
+        scope["path"] = scope["path"].removeprefix(before) if scope["path"].startswith(f"{before}/") else scope["path"]
         if (key := self._known_key(request)) is not None and not key.opens(scope["path"].removeprefix(key.place)):
             raise HTTPException(403, "A page must belong to your own desk, but this one does not")
         if scope["type"] == "websocket":
@@ -184,14 +195,20 @@ class AccessControl:
         if key is not None:
             if (timer := scope.get("state", {}).get(TIMER)) is not None:
                 timer.cancel()
-            scope.update({"root_path": key.place, KEY: key})
+            # NiceGUI would put the path of this header before the paths of its files, where it is already.
+            kept = [each for each in scope["headers"] if each[0] != b"x-forwarded-prefix"]
+            place, path = before + key.place, before + scope["path"]
+            scope.update({"root_path": place, "path": path, "headers": kept, KEY: key})
             return self._pass_on
         query = dict(request.query_params)
         token, ticket = query.pop("token", ""), query.pop("ticket", "")
         key = self._key
         if is_page and (key.fits(token) or key.take(ticket, scope.get("client"), scope.get("server"))):
             path = scope["path"].removeprefix(key.place).lstrip("/")
-            address = f"{key.place}/{quote(path)}" + (f"?{urlencode(query)}" if query else "")
+            # Relative, as some proxies put their own path before one that begins with a slash.
+            address = f"{'../' * (scope['path'].count('/') - 1) or './'}{key.place[1:]}/{quote(path)}" + (
+                f"?{urlencode(query)}" if query else ""
+            )
             headers = {"set-cookie": self._own_cookie(request.headers), "cache-control": "no-store"}
             return RedirectResponse(address, 303, headers)
         if is_page and self._door.entrance is not None and scope["path"] == "/":
@@ -215,7 +232,8 @@ class AccessControl:
             raise HTTPException(
                 403, f"Requests must come from the desk's own page, but this one came from {shown(origin)}"
             )
-        if self._is_local and name not in LOOPBACK and name != self._door.name:
+        public = self._door.public
+        if self._is_local and name not in LOOPBACK and (public is None or not public.admits(name)):
             raise HTTPException(403, f"The desk's host must be a name of this computer, but it was {shown(host)}")
         is_open_ended = "transfer-encoding" in headers or not re.fullmatch("[0-9]{1,18}", length)
         if is_open_ended or int(length) > REQUEST_BYTES_MAX:
@@ -249,8 +267,8 @@ class AccessControl:
             "frame",
         )
         if is_within:
-            return _cookie(self._key, "SameSite=None; Secure; Partitioned", is_secure=False)
-        return _cookie(self._key, "SameSite=Strict", is_secure=self._door.is_secure)
+            return self._door.short_cookie(self._key, "SameSite=None; Secure; Partitioned")
+        return self._door.short_cookie(self._key)
 
     async def _pass_on(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Call the application; a failure of it after the client has left is none."""
@@ -278,7 +296,3 @@ class AccessControl:
             except Exception:
                 if not has_left:
                     raise
-
-
-def _cookie(key: Token, rule: str, *, is_secure: bool) -> str:
-    return f"{COOKIE}={key.token}; Path={key.place}; HttpOnly; {rule}" + ("; Secure" if is_secure else "")

@@ -24,6 +24,7 @@ from kiks.desk.server.fair_share import FairShare
 from kiks.desk.server.gateway import Gateway
 from kiks.desk.server.page_guard import PageGuard, guard_messages
 from kiks.desk.server.players import Players
+from kiks.desk.server.public_address import PublicAddress
 from kiks.desk.server.server_log import log_plainly
 from kiks.desk.server.token import Token
 from kiks.errors import LinkError, ParameterError
@@ -72,25 +73,28 @@ class DeskServer:
         self._loop: asyncio.AbstractEventLoop | None = None
         self._lock = threading.Lock()
 
-    def start(self, *, host: str = "127.0.0.1", port: int | None = None) -> None:
+    def start(self, *, host: str = "127.0.0.1", port: int | None = None, public: PublicAddress | None = None) -> None:
         """Start the server unless it runs already.
 
         Args:
             host: Address to listen at.
             port: TCP port, 0 for a free one; if left out, `PORT`, or a free one if that is taken.
+            public: The address that people open, if a proxy stands before it; that of before if left out.
 
         Raises:
             LinkError: If it cannot listen there.
         """
         with self._lock:
             if self._socket is not None:
-                if port not in (None, 0, self._socket.getsockname()[1]):
+                if port not in (None, 0, self.port):
                     raise ParameterError(
                         f"port must be that of the desk that is open, {self.url()}, but it was {port}."
                     )
+                self.door.public = public.at(self.port) if public else self.door.public
                 return
             self._is_local = host in LOOPBACK
             self._socket = _listen(host, PORT, or_free=True) if port is None else _listen(host, port)
+            self.door.public = public.at(self.port) if public else None
             begun = threading.Event()
             server = threading.Thread(target=self._serve, args=(begun,), name="kiks desk", daemon=True)
             server.start()
@@ -125,18 +129,27 @@ class DeskServer:
 
     def url(self, number: int | None = None) -> str:
         """Return the URL of a desk, or of the newest one, with the token."""
-        return f"{self._page(number)}?token={self.key.token}"
+        return f"{self.address()}{_page(number)}?token={self.key.token}"
 
     def url_for_once(self, number: int) -> str:
-        """Return a URL of a desk that works once, for a browser of this user: other users may see it."""
-        return f"{self._page(number)}?ticket={self.key.new_ticket()}"
+        """Return a URL of a desk that works once, for a browser of this user: other users may see it.
+
+        It leads past a proxy, whose connections are not this user's.
+        """
+        return f"http://{self.place()}{self.door.path}/{_page(number)}?ticket={self.key.new_ticket()}"
 
     def address(self) -> str:
-        """Return the address under which other computers reach this server, with a slash at its end."""
-        return f"http://{self.place()}/"
+        """Return the address under which people reach this server, with a slash at its end."""
+        return f"http://{self.place()}/" if self.door.public is None else self.door.public.url
+
+    @property
+    def port(self) -> int:
+        """The TCP port."""
+        assert self._socket is not None
+        return int(self._socket.getsockname()[1])
 
     def place(self) -> str:
-        """Return the host and the port of that address."""
+        """Return the host and the port under which other computers reach this server without a proxy."""
         assert self._socket is not None
         host, port = self._socket.getsockname()[:2]
         host = _own_address(self._socket.family) if host in EVERY_ADDRESS else host
@@ -159,9 +172,6 @@ class DeskServer:
         return asyncio.run_coroutine_threadsafe(work, self._loop).result()
 
     # ---- inside ----
-
-    def _page(self, number: int | None) -> str:
-        return self.address() + ("" if number is None else f"desk/{number}")
 
     def _serve(self, begun: threading.Event) -> None:
         """Run the web server in its own thread."""
@@ -242,6 +252,10 @@ class DeskServer:
                 ui.label(CLOSED)
             else:
                 Page(gateway.desk, gateway.editing, number)
+
+
+def _page(number: int | None) -> str:
+    return "" if number is None else f"desk/{number}"
 
 
 def _own_address(family: socket.AddressFamily) -> str:

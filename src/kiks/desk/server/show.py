@@ -12,6 +12,7 @@ from typing import Any
 
 from kiks.desk.screen import has_screen
 from kiks.desk.server.desk import Desk, NewsHandler, OutsidePrograms
+from kiks.desk.server.public_address import PublicAddress, address_for_notebooks, why_unreachable
 from kiks.desk.server.server import SERVER
 from kiks.export.frames import pack_frame
 from kiks.model.checks import check_count, check_kind
@@ -70,6 +71,7 @@ class Shown:
         desk: The desk.
         host: Address to listen at.
         port: TCP port, 0 for a free one; if left out, 8123, or a free one if that is taken.
+        public: The address that people open, if a proxy stands before the server.
         number: Its number in its address; the next one if left out.
 
     Attributes:
@@ -82,14 +84,20 @@ class Shown:
     """
 
     def __init__(
-        self, desk: Desk, *, host: str = "127.0.0.1", port: int | None = None, number: int | None = None
+        self,
+        desk: Desk,
+        *,
+        host: str = "127.0.0.1",
+        port: int | None = None,
+        public: PublicAddress | None = None,
+        number: int | None = None,
     ) -> None:
         self.desk = desk
         with desk.sim.lock:
             # Compile the code for frames before the first browser waits for it.
             pack_frame(desk.sim, scene=0)
         desk.keep_past()
-        SERVER.start(host=host, port=port)
+        SERVER.start(host=host, port=port, public=public)
         self.gateway = SERVER.open(desk, number)
         self.url = SERVER.url(self.gateway.number)
         self._driver: Driver | None = None
@@ -150,6 +158,11 @@ class Shown:
             ipython.display_pub.publish({"text/plain": repr(self), "text/html": self._repr_html_()})
 
     def _repr_html_(self) -> str:
+        if SERVER.door.public is None and (why := why_unreachable()):
+            from kiks.export.notebook import simulation  # with the library that draws, which a desk needs here alone
+
+            pixels = simulation(self.desk.sim)[0]["image/png"]
+            return f'<p>{html.escape(why)}</p><img width="480" alt="" src="data:image/png;base64,{pixels}">'
         return f'<iframe src="{html.escape(self.url)}" style="width: 100%; height: 640px; border: 0"></iframe>'
 
 
@@ -160,6 +173,7 @@ def show(
     is_alive: bool = False,
     port: int | None = None,
     browser: bool = True,
+    address: str | None = None,
 ) -> Shown:
     """Show a world in a browser; see `Simulation.show`.
 
@@ -169,7 +183,7 @@ def show(
     check_kind("is_alive", is_alive, bool)
     port = None if port is None else check_count("port", port, 0, 65535, "Leave it out for a free one.")
     desk = Desk(sim, speed=speed, may_run_programs=is_alive)
-    shown = Shown(desk, port=port)
+    shown = Shown(desk, port=port, public=address_for_notebooks(address))
     if is_alive:
         shown.drive()
     else:
