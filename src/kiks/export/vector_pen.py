@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kiks.export.light import light_map
-from kiks.export.looks import LAMPLIGHT, Colour
-from kiks.export.sheet import FLOOR, LIGHT_SHARE, Place, coarse_cells, darkness, mixed, wall_grey
+from kiks.export.looks import Colour
+from kiks.export.sheet import FLOOR, Place, coarse_cells, darkness, lit_floor, wall_grey
 from kiks.model.arena import Arena
 from kiks.model.robot import RobotSpec
 
@@ -24,8 +23,8 @@ DOTS_PER_INCH = 160
 UNIT_POINTS = 0.2
 """A pixel of a sheet on paper [points]: a picture fills the width of a page."""
 
-_WALL_CELLS_MAX, _LIGHT_STEPS, _SHADES_MAX = 2000, 24, 16
-"""Most cells along a side of the walls that are outlined, levels of light, and most shades of the floor."""
+_WALL_CELLS_MAX, _SHADES_MAX = 2000, 16
+"""Most cells along a side of the walls that are outlined, and most shades of the floor."""
 
 _PARTS = {"l": "left", "m": "center", "r": "right"}
 
@@ -67,10 +66,10 @@ class VectorPen:
     def ground(self, arena: Arena, lamps: NDArray[np.float64], spec: RobotSpec | None) -> None:
         """Draw what `ground_picture` draws, as outlines; each grey lies over the darker ones."""
         self._axes.set_facecolor(_colour(FLOOR))
-        if (light := light_map(arena, lamps, spec)) is not None:
-            for share in np.linspace(0.0, 1.0, _LIGHT_STEPS)[1:].tolist():
-                colour = mixed(FLOOR, LAMPLIGHT, LIGHT_SHARE * share)
-                self._fill(np.flipud(light), share, arena.width_mm / light.shape[1], 0.5, colour)
+        if (lit := lit_floor(arena, lamps, spec)) is not None:
+            # As outlines, each level of light would be as long as all shadows. A viewer makes the pixels smooth.
+            extent = (0.0, arena.width_mm, 0.0, arena.height_mm)
+            self._axes.imshow(lit, extent=extent, interpolation="none", zorder=1)
         if arena.shades is not None:
             self._darken(*coarse_cells(arena.shades, arena.mm_per_cell, _WALL_CELLS_MAX))
         cells, cell_mm = coarse_cells(arena.brightness, arena.mm_per_cell, _WALL_CELLS_MAX)
