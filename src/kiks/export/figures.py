@@ -13,6 +13,7 @@ from textwrap import fill
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kiks.engine.state import BALL
 from kiks.errors import ParameterError
@@ -64,8 +65,8 @@ PATH_COLUMNS, LEGEND_LINE_POINTS = 3, 13.0
 HEAT_MM = 20.0
 """Side of a cell of the heat map [mm]."""
 
-POINTS_MAX = 4000
-"""Most points of a line over time."""
+LINE_PARTS = 1000
+"""Parts of a line over time, each about as wide as a pixel."""
 
 ROWS = {"readings": 2.1, "speeds": 2.1, "time": 0.75}
 """Heights of the rows over time [inches]; those of an arena have its shape."""
@@ -298,9 +299,9 @@ def _draw_heat(axes: Any, picture: Picture, poses: Table) -> None:
 
 def _draw_readings(axes: Any, table: Table) -> None:
     """Draw what the program read of the proximity sensors."""
-    table = _thinned(table[table["command"] == "N"])
+    table = table[table["command"] == "N"]
     for sensor in range(8):
-        axes.plot(table["time_s"], table["counts"][:, sensor], linewidth=0.7, label=str(sensor))
+        axes.plot(*_seen(table["time_s"], table["counts"][:, sensor]), linewidth=0.7, label=str(sensor))
     axes.set_ylabel("proximity")
     axes.set_xlabel("time [s]")
     axes.grid(alpha=0.3)
@@ -312,10 +313,9 @@ def _draw_readings(axes: Any, table: Table) -> None:
 
 def _draw_speeds(axes: Any, table: Table) -> None:
     """Draw the speeds of the wheels, as asked for and as measured."""
-    table = _thinned(table)
     for side, colour in (("left", "C0"), ("right", "C3")):
-        axes.plot(table["time_s"], table[f"{side}_speed"], color=colour, linewidth=0.7, label=side)
-        axes.plot(table["time_s"], table[f"{side}_setpoint"], color=colour, linewidth=0.7, linestyle=":")
+        axes.plot(*_seen(table["time_s"], table[f"{side}_speed"]), color=colour, linewidth=0.7, label=side)
+        axes.plot(*_seen(table["time_s"], table[f"{side}_setpoint"]), color=colour, linewidth=0.7, linestyle=":")
     axes.plot([], [], color="gray", linewidth=0.9, linestyle=":", label="asked for")
     axes.set_ylabel("speed [pulses/10 ms]")
     axes.set_xlabel("time [s]")
@@ -344,6 +344,12 @@ def _legend_above(axes: Any, columns: int) -> None:
     axes.legend(fontsize="small", ncols=columns, columnspacing=1.0, handlelength=1.2, labelspacing=0.2, **place)
 
 
-def _thinned(table: Table) -> Table:
-    """Return a table with no more rows than a line can show."""
-    return table[:: max(-(-len(table) // POINTS_MAX), 1)]
+def _seen(time_s: NDArray[np.float64], values: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[Any]]:
+    """Return of a line over time what can be seen: the least and the greatest value of each part of it."""
+    size = -(-len(values) // LINE_PARTS)
+    if size <= 2:
+        return time_s, values
+    rows = np.pad(values, (0, -len(values) % size), mode="edge").reshape(-1, size)
+    ends = np.stack([rows.argmin(axis=1), rows.argmax(axis=1)]) + np.arange(len(rows)) * size
+    kept = np.unique(np.minimum(ends, len(values) - 1))
+    return time_s[kept], values[kept]

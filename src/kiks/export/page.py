@@ -12,6 +12,7 @@ from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 import jinja2
 from markupsafe import Markup
@@ -38,6 +39,9 @@ FIGURES = {
 }
 """Title of each figure, and a sentence."""
 
+_SAFE = " !$()*+,/:;=?@[]"
+"""What stands in the address of a figure as it is, beside letters, numbers and -._~: most of a figure is numbers."""
+
 
 def save_page(
     recording: Recording,
@@ -63,7 +67,7 @@ def save_page(
         title=title,
         robot=robot,
         figures=[
-            (name, head, text.format(robot=robot), base64.b64encode(figures[name]).decode())
+            (name, head, text.format(robot=robot), quote(figures[name], safe=_SAFE))
             for name, (head, text) in FIGURES.items()
             if name in figures
         ],

@@ -84,7 +84,7 @@ class RunFrames:
             shapes = describe_shapes(sim)
             if not self.shapes or self.shapes[-1][1] != shapes:
                 self.shapes.append((len(self.frames), shapes))
-            self.frames.append(pack_frame(sim, scene=len(self.scenes) - 1))
+            self.frames.append(pack_frame(sim, scene=len(self.scenes) - 1, is_coarse=True))
 
     def _take_scene(self, sim: Simulation) -> None:
         """Add the present scene if it differs from the last one."""

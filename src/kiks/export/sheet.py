@@ -93,7 +93,7 @@ def ground_picture(arena: Arena, lamps: NDArray[np.float64], spec: RobotSpec | N
 
 
 def lit_floor(arena: Arena, lamps: NDArray[np.float64], spec: RobotSpec | None) -> Image | None:
-    """Return a picture of a white floor with the light of lamps, a pixel for each cell of `light_map`; None if it is dark.
+    """Return a white floor with the light of lamps, a pixel for each cell of `light_map`; None if it is dark.
 
     Args:
         arena: The arena.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 import warnings
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
@@ -26,6 +27,18 @@ UNIT_POINTS = 0.2
 _WALL_CELLS_MAX, _SHADES_MAX = 2000, 16
 """Most cells along a side of the walls that are outlined, and most shades of the floor."""
 
+_STRAIGHT = 1e-6
+"""Two sides of an outline that turn by less are one [mm^2]."""
+
+_STEPS = 100
+"""Steps in a point, to which places in an SVG file are rounded: a hundredth of the width of a line."""
+
+_PATH, _PART, _ZERO = re.compile(r' d="([^"]*)"'), re.compile(r"([MLCQz])([^MLCQz]*)"), re.compile(r"\b0\.")
+"""The data of a path in an SVG file, a part of it, which is a letter and places, and a zero that may be left out."""
+
+_SQUARE = "image-rendering:crisp-edges;image-rendering:pixelated"
+"""How Matplotlib asks for pictures whose pixels are squares: the light of lamps is smooth."""
+
 _PARTS = {"l": "left", "m": "center", "r": "right"}
 
 
@@ -45,7 +58,9 @@ def file_of(figure: Figure, kind: str, dots_per_inch: int = DOTS_PER_INCH) -> by
     with rc_context({"svg.hashsalt": "kiks", "pdf.fonttype": 42}), warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Glyph .* missing from")
         figure.savefig(buffer, format=kind, dpi=dots_per_inch, metadata=dated)
-    return buffer.getvalue()
+    if kind != "svg":
+        return buffer.getvalue()
+    return _PATH.sub(_shortened, buffer.getvalue().decode()).replace(_SQUARE, "").encode()
 
 
 class VectorPen:
@@ -89,7 +104,10 @@ class VectorPen:
         """Fill the area above a level; the middle of the first cell is so many cells from the lower left corner."""
         x_mm, y_mm = ((np.arange(count) + first) * cell_mm for count in cells.shape[::-1])
         levels = [level, 2.0]
-        self._axes.contourf(x_mm, y_mm, cells.astype(np.float64), levels=levels, colors=[_colour(colour)], zorder=1)
+        areas = self._axes.contourf(
+            x_mm, y_mm, cells.astype(np.float64), levels=levels, colors=[_colour(colour)], zorder=1
+        )
+        areas.set_paths([_corners(path) for path in areas.get_paths()])
 
     def ellipse(
         self, box: tuple[float, ...], fill: Colour | None = None, outline: Colour | None = None, width: float = 1
@@ -159,6 +177,39 @@ class VectorPen:
             zorder=1,
         )
         self._axes.add_artist(patch)
+
+
+def _corners(path: Any) -> Any:
+    """Return an outline without the points on its straight sides, of which it has one for each cell."""
+    from matplotlib.path import Path
+
+    if path.codes is None or len(path.codes) < 3:
+        return path
+    steps = np.diff(path.vertices, axis=0)
+    turns = steps[:-1, 0] * steps[1:, 1] - steps[:-1, 1] * steps[1:, 0]
+    is_line = path.codes == Path.LINETO
+    is_corner = np.ones(len(is_line), bool)
+    is_corner[1:-1] = (np.abs(turns) > _STRAIGHT) | ~is_line[1:-1] | ~is_line[2:]
+    return Path(path.vertices[is_corner], path.codes[is_corner])
+
+
+def _shortened(found: re.Match[str]) -> str:
+    """Return the data of a path of an SVG file as short steps, each from the place before."""
+    parts: list[str] = []
+    begin = at = [0, 0]
+    before = ""
+    for letter, numbers in _PART.findall(found[1]):
+        ends = [round(float(number) * _STEPS) for number in numbers.split()]
+        steps = [end - at[index % 2] for index, end in enumerate(ends)]
+        at = begin if letter == "z" else ends[-2:]
+        begin = at if letter == "M" else begin
+        if letter == before == "L":
+            letter = ""  # the letter before holds for what follows
+        else:
+            before = letter
+        if letter or any(steps):
+            parts.append(letter.lower() + " ".join(f"{step / _STEPS:.2f}".rstrip("0").rstrip(".") for step in steps))
+    return f' d="{_ZERO.sub(".", " ".join(parts)).replace(" -", "-")}"'
 
 
 def _colour(colour: Colour | None) -> Any:
