@@ -101,8 +101,8 @@ def lead_to_public_names(app, env, node, contnode):
 HERE = Path(__file__).parent
 QUESTIONS = (HERE / "how_do_i.md").read_text(encoding="utf-8")
 
-LISTS = {"how_do_i", "genindex", "py-modindex", "search", "index"}
-"""Pages that the search does not find."""
+LISTS = {"how_do_i", "index"}
+"""Pages that lead to others: the search does not find them."""
 
 PAGES = {
     re.search("^# (.+)", path.read_text(encoding="utf-8"), re.MULTILINE)[1]: path.relative_to(HERE)
@@ -139,18 +139,21 @@ def help_readers_and_keys(app, page, template, context, doctree):
     context["body"] = SCROLLED.sub(r'\g<0> tabindex="0"', context.get("body", ""))
 
 
+NOT_SEARCHED = ".headerlink, .genindextable, .indextable, .genindex-jumpbox"
+"""What the search leaves out of a page."""
+
 QUESTION = re.compile(r"^### \.\.\. (.+)\n<!-- (.+) -->\n.*?\]\(([\w/]+)\.(?:md|rst)", re.MULTILINE)
 """A question of `how_do_i.md`, other words for it, and the page that its first link leads to."""
 
 
 def add_questions(app, page, template, context, doctree):
-    """Give the search the questions that a page answers; what only lists words or questions is left to the lists."""
-    if page in LISTS or "body" not in context:
-        context["body"] = f'<div data-pagefind-ignore="all">{context.get("body", "")}</div>'
-        return
+    """Give the search the questions that a page answers, in the words of those who ask."""
+    if page in LISTS:
+        context["body"] = f'<div data-pagefind-ignore="all">{context["body"]}</div>'
     asked = [f"{question} {words}" for question, words, answer in QUESTION.findall(QUESTIONS) if answer == page]
-    text = escape(". ".join(asked))
-    context["body"] += f'<p hidden data-pagefind-meta="asked" data-pagefind-weight="5">{text}</p>' if asked else ""
+    if asked:
+        text = escape(". ".join(asked))
+        context["body"] += f'<p hidden data-pagefind-meta="asked" data-pagefind-weight="5">{text}</p>'
 
 
 def make_search(app, fault):
@@ -158,7 +161,7 @@ def make_search(app, fault):
     if fault is None and app.builder.name == "html":
         shutil.rmtree(app.outdir / "pagefind", ignore_errors=True)
         command = [sys.executable, "-m", "pagefind", "--quiet", "--site", app.outdir]
-        command += ["--root-selector", "article[role=main]", "--exclude-selectors", ".headerlink"]
+        command += ["--root-selector", "article[role=main]", "--exclude-selectors", NOT_SEARCHED]
         subprocess.run(command, check=True)
 
 
