@@ -5,8 +5,10 @@ from __future__ import annotations
 import os
 import re
 import shutil
+import subprocess
 import sys
 import typing
+from html import escape
 from pathlib import Path
 
 from sphinx.ext.napoleon import GoogleDocstring
@@ -75,6 +77,7 @@ html_theme = "furo"
 html_title = f"KiKS {release}"
 html_favicon = "images/icon.svg"
 html_static_path, html_css_files = ["style"], ["gallery.css"]
+templates_path = ["templates"]
 
 
 # Types in signatures are without the rules of Pydantic, which texts say.
@@ -98,6 +101,11 @@ def lead_to_public_names(app, env, node, contnode):
 
 
 HERE = Path(__file__).parent
+QUESTIONS = (HERE / "how_do_i.md").read_text(encoding="utf-8")
+
+LISTS = {"how_do_i", "index"}
+"""Pages that lead to others: the search does not find them."""
+
 PAGES = {
     re.search("^# (.+)", path.read_text(encoding="utf-8"), re.MULTILINE)[1]: path.relative_to(HERE)
     .with_suffix("")
@@ -133,6 +141,32 @@ def help_readers_and_keys(app, page, template, context, doctree):
     context["body"] = SCROLLED.sub(r'\g<0> tabindex="0"', context.get("body", ""))
 
 
+NOT_SEARCHED = ".headerlink, .genindextable, .indextable, .genindex-jumpbox"
+"""What the search leaves out of a page."""
+
+QUESTION = re.compile(r"^### \.\.\. (.+)\n<!-- (.+) -->\n.*?\]\(([\w/]+)\.(?:md|rst)", re.MULTILINE)
+"""A question of `how_do_i.md`, other words for it, and the page that its first link leads to."""
+
+
+def add_questions(app, page, template, context, doctree):
+    """Give the search the questions that a page answers, in the words of those who ask."""
+    if page in LISTS:
+        context["body"] = f'<div data-pagefind-ignore="all">{context["body"]}</div>'
+    asked = [f"{question} {words}" for question, words, answer in QUESTION.findall(QUESTIONS) if answer == page]
+    if asked:
+        text = escape(". ".join(asked))
+        context["body"] += f'<p hidden data-pagefind-meta="asked" data-pagefind-weight="5">{text}</p>'
+
+
+def make_search(app, fault):
+    """Index the site for its search."""
+    if fault is None and app.builder.name == "html":
+        shutil.rmtree(app.outdir / "pagefind", ignore_errors=True)
+        command = [sys.executable, "-m", "pagefind", "--quiet", "--site", app.outdir]
+        command += ["--root-selector", "article[role=main]", "--exclude-selectors", NOT_SEARCHED]
+        subprocess.run(command, check=True)
+
+
 def write_pages(app):
     """Write the pages that are made from what commands and files say of themselves, if they have changed; notebooks."""
     shutil.copytree(gallery.ROOT / "examples" / "notebooks", Path(app.srcdir) / "notebooks", dirs_exist_ok=True)
@@ -146,6 +180,8 @@ def setup(app):
     """Connect the functions above; `prepare` comes before napoleon, and `help_readers_and_keys` after the theme."""
     app.connect("builder-inited", write_pages)
     app.connect("html-page-context", help_readers_and_keys, priority=900)
+    app.connect("html-page-context", add_questions)
+    app.connect("build-finished", make_search)
     app.connect("missing-reference", lead_to_public_names)
     app.connect("autodoc-process-signature", shorten_arrays, priority=600)
     app.connect("autodoc-process-docstring", prepare, priority=400)

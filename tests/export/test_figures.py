@@ -11,7 +11,8 @@ from tests.at_length import cases
 
 from kiks import Arena, Khepera, ParameterError, Recording, Simulation
 from kiks.export.figures import NO_ROBOT, PANELS, figure_of, panels_of, save_figures
-from kiks.recording.analysis import odometry, time_shares
+from kiks.export.findings import findings_of
+from kiks.recording.analysis import odometry
 from kiks.recording.recorder import RunRecorder
 
 
@@ -45,7 +46,7 @@ def test_odometry_follows_a_robot_that_touches_nothing() -> None:
 
 
 def test_the_shares_of_time_are_those_of_the_line(recording: Recording) -> None:
-    (shares,) = time_shares(recording.log, [1])
+    (shares,) = findings_of(recording).shares
     assert shares.window_ns == recording.log.end_ns - recording.log.begin_ns
     characters = sum(len(data) for data in recording.table("wire")["data"].tolist())
     assert shares.link_ns == pytest.approx(characters * 11e9 / 9600, rel=0.01)

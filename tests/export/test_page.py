@@ -177,7 +177,7 @@ def test_the_numbers_are_those_of_the_run(rich: Files) -> None:
 
 
 def test_there_is_a_scene_for_each_change(rich: Files) -> None:
-    run = RunFrames(Recording(rich[0]).log)
+    run = RunFrames.of(Recording(rich[0]).log)
     counts = [(len(scene["robots"]), len(scene["bodies"]), scene["arena"]["picture"]) for scene in run.scenes]
     assert counts == [(2, 1, 0), (2, 2, 0), (2, 2, 1), (3, 2, 1)]
     assert run.replay.equal_count == run.replay.check_count > 10
@@ -187,7 +187,7 @@ def test_there_is_a_scene_for_each_change(rich: Files) -> None:
 @at_length
 def test_a_long_run_has_a_longer_period(short: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr("kiks.export.run_frames.FRAME_BYTES_MAX", 50_000)
-    run = RunFrames(Recording(short).log)
+    run = RunFrames.of(Recording(short).log)
     assert run.period_ns == 80_000_000
     assert sum(map(len, run.frames)) < 50_000
     assert "the player has the state every 0.08 s" in Tags(page_of(short, tmp_path)).text
@@ -199,7 +199,7 @@ def test_frames_keep_to_the_recording_where_the_run_differs(short: Path, monkeyp
     apply = Replay._apply
     monkeypatch.setattr(Replay, "_apply", lambda self, it: None if it.data.startswith(b"D") else apply(self, it))
     recording = Recording(short)
-    run = RunFrames(recording.log)
+    run = RunFrames.of(recording.log)
     assert run.replay.equal_count < 10
     assert len(run.scenes) == 1
     poses = recording.table("poses")

@@ -22,13 +22,13 @@ def bundle(entry: Path) -> str:
     define them. What they import while they run is left out.
     """
     texts: dict[str, str] = {}
-    needs: dict[str, set[str]] = {}
+    needs: dict[str, list[str]] = {}
     waiting = [entry.name]
     while waiting:
         name = waiting.pop()
         if name not in texts:
             texts[name] = (entry.parent / name).read_text("utf-8")
-            needs[name] = {found[2] for found in _IMPORT.finditer(texts[name])}
+            needs[name] = [found[2] for found in _IMPORT.finditer(texts[name])]
             waiting += needs[name]
     order = TopologicalSorter(needs).static_order()
     return "\n".join(['"use strict";', "const modules = {};", *(_function_of(name, texts[name]) for name in order)])

@@ -13,20 +13,23 @@ from textwrap import fill
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kiks.engine.state import BALL
 from kiks.errors import ParameterError
+from kiks.export.findings import Findings, findings_of
 from kiks.export.kinds import KINDS
 from kiks.export.looks import LAMPLIGHT, body_colour, css, robot_colour
 from kiks.export.pictures import Picture, Trails
 from kiks.export.vector_pen import file_of
 from kiks.model.arena import Arena
 from kiks.model.atomic_files import ending_of, replace_file
-from kiks.recording.analysis import odometry, time_shares
+from kiks.recording.analysis import odometry
 from kiks.recording.recorder import RunRecorder, RunWriter
 from kiks.recording.recording import Recording
 from kiks.recording.tables import Table
 from kiks.sim.simulation import Simulation
+from kiks.sim.wire_log import TimeShares
 from kiks.units import s_from_ns
 
 NO_ROBOT = "There was no robot in this run"
@@ -64,8 +67,8 @@ PATH_COLUMNS, LEGEND_LINE_POINTS = 3, 13.0
 HEAT_MM = 20.0
 """Side of a cell of the heat map [mm]."""
 
-POINTS_MAX = 4000
-"""Most points of a line over time."""
+LINE_PARTS = 1000
+"""Parts of a line over time, each about as wide as a pixel."""
 
 ROWS = {"readings": 2.1, "speeds": 2.1, "time": 0.75}
 """Heights of the rows over time [inches]; those of an arena have its shape."""
@@ -149,13 +152,13 @@ def _with_plain_texts(figure: Any) -> Any:
     return figure
 
 
-def panels_of(recording: Recording, *, robot: int = 1) -> dict[str, bytes]:
+def panels_of(recording: Recording, found: Findings | None = None, *, robot: int = 1) -> dict[str, bytes]:
     """Return what `save_figures` draws of one recording as single pictures, by the names of `PANELS`, in SVG."""
     from matplotlib.figure import Figure
 
     pictures = {}
     arena_inches = _arena_inches([recording]) + 0.9
-    for name, draw in _drawings(recording, robot).items():
+    for name, draw in _drawings(recording, found or findings_of(recording), robot).items():
         size = (2 * COLUMN_INCHES, PANELS[name]) if PANELS[name] else (COLUMN_INCHES, arena_inches)
         figure = Figure(figsize=size, layout="constrained")
         draw(figure.subplots())
@@ -168,7 +171,7 @@ def figure_of(recordings: Sequence[Recording], *, robot: int = 1) -> Any:
     from matplotlib.figure import Figure
     from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-    drawings = [_drawings(recording, robot) for recording in recordings]
+    drawings = [_drawings(recording, findings_of(recording), robot) for recording in recordings]
     # Padding makes room for the legends between the rows.
     layout = ConstrainedLayoutEngine(h_pad=0.1)
     arena_inches = _arena_inches(recordings)
@@ -213,10 +216,10 @@ def figure_of_run(sim: Simulation, *, robot: int = 1) -> Any:
     return figure_of([Recording(recorders[-1].path)], robot=robot)
 
 
-def _drawings(recording: Recording, robot: int) -> dict[str, Callable[[Any], None]]:
+def _drawings(recording: Recording, found: Findings, robot: int) -> dict[str, Callable[[Any], None]]:
     """Return functions that draw the rows on axes, by the names of `PANELS`: of a run without a robot, paths alone."""
-    poses, wheels, readings = recording.tables("poses", "wheels", "readings")
-    picture = Picture.of_recording(recording, recording.log.end_ns)
+    poses, wheels, readings = (found.tables[name] for name in ("poses", "wheels", "readings"))
+    picture = found.picture
     bodies_alone = Trails((), picture.trails.bodies if picture.trails else {})
     picture = replace(picture, trails=bodies_alone)
     paths = {"paths": lambda axes: _draw_paths(axes, recording, picture, poses, wheels)}
@@ -227,7 +230,7 @@ def _drawings(recording: Recording, robot: int) -> dict[str, Callable[[Any], Non
         "places": lambda axes: _draw_heat(axes, replace(picture, poses=picture.poses[:0]), poses),
         "readings": lambda axes: _draw_readings(axes, readings[readings["robot"] == robot]),
         "speeds": lambda axes: _draw_speeds(axes, wheels[wheels["robot"] == robot]),
-        "time": lambda axes: _draw_time(axes, recording, robot),
+        "time": lambda axes: _draw_time(axes, found.shares[robot - 1], robot),
     }
 
 
@@ -298,9 +301,9 @@ def _draw_heat(axes: Any, picture: Picture, poses: Table) -> None:
 
 def _draw_readings(axes: Any, table: Table) -> None:
     """Draw what the program read of the proximity sensors."""
-    table = _thinned(table[table["command"] == "N"])
+    table = table[table["command"] == "N"]
     for sensor in range(8):
-        axes.plot(table["time_s"], table["counts"][:, sensor], linewidth=0.7, label=str(sensor))
+        axes.plot(*_seen(table["time_s"], table["counts"][:, sensor]), linewidth=0.7, label=str(sensor))
     axes.set_ylabel("proximity")
     axes.set_xlabel("time [s]")
     axes.grid(alpha=0.3)
@@ -312,10 +315,9 @@ def _draw_readings(axes: Any, table: Table) -> None:
 
 def _draw_speeds(axes: Any, table: Table) -> None:
     """Draw the speeds of the wheels, as asked for and as measured."""
-    table = _thinned(table)
     for side, colour in (("left", "C0"), ("right", "C3")):
-        axes.plot(table["time_s"], table[f"{side}_speed"], color=colour, linewidth=0.7, label=side)
-        axes.plot(table["time_s"], table[f"{side}_setpoint"], color=colour, linewidth=0.7, linestyle=":")
+        axes.plot(*_seen(table["time_s"], table[f"{side}_speed"]), color=colour, linewidth=0.7, label=side)
+        axes.plot(*_seen(table["time_s"], table[f"{side}_setpoint"]), color=colour, linewidth=0.7, linestyle=":")
     axes.plot([], [], color="gray", linewidth=0.9, linestyle=":", label="asked for")
     axes.set_ylabel("speed [pulses/10 ms]")
     axes.set_xlabel("time [s]")
@@ -323,9 +325,8 @@ def _draw_speeds(axes: Any, table: Table) -> None:
     _legend_above(axes, 3)
 
 
-def _draw_time(axes: Any, recording: Recording, robot: int) -> None:
+def _draw_time(axes: Any, shares: TimeShares, robot: int) -> None:
     """Draw where the time went: a bar of the shares of line, robot, thinking and waiting."""
-    (shares,) = time_shares(recording.log, [robot])
     begin_s = 0.0
     names = ("on the line", "robot", "thinking", "waiting")
     for name, share_ns, colour in zip(names, shares, ("C0", "C2", "C1", "lightgray"), strict=True):
@@ -344,6 +345,12 @@ def _legend_above(axes: Any, columns: int) -> None:
     axes.legend(fontsize="small", ncols=columns, columnspacing=1.0, handlelength=1.2, labelspacing=0.2, **place)
 
 
-def _thinned(table: Table) -> Table:
-    """Return a table with no more rows than a line can show."""
-    return table[:: max(-(-len(table) // POINTS_MAX), 1)]
+def _seen(time_s: NDArray[np.float64], values: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[Any]]:
+    """Return of a line over time what can be seen: the least and the greatest value of each part of it."""
+    size = -(-len(values) // LINE_PARTS)
+    if size <= 2:
+        return time_s, values
+    rows = np.pad(values, (0, -len(values) % size), mode="edge").reshape(-1, size)
+    ends = np.stack([rows.argmin(axis=1), rows.argmax(axis=1)]) + np.arange(len(rows)) * size
+    kept = np.unique(np.minimum(ends, len(values) - 1))
+    return time_s[kept], values[kept]

@@ -47,6 +47,10 @@ NO_HIT = 65535
 RAY_UNIT_MM = 0.01
 """Unit of all other lengths of rays [mm]."""
 
+PLACE_STEPS, HEADING_STEPS, WAY_STEPS, RAY_STEP = 64, 1024, 4, 32
+"""Of coarse frames, steps in a millimetre of a place, in a radian of a heading and in a millimetre of a way driven, and
+units of a step of a ray. They are too small to be seen, and powers of two, so most bytes stay the same."""
+
 HEAD = np.dtype(
     [
         ("version", "u1"),
@@ -91,6 +95,7 @@ def pack_frame(
     speed_now: float = 0.0,
     speed_average: float = 0.0,
     is_held: Callable[[str, int], bool] | None = None,
+    is_coarse: bool = False,
 ) -> bytes:
     """Return a frame of the present state.
 
@@ -102,6 +107,7 @@ def pack_frame(
         speed_now: Momentary speed [simulated seconds per real second].
         speed_average: Average speed since the start [simulated seconds per real second].
         is_held: Returns for "robot" and an index whether a hand holds it; if left out, no hand holds a robot.
+        is_coarse: Whether lengths and angles are rounded to what can be seen: many such frames together pack well.
     """
     seen = sim.look()
     records: Any = sim.world.state.robots[0]
@@ -121,6 +127,12 @@ def pack_frame(
     # The robot's own counters wrap at 32 bits, too.
     robots["encoders"] = (records["pulse_count"] + records["counter_offset"]).astype(np.int32)
     robots["distances_mm"] = sim.world.distances_mm()
+    ray_step = 1
+    if is_coarse:
+        steps = np.array((PLACE_STEPS, PLACE_STEPS, HEADING_STEPS), "<f4")
+        robots["pose"] = np.rint(robots["pose"] * steps) / steps
+        robots["distances_mm"] = np.rint(robots["distances_mm"] * WAY_STEPS) / WAY_STEPS
+        ray_step = RAY_STEP
     robots["proximity"], robots["ambient"] = seen.proximity, seen.ambient
     bodies, lamps, cameras = _pack_bodies(sim, seen.places), sim.world.lamps.astype("<f4"), _pack_cameras(sim)
     # A speed may be infinite or NaN; then 0 is shown.
@@ -128,7 +140,7 @@ def pack_frame(
     counts = (len(part) for part in (robots, bodies, lamps, cameras))
     flags = PAUSED * is_paused + PROGRAM_DRIVES * is_driven
     head = np.array((VERSION, KIND, flags, scene, sim.time_s, *speeds, *counts), HEAD)
-    lengths = np.minimum(np.maximum(np.rint(seen.lengths_mm / RAY_UNIT_MM), 0), NO_HIT - 1)
+    lengths = np.minimum(np.maximum(ray_step * np.rint(seen.lengths_mm / (ray_step * RAY_UNIT_MM)), 0), NO_HIT - 1)
     lengths[seen.met == NOTHING] = NO_HIT
     return b"".join(part.tobytes() for part in (head, robots, bodies, lamps, cameras, lengths.astype("<u2")))
 

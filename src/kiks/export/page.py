@@ -12,12 +12,14 @@ from collections.abc import Callable
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 import jinja2
 from markupsafe import Markup
 
 from kiks.export.bundle import bundle
 from kiks.export.figures import NO_ROBOT, panels_of
+from kiks.export.findings import findings_of
 from kiks.export.page_contents import contents_of
 from kiks.export.run_frames import PERIOD_NS, RunFrames
 from kiks.model.atomic_files import replace_file
@@ -38,6 +40,9 @@ FIGURES = {
 }
 """Title of each figure, and a sentence."""
 
+_SAFE = " !$()*+,/:;=?@[]"
+"""What stands in the address of a figure as it is, beside letters, numbers and -._~: most of a figure is numbers."""
+
 
 def save_page(
     recording: Recording,
@@ -56,14 +61,15 @@ def save_page(
         robot: Number of the robot whose readings, speeds, time and wire are shown; a run without a robot has none.
         on_progress: Called now and then with the share that is done.
     """
-    figures = panels_of(recording, robot=robot)
-    frames = RunFrames(recording.log, on_progress)
+    frames = RunFrames(recording.log)
+    found = findings_of(recording, frames.pieces(on_progress))
+    figures = panels_of(recording, found, robot=robot)
     page = page_template("run_page.html").render(
-        contents_of(recording, frames, robot),
+        contents_of(recording, found, frames, robot),
         title=title,
         robot=robot,
         figures=[
-            (name, head, text.format(robot=robot), base64.b64encode(figures[name]).decode())
+            (name, head, text.format(robot=robot), quote(figures[name], safe=_SAFE))
             for name, (head, text) in FIGURES.items()
             if name in figures
         ],

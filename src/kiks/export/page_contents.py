@@ -12,8 +12,8 @@ from pygments.formatters import HtmlFormatter
 from pygments.lexers import PythonLexer, TextLexer
 
 from kiks.errors import counted
+from kiks.export.findings import Findings
 from kiks.export.run_frames import RunFrames
-from kiks.recording.analysis import time_shares
 from kiks.recording.recording import Recording
 from kiks.recording.tables import Table
 from kiks.units import clock_text
@@ -41,9 +41,9 @@ ROBOTS_MAX = 100
 """Most robots in the table of numbers."""
 
 
-def contents_of(recording: Recording, frames: RunFrames, robot: int) -> dict[str, Any]:
+def contents_of(recording: Recording, found: Findings, frames: RunFrames, robot: int) -> dict[str, Any]:
     """Return what `web/run_page.html` needs to tell of a recording, by name."""
-    events, wire = recording.tables("events", "wire")
+    events, wire = found.tables["events"], found.tables["wire"]
     programs, file = _programs(recording), recording.log.reader.path.name
     names = ", ".join(dict.fromkeys(program["name"] for program in programs))
     return {
@@ -56,7 +56,7 @@ def contents_of(recording: Recording, frames: RunFrames, robot: int) -> dict[str
         ),
         "is_whole": recording.is_whole,
         "facts": _facts(recording, frames),
-        "numbers": _numbers(recording, frames, wire),
+        "numbers": _numbers(recording, found, frames),
         "events": [(*row[:3], _cut(row[3])) for row in events[:MOMENTS_MAX].tolist()],
         "more_events": max(len(events) - MOMENTS_MAX, 0),
         "kinds": sorted(set(events["kind"].tolist())),
@@ -110,12 +110,12 @@ def _facts(recording: Recording, frames: RunFrames) -> list[tuple[str, str]]:
     return [(name, value) for name, value in rows if value]
 
 
-def _numbers(recording: Recording, frames: RunFrames, wire: Table) -> list[dict[str, Any]]:
+def _numbers(recording: Recording, found: Findings, frames: RunFrames) -> list[dict[str, Any]]:
     """Return the table of numbers: what each robot did meanwhile; shares are percent of the time."""
-    robots = range(1, min(frames.replay.sim.robot_count, ROBOTS_MAX) + 1)
+    wire = found.tables["wire"]
     replies = Counter(wire["robot"][~wire["is_sent"]].tolist())
     rows = []
-    for number, shares in zip(robots, time_shares(recording.log, robots), strict=True):
+    for number, shares in enumerate(found.shares[:ROBOTS_MAX], 1):
         was_there = number <= frames.first.robot_count
         driven_mm = frames.replay.sim.travelled_mm(number) - (frames.first.travelled_mm(number) if was_there else 0)
         rows.append(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
@@ -22,6 +22,7 @@ from kiks.model.atomic_files import ending_of, replace_file
 from kiks.model.robot import Body, RobotSpec
 from kiks.recording.moments import moments
 from kiks.recording.recording import Recording
+from kiks.recording.rerun import Piece
 from kiks.sim.simulation import Simulation
 from kiks.units import NS_PER_S, s_from_ns
 
@@ -103,13 +104,13 @@ class Picture:
         return cls(arena, lamps.reshape(-1, 4), bodies, starts.reshape(-1, 3), robots, title=title)
 
     @classmethod
-    def of_recording(cls, recording: Recording, time_ns: int) -> Picture:
-        """Return the picture of a recorded world at a time [ns], with the paths up to it."""
+    def of_recording(cls, recording: Recording, time_ns: int, pieces: Iterable[Piece] | None = None) -> Picture:
+        """Return the picture of a recorded world at a time [ns], with the paths up to it; see `moments` for pieces."""
         begin_ns = recording.log.begin_ns
         step_ns = max(POINT_NS, (time_ns - begin_ns) // POINTS_MAX)
         paths: list[list[Sequence[float]]] = []
         places: dict[int, list[Place]] = {}
-        for moment in moments(recording.log, [*range(begin_ns, time_ns, step_ns), time_ns]):
+        for moment in moments(recording.log, [*range(begin_ns, time_ns, step_ns), time_ns], pieces):
             paths += [[] for _ in range(len(moment.poses) - len(paths))]
             for path, pose in zip(paths, moment.poses.tolist(), strict=False):
                 path.append(pose)

@@ -9,7 +9,7 @@ import base64
 import json
 import struct
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from itertools import groupby
 from typing import Any
 
@@ -18,6 +18,7 @@ import numpy as np
 from kiks.export.frames import arena_picture, describe_scene, describe_shapes, pack_frame, scene_key
 from kiks.recording.log import RecordedLog
 from kiks.recording.replay import Replay
+from kiks.recording.rerun import Piece, run_again
 from kiks.sim.simulation import Simulation
 from kiks.units import TICK_NS, s_from_ns
 
@@ -35,7 +36,6 @@ class RunFrames:
 
     Args:
         log: The log of the recording.
-        on_progress: Called now and then with the share that is done.
 
     Attributes:
         begin_ns: When the run begins [ns].
@@ -46,30 +46,49 @@ class RunFrames:
         pictures: Walls, as PNG.
         shapes: Messages of `describe_shapes`, and from which frame on each holds.
         first: The world at the beginning.
-        replay: The run made again, at its end.
+        replay: The run that is made again, at its end when all pieces are.
     """
 
-    def __init__(self, log: RecordedLog, on_progress: Callable[[float], None] = lambda share: None) -> None:
+    def __init__(self, log: RecordedLog) -> None:
         self.frames: list[bytes] = []
         self.scenes: list[dict[str, Any]] = []
         self.pictures: list[bytes] = []
         self.shapes: list[tuple[int, dict[str, Any]]] = []
         self._key: tuple[Any, ...] = ()
         self._arena: Any = None
+        self._log = log
+        self.begin_ns, self.end_ns, self.period_ns = log.begin_ns, log.end_ns, PERIOD_NS
         self.first = Replay(log, log.begin_ns).sim
-        self.replay = Replay(log, log.begin_ns)
-        self._take()
-        self.begin_ns, self.end_ns = begin_ns, end_ns = log.begin_ns, log.end_ns
-        self.period_ns = fitting_period_ns(end_ns - begin_ns, len(self.frames[0]))
-        for time_ns in range(begin_ns + self.period_ns, end_ns, self.period_ns):
-            self.replay.sim.advance_to(time_ns)
+
+    @classmethod
+    def of(cls, log: RecordedLog) -> RunFrames:
+        """Return all frames of a run."""
+        frames = cls(log)
+        for _ in frames.pieces():
+            pass
+        return frames
+
+    def pieces(self, on_progress: Callable[[float], None] = lambda share: None) -> Iterator[Piece]:
+        """Make the run again, take the frames, and yield its pieces, as `run_again` does.
+
+        Args:
+            on_progress: Called now and then with the share that is done.
+        """
+
+        def look(replay: Replay) -> int:
+            self.replay = replay
             self._take()
-            if len(self.frames) % 100 == 0:
-                on_progress((time_ns - begin_ns) / (end_ns - begin_ns))
+            if len(self.frames) == 1:
+                self.period_ns = fitting_period_ns(self.end_ns - self.begin_ns, len(self.frames[0]))
+            elif len(self.frames) % 100 == 0:
+                on_progress((replay.sim.now_ns - self.begin_ns) / (self.end_ns - self.begin_ns))
+            return self.begin_ns + len(self.frames) * self.period_ns
+
+        yield from run_again(self._log, look=look)
         while self.replay.advance():
             pass
-        self.replay.sim.advance_to(end_ns)
-        if end_ns > begin_ns:
+        self.replay.sim.advance_to(self.end_ns)
+        if self.end_ns > self.begin_ns:
             self._take()
         on_progress(1.0)
 
@@ -84,7 +103,7 @@ class RunFrames:
             shapes = describe_shapes(sim)
             if not self.shapes or self.shapes[-1][1] != shapes:
                 self.shapes.append((len(self.frames), shapes))
-            self.frames.append(pack_frame(sim, scene=len(self.scenes) - 1))
+            self.frames.append(pack_frame(sim, scene=len(self.scenes) - 1, is_coarse=True))
 
     def _take_scene(self, sim: Simulation) -> None:
         """Add the present scene if it differs from the last one."""

@@ -84,16 +84,29 @@ def ground_picture(arena: Arena, lamps: NDArray[np.float64], spec: RobotSpec | N
     cells = np.flipud(arena.brightness)
     shade = wall_grey(cells.astype(np.uint16)).astype(np.uint8)
     floor: Any = np.array(FLOOR, np.uint8)
-    if (light := light_map(arena, lamps, spec)) is not None:
-        opacity = Image.fromarray((255 * LIGHT_SHARE * light).astype(np.uint8)).resize(
-            (cells.shape[1], cells.shape[0]), Image.Resampling.BILINEAR
-        )
-        floor = Image.new("RGB", opacity.size, FLOOR)
-        floor.paste(LAMPLIGHT, mask=opacity)
+    if (lit := lit_floor(arena, lamps, spec)) is not None:
+        floor = lit.resize((cells.shape[1], cells.shape[0]), Image.Resampling.BILINEAR)
     if arena.shades is not None:
         floor = (1.0 - darkness(np.flipud(arena.shades)))[..., None] * np.asarray(floor)
     colours = np.where((cells == 0)[..., None], np.asarray(floor), shade[..., None])
     return Image.fromarray(colours.astype(np.uint8), "RGB").resize(size, Image.Resampling.LANCZOS)
+
+
+def lit_floor(arena: Arena, lamps: NDArray[np.float64], spec: RobotSpec | None) -> Image | None:
+    """Return a white floor with the light of lamps, a pixel for each cell of `light_map`; None if it is dark.
+
+    Args:
+        arena: The arena.
+        lamps: x_mm, y_mm, power_w, and 1 for on or 0 for off, float64 [lamp, 4].
+        spec: The robot for whose sensors the light is drawn; a Khepera if None.
+    """
+    from PIL import Image
+
+    if (light := light_map(arena, lamps, spec)) is None:
+        return None
+    floor = Image.new("RGB", light.shape[::-1], FLOOR)
+    floor.paste(LAMPLIGHT, mask=Image.fromarray((255 * LIGHT_SHARE * light).astype(np.uint8)))
+    return floor
 
 
 def darkness(brightness: NDArray[Any]) -> NDArray[np.float64]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 import warnings
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
@@ -10,9 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kiks.export.light import light_map
-from kiks.export.looks import LAMPLIGHT, Colour
-from kiks.export.sheet import FLOOR, LIGHT_SHARE, Place, coarse_cells, darkness, mixed, wall_grey
+from kiks.export.looks import Colour
+from kiks.export.sheet import FLOOR, Place, coarse_cells, darkness, lit_floor, wall_grey
 from kiks.model.arena import Arena
 from kiks.model.robot import RobotSpec
 
@@ -24,8 +24,20 @@ DOTS_PER_INCH = 160
 UNIT_POINTS = 0.2
 """A pixel of a sheet on paper [points]: a picture fills the width of a page."""
 
-_WALL_CELLS_MAX, _LIGHT_STEPS, _SHADES_MAX = 2000, 24, 16
-"""Most cells along a side of the walls that are outlined, levels of light, and most shades of the floor."""
+_WALL_CELLS_MAX, _SHADES_MAX = 2000, 16
+"""Most cells along a side of the walls that are outlined, and most shades of the floor."""
+
+_STRAIGHT = 1e-6
+"""Two sides of an outline that turn by less are one [mm^2]."""
+
+_STEPS = 100
+"""Steps in a point, to which places in an SVG file are rounded: a hundredth of the width of a line."""
+
+_PATH, _PART, _ZERO = re.compile(r' d="([^"]*)"'), re.compile(r"([MLCQz])([^MLCQz]*)"), re.compile(r"\b0\.")
+"""The data of a path in an SVG file, a part of it, which is a letter and places, and a zero that may be left out."""
+
+_SQUARE = "image-rendering:crisp-edges;image-rendering:pixelated"
+"""How Matplotlib asks for pictures whose pixels are squares: the light of lamps is smooth."""
 
 _PARTS = {"l": "left", "m": "center", "r": "right"}
 
@@ -46,7 +58,9 @@ def file_of(figure: Figure, kind: str, dots_per_inch: int = DOTS_PER_INCH) -> by
     with rc_context({"svg.hashsalt": "kiks", "pdf.fonttype": 42}), warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Glyph .* missing from")
         figure.savefig(buffer, format=kind, dpi=dots_per_inch, metadata=dated)
-    return buffer.getvalue()
+    if kind != "svg":
+        return buffer.getvalue()
+    return _PATH.sub(_shortened, buffer.getvalue().decode()).replace(_SQUARE, "").encode()
 
 
 class VectorPen:
@@ -67,10 +81,10 @@ class VectorPen:
     def ground(self, arena: Arena, lamps: NDArray[np.float64], spec: RobotSpec | None) -> None:
         """Draw what `ground_picture` draws, as outlines; each grey lies over the darker ones."""
         self._axes.set_facecolor(_colour(FLOOR))
-        if (light := light_map(arena, lamps, spec)) is not None:
-            for share in np.linspace(0.0, 1.0, _LIGHT_STEPS)[1:].tolist():
-                colour = mixed(FLOOR, LAMPLIGHT, LIGHT_SHARE * share)
-                self._fill(np.flipud(light), share, arena.width_mm / light.shape[1], 0.5, colour)
+        if (lit := lit_floor(arena, lamps, spec)) is not None:
+            # As outlines, each level of light would be as long as all shadows. A viewer makes the pixels smooth.
+            extent = (0.0, arena.width_mm, 0.0, arena.height_mm)
+            self._axes.imshow(lit, extent=extent, interpolation="none", zorder=1)
         if arena.shades is not None:
             self._darken(*coarse_cells(arena.shades, arena.mm_per_cell, _WALL_CELLS_MAX))
         cells, cell_mm = coarse_cells(arena.brightness, arena.mm_per_cell, _WALL_CELLS_MAX)
@@ -90,7 +104,10 @@ class VectorPen:
         """Fill the area above a level; the middle of the first cell is so many cells from the lower left corner."""
         x_mm, y_mm = ((np.arange(count) + first) * cell_mm for count in cells.shape[::-1])
         levels = [level, 2.0]
-        self._axes.contourf(x_mm, y_mm, cells.astype(np.float64), levels=levels, colors=[_colour(colour)], zorder=1)
+        areas = self._axes.contourf(
+            x_mm, y_mm, cells.astype(np.float64), levels=levels, colors=[_colour(colour)], zorder=1
+        )
+        areas.set_paths([_corners(path) for path in areas.get_paths()])
 
     def ellipse(
         self, box: tuple[float, ...], fill: Colour | None = None, outline: Colour | None = None, width: float = 1
@@ -160,6 +177,39 @@ class VectorPen:
             zorder=1,
         )
         self._axes.add_artist(patch)
+
+
+def _corners(path: Any) -> Any:
+    """Return an outline without the points on its straight sides, of which it has one for each cell."""
+    from matplotlib.path import Path
+
+    if path.codes is None or len(path.codes) < 3:
+        return path
+    steps = np.diff(path.vertices, axis=0)
+    turns = steps[:-1, 0] * steps[1:, 1] - steps[:-1, 1] * steps[1:, 0]
+    is_line = path.codes == Path.LINETO
+    is_corner = np.ones(len(is_line), bool)
+    is_corner[1:-1] = (np.abs(turns) > _STRAIGHT) | ~is_line[1:-1] | ~is_line[2:]
+    return Path(path.vertices[is_corner], path.codes[is_corner])
+
+
+def _shortened(found: re.Match[str]) -> str:
+    """Return the data of a path of an SVG file as short steps, each from the place before."""
+    parts: list[str] = []
+    begin = at = [0, 0]
+    before = ""
+    for letter, numbers in _PART.findall(found[1]):
+        ends = [round(float(number) * _STEPS) for number in numbers.split()]
+        steps = [end - at[index % 2] for index, end in enumerate(ends)]
+        at = begin if letter == "z" else ends[-2:]
+        begin = at if letter == "M" else begin
+        if letter == before == "L":
+            letter = ""  # the letter before holds for what follows
+        else:
+            before = letter
+        if letter or any(steps):
+            parts.append(letter.lower() + " ".join(f"{step / _STEPS:.2f}".rstrip("0").rstrip(".") for step in steps))
+    return f' d="{_ZERO.sub(".", " ".join(parts)).replace(" -", "-")}"'
 
 
 def _colour(colour: Colour | None) -> Any:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.recording.log import RecordedLog
-from kiks.recording.rerun import run_again
+from kiks.recording.rerun import Piece
 from kiks.sim.run_log import Kind
 from kiks.sim.wire_log import Span, TimeShares, share_time
 
@@ -44,26 +44,34 @@ def odometry(
     return np.column_stack([x_mm, y_mm, headings])
 
 
-def time_shares(log: RecordedLog, robots: Sequence[int]) -> list[TimeShares]:
-    """Return where the time of a recording went on the lines of robots, by their numbers."""
-    lines = {robot - 1: _Line() for robot in robots}
-    for entry in (entry for piece in run_again(log) for entry in piece.entries):
-        line = lines.get(entry.robot)
-        if line is None:
-            continue
-        if entry.kind in (Kind.SEND, Kind.TYPE):
-            line.sent.append((entry.other, len(entry.data)))
-        elif entry.kind == Kind.THINK:
-            line.thinking.append((entry.number, entry.other))
-        elif entry.kind == Kind.ACT:
-            # The reply tells how long a character takes.
-            begin_ns = max((begin + count * entry.other for begin, count in line.sent), default=entry.time_ns)
-            line.link += [(begin, begin + count * entry.other) for begin, count in line.sent]
-            line.link.append((entry.number, entry.number + len(entry.data) * entry.other))
-            line.robot.append((begin_ns, entry.time_ns))
-            line.sent.clear()
-    window = log.begin_ns, log.end_ns
-    return [share_time(window, link=each.link, robot=each.robot, thinking=each.thinking) for each in lines.values()]
+class Lines:
+    """The lines of robots, by their numbers, as they are found while a run is made again."""
+
+    def __init__(self, robots: Sequence[int]) -> None:
+        self._lines = {robot - 1: _Line() for robot in robots}
+
+    def add(self, piece: Piece) -> None:
+        """Add what took time in a piece of the run."""
+        for entry in piece.entries:
+            line = self._lines.get(entry.robot)
+            if line is None:
+                continue
+            if entry.kind in (Kind.SEND, Kind.TYPE):
+                line.sent.append((entry.other, len(entry.data)))
+            elif entry.kind == Kind.THINK:
+                line.thinking.append((entry.number, entry.other))
+            elif entry.kind == Kind.ACT:
+                # The reply tells how long a character takes.
+                begin_ns = max((begin + count * entry.other for begin, count in line.sent), default=entry.time_ns)
+                line.link += [(begin, begin + count * entry.other) for begin, count in line.sent]
+                line.link.append((entry.number, entry.number + len(entry.data) * entry.other))
+                line.robot.append((begin_ns, entry.time_ns))
+                line.sent.clear()
+
+    def shares(self, log: RecordedLog) -> list[TimeShares]:
+        """Return where the time of the recording went on each line."""
+        window, lines = (log.begin_ns, log.end_ns), self._lines.values()
+        return [share_time(window, link=each.link, robot=each.robot, thinking=each.thinking) for each in lines]
 
 
 @dataclass

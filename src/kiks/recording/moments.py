@@ -63,17 +63,18 @@ class Moment(NamedTuple):
     passed: Sequence[Tick]
 
 
-def moments(log: RecordedLog, times_ns: Sequence[int]) -> Iterator[Moment]:
+def moments(log: RecordedLog, times_ns: Sequence[int], pieces: Iterable[Piece] | None = None) -> Iterator[Moment]:
     """Yield the recorded state at each time.
 
     Args:
         log: The log of the recording.
         times_ns: The times [ns], at least one, in their order, within the recording.
+        pieces: Those of `run_again` from the first time or a second before, where something else needs them, too.
     """
     # What programs have read last may have been read a little before.
     begin_ns = max(times_ns[0] - NS_PER_S, log.begin_ns)
     latest = _Latest(log.state_before(begin_ns))
-    for_ticks, for_entries = tee(run_again(log, begin_ns, times_ns[-1]))
+    for_ticks, for_entries = tee(run_again(log, begin_ns, times_ns[-1]) if pieces is None else pieces)
     ticks, entries = _ticks(for_ticks), (entry for piece in for_entries for entry in piece.entries)
     now, later, entry = next(ticks), next(ticks, None), next(entries, None)
     for number, time_ns in enumerate(times_ns):

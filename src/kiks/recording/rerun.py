@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 from kiks.recording.entries import Entry
 from kiks.recording.log import RecordedLog
 from kiks.recording.motion import Motion, MotionWatcher
 from kiks.recording.replay import Replay
+from kiks.sim.read_completion import NEVER_NS
 from kiks.sim.run_log import Kind, NotedEntry
 from kiks.sim.turret_host import has_user_turret
 from kiks.units import NS_PER_S, s_from_ns
@@ -35,7 +36,13 @@ class Piece(NamedTuple):
     after_tick: int
 
 
-def run_again(log: RecordedLog, begin_ns: int | None = None, end_ns: int | None = None) -> Iterator[Piece]:
+def run_again(
+    log: RecordedLog,
+    begin_ns: int | None = None,
+    end_ns: int | None = None,
+    *,
+    look: Callable[[Replay], int] = lambda replay: NEVER_NS,
+) -> Iterator[Piece]:
     """Make a recorded run again, and yield what it does, piece by piece.
 
     It warns if the run is another one now, as one of another version of KiKS may be.
@@ -44,10 +51,11 @@ def run_again(log: RecordedLog, begin_ns: int | None = None, end_ns: int | None 
         log: The log of the recording.
         begin_ns: From when on [ns]; from its beginning if left out.
         end_ns: Up to when [ns]; to its end if left out.
+        look: Looks at the run at its beginning, and then at each time that it has returned, if that is before the end.
     """
     begin_ns = log.begin_ns if begin_ns is None else begin_ns
     end_ns = log.end_ns if end_ns is None else end_ns
-    observer = _Observer(log, begin_ns)
+    observer = _Observer(log, begin_ns, look)
     recorded = log.entries_from(begin_ns)
     entry, after_tick = next(recorded, None), -1
     while True:
@@ -72,15 +80,24 @@ def run_again(log: RecordedLog, begin_ns: int | None = None, end_ns: int | None 
         )
 
 
+def heard(pieces: Iterable[Piece], *hear: Callable[[Piece], None]) -> Iterator[Piece]:
+    """Yield the pieces of a run; functions hear each of them before, so that one run is enough for all of them."""
+    for piece in pieces:
+        for each in hear:
+            each(piece)
+        yield piece
+
+
 class _Observer:
     """Watches a replay: collects what robots do, and motion.
 
     Args:
         log: The log of the recording.
         begin_ns: Where it begins [ns].
+        look: That of `run_again`.
     """
 
-    def __init__(self, log: RecordedLog, begin_ns: int) -> None:
+    def __init__(self, log: RecordedLog, begin_ns: int, look: Callable[[Replay], int]) -> None:
         self._acts: list[Entry] = []
         self.replay = Replay(log, begin_ns)
         self.sim = self.replay.sim
@@ -89,9 +106,13 @@ class _Observer:
         self.sim.world.watch(self.motion)
         self.replay.on_change = self._look
         self._look()
+        self._look_at, self._due_ns = look, look(self.replay)
 
     def run_to(self, time_ns: int) -> list[Entry]:
         """Let the run go on up to a time [ns]; return what robots have done."""
+        while self._due_ns < time_ns:
+            self.sim.advance_to(self._due_ns)
+            self._due_ns = self._look_at(self.replay)
         self.sim.advance_to(time_ns)
         self.sim.sync()
         self._look()

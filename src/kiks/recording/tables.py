@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -50,11 +50,26 @@ def tables(log: RecordedLog, names: Sequence[str]) -> list[Table]:
         log: The log of the recording.
         names: Of `TABLES`.
     """
-    parts: list[list[Any]] = [[] for _ in names]
+    parts = TableParts(names)
     for piece in run_again(log):
-        for name, found in zip(names, parts, strict=True):
+        parts.add(piece)
+    return parts.tables(log)
+
+
+class TableParts:
+    """Tables that are put together while a run is made again; `names` are of `TABLES`."""
+
+    def __init__(self, names: Iterable[str]) -> None:
+        self._parts: list[tuple[str, list[Any]]] = [(name, []) for name in names]
+
+    def add(self, piece: Piece) -> None:
+        """Add what is in a piece of the run."""
+        for name, found in self._parts:
             found.extend(TABLES[name].parts_of(piece))
-    return [_made(log, name, found) for name, found in zip(names, parts, strict=True)]
+
+    def tables(self, log: RecordedLog) -> list[Table]:
+        """Return the tables; the log is that of the recording."""
+        return [_made(log, name, found) for name, found in self._parts]
 
 
 def _made(log: RecordedLog, name: str, parts: list[Any]) -> Table:

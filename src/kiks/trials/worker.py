@@ -46,7 +46,7 @@ def _show(recording: str) -> str:
     from kiks.export.run_frames import RunFrames
     from kiks.recording.recording import Recording
 
-    frames = RunFrames(Recording(recording).log)
+    frames = RunFrames.of(Recording(recording).log)
     section = page_template("run_player.html").render(player_values(frames))
     return json.dumps({"section": section, "frames": frames.pack()})
 
