@@ -14,6 +14,7 @@ from kiks.desk.panels.monitor import MonitorPanel
 from kiks.desk.panels.octave import OctavePanel
 from kiks.desk.panels.programs import ProgramsPanel
 from kiks.desk.panels.settings import SettingsPanel
+from kiks.desk.panels.shortcuts import pass_on_keys
 from kiks.desk.panels.time_bar import TimeBar
 from kiks.desk.panels.time_controls import TimePanel
 from kiks.desk.panels.view import ViewPanel
@@ -95,6 +96,7 @@ class Page:
                 self._build_tabs(feed)
         with tools:
             ViewPanel(desk, self._view, board)
+        pass_on_keys()
         ui.timer(NEWS_S, self._tell_news)
 
     def _build_tabs(self, feed: str) -> None:
