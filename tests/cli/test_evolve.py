@@ -31,7 +31,9 @@ def ran(*words: object, cwd: Path) -> subprocess.CompletedProcess[str]:
 def evolved(tmp_path_factory: pytest.TempPathFactory) -> Path:
     place = tmp_path_factory.mktemp("evolved")
     (place / "quick.py").write_text(TASK)
-    kiks("evolve", place / "quick.py", "--seed", 1, "--population", 8, "--generations", 3, "--out", place / "out")
+    words = ("--seed", 1, "--population", 8, "--generations", 3, "--out", place / "out")
+    said = kiks("evolve", place / "quick.py", *words, "--quiet").output
+    assert said.startswith("Champion of generation"), "no line of the progress"
     return place
 
 

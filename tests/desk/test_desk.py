@@ -51,10 +51,19 @@ def test_run_pause_and_step(visitor: Visitor) -> None:
     visitor.until(lambda: not visitor.desk.gate.is_paused and visitor.sim.now_ns > now_ns + 1_100_000_000)
     visitor.page.keyboard.press("Space")
     visitor.until(lambda: visitor.desk.gate.is_paused)
-    # On a button, space presses only that one.
+    # What was clicked passes the key on, and is not pressed again.
+    for clicked in ("proximity-0", "curves-speeds", "tab-wire", "mark", "tab-settings", "noise"):
+        visitor.click(clicked)
+        visitor.page.keyboard.press("Space")
+        visitor.until(lambda: not visitor.desk.gate.is_paused)
+        visitor.page.keyboard.press("Space")
+        visitor.until(lambda: visitor.desk.gate.is_paused)
+    expect(visitor.at("noise")).to_have_attribute("aria-checked", "false")
+    # A button to which Tab has come takes it, and only that one is pressed.
     visitor.choose("step-size", "10 ms")
     now_ns = visitor.sim.now_ns
-    visitor.at("step").focus()
+    visitor.at("run").focus()
+    visitor.page.keyboard.press("Tab")
     visitor.page.keyboard.press("Space")
     visitor.until(lambda: visitor.sim.now_ns > now_ns)
     expect(clock).to_have_text(clock_text(now_ns + 10_000_000))

@@ -22,6 +22,7 @@ from kiks.recording.recording import Recording
 from kiks.recording.replay import check_recording
 from kiks.sim.from_project import simulation_of
 from kiks.sim.simulation import Simulation
+from kiks.units import ns_from_s
 
 pytestmark = pytest.mark.anyio
 
@@ -365,3 +366,28 @@ async def test_lock_holds_in_the_server(tmp_path: Path, may_edit: bool) -> None:
         assert may_edit or (desk.sim.state_hash(), desk.project.noise) == (before, True), name
     assert desk.project.noise is not may_edit
     desk.close()
+
+
+async def test_going_on_from_a_past_keeps_the_steps_up_to_there(desk: Desk, editing: Editing) -> None:
+    desk.keep_past()
+    await line(editing)
+    walls = desk.sim.arena.brightness
+    desk.sim.run(1)
+    await editing.place(Ball(250, 200))
+    await editing.undo()
+    desk.sim.run(1)
+    await editing.place(Lamp(250, 200))
+    for time_s, steps in ((1.5, (1, 1)), (1.0, (1, 1)), (0.5, (1, 0))):
+        await desk.looking.look_at(ns_from_s(time_s))
+        assert (editing.can_undo, editing.can_redo) == (False, False)
+        await desk.go_on_from_here()
+        assert (editing.can_undo, editing.can_redo) == tuple(map(bool, steps))
+        await editing.undo()
+        assert not desk.sim.arena.brightness[100, 200]
+        await editing.redo()
+        assert np.array_equal(desk.sim.arena.brightness, walls)
+        await editing.redo()
+        assert counts(desk) == (1, 2 + steps[1], 1)
+    await rectangle(editing, 300, 10, 310, 50)
+    await step(editing.undo, 2)
+    assert not editing.can_undo

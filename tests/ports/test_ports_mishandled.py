@@ -203,14 +203,33 @@ def test_error_explains_why_a_port_cannot_be_opened(what: str, tmp_path: Path) -
 
 
 @pytest.mark.slow
-def test_too_few_descriptors_for_all_robots_give_one_line(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("limit", "arguments", "words"),
+    cases(
+        [
+            (16, "host --port 0", "the desk must be able to open 32 more files, but this process may have 16 in all"),
+            (16, "serve --desk", "the desk must be able to open 32 more files"),
+            (16, "demo avoid --desk", "the desk must be able to open 32 more files"),
+            (
+                16,
+                "room examples/exercises/lamp --students NAMES --port 0",
+                "the desk must be able to open 32 more files",
+            ),
+            (16, "serve --robots 6 --no-pty --tcp 0", "the server of ports must be able to open 9 more files"),
+            (100, "serve --robots 40 --tcp 0", "this process may have 100"),
+        ],
+        normally=1,
+    ),
+)
+def test_a_server_with_too_few_files_gives_one_line(limit: int, arguments: str, words: str, tmp_path: Path) -> None:
+    (names := tmp_path / "names").write_text("Ada\n")
+    given = [{"NAMES": f"{names}"}.get(word, word) for word in arguments.split()]
     code = (
-        "import resource, sys\nresource.setrlimit(resource.RLIMIT_NOFILE, (100, 100))\n"
-        f"sys.argv = ['kiks', 'serve', '--robots', '40', '--tcp', '0', '--link', '{tmp_path}/robot']\n"
-        "from kiks.__main__ import main\nmain()\n"
+        f"import resource, sys\nresource.setrlimit(resource.RLIMIT_NOFILE, ({limit}, {limit}))\n"
+        f"sys.argv = ['kiks', *{given}]\nfrom kiks.__main__ import main\nmain()\n"
     )
     done = forked.run(code=code)
     assert done.returncode == 2
     (line,) = done.stderr.splitlines()
-    assert "this process may have 100" in line
-    assert not list(os.scandir(str(tmp_path)))
+    assert words in line
+    assert "llow more: ulimit -n " in line

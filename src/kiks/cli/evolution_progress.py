@@ -1,4 +1,4 @@
-"""How far an evolution is: a line that changes on a terminal, lines now and then elsewhere."""
+"""How far an evolution is: a line that changes on a terminal, lines now and then elsewhere; none with --quiet."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Self
 
 import typer
 
+from kiks.cli.outputs import is_quiet
 from kiks.errors import counted
 
 if TYPE_CHECKING:
@@ -34,7 +35,9 @@ class Progress:
         self._console, self._generations, self._seconds = Console(), generations, seconds
         text = TextColumn("{task.description}", table_column=Column(no_wrap=True, overflow="ellipsis"))
         columns = (TextColumn(evolution.task.name), BarColumn(min(20, self._console.width // 6)), text)
-        self._bars = Bars(*columns, console=self._console, transient=True, disable=not self._console.is_terminal)
+        self._has_lines = not (is_quiet() or self._console.is_terminal)
+        is_bar = self._console.is_terminal and not is_quiet()
+        self._bars = Bars(*columns, console=self._console, transient=True, disable=not is_bar)
         self._bar = self._bars.add_task("preparing", total=1.0)
         self._before = len(evolution.generations)
         self._begin_s, self._last_s = perf_counter(), _working_s()
@@ -62,7 +65,7 @@ class Progress:
         left = f"{passed_s / done - passed_s if done else 0.0:.0f} s left"
         line = "   ".join((f"generation {count}", first, left, *others, f"{_metric(rate)} x real time"))
         self._bars.update(self._bar, completed=done, description=line)
-        if not self._console.is_terminal and (now_s - self._told_s > EVERY_S or done >= 1):
+        if self._has_lines and (now_s - self._told_s > EVERY_S or done >= 1):
             self._told_s = now_s
             typer.echo(line)
 
@@ -70,7 +73,7 @@ class Progress:
         """Show the finals; called before each round."""
         said = f"finals: {counted(sizes[number], 'candidate')}"
         self._bars.update(self._bar, completed=number / len(sizes), description=said)
-        if not self._console.is_terminal and not number:
+        if self._has_lines and not number:
             typer.echo(f"Finals: {counted(sizes[0], 'candidate')} in {counted(len(sizes), 'round')}")
 
 

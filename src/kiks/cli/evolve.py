@@ -15,7 +15,7 @@ import typer
 from kiks.cli.engine_start import ready_batch, ready_engine
 from kiks.cli.evolution_progress import Progress
 from kiks.cli.options import Seed, written_folder
-from kiks.cli.outputs import has_results, leave_out, tell_results
+from kiks.cli.outputs import has_results, is_quiet, leave_out, shows_progress, tell_results
 from kiks.cli.record import RecordFile, recorded
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import ParameterError, nearest, shown
@@ -42,6 +42,7 @@ PERIODS = 5
 
 
 @has_results
+@shows_progress
 def evolve(
     context: typer.Context,
     task: Annotated[str, typer.Argument(help="A task (--list shows them), or a Python file that holds one.")] = "avoid",
@@ -128,9 +129,9 @@ def evolve(
             evolution: Evolution | None = None
             try:
                 evolution = Evolution(chosen, algorithm, seed=number, population=population, folder=home)
-                if seeds is not None:
+                if seeds is not None and not is_quiet():
                     typer.echo(f"Seed {number}:")
-                if evolution.generations:
+                if evolution.generations and not is_quiet():
                     typer.echo(f"Continuing after generation {len(evolution.generations)} in {home}.")
                 if cluster is not None and executor is None:
                     from kiks.learn.ray_executor import RayExecutor

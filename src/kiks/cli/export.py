@@ -10,7 +10,7 @@ import typer
 
 from kiks.cli.engine_start import ready_engine
 from kiks.cli.options import progress_bar
-from kiks.cli.outputs import leave_out, output
+from kiks.cli.outputs import leave_out, output, shows_progress
 from kiks.errors import ParameterError, shown
 from kiks.export.kinds import ENDINGS, KINDS, kind_of, options_of
 from kiks.export.kinds import export as write_export
@@ -26,6 +26,7 @@ def picture_size(value: str | None) -> Any:
     return int(words[1]), int(words[2])
 
 
+@shows_progress
 def export(
     context: typer.Context,
     files: Annotated[

@@ -10,7 +10,7 @@ import typer
 from kiks.cli.engine_start import ready_batch
 from kiks.cli.export import picture_size
 from kiks.cli.options import progress_bar
-from kiks.cli.outputs import leave_out, output
+from kiks.cli.outputs import leave_out, output, shows_progress
 from kiks.errors import ParameterError, shown
 
 ENDINGS = (".mp4", ".gif", ".webp", ".png", ".html")
@@ -29,6 +29,7 @@ def _numbers(value: str | None) -> Any:
         raise ParameterError(f"--generations must be numbers such as 1,20,60, but it was {shown(value)}.") from None
 
 
+@shows_progress
 def ghosts(
     context: typer.Context,
     folder: Annotated[Path, typer.Argument(help="The folder of an evolution of one controller, which may run.")],

@@ -11,7 +11,7 @@ import typer
 
 from kiks.cli.engine_start import ready_engine
 from kiks.cli.options import Trusted, Workers, print_table, progress_bar, say
-from kiks.cli.outputs import has_results, tell_results
+from kiks.cli.outputs import has_results, shows_progress, tell_results
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import counted, printable
 
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 
 @has_results
+@shows_progress
 def grade(
     context: typer.Context,
     exercise: Annotated[

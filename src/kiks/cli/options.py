@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 
+from kiks.cli.outputs import is_quiet
 from kiks.errors import ParameterError, nearest, printable, shown
 from kiks.model.atomic_files import make_folder
 from kiks.model.checks import ROBOTS_MAX
@@ -200,12 +201,12 @@ def say(text: str) -> None:
 
 @contextmanager
 def progress_bar(work: str) -> Iterator[Callable[..., None]]:
-    """Yield a function that shows on a terminal how much is done, as a share or of a number."""
+    """Yield a function that shows on a terminal how much is done, as a share or of a number, unless --quiet."""
     from rich.console import Console
     from rich.progress import Progress
 
     console = Console(stderr=True)
-    with Progress(console=console, transient=True, disable=not console.is_terminal) as progress:
+    with Progress(console=console, transient=True, disable=is_quiet() or not console.is_terminal) as progress:
         bar = progress.add_task(work, total=None)
         yield lambda done, count=1: progress.update(bar, completed=done, total=count)
 

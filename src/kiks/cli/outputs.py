@@ -14,6 +14,7 @@ import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, nullcontext, suppress
+from contextvars import ContextVar
 from enum import Enum
 from pathlib import Path
 from typing import Annotated, Any, get_args
@@ -58,12 +59,24 @@ def output(
 
 
 _JSON, _RESULTS = "kiks.json", "kiks.results"
+_quiet = ContextVar("quiet", default=False)
 
 
 def has_results(function: Callable[..., None]) -> Callable[..., None]:
     """Mark a command that calls `tell_results`, so that it takes --json."""
     function.has_results = True  # type: ignore[attr-defined]
     return function
+
+
+def shows_progress(function: Callable[..., None]) -> Callable[..., None]:
+    """Mark a command that shows how far it is, so that it takes --quiet."""
+    function.shows_progress = True  # type: ignore[attr-defined]
+    return function
+
+
+def is_quiet() -> bool:
+    """Return whether the command that runs is to show no progress."""
+    return _quiet.get()
 
 
 def tell_results(context: typer.Context, results: object, lines: Iterable[str] = ()) -> None:
@@ -110,6 +123,7 @@ def _added(
     json: Annotated[
         bool, typer.Option("--json", help="Print the results as JSON; all else goes to the error output.")
     ] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", help="Show no progress.")] = False,
     force: Annotated[bool, typer.Option("--force", help="Replace files of any kind.")] = False,
 ) -> None:
     pass
@@ -118,16 +132,19 @@ def _added(
 class Command(TyperCommand):
     """A command that begins when nothing speaks against what it was told.
 
-    It takes --json if it has results for scripts, and --force if it writes files.
+    It takes --json if it has results for scripts, --quiet if it shows progress, and --force if it writes files.
     """
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
         marked = [(param, getattr(param.callback, "output", None)) for param in self.params]
         self._outputs = [(param, found) for param, found in marked if found]
-        for_scripts, forcing = typer.main.get_command(_adding).params[:2]
+        for_scripts, quieting, forcing = typer.main.get_command(_adding).params[:3]
         if getattr(self.callback, "has_results", False):
             self.params.append(for_scripts)
+        self._shows_progress = getattr(self.callback, "shows_progress", False)
+        if self._shows_progress:
+            self.params.append(quieting)
         if not all(is_new for _, (*_, is_new) in self._outputs):
             self.params.append(forcing)
         for param in self.params:
@@ -169,6 +186,7 @@ class Command(TyperCommand):
             if order.count(param) > 1 and param.nargs == 1 and not getattr(param, "multiple", False):
                 raise ParameterError(f"{_name(param)} must be given once, but it was given {order.count(param)} times.")
         ctx.meta[_JSON] = ctx.params.pop("json", False)
+        _quiet.set(self._shows_progress and ctx.params.pop("quiet"))
         self._check_outputs(ctx.params, is_forced=ctx.params.pop("force", False))
         return left
 

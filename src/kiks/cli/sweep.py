@@ -13,7 +13,7 @@ from kiks.cli.compare import FIGURES
 from kiks.cli.engine_start import ready_engine
 from kiks.cli.job import job_of
 from kiks.cli.options import World, print_table, progress_bar, say
-from kiks.cli.outputs import has_results, output, tell_results
+from kiks.cli.outputs import has_results, is_quiet, output, shows_progress, tell_results
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import counted
 from kiks.model.ranges import numbers_of
@@ -27,6 +27,7 @@ FAMILY_MAX, SEEDS_MAX = 1000, 1000
 
 
 @has_results
+@shows_progress
 def sweep(
     context: typer.Context,
     world: World,
@@ -105,7 +106,8 @@ def sweep(
     assert goal is not None
     end_as_with_ctrl_c()
     ready_engine()
-    say(f"{counted(count, 'run')} of {project.seconds:g} s at most. Goal: {goal.text or goal.solved}.")
+    if not is_quiet():
+        say(f"{counted(count, 'run')} of {project.seconds:g} s at most. Goal: {goal.text or goal.solved}.")
     with progress_bar("runs") as progress:
         found = swept(
             project,

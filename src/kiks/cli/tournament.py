@@ -12,7 +12,7 @@ import typer
 from kiks.cli.engine_start import ready_engine
 from kiks.cli.job import demonstration_of
 from kiks.cli.options import SeedOrOwn, Trusted, Workers, print_table, progress_bar, say
-from kiks.cli.outputs import has_results, leave_out, tell_results
+from kiks.cli.outputs import has_results, leave_out, shows_progress, tell_results
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import KiksError, ParameterError, counted, nearest, printable
 
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 
 @has_results
+@shows_progress
 def tournament(
     context: typer.Context,
     match: Annotated[

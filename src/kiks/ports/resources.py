@@ -77,6 +77,30 @@ def opening(what: str) -> Iterator[None]:
         raise LinkError(f"{what} must be able to open, but {why}") from None
 
 
+def check_files(what: str, count: int) -> None:
+    """Check that this process may open some more files: a server that begins with too few fails later, and in pieces.
+
+    Args:
+        what: The server, as the subject of the message.
+        count: How many it needs with its first clients.
+
+    Raises:
+        LinkError: If it may not.
+    """
+    try:
+        with contextlib.ExitStack() as stack:
+            for _ in range(count):
+                stack.callback(os.close, os.open(os.devnull, os.O_RDONLY))
+    except OSError as error:
+        if error.errno not in SHORTAGES:
+            raise
+        limit = "too few" if resource is None else resource.getrlimit(resource.RLIMIT_NOFILE)[0]
+        raise LinkError(
+            f"{what} must be able to open {count} more files, but this process may have {limit} in all. Allow more: "
+            "ulimit -n 4096."
+        ) from None
+
+
 def accept(listener: socket.socket) -> socket.socket | None:
     """Return the next connection; None if there is none, or no descriptor for it: then it waits in the queue.
 

@@ -19,6 +19,7 @@ from kiks.ports.endpoint import Channel, Endpoint
 from kiks.ports.live import Link, Live, TimePolicy
 from kiks.ports.lockstep import Lockstep
 from kiks.ports.program_scheduler import PATIENCE_S, ProgramScheduler
+from kiks.ports.resources import check_files
 from kiks.sim.port import BAUD_MAX, BAUD_MIN
 from kiks.sim.simulation import Simulation
 
@@ -61,6 +62,8 @@ class Server:
         pace: Pace | None = None,
         new_patience: Callable[[float], Patience] = Patience,
     ) -> None:
+        # Its selector takes one, the pair of sockets that wakes it two, and a client of each endpoint one.
+        check_files("the server of ports", 3 + sum(map(len, endpoints.values())))
         self.sim = sim
         self._timing: TimePolicy
         if thinking == "live":

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 from nicegui import ui
 
@@ -13,11 +14,13 @@ from kiks.desk.panels.exercise import ExercisePanel
 from kiks.desk.panels.monitor import MonitorPanel
 from kiks.desk.panels.octave import OctavePanel
 from kiks.desk.panels.programs import ProgramsPanel
+from kiks.desk.panels.remembered import remember, remembered
 from kiks.desk.panels.settings import SettingsPanel
+from kiks.desk.panels.shortcuts import pass_on_keys
 from kiks.desk.panels.time_bar import TimeBar
 from kiks.desk.panels.time_controls import TimePanel
 from kiks.desk.panels.view import ViewPanel
-from kiks.desk.panels.widgets import WEB, Panel, heading, named, told
+from kiks.desk.panels.widgets import WEB, Panel, heading, icon_button, named, told, with_props
 from kiks.desk.panels.wire import WirePanel
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.live_editing import Editing
@@ -27,11 +30,15 @@ PRIMARY, ACCENT, POSITIVE = "#174a63", "#b85c00", "#1b7a34"
 """Background colours for white text, with contrasts of 9.4, 4.7 and 5.4 to 1. On dark pages, text in these colours is
 lighter: see `web/page.css`."""
 
-HINT = "Drag a robot to move it, its rim to turn it. Click it to see its readings."
+HINTS = {
+    "desk": "Drag a robot to move it, its rim to turn it. Click it to see its readings.",
+    "locked": "Click a robot to see its readings.",
+    "recording": "Space plays the recording. Drag the bar to any time; its marks say what happened.",
+}
+"""The line below the arena, which a browser shows until a person closes it."""
 
-LOCKED_HINT = "Click a robot to see its readings."
-
-PAST_HINT = "Space plays the recording. Drag the bar to any time; its marks say what happened."
+SPLIT, SPLITS, SPLIT_STEP = 64.0, (30, 100), 2.0
+"""How much of the width the arena has at first, how much it may have, and by how much a key changes it [%]."""
 
 MEMORY = """<script>
 try {
@@ -42,9 +49,6 @@ try {
 </script>"""
 """Replacement for the session storage in which NiceGUI keeps a tab's id: in a notebook that has another host name, such
 as localhost for 127.0.0.1, Chromium denies access to it, and no button would work."""
-
-NOTE_SPLIT = "(value) => document.body.style.setProperty('--desk-split', value)"
-"""Tells the style sheet how much of the width the arena has [%], for the tooltips beside it."""
 
 NOTE_HEADER = """
     const note = ([{ target }]) => document.body.style.setProperty("--desk-top", `${target.offsetHeight}px`);
@@ -73,29 +77,63 @@ class Page:
         ui.colors(primary=PRIMARY, accent=ACCENT, positive=POSITIVE)
         ui.add_head_html(MEMORY)
         ui.add_css(WEB / "page.css")
-        with ui.header(elevated=True).classes("items-center q-py-none q-px-md no-wrap gap-2").style("height: 58px"):
+        with ui.header(elevated=True).classes("items-center q-py-none q-px-md no-wrap gap-2"):
             heading("KiKS", "text-h6 desk-from-1200", level=1)
             ui.run_javascript(NOTE_HEADER)
             TimePanel(desk, feed)
             ui.space()
             tools = ui.row().classes("items-center no-wrap gap-1")
-        with ui.splitter(value=64, limits=(30, 100)).classes("desk-body") as halves:
-            halves.on("update:model-value", js_handler=NOTE_SPLIT)
-            with halves.before, ui.column().classes("desk-stage"):
+        known = remembered("split")  # other servers of the computer may have set anything
+        split = float(known) if known.replace(".", "", 1).isdecimal() else SPLIT
+        split = min(max(split, SPLITS[0]), SPLITS[1])
+        with ui.splitter(value=split, limits=SPLITS, on_change=self._note_split).classes("desk-body") as self._halves:
+            with self._halves.before, ui.column().classes("desk-stage"):
                 board = ScoreBoard(feed, "board.css")
                 with ui.element("div").classes("desk-arena"):
                     self._view = ArenaView(
                         feed, on_pick=self._pick, on_edit=self._edit, on_draw=self._draw, on_remove=self._remove
                     )
-                    self._hint = ui.label(
-                        LOCKED_HINT if desk.is_locked else HINT if desk.past is None else PAST_HINT
-                    ).classes("desk-hint")
+                self._build_hint("locked" if desk.is_locked else "desk" if desk.past is None else "recording")
                 TimeBar(desk, feed)
-            with halves.after, ui.column().classes("w-full gap-0 no-wrap"):
+            with self._halves.after, ui.column().classes("w-full gap-0 no-wrap"):
                 self._build_tabs(feed)
+            with self._halves.separator:
+                self._build_edge()
         with tools:
             ViewPanel(desk, self._view, board)
+        pass_on_keys()
         ui.timer(NEWS_S, self._tell_news)
+
+    def _build_hint(self, name: str) -> None:
+        """Build the line below the arena, unless it was closed in this browser."""
+
+        def close() -> None:
+            self._hint_row.set_visibility(False)
+            remember(f"hint-{name}", "closed")
+
+        with ui.row().classes("desk-hint items-center no-wrap w-full") as self._hint_row:
+            self._hint = ui.label(HINTS[name]).classes("col")
+            icon_button("close", "Close the hint", "close-hint", close, look="flat round dense size=sm")
+        self._hint_row.set_visibility(not remembered(f"hint-{name}"))
+
+    def _build_edge(self) -> None:
+        """Build the edge between arena and panels, which keys move, too."""
+        words = "Width of the arena: the left and right arrow keys change it"
+        edge = ui.element("div").classes("desk-edge").props("role=separator tabindex=0 aria-orientation=vertical")
+        self._edge = named(with_props(edge, aria_label=words, aria_valuemin="30", aria_valuemax="100"), "edge")
+        for key, sign in (("left", -1), ("right", 1)):
+            self._edge.on(f"keydown.{key}.prevent", partial(self._move_edge, sign * SPLIT_STEP))
+        self._note_split()
+
+    def _move_edge(self, by: float) -> None:
+        self._halves.value = min(max(self._halves.value + by, SPLITS[0]), SPLITS[1])
+
+    def _note_split(self) -> None:
+        """Let the browser remember the width, and tell the style sheet, for the tooltips beside the arena."""
+        split = round(self._halves.value, 1)
+        with_props(self._edge, aria_valuenow=f"{split:.0f}")
+        remember("split", split)
+        ui.run_javascript(f"document.body.style.setProperty('--desk-split', {split})")
 
     def _build_tabs(self, feed: str) -> None:
         """Build the tabs beside the arena; the panel of each is built when it is first opened."""
@@ -201,3 +239,4 @@ class Page:
         if lines and self._desk.outside.interpreters():
             # The last line of the log stands there, as in the window of KiKS 2.2.0.
             self._hint.set_text(lines[-1])
+            self._hint_row.set_visibility(True)

@@ -86,7 +86,7 @@ class ProgramsPanel(Panel):
         self._is_saving = False
         self._seen = self._checked = NEW
         ui.add_css(CSS)
-        with ui.column().classes("w-full q-pa-sm gap-2"):
+        with ui.column().classes("w-full q-pa-sm gap-2 no-wrap desk-programs"):
             if desk.may_run_programs:
                 self._build_editor()
             else:
@@ -95,7 +95,9 @@ class ProgramsPanel(Panel):
             self._attached = named(ui.column().classes("w-full gap-0"), "attached")
             with ui.expansion("Output", value=True).classes("w-full").props("dense"):
                 label = "What the program has printed"
-                self._log = LogBox("12rem", "output", label, rows_max=SHOWN_LINES, new_max=NEWEST_LINES)
+                self._log = LogBox(
+                    "clamp(5rem, 17vh, 14rem)", "output", label, rows_max=SHOWN_LINES, new_max=NEWEST_LINES
+                )
         self.refresh()
 
     # ---- the list and the output ----
@@ -241,11 +243,15 @@ class ProgramsPanel(Panel):
             run.props("unelevated no-caps color=primary")
             run.tooltip("Save and run this program (Ctrl-Enter); first stops a program that runs on this robot")
         # Here, the page's shortcut keys (space, .) are text.
-        with ui.element("div").classes("w-full").on("keydown", js_handler="(event) => event.stopPropagation()"):
+        with (
+            ui.element("div")
+            .classes("w-full desk-program")
+            .on("keydown", js_handler="(event) => event.stopPropagation()")
+        ):
             keys: dict[str, Any] = {"Ctrl-Enter": act, "Cmd-Enter": act}
             self._editor = ui.codemirror(NEW, language="Python", theme=LIGHT, keymap=keys)
             named(self._editor, "editor").on_value_change(self._note_draft)
-            self._editor.classes("w-full").style("height: 38vh; border: 1px solid currentcolor")
+            self._editor.classes("w-full desk-editor")
         self._mistake = named(ui.label().classes("desk-error text-body2").props("role=status"), "mistake")
         with ui.row().classes("w-full items-end no-wrap gap-2"):
             self._name = named(ui.input("Saved as", value="mine.py"), "name").classes("col").props("dense")

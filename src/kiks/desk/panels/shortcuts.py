@@ -5,6 +5,7 @@ The keys of the arena view are in `web/keys.js`, those of the slider of the time
 
 from __future__ import annotations
 
+import json
 from collections.abc import Awaitable, Callable, Mapping
 from typing import Any, NamedTuple
 
@@ -39,6 +40,31 @@ SHORTCUTS = {
     "undo": Shortcut("Ctrl-z", "Undo the last step"),
     "redo": Shortcut("Ctrl-y", "Redo the step"),
 }
+
+PASS_ON = f"""
+    const keys = {json.dumps([each.key for each in SHORTCUTS.values()])};
+    const controls = ["button", "tab", "checkbox", "switch", "radio"].map((role) => `[role=${{role}}]`);
+    const taking = ["button", "a", ".q-select input[readonly]", ...controls].join();
+    let isPointed = false;
+    addEventListener("pointerdown", () => {{ isPointed = true; }}, true);
+    addEventListener("keydown", (event) => {{
+        const at = document.activeElement;
+        if (event.key === "Tab" || event.key.startsWith("Arrow")) isPointed = false;
+        if (!isPointed || !keys.includes(event.key) || event.ctrlKey || event.altKey || event.metaKey) return;
+        if (!at.closest(taking) || at.ariaExpanded === "true" || at.closest(".q-dialog, .q-menu")) return;
+        event.preventDefault();
+        event.stopImmediatePropagation();
+        at.blur();
+        document.dispatchEvent(new KeyboardEvent("keydown", event));
+    }}, true);
+"""
+"""Lets what was clicked pass the page's keys on: after a click on a sensor or a speed, space pauses, and does not click
+again. What Tab or an arrow key brought the focus to takes them itself. Quasar gives the focus to a part of a button."""
+
+
+def pass_on_keys() -> None:
+    """Let what is clicked on this page pass the page's keys on."""
+    ui.run_javascript(PASS_ON)
 
 
 def listen(acts: Mapping[str, Callable[[], Awaitable[object]]], *, is_for_buttons: bool = True) -> None:

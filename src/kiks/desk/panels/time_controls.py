@@ -32,15 +32,6 @@ SPEEDS |= {1.0: "real time", 0.0: "full speed"}
 STEPS: dict[float, str] = {0.01: "10 ms", 0.1: "100 ms", 1.0: "1 s", 10.0: "10 s"}
 """Sizes of a step [s]."""
 
-LEAVE = """(event) => {
-    if (![" ", "."].includes(event.key) || event.target.ariaExpanded === "true") return;
-    event.qKeyEvent = true;
-    event.preventDefault();
-    event.target.blur();
-}"""
-"""Makes a closed list pass the keys space and . on to the page: after choosing a speed, space pauses and does not open
-the list again. Quasar skips events with this mark, and the page handles keys while no list has the focus."""
-
 
 class TimePanel(Panel):
     """The row of controls above the arena.
@@ -110,4 +101,4 @@ class TimePanel(Panel):
 
 def _select(choices: dict[float, str], value: float, word: str, name: str, width: str) -> ui.select:
     choice = ui.select(choices, value=value).props("dense dark borderless options-dense").style(f"min-width: {width}")
-    return with_props(choice, aria_label=word, data_testid=name).on("keydown", js_handler=LEAVE)
+    return with_props(choice, aria_label=word, data_testid=name)

@@ -60,10 +60,11 @@ class ViewPanel:
                 named(box, f"show-{name}").props("dense").classes("q-py-xs")
             clear = ui.button("Clear trails", icon="auto_fix_normal").props("flat dense no-caps")
             clear.on_click(lambda: view.run_method("clear_trails"))
-        with _button("my_location", "Follow a robot", "follow"), ui.menu() as self._robots:
+        with _button("my_location", "Follow a robot", "follow", word="Follow"), ui.menu() as self._robots:
             pass
         self._robots.on("before-show", self._list_robots)
-        _button("fit_screen", "Show all of the arena (key: 0)", "fit").on_click(lambda: view.run_method("fit"))
+        fit = "Show all of the arena (key: 0)"
+        _button("fit_screen", fit, "fit", lambda: view.run_method("fit"), word="Show all")
         tip = "Snapshot: save a picture of the arena as you see it (PNG)"
         _button("photo_camera", "Snapshot", "snapshot", lambda: view.run_method("snapshot"), tip=tip)
         tip = "Hall view, for a projector: arena, score and clock, large (Escape ends it)"

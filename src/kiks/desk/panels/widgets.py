@@ -198,10 +198,20 @@ def relabel(button: ui.button, icon: str, label: str) -> None:
 
 
 def bar_button(
-    icon: str, label: str, name: str, act: Callable[..., Any] | None = None, *, tip: str = "", place: str = "below"
+    icon: str,
+    label: str,
+    name: str,
+    act: Callable[..., Any] | None = None,
+    *,
+    tip: str = "",
+    place: str = "below",
+    word: str = "",
 ) -> ui.button:
-    """Build an icon button of the bar above the arena."""
-    return icon_button(icon, label, name, act, tip=tip, look="flat round dense color=white", place=place)
+    """Build a button of the bar above the arena: an icon, and below it where there is room a word, `label` if none."""
+    button = icon_button(icon, label, name, act, tip=tip, look="flat dense stack no-caps color=white", place=place)
+    with button:
+        ui.label(word or label).classes("desk-word")
+    return button
 
 
 def text_button(text: str, icon: str, name: str, tip: str, act: Callable[..., Any] | None = None) -> ui.button:

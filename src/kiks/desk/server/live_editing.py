@@ -10,6 +10,7 @@ import asyncio
 import math
 import pickle
 import zlib
+from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from itertools import count
@@ -35,6 +36,9 @@ HISTORY_BYTES_MAX = 64 << 20
 
 STEPS_MAX = 1000
 """Most steps that can be undone."""
+
+MOMENTS_MAX = 100
+"""Most edits to whose times people can go back and still undo the steps before."""
 
 _LARGE_CELLS = 4_000_000
 
@@ -131,6 +135,16 @@ class _Step(NamedTuple):
     is_another_arena: bool
 
 
+class _Moment(NamedTuple):
+    """The history after an edit, for people who go on from that time: what was known, and what could be undone then."""
+
+    time_ns: int
+    known: tuple[Any, ...]
+    numbers: list[int]
+    undoable: list[bytes]
+    redoable: list[bytes]
+
+
 class Editing:
     """Edits the world of a desk; all browsers of the desk share it and its history.
 
@@ -149,16 +163,22 @@ class Editing:
         self._numbers: list[int] = []  # of the things in the world: robots, balls, cylinders, lamps
         self._fresh = count(1)
         self._known: tuple[Any, ...] = ()  # what of the world only edits change
+        self._run: object = None
+        self._moments: deque[_Moment] = deque(maxlen=MOMENTS_MAX)  # of this run
 
     @property
     def can_undo(self) -> bool:
         """Whether this world has a step to undo."""
-        return bool(self._undoable) and self._known[0] is self._desk.sim
+        return bool(self._undoable) if self._is_known else any(each.undoable for each in self._earlier()[:1])
 
     @property
     def can_redo(self) -> bool:
         """Whether this world has a step to redo."""
-        return bool(self._redoable) and self._known[0] is self._desk.sim
+        return bool(self._redoable) if self._is_known else any(each.redoable for each in self._earlier()[:1])
+
+    @property
+    def _is_known(self) -> bool:
+        return self._known[:1] == (self._desk.sim,)
 
     # ---- steps ----
 
@@ -249,9 +269,10 @@ class Editing:
             if source:
                 here, there, is_another = _unpacked(source[-1])
                 then = there if is_another else _with_change(now, here, there)
-                await self._apply(now, then, is_another)
+                time_ns = await self._apply(now, then, is_another)
                 source.pop()
                 _push(target, _Step(then, now, is_another))
+                self._note(time_ns)
 
     async def _edit(self, edit: Callable[[Content], Content], *, is_another_arena: bool = False) -> None:
         async with self._lock:
@@ -261,9 +282,42 @@ class Editing:
             then = await asyncio.to_thread(edit, now) if is_large else edit(now)
             if then == now:
                 return
-            await self._apply(now, then, is_another_arena)
+            time_ns = await self._apply(now, then, is_another_arena)
             _push(self._undoable, _Step(then, now, is_another_arena))
             self._redoable.clear()
+            self._note(time_ns)
+
+    # ---- the history, also of those who go on from the past ----
+
+    def _note(self, time_ns: int) -> None:
+        """Note the history after an edit at a time [ns]."""
+        if self._run is not (run := self._desk.looking.run):
+            self._run = run
+            self._moments.clear()
+        known = _lasting(self._known)
+        self._moments.append(_Moment(time_ns, known, self._numbers, [*self._undoable], [*self._redoable]))
+
+    def _earlier(self) -> list[_Moment]:
+        """Return the moments up to the present of a world that goes on from the past, the last one first."""
+        if self._run is not self._desk.looking.run or self._desk.past is not None:
+            return []
+        now_ns = self._desk.sim.now_ns
+        return [each for each in reversed(self._moments) if each.time_ns <= now_ns]
+
+    def _recall(self, known: tuple[Any, ...]) -> None:
+        """Go back to the history of a world that goes on from the past; it is empty in any other unknown world."""
+        before = [] if self._is_known else self._earlier()
+        found = next((each for each in before if each.known == _lasting(known)), None)
+        if found is None:
+            things = known[0].robot_count + len(known[2]) + known[3]
+            self._numbers = [next(self._fresh) for _ in range(things)]
+            self._undoable.clear()
+            self._redoable.clear()
+        else:
+            self._numbers, self._undoable[:], self._redoable[:] = found[2:]
+            while self._moments[-1] is not found:
+                self._moments.pop()
+        self._known = known
 
     # ---- the world ----
 
@@ -275,14 +329,13 @@ class Editing:
         robots = [Robot(*start, robot) for start, robot in zip(arena.starts, project.robots, strict=False)]
         things: list[Thing] = [*robots, *arena.bodies, *arena.lamps]
         if known != self._known or len(things) != len(self._numbers):
-            self._known, self._numbers = known, [next(self._fresh) for _ in things]
-            self._undoable.clear()
-            self._redoable.clear()
+            self._recall(known)
         walls = replace(arena, starts=(), balls=(), cylinders=(), lamps=())
         return Content(walls, dict(zip(self._numbers, things, strict=True)))
 
-    async def _apply(self, now: Content, then: Content, is_another_arena: bool) -> None:
-        desk = self._desk
+    async def _apply(self, now: Content, then: Content, is_another_arena: bool) -> int:
+        """Change the world, and return the time of that [ns]."""
+        desk, time_ns = self._desk, 0
         desk.check_unlocked()
         if is_another_arena or now.of(Robot).keys() != then.of(Robot).keys():
             await desk.alter(then.in_project(await desk.present_project()))
@@ -290,7 +343,7 @@ class Editing:
             # The faces of walls take a while: they are computed before the world is locked.
             if then.walls is not now.walls:
                 await asyncio.to_thread(lambda: then.walls.faces)
-            await desk.do(lambda sim: _change(sim, now, then))
+            time_ns = await desk.do(lambda sim: _change(sim, now, then))
             robots = tuple(each.robot for each in then.of(Robot).values())
             desk.project = replace(desk.project, robots=robots)
             # Resets return to here: the places of the old checkpoint may be walls by now.
@@ -299,6 +352,7 @@ class Editing:
             desk.tell()
         self._known = await desk.do(_known_of)
         self._numbers = [number for kind in _KINDS for number in then.of(kind)]
+        return time_ns
 
     def _in_another_arena(self, now: Content, arena: Arena) -> Content:
         discs = [(body.x_mm, body.y_mm, body.radius_mm) for body in arena.bodies]
@@ -335,6 +389,12 @@ class Editing:
 
 def _known_of(sim: Simulation) -> tuple[Any, ...]:
     return sim, sim.arena, sim.bodies()["number"].tolist(), len(sim.world.lamps)
+
+
+def _lasting(known: tuple[Any, ...]) -> tuple[Any, ...]:
+    """Return what of it is the same in another world that goes on from a time of this one."""
+    sim, arena, numbers, lamp_count = known
+    return sim.robot_count, zlib.crc32(arena.brightness.tobytes()), numbers, lamp_count
 
 
 def _with_change(now: Content, here: Content, there: Content) -> Content:
@@ -375,8 +435,8 @@ def _in_order(sim: Simulation) -> list[int]:
     return sorted(range(len(are_balls)), key=lambda index: not are_balls[index])
 
 
-def _change(sim: Simulation, now: Content, then: Content) -> None:
-    """Apply the difference between two contents to a world that has the robots of both."""
+def _change(sim: Simulation, now: Content, then: Content) -> int:
+    """Apply the difference between two contents to a world that has the robots of both; return the time [ns]."""
     numbers = sim.bodies()["number"].tolist()
     bodies = dict(zip((*now.of(Ball), *now.of(Cylinder)), (numbers[index] for index in _in_order(sim)), strict=True))
     for robot, (number, before) in enumerate(now.of(Robot).items(), 1):
@@ -402,6 +462,7 @@ def _change(sim: Simulation, now: Content, then: Content) -> None:
         elif not isinstance(thing, Robot):
             add = sim.add_ball if isinstance(thing, Ball) else sim.add_cylinder
             add(**thing._asdict())
+    return sim.now_ns
 
 
 def _change_body(sim: Simulation, body: int, before: dict[str, Any], after: dict[str, Any]) -> None:

@@ -37,12 +37,14 @@ class LookingBack:
         past: What is shown of the past; None while the present is shown.
         has_present: Whether a world goes on besides the past; False while the desk shows only a file.
         marks: What has happened, as far as it was read.
+        run: Stands for the run of the present world, also where it goes on from its past.
     """
 
     def __init__(self, present: Callable[[], DeskWorld], say: Callable[[str], None]) -> None:
         self.past: Player | None = None
         self.has_present = True
         self.marks: list[Mark] = []
+        self.run = object()
         self._present, self._say = present, say
         # The recording of what led to the present, and while a world is recorded what writes it.
         self._source: Source | None = None
@@ -73,6 +75,7 @@ class LookingBack:
             sim: The world.
             is_branch: Whether it goes on from a time of the past, which is kept up to there; else it is forgotten.
         """
+        self.run = self.run if is_branch else object()
         before, bookmarks = (self._source, self._bookmarks) if is_branch else (None, [])
         self._turn_from_other_run()
         self._bookmarks = []

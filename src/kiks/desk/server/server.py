@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import logging
 import socket
 import threading
 from collections.abc import Coroutine
@@ -30,13 +29,16 @@ from kiks.desk.server.token import Token
 from kiks.errors import LinkError, ParameterError
 from kiks.model.limits import MESSAGE_BYTES_MAX
 from kiks.ports.joining import PATH
-from kiks.ports.resources import SHORTAGES, opening, shortage
+from kiks.ports.resources import check_files, opening
 
 PORT = 8123
 """Default TCP port."""
 
 START_S = 30.0
 """Timeout of the server's start [s]; a busy computer needs seconds."""
+
+FILES = 32
+"""Open files that it needs with a page and a program."""
 
 BACKLOG = 128
 """Maximum number of connections that wait to be accepted."""
@@ -92,6 +94,7 @@ class DeskServer:
                     )
                 self.door.public = public.at(self.port) if public else self.door.public
                 return
+            check_files("the desk", FILES)
             self._is_local = host in LOOPBACK
             self._socket = _listen(host, PORT, or_free=True) if port is None else _listen(host, port)
             self.door.public = public.at(self.port) if public else None
@@ -209,10 +212,6 @@ class DeskServer:
         assert self._socket is not None
         try:
             uvicorn.Server(config).run(sockets=[self._socket])
-        except OSError as error:
-            if error.errno not in SHORTAGES:
-                raise
-            logging.getLogger("kiks.desk").error("the desk cannot serve: %s", shortage())
         finally:
             begun.set()
 
