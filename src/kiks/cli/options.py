@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 
-from kiks.errors import ParameterError, nearest, printable, shown
+from kiks.errors import ParameterError, nearest_file, printable, shown
 from kiks.model.atomic_files import make_folder
 from kiks.model.checks import ROBOTS_MAX
 
@@ -307,7 +307,7 @@ def parse_words(words: list[str]) -> list[Command]:
             )
             raise ParameterError(
                 f"PROGRAM must be a Python file, but {found}. Give its path before its own arguments."
-                f"{nearest(word, demonstrations())}"
+                f"{nearest_file(Path(word), demonstrations())}"
             )
     return commands
 

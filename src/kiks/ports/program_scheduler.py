@@ -380,6 +380,6 @@ def check_policy(when_silent: str, patience_s: float) -> None:
     if when_silent not in POLICIES:
         raise ParameterError(
             f"when_silent must be 'wait', 'drop' or 'ignore', but it was {shown(when_silent)}."
-            f"{nearest(str(when_silent), POLICIES)}"
+            f"{nearest(when_silent, POLICIES)}"
         )
     Patience(patience_s)
