@@ -43,6 +43,8 @@ class Group(TyperGroup):
         known = [*self.commands, *_options(self)]
         if ctx.parent is None:
             known += [f"demo {name}" for name in demonstrations()] + _openings(Path(args[0]))
+            for name, command in self.commands.items():
+                known += [f"{name} {word}" for word in [*getattr(command, "commands", ()), *_options(command)]]
         raise ParameterError(
             f"A command must be one that {ctx.command_path} -h lists, but {shown(args[0])} is none."
             f"{nearest(args[0], known)}"

@@ -278,6 +278,8 @@ def parse_words(words: list[str]) -> list[Command]:
     from kiks.ports.program_process import Command, module_command
 
     commands: list[Command] = []
+    if words[:1] == [""]:
+        raise ParameterError("PROGRAM must be the name of a file, but it is empty. Write one.")
     if words[:1] == ["-m"]:
         commands.append(module_command("".join(words[1:2]), []))
         words = words[2:]

@@ -169,7 +169,7 @@ class Command(OneLineCommand):
             ) from None
         given, _, order = self.make_parser(ctx).parse_args(list(args))
         for param in order:
-            if given[param.name] == "" and "path" in param.type.name:
+            if given[param.name] == "" and "path" in param.display_type(ctx):
                 raise ParameterError(f"{_name(param)} must be the name of a file, but it is empty. Write one.")
             if order.count(param) > 1 and param.nargs == 1 and not getattr(param, "multiple", False):
                 raise ParameterError(f"{_name(param)} must be given once, but it was given {order.count(param)} times.")

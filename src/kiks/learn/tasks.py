@@ -13,7 +13,7 @@ from kiks.batch.loop_timing import Milliseconds
 from kiks.control.controller import Controller
 from kiks.control.controllers import Recipe, controller_of
 from kiks.control.recipes import module_in
-from kiks.errors import KiksError, ParameterError, nearest_file, shown
+from kiks.errors import KiksError, ParameterError, hinting, nearest_file, shown
 from kiks.learn.classic_tasks import (
     floreano_mondada_1994,
     floreano_mondada_1996,
@@ -52,6 +52,9 @@ __all__ = [
 
 def __dir__() -> list[str]:
     return __all__
+
+
+__getattr__ = hinting(__name__, __all__)
 
 
 Name = Annotated[
