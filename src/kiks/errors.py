@@ -83,6 +83,9 @@ _ROMAN = {"i": "1", "ii": "2", "iii": "3", "iv": "4", "v": "5", "vi": "6"}
 LIKE = 0.6
 """How alike two names must be for one to be meant by the other, from 0 to 1 for the same name."""
 
+BEGINNING = 0.85
+"""How alike two names count of which one is the beginning of the other, with three letters at least."""
+
 
 def closest(given: str, known: Iterable[str]) -> str | None:
     """Return the known name that was probably meant, or None.
@@ -105,8 +108,8 @@ def closest(given: str, known: Iterable[str]) -> str | None:
             matcher.set_seq2(one)
             for other in _spellings(name):
                 matcher.set_seq1(other)
-                begins = 0.75 if len(one) > 1 and other.startswith(one) else 0.0
-                best = max(best, begins, matcher.ratio())
+                begins = len(min(one, other, key=len)) > 2 and (one.startswith(other) or other.startswith(one))
+                best = max(best, matcher.ratio(), BEGINNING * begins)
         return best
 
     typed = [each for each in _spellings(given[:SHOWN_MAX]) if each]

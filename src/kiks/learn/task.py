@@ -513,7 +513,8 @@ class Task(Experiment):
         if candidates.shape[1] != self.parameter_count:
             counts = " and ".join(f"{side.parameter_count} of the {side.name}" for side in self.sides if side.name)
             raise ParameterError(
-                f"a candidate must have {self.parameter_count} parameters{counts and f' ({counts})'}, but their number "
+                f"a candidate must have {counted(self.parameter_count, 'parameter')}{counts and f' ({counts})'}, but "
+                "their number "
                 f"was {candidates.shape[1]}."
             )
         seconds = self.seconds if seconds is None else check_number("seconds", seconds, SECONDS_MIN, SECONDS_MAX)

@@ -377,8 +377,8 @@ def _with_files_beside(project: Project, folder: Path) -> Project:
 
 def load_arena_file(path: Path) -> Arena:
     """Read an arena that comes with KiKS, or a file: see `Arena.load`."""
-    if not path.suffix and not path.exists():
-        known = shipped_arenas()
+    known = shipped_arenas()
+    if not path.exists() and (not path.suffix or path.stem in known):
         if path.as_posix() not in known:
             names = ", ".join(name for name in known if "/" not in name)
             hint = nearest_file(path, known)

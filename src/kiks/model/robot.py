@@ -14,7 +14,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from kiks.errors import ParameterError, nearest_file, printable, shown
+from kiks.errors import ParameterError, counted, nearest_file, printable, shown
 from kiks.model.arena_file import toml
 from kiks.model.atomic_files import path_of, replace_file
 from kiks.model.checks import ROBOTS_MAX, check_count
@@ -421,7 +421,8 @@ def specs_of(
     count = check_count("robots", count, least, ROBOTS_MAX, "Say how many you need.")
     if len(named) not in (1, count):
         raise ParameterError(
-            f"robot must name one kind for all or one for each of {count} robots, but it named {len(named)}. "
+            f"robot must name one kind for all or one for each of {counted(count, 'robot')}, but it named "
+            f"{len(named)}. "
             "Leave robots out to have one of each."
         )
     specs = [each if isinstance(each, RobotSpec) else RobotSpec.load(each) for each in named]

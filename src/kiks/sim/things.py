@@ -178,7 +178,7 @@ class Things:
         check_kind("checkpoint", checkpoint, Checkpoint, "checkpoint() returns one.")
         if len(checkpoint.poses) != world.robot_count:
             raise ParameterError(
-                f"checkpoint must be of {world.robot_count} robots, but it was of {len(checkpoint.poses)}. "
+                f"checkpoint must be of {counted(world.robot_count, 'robot')}, but it was of {len(checkpoint.poses)}. "
                 "Take it from the same simulation."
             )
         check_numbers("poses of a checkpoint", checkpoint.poses, (world.robot_count, 3))
