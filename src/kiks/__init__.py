@@ -19,7 +19,10 @@ from kiks.version import __version__ as __version__  # before all others, becaus
 import lazy_loader
 import serial  # noqa: TID253  (pyserial has to be told where our plug-in is)
 
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)  # the names of __init__.pyi
+from kiks.errors import hinting as _hinting
+
+_get, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)  # the names of __init__.pyi
+__getattr__ = _hinting(__name__, __all__, _get)
 
 if "kiks.ports.pyserial" not in serial.protocol_handler_packages:
     serial.protocol_handler_packages.append("kiks.ports.pyserial")

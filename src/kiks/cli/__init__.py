@@ -10,6 +10,7 @@ import typer
 from kiks.cli.arena import arena
 from kiks.cli.calibrate import calibrate
 from kiks.cli.champion import champion
+from kiks.cli.command_line import Group
 from kiks.cli.compare import compare
 from kiks.cli.desk import desk
 from kiks.cli.doctor import doctor
@@ -47,6 +48,7 @@ Example: kiks demo avoid --desk
 Example: kiks demo follow --arena office --seconds 300"""
 
 app = typer.Typer(
+    cls=Group,
     help="KiKS Is a Khepera Simulator: programs for a real Khepera robot run on a simulated one, unchanged.",
     context_settings={"help_option_names": ["-h", "--help"]},
     subcommand_metavar="COMMAND ...",
@@ -103,7 +105,9 @@ kiks -h lists all commands, kiks COMMAND -h explains one."""
 @app.callback(invoke_without_command=True)
 def _options(
     context: typer.Context,
-    version: bool = typer.Option(False, "--version", callback=_print_version, is_eager=True, help="Show the version."),
+    version: bool = typer.Option(
+        False, "--version", "-V", callback=_print_version, is_eager=True, help="Show the version."
+    ),
 ) -> None:
     show_log(is_quiet=True)
     if context.invoked_subcommand is None:

@@ -99,7 +99,7 @@ def lines_of(name: str, comparison: Comparison) -> Iterator[str]:
     from kiks.learn.results import title_of
     from kiks.learn.statistics import CONFIDENCE
 
-    correction = f", p corrected for {len(comparison.pairs)} pairs by {comparison.correction}'s method"
+    correction = f", p corrected for {counted(len(comparison.pairs), 'pair')} by {comparison.correction}'s method"
     yield f"{title_of(name)}{correction if comparison.correction else ''}:"
     if (omnibus := comparison.omnibus) is not None:
         yield f"  all {omnibus.method}: H = {omnibus.statistic:.3g}, p = {omnibus.p:.3g}"

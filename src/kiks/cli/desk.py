@@ -14,7 +14,7 @@ from kiks.cli.engine_start import ready_engine
 from kiks.cli.options import Address, World, is_project, parse_words
 from kiks.cli.record import RecordFile, recorded
 from kiks.ending import end_as_with_ctrl_c
-from kiks.errors import ParameterError
+from kiks.errors import ParameterError, counted
 
 if TYPE_CHECKING:
     from kiks.desk.server.desk import Desk
@@ -114,7 +114,8 @@ def with_kinds(project: Project, kinds: list[str]) -> Project:
     robots = project.robots
     if kinds and len(kinds) not in (1, len(robots)):
         raise ParameterError(
-            f"--robot must name one kind for all or one for each of {len(robots)} robots, but it named {len(kinds)}."
+            f"--robot must name one kind for all or one for each of {counted(len(robots), 'robot')}, but it named "
+            f"{len(kinds)}."
         )
     named = kinds * len(robots) if len(kinds) == 1 else kinds or [each.kind for each in robots]
     return replace(project, robots=tuple(replace(each, kind=kind) for each, kind in zip(robots, named, strict=True)))

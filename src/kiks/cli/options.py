@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 import typer
 
 from kiks.cli.outputs import is_quiet
-from kiks.errors import ParameterError, nearest, printable, shown
+from kiks.errors import ParameterError, nearest_file, printable, shown
 from kiks.model.atomic_files import make_folder
 from kiks.model.checks import ROBOTS_MAX
 
@@ -283,6 +283,8 @@ def parse_words(words: list[str]) -> list[Command]:
     from kiks.ports.program_process import Command, module_command
 
     commands: list[Command] = []
+    if words[:1] == [""]:
+        raise ParameterError("PROGRAM must be the name of a file, but it is empty. Write one.")
     if words[:1] == ["-m"]:
         commands.append(module_command("".join(words[1:2]), []))
         words = words[2:]
@@ -312,7 +314,7 @@ def parse_words(words: list[str]) -> list[Command]:
             )
             raise ParameterError(
                 f"PROGRAM must be a Python file, but {found}. Give its path before its own arguments."
-                f"{nearest(word, demonstrations())}"
+                f"{nearest_file(Path(word), demonstrations())}"
             )
     return commands
 

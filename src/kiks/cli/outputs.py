@@ -20,9 +20,9 @@ from pathlib import Path
 from typing import Annotated, Any, get_args
 
 import typer
-from typer.core import TyperCommand
 
-from kiks.errors import ParameterError, figure, shown
+from kiks.cli.command_line import OneLineCommand
+from kiks.errors import ParameterError, figure, nearest, printable, shown
 from kiks.model.atomic_files import check_writable, ending_of
 
 # fmt: off
@@ -129,7 +129,7 @@ def _added(
     pass
 
 
-class Command(TyperCommand):
+class Command(OneLineCommand):
     """A command that begins when nothing speaks against what it was told.
 
     It takes --json if it has results for scripts, --quiet if it shows progress, and --force if it writes files.
@@ -177,12 +177,17 @@ class Command(TyperCommand):
             given = self.make_parser(ctx).parse_args(list(args))[0]
             value = given.get(param.name)
             if value in (None, ()):
-                raise ParameterError(self._missing(ctx, param, given)) from None
+                alone = self.make_parser(ctx).parse_args(list(args))[1]
+                raise ParameterError(self._missing(ctx, param, given, alone)) from None
             if not (rule := _rule(param)):
                 raise
-            raise ParameterError(f"{_name(param)} must be {rule}, but it was {shown(value)}.") from None
-        order = self.make_parser(ctx).parse_args(list(args))[2]
+            raise ParameterError(
+                f"{_name(param)} must be {rule}, but it was {shown(value)}.{_meant(param, str(value))}"
+            ) from None
+        given, _, order = self.make_parser(ctx).parse_args(list(args))
         for param in order:
+            if given[param.name] == "" and "path" in param.display_type(ctx):
+                raise ParameterError(f"{_name(param)} must be the name of a file, but it is empty. Write one.")
             if order.count(param) > 1 and param.nargs == 1 and not getattr(param, "multiple", False):
                 raise ParameterError(f"{_name(param)} must be given once, but it was given {order.count(param)} times.")
         ctx.meta[_JSON] = ctx.params.pop("json", False)
@@ -190,7 +195,7 @@ class Command(TyperCommand):
         self._check_outputs(ctx.params, is_forced=ctx.params.pop("force", False))
         return left
 
-    def _missing(self, ctx: Any, param: Any, given: Mapping[str, Any]) -> str:
+    def _missing(self, ctx: Any, param: Any, given: Mapping[str, Any], alone: list[str]) -> str:
         """Return what is to be said if a required option or argument was not given."""
         names, words = _name(param), []
         if param.param_type_name == "argument":
@@ -198,6 +203,8 @@ class Command(TyperCommand):
             needed = [each for each in self.params if each.param_type_name == "argument" and each.required]
             names = " and ".join(map(_name, needed))
             words = [str(value) for each in needed if (value := given.get(str(each.name)))]
+        elif alone:
+            return f"{names} must be given, but {shown(alone[0])} stands alone. Write {names} {printable(alone[0])}."
         found = f"only {shown(words[0])} was" if words else "nothing was"
         return f"{names} must be given, but {found}. {ctx.command_path} -h shows how."
 
@@ -254,8 +261,21 @@ def _rule(param: Any) -> str:
     kind = param.type_descriptor.annotation
     if kind in (int, float):
         return " ".join(filter(None, ("a whole number" if kind is int else "a number", _limits(param))))
-    choices = [each.value for each in kind] if isinstance(kind, type) and issubclass(kind, Enum) else get_args(kind)
-    return f"one of {', '.join(choices)}" if choices and all(isinstance(each, str) for each in choices) else ""
+    return f"one of {', '.join(choices)}" if (choices := _choices(kind)) else ""
+
+
+def _choices(kind: Any) -> list[str]:
+    values = [each.value for each in kind] if isinstance(kind, type) and issubclass(kind, Enum) else get_args(kind)
+    return [*values] if all(isinstance(each, str) for each in values) else []
+
+
+def _meant(param: Any, value: str) -> str:
+    """Return ' Did you mean X?' for a choice with a slip, and for a number with its unit or a comma; or nothing."""
+    kind = param.type_descriptor.annotation
+    if kind not in (int, float):
+        return nearest(value, _choices(kind))
+    number = re.match(r"[0-9]+([.,][0-9]+)?" if kind is float else "[0-9]+", value)
+    return "" if number is None or number[0] == value else f" Did you mean {number[0].replace(',', '.')}?"
 
 
 def _say_plainly(param: Any) -> None:

@@ -14,7 +14,7 @@ from kiks.cli.job import demonstration_of
 from kiks.cli.options import SeedOrOwn, Trusted, Workers, print_table, progress_bar, say
 from kiks.cli.outputs import has_results, leave_out, shows_progress, tell_results
 from kiks.ending import end_as_with_ctrl_c
-from kiks.errors import KiksError, ParameterError, counted, nearest, printable
+from kiks.errors import KiksError, ParameterError, counted, nearest_file, printable
 
 if TYPE_CHECKING:
     from kiks.trials.submissions import Submission
@@ -72,7 +72,7 @@ def tournament(
     if not path.exists():
         raise ParameterError(
             f"MATCH must be a match that comes with KiKS, such as sumo, or a project, but there is no {match!r}."
-            f"{nearest(match, demonstrations())}"
+            f"{nearest_file(path, demonstrations())}"
         )
     chosen = Match.load(path)
     out = out or Path(f"tournament-{chosen.title}")

@@ -135,7 +135,7 @@ def check_actuators(actuators: AnyActuator | Sequence[AnyActuator]) -> tuple[Any
         if not isinstance(each, Actuator) and (not isinstance(each, str) or each not in ACTUATORS):
             raise ParameterError(
                 f"actuators must be some of {', '.join(ACTUATORS)}, but {shown(each)} was among them."
-                f"{nearest(shown(each), ACTUATORS)} One of your own is made by @kiks.actuator."
+                f"{nearest(each, ACTUATORS)} One of your own is made by @kiks.actuator."
             )
     if given[:1] != (WHEELS,) or len(set(given)) != len(given):
         raise ParameterError(

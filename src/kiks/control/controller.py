@@ -161,7 +161,8 @@ class Controller(Compiled):
         given = given.reshape(1) if given.ndim == 0 else given
         if self.parameter_count not in (None, given.shape[-1]):
             raise ParameterError(
-                f"the controller {shown(self.name)} must be given {self.parameter_count} parameters, but got "
+                f"the controller {shown(self.name)} must be given {counted(self.parameter_count or 0, 'parameter')}, "
+                "but got "
                 f"{given.shape[-1]} (shape {given.shape}; the last axis is one controller's)."
             )
         return given

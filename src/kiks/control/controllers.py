@@ -44,7 +44,7 @@ from kiks.control.senses import check_senses, named, reading_count, recipes_for
 from kiks.engine.compiling import kernel
 from kiks.engine.numbers import tanh
 from kiks.engine.simd.stack_arrays import stack_floats
-from kiks.errors import ParameterError, shown
+from kiks.errors import ParameterError, hinting, shown
 from kiks.model.checks import check_count, check_kind
 from kiks.model.data_file import Number, OneOf, Rule, Switch, Whole, adapter, check
 
@@ -66,6 +66,9 @@ __all__ = [
 
 def __dir__() -> list[str]:
     return __all__
+
+
+__getattr__ = hinting(__name__, __all__)
 
 
 SPEED_LIMIT = 10.0

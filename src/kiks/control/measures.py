@@ -17,7 +17,7 @@ from pydantic import BeforeValidator, Field
 from kiks.control.arguments import made_once
 from kiks.control.measure import Measure, measure
 from kiks.engine.compiling import kernel
-from kiks.errors import ParameterError
+from kiks.errors import ParameterError, hinting
 from kiks.model.arena import Arena
 from kiks.model.checks import check_kind, check_number
 from kiks.model.data_file import Number, OneOf, Text, Whole, as_list
@@ -58,6 +58,9 @@ __all__ = [
 
 def __dir__() -> list[str]:
     return __all__
+
+
+__getattr__ = hinting(__name__, __all__)
 
 
 Positive = Annotated[Number, Field(gt=0, le=1e6)]

@@ -258,7 +258,7 @@ def check_senses(senses: AnySense | Sequence[AnySense]) -> tuple[AnySense, ...]:
         if not isinstance(each, Sense) and (not isinstance(each, str) or each not in SENSES):
             raise ParameterError(
                 f"senses must be some of {', '.join(SENSES)}, but {shown(each)} was among them."
-                f"{nearest(shown(each), SENSES)} One of your own is made by @kiks.sense."
+                f"{nearest(each, SENSES)} One of your own is made by @kiks.sense."
             )
     if len(set(given)) != len(given):
         raise ParameterError(f"senses must name each sense once, but they were {named(given)}.")

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from kiks.errors import ParameterError, library, shown
+from kiks.errors import ParameterError, library, nearest, shown
 from kiks.export.kinds import KINDS
 from kiks.export.panel import Panel
 from kiks.export.solid_stage import SolidStage
@@ -96,7 +96,8 @@ def save_film(
     fps = check_count("fps", fps, 1, GIF_FPS_MAX if ending == GIF else FPS_MAX)
     speed = check_number("speed", speed, SPEED_MIN, SPEED_MAX)
     if view not in tuple(VIEWS):
-        raise ParameterError(f"view must be one of {', '.join(map(repr, VIEWS))}, but it was {shown(view)}.")
+        hint = nearest(view, VIEWS)
+        raise ParameterError(f"view must be one of {', '.join(map(repr, VIEWS))}, but it was {shown(view)}.{hint}")
     follow, zoom = checked_follow(recording, follow, zoom)
     if is_plain and robot is not None:
         raise ParameterError(f"robot must be left out of a plain film, but it was {shown(robot)}.")

@@ -91,7 +91,7 @@ def kind_of(path: str | Path, kind: str | None = None) -> str:
         return next(name for name, each in KINDS.items() if ending in each.endings)
     if kind not in KINDS:
         raise ParameterError(
-            f"kind must be one of {', '.join(map(repr, KINDS))}, but it was {shown(kind)}.{nearest(str(kind), KINDS)}"
+            f"kind must be one of {', '.join(map(repr, KINDS))}, but it was {shown(kind)}.{nearest(kind, KINDS)}"
         )
     ending_of(path, f"a {kind}", KINDS[kind].endings)
     return kind

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import logging
 import re
 
+from kiks.errors import shown
 from kiks.firmware import tools
 from kiks.firmware.commands import COMMANDS, NoTurretError, ProtocolError, Reply, set_speed
+from kiks.firmware.meant import hint_for
 from kiks.firmware.receiver import LINE_LIMIT
 from kiks.firmware.robot import Robot
 
 UNKNOWN = b"Command not found\r\n"
 PROTOCOL_ERROR = b"z,Protocol error\r\n"
 NO_TURRET = b"z,Turret order not supported\r\n"
+
+_log = logging.getLogger("kiks.robot")
 
 DEMO_PERIOD_NS = 20_000_000
 """Period of the demonstration of mode 0 [ns]: one sensor round."""
@@ -58,11 +63,15 @@ class Firmware(Robot):
                     values = act(self, *numbers(words[1:], count)) if count else act(self)
                 return self._reply(letter.lower(), values)
         except ProtocolError:
+            self._hint(line, PROTOCOL_ERROR)
             return PROTOCOL_ERROR
         except NoTurretError:
             return NO_TURRET
         answer = tools.run(self, line)
-        return self._unknown() if answer is None else answer
+        if answer is None:
+            self._hint(line, UNKNOWN)
+            return self._unknown()
+        return answer
 
     def _reply(self, letter: bytes, values: Reply) -> bytes:
         if values:
@@ -81,6 +90,13 @@ class Firmware(Robot):
         if len(order) != 1 or not b"A" <= order <= b"Z":
             raise ProtocolError
         return (*numbers(words[:1], 1), order.decode(), *numbers(words[2:], len(words) - 2))
+
+    def _hint(self, line: bytes, answer: bytes) -> None:
+        """Say once for each kind of refusal how the command is written: the robot does not."""
+        if answer not in self.hinted and (hint := hint_for(line)):
+            self.hinted.add(answer)
+            said, text = answer.decode().strip(), shown(line.decode("latin-1"))
+            _log.warning("robot %d answered %r to %s. %s", self.number + 1, said, text, hint)
 
     def _unknown(self) -> bytes:
         return b"z," + UNKNOWN if self.spec.quirks.unknown_command_with_z else UNKNOWN

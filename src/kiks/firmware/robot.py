@@ -30,6 +30,7 @@ class Robot:
         dictated: An order for a turret, and the robot's reply to it, if the program that sends it says that, too.
         baud: Speed of the line now [bit/s]; the tool `serial` changes it.
         selected_baud: Speed that the mode selector asks for [bit/s]: the robot reads it at a reset.
+        hinted: What a person has had a hint about: it comes once.
     """
 
     def __init__(
@@ -49,6 +50,7 @@ class Robot:
         self.fitted: list[Turret] = []
         self.turrets: dict[int, Turret] = {}
         self.dictated: tuple[bytes, bytes] | None = None
+        self.hinted: set[bytes] = set()
         self.now_ns = 0
         self.selected_baud = spec.firmware.baud
         self.demo_wakes_ns: int | None = None

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kiks.errors import ParameterError, counted, shown
+from kiks.errors import ParameterError, counted, nearest, shown
 from kiks.export.tables import write_parquet
 from kiks.learn.champion import Champion
 from kiks.learn.evolution_log import Folder
@@ -87,6 +87,7 @@ class Archive:
             if axis.measure not in self.value_names:
                 raise ParameterError(
                     f"an axis must name one of {', '.join(self.value_names)}, but it named {shown(axis.measure)}."
+                    f"{nearest(axis.measure, self.value_names)}"
                 )
         self.shape = tuple(axis.cells for axis in self.axes)
         self.cell_count = int(np.prod([float(cells) for cells in self.shape]))

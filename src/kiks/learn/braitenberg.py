@@ -101,7 +101,7 @@ def vehicle(name: str) -> Champion:
     """
     if not isinstance(name, str) or name not in VEHICLES:
         raise ParameterError(
-            f"name must be one of {', '.join(VEHICLES)}, but it was {shown(name)}.{nearest(str(name), VEHICLES)}"
+            f"name must be one of {', '.join(VEHICLES)}, but it was {shown(name)}.{nearest(name, VEHICLES)}"
         )
     found = VEHICLES[name]
     return Champion(found.controller, found.parameters, task=f"vehicle {name}")

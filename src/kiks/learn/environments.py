@@ -162,7 +162,7 @@ def environment_of(task: str | Task) -> Task:
     if not isinstance(task, Task):
         raise ParameterError(
             f"task must be a kiks.Task with a reward, or one of {', '.join(ENVIRONMENTS)}, but it was {shown(task)}."
-            f"{nearest(shown(task), tuple(ENVIRONMENTS))}"
+            f"{nearest(task, tuple(ENVIRONMENTS))}"
         )
     if task.reward is None or task.against is not None:
         raise ParameterError(

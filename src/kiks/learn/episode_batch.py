@@ -14,7 +14,7 @@ from kiks.batch.initial_state import random_starts
 from kiks.control.measure import Measure
 from kiks.control.measures import contacts, path_mm
 from kiks.control.senses import sense_of
-from kiks.errors import ParameterError
+from kiks.errors import ParameterError, counted
 from kiks.export.pictures import Picture
 from kiks.learn.environments import environment_of
 from kiks.learn.task import Task
@@ -186,6 +186,7 @@ class Episodes:
                 if len(taken) == self.batch.robot_count:
                     return taken
         raise ParameterError(
-            f"the arena must have room for {self.batch.robot_count} robots, but places for only {len(taken)} were "
+            f"the arena must have room for {counted(self.batch.robot_count, 'robot')}, but places for only "
+            f"{len(taken)} were "
             "found. Take a larger one, or fewer robots."
         )

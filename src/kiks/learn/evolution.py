@@ -26,7 +26,7 @@ from typing import Any, TypeGuard
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kiks.errors import ParameterError, counted, shown
+from kiks.errors import ParameterError, counted, nearest, shown
 from kiks.learn import seeds
 from kiks.learn.algorithms import Algorithm, Setting, make_algorithm, whole_name
 from kiks.learn.archive import Archive
@@ -594,7 +594,8 @@ class Evolution:
         """
         names = [each.name for each in self.task.sides]
         if not isinstance(side, int | str) or side not in (*range(len(names)), *names):
-            raise ParameterError(f"side must be 0, 1 or one of {', '.join(names)}, but it was {shown(side)}.")
+            hint = nearest(side, names)
+            raise ParameterError(f"side must be 0, 1 or one of {', '.join(names)}, but it was {shown(side)}.{hint}")
         if not self.generations:
             raise ParameterError("tell() must be called for a generation before there is a champion, but it was not.")
         count = len(self.generations)

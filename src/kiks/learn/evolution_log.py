@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from kiks.errors import ParameterError, counted, shown
+from kiks.errors import ParameterError, counted, nearest_file, shown
 from kiks.export.tables import write_parquet
 from kiks.learn.finals import Contender, Finals, Tournament
 from kiks.learn.fingerprint import differing, tell_unseen
@@ -141,7 +141,7 @@ class Folder:
         if not file.exists():
             raise ParameterError(
                 f"{str(self.path)!r} must be the folder of an evolution, but it has no {IDENTITY}. "
-                "Name one that `kiks evolve` has written."
+                f"Name one that `kiks evolve` has written.{nearest_file(self.path) if not self.path.exists() else ''}"
             )
         what = f"The record of an evolution {str(file)!r}"
         return check(Identity, parse_json(read_file(file, what), what), what, advice="Take a new folder.")

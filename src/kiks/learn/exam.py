@@ -162,7 +162,7 @@ class Exam(Experiment):
         solved = np.asarray(result)
         if solved.dtype != np.bool_ or solved.shape != (count,):
             raise ParameterError(
-                f"solved must return a bool for each of {count} starts, but returned {shown(result)}. "
+                f"solved must return a bool for each of {counted(count, 'start')}, but returned {shown(result)}. "
                 "The measures have the shape [start]."
             )
         return ExamResult(solved, values, rollouts.measures, self.goal)

@@ -10,7 +10,7 @@ import numpy as np
 
 from kiks.batch.initial_state import random_starts
 from kiks.control.measure import Measure
-from kiks.errors import ParameterError, shown
+from kiks.errors import ParameterError, counted, shown
 from kiks.learn.evaluation import Floats
 from kiks.model.arena import Arena
 from kiks.upwards import shown_in_notebooks
@@ -84,7 +84,8 @@ def fitness_of(fitness: Fitness | None, measure_names: Sequence[str], values: Fl
     numbers = np.asarray(result, np.float64)
     if numbers.shape != (len(values),) or not np.isfinite(numbers).all():
         raise ParameterError(
-            f"fitness must return a finite number for each of {len(values)} candidates, but returned {shown(result)}. "
+            f"fitness must return a finite number for each of {counted(len(values), 'candidate')}, but returned "
+            f"{shown(result)}. "
             "The measures have the shape [candidate, world]: take a mean over axis 1."
         )
     return numbers

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.batch.initial_state import WORLDS_LIMIT
-from kiks.errors import ParameterError, installing, shown
+from kiks.errors import ParameterError, installing, nearest, shown
 from kiks.learn.environments import ENVIRONMENTS, environment_of
 from kiks.learn.episode_batch import SEED_LIMIT, Episodes
 from kiks.learn.task import Task
@@ -174,6 +174,7 @@ class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[An
             modes = [mode.value for mode in AutoresetMode]
             raise ParameterError(
                 f"autoreset_mode must be one of {modes}, but it was {shown(autoreset_mode)}."
+                f"{nearest(autoreset_mode, modes)}"
             ) from None
         self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
         self.max_episode_steps = max_episode_steps

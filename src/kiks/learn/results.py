@@ -16,7 +16,7 @@ from pydantic import Field
 
 from kiks.control.controller import Controller
 from kiks.control.senses import AnySense
-from kiks.errors import ParameterError
+from kiks.errors import ParameterError, nearest_file
 from kiks.learn import seeds
 from kiks.learn.evolution import Evolution
 from kiks.learn.evolution_log import IDENTITY, TRIALS, Digest, Folder, check_alike
@@ -272,7 +272,7 @@ def evolutions_in(folder: str | Path) -> list[Path]:
     if not homes:
         raise ParameterError(
             f"{str(path)!r} must be a folder of `kiks evolve`, but it holds no evolution. Name one with {IDENTITY}, or "
-            "one of kiks evolve --seeds."
+            f"one of kiks evolve --seeds.{nearest_file(path) if not path.exists() else ''}"
         )
     return sorted(homes)
 

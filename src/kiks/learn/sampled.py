@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from kiks.control.senses import Sense, sense
 from kiks.engine.compiling import kernel
 from kiks.engine.numbers import at_instant, draw, sin_cos, stream_of
-from kiks.errors import ParameterError, shown
+from kiks.errors import ParameterError, nearest, shown
 from kiks.model.arena import Arena
 from kiks.model.array_checks import check_numbers
 from kiks.model.checks import check_number
@@ -110,7 +110,9 @@ def sampled_proximity(
         <Sense 'sampled': N>
     """
     if noise not in NOISES:
-        raise ParameterError(f"noise must be one of {', '.join(NOISES)}, but it was {shown(noise)}.")
+        raise ParameterError(
+            f"noise must be one of {', '.join(NOISES)}, but it was {shown(noise)}.{nearest(noise, NOISES)}"
+        )
     radius_mm = check_number("radius_mm", radius_mm, 1, 0.25 * _ROOM_MM)
     discs = check_numbers("obstacles", obstacles, (None, 2)) if len(obstacles) else np.zeros((0, 2))
     of_wall, of_disc = sampled_table(math.inf), sampled_table(radius_mm)

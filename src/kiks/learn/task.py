@@ -18,7 +18,7 @@ from kiks.control.controller import Controller
 from kiks.control.controllers import SPEED_LIMIT
 from kiks.control.measure import Measure
 from kiks.control.measures import trajectory
-from kiks.errors import ParameterError, counted, shown
+from kiks.errors import ParameterError, counted, nearest, shown
 from kiks.learn.algorithm_name import AlgorithmName, parts_of
 from kiks.learn.champion import Champion
 from kiks.learn.evaluation import Floats, Integers, check_candidates
@@ -249,12 +249,13 @@ class Task(Experiment):
             if axis.measure not in names:
                 raise ParameterError(
                     f"an axis must name one of {', '.join(names)}, but it named {shown(axis.measure)}."
+                    f"{nearest(axis.measure, names)}"
                 )
         for objective in self.objectives:
             if objective.removeprefix("-") not in (known := ("fitness", *names)):
                 raise ParameterError(
                     f"an objective must name one of {', '.join(known)}, with a minus before it if less is better, but "
-                    f"it named {shown(objective)}."
+                    f"it named {shown(objective)}.{nearest(objective, known)}"
                 )
         parts_of(self.algorithm)
 
@@ -512,7 +513,8 @@ class Task(Experiment):
         if candidates.shape[1] != self.parameter_count:
             counts = " and ".join(f"{side.parameter_count} of the {side.name}" for side in self.sides if side.name)
             raise ParameterError(
-                f"a candidate must have {self.parameter_count} parameters{counts and f' ({counts})'}, but their number "
+                f"a candidate must have {counted(self.parameter_count, 'parameter')}{counts and f' ({counts})'}, but "
+                "their number "
                 f"was {candidates.shape[1]}."
             )
         seconds = self.seconds if seconds is None else check_number("seconds", seconds, SECONDS_MIN, SECONDS_MAX)

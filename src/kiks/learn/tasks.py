@@ -13,7 +13,7 @@ from kiks.batch.loop_timing import Milliseconds
 from kiks.control.controller import Controller
 from kiks.control.controllers import Recipe, controller_of
 from kiks.control.recipes import module_in
-from kiks.errors import KiksError, ParameterError, nearest, shown
+from kiks.errors import KiksError, ParameterError, hinting, nearest_file, shown
 from kiks.learn.classic_tasks import (
     floreano_mondada_1994,
     floreano_mondada_1996,
@@ -52,6 +52,9 @@ __all__ = [
 
 def __dir__() -> list[str]:
     return __all__
+
+
+__getattr__ = hinting(__name__, __all__)
 
 
 Name = Annotated[
@@ -118,7 +121,7 @@ def load(name: str | Path, controller: Controller | None = None) -> Task:
     if path.suffix != ".py" or not path.is_file():
         raise ParameterError(
             f"a task must be one of {', '.join(TASKS)}, a task file *.toml or a Python file, but it was {shown(name)}."
-            f"{nearest(name, TASKS)}"
+            f"{nearest_file(path, TASKS)}"
         )
     task = getattr(module_in(path.absolute()), "task", None)
     if not isinstance(task, Task):

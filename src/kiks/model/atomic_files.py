@@ -10,7 +10,7 @@ from contextlib import ExitStack, closing, contextmanager, suppress
 from pathlib import Path, PurePosixPath
 from typing import IO, Any, BinaryIO, cast
 
-from kiks.errors import KiksError, ParameterError, shown
+from kiks.errors import KiksError, ParameterError, nearest, shown
 
 fcntl: Any = None
 with suppress(ModuleNotFoundError):  # Windows has none: there files are written as on a drive without locks
@@ -298,7 +298,7 @@ def ending_of(path: object, what: str, endings: Iterable[str]) -> str:
     if ending not in endings:
         *others, last = endings
         known = f"{', '.join(others)} or {last}" if others else last
-        raise ParameterError(f"{what} must end in {known}, but it was {shown(str(path))}.")
+        raise ParameterError(f"{what} must end in {known}, but it was {shown(str(path))}.{nearest(ending, endings)}")
     return ending
 
 

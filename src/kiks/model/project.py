@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Field, InstanceOf
 
-from kiks.errors import ArenaError, KiksError, ParameterError, counted, nearest, shown
+from kiks.errors import ArenaError, KiksError, ParameterError, counted, nearest, nearest_file, shown
 from kiks.model.arena import MOSTLY_WALL, TURN_ROUND, Arena
 from kiks.model.arena_file import (
     Balls,
@@ -377,11 +377,11 @@ def _with_files_beside(project: Project, folder: Path) -> Project:
 
 def load_arena_file(path: Path) -> Arena:
     """Read an arena that comes with KiKS, or a file: see `Arena.load`."""
-    if not path.suffix and not path.exists():
-        known = shipped_arenas()
+    known = shipped_arenas()
+    if not path.exists() and (not path.suffix or path.stem in known):
         if path.as_posix() not in known:
             names = ", ".join(name for name in known if "/" not in name)
-            hint = nearest(str(path), known)
+            hint = nearest_file(path, known)
             raise ArenaError(f"An arena must be a file or one of {names}, but there is no {shown(str(path))}.{hint}")
         path = known[path.as_posix()]
     read = _READERS.get(path.suffix.lower())

@@ -14,7 +14,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from kiks.errors import ParameterError, nearest, printable, shown
+from kiks.errors import ParameterError, counted, nearest_file, printable, shown
 from kiks.model.arena_file import toml
 from kiks.model.atomic_files import path_of, replace_file
 from kiks.model.checks import ROBOTS_MAX, check_count
@@ -315,9 +315,8 @@ class RobotSpec:
             data = read_file(path, what)
         else:
             raise ParameterError(
-                f"robot must be one of {known} or a TOML file, but it was {shown(source)}.{nearest(source, known)} "
-                "Copy a "
-                "robot of ours to begin with one of your own."
+                f"robot must be one of {known} or a TOML file, but it was {shown(source)}."
+                f"{nearest_file(path, known)} Copy a robot of ours to begin with one of your own."
             )
         spec = _checked(parse_toml(data, what), what)
         return spec if response is None else spec.with_changes(proximity__response=response)
@@ -422,7 +421,8 @@ def specs_of(
     count = check_count("robots", count, least, ROBOTS_MAX, "Say how many you need.")
     if len(named) not in (1, count):
         raise ParameterError(
-            f"robot must name one kind for all or one for each of {count} robots, but it named {len(named)}. "
+            f"robot must name one kind for all or one for each of {counted(count, 'robot')}, but it named "
+            f"{len(named)}. "
             "Leave robots out to have one of each."
         )
     specs = [each if isinstance(each, RobotSpec) else RobotSpec.load(each) for each in named]

@@ -30,7 +30,7 @@ BURST_MAX = 16 * BACKLOG_LIMIT
 _SHORTEST_NS = character_ns(BAUD_MAX)
 
 LINE_REQUESTS: dict[int, Callable[..., object]] = {
-    Kind.COUNT: lambda wire, at_ns: wire.line.arrived_count(at_ns),
+    Kind.COUNT: lambda wire, at_ns: wire.arrived_count(at_ns),
     Kind.DROP: lambda wire, at_ns: wire.line.take(wire.line.arrived_count(at_ns)),
     Kind.SENT: lambda wire, at_ns: max(at_ns, wire.line.sending_until_ns),
     Kind.SET_BAUD: lambda wire, at_ns, baud: wire.set_baud(baud),
@@ -228,9 +228,11 @@ class ProgramParticipant(Participant):
         self.waits = False
         end_ns, count = end
         if end_ns == NEVER_NS:
-            self._answer(self.acts_from_ns, error=str(never_ends(request.robot)))
+            self._answer(self.acts_from_ns, error=str(never_ends(request.robot, wire)))
         else:
             data = wire.line.take(count)
+            if not data:
+                wire.note_wait(end_ns)
             self._answer(max(end_ns, self.acts_from_ns), (data, wire.line.taken_ns), robot=request.robot)
 
     def _check_wait_for_all(self, request: Request) -> None:

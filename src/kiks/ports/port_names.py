@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from kiks.errors import LinkError, shown
+from kiks.errors import LinkError, closest, printable, shown
 from kiks.ports.url import find_sim_port, is_elsewhere
 from kiks.sim.simulation import Simulation
 
@@ -91,9 +91,12 @@ class PortNames:
             free = [robot for robot in (program, *others) if robot not in taken]
             if not free:
                 known = self._by_name | {found: robot for (of, found), robot in self._found.items() if of == program}
+                meant = known.get(closest(name, known) or "", program)
+                found = ", ".join(f"{shown(each)} is robot {robot}" for each, robot in known.items())
                 raise LinkError(
-                    f"a port must belong to a robot, but {shown(name)} is one more than there are robots: {known}. "
-                    f"Run it with --robots {self._sim.robot_count + 1}, or map two names to one robot with --map."
+                    f"a port must belong to a robot, but {shown(name)} is one more than there are robots: {found}. "
+                    f"Run it with --robots {self._sim.robot_count + 1}, "
+                    f"or name its robot: --map {printable(name)}={meant}."
                 )
             self._found[program, name] = free[0]
         return self._found[program, name]

@@ -29,7 +29,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 
 from kiks.clock.patience import Patience
-from kiks.errors import ParameterError, nearest, shown
+from kiks.errors import ParameterError, counted, nearest, shown
 from kiks.sim.read_completion import NEVER_NS
 from kiks.sim.simulation import Simulation
 
@@ -301,8 +301,8 @@ class ProgramScheduler:
             if not self._has_reported_missing:
                 self._has_reported_missing = True
                 self._log.warning(
-                    "the world begins when %d programs are there. Missing: %s. %s",
-                    self._expected,
+                    "the world begins when %s there. Missing: %s. %s",
+                    f"{counted(self._expected, 'program')} {'is' if self._expected == 1 else 'are'}",
                     self._missing(),
                     "It waits until all are there." if waits_on else f"It waits {left_s:.0f} s more.",
                 )
@@ -380,6 +380,6 @@ def check_policy(when_silent: str, patience_s: float) -> None:
     if when_silent not in POLICIES:
         raise ParameterError(
             f"when_silent must be 'wait', 'drop' or 'ignore', but it was {shown(when_silent)}."
-            f"{nearest(str(when_silent), POLICIES)}"
+            f"{nearest(when_silent, POLICIES)}"
         )
     Patience(patience_s)

@@ -87,7 +87,7 @@ def find_sim_port(url: str, newest: Simulation | None = None) -> SimPort:
             known = " or ".join(list(alive)[-_SHOWN_NAMES:]) or "none now"
             raise LinkError(
                 f"a simulation's name must be one that is alive, such as {known}, but it was {shown(name)}. "
-                f"'kiks://1' without a name is robot 1 of the newest simulation."
+                f"'kiks://1' without a name is robot 1 of the newest simulation.{nearest(name, alive)}"
             )
         sim = alive[name] if name else newest or next(reversed(alive.values()), None) or Simulation()
     robot = int(number)

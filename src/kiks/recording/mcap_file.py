@@ -24,7 +24,7 @@ from mcap.records import Attachment, Chunk, Metadata
 from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 
-from kiks.errors import ParameterError
+from kiks.errors import ParameterError, nearest_file
 from kiks.model.atomic_files import FileBeside, ending_of, explained, path_of, target_of
 from kiks.model.limits import RECORD_BYTES_MAX
 from kiks.version import __version__
@@ -176,7 +176,10 @@ class McapReader:
         self.what = f"Recording {str(path)!r}"
         self.path = path_of(path, "a recording")
         if not self.path.is_file():
-            raise ParameterError(f"{self.what} must exist, but there is no such file. Check its name and its folder.")
+            raise ParameterError(
+                f"{self.what} must exist, but there is no such file. Check its name and its folder."
+                f"{nearest_file(self.path)}"
+            )
         self.chunks: list[FoundChunk] = []
         self.attachments: dict[str, bytes] = {}
         self.told: dict[str, str] = {}

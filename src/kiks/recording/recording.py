@@ -221,7 +221,7 @@ class Recording:
             if name not in tables.TABLES:
                 raise ParameterError(
                     f"name must be one of {', '.join(map(repr, tables.TABLES))}, but it was {shown(name)}."
-                    f"{nearest(str(name), list(tables.TABLES))}"
+                    f"{nearest(name, list(tables.TABLES))}"
                 )
         return tables.tables(self.log, names)
 

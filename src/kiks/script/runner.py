@@ -219,6 +219,9 @@ def _run_main_thread(start: Callable[[], None]) -> int:
     except KeyboardInterrupt:
         raise
     except BaseException as error:
+        # pyserial's error of a port stands for one of KiKS, whose line says enough with the place in the program.
+        if isinstance(error.__context__, KiksError) and error.__suppress_context__:
+            return _complain(f"kiks: {_place_of(error)}{error}")
         sys.excepthook(type(error), error, error.__traceback__)
         return 1
     return 0
@@ -248,6 +251,13 @@ def _print_program_trace(error: BaseException) -> None:
         left += [other for other in others if other is not None and id(other) not in seen]
         seen.update(map(id, left))
     print("".join(traceback.format_exception(error)), end="", file=sys.stderr)
+
+
+def _place_of(error: BaseException) -> str:
+    """Return the last line of the program itself that led to an error."""
+    frames = traceback.extract_tb(_program_part(error.__traceback__))
+    place = next((each for each in reversed(frames) if "serial" not in Path(each.filename).parts), None)
+    return f"{Path(place.filename).name}, line {place.lineno}: " if place else ""
 
 
 def _program_part(trace: TracebackType | None) -> TracebackType | None:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from kiks.engine.physics import contact
 from kiks.engine.scalar_math import uniform
 from kiks.engine.state import BALL, State
-from kiks.errors import ArenaError, ParameterError, shown
+from kiks.errors import ArenaError, ParameterError, counted, shown
 from kiks.model.arena import PAD, Arena
 from kiks.model.checks import check_heading
 from kiks.model.free_disc import OVERLAP_MM
@@ -104,7 +104,8 @@ class FreeSpace:
             if self.obstacle(x, y, radius_mm, others) is None:
                 return x, y, 2 * math.pi * turn
         raise ArenaError(
-            f"Arena {shown(self.arena.name)} must have room for {count} robots, but {ATTEMPTS} random places for "
+            f"Arena {shown(self.arena.name)} must have room for {counted(count, 'robot')}, but {ATTEMPTS} random "
+            "places for "
             f"robot {index + 1} were all taken. Ask for fewer, give start poses, or take a larger arena."
         )
 

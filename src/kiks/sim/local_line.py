@@ -63,13 +63,15 @@ class LocalLine:
             advance_to(wire.next_ns or 0)
         end_ns, count = end
         if end_ns == NEVER_NS:
-            raise never_ends(self._robot)
+            raise never_ends(self._robot, wire)
         advance_to(end_ns)
+        if not count:
+            wire.note_wait(end_ns)
         return wire.line.take(count)
 
     def arrived_count(self) -> int:
         """Return how many characters have arrived and were not read."""
-        return self._wire.line.arrived_count(self._world.now_ns)
+        return self._wire.arrived_count(self._world.now_ns)
 
     def sent_ns(self) -> int:
         """Return when everything will have been sent [ns]."""

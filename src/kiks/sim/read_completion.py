@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
-from kiks.errors import LinkError
+from kiks.errors import LinkError, shown
 
 if TYPE_CHECKING:
     from kiks.sim.wire import Wire
@@ -88,11 +88,13 @@ def is_complete(wire: Wire, read: Read, now_ns: int) -> bool:
     return read.size == 0 or 0 < count <= wire.line.arrived_count(now_ns)
 
 
-def never_ends(robot: int) -> LinkError:
+def never_ends(robot: int, wire: Wire) -> LinkError:
     """Return the error of a read without time-out to which no answer can come."""
+    partial = wire.firmware.receiver.partial.decode("latin-1")
+    found = f"{shown(partial)} has no end of line" if partial else "no command is on the line"
     return LinkError(
-        f"robot {robot} must have been asked something before its answer is read, but no command is "
-        f"on the line, so the read would never end. Send one that ends in a line feed, or set a timeout."
+        f"robot {robot} must have been asked something before its answer is read, but {found}, so the read would never "
+        "end. Send a command that ends in a line feed, or set a timeout."
     )
 
 

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.clock.program_clock import ProgramClock
+from kiks.clock.sleeping import watch_sleeps
 from kiks.engine.sensing.rays import walls_of
 from kiks.errors import ParameterError, counted, shown
 from kiks.firmware.khepera import Firmware
@@ -1049,6 +1050,7 @@ class SimPort(VirtualPort):
 
     def __init__(self, sim: Simulation, robot: int) -> None:
         super().__init__(LocalLine(sim.loop, robot), sim.program)
+        watch_sleeps(sim, sim.world)
         self.sim = sim
         self.robot = robot
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from kiks.engine.scalar_math import sin_cos
 from kiks.engine.scene import enter_worlds
 from kiks.engine.state import BALL, BODY, CYLINDER
-from kiks.errors import ArenaError, KiksError, ParameterError, counted, shown
+from kiks.errors import ArenaError, KiksError, ParameterError, counted, nearest, shown
 from kiks.model.arena import Arena, Ball, Cylinder, Lamp
 from kiks.model.array_checks import check_numbers
 from kiks.model.checks import check_count, check_heading, check_kind, check_number
@@ -178,7 +178,7 @@ class Things:
         check_kind("checkpoint", checkpoint, Checkpoint, "checkpoint() returns one.")
         if len(checkpoint.poses) != world.robot_count:
             raise ParameterError(
-                f"checkpoint must be of {world.robot_count} robots, but it was of {len(checkpoint.poses)}. "
+                f"checkpoint must be of {counted(world.robot_count, 'robot')}, but it was of {len(checkpoint.poses)}. "
                 "Take it from the same simulation."
             )
         check_numbers("poses of a checkpoint", checkpoint.poses, (world.robot_count, 3))
@@ -193,4 +193,5 @@ def _check_changes(changes: dict[str, Any]) -> None:
     if unknown := [name for name in changes if name not in CHANGES]:
         raise ParameterError(
             f"changes of a body must be {', '.join(CHANGES)}, but they were {shown(unknown)}. `move_body` moves it."
+            f"{nearest(unknown[0], CHANGES)}"
         )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections import deque
 from collections.abc import Callable
 from typing import Annotated, Any
@@ -9,6 +10,7 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from kiks.clock.serial_timing import SerialTiming
+from kiks.errors import shown
 from kiks.firmware.khepera import Firmware
 from kiks.firmware.receiver import LINE_LIMIT
 from kiks.model.checks import CLOCK_END_NS
@@ -17,6 +19,11 @@ from kiks.model.robot import Baud
 from kiks.sim.run_log import ACT, DROP, HANG_UP, SEND, SET_BAUD, THINK, TYPE, NotedEntry, WireRecorder
 from kiks.sim.wire_log import TimeShares, WireLog
 from kiks.units import ns_from_s
+
+_log = logging.getLogger("kiks.robot")
+
+SILENCE_NS = 500_000_000
+"""For how long a program waits for an answer to a command without an end of line before it gets a hint [ns]."""
 
 STOP = b"D,0,0\n"
 """The command that stops the wheels."""
@@ -131,6 +138,21 @@ class Wire:
         if (log := self.log) is not None:
             due = list(self.pending)[len(self.pending) - len(lines) :] if lines else []
             log.send(data, start_ns, character_ns, [(k, each[0]) for (k, _), each in zip(lines, due, strict=True)])
+
+    def arrived_count(self, now_ns: int) -> int:
+        """Return how many characters have arrived at a time [ns] and were not read, for a program that asks."""
+        count = self.line.arrived_count(now_ns)
+        if not count:
+            self.note_wait(now_ns)
+        return count
+
+    def note_wait(self, now_ns: int) -> None:
+        """Say once that a program waits for an answer to a command that has no end of line."""
+        partial, hinted = self.firmware.receiver.partial, self.firmware.hinted
+        if partial and partial not in hinted and now_ns - self.line.sending_until_ns >= SILENCE_NS:
+            hinted.add(partial)
+            text, end = shown(partial.decode("latin-1")), "a line feed, the one character '\\n'"
+            _log.warning("robot %d waits for the end of the line %s. A command ends in %s.", self._index + 1, text, end)
 
     def act(self, now_ns: int) -> None:
         """Do what is due."""

@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 
-from kiks.errors import ParameterError, printable, shown
+from kiks.errors import ParameterError, nearest_file, printable, shown
 from kiks.model.atomic_files import explained
 from kiks.ports.program_process import Command
 from kiks.trials.hand_in import HAND_IN_BYTES_MAX, PROGRAM
@@ -129,7 +129,9 @@ def _found_in(path: Path, what: str) -> list[tuple[str, _Tree, str]]:
         tree = _tree_of_folder(path)
         return [(path.name, tree, "")] if PurePosixPath(_MAIN) in tree else [*_split(tree)]
     if not path.is_file():
-        raise ParameterError(f"{what} must be files or folders, but there is no {shown(str(path))}.")
+        raise ParameterError(
+            f"{what} must be files or folders, but there is no {shown(str(path))}.{nearest_file(path)}"
+        )
     read = _reader(path)
     if not zipfile.is_zipfile(path):
         return [(path.stem, {PurePosixPath(path.name): read}, "")]

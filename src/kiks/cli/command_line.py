@@ -1,0 +1,93 @@
+"""Mistakes in the words of a command line: each gets one line of KiKS, and the nearest command or option."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import typer
+from typer.core import TyperCommand, TyperGroup
+
+from kiks.errors import ParameterError, nearest, shown
+from kiks.model.shipped import demonstrations, shipped_arenas
+
+UsageError: Any = typer.BadParameter.__base__
+"""The base of all errors of the library that reads the command line."""
+
+
+class OneLineCommand(TyperCommand):
+    """A command whose mistakes are errors of KiKS."""
+
+    def make_context(self, info_name: Any, args: list[str], parent: Any = None, **extra: Any) -> Any:
+        """Read the words of the command."""
+        with _in_one_line(self, info_name, parent):
+            return super().make_context(info_name, args, parent, **extra)
+
+
+class Group(TyperGroup):
+    """Commands with a common first word; `help` before a command is `-h` after it."""
+
+    def make_context(self, info_name: Any, args: list[str], parent: Any = None, **extra: Any) -> Any:
+        """Read the words before the command."""
+        with _in_one_line(self, info_name, parent):
+            words = [*args[1:], "-h"] if args[:1] == ["help"] else args
+            return super().make_context(info_name, words, parent, **extra)
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Find the command."""
+        if args[0] in self.commands or ctx.resilient_parsing or args[0].startswith("-"):
+            return super().resolve_command(ctx, args)
+        known = [*self.commands, *_options(self)]
+        if ctx.parent is None:
+            known += [f"demo {name}" for name in demonstrations()] + _openings(Path(args[0]))
+            for name, command in self.commands.items():
+                known += [f"{name} {word}" for word in [*getattr(command, "commands", ()), *_options(command)]]
+        raise ParameterError(
+            f"A command must be one that {ctx.command_path} -h lists, but {shown(args[0])} is none."
+            f"{nearest(args[0], known)}"
+        )
+
+
+def _openings(file: Path) -> list[str]:
+    """Return the command for a file that was named without one."""
+    verbs = {".py": "run", ".kiks": "desk", ".mcap": "replay", ".toml": "desk --arena", ".png": "desk --arena"}
+    return [f"{verbs[file.suffix]} {file}"] if file.suffix in verbs and file.is_file() else []
+
+
+def _options(command: Any) -> list[str]:
+    return [name for param in command.params for name in param.opts if name.startswith("-")]
+
+
+@contextmanager
+def _in_one_line(command: Any, name: str, parent: Any) -> Iterator[None]:
+    """Let a mistake be told in the words of KiKS; a help that stands in for one stays as it is."""
+    try:
+        yield
+    except UsageError as error:
+        if "\n" in (text := error.format_message()):
+            raise
+        path = f"{parent.command_path} {name}" if parent else name
+        raise ParameterError(_said(error, text.rstrip("."), command, path)) from None
+
+
+def _said(error: Any, text: str, command: Any, path: str) -> str:
+    option, how = getattr(error, "option_name", ""), f"{path} -h shows how."
+    if hasattr(error, "possibilities"):
+        homes = (each.name for each in getattr(command, "commands", {}).values() if option in _options(each))
+        home = next(homes, None)
+        hint = f" It stands behind its command: {path} {home} {option}." if home else nearest(option, _options(command))
+        return f"An option must be one that {path} -h lists, but {shown(option)} is none.{hint}"
+    if option and "not take" in text:
+        return f"{option} must stand alone, but a value was given with it. Leave the value out."
+    if option:
+        return f"{option} must have a value after it, but there is none. {how}"
+    if extra := re.search(r"extra argument\S* \((.*)\)", text):
+        takes = " ".join(command.collect_usage_pieces(None))
+        known = _options(command)
+        known += [f"--arena {arena}" for arena in shipped_arenas()] if "--arena" in known else []
+        hint = nearest(extra[1], known)
+        return f"{path} must be followed by {takes} alone, but {shown(extra[1])} is one word more.{hint} {how}"
+    return f"{text}. {how}"
