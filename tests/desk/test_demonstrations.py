@@ -38,8 +38,9 @@ def test_a_demonstration_begins_with_its_program_and_supervisor_also_again_and_a
         assert desk.sim.bodies()["x_mm"].tolist() == places
         asyncio.run(desk.replace(asyncio.run(desk.present_project())))
         assert (desk.sim.bodies()["x_mm"].tolist(), desk.has_beginners) == (pytest.approx(places, abs=1e-3), True)
-        saved = asyncio.run(desk.project_to_save("mine"))
-        assert (saved.supervisor, saved.robots[0].program, len(saved.arena.cylinders)) == (None, None, 12)
+        saved, beside = asyncio.run(desk.project_to_save("mine.kiks"))
+        assert (saved.supervisor, saved.robots[0].program, len(saved.arena.cylinders)) == (*sorted(beside)[::-1], 12)
+        assert beside == {name: (CLEAN.parent / name).read_bytes() for name in ("clean.py", "supervisors/clean.py")}
 
 
 def test_a_page_without_that_right_opens_the_world_alone(tmp_path: Path) -> None:

@@ -13,17 +13,17 @@ from typing import Any, Protocol, TypeVar
 
 from kiks.clock.gate import Gate
 from kiks.desk.server.desk_world import DeskWorld
+from kiks.desk.server.home import Home
 from kiks.desk.server.looking_back import LookingBack
 from kiks.desk.server.player import Player
 from kiks.desk.server.scripts import EXAMPLES
 from kiks.desk.server.tries import Tries
 from kiks.errors import KiksError, LinkError, ParameterError
 from kiks.model.arena import Arena
-from kiks.model.atomic_files import program_in
 from kiks.model.checks import CLOCK_END_NS
 from kiks.model.exercise import STUDENT
-from kiks.model.project import Project, ProjectRobot
-from kiks.ports.program_process import Command, Permission, commands_of, supervisor_of
+from kiks.model.project import Project
+from kiks.ports.program_process import Command, Permission
 from kiks.ports.programs import Programs
 from kiks.ports.sandbox import Sandbox
 from kiks.sim.from_project import described, project_of, simulation_of
@@ -105,7 +105,8 @@ class Desk:
     Attributes:
         present: The world that goes on.
         looking: How people look back.
-        project: The project it was built from.
+        project: The project it was built from, which names the programs that start with the world.
+        home: Where the project lies, and its programs.
         programs: The programs in the present world.
         programs_ended: Called with the locked world when all of them have ended: a run of an exercise is over then.
         is_seen: Set when a page has shown it for the first time.
@@ -166,11 +167,12 @@ class Desk:
         self._commands = list(commands)
         self._supervisor = _command_of(supervisor)
         self.speed_max = speed_max
-        self._home = self.folder if home is None else home.resolve()
-        self._granted = [*commands, self._supervisor]
+        self.home = Home(self.folder if home is None else home)
+        self.project = self.home.named(described(sim) if project is None else project, commands, supervisor)
+        again = zip(self.home.commands(self.project), commands, strict=False)
+        self._granted = [*commands, self._supervisor, *(command for command, given in again if given is not None)]
         self._new_programs = new_programs or self._usual_programs
         self._retired: list[Programs] = []
-        self.project = described(sim) if project is None else project
         world = DeskWorld(sim, speed)
         self._set_end(world)
         self._take(world, self._commands)
@@ -337,7 +339,7 @@ class Desk:
         """Try a person's program in all cases of the project, while the world goes on; see `tries`."""
         self._permission().check(command)
         has_hidden = self.may_edit or not self.is_locked
-        self.tries.begin(self.project, self._home, command, has_hidden=has_hidden)
+        self.tries.begin(self.home.alone(self.project), self.home.folder, command, has_hidden=has_hidden)
 
     # ---- another world ----
 
@@ -354,9 +356,9 @@ class Desk:
         """
         if folder is not None and self.is_for_others:
             raise ParameterError("This desk must stay with its exercise, so no other world can be opened here.")
-        home = folder or self._home
-        await self._put(project, commands_of(project, home), _command_of(supervisor_of(project, home)), home)
-        self._home = home
+        home = self.home if folder is None else Home(folder)
+        await self._put(project, home.commands(project), _command_of(home.supervisor(project)), home)
+        self.home = home
 
     async def alter(self, project: Project) -> None:
         """Replace the world by that of its own project with another arena, other robots or other settings.
@@ -374,17 +376,17 @@ class Desk:
         Raises:
             LinkError: If the world cannot be replaced.
         """
-        await self._put(self.project, self._commands, self._supervisor, self._home)
+        await self._put(self.project, self._commands, self._supervisor, self.home)
 
     async def _put(
-        self, project: Project, commands: Sequence[Command | None], supervisor: Command | None, home: Path
+        self, project: Project, commands: Sequence[Command | None], supervisor: Command | None, home: Home
     ) -> None:
-        """Begin the world of a project, which lies in a folder."""
+        """Begin the world of a project."""
         self._check_owns()
         if self._sandbox is not None:
             # A program that has broken a limit has ended it, and the programs below are not to wait for another one.
             await asyncio.to_thread(self._sandbox.warm)
-        sim = await asyncio.to_thread(simulation_of, project, home)
+        sim = await asyncio.to_thread(simulation_of, project, home.folder)
         old, before = self.present, (self.project, self._commands, self._supervisor)
         was_paused = old.gate.is_paused
         world = DeskWorld(sim, old.gate.speed)
@@ -454,20 +456,18 @@ class Desk:
         world, project = world or self.shown, self.project
         return replace(await world.do(lambda sim: project_of(sim, project)), speed=self.present.gate.speed)
 
-    async def project_to_save(self, name: str) -> Project:
-        """Return the present project for a file in the desk's folder, without programs that lie elsewhere.
+    async def project_to_save(
+        self, file: str, change: Callable[[Project], Project] = lambda project: project
+    ) -> tuple[Project, dict[str, bytes]]:
+        """Return the present project for a file, and what else has to be in its folder, by names.
 
         Args:
-            name: Name of the file without its ending, which becomes that of the arena.
+            file: Its name in the desk's folder; without its ending, that of the arena.
+            change: Changes the project first.
         """
-        project = await self.present_project()
-        if self._home != self.folder:
-            robots = tuple(replace(each, program=None, arguments=()) for each in project.robots)
-            project = replace(project, robots=robots, supervisor=None)
-        robots = tuple(
-            _with_program(each, self.attached(number), self.folder) for number, each in enumerate(project.robots, 1)
-        )
-        return replace(project, arena=replace(project.arena, name=name), robots=robots)
+        project, path = change(await self.present_project()), self.folder / file
+        project, beside = await asyncio.to_thread(self.home.moved, project, path.parent)
+        return replace(project, arena=replace(project.arena, name=path.stem)), beside
 
     # ---- programs of the project ----
 
@@ -476,15 +476,12 @@ class Desk:
         return self._commands[robot - 1] if robot <= len(self._commands) else None
 
     def attach(self, command: Command | None, robot: int) -> None:
-        """Let a program of the desk's folder start with this world from now on, and be saved with it; None for none."""
-        if command is not None and _name_in(self.folder, command) is None:
-            return
+        """Let a program start with this world from now on, and be saved with it; None for none."""
         self._commands += [None] * (robot - len(self._commands))
         self._commands[robot - 1] = command
         robots = list(self.project.robots)
         if robot <= len(robots):
-            without = replace(robots[robot - 1], program=None, arguments=())
-            robots[robot - 1] = _with_program(without, command, self._home)
+            robots[robot - 1] = self.home.with_program(robots[robot - 1], command)
             self.project = replace(self.project, robots=tuple(robots))
 
     # ---- time ----
@@ -647,23 +644,3 @@ def _end(programs: Programs) -> None:
 
 def _command_of(supervisor: Path | None) -> Command | None:
     return None if supervisor is None else Command(supervisor)
-
-
-def _name_in(folder: Path, command: Command) -> str | None:
-    """Return the name of a program's file in a folder or below it, as a project names it; None if it lies elsewhere."""
-    program, home = command.program.resolve(), folder.resolve()
-    if command.module or not program.is_relative_to(home):
-        return None
-    try:
-        program_in(home, name := program.relative_to(home).as_posix())
-        return name
-    except ParameterError:
-        return None
-
-
-def _with_program(robot: ProjectRobot, command: Command | None, folder: Path) -> ProjectRobot:
-    """Return a robot of a project in a folder with its program, if that lies there; else as it is."""
-    name = None if command is None else _name_in(folder, command)
-    if command is None or name is None:
-        return robot
-    return replace(robot, program=name, arguments=tuple(command.arguments))
