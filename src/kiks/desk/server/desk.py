@@ -47,7 +47,7 @@ LOCKED = (
 
 Done = TypeVar("Done")
 
-NewPrograms = Callable[[Simulation, Sequence[Command | None], Gate], Programs]
+NewPrograms = Callable[["Desk", Simulation, Sequence[Command | None], Gate], Programs]
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ class Desk:
         sandbox: Where people's programs run; None: in processes with the rights of this one.
         commands: Programs that start with the world, the first for robot 1 and so on; they are always permitted.
         supervisor: File of the project's supervisor, which is permitted, too.
-        new_programs: Factory of a world's program host; the default takes the project's settings.
+        new_programs: Makes what runs the programs of each world.
         is_held: Whether programs wait for `begin`; else they start at once.
         has_old_coordinates: Whether people see the coordinates of KiKS 2.2.0.
         project_of: Makes the project of an arena that people open.
@@ -137,7 +137,7 @@ class Desk:
         sandbox: Sandbox | None = None,
         commands: Sequence[Command | None] = (),
         supervisor: Path | None = None,
-        new_programs: NewPrograms | None = None,
+        new_programs: NewPrograms = lambda *parts: usual_programs(*parts),
         is_held: bool = False,
         has_old_coordinates: bool = False,
         project_of: Callable[[Arena], Project] = Project.of_arena,
@@ -149,7 +149,7 @@ class Desk:
         self.may_run_programs = may_run_programs
         self.may_edit = may_edit
         self.is_for_others = is_for_others
-        self._sandbox = sandbox
+        self.sandbox = sandbox
         self.has_old_coordinates = has_old_coordinates
         self.project_of = project_of
         self.scene = 0
@@ -171,7 +171,7 @@ class Desk:
         self.project = self.home.named(described(sim) if project is None else project, commands, supervisor)
         again = zip(self.home.commands(self.project), commands, strict=False)
         self._granted = [*commands, self._supervisor, *(command for command, given in again if given is not None)]
-        self._new_programs = new_programs or self._usual_programs
+        self._new_programs = new_programs
         self._retired: list[Programs] = []
         world = DeskWorld(sim, speed)
         self._set_end(world)
@@ -181,7 +181,7 @@ class Desk:
         """Show another present world, with programs that begin with it."""
         sim = world.sim
         # First, because it may fail: then the old world stays.
-        programs = self._new_programs(sim, commands, world.gate)
+        programs = self._new_programs(self, sim, commands, world.gate)
         programs.permission = self._permission()
         if self._has_begun:
             programs.begin()
@@ -235,17 +235,6 @@ class Desk:
         self.programs.begin()
         if (past := self.past) is not None:
             past.gate.ask(past.gate.go_on)
-
-    def _usual_programs(self, sim: Simulation, commands: Sequence[Command | None], gate: Gate) -> Programs:
-        return Programs(
-            sim,
-            commands,
-            thinking=self.project.thinking,
-            say=self.say,
-            keeps_output=True,
-            new_patience=gate.patience,
-            sandbox=self._sandbox,
-        )
 
     def _permission(self) -> Permission:
         return Permission(self._granted, folders=(self.folder, EXAMPLES.parent), may_start_others=self.may_run_programs)
@@ -383,9 +372,9 @@ class Desk:
     ) -> None:
         """Begin the world of a project."""
         self._check_owns()
-        if self._sandbox is not None:
+        if self.sandbox is not None:
             # A program that has broken a limit has ended it, and the programs below are not to wait for another one.
-            await asyncio.to_thread(self._sandbox.warm)
+            await asyncio.to_thread(self.sandbox.warm)
         sim = await asyncio.to_thread(simulation_of, project, home.folder)
         old, before = self.present, (self.project, self._commands, self._supervisor)
         was_paused = old.gate.is_paused
@@ -611,6 +600,19 @@ class Desk:
         _end(self.programs)
         with self.present.sim.lock:
             self.present.sim.loop.gate = None
+
+
+def usual_programs(
+    desk: Desk, sim: Simulation, commands: Sequence[Command | None], gate: Gate, /, **options: Any
+) -> Programs:
+    """Return what runs the programs of a world on a desk, as its project says; with other options of `Programs`."""
+    own: dict[str, Any] = {
+        "thinking": desk.project.thinking,
+        "say": desk.say,
+        "sandbox": desk.sandbox,
+        "keeps_output": True,
+    }
+    return Programs(sim, commands, new_patience=gate.patience, **own | options)
 
 
 class NewsHandler(logging.Handler):
