@@ -8,9 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from tests import forked
+from tests.at_length import cases
+from tests.cli.test_cli import state_of
 from tests.guard import GUARD_S, wait_until
 
 from kiks.desk.server.desk import Desk
+from kiks.desk.server.folder import Folder
+from kiks.desk.server.home import Home
 from kiks.model.project import Project, ProjectRobot
 from kiks.model.shipped import demonstrations
 from kiks.ports.program_process import Command
@@ -38,8 +43,23 @@ def test_a_demonstration_begins_with_its_program_and_supervisor_also_again_and_a
         assert desk.sim.bodies()["x_mm"].tolist() == places
         asyncio.run(desk.replace(asyncio.run(desk.present_project())))
         assert (desk.sim.bodies()["x_mm"].tolist(), desk.has_beginners) == (pytest.approx(places, abs=1e-3), True)
-        saved = asyncio.run(desk.project_to_save("mine"))
-        assert (saved.supervisor, saved.robots[0].program, len(saved.arena.cylinders)) == (None, None, 12)
+        saved, beside = asyncio.run(desk.project_to_save("mine.kiks"))
+        assert (saved.supervisor, saved.robots[0].program, len(saved.arena.cylinders)) == (*sorted(beside)[::-1], 12)
+        assert beside == {name: (CLEAN.parent / name).read_bytes() for name in ("clean.py", "supervisors/clean.py")}
+
+
+@pytest.mark.parametrize("name", cases(["soccer", *sorted({*demonstrations()} - {"soccer"})]))
+def test_a_demonstration_that_is_saved_elsewhere_runs_the_same_and_replaces_nothing(name: str, tmp_path: Path) -> None:
+    path = demonstrations()[name]
+    project = Project.load(path)
+    taken = tmp_path / str(project.robots[0].program)
+    taken.write_text("mine")
+    for _ in "12":
+        saved, beside = Home(path.parent).moved(project, tmp_path)
+        Folder(tmp_path).save(saved.to_bytes(), "saved", "a project", beside=beside, may_replace=True)
+    runs = [forked.run(*words, "--seconds", "1", cwd=tmp_path) for words in (("demo", name), ("run", "saved.kiks"))]
+    assert state_of(runs[0].stderr) == state_of(runs[1].stderr)
+    assert (taken.read_text(), saved.robots[0].program, beside) == ("mine", f"{taken.stem}_2.py", {})
 
 
 def test_a_page_without_that_right_opens_the_world_alone(tmp_path: Path) -> None:

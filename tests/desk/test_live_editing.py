@@ -291,7 +291,7 @@ async def test_properties_of_anything_change_in_the_running_world_and_the_record
     assert not sim.arena.brightness[180, 200]
     assert check_recording(Recording(tmp_path / "run.mcap").log).differs_ns is None
 
-    saved = Project.from_bytes((await desk.project_to_save("mine")).to_bytes())
+    saved = Project.from_bytes((await desk.project_to_save("mine.kiks"))[0].to_bytes())
     assert saved.robots[0].name == "Grace"
     assert saved.arena.lamps == (Lamp(50, 350, 4, False),)
     assert saved.arena.balls == (Ball(300, 300, 20, 20, 190),)

@@ -48,7 +48,7 @@ class Host:
         self.said: list[str] = []
         numbers = range(1, robots + 1)
 
-        def new_programs(sim: Simulation, commands: Sequence[Command | None], gate: Gate) -> Programs:
+        def new_programs(_: Desk, sim: Simulation, commands: Sequence[Command | None], gate: Gate) -> Programs:
             options = {"thinking": thinking, "players": numbers, "patience_s": GUARD_S, "say": self.said.append}
             return Programs(sim, commands, gate=gate, **options)
 

@@ -1,4 +1,4 @@
-"""A page of a real desk in the test's own process, so that tests can read the state of the engine, too.
+"""A page of a real desk, mostly in the test's own process, so that tests can read the state of the engine, too.
 
 Nothing sleeps: `until` lets the page draw its next picture, again and again, until a fact is so.
 """
@@ -148,16 +148,23 @@ def write(page: Page, text: str) -> None:
     page.keyboard.insert_text(text)
 
 
-class Visitor:
-    """A desk in an empty page."""
+class Guest:
+    """A page of a desk that may be in another process."""
 
-    def __init__(self, page: Page, shown: Shown) -> None:
-        self.page, self.shown, self.desk = page, shown, shown.desk
-        open_page(page, shown.url)
+    def __init__(self, page: Page, url: str) -> None:
+        self.page = page
+        open_page(page, url)
 
-    @property
-    def sim(self) -> Simulation:
-        return self.desk.sim
+    def until(self, fact: Callable[[], Fact]) -> Fact:
+        for _ in range(PICTURES_MAX):
+            if found := fact():
+                return found
+            self.page.evaluate(NEXT_PICTURE)
+        raise AssertionError(f"it did not come until {self.state()}")
+
+    def state(self) -> str:
+        """Return what is seen when a fact has not come."""
+        return str(self.at("clock").text_content())
 
     def at(self, name: str) -> Locator:
         return self.page.get_by_test_id(name)
@@ -178,23 +185,6 @@ class Visitor:
     def fill(self, texts: dict[str, str]) -> None:
         for name, text in texts.items():
             self.at(name).fill(text)
-
-    def save_as(self, name: str) -> Project:
-        """Save the world from the tab of the arena, and return what is in the file."""
-        self.at("save-name").fill(name)
-        self.at("save").click()
-        self.told(f"Saved as {name}.kiks")
-        return Project.load(self.desk.folder / f"{name}.kiks")
-
-    def until(self, fact: Callable[[], Fact]) -> Fact:
-        for _ in range(PICTURES_MAX):
-            if found := fact():
-                return found
-            self.page.evaluate(NEXT_PICTURE)
-        states = [(handle.name, handle.state) for handle in self.desk.programs.handles]
-        commands = [list(wire.pending) for wire in self.sim.wires]
-        state = f"{self.shown._thread}, {self.desk.gate.is_paused=}, {states}, {commands}"
-        raise AssertionError(f"it did not come until {self.sim}, {state}")
 
     def tab(self, name: str) -> None:
         self.at(f"tab-{name}").click()
@@ -219,16 +209,54 @@ class Visitor:
         self.at("console").fill(command)
         self.at("console").press("Enter")
 
+    def seen(self, robot: int) -> tuple[float, float, float]:
+        pose = self.answer("(index) => kiksDesk.pose(index)", robot - 1)
+        return pose["x_mm"], pose["y_mm"], pose["heading_rad"]
+
+    def take(self, tool: str) -> None:
+        """Choose a tool, and wait until the arena has it."""
+        self.at(f"tool-{tool}").click()
+        self.page.locator(f"[data-testid=tool-{tool}].bg-accent").wait_for()
+
+    def write(self, text: str) -> None:
+        write(self.page, text)
+
+    def picture(self, name: str) -> None:
+        leave_picture(self.page, name)
+
+    def answer(self, script: str, argument: Any = None) -> Any:
+        return self.page.evaluate(script, argument)
+
+
+class Visitor(Guest):
+    """A desk of this process in an empty page."""
+
+    def __init__(self, page: Page, shown: Shown) -> None:
+        self.shown, self.desk = shown, shown.desk
+        super().__init__(page, shown.url)
+
+    @property
+    def sim(self) -> Simulation:
+        return self.desk.sim
+
+    def save_as(self, name: str) -> Project:
+        """Save the world from the tab of the arena, and return what is in the file."""
+        self.at("save-name").fill(name)
+        self.at("save").click()
+        self.told(f"Saved as {name}.kiks")
+        return Project.load(self.desk.folder / f"{name}.kiks")
+
+    def state(self) -> str:
+        states = [(handle.name, handle.state) for handle in self.desk.programs.handles]
+        commands = [list(wire.pending) for wire in self.sim.wires]
+        return f"{self.sim}, {self.shown._thread}, {self.desk.gate.is_paused=}, {states}, {commands}"
+
     def setpoints(self, robot: int = 1) -> list[int]:
         return self.sim.world.state.robots["speed_setpoint"][0, robot - 1].tolist()
 
     def pause(self) -> None:
         self.at("run").click()
         self.until(lambda: self.desk.gate.is_paused)
-
-    def seen(self, robot: int) -> tuple[float, float, float]:
-        pose = self.answer("(index) => kiksDesk.pose(index)", robot - 1)
-        return pose["x_mm"], pose["y_mm"], pose["heading_rad"]
 
     def on_page(self, x_mm: float, y_mm: float) -> tuple[float, float]:
         """Return where a place of the arena is when the page shows all that the world has, so that a click hits it."""
@@ -261,11 +289,6 @@ class Visitor:
         for robot in range(1, self.sim.robot_count + 1):
             self.until(lambda robot=robot: self.seen(robot) == pytest.approx(self.sim.pose(robot), abs=0.1))
 
-    def take(self, tool: str) -> None:
-        """Choose a tool, and wait until the arena has it."""
-        self.at(f"tool-{tool}").click()
-        self.page.locator(f"[data-testid=tool-{tool}].bg-accent").wait_for()
-
     def drag(self, start: tuple[float, float], end: tuple[float, float]) -> None:
         self.pull(start, end)
         self.let_go()
@@ -277,16 +300,7 @@ class Visitor:
         expect(self.at("arena-notice")).to_contain_text("which cannot be changed")
         self.page.mouse.up()
 
-    def write(self, text: str) -> None:
-        write(self.page, text)
-
     def is_free(self, robot: int) -> bool:
         with self.sim.lock:
             x_mm, y_mm, _ = self.sim.pose(robot)
             return bool(self.sim.world.free_space.may_lie(robot - 1)(x_mm, y_mm))
-
-    def picture(self, name: str) -> None:
-        leave_picture(self.page, name)
-
-    def answer(self, script: str, argument: Any = None) -> Any:
-        return self.page.evaluate(script, argument)

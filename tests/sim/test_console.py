@@ -37,13 +37,21 @@ def test_several_lines_are_answered_in_their_order() -> None:
     assert [(typed.text, typed.reply) for typed in sent] == answered
 
 
-def test_line_of_a_program_is_its_own() -> None:
-    sim = fresh(2)
-    with serial.serial_for_url(sim.url(1)):
-        with pytest.raises(LinkError, match=r"line of robot 1 must be free .* but the program that opened .* has it"):
-            type_lines(sim, 1, "D,1,1")
-        assert len(type_lines(sim, 2, "D,1,1")) == 1
-    assert len(type_lines(sim, 1, "D,1,1")) == 1
+@pytest.mark.parametrize("is_asking", [True, False])
+def test_what_is_typed_stands_between_the_commands_of_a_program(is_asking: bool) -> None:
+    """The program gets its own replies alone, also if a person types while it waits for one."""
+    sim = fresh()
+    with serial.serial_for_url(sim.url(1), timeout=1) as port:
+        port.write(b"D,5,5\nG,3")
+        with pytest.raises(LinkError, match=r"between the commands of a program, but .* has sent 'G,3' and no line's"):
+            type_lines(sim, 1, "D,0,0")
+        port.write(b",4\n")
+        assert is_asking or [port.readline() for _ in "DG"] == [b"d\r\n", b"g\r\n"]
+        typed = type_lines(sim, 1, "D,0,0\nE")
+        assert not is_asking or [port.readline() for _ in "DG"] == [b"d\r\n", b"g\r\n"]
+        port.write(b"H\n")
+        assert port.readline().startswith(b"h,")
+    assert [(each.reply or "")[:2] for each in typed] == ["d", "e,"]
 
 
 @pytest.mark.parametrize("waits", [True, False])

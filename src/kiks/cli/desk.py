@@ -3,23 +3,24 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from kiks.cli.engine_start import ready_engine
-from kiks.cli.options import Address, World, is_project, parse_words
+from kiks.cli.job import Job, job_of
+from kiks.cli.options import Address, World
 from kiks.cli.record import RecordFile, recorded
 from kiks.ending import end_as_with_ctrl_c
-from kiks.errors import ParameterError, counted
+from kiks.errors import ParameterError
 
 if TYPE_CHECKING:
     from kiks.desk.server.desk import Desk
     from kiks.desk.server.public_address import PublicAddress
-    from kiks.model.project import Project
     from kiks.sim.simulation import Simulation
 
 WithDesk = Annotated[bool, typer.Option("--desk", help="Show the world in a browser, at first in real time.")]
@@ -68,57 +69,78 @@ def desk(
     Example: kiks desk --arena maze
     """
     from kiks.desk.server.access import LOOPBACK
-    from kiks.desk.server.desk import Desk
     from kiks.desk.server.public_address import public_address
-    from kiks.ports.program_process import commands_of, supervisor_of
-    from kiks.sim.from_project import simulation_of
 
     public = None if address is None else public_address(address)
-    words = list(program or [])
-    file = words.pop(0) if words and is_project(words[0]) else None
-    begin = parse_words(words)
-    project, home = world.project(file, programs=len(begin), fills_starts=True)
-    folder = folder or home
+    words = program or []
+    job = job_of(words[0] if words else None, words[1:], world, needs_program=False, fills_starts=True)
+    speed = job.project.speed if speed is None else speed or None
+    project = replace(job.project, thinking=thinking or job.project.thinking, speed=speed)
+    show_job(
+        replace(job, project=project),
+        folder=folder,
+        record=record,
+        waits=not no_wait,
+        may_run_programs=run_programs or (host in LOOPBACK and public is None),
+        may_edit=edit,
+        page={"host": host, "port": port, "public": public, "browser": browser},
+    )
+
+
+def show_job(
+    job: Job,
+    *,
+    thinking: str | None = None,
+    folder: Path | None = None,
+    record: Path | None = None,
+    export: Path | None = None,
+    waits: bool = True,
+    may_run_programs: bool = True,
+    programs_ended: Callable[[Desk, Simulation], None] = lambda desk, sim: None,
+    page: Mapping[str, Any] | None = None,
+    **options: Any,
+) -> None:
+    """Show what the command line names on a desk that owns its world, until Ctrl-C.
+
+    Args:
+        job: What it names.
+        thinking: Thinking time of its programs, as `simulation_of` takes it; that of the project if left out.
+        folder: Where files are opened and saved; the folder where the command was started if left out.
+        record: See `recorded`.
+        export: See `recorded`.
+        waits: See `open_desk`.
+        may_run_programs: See `Desk`.
+        programs_ended: Called with the desk and its world, locked, when its programs have ended.
+        page: Options of `open_desk`.
+        options: Other ones of `Desk`.
+    """
+    from kiks.desk.server.desk import Desk
+    from kiks.sim.from_project import simulation_of, with_kinds
+
+    folder = folder or Path()
     if not folder.is_dir():
         raise ParameterError(f"--folder must be a folder, but {str(folder)!r} is none. Create it first.")
-    if not is_project(file or world.arena or ""):
-        home = folder
-    project = replace(
-        with_kinds(project, world.robot or []),
-        thinking=thinking or project.thinking,
-        speed=project.speed if speed is None else speed or None,
-    )
-    commands = commands_of(project, home)
-    commands[: len(begin)] = begin
-    sim = simulation_of(project, home, ready=ready_engine)
-    shown = Desk(
+    home, project = job.folder or folder, with_kinds(job.project, job.kinds)
+    if thinking is not None and not thinking.startswith("replay"):
+        project = replace(project, thinking=thinking)
+    count = max(len(job.commands), 1)
+    sim = simulation_of(project, home, thinking=thinking, program_count=count, ready=ready_engine)
+    desk = Desk(
         sim,
         project=project,
         speed=project.speed,
         folder=folder,
         home=home,
         owns_world=True,
-        may_run_programs=run_programs or (host in LOOPBACK and public is None),
-        commands=commands,
-        supervisor=supervisor_of(project, home) if file is not None else None,
-        is_held=not no_wait,
-        may_edit=edit,
+        may_run_programs=may_run_programs,
+        commands=job.commands,
+        supervisor=job.supervisor,
+        is_held=waits,
+        **options,
     )
     # A new start makes another world: the recording ends with the first one.
-    with recorded(sim, record=record, programs=[each.file for each in commands if each is not None]):
-        open_desk(shown, host=host, port=port, public=public, browser=browser, waits=not no_wait)
-
-
-def with_kinds(project: Project, kinds: list[str]) -> Project:
-    """Return a project with other kinds of robots, whose files lie in its folder: the desk saves it and begins anew."""
-    robots = project.robots
-    if kinds and len(kinds) not in (1, len(robots)):
-        raise ParameterError(
-            f"--robot must name one kind for all or one for each of {counted(len(robots), 'robot')}, but it named "
-            f"{len(kinds)}."
-        )
-    named = kinds * len(robots) if len(kinds) == 1 else kinds or [each.kind for each in robots]
-    return replace(project, robots=tuple(replace(each, kind=kind) for each, kind in zip(robots, named, strict=True)))
+    with recorded(sim, record, export, job.texts):
+        open_desk(desk, waits=waits, programs_ended=partial(programs_ended, desk), **page or {})
 
 
 def open_desk(

@@ -18,6 +18,7 @@ from kiks.model.checks import ROBOTS_MAX
 
 if TYPE_CHECKING:
     from kiks.clock.gate import Gate
+    from kiks.desk.server.desk import Desk
     from kiks.ports.program_process import Command
     from kiks.ports.programs import Programs
     from kiks.sim.simulation import Simulation
@@ -67,14 +68,13 @@ def host(
     Example: kiks host --arena office --players 2 --host 0.0.0.0
     """
     from kiks.desk.server.access import LOOPBACK
-    from kiks.desk.server.desk import Desk
+    from kiks.desk.server.desk import Desk, usual_programs
     from kiks.desk.server.players import Players
     from kiks.desk.server.public_address import public_address
     from kiks.desk.server.server import SERVER
     from kiks.ports.program_process import commands_of, supervisor_of
     from kiks.ports.program_scheduler import check_policy
-    from kiks.ports.programs import Programs
-    from kiks.sim.from_project import simulation_of
+    from kiks.sim.from_project import simulation_of, with_kinds
 
     show_log()
     public = None if address is None else public_address(address)
@@ -88,21 +88,12 @@ def host(
     if policy.startswith("live"):
         leave_out(context, f"with --thinking {policy}, where the world waits for no program", "when_silent", "patience")
     check_policy(silence.when_silent, silence.patience)
+    read = with_kinds(read, world.robot or ())
     read = replace(read, thinking=policy, speed=read.speed if speed is None else speed or None)
 
-    def new_programs(sim: Simulation, commands: Sequence[Command | None], gate: Gate) -> Programs:
-        return Programs(
-            sim,
-            commands,
-            thinking=policy,
-            when_silent=silence.when_silent,
-            patience_s=silence.patience,
-            say=tell,
-            keeps_output=True,
-            new_patience=gate.patience,
-            players=robots,
-            gate=gate,
-        )
+    def new_programs(desk: Desk, sim: Simulation, commands: Sequence[Command | None], gate: Gate) -> Programs:
+        rules = {"when_silent": silence.when_silent, "patience_s": silence.patience}
+        return usual_programs(desk, sim, commands, gate, say=tell, players=robots, gate=gate, thinking=policy, **rules)
 
     def tell(text: str) -> None:
         say(text)
@@ -122,8 +113,8 @@ def host(
 
     own = [None if robot in robots else command for robot, command in enumerate(commands_of(read, home), 1)]
     desk = Desk(
-        simulation_of(read, home, kinds=world.robot or (), ready=ready_engine),
-        project=None if world.robot else read,
+        simulation_of(read, home, ready=ready_engine),
+        project=read,
         speed=read.speed,
         folder=home,
         owns_world=True,

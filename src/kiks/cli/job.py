@@ -28,7 +28,7 @@ class Job:
 
     Attributes:
         project: The world, with the changes of the command line.
-        folder: Where the project lies.
+        folder: Where the project lies; None for a world without one.
         commands: The program of each robot; None for a robot without one.
         kinds: Kinds of robots in place of the project's; none for those of the project.
         supervisor: The file of the supervisor; None without one.
@@ -38,12 +38,23 @@ class Job:
     """
 
     project: Project
-    folder: Path
+    folder: Path | None
     commands: list[Command | None]
     kinds: Sequence[str | RobotSpec] = ()
     supervisor: Path | None = None
     demonstration: str = ""
     needs_little: bool = False
+
+    @property
+    def home(self) -> Path:
+        """Where the files that the project names are looked up."""
+        return self.folder or Path()
+
+    @property
+    def texts(self) -> list[Path]:
+        """The files of the programs and of the supervisor, which a recording keeps."""
+        files = [each.file for each in self.commands if each is not None]
+        return files if self.supervisor is None else [*files, self.supervisor]
 
 
 def takes_options_behind(word: str) -> bool:
@@ -56,16 +67,30 @@ def demonstration_of(word: str) -> str:
     return word if word.isidentifier() and not Path(word).exists() and word in _demonstrations() else ""
 
 
-def job_of(word: str, arguments: Sequence[str], world: World) -> Job:
-    """Return what the words after `kiks run` mean.
+def job_of(
+    word: str | None,
+    arguments: Sequence[str],
+    world: World,
+    *,
+    needs_program: bool = True,
+    fills_starts: bool = False,
+) -> Job:
+    """Return what the words after `kiks run` mean, or those after `kiks desk`.
 
     Args:
-        word: A program, a project, a demonstration, a champion's file, or the folder of an evolution.
+        word: A program, a project, a demonstration, a champion's file, or the folder of an evolution; None for a world
+            alone.
         arguments: The words after it.
         world: The options that choose a world.
+        needs_program: Whether a project must name a program; on a desk, a person starts one.
+        fills_starts: Whether each start of an arena has a robot, or only the first.
     """
     from kiks.ports.program_process import commands_of, supervisor_of
 
+    if word is None:
+        project, home = world.project(fills_starts=fills_starts)
+        folder = home if is_project(world.arena or "") else None
+        return Job(project, folder, commands_of(project, home), world.robot or ())
     if _is_champion(word):
         if arguments:
             raise ParameterError(
@@ -75,17 +100,17 @@ def job_of(word: str, arguments: Sequence[str], world: World) -> Job:
     demonstration = demonstration_of(word)
     if not (demonstration or is_project(word)):
         named = parse_words([word, *arguments])
-        project, home = world.project(programs=len(named))
+        project, home = world.project(programs=len(named), fills_starts=fills_starts)
         if any(each.program for each in project.robots):
             say(f"the programs of {world.arena} do not start here. kiks run {world.arena} starts them, too.")
-        return Job(project, home, [*named], world.robot or ())
+        return Job(project, home if is_project(world.arena or "") else None, [*named], world.robot or ())
     named = parse_words(list(arguments)) if arguments else []
     project, home = world.project(str(_demonstrations()[word]) if demonstration else word, programs=len(named))
     commands = commands_of(project, home)
     commands[: len(named)] = named
     while commands and commands[-1] is None:
         commands.pop()
-    if not commands:
+    if not commands and needs_program:
         raise ParameterError(
             f"a project must name a program for a robot, but {word!r} names none. Name one after it: "
             f"kiks run {word} my_program.py."
@@ -136,7 +161,7 @@ def _champion_job(path: Path, world: World) -> Job:
         say("the champion's file names no world, so it drives in the default box. --arena names another arena.")
     project = world.changed(champion.project(arena))
     project = replace(project, seconds=project.seconds or CHAMPION_S)
-    return Job(project, Path(), [_driver([file] * len(project.robots))], world.robot or [champion.robot])
+    return Job(project, None, [_driver([file] * len(project.robots))], world.robot or [champion.robot])
 
 
 def _two_sided_job(folder: Path, world: World) -> Job | None:
@@ -166,4 +191,4 @@ def _two_sided_job(folder: Path, world: World) -> Job | None:
     kinds = [champions[side].robot for side in sides]
     commands: list[Command | None] = [_driver([files[side] for side in sides])]
     supervisor = shipped(f"examples/demos/supervisors/{task.name}.py")
-    return Job(project, Path(), commands, kinds, supervisor)
+    return Job(project, None, commands, kinds, supervisor)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import gc
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from kiks.cli.desk import NoWait, WithDesk, open_desk
+from kiks.cli.desk import NoWait, WithDesk, show_job
 from kiks.cli.engine_start import ready_engine
-from kiks.cli.job import job_of, takes_options_behind
+from kiks.cli.job import Job, job_of, takes_options_behind
 from kiks.cli.join import run_joined
 from kiks.cli.limits import Limits, MaxWall, Seconds
 from kiks.cli.options import Silence, World, say, show_log
@@ -25,7 +25,8 @@ from kiks.errors import ParameterError, shown
 
 if TYPE_CHECKING:
     from kiks.clock.gate import Gate
-    from kiks.ports.program_process import Command
+    from kiks.desk.server.desk import Desk
+    from kiks.ports.program_process import Command, Labels
     from kiks.ports.programs import Programs
     from kiks.sim.simulation import Simulation
     from kiks.sim.supervision import Supervision
@@ -139,7 +140,7 @@ def run(
         leave_out(context, "without --desk", "no_wait")
     else:
         leave_out(context, "with --desk, where a person ends the run", "max_wall", "seconds", "json")
-    job = job_of(str(program), arguments or [], world)
+    job = job_of(str(program), arguments or [], world, needs_program=not desk)
     from kiks.ports.program_process import Labels
     from kiks.ports.program_scheduler import check_policy
     from kiks.ports.programs import Programs
@@ -154,7 +155,7 @@ def run(
     import kiks.script  # noqa: F401  (under an interpreter that it does not know, KiKS ends here)
 
     is_alone = len(commands) == 1 and not desk
-    thinking = thinking_of(project, job.folder) if thinking is None else thinking
+    thinking = thinking_of(project, job.home) if thinking is None else thinking
     if not thinking.startswith("live"):
         leave_out(context, f"with --thinking {thinking}", "save_thinking")
     if is_alone:
@@ -163,36 +164,21 @@ def run(
         index_of_robot(number, len(project.robots))
     # A program may change the working folder.
     thoughts = None if save_thinking is None else save_thinking.absolute()
+    names = [each.name for each in commands if each is not None]
+    rules: dict[str, Any] = {"robots_by_name": mapping, "record": thoughts}
+    rules |= {"when_silent": silence.when_silent, "patience_s": silence.patience}
+    if desk:
+        _run_on_desk(job, thinking, Labels(names or [""]), rules, record=record, export=export, waits=not no_wait)
+        return
     ready = partial(ready_engine, as_needed=is_alone and job.needs_little)
-    sim = simulation_of(
-        project, job.folder, kinds=job.kinds, thinking=thinking, program_count=len(commands), ready=ready
-    )
+    sim = simulation_of(project, job.home, kinds=job.kinds, thinking=thinking, program_count=len(commands), ready=ready)
     # What is loaded by now stays to the end of the process: no collection looks at it again, not even those at the end,
     # which would take a third of the time of a short run.
     gc.freeze()
-    names = [each.name for each in commands if each is not None]
     labels = Labels(names) if len(names) > 1 else None
-    host = partial(
-        Programs,
-        robots_by_name=mapping,
-        thinking=thinking,
-        record=thoughts,
-        when_silent=silence.when_silent,
-        patience_s=silence.patience,
-        say=say if labels is None else labels.say,
-        labels=labels,
-    )
-    texts = [each.file for each in commands if each is not None]
     code, doubt = 1, ""
     with ExitStack() as at_the_end:
-        texts += [] if job.supervisor is None else [job.supervisor]
-        at_the_end.enter_context(recorded(sim, record, export, texts))
-        if desk:
-            # If the command line has changed the kinds of robots, the desk derives the project from the simulation.
-            told = None if job.kinds else project
-            options = {"project": told, "speed": project.speed, "folder": job.folder, "supervisor": job.supervisor}
-            _run_on_desk(sim, commands, host, thinking, waits=not no_wait, **options)
-            return
+        at_the_end.enter_context(recorded(sim, record, export, job.texts))
         supervision = Supervision(sim, job.supervisor, project.goal)
         at_the_end.callback(supervision.close)
         end_as_with_ctrl_c()
@@ -201,7 +187,8 @@ def run(
                 code = _run_one(sim, commands[0], mapping, thoughts, limits)
                 doubt = limits.doubt
             else:
-                programs = host(sim, commands)
+                tell = say if labels is None else labels.say
+                programs = Programs(sim, commands, thinking=thinking, say=tell, labels=labels, **rules)
                 with limits.kept(sim, programs.end, programs.end_soon):
                     code = programs.run()
                 doubt = limits.doubt or programs.doubt
@@ -233,29 +220,34 @@ def _judged(supervision: Supervision) -> dict[str, Any]:
     return {"goal": vars(supervision.judge.end())}
 
 
-def _run_on_desk(
-    sim: Simulation,
-    commands: Sequence[Command | None],
-    host: Callable[..., Programs],
-    thinking: str,
-    *,
-    waits: bool,
-    **options: Any,
-) -> None:
-    """Run programs in processes of their own in a world on the desk, until Ctrl-C; options are those of `Desk`."""
-    from kiks.desk.server.desk import Desk
+def _run_on_desk(job: Job, thinking: str, labels: Labels, rules: dict[str, Any], **options: Any) -> None:
+    """Run programs in processes of their own in a world on the desk, until Ctrl-C.
 
-    def host_at(sim: Simulation, commands: Sequence[Command | None], gate: Gate) -> Programs:
-        return host(sim, commands, new_patience=gate.patience)
+    Args:
+        job: What is run.
+        thinking: Thinking time of the programs.
+        labels: Prints their output, which the page shows, too.
+        rules: Other options of `Programs`.
+        options: Those of `show_job`.
+    """
+    from kiks.desk.server.desk import usual_programs
 
-    desk = Desk(sim, commands=commands, new_programs=host_at, is_held=waits, **options)
+    def new_programs(desk: Desk, sim: Simulation, commands: Sequence[Command | None], gate: Gate) -> Programs:
+        def tell(text: str) -> None:
+            labels.say(text)
+            desk.say(text)
 
-    def end(sim: Simulation) -> None:
-        # The page shows the last state until a person lets time pass.
-        desk.present.gate.pause(sim.now_ns)
-        _tell(sim, thinking, desk.programs.doubt)
+        # Only the command line can name a replay that lies anywhere; the settings of the desk change all else.
+        policy = thinking if thinking.startswith("replay") else desk.project.thinking
+        return usual_programs(desk, sim, commands, gate, thinking=policy, say=tell, labels=labels, **rules)
 
-    open_desk(desk, waits=waits, programs_ended=end)
+    def end(desk: Desk, sim: Simulation) -> None:
+        if not desk.programs.was_touched:
+            # The page shows the last state until a person lets time pass.
+            desk.present.gate.pause(sim.now_ns)
+            _tell(sim, thinking, desk.programs.doubt)
+
+    show_job(job, thinking=thinking, new_programs=new_programs, programs_ended=end, **options)
 
 
 def _run_one(sim: Simulation, command: Command, told: dict[str, int], record: Path | None, limits: Limits) -> int:

@@ -111,7 +111,7 @@ def sweep(
     with progress_bar("runs") as progress:
         found = swept(
             project,
-            job.folder,
+            job.home,
             job.commands,
             axes,
             folder,
@@ -138,15 +138,15 @@ def sweep(
 
 def _project(job: Job, formulas: dict[str, str | None], seconds: float | None) -> Project:
     """Return the world of a sweep, with a goal and a time limit."""
-    from kiks.cli.desk import with_kinds
     from kiks.model.data_file import check
     from kiks.model.goal import Goal
+    from kiks.sim.from_project import with_kinds
     from kiks.trials.sweep import GETTING_ABOUT, SECONDS
 
     goal, told = job.project.goal, {name: text for name, text in formulas.items() if text is not None}
     if told:
         goal = check(Goal, ({} if goal is None or "solved" in told else vars(goal) | {"text": ""}) | told, "the goal")
-    project = with_kinds(job.project, [each for each in job.kinds if isinstance(each, str)])
+    project = with_kinds(job.project, job.kinds)
     return replace(project, goal=goal or GETTING_ABOUT, seconds=seconds or project.seconds or SECONDS)
 
 

@@ -7,11 +7,13 @@ from pathlib import Path
 
 from kiks.model.arena import Arena
 
+PACKAGE = Path(__file__).resolve().parents[1]
+"""The folder of KiKS itself."""
+
 
 def shipped(name: str) -> Path:
     """Return the path of a file or folder that comes with KiKS, by its path from the root of a checkout."""
-    package = Path(__file__).parents[1]
-    places = (package / name, package.parents[1] / name)
+    places = (PACKAGE / name, PACKAGE.parents[1] / name)
     return next((place for place in places if place.exists()), places[0])
 
 

@@ -147,9 +147,9 @@ class Process:
         name: Name of the program for people.
         start: What `kiks.script.child_main` gets.
         connection: Its end of the socket.
-        keeps_output: Whether to keep its output. Such a program has no keyboard, and a process group of its own: its
-            child processes end with it. Otherwise it has the terminal.
-        writer: Writes its output to the terminal, if the output is not kept; None: the program writes it itself.
+        keeps_output: Whether to keep its output.
+        writer: Writes its output to the terminal. Without one, a program whose output is kept has no keyboard, and a
+            process group of its own: its child processes end with it. Another one has the terminal itself.
         on_end: Called by that thread after the end.
         hear: Called with each line of its output, unless the program writes that itself.
         launch: Starts it elsewhere, such as in a sandbox; None: in a process with the rights of this one.
@@ -171,14 +171,14 @@ class Process:
         launch: Launch | None = None,
     ) -> None:
         self.output: RingBuffer[OutputLine] | None = RingBuffer(OUTPUT_LIMIT) if keeps_output else None
-        self._writer = _OutputKeeper(self.output) if self.output is not None else writer
+        self._writer = _OutputKeeper(self.output, writer) if self.output is not None else writer
         self._on_end, self._hear = on_end, hear
         self._child: Child | None = None
         self._is_over = threading.Event()
         has_started = threading.Event()
         failures: list[OSError | KiksError] = []
         if launch is None:
-            launch = partial(OwnChild, start, connection, is_apart=keeps_output)
+            launch = partial(OwnChild, start, connection, is_apart=keeps_output and writer is None)
 
         def run() -> None:
             # The process inherits it, and so hears Ctrl-C only when it has loaded (`child_main.py`): Python's own start
@@ -369,16 +369,23 @@ class OutputWriter:
 
 
 class _OutputKeeper(OutputWriter):
-    """Keeps the newest lines; it never waits for readers."""
+    """Keeps the newest lines; it never waits for readers. If there is another writer, that takes them, too."""
 
-    longest = LINE_LIMIT
-
-    def __init__(self, output: RingBuffer[OutputLine]) -> None:
-        self._output = output
+    def __init__(self, output: RingBuffer[OutputLine], other: OutputWriter | None) -> None:
+        self._output, self._other = output, other
+        self.longest, self.pause_s = (LINE_LIMIT, None) if other is None else (other.longest, other.pause_s)
 
     def take(self, lines: list[bytes], is_error: bool) -> None:
         skipped = max(len(lines) - OUTPUT_LIMIT, 0)
         self._output.add([_output_line(each, is_error) for each in lines[skipped:]], skipped=skipped)
+        if self._other is not None:
+            self._other.take(lines, is_error)
+
+    def show_unfinished(self, text: bytes, is_error: bool) -> bool:
+        if self._other is None or not self._other.show_unfinished(text, is_error):
+            return False
+        self._output.add([_output_line(text, is_error)])
+        return True
 
 
 class Labels:
@@ -388,18 +395,18 @@ class Labels:
     prompt, after a pause; elsewhere only complete lines are printed.
 
     Args:
-        names: Names of the programs in their order; all labels have the same width.
+        names: Names of the programs in their order; all labels have the same width. A single one needs none.
     """
 
     def __init__(self, names: Sequence[str]) -> None:
         self._lock = threading.Lock()
-        self._has_unfinished = False
+        self._has_unfinished, self._has_several = False, len(names) > 1
         self._width = max(len(f"{number} {name}") for number, name in enumerate(names, 1))
         self.are_terminals = {is_error: os.isatty(stream) for is_error, stream in _STREAMS.items()}
 
     def writer(self, number: int, name: str) -> OutputWriter:
         """Return the writer for a program's output."""
-        return _LabelledWriter(self, number, f"{number} {name}".ljust(self._width))
+        return _LabelledWriter(self, number, f"{number} {name}".ljust(self._width) if self._has_several else "")
 
     def say(self, text: str) -> None:
         """Print a line of KiKS between those of the programs."""
@@ -429,10 +436,10 @@ class _LabelledWriter(OutputWriter):
     def __init__(self, labels: Labels, number: int, label: str) -> None:
         self._labels = labels
         self.pause_s = PROMPT_S if any(labels.are_terminals.values()) else None
-        plain, colour = label.encode(errors="replace"), _COLOURS[(number - 1) % len(_COLOURS)]
+        plain, colour = f"{label} | ".encode(errors="replace") if label else b"", _COLOURS[(number - 1) % len(_COLOURS)]
         has_colours = not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
         self._heads = {
-            is_error: (b"\033[%dm%b |\033[0m " % (colour, plain)) if has_colours and is_terminal else plain + b" | "
+            is_error: b"\033[%dm%b\033[0m" % (colour, plain) if has_colours and is_terminal and plain else plain
             for is_error, is_terminal in labels.are_terminals.items()
         }
 

@@ -158,10 +158,10 @@ class Programs:
         patience_s: How long a program may be silent [s of real time].
         say: Called with a line of text about each program that has ended.
         keeps_output: Whether the handles keep the output; otherwise it goes to the output of this process. If they do,
-            child processes of a program end with it.
+            and there are no labels, a program has no keyboard, and its child processes end with it.
         new_patience: Makes patiences with another wall clock, such as one that stands still while the world does.
         visitors: Number of programs in threads of this process that begin together with these; see `admit`.
-        labels: Prints the output with labels, if the handles do not keep it; None: the programs print it themselves.
+        labels: Prints the output with labels; None: the programs print what is not kept themselves.
         are_apart: Whether no program may take the own robot of another one, as in a match.
         players: Robots that programs elsewhere take (see `let_in`). With thinking 'live' the world waits for none of
             them, and goes on in real time.
@@ -172,6 +172,7 @@ class Programs:
     Attributes:
         handles: The programs; of ended ones, the last one of each robot.
         permission: Which programs may start; all by default.
+        was_touched: Whether a program was started or stopped while the world was there.
     """
 
     def __init__(
@@ -204,7 +205,7 @@ class Programs:
         self._say, self._thinking, self._record = say, thinking, record
         self._keeps_output, self._labels, self._sandbox = keeps_output, labels, sandbox
         self._over: tuple[int, str] | None = None
-        self._signals, self._count, self._was_touched, self._is_closed = 0, 0, False, False
+        self._signals, self._count, self.was_touched, self._is_closed = 0, 0, False, False
         self._first_programs = [(robot, command) for robot, command in enumerate(commands, 1) if command is not None]
         self._begun_count = len(self._first_programs)
         for number in range(1, self._begun_count + 1):
@@ -263,7 +264,7 @@ class Programs:
         """Why the run might not be repeatable; empty if it is, apart from live thinking."""
         if self._signals:
             return "it was interrupted"
-        if self._was_touched:
+        if self.was_touched:
             return "a program was started or stopped while the world was there"
         return "" if self._scheduler.is_repeatable else "the world did not wait for every program"
 
@@ -299,7 +300,7 @@ class Programs:
             self._names.own(robot)
             handle = self._add(command, robot)
             self._drop_replaced()
-            self._was_touched = True
+            self.was_touched = True
         self._wake()
         return handle
 
@@ -316,7 +317,7 @@ class Programs:
             participant.is_waited_for = False
             self._scheduler.join(participant)
             self._visitors = [each for each in self._visitors if not each.has_left] + [participant]
-            self._was_touched = True
+            self.was_touched = True
         return participant
 
     def let_in(self, connection: socket.socket, robot: int, name: str) -> tuple[Player, Start]:
@@ -342,7 +343,7 @@ class Programs:
             self._names.own(robot, is_alone=True)
             self._scheduler.join(player)
             self._players[robot] = player
-            self._was_touched = self._was_touched or has_begun
+            self.was_touched = self.was_touched or has_begun
             start = self._start_of(robot, self._thinking)
         self._wake()
         return player, start
@@ -362,13 +363,13 @@ class Programs:
         """
         for player in self._players.values():
             if player is not None and not player.has_left:
-                self._was_touched = True
+                self.was_touched = True
                 player.dismiss(why)
 
     def lose(self, player: Player) -> None:
         """Disconnect a program elsewhere whose connection was lost: its robot stops."""
         with self.sim.lock:
-            self._was_touched = self._was_touched or not player.has_left
+            self.was_touched = self.was_touched or not player.has_left
             player.dismiss("")
         self._wake()
 
@@ -404,7 +405,7 @@ class Programs:
         if not handle.is_running:
             return
         was_interrupted, handle.is_stopped = handle.is_stopped, True
-        self._was_touched = True
+        self.was_touched = True
         if was_interrupted or not handle.is_here:
             handle.process.kill()
             return

@@ -46,6 +46,8 @@ class Typed:
 def type_lines(sim: Simulation, robot: int, text: str) -> list[Typed]:
     r"""Send what a person has typed, on the robot's line, at the present time. The caller lets that time pass.
 
+    A program that has the line gets no reply to it. Its own next command waits until the line is free.
+
     Args:
         sim: The world.
         robot: Number of the robot, from 1.
@@ -55,7 +57,7 @@ def type_lines(sim: Simulation, robot: int, text: str) -> list[Typed]:
         What was sent, each with its reply when that has arrived.
 
     Raises:
-        LinkError: If a program has the line, or it is full.
+        LinkError: If a program has sent a part of a command, or the line is full.
 
     Example:
         >>> sim = Simulation()
@@ -77,10 +79,10 @@ def type_lines(sim: Simulation, robot: int, text: str) -> list[Typed]:
             )
     with sim.lock:
         wire = sim.wires[sim.index_of(robot)]
-        if wire.holder is not None:
+        if partial := wire.firmware.receiver.partial:
             raise LinkError(
-                f"the line of robot {robot} must be free for what you type, but {wire.holder} has it. "
-                "Stop that program first, or type to another robot."
+                f"what you type must stand between the commands of a program, but the one on robot {robot} has sent "
+                f"{shown(partial.decode('latin-1'))} and no line's end yet. Try again, or stop that program first."
             )
         line_ns = wire.line.character_ns * (BACKLOG_LIMIT - sum(len(line) + 1 for line in lines))
         if wire.line.sending_until_ns - sim.now_ns > line_ns:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -109,14 +109,46 @@ def _imperfect(robot: ProjectRobot, project: Project, number: int, folder: Path)
     exact = spec_of(robot, project, folder)
     # A larger family begins with the same robots.
     made = family(exact, number, seed=FAMILY_SEED)[-1]
-    changes = dict(robot.changes)
-    for part in fields(made):
-        old, new = getattr(exact, part.name), getattr(made, part.name)
-        if new != old:
-            others = {each.name: getattr(new, each.name) for each in fields(new)}
-            differing = {key: value for key, value in others.items() if value != getattr(old, key)}
-            changes[part.name] = changes.get(part.name, {}) | differing
-    return replace(robot, changes=changes)
+    changes = {name: robot.changes.get(name, {}) | values for name, values in _changes(exact, made).items()}
+    return replace(robot, changes=robot.changes | changes)
+
+
+def with_kinds(project: Project, kinds: Sequence[str | RobotSpec]) -> Project:
+    """Return a project whose robots are of other kinds: of those that come with KiKS, with what differs in the project.
+
+    Args:
+        project: The project.
+        kinds: One for all or one for each, names, files or specs; none for those of the project.
+
+    Example:
+        >>> wide = RobotSpec.load("khepera_ii").with_changes(body__diameter_mm=80.0)
+        >>> robot = with_kinds(Project(), [wide]).robots[0]
+        >>> robot.kind, robot.changes
+        ('khepera_ii', {'body': {'diameter_mm': 80.0}})
+    """
+    if not kinds:
+        return project
+    known = {name: RobotSpec.load(name) for name in robot_names()}
+    robots = []
+    for robot, spec in zip(project.robots, specs_of(kinds, len(project.robots), project.response), strict=True):
+        found = {name: _changes(each, spec) for name, each in known.items() if _sections(spec) <= _sections(each)}
+        kind = min(found, key=lambda name: sum(map(len, found[name].values())))
+        robots.append(replace(robot, kind=kind, changes=found[kind]))
+    return replace(project, robots=tuple(robots))
+
+
+def _sections(spec: RobotSpec) -> set[str]:
+    return {name for name, value in vars(spec).items() if name != "name" and value is not None}
+
+
+def _changes(old: RobotSpec, new: RobotSpec) -> dict[str, dict[str, Any]]:
+    """Return what of a kind of robot is another than in an old one: the keys of each section and their values."""
+    found = {}
+    for name in sorted(_sections(new)):
+        before, after = vars(getattr(old, name)), vars(getattr(new, name))
+        if changed := {key: value for key, value in after.items() if value != before[key]}:
+            found[name] = changed
+    return found
 
 
 def spec_of(robot: ProjectRobot, project: Project, folder: Path) -> RobotSpec:

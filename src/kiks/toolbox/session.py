@@ -361,16 +361,11 @@ class Session:
             raise LinkError("there must be a world first, but none was begun. Call kiks(ARENA) or kiks_kopen.")
         return self.desk
 
-    def _new_programs(self, sim: Simulation, commands: Sequence[Command | None], gate: Gate) -> Programs:
-        return Programs(
-            sim,
-            commands,
-            thinking=sim.thinking,
-            say=self._say,
-            keeps_output=True,
-            new_patience=gate.patience,
-            visitors=self.settings.programs if self.settings.programs > 1 else 0,
-        )
+    def _new_programs(self, desk: Desk, sim: Simulation, commands: Sequence[Command | None], gate: Gate) -> Programs:
+        from kiks.desk.server.desk import usual_programs
+
+        visitors = self.settings.programs if self.settings.programs > 1 else 0
+        return usual_programs(desk, sim, commands, gate, thinking=sim.thinking, say=self._say, visitors=visitors)
 
     def _say(self, text: str) -> None:
         if self.desk is not None:

@@ -165,8 +165,8 @@ class ExerciseDialog:
         goal = Goal(**{name: value})
         await self._desk.do(lambda sim: Judge(sim, goal))
 
-    async def _made(self) -> Project:
-        """Return the exercise."""
+    async def _made(self) -> tuple[Project, dict[str, bytes]]:
+        """Return the exercise, and the files that have to be beside it."""
         goal: Goal = self._goal.record()
         await self._desk.do(lambda sim: Judge(sim, goal))
         try:
@@ -175,23 +175,21 @@ class ExerciseDialog:
             raise ParameterError(f"The time limit must be a number, but it was {self._seconds.value!r}.") from None
         exercise: Exercise = self._exercise.record()
         template = self._template() if self._has_template.value else exercise.template
-        project = await self._desk.project_to_save(_stem(self._name.value))
+        file = f"{_stem(self._name.value)}.kiks"
+        project, beside = await self._desk.project_to_save(file, _without_students_program)
         if not self._begins_here.value:
             project = replace(project, arena=replace(self._desk.project.arena, name=project.arena.name))
-        robots = list(project.robots)
-        if robots:
-            robots[STUDENT - 1] = replace(robots[STUDENT - 1], program=None, arguments=())
-        return replace(
+        made = replace(
             project,
-            robots=tuple(robots),
             seconds=seconds,
             goal=goal,
             exercise=replace(exercise, template="" if template == NEW else template),
             cases=tuple(form.record() for form, _ in self._cases),
         )
+        return made, beside
 
     async def _save(self) -> None:
-        made = await self._made()
+        made, beside = await self._made()
         files = {f"{_stem(self._name.value)}.kiks": made}
         if self._also.value:
             files[f"{_stem(self._name.value)}{STUDENTS}.kiks"] = made.for_students()
@@ -200,9 +198,17 @@ class ExerciseDialog:
             return
         for name, project in files.items():
             data = await asyncio.to_thread(project.to_bytes)
-            await asyncio.to_thread(self._folder.save, data, name, "an exercise", may_replace=bool(question))
-        ui.notify(f"Saved as {' and '.join(files)}.", type="positive")
+            agreed = bool(question)
+            await asyncio.to_thread(self._folder.save, data, name, "an exercise", may_replace=agreed, beside=beside)
+        ui.notify(f"Saved as {' and '.join(files)} in {self._desk.folder}.", type="positive")
         self._dialog.submit(None)
+
+
+def _without_students_program(project: Project) -> Project:
+    robots = list(project.robots)
+    if robots:
+        robots[STUDENT - 1] = replace(robots[STUDENT - 1], program=None, arguments=())
+    return replace(project, robots=tuple(robots))
 
 
 def _stem(name: object) -> str:

@@ -17,8 +17,11 @@ from kiks.desk.server.folder import OPENED, PICTURES, Folder, decode, encode
 from kiks.desk.server.live_editing import Editing
 from kiks.errors import ParameterError
 from kiks.model.limits import UPLOAD_BYTES_MAX
-from kiks.model.project import EXERCISE_FILE, Project
+from kiks.model.project import Project
 from kiks.model.shipped import demonstrations
+
+Encoded = tuple[bytes, dict[str, bytes]]
+"""What a file holds, and the files that have to be beside it, by name."""
 
 
 class FilesPanel:
@@ -99,9 +102,7 @@ class FilesPanel:
         if not name:
             raise ParameterError("A file must be chosen first. Save one, or open an example.")
         path = self._folder.open(name)
-        # What an exercise names lies in its folder.
-        home = path.parent if path.name == EXERCISE_FILE else self._desk.folder
-        await self._open_file(name, await asyncio.to_thread(Project.load, path), home)
+        await self._open_file(name, await asyncio.to_thread(Project.load, path), path.parent)
         self._name.value = str(PurePosixPath(name).with_suffix(".kiks"))
 
     @told
@@ -118,22 +119,30 @@ class FilesPanel:
         await self._desk.replace(project, folder)
         ui.notify(f"Opened {project.arena.name}.")
 
-    async def _encoded(self, name: str) -> bytes:
+    async def _encoded(self, name: str) -> Encoded:
         full = self._folder.full_name(name)
-        return await asyncio.to_thread(encode, await self._desk.project_to_save(PurePosixPath(full).stem), full)
+        project, beside = await self._desk.project_to_save(full)
+        return await asyncio.to_thread(encode, project, full), {} if full.lower().endswith(".kad") else beside
 
     @told
     async def _save(self) -> None:
-        name = str(self._name.value or "")
-        saved = await save_in(self._folder, lambda: self._encoded(name), name, "a project")
+        name, others = str(self._name.value or ""), []
+
+        async def encoded() -> Encoded:
+            data, beside = await self._encoded(name)
+            others.extend(sorted(beside))
+            return data, beside
+
+        saved = await save_in(self._folder, encoded, name, "a project")
         self._list()
         if saved is not None:
-            ui.notify(f"Saved as {saved}.", type="positive")
+            also = f", with {', '.join(others)} beside it" if others else ""
+            ui.notify(f"Saved as {saved} in {self._desk.folder}{also}.", type="positive")
 
     @told
     async def _download(self) -> None:
         name = PurePosixPath(self._folder.full_name(str(self._name.value or "world"))).name
-        ui.download.content(await self._encoded(name), name)
+        ui.download.content((await self._encoded(name))[0], name)
 
     async def _take(self, event: UploadEventArguments) -> None:
         await self._taken(event)
@@ -150,13 +159,13 @@ class FilesPanel:
 
 
 async def save_in(
-    folder: Folder, encoded: Callable[[], Awaitable[bytes]], name: str, what: str, *, is_own: bool = False
+    folder: Folder, encoded: Callable[[], Awaitable[Encoded]], name: str, what: str, *, is_own: bool = False
 ) -> str | None:
     """Save a file after a person has agreed, where one would be replaced.
 
     Args:
         folder: The folder.
-        encoded: Makes what the file holds.
+        encoded: Makes what the file holds, and what has to be beside it.
         name: Name of the file.
         what: What messages call it.
         is_own: Whether it is the file that the person edits: if that is as it was, there is no question.
@@ -167,4 +176,6 @@ async def save_in(
     question = "" if is_own and folder.is_known(folder.full_name(name)) else folder.question(name)
     if question and not await agrees(question):
         return None
-    return await asyncio.to_thread(folder.save, await encoded(), name, what, may_replace=is_own or bool(question))
+    data, beside = await encoded()
+    may_replace = is_own or bool(question)
+    return await asyncio.to_thread(folder.save, data, name, what, may_replace=may_replace, beside=beside)

@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from nicegui import background_tasks, ui
 
-from kiks.desk.panels.files import save_in
+from kiks.desk.panels.files import Encoded, save_in
 from kiks.desk.panels.widgets import LogBox, Panel, icon_button, named, offer_robots, select, told, with_props
 from kiks.desk.server import scripts
 from kiks.desk.server.desk import Desk
@@ -230,7 +230,7 @@ class ProgramsPanel(Panel):
 
     def _build_editor(self) -> None:
         with ui.row().classes("w-full items-end no-wrap gap-2"):
-            tip = "Your programs in the desk's folder, and examples that come with KiKS"
+            tip = "Your programs in the desk's folder, those of its project, and examples that come with KiKS"
             self._choice = select("Program", "script", {}, None, tip, self._open).classes("col")
             icon_button("note_add", "New program", "new-program", lambda: self._new(), tip="Write a new program")
         with ui.row().classes("w-full items-end no-wrap gap-2"):
@@ -282,7 +282,9 @@ class ProgramsPanel(Panel):
 
     def _offer(self) -> None:
         """Update the list of programs."""
-        self._choice.set_options(scripts.offered(self._folder))
+        desk = self._desk
+        attached = [command for number in range(1, desk.sim.robot_count + 1) if (command := desk.attached(number))]
+        self._choice.set_options(scripts.offered(self._folder, attached))
 
     @told
     async def _open(self) -> None:
@@ -378,12 +380,10 @@ class ProgramsPanel(Panel):
     async def _stored(self) -> Path | None:
         """Save the program under its name and return its file; None if another one would be replaced and is to stay."""
         script, text, folder = self._script, self._editor.value or "", self._folder
-        if script is not None and script.parent == EXAMPLES and text == scripts.read_script(script):
-            return script
         name, data = self._name.value or "", scripts.encode_script(text)
 
-        async def encoded() -> bytes:
-            return data
+        async def encoded() -> Encoded:
+            return data, {}
 
         is_own = script == folder.path / folder.full_name(name)
         saved = await save_in(folder, encoded, name, "a program", is_own=is_own)
@@ -400,9 +400,7 @@ class ProgramsPanel(Panel):
     async def _save(self) -> None:
         script = await self._stored()
         if script is not None:
-            is_example = script.parent == EXAMPLES
-            where = "an unchanged example, with nothing to save" if is_example else f"saved in {self._desk.folder}"
-            ui.notify(f"{script.name} is {where}.")
+            ui.notify(f"{script.name} is saved in {self._desk.folder}.")
 
     @property
     def text(self) -> str:
@@ -412,6 +410,8 @@ class ProgramsPanel(Panel):
     async def command(self) -> Command | None:
         """Check the program in the editor, save it, and return how it is started; None if a person wants it otherwise.
 
+        A program from elsewhere, such as an example, is saved only if it was changed.
+
         Raises:
             ParameterError: If it has a mistake.
         """
@@ -420,7 +420,10 @@ class ProgramsPanel(Panel):
         if self._check():
             raise ParameterError(f"The program has a mistake. {self._mistake.text}")
         arguments = scripts.split_arguments(self._arguments.value or "")
-        script = await self._stored()
+        script = self._script
+        is_from_elsewhere = script is not None and script.parent != self._folder.path
+        if script is None or not is_from_elsewhere or self._editor.value != scripts.read_script(script):
+            script = await self._stored()
         return None if script is None else Command(script, arguments)
 
     async def _run(self) -> None:
@@ -437,12 +440,11 @@ class ProgramsPanel(Panel):
         desk, programs = self._desk, self._desk.programs
         if desk.project.exercise is not None and desk.owns_world:
             desk.attach(command, robot)
-            if desk.attached(robot) == command:
-                # A run that is judged begins at time 0, with its programs.
-                await desk.start_over()
-                await desk.go_on()
-                self._show(next((each for each in desk.programs.handles if each.robot == robot), None))
-                return
+            # A run that is judged begins at time 0, with its programs.
+            await desk.start_over()
+            await desk.go_on()
+            self._show(next((each for each in desk.programs.handles if each.robot == robot), None))
+            return
         desk.check_present()
         for handle in list(programs.handles):
             if handle.robot == robot and handle.is_running:

@@ -13,17 +13,17 @@ from typing import Any, Protocol, TypeVar
 
 from kiks.clock.gate import Gate
 from kiks.desk.server.desk_world import DeskWorld
+from kiks.desk.server.home import Home
 from kiks.desk.server.looking_back import LookingBack
 from kiks.desk.server.player import Player
 from kiks.desk.server.scripts import EXAMPLES
 from kiks.desk.server.tries import Tries
 from kiks.errors import KiksError, LinkError, ParameterError
 from kiks.model.arena import Arena
-from kiks.model.atomic_files import program_in
 from kiks.model.checks import CLOCK_END_NS
 from kiks.model.exercise import STUDENT
-from kiks.model.project import Project, ProjectRobot
-from kiks.ports.program_process import Command, Permission, commands_of, supervisor_of
+from kiks.model.project import Project
+from kiks.ports.program_process import Command, Permission
 from kiks.ports.programs import Programs
 from kiks.ports.sandbox import Sandbox
 from kiks.sim.from_project import described, project_of, simulation_of
@@ -47,7 +47,7 @@ LOCKED = (
 
 Done = TypeVar("Done")
 
-NewPrograms = Callable[[Simulation, Sequence[Command | None], Gate], Programs]
+NewPrograms = Callable[["Desk", Simulation, Sequence[Command | None], Gate], Programs]
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ class Desk:
         sandbox: Where people's programs run; None: in processes with the rights of this one.
         commands: Programs that start with the world, the first for robot 1 and so on; they are always permitted.
         supervisor: File of the project's supervisor, which is permitted, too.
-        new_programs: Factory of a world's program host; the default takes the project's settings.
+        new_programs: Makes what runs the programs of each world.
         is_held: Whether programs wait for `begin`; else they start at once.
         has_old_coordinates: Whether people see the coordinates of KiKS 2.2.0.
         project_of: Makes the project of an arena that people open.
@@ -105,7 +105,8 @@ class Desk:
     Attributes:
         present: The world that goes on.
         looking: How people look back.
-        project: The project it was built from.
+        project: The project it was built from, which names the programs that start with the world.
+        home: Where the project lies, and its programs.
         programs: The programs in the present world.
         programs_ended: Called with the locked world when all of them have ended: a run of an exercise is over then.
         is_seen: Set when a page has shown it for the first time.
@@ -136,7 +137,7 @@ class Desk:
         sandbox: Sandbox | None = None,
         commands: Sequence[Command | None] = (),
         supervisor: Path | None = None,
-        new_programs: NewPrograms | None = None,
+        new_programs: NewPrograms = lambda *parts: usual_programs(*parts),
         is_held: bool = False,
         has_old_coordinates: bool = False,
         project_of: Callable[[Arena], Project] = Project.of_arena,
@@ -148,7 +149,7 @@ class Desk:
         self.may_run_programs = may_run_programs
         self.may_edit = may_edit
         self.is_for_others = is_for_others
-        self._sandbox = sandbox
+        self.sandbox = sandbox
         self.has_old_coordinates = has_old_coordinates
         self.project_of = project_of
         self.scene = 0
@@ -166,11 +167,12 @@ class Desk:
         self._commands = list(commands)
         self._supervisor = _command_of(supervisor)
         self.speed_max = speed_max
-        self._home = self.folder if home is None else home.resolve()
-        self._granted = [*commands, self._supervisor]
-        self._new_programs = new_programs or self._usual_programs
+        self.home = Home(self.folder if home is None else home)
+        self.project = self.home.named(described(sim) if project is None else project, commands, supervisor)
+        again = zip(self.home.commands(self.project), commands, strict=False)
+        self._granted = [*commands, self._supervisor, *(command for command, given in again if given is not None)]
+        self._new_programs = new_programs
         self._retired: list[Programs] = []
-        self.project = described(sim) if project is None else project
         world = DeskWorld(sim, speed)
         self._set_end(world)
         self._take(world, self._commands)
@@ -179,7 +181,7 @@ class Desk:
         """Show another present world, with programs that begin with it."""
         sim = world.sim
         # First, because it may fail: then the old world stays.
-        programs = self._new_programs(sim, commands, world.gate)
+        programs = self._new_programs(self, sim, commands, world.gate)
         programs.permission = self._permission()
         if self._has_begun:
             programs.begin()
@@ -233,17 +235,6 @@ class Desk:
         self.programs.begin()
         if (past := self.past) is not None:
             past.gate.ask(past.gate.go_on)
-
-    def _usual_programs(self, sim: Simulation, commands: Sequence[Command | None], gate: Gate) -> Programs:
-        return Programs(
-            sim,
-            commands,
-            thinking=self.project.thinking,
-            say=self.say,
-            keeps_output=True,
-            new_patience=gate.patience,
-            sandbox=self._sandbox,
-        )
 
     def _permission(self) -> Permission:
         return Permission(self._granted, folders=(self.folder, EXAMPLES.parent), may_start_others=self.may_run_programs)
@@ -337,7 +328,7 @@ class Desk:
         """Try a person's program in all cases of the project, while the world goes on; see `tries`."""
         self._permission().check(command)
         has_hidden = self.may_edit or not self.is_locked
-        self.tries.begin(self.project, self._home, command, has_hidden=has_hidden)
+        self.tries.begin(self.home.alone(self.project), self.home.folder, command, has_hidden=has_hidden)
 
     # ---- another world ----
 
@@ -354,9 +345,9 @@ class Desk:
         """
         if folder is not None and self.is_for_others:
             raise ParameterError("This desk must stay with its exercise, so no other world can be opened here.")
-        home = folder or self._home
-        await self._put(project, commands_of(project, home), _command_of(supervisor_of(project, home)), home)
-        self._home = home
+        home = self.home if folder is None else Home(folder)
+        await self._put(project, home.commands(project), _command_of(home.supervisor(project)), home)
+        self.home = home
 
     async def alter(self, project: Project) -> None:
         """Replace the world by that of its own project with another arena, other robots or other settings.
@@ -374,17 +365,17 @@ class Desk:
         Raises:
             LinkError: If the world cannot be replaced.
         """
-        await self._put(self.project, self._commands, self._supervisor, self._home)
+        await self._put(self.project, self._commands, self._supervisor, self.home)
 
     async def _put(
-        self, project: Project, commands: Sequence[Command | None], supervisor: Command | None, home: Path
+        self, project: Project, commands: Sequence[Command | None], supervisor: Command | None, home: Home
     ) -> None:
-        """Begin the world of a project, which lies in a folder."""
+        """Begin the world of a project."""
         self._check_owns()
-        if self._sandbox is not None:
+        if self.sandbox is not None:
             # A program that has broken a limit has ended it, and the programs below are not to wait for another one.
-            await asyncio.to_thread(self._sandbox.warm)
-        sim = await asyncio.to_thread(simulation_of, project, home)
+            await asyncio.to_thread(self.sandbox.warm)
+        sim = await asyncio.to_thread(simulation_of, project, home.folder)
         old, before = self.present, (self.project, self._commands, self._supervisor)
         was_paused = old.gate.is_paused
         world = DeskWorld(sim, old.gate.speed)
@@ -454,20 +445,18 @@ class Desk:
         world, project = world or self.shown, self.project
         return replace(await world.do(lambda sim: project_of(sim, project)), speed=self.present.gate.speed)
 
-    async def project_to_save(self, name: str) -> Project:
-        """Return the present project for a file in the desk's folder, without programs that lie elsewhere.
+    async def project_to_save(
+        self, file: str, change: Callable[[Project], Project] = lambda project: project
+    ) -> tuple[Project, dict[str, bytes]]:
+        """Return the present project for a file, and what else has to be in its folder, by names.
 
         Args:
-            name: Name of the file without its ending, which becomes that of the arena.
+            file: Its name in the desk's folder; without its ending, that of the arena.
+            change: Changes the project first.
         """
-        project = await self.present_project()
-        if self._home != self.folder:
-            robots = tuple(replace(each, program=None, arguments=()) for each in project.robots)
-            project = replace(project, robots=robots, supervisor=None)
-        robots = tuple(
-            _with_program(each, self.attached(number), self.folder) for number, each in enumerate(project.robots, 1)
-        )
-        return replace(project, arena=replace(project.arena, name=name), robots=robots)
+        project, path = change(await self.present_project()), self.folder / file
+        project, beside = await asyncio.to_thread(self.home.moved, project, path.parent)
+        return replace(project, arena=replace(project.arena, name=path.stem)), beside
 
     # ---- programs of the project ----
 
@@ -476,15 +465,12 @@ class Desk:
         return self._commands[robot - 1] if robot <= len(self._commands) else None
 
     def attach(self, command: Command | None, robot: int) -> None:
-        """Let a program of the desk's folder start with this world from now on, and be saved with it; None for none."""
-        if command is not None and _name_in(self.folder, command) is None:
-            return
+        """Let a program start with this world from now on, and be saved with it; None for none."""
         self._commands += [None] * (robot - len(self._commands))
         self._commands[robot - 1] = command
         robots = list(self.project.robots)
         if robot <= len(robots):
-            without = replace(robots[robot - 1], program=None, arguments=())
-            robots[robot - 1] = _with_program(without, command, self._home)
+            robots[robot - 1] = self.home.with_program(robots[robot - 1], command)
             self.project = replace(self.project, robots=tuple(robots))
 
     # ---- time ----
@@ -616,6 +602,19 @@ class Desk:
             self.present.sim.loop.gate = None
 
 
+def usual_programs(
+    desk: Desk, sim: Simulation, commands: Sequence[Command | None], gate: Gate, /, **options: Any
+) -> Programs:
+    """Return what runs the programs of a world on a desk, as its project says; with other options of `Programs`."""
+    own: dict[str, Any] = {
+        "thinking": desk.project.thinking,
+        "say": desk.say,
+        "sandbox": desk.sandbox,
+        "keeps_output": True,
+    }
+    return Programs(sim, commands, new_patience=gate.patience, **own | options)
+
+
 class NewsHandler(logging.Handler):
     """Log handler that shows warnings in the browsers of a desk.
 
@@ -647,23 +646,3 @@ def _end(programs: Programs) -> None:
 
 def _command_of(supervisor: Path | None) -> Command | None:
     return None if supervisor is None else Command(supervisor)
-
-
-def _name_in(folder: Path, command: Command) -> str | None:
-    """Return the name of a program's file in a folder or below it, as a project names it; None if it lies elsewhere."""
-    program, home = command.program.resolve(), folder.resolve()
-    if command.module or not program.is_relative_to(home):
-        return None
-    try:
-        program_in(home, name := program.relative_to(home).as_posix())
-        return name
-    except ParameterError:
-        return None
-
-
-def _with_program(robot: ProjectRobot, command: Command | None, folder: Path) -> ProjectRobot:
-    """Return a robot of a project in a folder with its program, if that lies there; else as it is."""
-    name = None if command is None else _name_in(folder, command)
-    if command is None or name is None:
-        return robot
-    return replace(robot, program=name, arguments=tuple(command.arguments))

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path, PurePosixPath
 
 from kiks.errors import ArenaError, ParameterError
 from kiks.model.arena import Arena
 from kiks.model.arena_file import decode_arena
-from kiks.model.atomic_files import check_relative, ending_of, inside, replace_file
+from kiks.model.atomic_files import check_relative, ending_of, inside, make_folder, replace_file
 from kiks.model.kad import decode_kad, encode_kad
 from kiks.model.limits import UPLOAD_BYTES_MAX
 from kiks.model.picture import decode_picture
 from kiks.model.project import Project
+from kiks.model.shipped import PACKAGE
 
 PICTURES = (".png", ".tif", ".tiff", ".pgm", ".pbm", ".ppm", ".bmp")
 """Endings of pictures."""
@@ -77,23 +79,36 @@ class Folder:
         self._known[name] = self._version(name)
         return path
 
-    def save(self, data: bytes, name: str, what: str, *, may_replace: bool = False) -> str:
-        """Write a file; return its name with its ending.
+    def save(
+        self, data: bytes, name: str, what: str, *, may_replace: bool = False, beside: Mapping[str, bytes] | None = None
+    ) -> str:
+        """Write a file, the files beside it that it names first; return its name with its ending.
 
         Args:
             data: What it holds.
             name: Name of the file, with the default ending if it has none.
             what: What messages call it.
             may_replace: Whether to replace an existing file as it was when it was opened, saved or asked about here.
+            beside: What else has to be in its folder, by names there; it replaces nothing.
         """
         full = self.full_name(name)
         path = self._path(full, self.saved)
+        if path.is_relative_to(PACKAGE):
+            raise ParameterError(
+                f"{what} must be saved outside of KiKS itself, but {str(self.path)!r} belongs to it. Start the desk in "
+                "a folder of yours, or name one with --folder."
+            )
         if path.exists() and not (may_replace and self.is_known(full)):
             raise ParameterError(f"The name must be new, but {full!r} exists. Choose another one, or replace it.")
         if self.count_max is not None and not path.exists() and len(self.names()) >= self.count_max:
             raise ParameterError(
                 f"The folder must have at most {self.count_max} files. Save under the name of another."
             )
+        for other, content in (beside or {}).items():
+            place = inside(path.parent, other, "The name")
+            make_folder(place.parent, what)
+            if not place.exists():
+                replace_file(place, content, what)
         replace_file(path, data, what)
         self._known[full] = self._version(full)
         return full

@@ -6,6 +6,7 @@ import re
 import shlex
 import unicodedata
 import warnings
+from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
 
@@ -14,8 +15,9 @@ from kiks.errors import ParameterError, shown
 from kiks.model.atomic_files import program_in
 from kiks.model.limits import PROGRAM_BYTES_MAX
 from kiks.model.shipped import shipped
+from kiks.ports.program_process import Command
 
-EXAMPLES = shipped("examples/demos")
+EXAMPLES = shipped("examples/demos").resolve()
 """Folder of the example programs, which are those of the demonstrations."""
 
 NEW = '''"""My program."""
@@ -36,11 +38,13 @@ class ProgramFolder(Folder):
     depth_max = 0
 
 
-def offered(folder: Folder) -> dict[Path, str]:
-    """Return the programs of a folder and the examples, with what the list calls them."""
+def offered(folder: Folder, commands: Iterable[Command] = ()) -> dict[Path, str]:
+    """Return the programs of a folder, those of its project and the examples, with what the list calls them."""
     own = {folder.path / name: name for name in folder.names()}
-    examples = sorted(EXAMPLES.glob("[!_]*.py"))
-    return own | {path: f"example: {path.stem.replace('_', ' ')}" for path in examples}
+    files = {each.program.resolve() for each in commands if each.program.suffix == ".py"}
+    attached = {path: f"{path.name} of the project" for path in sorted(files - own.keys()) if path.is_file()}
+    examples = {path: f"example: {path.stem.replace('_', ' ')}" for path in sorted(EXAMPLES.glob("[!_]*.py"))}
+    return own | examples | attached
 
 
 def name_of(title: str) -> str:
