@@ -152,7 +152,9 @@ def add_questions(app, page, template, context, doctree):
     """Give the search the questions that a page answers, in the words of those who ask."""
     if page in LISTS:
         context["body"] = f'<div data-pagefind-ignore="all">{context["body"]}</div>'
-    asked = [f"{question} {words}" for question, words, answer in QUESTION.findall(QUESTIONS) if answer == page]
+    asked = [
+        f"How do I {question} {words}" for question, words, answer in QUESTION.findall(QUESTIONS) if answer == page
+    ]
     if asked:
         text = escape(". ".join(asked))
         context["body"] += f'<p hidden data-pagefind-meta="asked" data-pagefind-weight="5">{text}</p>'

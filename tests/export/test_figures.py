@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
-from tests.at_length import cases
 
 from kiks import Arena, Khepera, ParameterError, Recording, Simulation
 from kiks.export.figures import NO_ROBOT, PANELS, figure_of, panels_of, save_figures
@@ -117,12 +116,3 @@ def test_a_figure_has_a_column_for_each_recording(recording: Recording) -> None:
     readings = figure.axes[4].lines
     assert len(readings) == 8
     np.testing.assert_array_equal(readings[2].get_ydata(), recording.table("readings")["counts"][:, 2])
-
-
-@pytest.mark.parametrize("ending", cases(["png", "svg", "pdf"]))
-def test_the_same_recording_gives_the_same_picture(ending: str, recording: Recording, tmp_path: Path) -> None:
-    files = [tmp_path / f"{name}.{ending}" for name in ("one", "two")]
-    for file in files:
-        save_figures([recording], file)
-    assert files[0].read_bytes() == files[1].read_bytes()
-    assert files[0].stat().st_size > 10_000

@@ -1,0 +1,32 @@
+"""The search of the site, as a visitor uses it: what is typed leads to the right page. `make docs` makes the site."""
+
+from pathlib import Path
+from urllib.parse import urlparse
+
+import pytest
+from tests.desk.conftest import browser, context, new_page, playwright
+from tests.desk.visitor import NewPage
+
+__all__ = ["browser", "context", "new_page", "playwright"]
+
+ROOT = Path(__file__).parents[1]
+SITE, INDEX = ROOT / "build" / "docs", ROOT / "build" / "docs" / "pagefind" / "pagefind-entry.json"
+
+
+@pytest.mark.slow
+def test_what_visitors_type_leads_to_the_right_page(new_page: NewPage) -> None:
+    newest_s = max(path.stat().st_mtime for path in (ROOT / "docs").rglob("*.md"))
+    if not INDEX.exists() or INDEX.stat().st_mtime < newest_s:
+        pytest.skip("the site is not as new as its pages: make docs")
+    page, missed = new_page(), {}
+    page.route("http://site/**", lambda route: route.fulfill(path=SITE / urlparse(route.request.url).path[1:]))
+    page.goto("http://site/start.html")
+    for line in (ROOT / "tests" / "search_questions.txt").read_text().splitlines()[1:]:
+        question, answer = line.rsplit(maxsplit=1)
+        page.locator("input.sidebar-search").fill(question.strip())
+        page.locator("input.sidebar-search").press("Enter")
+        page.locator(".pagefind-ui__result-link").first.wait_for()
+        found = page.locator(".pagefind-ui__result-title > a").evaluate_all("links => links.map(link => link.pathname)")
+        if f"/{answer}.html" not in found[:3]:
+            missed[question.strip()] = found[:3]
+    assert not missed
