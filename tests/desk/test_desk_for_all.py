@@ -21,6 +21,11 @@ FOCUS = """() => {
 }"""
 """Which element has the focus: a number of its own, a name, and whether one sees that it has it."""
 
+ARENA_SHARE = """() => {
+    const { width, height } = document.querySelector(".kiks-arena").getBoundingClientRect();
+    return (width * height) / (innerWidth * innerHeight);
+}"""
+
 
 def walk(visitor: Visitor) -> Iterator[str]:
     """Press Tab until the focus returns to the start; return all elements that had it."""
@@ -114,6 +119,35 @@ def test_fingers_reach_everything_on_small_screens(new_page: NewPage, shown: Sho
         fingers.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": places})
     visitor.until(lambda: visitor.sim.pose(1)[0] == pytest.approx(200, abs=2))
     visitor.pause()
+
+
+def test_the_arena_has_half_of_the_page_and_a_browser_remembers_its_edge(new_page: NewPage, shown: Shown) -> None:
+    page, known = new_page(1366, 768), ("66", False)
+    visitor = Visitor(page, shown)
+    for width, height in ((683, 384), (960, 540), (1366, 768)):  # a small laptop and a large screen at 200 %
+        page.set_viewport_size({"width": width, "height": height})
+        visitor.until(lambda: visitor.answer(ARENA_SHARE) >= 0.5)
+    expect(visitor.at("reset").locator(".desk-word")).to_be_visible()
+    visitor.tab("programs")
+    for width, height in ((1920, 1080), (1366, 768)):
+        page.set_viewport_size({"width": width, "height": height})
+        editor, output = (visitor.at(name).bounding_box() for name in ("editor", "output"))
+        assert editor["height"] > 0.25 * height
+        assert output["y"] + output["height"] <= height
+    visitor.at("edge").focus()
+    for key in ("Right", "Right", "Left"):
+        page.keyboard.press(f"Arrow{key}")
+    expect(visitor.at("edge")).to_have_attribute("aria-valuenow", "66")
+    visitor.click("close-hint")
+    expect(page.locator(".desk-hint")).to_be_hidden()
+    visitor = Visitor(page, shown)
+    assert (visitor.at("edge").get_attribute("aria-valuenow"), page.locator(".desk-hint").is_visible()) == known
+    box = visitor.at("edge").bounding_box()
+    page.mouse.move(box["x"] + 9, 300)
+    page.mouse.down()
+    page.mouse.move(box["x"] - 300, 300, steps=3)
+    page.mouse.up()
+    visitor.until(lambda: float(visitor.at("edge").get_attribute("aria-valuenow")) < 50)
 
 
 @at_length

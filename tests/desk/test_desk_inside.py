@@ -152,8 +152,13 @@ def test_applying_settings_restarts_the_world(visitor: Visitor) -> None:
     visitor.picture("another_world")
     old = visitor.sim
     visitor.at("seed").fill("1.5")
-    visitor.click("apply", told="seed must be a whole number, but it was 1.5.")
+    visitor.click("apply", told="Seed must be a whole number of at least 0, but it was 1.5.")
     visitor.picture("wrong_setting")
+    for typed in ("-1", "42"):  # what is typed stays, also after it was left and the page has answered
+        visitor.at("seed").fill(typed)
+        visitor.click("add-robot")
+        expect(visitor.page.get_by_label("Name", exact=True)).to_have_count(4 + (typed == "42"))
+        expect(visitor.at("seed")).to_have_value(typed)
     assert visitor.sim is old
 
 

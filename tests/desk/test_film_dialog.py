@@ -71,7 +71,7 @@ def test_mistakes_are_told_and_a_closed_dialog_gives_the_film_up(recorded: Visit
     end_s = visitor.at("film-end").input_value()
     for name, value, words in (
         ("end", "0", "a film must end after it begins"),
-        ("end", "", "A film needs a beginning, an end and a speed"),
+        ("end", "", "To [s] must be a number of at least 0, but the field is empty"),
         ("start", "1e6", "start_s must be from"),
         ("speed", "0", "speed must be from 0.001 to 1000"),
         ("speed", "0.001", "A film must be at most 300 s long"),

@@ -15,7 +15,6 @@ import pytest
 from tests.guard import GUARD_S, wait_until
 
 from kiks import Arena, Khepera, Recording, Simulation
-from kiks.desk.panels import time_bar
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.marks import Mark, next_mark
 from kiks.desk.server.show import Driver
@@ -377,25 +376,6 @@ def test_from_a_time_of_a_recording_a_person_goes_on(tape: SimpleNamespace) -> N
         run(desk.go_on_from_here())
         assert state_of(desk) == (tape.times[10], hashes[tape.times[10]])
         assert desk.looking.span == (0, tape.times[10])
-
-
-def test_before_a_branch_a_person_reads_from_when_it_goes_on_and_how_far_the_run_has_come(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    asked = []
-
-    async def refuse(*texts: str, **_: str) -> None:
-        asked.append(texts)
-
-    monkeypatch.setattr(time_bar, "agrees", refuse)
-    sim = make_sim()
-    with desk_of(sim) as desk:
-        sim.run(3.0)
-        run(desk.looking.look_at(NS_PER_S))
-        run(time_bar.TimeBar._go_on(SimpleNamespace(_desk=desk)))  # type: ignore[arg-type]
-    ((question, words),) = asked
-    assert question == "Go on from 0:01.00"
-    assert words.startswith("The run that has come to 0:03.00 ends. Time is paused first")
 
 
 @pytest.mark.parametrize(("at_s", "begin_s"), [(0.0, 0.0), (0.5, 0.0), (2.0, 0.0), (3.7, 0.0), (3.7, 3.7)])

@@ -171,6 +171,8 @@ def test_a_living_world_is_looked_back_at_and_goes_on(visitor: Visitor, new_page
     other.at("back-long").click()
     visitor.until(lambda: visitor.sim.time_s < present.time_s - 1)
     assert present.now_ns == now_ns, "it stands still meanwhile"
+    visitor.click("go-on-from-here", shows={"dialog-text": "ends. Time is paused first"})
+    visitor.at("dialog-no").click()
     visitor.at("back-to-now").click()
     for each in (visitor, other):
         expect(each.at("bar-state")).to_have_text("Now")

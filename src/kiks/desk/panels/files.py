@@ -11,7 +11,7 @@ from nicegui.events import UploadEventArguments
 
 from kiks.desk.panels.exercise_dialog import ExerciseDialog, Template
 from kiks.desk.panels.film import FilmDialog
-from kiks.desk.panels.widgets import agrees, named, number, select, text_button, told, with_props
+from kiks.desk.panels.widgets import NumberField, agrees, named, select, text_button, told, with_props
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.folder import OPENED, PICTURES, Folder, decode, encode
 from kiks.desk.server.live_editing import Editing
@@ -88,7 +88,9 @@ class FilesPanel:
                 text_button("Upload a file", "upload", "upload-file", tip).on("click", js_handler=pick)
                 ui.element("q-uploader-add-trigger")
             with_props(named(self._upload, "upload"), accept=",".join(OPENED))
-            self._mm_per_pixel = number("mm per pixel", "mm-per-pixel", 1.0, min=0.1, max=100, step=0.1).classes("w-28")
+            self._mm_per_pixel = NumberField("mm per pixel", "mm-per-pixel", 1.0, min=0.1, max=100, step=0.1).classes(
+                "w-28"
+            )
             self._mm_per_pixel.tooltip("Size of a pixel of an uploaded picture")
 
     def _list(self) -> None:
@@ -151,7 +153,7 @@ class FilesPanel:
     @told
     async def _taken(self, event: UploadEventArguments) -> None:
         name, data = event.file.name, await event.file.read()
-        project = await asyncio.to_thread(decode, name, data, self._mm_per_pixel.value)
+        project = await asyncio.to_thread(decode, name, data, self._mm_per_pixel.read())
         if PurePosixPath(name).suffix.lower() in PICTURES:
             await self._editing.begin(project.arena)
         else:

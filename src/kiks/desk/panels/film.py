@@ -8,7 +8,7 @@ from pathlib import Path
 
 from nicegui import ui
 
-from kiks.desk.panels.widgets import dialog, number, select, told
+from kiks.desk.panels.widgets import NumberField, dialog, select, told
 from kiks.desk.server.desk import Desk
 from kiks.errors import ParameterError, library
 from kiks.export.film import FPS, save_film
@@ -35,9 +35,9 @@ class FilmDialog:
         self._is_given_up = False
         with dialog("Make a film of the run") as self._dialog:
             with ui.row().classes("no-wrap items-end"):
-                self._start = number("From [s]", "film-start", min=0.0).classes("col")
-                self._end = number("To [s]", "film-end", min=0.0).classes("col")
-                self._speed = number("Times real time", "film-speed", 1.0, min=0.0).classes("col")
+                self._start = NumberField("From [s]", "film-start", min=0.0).classes("col")
+                self._end = NumberField("To [s]", "film-end", min=0.0).classes("col")
+                self._speed = NumberField("Times real time", "film-speed", 1.0, min=0.0).classes("col")
             self._follow = select("What is seen", "film-follow", {0: "the whole arena"}, 0).classes("w-full")
             self._kind = ui.toggle(endings := list(KINDS["film"].endings), value=endings[0]).props(
                 "dense no-caps data-testid=film-kind"
@@ -66,9 +66,7 @@ class FilmDialog:
 
     @told
     async def _make(self) -> None:
-        start_s, end_s, speed = self._start.value, self._end.value, self._speed.value
-        if None in (start_s, end_s, speed):
-            raise ParameterError("A film needs a beginning, an end and a speed. Write all three numbers.")
+        start_s, end_s, speed = self._start.read(), self._end.read(), self._speed.read()
         # Differences of decimal numbers are off by rounding.
         if speed > 0 and (length_s := round((end_s - start_s) / speed, 6)) > LENGTH_MAX_S:
             raise ParameterError(

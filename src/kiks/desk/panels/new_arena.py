@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import cast
 
 from nicegui import ui
 
-from kiks.desk.panels.widgets import answer, dialog, finish, number, select
+from kiks.desk.panels.widgets import NumberField, answer, dialog, finish, select
 from kiks.model.arena import Arena
 from kiks.model.materials import REFLECTANCES
 
@@ -51,6 +50,5 @@ async def ask_for_maze() -> Arena | None:
 
 
 def _whole(label: str, name: str, value: int, low: int, high: int) -> Callable[[], int]:
-    """Build a field for a whole number and return its getter, which returns -1 for an empty field."""
-    field = number(label, name, value, min=low, max=high, precision=0).classes("w-full")
-    return lambda: -1 if field.value is None or not math.isfinite(field.value) else int(field.value)
+    """Build a field for a whole number and return its getter."""
+    return NumberField(label, name, value, is_whole=True, min=low, max=high).classes("w-full").read

@@ -83,6 +83,7 @@ class ProgramsPanel(Panel):
         self._exercise: Exercise | None = None
         self._text: str | None = NEW  # as it was read or saved last; None with a draft
         self._drafts: dict[Path | None, str] = {}
+        self._shown_arguments = ""  # where something else stands, a person has typed it
         self._is_saving = False
         self._seen = self._checked = NEW
         ui.add_css(CSS)
@@ -196,8 +197,11 @@ class ProgramsPanel(Panel):
                 return
         for robot, command in attached.items():
             if (program := command.program.resolve()) in self._choice.options:
+                if self._script in self._drafts:
+                    return  # a person writes another program
                 self._choice.value, self._robot.value = program, robot
-                self._arguments.value = shlex.join(command.arguments)
+                if self._arguments.value == self._shown_arguments:
+                    self._arguments.value = self._shown_arguments = shlex.join(command.arguments)
                 return
         if is_first:
             self._choice.value = EXAMPLES / "first_steps.py"

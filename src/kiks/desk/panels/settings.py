@@ -7,9 +7,8 @@ from typing import Any
 
 from nicegui import ui
 
-from kiks.desk.panels.widgets import Panel, heading, lock_note, named, number, select, with_props
+from kiks.desk.panels.widgets import NumberField, Panel, heading, lock_note, named, select, with_props
 from kiks.desk.server.desk import Desk
-from kiks.errors import ParameterError
 from kiks.model.project import ProjectRobot
 from kiks.model.robot import RobotSpec, robot_names
 from kiks.model.thinking_policy import split_thinking
@@ -82,11 +81,11 @@ class SettingsPanel(Panel):
                 element.disable()
 
     def _build_run(self) -> None:
-        self._seed = number("Seed", "seed", min=0).props("outlined").classes("w-full")
+        self._seed = NumberField("Seed", "seed", is_whole=True, min=0).props("outlined").classes("w-full")
         with_props(self._seed, hint="Whole number. The same seed gives the same run, to the bit.")
         hint = "How much simulated time the program's computing takes."
         self._policy = _choice("Thinking", "thinking", POLICIES, hint)
-        self._amount = number("", "thinking-amount", min=0).props("outlined").classes("w-full")
+        self._amount = NumberField("", "thinking-amount", min=0).props("outlined").classes("w-full")
         self._amount.bind_visibility_from(self._policy, "value", lambda policy: policy in ("fixed", "live"))
         self._policy.on_value_change(self._name_amount)
         self._file = named(ui.input("Recorded times"), "thinking-file").classes("w-full")
@@ -144,17 +143,15 @@ class SettingsPanel(Panel):
         policy = self._policy.value
         if policy == "replay":
             return f"replay:{self._file.value}"
-        return policy if policy == "none" else f"{policy}:{self._amount.value}"
+        return policy if policy == "none" else f"{policy}:{self._amount.read()}"
 
     async def _apply(self) -> None:
-        seed = self._seed.value
-        if seed is None or seed != int(seed):
-            raise ParameterError(f"seed must be a whole number, but it was {seed}.")
+        seed = self._seed.read()
         present = await self._desk.present_project()
         await self._desk.alter(
             replace(
                 present,
-                seed=int(seed),
+                seed=seed,
                 thinking=self._thinking(),
                 baud=int(self._baud.value),
                 response=self._model.value or None,

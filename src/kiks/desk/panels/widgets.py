@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Awaitable, Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,7 +13,7 @@ from nicegui import ui
 from nicegui.element import Element
 
 from kiks.desk.server.desk import LOCKED, Desk
-from kiks.errors import KiksError, counted
+from kiks.errors import KiksError, ParameterError, counted
 from kiks.export.looks import robot_colours
 from kiks.sim.ring_buffer import RingBuffer
 
@@ -228,9 +229,40 @@ def select(
     return named(choice.tooltip(tip) if tip else choice, name)
 
 
-def number(label: str, name: str, value: float | None = None, **options: Any) -> ui.number:
-    """Build a field for a number; options are those of `ui.number`."""
-    return named(ui.number(label, value=value, **options).props("dense"), name)
+class NumberField(ui.number):
+    """A field for a number, which stays as a person types it: `read` says what is wrong with it.
+
+    Args:
+        label: Its label.
+        name: Its name for tests.
+        value: What stands in it at first.
+        is_whole: Whether the number is a whole one.
+        options: Those of `ui.number`, such as `min` and `max`.
+    """
+
+    def __init__(
+        self, label: str, name: str, value: float | None = None, *, is_whole: bool = False, **options: Any
+    ) -> None:
+        super().__init__(label, value=value, **options)
+        self._is_whole = is_whole
+        named(self.props("dense"), name)
+
+    def sanitize(self) -> None:
+        """Leave it as it is, where NiceGUI would put the nearest number that is allowed, written in another way."""
+
+    def read(self) -> Any:
+        """Return the number.
+
+        Raises:
+            ParameterError: If there is none, or it is not allowed.
+        """
+        value, kind = self.value, "a whole number" if self._is_whole else "a number"
+        if value is None or self.out_of_limits or not math.isfinite(value) or (self._is_whole and value % 1):
+            least, most = self.props.get("min"), self.props.get("max")
+            limits = f" from {least:g} to {most:g}" if most is not None else f" of at least {least:g}"
+            given = "the field is empty" if value is None else f"it was {value:g}"
+            raise ParameterError(f"{self.props['label']} must be {kind}{limits}, but {given}.")
+        return int(value) if self._is_whole else value
 
 
 def offer_robots(choice: ui.select, desk: Desk) -> None:
