@@ -17,6 +17,7 @@ import typer
 from kiks.errors import ParameterError, nearest, printable, shown
 from kiks.model.atomic_files import make_folder
 from kiks.model.checks import ROBOTS_MAX
+from kiks.model.package import where_from
 
 if TYPE_CHECKING:
     from kiks.model.arena import Arena
@@ -306,8 +307,8 @@ def parse_words(words: list[str]) -> list[Command]:
                 f"{shown(word)} is a folder without a __main__.py" if is_folder else f"there is no file {shown(word)}"
             )
             raise ParameterError(
-                f"PROGRAM must be a Python file, but {found}. Give its path before its own arguments."
-                f"{nearest(word, demonstrations())}"
+                f"PROGRAM must be a Python file, but {found}. "
+                f"{where_from(word, 'Give its path before its own arguments.')}{nearest(word, demonstrations())}"
             )
     return commands
 
