@@ -18,6 +18,7 @@ from kiks.cli.outputs import is_quiet
 from kiks.errors import ParameterError, nearest_file, printable, shown
 from kiks.model.atomic_files import make_folder
 from kiks.model.checks import ROBOTS_MAX
+from kiks.model.package import where_from
 
 if TYPE_CHECKING:
     from kiks.model.arena import Arena
@@ -313,7 +314,8 @@ def parse_words(words: list[str]) -> list[Command]:
                 f"{shown(word)} is a folder without a __main__.py" if is_folder else f"there is no file {shown(word)}"
             )
             raise ParameterError(
-                f"PROGRAM must be a Python file, but {found}. Give its path before its own arguments."
+                f"PROGRAM must be a Python file, but {found}. "
+                f"{where_from(word, 'Give its path before its own arguments.')}"
                 f"{nearest_file(Path(word), demonstrations())}"
             )
     return commands

@@ -36,6 +36,7 @@ from pydantic_core import core_schema
 
 from kiks.errors import SHOWN_MAX, KiksError, ParameterError, nearest, nearest_file, printable, shown
 from kiks.model.limits import DATA_FILE_BYTES_MAX
+from kiks.model.package import where_from
 
 TEXT_MAX = 1000
 """Most characters of a text in a file."""
@@ -149,7 +150,8 @@ def read_file(
             raise error(f"{what} must be a file, but it is a folder. Name a file in it.")
         if not path.is_file():
             folder = "" if path.is_absolute() else f" and the folder {str(Path.cwd())!r}"
-            raise error(f"{what} must exist, but there is no such file. Check the name{folder}.{nearest_file(path)}")
+            advice = where_from(path, f"Check the name{folder}.{nearest_file(path)}")
+            raise error(f"{what} must exist, but there is no such file. {advice}")
         with path.open("rb") as file:
             # Python asks for the memory of as many bytes as it is told to read, though there are fewer.
             data = file.read(min(os.fstat(file.fileno()).st_size, bytes_max) + 1)

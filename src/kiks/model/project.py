@@ -57,6 +57,7 @@ from kiks.model.exercise import CASES_MAX, LONG_TEXT_MAX, Cases, Exercise
 from kiks.model.goal import Goal
 from kiks.model.kad import load_kad
 from kiks.model.limits import PROJECT_FILE_BYTES_MAX
+from kiks.model.package import where_from
 from kiks.model.picture import decode_picture, encode_picture
 from kiks.model.robot import Baud, Brightness, Response, robot_names
 from kiks.model.ros_map import load_ros_map
@@ -381,8 +382,9 @@ def load_arena_file(path: Path) -> Arena:
     if not path.exists() and (not path.suffix or path.stem in known):
         if path.as_posix() not in known:
             names = ", ".join(name for name in known if "/" not in name)
-            hint = nearest_file(path, known)
-            raise ArenaError(f"An arena must be a file or one of {names}, but there is no {shown(str(path))}.{hint}")
+            advice = where_from(path, nearest_file(path, known).lstrip())
+            what = f"An arena must be a file or one of {names}, but there is no {shown(str(path))}. {advice}"
+            raise ArenaError(what.rstrip())
         path = known[path.as_posix()]
     read = _READERS.get(path.suffix.lower())
     return _picture_alone(path) if read is None else read(path)

@@ -6,15 +6,7 @@ from functools import cache
 from pathlib import Path
 
 from kiks.model.arena import Arena
-
-PACKAGE = Path(__file__).resolve().parents[1]
-"""The folder of KiKS itself."""
-
-
-def shipped(name: str) -> Path:
-    """Return the path of a file or folder that comes with KiKS, by its path from the root of a checkout."""
-    places = (PACKAGE / name, PACKAGE.parents[1] / name)
-    return next((place for place in places if place.exists()), places[0])
+from kiks.model.package import shipped as shipped
 
 
 @cache

@@ -11,9 +11,9 @@ from kiks.model.arena_file import decode_arena
 from kiks.model.atomic_files import check_relative, ending_of, inside, make_folder, replace_file
 from kiks.model.kad import decode_kad, encode_kad
 from kiks.model.limits import UPLOAD_BYTES_MAX
+from kiks.model.package import PACKAGE
 from kiks.model.picture import decode_picture
 from kiks.model.project import Project
-from kiks.model.shipped import PACKAGE
 
 PICTURES = (".png", ".tif", ".tiff", ".pgm", ".pbm", ".ppm", ".bmp")
 """Endings of pictures."""
