@@ -116,7 +116,8 @@ def closest(given: str, known: Iterable[str]) -> str | None:
     typed = [each for each in _spellings(given[:SHOWN_MAX]) if each]
 
     def rank(name: str) -> tuple[float, int, int, str]:
-        return likeness(name), len(commonprefix([name, given])), -abs(len(name) - len(given)), name
+        beginning = commonprefix([name, given])  # noqa: RUF071  (of characters)
+        return likeness(name), len(beginning), -abs(len(name) - len(given)), name
 
     best = max(known, key=rank, default="")
     return best if best and likeness(best) >= LIKE else None

@@ -133,8 +133,8 @@ def _champion_job(path: Path, world: World) -> Job:
         )
     if file.is_file() and not re.search(rb"^\s*champion\s*=", file.read_bytes(), re.MULTILINE):
         raise ParameterError(
-            f"PROGRAM must be a program, a project or a champion, but {shown(str(file))} is none. An arena stands after "
-            "--arena, a robot after --robot, a task after kiks evolve."
+            f"PROGRAM must be a program, a project or a champion, but {shown(str(file))} is none. An arena stands "
+            "after --arena, a robot after --robot, a task after kiks evolve."
         )
     champion = Champion.load(file)
     arena = None if world.arena is None else load_arena(world.arena)
