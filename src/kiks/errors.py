@@ -145,6 +145,8 @@ def nearest_file(path: Path, known: Iterable[str] = ()) -> str:
     """Return ' Did you mean X?' for the file with nearly this path, or for a known name, or nothing."""
     folder = path.parent
     with suppress(OSError, ValueError):
+        if path.exists():
+            return ""
         if not folder.is_dir():
             other = closest(folder.name, (each.name for each in folder.parent.iterdir() if each.is_dir()))
             folder = folder.with_name(other or folder.name)
