@@ -12,6 +12,7 @@ import sys
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from opcode import opmap
+from os.path import commonprefix
 from pathlib import Path
 from typing import Any
 
@@ -113,8 +114,13 @@ def closest(given: str, known: Iterable[str]) -> str | None:
         return best
 
     typed = [each for each in _spellings(given[:SHOWN_MAX]) if each]
-    ranked = sorted(((likeness(name), -abs(len(name) - len(given)), name) for name in known), reverse=True)
-    return ranked[0][2] if ranked and ranked[0][0] >= LIKE else None
+
+    def rank(name: str) -> tuple[float, int, int, str]:
+        beginning = commonprefix([name, given])  # noqa: RUF071  (of characters)
+        return likeness(name), len(beginning), -abs(len(name) - len(given)), name
+
+    best = max(known, key=rank, default="")
+    return best if best and likeness(best) >= LIKE else None
 
 
 def _spellings(name: str) -> set[str]:
@@ -139,6 +145,8 @@ def nearest_file(path: Path, known: Iterable[str] = ()) -> str:
     """Return ' Did you mean X?' for the file with nearly this path, or for a known name, or nothing."""
     folder = path.parent
     with suppress(OSError, ValueError):
+        if path.exists():
+            return ""
         if not folder.is_dir():
             other = closest(folder.name, (each.name for each in folder.parent.iterdir() if each.is_dir()))
             folder = folder.with_name(other or folder.name)

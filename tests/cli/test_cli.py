@@ -262,47 +262,10 @@ def test_live_thinking_is_recorded_and_replayed(tmp_path: Path) -> None:
     assert state_of(replays[0].stderr) == state_of(replays[1].stderr)
 
 
-MISTAKES = {
-    "run nowhere.py": "PROGRAM must be a Python file, but there is no file 'nowhere.py'",
-    f"run --map ttyS0 {WANDER}": "--map must be a port's name, = and a robot's number",
-    f"run --map ttyS0=4 {WANDER}": "This simulation has robot 1",
-    f"run --thinking slow {WANDER}": "thinking must be 'none'",
-    f"run --robot kephera {WANDER}": "Did you mean 'khepera'",
-    f"run --turret grippr {WANDER}": "Did you mean 'gripper'",
-    f"run --turret gripper=2 {WANDER}": "a robot's number from 1 to 1, but it was",
-    f"run --turret gripper=x {WANDER}": "--turret must be a turret, or one with = and a robot's number",
-    "demo avoid --arena nowhere.png": "nowhere.png",
-    "demo folow": "Did you mean 'follow'",
-    f"run --robots 0 {WANDER}": "--robots must be a whole number from 1 to 1000, but it was '0'.",
-    "serve --speed fast": "--speed must be a number, but it was 'fast'.",
-    "schema robto": "KIND must be one of robot, arena, project, task, but it was 'robto'.",
-    "export run.mcap": "RECORDING and OUT must be given, but only 'run.mcap' was. kiks export -h shows how.",
-    f"desk --no-browser {ARENA}": "office.toml' is none. An arena stands after --arena, and programs in other",
-    f"run {ROOT}/examples": "examples' has neither a __main__.py nor a champion. Name a file in it.",
-    "replay": "FILE must be given, but nothing was. kiks replay -h shows how.",
-    "arena new room.toml": "--width-mm must be given, but nothing was. kiks arena new -h shows how.",
-    "run champion.toml student.py": "a champion must drive all robots alone, but 'student.py' follows it",
-    "run nowhere.kiks": "Project file 'nowhere.kiks' must exist",
-    f"run --seconds 20,5 {WANDER}": "--seconds",
-    f"run --max-wall nan {WANDER}": "--max-wall",
-    "run nowhere.toml": "Champion's file 'nowhere.toml' must exist",
-    "evolve avoyd": "Did you mean 'avoid'",
-}
-
-
-@pytest.mark.parametrize("line", MISTAKES)
-def test_mistakes_are_errors_that_say_what_to_do(line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    with pytest.raises(KiksError, match=re.escape(MISTAKES[line])) as error:
-        kiks(*line.split())
-    assert "\n" not in str(error.value)
-
-
-@pytest.mark.parametrize("line", ["run nowhere.py", "export run.mcap", f"run --map ttyS0=4 {WANDER}"])
-def test_a_mistake_ends_in_one_line_and_exit_code_2(line: str, tmp_path: Path) -> None:
-    result = forked.run(*line.split(), cwd=tmp_path)
-    (told,) = result.stderr.splitlines()
-    assert (result.returncode, told.partition(": ")[0], MISTAKES[line] in told) == (2, "kiks", True)
+def test_a_mistake_ends_in_one_line_and_exit_code_2(tmp_path: Path) -> None:
+    result = forked.run("run", "nowhere.py", cwd=tmp_path)  # more of them stand in slips.txt
+    message = "kiks: PROGRAM must be a Python file, but there is no file 'nowhere.py'. Give its path before its own"
+    assert (result.returncode, result.stderr) == (2, f"{message} arguments.\n")
 
 
 NO_RESULTS = """

@@ -23,7 +23,7 @@ class OneLineCommand(TyperCommand):
 
     def make_context(self, info_name: Any, args: list[str], parent: Any = None, **extra: Any) -> Any:
         """Read the words of the command."""
-        with _in_one_line(self, info_name, parent):
+        with _in_one_line(self, args, info_name, parent):
             return super().make_context(info_name, args, parent, **extra)
 
 
@@ -32,7 +32,7 @@ class Group(TyperGroup):
 
     def make_context(self, info_name: Any, args: list[str], parent: Any = None, **extra: Any) -> Any:
         """Read the words before the command."""
-        with _in_one_line(self, info_name, parent):
+        with _in_one_line(self, args, info_name, parent):
             words = [*args[1:], "-h"] if args[:1] == ["help"] else args
             return super().make_context(info_name, words, parent, **extra)
 
@@ -40,9 +40,13 @@ class Group(TyperGroup):
         """Find the command."""
         if args[0] in self.commands or ctx.resilient_parsing or args[0].startswith("-"):
             return super().resolve_command(ctx, args)
-        known = [*self.commands, *_options(self)]
-        if ctx.parent is None:
-            known += [f"demo {name}" for name in demonstrations()] + _openings(Path(args[0]))
+        known = ["help", *self.commands, *_options(self)]
+        if opening := _opening(Path(args[0])):
+            known = [opening]
+        elif "info" in self.commands:
+            known += [f"info {arena}" for arena in shipped_arenas()]
+        else:
+            known += [f"demo {name}" for name in demonstrations()]
             for name, command in self.commands.items():
                 known += [f"{name} {word}" for word in [*getattr(command, "commands", ()), *_options(command)]]
         raise ParameterError(
@@ -51,10 +55,10 @@ class Group(TyperGroup):
         )
 
 
-def _openings(file: Path) -> list[str]:
-    """Return the command for a file that was named without one."""
+def _opening(file: Path) -> str:
+    """Return the command for a file that was named without one; empty if there is no such file."""
     verbs = {".py": "run", ".kiks": "desk", ".mcap": "replay", ".toml": "desk --arena", ".png": "desk --arena"}
-    return [f"{verbs[file.suffix]} {file}"] if file.suffix in verbs and file.is_file() else []
+    return f"{verbs[file.suffix]} {file}" if file.suffix in verbs and file.is_file() else ""
 
 
 def _options(command: Any) -> list[str]:
@@ -62,22 +66,25 @@ def _options(command: Any) -> list[str]:
 
 
 @contextmanager
-def _in_one_line(command: Any, name: str, parent: Any) -> Iterator[None]:
+def _in_one_line(command: Any, args: list[str], name: str, parent: Any) -> Iterator[None]:
     """Let a mistake be told in the words of KiKS; a help that stands in for one stays as it is."""
+    given = list(args)  # reading them takes them away
     try:
         yield
     except UsageError as error:
         if "\n" in (text := error.format_message()):
             raise
         path = f"{parent.command_path} {name}" if parent else name
-        raise ParameterError(_said(error, text.rstrip("."), command, path)) from None
+        raise ParameterError(_said(error, text.rstrip("."), command, given, path)) from None
 
 
-def _said(error: Any, text: str, command: Any, path: str) -> str:
+def _said(error: Any, text: str, command: Any, args: list[str], path: str) -> str:
     option, how = getattr(error, "option_name", ""), f"{path} -h shows how."
     if hasattr(error, "possibilities"):
-        homes = (each.name for each in getattr(command, "commands", {}).values() if option in _options(each))
-        home = next(homes, None)
+        # Of letters behind one hyphen the library names the first alone.
+        option = next((word.partition("=")[0] for word in args if word.startswith(option)), option)
+        homes = [name for name, each in getattr(command, "commands", {}).items() if option in _options(each)]
+        home = "run" if "run" in homes else "".join(homes[:1])
         hint = f" It stands behind its command: {path} {home} {option}." if home else nearest(option, _options(command))
         return f"An option must be one that {path} -h lists, but {shown(option)} is none.{hint}"
     if option and "not take" in text:

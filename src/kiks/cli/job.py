@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -154,6 +155,11 @@ def _champion_job(path: Path, world: World) -> Job:
         raise ParameterError(
             f"PROGRAM must be a program, a project or the folder of an evolution, but {shown(str(path))} has neither a "
             "__main__.py nor a champion. Name a file in it."
+        )
+    if file.is_file() and not re.search(rb"^\s*champion\s*=", file.read_bytes(), re.MULTILINE):
+        raise ParameterError(
+            f"PROGRAM must be a program, a project or a champion, but {shown(str(file))} is none. An arena stands "
+            "after --arena, a robot after --robot, a task after kiks evolve."
         )
     champion = Champion.load(file)
     arena = None if world.arena is None else load_arena(world.arena)

@@ -16,7 +16,7 @@ import typer
 
 from kiks.cli.outputs import is_quiet
 from kiks.errors import ParameterError, nearest_file, printable, shown
-from kiks.model.atomic_files import make_folder
+from kiks.model.atomic_files import make_folder, path_of
 from kiks.model.checks import ROBOTS_MAX
 from kiks.model.package import where_from
 
@@ -178,7 +178,7 @@ def load_arena(file: str | None) -> Arena:
 
     if file is None:
         return Arena.default()
-    arena = Arena.load(file)
+    arena = Arena.load(path_of(file, "--arena"))
     if is_project(file):
         say(f"the arena alone is taken from {file}; its robots, programs and settings are left out here.")
     return arena
@@ -254,7 +254,7 @@ def parse_turret(entry: str, robot_count: int) -> tuple[str, int | None]:
     if not (number.isascii() and number.isdigit() and 1 <= int(number) <= robot_count):
         raise ParameterError(
             f"--turret must be a turret, or one with = and a robot's number from 1 to {robot_count}, but it was "
-            f"{shown(entry)}. Example: gripper=2."
+            f"{shown(entry)}. Example: gripper={robot_count}."
         )
     return name, int(number)
 
@@ -280,7 +280,7 @@ def parse_words(words: list[str]) -> list[Command]:
     begins with a .py file or -m, it is a program with all its arguments, which may be .py files themselves. The first
     program may also be -m and a module's name in words of their own, another file, or a folder with a `__main__.py`.
     """
-    from kiks.model.shipped import demonstrations
+    from kiks.model.shipped import demonstrations, shipped_arenas
     from kiks.ports.program_process import Command, module_command
 
     commands: list[Command] = []
@@ -316,7 +316,7 @@ def parse_words(words: list[str]) -> list[Command]:
             raise ParameterError(
                 f"PROGRAM must be a Python file, but {found}. "
                 f"{where_from(word, 'Give its path before its own arguments.')}"
-                f"{nearest_file(Path(word), demonstrations())}"
+                f"{nearest_file(Path(word), [*demonstrations(), *(f'--arena {name}' for name in shipped_arenas())])}"
             )
     return commands
 

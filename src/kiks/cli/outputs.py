@@ -275,7 +275,8 @@ def _meant(param: Any, value: str) -> str:
     if kind not in (int, float):
         return nearest(value, _choices(kind))
     number = re.match(r"[0-9]+([.,][0-9]+)?" if kind is float else "[0-9]+", value)
-    return "" if number is None or number[0] == value else f" Did you mean {number[0].replace(',', '.')}?"
+    meant = "" if number is None else number[0].replace(",", ".")
+    return f" Did you mean {meant}?" if meant not in ("", value) else ""
 
 
 def _say_plainly(param: Any) -> None:

@@ -311,7 +311,7 @@ class RobotSpec:
         what = f"Robot file {source!r}"
         if source in known:
             data = read_file(_FOLDER / f"{source}.toml", what)
-        elif path.suffix or len(path.parts) > 1 or path.is_file():
+        elif path.is_file() or len(path.parts) > 1 or (path.suffix and path.stem not in known):
             data = read_file(path, what)
         else:
             raise ParameterError(

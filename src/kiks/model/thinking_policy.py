@@ -34,4 +34,7 @@ def _number(text: str, value: str, meaning: str, most: float) -> float:
     with suppress(ValueError):
         if 0 <= (number := float(value)) <= most:
             return number
-    raise ParameterError(f"thinking must give {meaning} from 0 to {most:g} after the colon, but it was {shown(text)}.")
+    raise ParameterError(
+        f"thinking must give {meaning} from 0 to {most:g} after the colon, but it was {shown(text)}. Example: "
+        f"{text.partition(':')[0]}:5."
+    )

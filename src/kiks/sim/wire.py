@@ -149,8 +149,8 @@ class Wire:
     def note_wait(self, now_ns: int) -> None:
         """Say once that a program waits for an answer to a command that has no end of line."""
         partial, hinted = self.firmware.receiver.partial, self.firmware.hinted
-        if partial and partial not in hinted and now_ns - self.line.sending_until_ns >= SILENCE_NS:
-            hinted.add(partial)
+        if partial and b"" not in hinted and now_ns - self.line.sending_until_ns >= SILENCE_NS:
+            hinted.add(b"")
             text, end = shown(partial.decode("latin-1")), "a line feed, the one character '\\n'"
             _log.warning("robot %d waits for the end of the line %s. A command ends in %s.", self._index + 1, text, end)
 
