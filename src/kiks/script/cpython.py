@@ -373,6 +373,9 @@ def thread_starts(scheduler: Any) -> dict[str, dict[str, Any]]:
         return handle
 
     real_handle = _thread._ThreadHandle  # type: ignore[attr-defined]
+    if hasattr(_thread, "set_name"):
+        # From 3.14 on, it would rename the one thread of the operating system that runs all of the program's.
+        starts["set_name"] = lambda name, /: None
     return {
         "_thread": {**starts, "start_joinable_thread": start_joinable_thread, "_ThreadHandle": Handle},
         "threading": {"_ThreadHandle": Handle},
