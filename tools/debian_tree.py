@@ -1,4 +1,4 @@
-"""Runs commands on a Debian that is made from nothing in a folder, as root on Debian with debootstrap:
+"""Runs commands on a Debian that is made from nothing in a folder, as root on Debian with debootstrap.
 
     python tools/debian_tree.py trixie make demo
     python tools/debian_tree.py trixie make test
