@@ -124,8 +124,9 @@ def check_interpreter() -> None:
     lacks = ""
     if sys.implementation.name != "cpython" or not FIRST <= sys.version_info[:2] <= LAST:
         lacks = "whose insides are not known"
-    elif not getattr(sys, "_is_gil_enabled", lambda: True)():
-        lacks = "without its lock of the interpreter"
+    elif "t" in sys.abiflags:
+        # Even if it is switched on: objects look otherwise, and classes may be changed by other threads meanwhile.
+        lacks = "built without its lock of the interpreter"
     elif not _has_known_structures():
         lacks = "whose structures are not those of its version"
     else:
