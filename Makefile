@@ -52,10 +52,10 @@ $(VENV)/.developer: $(VENV)/.user
 	@$(call install,.[dev])
 	@touch $@
 
-# uv takes a tenth of the time of pip. Where it cannot get the packages, for instance because only pip knows the mirror, pip installs them.
-WHEELS  = --only-binary :all: --no-binary kiks
-install = $(UV) pip install --quiet --python $(BIN)/python $(WHEELS) --editable '$(1)' || \
-	$(BIN)/python -m pip install -qq --disable-pip-version-check $(WHEELS) --editable '$(1)'
+# uv takes a tenth of the time of pip. Where it cannot get the packages, for instance because only pip knows the mirror, pip installs them,
+# and builds those that have no wheel for a new Python yet.
+install = $(UV) pip install --quiet --python $(BIN)/python --only-binary :all: --no-binary kiks --editable '$(1)' || \
+	$(BIN)/python -m pip install -qq --disable-pip-version-check --prefer-binary --editable '$(1)'
 
 system:
 	@PYTHON="$(PYTHON)" sh tools/system-packages.sh tests

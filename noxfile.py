@@ -20,7 +20,8 @@ OTHERS = [each for each in nox.project.python_versions(PROJECT) if tuple(each.sp
 
 # What these tests import beside KiKS; the extra `dev` holds much that has nothing to do with the interpreter.
 TESTED_WITH = (
-    *("aioserial", "hypothesis", "jsonschema", "pygame", "pyserial-asyncio"),
+    *("aioserial", "hypothesis", "jsonschema", "pyserial-asyncio"),
+    *("pygame; python_version < '3.14'", "pygame-ce; python_version >= '3.14'"),
     *("pytest", "pytest-timeout", "pytest-xdist"),
 )
 OUTCOMES = ("-m", "tests.outcomes")
@@ -63,8 +64,7 @@ def tests(session: nox.Session) -> None:
     """Test what depends on the interpreter, and require the same outcomes of programs, to the bit."""
     if not HERE:
         session.skip("no other Python is here")
-    wheels = ("--only-binary", ":all:", "--no-binary", "kiks")
-    session.install("--quiet", *wheels, "--editable", ".", *TESTED_WITH)
+    session.install("--quiet", "--editable", ".", *TESTED_WITH)
     session.run("python", "-m", "kiks", "warmup")
     own, other = own_outcomes(), Path(session.create_tmp()) / f"{session.python}.json"
     session.run("python", *OUTCOMES, str(other), str(own))

@@ -22,7 +22,7 @@ class Pose:
 
 def report():
     print(sys.argv, sys.path[0], os.getcwd())
-    print(__name__, __package__, __file__, __cached__, __spec__ and (__spec__.name, __spec__.origin))
+    print(__name__, __package__, __file__, globals().get('__cached__'), __spec__ and (__spec__.name, __spec__.origin))
     print(type(__loader__), sorted(globals()), __builtins__ is sys.modules["builtins"])
     print(__main__ is sys.modules["__main__"], vars(__main__) is globals(), Pose.__module__)
     print(report.__code__.co_filename)

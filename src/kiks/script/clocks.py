@@ -42,6 +42,7 @@ OF_NOW = ("localtime", "gmtime", "ctime", "asctime", "strftime")
 """Functions of `time` that convert the present time if they are given none."""
 
 _real_now, _real_utcnow = (vars(datetime.datetime)[name] for name in ("now", "utcnow"))
+_real_today = vars(datetime.date)["today"]
 
 
 def replacements(scheduler: Scheduler, clock: VirtualPort) -> dict[str, dict[str, Any]]:
@@ -120,7 +121,7 @@ def replacements(scheduler: Scheduler, clock: VirtualPort) -> dict[str, dict[str
 
     return {
         "time": functions,
-        "datetime.datetime": _dates(scheduler, clock),
+        **_dates(scheduler, clock),
         "posix": {"times": times},
         "resource": {"getrusage": usage},
         "_uuid": {"generate_time_safe": new_time_uuid},
@@ -129,8 +130,11 @@ def replacements(scheduler: Scheduler, clock: VirtualPort) -> dict[str, dict[str
     }
 
 
-def _dates(scheduler: Scheduler, clock: VirtualPort) -> dict[str, Any]:
-    """Return the methods of `datetime.datetime` that tell the present; its other ones ask `time`."""
+def _dates(scheduler: Scheduler, clock: VirtualPort) -> dict[str, dict[str, Any]]:
+    """Return the methods of `datetime`'s classes that tell the present; the other ones ask `time`."""
+
+    def today(cls: type[datetime.date]) -> datetime.date:
+        return cls.fromtimestamp(calendar_ns(clock.ask_ns()) / NS_PER_S)
 
     def now(cls: type[datetime.datetime], tz: datetime.tzinfo | None = None) -> datetime.datetime:
         seconds, rest_ns = divmod(calendar_ns(clock.ask_ns()), NS_PER_S)
@@ -153,6 +157,10 @@ def _dates(scheduler: Scheduler, clock: VirtualPort) -> dict[str, Any]:
         return update_wrapper(call, method, ("__name__", "__qualname__", "__doc__"), ())
 
     return {
-        "now": classmethod(for_program(scheduler, now, real(_real_now))),
-        "utcnow": classmethod(for_program(scheduler, utcnow, real(_real_utcnow))),
+        # From 3.15 on, it no longer asks `time`.
+        "datetime.date": {"today": classmethod(for_program(scheduler, today, real(_real_today)))},
+        "datetime.datetime": {
+            "now": classmethod(for_program(scheduler, now, real(_real_now))),
+            "utcnow": classmethod(for_program(scheduler, utcnow, real(_real_utcnow))),
+        },
     }

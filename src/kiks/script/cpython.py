@@ -30,13 +30,18 @@ from typing import Any
 
 from kiks.errors import KiksError
 
-FIRST, LAST = (3, 11), (3, 13)
+FIRST, LAST = (3, 11), (3, 15)
 """The versions of CPython whose insides are known: those under which all tests have passed."""
 
 _HAS_HANDLES = sys.version_info >= (3, 13)
 """Whether `threading` knows of the end of a thread by a handle, not by a lock."""
 
-_HANDLE = "_os_thread_handle" if sys.version_info >= (3, 14) else "_handle"
+_HANDLE, EVENT_LOOP_POLICY = (
+    ("_os_thread_handle", "_BaseDefaultEventLoopPolicy")
+    if sys.version_info >= (3, 14)
+    else ("_handle", "BaseDefaultEventLoopPolicy")
+)
+"""Names that 3.14 changed: of a thread's handle, and in `asyncio.events`."""
 
 _METHOD_OF_ARGUMENTS_AND_KEYWORDS = 0x0001 | 0x0002
 """METH_VARARGS | METH_KEYWORDS (methodobject.h)."""
@@ -89,8 +94,8 @@ _CALL = ctypes.cast(ctypes.pythonapi.PyObject_Call, ctypes.c_void_p)
 def _private_names() -> Iterator[tuple[Any, tuple[str, ...]]]:
     """Yield the private names of the standard library that `script` uses, with the objects that have them."""
     yield asyncio, ("_get_running_loop", "_set_running_loop", "_enter_task", "_leave_task")
-    yield asyncio.events, ("_event_loop_policy",)
-    yield asyncio.DefaultEventLoopPolicy, ("_Local",)
+    yield asyncio.events, ("_event_loop_policy", EVENT_LOOP_POLICY)
+    yield getattr(asyncio.events, EVENT_LOOP_POLICY, None), ("_Local",)
     yield concurrent.futures.thread, ("_shutdown", "_threads_queues")
     yield concurrent.futures._base.Future, ("__hash__",)
     yield logging, ("_startTime",)
@@ -119,8 +124,9 @@ def check_interpreter() -> None:
     lacks = ""
     if sys.implementation.name != "cpython" or not FIRST <= sys.version_info[:2] <= LAST:
         lacks = "whose insides are not known"
-    elif not getattr(sys, "_is_gil_enabled", lambda: True)():
-        lacks = "without its lock of the interpreter"
+    elif "t" in sys.abiflags:
+        # Even if it is switched on: objects look otherwise, and classes may be changed by other threads meanwhile.
+        lacks = "built without its lock of the interpreter"
     elif not _has_known_structures():
         lacks = "whose structures are not those of its version"
     else:
@@ -368,6 +374,9 @@ def thread_starts(scheduler: Any) -> dict[str, dict[str, Any]]:
         return handle
 
     real_handle = _thread._ThreadHandle  # type: ignore[attr-defined]
+    if hasattr(_thread, "set_name"):
+        # From 3.14 on, it would rename the one thread of the operating system that runs all of the program's.
+        starts["set_name"] = lambda name, /: None
     return {
         "_thread": {**starts, "start_joinable_thread": start_joinable_thread, "_ThreadHandle": Handle},
         "threading": {"_ThreadHandle": Handle},

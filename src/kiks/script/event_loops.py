@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from itertools import count
 from typing import Any
 
+from kiks.script.cpython import EVENT_LOOP_POLICY
 from kiks.script.thread_scheduler import Scheduler
 
 _enter_task, _leave_task = asyncio._enter_task, asyncio._leave_task
@@ -58,8 +59,7 @@ def replacements(scheduler: Scheduler) -> dict[str, dict[str, Any]]:
         return known[key][0]
 
     return {
-        # Its name begins with an underscore from 3.14 on.
-        **{f"asyncio.events.{name}DefaultEventLoopPolicy": {"_Local": Local} for name in ("Base", "_Base")},
+        f"asyncio.events.{EVENT_LOOP_POLICY}": {"_Local": Local},
         "asyncio.events": {"_event_loop_policy": None},
         "asyncio.Future": {"__hash__": hash_by_number},
         "asyncio.Task": {"__hash__": hash_by_number},

@@ -205,7 +205,9 @@ class FileSystem:
             if not isinstance(folder, str | os.PathLike):
                 return []
             split = (os.path.split(each) for each in self._ports)
-            return [name for parent, name in split if parent == os.fspath(folder) and name not in there]
+            # `pathlib` lists "/dev/" from 3.14 on.
+            listed = os.path.normpath(folder)
+            return [name for parent, name in split if parent == listed and name not in there]
 
         def listdir(path: Any = ".") -> list[Any]:
             there = os.listdir(path)

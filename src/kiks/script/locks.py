@@ -27,6 +27,7 @@ LOCKS_IN_A_ROW = 1000
 
 _lock, _rlock = _thread.LockType, _thread.RLock
 _real_acquire, _real_release, _real_locked = _lock.acquire, _lock.release, _lock.locked
+_real_enter = _lock.__enter__
 _real_get, _real_put = _queue.SimpleQueue.get, _queue.SimpleQueue.put
 
 
@@ -120,6 +121,9 @@ def _plain_locks(scheduler: Scheduler, room: WaitingRoom) -> dict[str, Any]:
             return _real_acquire(lock, blocking, timeout)
         return room.wait(lock, "a lock", until_ns, lambda: _real_acquire(lock, False), lambda: release(lock))
 
+    def enter(lock: Any, *given: Any) -> bool:
+        return _real_enter(lock, *given) if given else acquire(lock)
+
     def release(lock: Any, *_: object) -> None:
         if foreign:
             foreign.pop(id(lock), None)
@@ -131,7 +135,9 @@ def _plain_locks(scheduler: Scheduler, room: WaitingRoom) -> dict[str, Any]:
         return _real_locked(lock)
 
     return {
-        **dict.fromkeys(("acquire", "acquire_lock", "__enter__"), acquire),
+        **dict.fromkeys(("acquire", "acquire_lock"), acquire),
+        # From 3.15 on, it takes no arguments.
+        "__enter__": enter if sys.version_info >= (3, 15) else acquire,
         **dict.fromkeys(("release", "release_lock", "__exit__"), release),
         # `threading` itself only looks, at the locks of all its threads and in the order of their addresses.
         **dict.fromkeys(("locked", "locked_lock"), for_program(scheduler, Reading(locked, _real_locked), _real_locked)),

@@ -29,7 +29,9 @@ def main_module(program: Path, arguments: list[str], module: str) -> Iterator[Ca
     """
     before = sys.argv, sys.path[:], sys.modules["__main__"]
     main = sys.modules["__main__"] = ModuleType("__main__")
-    vars(main).update(__builtins__=builtins, __annotations__={})
+    vars(main).update(__builtins__=builtins)
+    if sys.version_info < (3, 14):
+        vars(main).update(__annotations__={})
     path = os.path.join(os.getcwd(), program)
     sys.argv = [str(program), *arguments]
     # Python itself starts modules, folders and archives by this function of runpy (Modules/main.c).
@@ -76,5 +78,7 @@ def _run_file(path: str, main: ModuleType) -> None:
         loader = SourceFileLoader("__main__", path)
         code = compile(loader.get_data(path), path, "exec", dont_inherit=True)
     assert code is not None
-    vars(main).update(__file__=path, __cached__=None, __loader__=loader)
+    vars(main).update(__file__=path, __loader__=loader)
+    if sys.version_info < (3, 15):
+        vars(main).update(__cached__=None)
     exec(code, vars(main))
