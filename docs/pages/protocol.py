@@ -5,6 +5,7 @@ The examples are executed as the page is made, so that they are true. A test fai
 
 from __future__ import annotations
 
+import logging
 import math
 import sys
 from collections.abc import Iterator
@@ -173,6 +174,8 @@ def page() -> str:
 
 
 if __name__ == "__main__":
+    # The page shows refused commands, too; a hint for each is for people.
+    logging.getLogger("kiks").setLevel(logging.ERROR)
     if "--check" in sys.argv:
         if PAGE.read_text(encoding="utf-8") != page():
             sys.exit(f"{PAGE.name} must be what the command table says, but is not. Run make docs.")

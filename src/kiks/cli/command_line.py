@@ -12,7 +12,6 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from kiks.errors import ParameterError, nearest, shown
-from kiks.model.shipped import demonstrations, shipped_arenas
 
 UsageError: Any = typer.BadParameter.__base__
 """The base of all errors of the library that reads the command line."""
@@ -40,6 +39,8 @@ class Group(TyperGroup):
         """Find the command."""
         if args[0] in self.commands or ctx.resilient_parsing or args[0].startswith("-"):
             return super().resolve_command(ctx, args)
+        from kiks.model.shipped import demonstrations, shipped_arenas
+
         known = ["help", *self.commands, *_options(self)]
         if opening := _opening(Path(args[0])):
             known = [opening]
@@ -92,6 +93,8 @@ def _said(error: Any, text: str, command: Any, args: list[str], path: str) -> st
     if option:
         return f"{option} must have a value after it, but there is none. {how}"
     if extra := re.search(r"extra argument\S* \((.*)\)", text):
+        from kiks.model.shipped import shipped_arenas
+
         takes = " ".join(command.collect_usage_pieces(None))
         known = _options(command)
         known += [f"--arena {arena}" for arena in shipped_arenas()] if "--arena" in known else []

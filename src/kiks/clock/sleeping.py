@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import logging
 import sys
+from contextlib import suppress
+from pathlib import Path
 from time import perf_counter, process_time
-from types import CodeType
+from types import CodeType, FrameType
 from typing import Protocol
 from weakref import WeakSet, finalize
 
@@ -18,6 +20,9 @@ IDLE_S = 1.0
 
 FRAMES_MAX = 10
 """Most calls of the program that are looked at."""
+
+SCHEDULED = Path("/proc/self/schedstat")
+"""Where Linux says how long the first thread of this process has waited for a processor."""
 
 _log = logging.getLogger("kiks.program")
 _watched: WeakSet[object] = WeakSet()
@@ -34,21 +39,33 @@ def watch_sleeps(simulation: object, clock: Clock) -> None:
     if simulation in _watched:
         return
     _watched.add(simulation)
-    frame, codes = sys._getframe(1), []
+    frame: FrameType | None = sys._getframe(1)
+    codes: list[CodeType] = []
     while frame is not None and len(codes) < FRAMES_MAX:
         if str(frame.f_globals.get("__name__")).partition(".")[0] not in ("kiks", "serial"):
             codes.append(frame.f_code)
-        frame = frame.f_back  # type: ignore[assignment]
+        frame = frame.f_back
     if any(map(_names_sleep, codes)):
-        finalize(simulation, _compare, clock, clock.now_ns, perf_counter(), process_time())
+        finalize(simulation, _compare, clock, clock.now_ns, _idle_s())
 
 
 def _names_sleep(code: CodeType) -> bool:
     return "sleep" in code.co_names or any(_names_sleep(each) for each in code.co_consts if isinstance(each, CodeType))
 
 
-def _compare(clock: Clock, begin_ns: int, begin_s: float, computed_s: float) -> None:
-    idle_s, simulated_s = perf_counter() - begin_s - process_time() + computed_s, (clock.now_ns - begin_ns) * 1e-9
+def _idle_s() -> float:
+    """Return for how long the program has waited, beside a time that stays the same [s].
+
+    On a busy computer it also waits for a processor, which Linux counts (Documentation/scheduler/sched-stats.rst).
+    """
+    queued_ns = 0
+    with suppress(OSError, ValueError, IndexError):
+        queued_ns = int(SCHEDULED.read_text(encoding="ascii").split()[1])
+    return perf_counter() - process_time() - queued_ns * 1e-9
+
+
+def _compare(clock: Clock, begin_ns: int, begin_s: float) -> None:
+    idle_s, simulated_s = _idle_s() - begin_s, (clock.now_ns - begin_ns) * 1e-9
     if idle_s > max(IDLE_S, 2 * simulated_s):
         _log.warning(
             "the program has waited for %.0f s, and %.1f s have passed in its world: time.sleep lets no simulated time "
