@@ -230,14 +230,6 @@ def lonely(tmp_path: Path) -> Path:
     return tmp_path / "lonely.mcap"
 
 
-def test_a_run_without_a_robot_says_so(lonely: Path) -> None:
-    found = Tags(page_of(lonely, lonely.parent))
-    assert found.text.count("There was no robot in this run.") == 1
-    assert "no robot" in found.text
-    assert [attrs["class"] for tag, attrs in found.tags if tag == "figure"] == ["paths"]
-    assert "The wire" not in found.text
-
-
 def test_mistakes_are_told(short: Path, tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match=r"robot must be .*from 1 to 1"):
         page_of(short, tmp_path, robot=2)
@@ -389,6 +381,8 @@ def test_narrow_pages_and_pages_without_time_or_robots_fit(tmp_path, rich: Files
         )
     page = visit(page_of(lonely, lonely.parent))
     assert "There was no robot in this run." in page.locator("#monitor").inner_text()
+    assert page.locator("figure").get_attribute("class") == "paths"  # the only one
+    assert page.get_by_text("The wire").count() == 0
     assert not any(page.locator(name).is_visible() for name in ("#robot", "#follow"))
     page.evaluate("kiksPage.player.seek(kiksPage.feed.end_s)")
     page.wait_for_function("() => kiksPage.player._shown_s === kiksPage.feed.end_s")
