@@ -211,13 +211,19 @@ def test_frames_keep_to_the_recording_where_the_run_differs(short: Path, monkeyp
     assert "checkpoints differ" in Tags(page_of(short, tmp_path)).text
 
 
-def test_what_a_killed_run_has_written_becomes_a_page(short: Path, tmp_path: Path) -> None:
+def test_what_a_killed_run_has_written_becomes_a_page_and_mistakes_get_a_clear_error(
+    short: Path, tmp_path: Path
+) -> None:
     cut = tmp_path / "cut.mcap"
     last = McapReader(short).chunks[-1]
     cut.write_bytes(short.read_bytes()[: last.offset + last.length])
     found = Tags(page_of(cut, tmp_path))
     assert "was killed" in found.text
     assert f"{Recording(cut).duration_s:.3f} s of simulated time" in found.text
+    with pytest.raises(ParameterError, match=r"robot must be .*from 1 to 1"):
+        page_of(cut, tmp_path, robot=2)
+    with pytest.raises(ParameterError, match="a page must"):
+        save_page(Recording(cut), tmp_path / "none" / "page.html")
 
 
 @pytest.fixture
@@ -228,13 +234,6 @@ def lonely(tmp_path: Path) -> Path:
         sim.move_body(sim.add_ball(100, 100), 100, 100, speed_mm_s=100.0)
         sim.run(2.0)
     return tmp_path / "lonely.mcap"
-
-
-def test_mistakes_are_told(short: Path, tmp_path: Path) -> None:
-    with pytest.raises(ParameterError, match=r"robot must be .*from 1 to 1"):
-        page_of(short, tmp_path, robot=2)
-    with pytest.raises(ParameterError, match="a page must"):
-        save_page(Recording(short), tmp_path / "none" / "page.html")
 
 
 def test_a_bundle_takes_no_module_that_it_does_not_understand(tmp_path: Path) -> None:
