@@ -211,13 +211,19 @@ def test_frames_keep_to_the_recording_where_the_run_differs(short: Path, monkeyp
     assert "checkpoints differ" in Tags(page_of(short, tmp_path)).text
 
 
-def test_what_a_killed_run_has_written_becomes_a_page(short: Path, tmp_path: Path) -> None:
+def test_what_a_killed_run_has_written_becomes_a_page_and_mistakes_get_a_clear_error(
+    short: Path, tmp_path: Path
+) -> None:
     cut = tmp_path / "cut.mcap"
     last = McapReader(short).chunks[-1]
     cut.write_bytes(short.read_bytes()[: last.offset + last.length])
     found = Tags(page_of(cut, tmp_path))
     assert "was killed" in found.text
     assert f"{Recording(cut).duration_s:.3f} s of simulated time" in found.text
+    with pytest.raises(ParameterError, match=r"robot must be .*from 1 to 1"):
+        page_of(cut, tmp_path, robot=2)
+    with pytest.raises(ParameterError, match="a page must"):
+        save_page(Recording(cut), tmp_path / "none" / "page.html")
 
 
 @pytest.fixture
@@ -228,21 +234,6 @@ def lonely(tmp_path: Path) -> Path:
         sim.move_body(sim.add_ball(100, 100), 100, 100, speed_mm_s=100.0)
         sim.run(2.0)
     return tmp_path / "lonely.mcap"
-
-
-def test_a_run_without_a_robot_says_so(lonely: Path) -> None:
-    found = Tags(page_of(lonely, lonely.parent))
-    assert found.text.count("There was no robot in this run.") == 1
-    assert "no robot" in found.text
-    assert [attrs["class"] for tag, attrs in found.tags if tag == "figure"] == ["paths"]
-    assert "The wire" not in found.text
-
-
-def test_mistakes_are_told(short: Path, tmp_path: Path) -> None:
-    with pytest.raises(ParameterError, match=r"robot must be .*from 1 to 1"):
-        page_of(short, tmp_path, robot=2)
-    with pytest.raises(ParameterError, match="a page must"):
-        save_page(Recording(short), tmp_path / "none" / "page.html")
 
 
 def test_a_bundle_takes_no_module_that_it_does_not_understand(tmp_path: Path) -> None:
@@ -389,6 +380,8 @@ def test_narrow_pages_and_pages_without_time_or_robots_fit(tmp_path, rich: Files
         )
     page = visit(page_of(lonely, lonely.parent))
     assert "There was no robot in this run." in page.locator("#monitor").inner_text()
+    assert page.locator("figure").get_attribute("class") == "paths"  # the only one
+    assert page.get_by_text("The wire").count() == 0
     assert not any(page.locator(name).is_visible() for name in ("#robot", "#follow"))
     page.evaluate("kiksPage.player.seek(kiksPage.feed.end_s)")
     page.wait_for_function("() => kiksPage.player._shown_s === kiksPage.feed.end_s")

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from kiks.export.pictures import Picture
 from kiks.recording.analysis import Lines
 from kiks.recording.recording import Recording
-from kiks.recording.rerun import Piece, heard, run_again
+from kiks.recording.rerun import Piece, run_again, shared_with
 from kiks.recording.tables import TABLES, Table, TableParts
 from kiks.sim.wire_log import TimeShares
 
@@ -36,7 +36,7 @@ def findings_of(recording: Recording, pieces: Iterable[Piece] | None = None) -> 
     """
     log = recording.log
     parts, lines = TableParts(TABLES), Lines(recording.robots)
-    pieces = heard(run_again(log) if pieces is None else pieces, parts.add, lines.add)
+    pieces = shared_with(run_again(log) if pieces is None else pieces, parts.add, lines.add)
     picture = Picture.of_recording(recording, log.end_ns, pieces)
     for _ in pieces:  # the picture may be finished before the last one
         pass

@@ -80,11 +80,11 @@ def run_again(
         )
 
 
-def heard(pieces: Iterable[Piece], *hear: Callable[[Piece], None]) -> Iterator[Piece]:
-    """Yield the pieces of a run; functions hear each of them before, so that one run is enough for all of them."""
+def shared_with(pieces: Iterable[Piece], *takers: Callable[[Piece], None]) -> Iterator[Piece]:
+    """Yield the pieces of a run, and call functions with each of them before: one run is enough for all of them."""
     for piece in pieces:
-        for each in hear:
-            each(piece)
+        for take in takers:
+            take(piece)
         yield piece
 
 
