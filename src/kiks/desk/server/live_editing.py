@@ -304,13 +304,18 @@ class Editing:
         now_ns = self._desk.sim.now_ns
         return [each for each in reversed(self._moments) if each.time_ns <= now_ns]
 
-    def _recall(self, known: tuple[Any, ...]) -> None:
-        """Go back to the history of a world that goes on from the past; it is empty in any other unknown world."""
+    def _recall(self, known: tuple[Any, ...], count: int) -> None:
+        """Go back to the history of a world that goes on from the past; it is empty in any other unknown world.
+
+        Args:
+            known: What is known of the world.
+            count: How many things it has.
+        """
         before = [] if self._is_known else self._earlier()
-        found = next((each for each in before if each.known == _lasting(known)), None)
+        here = (_lasting(known), count)
+        found = next((each for each in before if (each.known, len(each.numbers)) == here), None)
         if found is None:
-            things = known[0].robot_count + len(known[2]) + known[3]
-            self._numbers = [next(self._fresh) for _ in range(things)]
+            self._numbers = [next(self._fresh) for _ in range(count)]
             self._undoable.clear()
             self._redoable.clear()
         else:
@@ -329,7 +334,7 @@ class Editing:
         robots = [Robot(*start, robot) for start, robot in zip(arena.starts, project.robots, strict=False)]
         things: list[Thing] = [*robots, *arena.bodies, *arena.lamps]
         if known != self._known or len(things) != len(self._numbers):
-            self._recall(known)
+            self._recall(known, len(things))
         walls = replace(arena, starts=(), balls=(), cylinders=(), lamps=())
         return Content(walls, dict(zip(self._numbers, things, strict=True)))
 
