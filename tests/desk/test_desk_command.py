@@ -165,7 +165,7 @@ def test_served_robots_on_a_desk(thinking: str, tmp_path: Path) -> None:
             (("--folder", "nowhere"), "--folder must be a folder"),
             (("--host", "192.0.2.1"), "the desk must be able to listen"),
             (("--arena", "nowhere.kiks"), "nowhere.kiks"),
-            (("--robots", "3", "--robot", "khepera", "--robot", "khepera_ii"), "--robot must name one kind for all"),
+            (("--robots", "3", "--robot", "khepera", "--robot", "khepera_ii"), "robot must name one kind for all"),
             (("--speed", "-1"), "speed must be at least 0.001, but it was -1"),
             (("--host", "no such host"), "the desk must be able to listen"),
         ],

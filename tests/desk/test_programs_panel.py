@@ -43,13 +43,10 @@ def test_program_is_written_saved_run_and_stopped(visitor: Visitor) -> None:
     visitor.tab("wire")
     expect(visitor.at("share-link")).not_to_contain_text("Link 0.0 %")
     visitor.send("H")
-    visitor.told("line of robot 1 must be free")
+    expect(visitor.at("console-log")).to_contain_text("← h,")  # between two commands of the program
     visitor.tab("programs")
     visitor.click("stop", shows={"programs": "mine.py on robot 1: stopped"})
     visitor.until(lambda: visitor.setpoints() == [0, 0])
-    visitor.tab("wire")
-    visitor.send("H")
-    expect(visitor.at("console-log")).to_contain_text("← h,")
 
 
 def test_a_program_that_ran_is_saved_with_the_project_and_shown_when_that_is_opened(visitor: Visitor) -> None:
