@@ -9,7 +9,7 @@ from __future__ import annotations
 import logging
 import sys
 from time import perf_counter, process_time
-from types import CodeType
+from types import CodeType, FrameType
 from typing import Protocol
 from weakref import WeakSet, finalize
 
@@ -34,11 +34,12 @@ def watch_sleeps(simulation: object, clock: Clock) -> None:
     if simulation in _watched:
         return
     _watched.add(simulation)
-    frame, codes = sys._getframe(1), []
+    frame: FrameType | None = sys._getframe(1)
+    codes: list[CodeType] = []
     while frame is not None and len(codes) < FRAMES_MAX:
         if str(frame.f_globals.get("__name__")).partition(".")[0] not in ("kiks", "serial"):
             codes.append(frame.f_code)
-        frame = frame.f_back  # type: ignore[assignment]
+        frame = frame.f_back
     if any(map(_names_sleep, codes)):
         finalize(simulation, _compare, clock, clock.now_ns, perf_counter(), process_time())
 
