@@ -42,7 +42,7 @@ def kopen(settings: Sequence[float]) -> Reference:
         >>> kclose(ref)
     """
     given: object = settings
-    values = None if isinstance(given, str) else check_numbers("settings", given).tolist()
+    values: Any = None if isinstance(given, str) else check_numbers("settings", given).tolist()
     is_list = isinstance(values, list) and 1 <= len(values) <= 3
     if not is_list or isinstance(values[0], list) or abs(values[0]) > 9999 or any(each % 1 for each in values[:2]):
         raise ParameterError(
