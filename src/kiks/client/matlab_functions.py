@@ -41,8 +41,8 @@ def kopen(settings: Sequence[float]) -> Reference:
         'd'
         >>> kclose(ref)
     """
-    # A text is a sequence of texts.
-    values = None if isinstance(settings, str) else check_numbers("settings", settings).tolist()  # type: ignore[unreachable]
+    given: object = settings
+    values: Any = None if isinstance(given, str) else check_numbers("settings", given).tolist()
     is_list = isinstance(values, list) and 1 <= len(values) <= 3
     if not is_list or isinstance(values[0], list) or abs(values[0]) > 9999 or any(each % 1 for each in values[:2]):
         raise ParameterError(
