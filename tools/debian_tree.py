@@ -2,11 +2,11 @@
 
     python tools/debian_tree.py trixie make demo
     python tools/debian_tree.py trixie make test
-    python tools/debian_tree.py forky --packages python3.15-venv,python3.15-dev,gcc,libc6-dev make interpreters
+    python tools/debian_tree.py --packages python3.15-venv,python3.15-dev,gcc,libc6-dev forky make interpreters
 
 They start in a copy of the last commit. The packages come from where this system's come from. A new system takes about
 two minutes, 0.4 GB for itself and 1 to 4 GB for what KiKS needs. It is deleted at the end, unless it has been given a
-folder by `--keep`: there, a second command takes it as it is.
+folder by `--keep`: there, a second command takes it as it is. Options stand before the suite.
 """
 
 from __future__ import annotations
