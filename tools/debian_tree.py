@@ -2,11 +2,11 @@
 
     python tools/debian_tree.py trixie make demo
     python tools/debian_tree.py trixie make test
-    python tools/debian_tree.py forky --packages python3.15-venv,python3.15-dev,gcc,libc6-dev make interpreters
+    python tools/debian_tree.py --packages python3.15-venv,python3.15-dev,gcc,libc6-dev forky make interpreters
 
 They start in a copy of the last commit. The packages come from where this system's come from. A new system takes about
 two minutes, 0.4 GB for itself and 1 to 4 GB for what KiKS needs. It is deleted at the end, unless it has been given a
-folder by `--keep`: there, a second command takes it as it is.
+folder by `--keep`: there, a second command takes it as it is. Options stand before the suite.
 """
 
 from __future__ import annotations
@@ -26,7 +26,8 @@ NEEDED = "ca-certificates,make,python3,python3-venv"
 """What a person must have to type README's first command; the command itself asks for the rest."""
 SCRIPT = "/usr/share/debootstrap/scripts/sid"
 """How each Debian is made; debootstrap does not know the names of later ones."""
-NETWORK = ("/etc/resolv.conf", "/etc/hosts", "/etc/ssl/certs/ca-certificates.crt", "/etc/pip.conf", "/etc/xdg/pip")
+CERTIFICATES = "/etc/ssl/certs/ca-certificates.crt"
+NETWORK = ("/etc/resolv.conf", "/etc/hosts", CERTIFICATES, "/etc/pip.conf", "/etc/xdg/pip")
 """How this system reaches the network and Python's packages."""
 MOUNTS = (
     "mount --make-rprivate / && mount -t proc proc {tree}/proc && mount --rbind /dev {tree}/dev && "
@@ -63,6 +64,8 @@ def make_tree(tree: Path, suite: str, packages: str) -> None:
 def run(tree: Path, command: list[str]) -> int:
     """Run a command in the tree's copy of KiKS; return its exit status."""
     environment = {"HOME": "/root", "LANG": "C.UTF-8", "PATH": "/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin"}
+    # uv trusts the system's certificates only if it is given them.
+    environment["SSL_CERT_FILE"] = CERTIFICATES
     words = ["unshare", "--mount", "sh", "-c", MOUNTS.format(tree=tree), "sh", *command]
     return subprocess.run(words, env=environment, check=False).returncode
 
