@@ -164,7 +164,7 @@ def test_lecturer_saves_a_world_as_an_exercise_and_opens_it(visitor: Visitor, tm
     visitor.picture("save-as-exercise-390")
     visitor.page.set_viewport_size({"width": 1366, "height": 768})
     visitor.at("exercise-name").fill("find")
-    visitor.click("dialog-yes", told="Saved as find.kiks and find-students.kiks.")
+    visitor.click("dialog-yes", told="Saved as find.kiks and find-students.kiks in ")
 
     made = Project.load(tmp_path / "find.kiks")
     assert made.exercise == Exercise("Find it", text=TEXT, template=DRIVE)

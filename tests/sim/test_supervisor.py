@@ -65,7 +65,7 @@ def test_a_mistake_is_explained_and_changes_nothing(sim):
     for act, words in (
         (lambda _: Simulation(robots=3, robot=["khepera", "khepera_ii"]), "one for each of 3 robots, but it named 2"),
         (lambda _: Simulation(robot=[]), "robots must be a whole number from 1 to 1000, but it was 0"),
-        (lambda sim: Simulation().reset(sim.checkpoint()), "checkpoint must be of 1 robots, but it was of 2"),
+        (lambda sim: Simulation().reset(sim.checkpoint()), "checkpoint must be of 1 robot, but it was of 2"),
         (lambda sim: sim.add_robot("kheperra"), "robot must be one of"),
         (lambda sim: sim.add_ball(20, 300), "ball must be free, but at .* a wall is 22.0 mm inside it"),
         (lambda sim: sim.add_cylinder(500, 300), "robot 1 is 4[23].. mm inside it"),

@@ -436,10 +436,11 @@ class _LabelledWriter(OutputWriter):
     def __init__(self, labels: Labels, number: int, label: str) -> None:
         self._labels = labels
         self.pause_s = PROMPT_S if any(labels.are_terminals.values()) else None
-        plain, colour = f"{label} | ".encode(errors="replace") if label else b"", _COLOURS[(number - 1) % len(_COLOURS)]
+        plain, colour = f"{label} |".encode(errors="replace") if label else b"", _COLOURS[(number - 1) % len(_COLOURS)]
         has_colours = not os.environ.get("NO_COLOR") and os.environ.get("TERM") != "dumb"
+        coloured = b"\033[%dm%b\033[0m" % (colour, plain)
         self._heads = {
-            is_error: b"\033[%dm%b\033[0m" % (colour, plain) if has_colours and is_terminal and plain else plain
+            is_error: (coloured if has_colours and is_terminal else plain) + b" " if plain else b""
             for is_error, is_terminal in labels.are_terminals.items()
         }
 

@@ -54,7 +54,7 @@ class Drags:
         >>> hands = Drags(sim)
         >>> hands.grab("viewer", "robot", 0)
         >>> hands.move("viewer", 900, 250)
-        >>> [round(value) for value in sim.pose(1)[:2]]
+        >>> [int(value) for value in sim.pose(1)[:2]]
         [462, 250]
     """
 

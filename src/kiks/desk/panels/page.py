@@ -133,7 +133,7 @@ class Page:
         split = round(self._halves.value, 1)
         with_props(self._edge, aria_valuenow=f"{split:.0f}")
         remember("split", split)
-        ui.run_javascript(f"document.body.style.setProperty('--desk-split', {split})")
+        ui.query("body").style(f"--desk-split: {split}")
 
     def _build_tabs(self, feed: str) -> None:
         """Build the tabs beside the arena; the panel of each is built when it is first opened."""

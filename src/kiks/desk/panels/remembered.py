@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 from nicegui import ui
 
 YEAR_S = 365 * 24 * 3600
@@ -16,4 +18,7 @@ def remembered(name: str) -> str:
 
 def remember(name: str, value: object) -> None:
     """Let the browser of this page remember a word or a number."""
-    ui.run_javascript(f"document.cookie = 'kiks-{name}={value}; path=/; max-age={YEAR_S}; samesite=lax'")
+    # A browser runs this text: nothing that comes from outside may be in it.
+    assert re.fullmatch(r"[\w.-]+", f"{name}{value}", re.ASCII)
+    code = f"document.cookie = 'kiks-{name}={value}; path=/; max-age={YEAR_S}; samesite=lax'"
+    ui.run_javascript(code)
