@@ -13,7 +13,20 @@ ROOT = Path(kiks.__file__).parent
 
 # Each folder or file may import those that stand before it, and itself.
 LAYERS = [
-    *("version", "upwards", "errors", "units", "ending", "model", "engine", "control", "firmware", "clock", "sim"),
+    *(
+        "version",
+        "upwards",
+        "errors",
+        "unknown_names",
+        "units",
+        "ending",
+        "model",
+        "engine",
+        "control",
+        "firmware",
+        "clock",
+        "sim",
+    ),
     *("recording", "ports", "script", "client", "batch", "export", "learn", "controllers", "measures", "tasks", "fit"),
     *("trials", "desk", "toolbox", "cli"),
 ]

@@ -19,7 +19,7 @@ from kiks.version import __version__ as __version__  # before all others, becaus
 import lazy_loader
 import serial  # noqa: TID253  (pyserial has to be told where our plug-in is)
 
-from kiks.errors import hinting as _hinting
+from kiks.unknown_names import hinting as _hinting
 
 _get, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)  # the names of __init__.pyi
 __getattr__ = _hinting(__name__, __all__, _get)

@@ -8,10 +8,8 @@ from __future__ import annotations
 
 import importlib
 import re
-import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable
 from contextlib import suppress
-from opcode import opmap
 from os.path import commonprefix
 from pathlib import Path
 from typing import Any
@@ -154,29 +152,6 @@ def nearest_file(path: Path, known: Iterable[str] = ()) -> str:
         names = [str(folder / found)] if found else []
         return nearest(str(path), [*names, *known])
     return nearest(str(path), known)
-
-
-def hinting(module: str, names: Sequence[str], get: Callable[[str], Any] | None = None) -> Callable[[str], Any]:
-    """Return the `__getattr__` of a module that says which of its names was meant.
-
-    Python does so itself, but for `from MODULE import NAME` only from 3.12 on.
-
-    Args:
-        module: Its name.
-        names: Its public names.
-        get: Returns what a name stands for, or raises an AttributeError; no other names if left out.
-    """
-
-    def find(name: str) -> Any:
-        if get is not None and name in names:
-            return get(name)
-        public = ".".join(dict.fromkeys((module.partition(".")[0], module.rpartition(".")[2])))
-        caller = sys._getframe(1)
-        if caller.f_code.co_code[caller.f_lasti] == opmap["IMPORT_FROM"]:
-            raise ImportError(f"cannot import name {name!r} from {public!r}.{nearest(name, names)}")
-        raise AttributeError(f"module {public!r} has no attribute {name!r}", name=name, obj=sys.modules[module])
-
-    return find
 
 
 def installing(extra: str) -> str:

@@ -189,7 +189,7 @@ def test_a_desk_behind_a_proxy_at_a_path_draws_and_is_dragged(kind: str, tmp_pat
         visitor.drag((150, 200), (250, 250))
         assert visitor.sim.pose(1)[:2] == pytest.approx((250, 250), abs=1)
         visitor.tab("wire")  # a part of the page that NiceGUI's own connection brings
-        # Without the proxy's address, nothing but names of this computer was let in.
+        # A browser of this computer needs no proxy.
         open_page(new_page(), SERVER.url_for_once(shown.gateway.number))
 
 

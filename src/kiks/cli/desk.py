@@ -13,7 +13,7 @@ import typer
 
 from kiks.cli.engine_start import ready_engine
 from kiks.cli.job import Job, job_of
-from kiks.cli.options import Address, World
+from kiks.cli.options import Address, World, public_address_of
 from kiks.cli.record import RecordFile, recorded
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import ParameterError
@@ -69,9 +69,8 @@ def desk(
     Example: kiks desk --arena maze
     """
     from kiks.desk.server.access import LOOPBACK
-    from kiks.desk.server.public_address import public_address
 
-    public = None if address is None else public_address(address)
+    public = public_address_of(address)
     words = program or []
     job = job_of(words[0] if words else None, words[1:], world, needs_program=False, fills_starts=True)
     speed = job.project.speed if speed is None else speed or None

@@ -10,7 +10,7 @@ import typer
 
 from kiks.cli.desk import open_desk
 from kiks.cli.engine_start import ready_engine
-from kiks.cli.options import Address, Silence, World, say, show_log
+from kiks.cli.options import Address, Silence, World, public_address_of, say, show_log
 from kiks.cli.outputs import has_results, leave_out, tell_results
 from kiks.cli.record import RecordFile, recorded, tell_run
 from kiks.errors import ParameterError, shown
@@ -70,14 +70,13 @@ def host(
     from kiks.desk.server.access import LOOPBACK
     from kiks.desk.server.desk import Desk, usual_programs
     from kiks.desk.server.players import Players
-    from kiks.desk.server.public_address import public_address
     from kiks.desk.server.server import SERVER
     from kiks.ports.program_process import commands_of, supervisor_of
     from kiks.ports.program_scheduler import check_policy
     from kiks.sim.from_project import simulation_of, with_kinds
 
     show_log()
-    public = None if address is None else public_address(address)
+    public = public_address_of(address)
     read, home = world.project(project, programs=players or 0, fills_starts=True)
     robots = range(1, (players or len(read.robots)) + 1)
     policy = thinking or read.thinking

@@ -21,6 +21,7 @@ from kiks.model.checks import ROBOTS_MAX
 from kiks.model.package import where_from
 
 if TYPE_CHECKING:
+    from kiks.desk.server.public_address import PublicAddress
     from kiks.model.arena import Arena
     from kiks.model.project import Project
     from kiks.ports.program_process import Command
@@ -34,6 +35,13 @@ SeedOrOwn = Annotated[
     int | None,
     typer.Option(help="Seed: the same seed, the same run; the own one of a project or champion, else 0.", min=0),
 ]
+
+
+def public_address_of(address: str | None) -> PublicAddress | None:
+    """Read --address."""
+    from kiks.desk.server.public_address import public_address
+
+    return None if address is None else public_address(address)
 
 
 def arena_names(incomplete: str) -> list[str]:

@@ -10,7 +10,7 @@ import typer
 
 from kiks.cli.desk import wait_for
 from kiks.cli.engine_start import ready_engine
-from kiks.cli.options import Address, Trusted
+from kiks.cli.options import Address, Trusted, public_address_of
 from kiks.ending import end_as_with_ctrl_c
 
 
@@ -41,11 +41,10 @@ def room(
     """
     from kiks.desk.room.entrance import check_code
     from kiks.desk.room.names import read_names
-    from kiks.desk.server.public_address import public_address
     from kiks.model.project import Project, project_file
 
     names, code = read_names(students), check_code(code) if code is not None else ""
-    public = None if address is None else public_address(address)
+    public = public_address_of(address)
     project, home = Project.load(exercise), project_file(exercise).parent
     ready_engine()
     from kiks.desk.room.page import open_room

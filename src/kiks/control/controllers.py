@@ -44,9 +44,10 @@ from kiks.control.senses import check_senses, named, reading_count, recipes_for
 from kiks.engine.compiling import kernel
 from kiks.engine.numbers import tanh
 from kiks.engine.simd.stack_arrays import stack_floats
-from kiks.errors import ParameterError, hinting, shown
+from kiks.errors import ParameterError, shown
 from kiks.model.checks import check_count, check_kind
 from kiks.model.data_file import Number, OneOf, Rule, Switch, Whole, adapter, check
+from kiks.unknown_names import hinting
 
 __all__ = [
     "collector",

@@ -17,11 +17,12 @@ from pydantic import BeforeValidator, Field
 from kiks.control.arguments import made_once
 from kiks.control.measure import Measure, measure
 from kiks.engine.compiling import kernel
-from kiks.errors import ParameterError, hinting
+from kiks.errors import ParameterError
 from kiks.model.arena import Arena
 from kiks.model.checks import check_kind, check_number
 from kiks.model.data_file import Number, OneOf, Text, Whole, as_list
 from kiks.model.robot import SENSOR_COUNT
+from kiks.unknown_names import hinting
 
 __all__ = [
     "avoidance",

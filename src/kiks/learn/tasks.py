@@ -13,7 +13,7 @@ from kiks.batch.loop_timing import Milliseconds
 from kiks.control.controller import Controller
 from kiks.control.controllers import Recipe, controller_of
 from kiks.control.recipes import module_in
-from kiks.errors import KiksError, ParameterError, hinting, nearest_file, shown
+from kiks.errors import KiksError, ParameterError, nearest_file, shown
 from kiks.learn.classic_tasks import (
     floreano_mondada_1994,
     floreano_mondada_1996,
@@ -29,6 +29,7 @@ from kiks.model.atomic_files import inside, path_of
 from kiks.model.checks import ROBOTS_MAX
 from kiks.model.data_file import OneOf, Rule, Text, Whole, check, parse_toml, read_file, record
 from kiks.model.robot import robot_names
+from kiks.unknown_names import hinting
 
 __all__ = [
     "TASKS",

@@ -378,8 +378,8 @@ def _with_files_beside(project: Project, folder: Path) -> Project:
 
 def load_arena_file(path: Path) -> Arena:
     """Read an arena that comes with KiKS, or a file: see `Arena.load`."""
-    known = shipped_arenas()
-    if not path.exists() and (not path.suffix or path.stem in known):
+    if not path.exists() and (not path.suffix or path.stem in shipped_arenas()):
+        known = shipped_arenas()
         if path.as_posix() not in known:
             names = ", ".join(name for name in known if "/" not in name)
             advice = where_from(path, nearest_file(path, known).lstrip())

@@ -169,7 +169,8 @@ class PropertiesPanel(Panel):
                 self._selected, self._refused.text = after, ""
         if name in self._fields and self._fields[name].value in taken:  # what has been typed since stays
             self._shown[name] = self._fields[name].value
-            self._in_focus = "" if self._in_focus == name else self._in_focus
+            if self._in_focus == name:
+                self._in_focus = ""
         await (self.show(None) if self._selected is None else self.refresh())
         self._mark()
         self._changed()

@@ -75,6 +75,19 @@ class Showing(Protocol):
         """Return what the board shows of it."""
 
 
+def usual_programs(
+    desk: Desk, sim: Simulation, commands: Sequence[Command | None], gate: Gate, /, **options: Any
+) -> Programs:
+    """Return what runs the programs of a world on a desk, as its project says; with other options of `Programs`."""
+    own: dict[str, Any] = {
+        "thinking": desk.project.thinking,
+        "say": desk.say,
+        "sandbox": desk.sandbox,
+        "keeps_output": True,
+    }
+    return Programs(sim, commands, new_patience=gate.patience, **own | options)
+
+
 class Desk:
     """A world on a desk.
 
@@ -137,7 +150,7 @@ class Desk:
         sandbox: Sandbox | None = None,
         commands: Sequence[Command | None] = (),
         supervisor: Path | None = None,
-        new_programs: NewPrograms = lambda *parts: usual_programs(*parts),
+        new_programs: NewPrograms = usual_programs,
         is_held: bool = False,
         has_old_coordinates: bool = False,
         project_of: Callable[[Arena], Project] = Project.of_arena,
@@ -600,19 +613,6 @@ class Desk:
         _end(self.programs)
         with self.present.sim.lock:
             self.present.sim.loop.gate = None
-
-
-def usual_programs(
-    desk: Desk, sim: Simulation, commands: Sequence[Command | None], gate: Gate, /, **options: Any
-) -> Programs:
-    """Return what runs the programs of a world on a desk, as its project says; with other options of `Programs`."""
-    own: dict[str, Any] = {
-        "thinking": desk.project.thinking,
-        "say": desk.say,
-        "sandbox": desk.sandbox,
-        "keeps_output": True,
-    }
-    return Programs(sim, commands, new_patience=gate.patience, **own | options)
 
 
 class NewsHandler(logging.Handler):
