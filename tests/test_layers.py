@@ -17,6 +17,7 @@ LAYERS = [
         "version",
         "upwards",
         "errors",
+        "meant",
         "unknown_names",
         "units",
         "ending",

@@ -26,7 +26,7 @@ def hinting(module: str, names: Sequence[str], get: Callable[[str], Any] | None 
             return get(name)
         from opcode import opmap
 
-        from kiks.errors import nearest
+        from kiks.meant import nearest
 
         public = ".".join(dict.fromkeys((module.partition(".")[0], module.rpartition(".")[2])))
         caller = sys._getframe(1)

@@ -18,8 +18,9 @@ from kiks.cli.options import Seed, written_folder
 from kiks.cli.outputs import has_results, is_quiet, leave_out, shows_progress, tell_results
 from kiks.cli.record import RecordFile, recorded
 from kiks.ending import end_as_with_ctrl_c
-from kiks.errors import ParameterError, nearest, shown
+from kiks.errors import ParameterError, shown
 from kiks.learn.algorithm_name import AlgorithmName
+from kiks.meant import nearest
 
 if TYPE_CHECKING:
     from kiks.control.controller import Controller

@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 import typer
 
 from kiks.cli.outputs import is_quiet
-from kiks.errors import ParameterError, nearest_file, printable, shown
+from kiks.errors import ParameterError, printable, shown
+from kiks.meant import nearest_file
 from kiks.model.atomic_files import make_folder, path_of
 from kiks.model.checks import ROBOTS_MAX
 from kiks.model.package import where_from

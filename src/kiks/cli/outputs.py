@@ -22,7 +22,8 @@ from typing import Annotated, Any, get_args
 import typer
 
 from kiks.cli.command_line import OneLineCommand
-from kiks.errors import ParameterError, figure, nearest, printable, shown
+from kiks.errors import ParameterError, figure, printable, shown
+from kiks.meant import nearest
 from kiks.model.atomic_files import check_writable, ending_of
 
 # fmt: off

@@ -14,7 +14,8 @@ from kiks.cli.job import demonstration_of
 from kiks.cli.options import SeedOrOwn, Trusted, Workers, print_table, progress_bar, say
 from kiks.cli.outputs import has_results, leave_out, shows_progress, tell_results
 from kiks.ending import end_as_with_ctrl_c
-from kiks.errors import KiksError, ParameterError, counted, nearest_file, printable
+from kiks.errors import KiksError, ParameterError, counted, printable
+from kiks.meant import nearest_file
 
 if TYPE_CHECKING:
     from kiks.trials.submissions import Submission

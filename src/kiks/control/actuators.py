@@ -19,7 +19,8 @@ from kiks.control.compiled_function import caller_of, decorator
 from kiks.control.turret_parts import VIEW, TurretPart, memory_of
 from kiks.engine.compiling import entry, kernel
 from kiks.engine.physics.gripper import ARM_MAX
-from kiks.errors import ParameterError, nearest, shown
+from kiks.errors import ParameterError, shown
+from kiks.meant import nearest
 from kiks.model.checks import check_count
 
 ARGUMENTS = (VIEW, types.float64)

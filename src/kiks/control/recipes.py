@@ -12,7 +12,8 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from kiks.errors import ParameterError, nearest, shown
+from kiks.errors import ParameterError, shown
+from kiks.meant import nearest
 from kiks.model.atomic_files import path_of, program_in
 from kiks.model.data_file import Rule, Text, record
 

@@ -25,7 +25,8 @@ from kiks.engine.sensing.ambient import sense_ambient
 from kiks.engine.sensing.floor import COUNTS, sense_floor
 from kiks.engine.sensing.proximity import make_readers, sense_linked
 from kiks.engine.state import PIXEL_COUNT
-from kiks.errors import ParameterError, nearest, shown
+from kiks.errors import ParameterError, shown
+from kiks.meant import nearest
 from kiks.model.checks import check_count, check_number
 from kiks.model.data_file import check
 from kiks.model.robot import SENSOR_COUNT

@@ -7,12 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from kiks.errors import ParameterError, library, nearest, shown
+from kiks.errors import ParameterError, library, shown
 from kiks.export.kinds import KINDS
 from kiks.export.panel import Panel
 from kiks.export.solid_stage import SolidStage
 from kiks.export.stage import Pixels, Stage
 from kiks.export.video_file import GIF, MP4, VideoFile
+from kiks.meant import nearest
 from kiks.model.atomic_files import ending_of, writing
 from kiks.model.checks import check_count, check_number
 from kiks.recording.moments import moments

@@ -12,7 +12,8 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from kiks.errors import ParameterError, nearest, shown
+from kiks.errors import ParameterError, shown
+from kiks.meant import nearest
 from kiks.model.atomic_files import ending_of
 
 if TYPE_CHECKING:

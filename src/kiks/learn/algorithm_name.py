@@ -7,7 +7,8 @@ import enum
 from collections.abc import Mapping
 from typing import Any
 
-from kiks.errors import ParameterError, nearest, shown
+from kiks.errors import ParameterError, shown
+from kiks.meant import nearest
 
 
 class AlgorithmName(enum.StrEnum):

@@ -14,11 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from kiks.errors import ParameterError, counted, nearest, shown
+from kiks.errors import ParameterError, counted, shown
 from kiks.export.tables import write_parquet
 from kiks.learn.champion import Champion
 from kiks.learn.evolution_log import Folder
 from kiks.learn.task import Axis
+from kiks.meant import nearest
 from kiks.model.atomic_files import path_of
 from kiks.model.checks import check_number
 from kiks.upwards import shown_in_notebooks

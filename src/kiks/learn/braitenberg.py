@@ -9,8 +9,9 @@ import numpy as np
 
 from kiks.control import controllers
 from kiks.control.controller import Controller
-from kiks.errors import ParameterError, nearest, shown
+from kiks.errors import ParameterError, shown
 from kiks.learn.champion import Champion
+from kiks.meant import nearest
 
 
 class _Vehicle(NamedTuple):

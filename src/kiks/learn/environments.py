@@ -24,10 +24,11 @@ from kiks.control.measures import (
     roaming_share,
     wall_following,
 )
-from kiks.errors import ParameterError, nearest, shown
+from kiks.errors import ParameterError, shown
 from kiks.learn import football as game
 from kiks.learn import ready_tasks
 from kiks.learn.task import Task, Watched
+from kiks.meant import nearest
 from kiks.model.arena import Arena, Cylinder, Pose
 from kiks.model.data_file import Number
 

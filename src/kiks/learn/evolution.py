@@ -26,7 +26,7 @@ from typing import Any, TypeGuard
 import numpy as np
 from numpy.typing import ArrayLike
 
-from kiks.errors import ParameterError, counted, nearest, shown
+from kiks.errors import ParameterError, counted, shown
 from kiks.learn import seeds
 from kiks.learn.algorithms import Algorithm, Setting, make_algorithm, whole_name
 from kiks.learn.archive import Archive
@@ -37,6 +37,7 @@ from kiks.learn.finals import FINALISTS, Contender, Finals, Tournament, hold_fin
 from kiks.learn.fingerprint import fingerprints
 from kiks.learn.seeds import seed_for
 from kiks.learn.task import Task
+from kiks.meant import nearest
 from kiks.model.array_checks import check_numbers
 from kiks.model.checks import check_count, check_kind, check_number
 from kiks.upwards import shown_in_notebooks

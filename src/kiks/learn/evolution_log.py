@@ -18,11 +18,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
-from kiks.errors import ParameterError, counted, nearest_file, shown
+from kiks.errors import ParameterError, counted, shown
 from kiks.export.tables import write_parquet
 from kiks.learn.finals import Contender, Finals, Tournament
 from kiks.learn.fingerprint import differing, tell_unseen
 from kiks.learn.task import Axis
+from kiks.meant import nearest_file
 from kiks.model.array_checks import Numbers, read_arrays
 from kiks.model.atomic_files import make_folder, path_of, replace_file
 from kiks.model.data_file import Rule, Text, Whole, check, parse_json, read_file, record

@@ -19,10 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.batch.initial_state import WORLDS_LIMIT
-from kiks.errors import ParameterError, installing, nearest, shown
+from kiks.errors import ParameterError, installing, shown
 from kiks.learn.environments import ENVIRONMENTS, environment_of
 from kiks.learn.episode_batch import SEED_LIMIT, Episodes
 from kiks.learn.task import Task
+from kiks.meant import nearest
 from kiks.model.checks import check_count
 
 try:

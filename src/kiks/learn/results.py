@@ -16,7 +16,7 @@ from pydantic import Field
 
 from kiks.control.controller import Controller
 from kiks.control.senses import AnySense
-from kiks.errors import ParameterError, nearest_file
+from kiks.errors import ParameterError
 from kiks.learn import seeds
 from kiks.learn.evolution import Evolution
 from kiks.learn.evolution_log import IDENTITY, TRIALS, Digest, Folder, check_alike
@@ -25,6 +25,7 @@ from kiks.learn.fingerprint import tell_unseen
 from kiks.learn.seeds import seed_for
 from kiks.learn.statistics import Solved, bootstrap_interval, wilson_interval
 from kiks.learn.task import Task
+from kiks.meant import nearest_file
 from kiks.model.atomic_files import path_of, replace_file
 from kiks.model.data_file import TEXT_MAX, Number, Text, Whole, check, parse_json, read_file, record
 from kiks.model.limits import RESULT_FILE_BYTES_MAX

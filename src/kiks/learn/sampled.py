@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 from kiks.control.senses import Sense, sense
 from kiks.engine.compiling import kernel
 from kiks.engine.numbers import at_instant, draw, sin_cos, stream_of
-from kiks.errors import ParameterError, nearest, shown
+from kiks.errors import ParameterError, shown
+from kiks.meant import nearest
 from kiks.model.arena import Arena
 from kiks.model.array_checks import check_numbers
 from kiks.model.checks import check_number

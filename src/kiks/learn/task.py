@@ -18,13 +18,14 @@ from kiks.control.controller import Controller
 from kiks.control.controllers import SPEED_LIMIT
 from kiks.control.measure import Measure
 from kiks.control.measures import trajectory
-from kiks.errors import ParameterError, counted, nearest, shown
+from kiks.errors import ParameterError, counted, shown
 from kiks.learn.algorithm_name import AlgorithmName, parts_of
 from kiks.learn.champion import Champion
 from kiks.learn.evaluation import Floats, Integers, check_candidates
 from kiks.learn.exam import Exam, world_of
 from kiks.learn.experiment import CLEAR_MM, Experiment, Fitness, fitness_of
 from kiks.learn.fingerprint import fingerprints
+from kiks.meant import nearest
 from kiks.model.arena import Arena, Pose
 from kiks.model.checks import ROBOTS_MAX, check_count, check_number
 from kiks.model.data_file import Number, Rule, Text, Whole, record

@@ -13,7 +13,7 @@ from kiks.batch.loop_timing import Milliseconds
 from kiks.control.controller import Controller
 from kiks.control.controllers import Recipe, controller_of
 from kiks.control.recipes import module_in
-from kiks.errors import KiksError, ParameterError, nearest_file, shown
+from kiks.errors import KiksError, ParameterError, shown
 from kiks.learn.classic_tasks import (
     floreano_mondada_1994,
     floreano_mondada_1996,
@@ -24,6 +24,7 @@ from kiks.learn.classic_tasks import (
 )
 from kiks.learn.ready_tasks import TASKS, avoid, disperse, follow, football, gather, light, maze, pursuit
 from kiks.learn.task import WORLDS_MAX, Seconds, Task
+from kiks.meant import nearest_file
 from kiks.model.arena import Arena
 from kiks.model.atomic_files import inside, path_of
 from kiks.model.checks import ROBOTS_MAX

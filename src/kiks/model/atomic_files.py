@@ -10,7 +10,8 @@ from contextlib import ExitStack, closing, contextmanager, suppress
 from pathlib import Path, PurePosixPath
 from typing import IO, Any, BinaryIO, cast
 
-from kiks.errors import KiksError, ParameterError, nearest, shown
+from kiks.errors import KiksError, ParameterError, shown
+from kiks.meant import nearest
 
 fcntl: Any = None
 with suppress(ModuleNotFoundError):  # Windows has none: there files are written as on a drive without locks

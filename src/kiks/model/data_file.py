@@ -34,7 +34,8 @@ import pydantic.dataclasses
 from pydantic import ConfigDict, Field, Strict, Tag, TypeAdapter, ValidationError
 from pydantic_core import core_schema
 
-from kiks.errors import SHOWN_MAX, KiksError, ParameterError, nearest, nearest_file, printable, shown
+from kiks.errors import SHOWN_MAX, KiksError, ParameterError, printable, shown
+from kiks.meant import nearest, nearest_file
 from kiks.model.limits import DATA_FILE_BYTES_MAX
 from kiks.model.package import where_from
 

@@ -10,7 +10,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from kiks.errors import ParameterError, nearest, shown
+from kiks.errors import ParameterError, shown
+from kiks.meant import nearest
 
 BLACK_REFLECTANCE = 0.02
 """Reflectance of the darkest surface, at brightness 0."""

@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Field, InstanceOf
 
-from kiks.errors import ArenaError, KiksError, ParameterError, counted, nearest, nearest_file, shown
+from kiks.errors import ArenaError, KiksError, ParameterError, counted, shown
+from kiks.meant import nearest, nearest_file
 from kiks.model.arena import MOSTLY_WALL, TURN_ROUND, Arena
 from kiks.model.arena_file import (
     Balls,

@@ -14,7 +14,8 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from kiks.errors import ParameterError, counted, nearest_file, printable, shown
+from kiks.errors import ParameterError, counted, printable, shown
+from kiks.meant import nearest_file
 from kiks.model.arena_file import toml
 from kiks.model.atomic_files import path_of, replace_file
 from kiks.model.checks import ROBOTS_MAX, check_count

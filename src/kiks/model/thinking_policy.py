@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from contextlib import suppress
 
-from kiks.errors import ParameterError, nearest, shown
+from kiks.errors import ParameterError, shown
+from kiks.meant import nearest
 
 _FORMS = "'none', 'fixed:MS', 'live', 'live:FACTOR' or 'replay:FILE'"
 

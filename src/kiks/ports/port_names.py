@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from kiks.errors import LinkError, closest, printable, shown
+from kiks.errors import LinkError, printable, shown
+from kiks.meant import closest
 from kiks.ports.url import find_sim_port, is_elsewhere
 from kiks.sim.simulation import Simulation
 

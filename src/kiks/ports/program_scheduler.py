@@ -29,7 +29,8 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 
 from kiks.clock.patience import Patience
-from kiks.errors import ParameterError, counted, nearest, shown
+from kiks.errors import ParameterError, counted, shown
+from kiks.meant import nearest
 from kiks.sim.read_completion import NEVER_NS
 from kiks.sim.simulation import Simulation
 

@@ -8,7 +8,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qsl, urlsplit
 
-from kiks.errors import LinkError, ParameterError, nearest, shown
+from kiks.errors import LinkError, ParameterError, shown
+from kiks.meant import nearest
 
 if TYPE_CHECKING:
     from kiks.sim.port import VirtualPort

@@ -24,7 +24,8 @@ from mcap.records import Attachment, Chunk, Metadata
 from mcap.stream_reader import StreamReader
 from mcap.writer import CompressionType, Writer
 
-from kiks.errors import ParameterError, nearest_file
+from kiks.errors import ParameterError
+from kiks.meant import nearest_file
 from kiks.model.atomic_files import FileBeside, ending_of, explained, path_of, target_of
 from kiks.model.limits import RECORD_BYTES_MAX
 from kiks.version import __version__

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks import upwards
-from kiks.errors import ParameterError, counted, nearest, shown
+from kiks.errors import ParameterError, counted, shown
+from kiks.meant import nearest
 from kiks.model.checks import check_count, check_number
 from kiks.model.project import Project
 from kiks.recording import tables

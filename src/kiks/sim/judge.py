@@ -12,7 +12,8 @@ import numpy as np
 from kiks.control import measures
 from kiks.control.measure import Measure, Moment
 from kiks.control.senses import AnySense, sense_of
-from kiks.errors import KiksError, ParameterError, nearest, shown
+from kiks.errors import KiksError, ParameterError, shown
+from kiks.meant import nearest
 from kiks.model.arena import Arena
 from kiks.model.checks import check_number
 from kiks.model.formula import Formula, Term

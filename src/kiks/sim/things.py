@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from kiks.engine.scalar_math import sin_cos
 from kiks.engine.scene import enter_worlds
 from kiks.engine.state import BALL, BODY, CYLINDER
-from kiks.errors import ArenaError, KiksError, ParameterError, counted, nearest, shown
+from kiks.errors import ArenaError, KiksError, ParameterError, counted, shown
+from kiks.meant import nearest
 from kiks.model.arena import Arena, Ball, Cylinder, Lamp
 from kiks.model.array_checks import check_numbers
 from kiks.model.checks import check_count, check_heading, check_kind, check_number

@@ -17,7 +17,8 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 
-from kiks.errors import ParameterError, nearest_file, printable, shown
+from kiks.errors import ParameterError, printable, shown
+from kiks.meant import nearest_file
 from kiks.model.atomic_files import explained
 from kiks.ports.program_process import Command
 from kiks.trials.hand_in import HAND_IN_BYTES_MAX, PROGRAM
