@@ -1,12 +1,12 @@
 """What a newcomer mistypes, and the one line that it gets: `slips.txt`."""
 
+import gc
 import logging
 import re
 import traceback
 from pathlib import Path
 
 import pytest
-from tests import forked
 from typer.testing import CliRunner
 
 import kiks
@@ -55,7 +55,8 @@ def of_wire(typed: str, caplog: pytest.LogCaptureFixture) -> str:
 def of_program(typed: str) -> str:
     """Return what `kiks run` says of a program, without the summary of the run."""
     Path("program.py").write_text(typed.removeprefix("program | ").replace("; ", "\n"))
-    said = forked.run("run", "program.py").stderr.splitlines()
+    said = CliRunner().invoke(app, ["run", "program.py"], prog_name="kiks").stderr.splitlines()
+    gc.unfreeze()
     return "\n".join(line.removeprefix("kiks: ") for line in said if not SUMMARY.match(line))
 
 
