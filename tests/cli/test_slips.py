@@ -76,6 +76,7 @@ def test_a_slip_gets_one_line_that_leads(
     for name in ("wander.py", "programs/avoid.py", "run.mcap"):
         Path(name).touch()
     Path("room.toml").write_text("size_mm = [300, 300]\n")
+    Path("lost.kiks").write_text("kiks = 1\n[walls]\nsize_mm = [300, 300]\n[[robot]]\nprogram = 'wandr.py'\n")
     caplog.set_level(logging.INFO, "kiks")
     said = said_of(typed, caplog).replace(str(tmp_path), "HERE")
     assert re.fullmatch(".*".join(map(re.escape, expected.split("..."))), said), said

@@ -14,6 +14,9 @@ from typer.core import TyperCommand, TyperGroup
 from kiks.errors import ParameterError, shown
 from kiks.meant import nearest
 
+ARENAS = (".toml", ".png", ".kad", ".yaml")
+"""Endings of files that an arena may have; none of them is a program's."""
+
 UsageError: Any = typer.BadParameter.__base__
 """The base of all errors of the library that reads the command line."""
 
@@ -43,8 +46,8 @@ class Group(TyperGroup):
         from kiks.model.shipped import demonstrations, shipped_arenas
 
         known = ["help", *self.commands, *_options(self)]
-        if opening := _opening(Path(args[0])):
-            known = [opening]
+        if meant := opening(Path(args[0])):
+            known = [meant]
         elif "info" in self.commands:
             known += [f"info {arena}" for arena in shipped_arenas()]
         else:
@@ -57,10 +60,11 @@ class Group(TyperGroup):
         )
 
 
-def _opening(file: Path) -> str:
+def opening(file: Path) -> str:
     """Return the command for a file that was named without one; empty if there is no such file."""
-    verbs = {".py": "run", ".kiks": "desk", ".mcap": "replay", ".toml": "desk --arena", ".png": "desk --arena"}
-    return f"{verbs[file.suffix]} {file}" if file.suffix in verbs and file.is_file() else ""
+    verbs = {".py": "run", ".kiks": "desk", ".mcap": "replay"} | dict.fromkeys(ARENAS, "desk --arena")
+    verb = verbs.get(file.suffix.lower())
+    return f"{verb} {file}" if verb and file.is_file() else ""
 
 
 def _options(command: Any) -> list[str]:
@@ -77,17 +81,20 @@ def _in_one_line(command: Any, args: list[str], name: str, parent: Any) -> Itera
         if "\n" in (text := error.format_message()):
             raise
         path = f"{parent.command_path} {name}" if parent else name
-        raise ParameterError(_said(error, text.rstrip("."), command, given, path)) from None
+        raise ParameterError(_said(error, text.rstrip("."), command, given, path, parent)) from None
 
 
-def _said(error: Any, text: str, command: Any, args: list[str], path: str) -> str:
+def _said(error: Any, text: str, command: Any, args: list[str], path: str, parent: Any) -> str:
     option, how = getattr(error, "option_name", ""), f"{path} -h shows how."
     if hasattr(error, "possibilities"):
         # Of letters behind one hyphen the library names the first alone.
         option = next((word.partition("=")[0] for word in args if word.startswith(option)), option)
-        homes = [name for name, each in getattr(command, "commands", {}).items() if option in _options(each)]
+        group = command if hasattr(command, "commands") else parent and parent.command
+        homes = [name for name, each in getattr(group, "commands", {}).items() if option in _options(each)]
         home = "run" if "run" in homes else "".join(homes[:1])
-        hint = f" It stands behind its command: {path} {home} {option}." if home else nearest(option, _options(command))
+        hint = nearest(option, _options(command))
+        if home:
+            hint = f" It stands behind its command: {path.removesuffix(f' {command.name}')} {home} {option}."
         return f"An option must be one that {path} -h lists, but {shown(option)} is none.{hint}"
     if option and "not take" in text:
         return f"{option} must stand alone, but a value was given with it. Leave the value out."

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 
+from kiks.cli.command_line import opening
 from kiks.cli.outputs import is_quiet
 from kiks.errors import ParameterError, printable, shown
 from kiks.meant import nearest_file
@@ -26,6 +27,11 @@ if TYPE_CHECKING:
     from kiks.model.arena import Arena
     from kiks.model.project import Project
     from kiks.ports.program_process import Command
+
+OTHERS = (".mcap", ".toml", ".kad", ".yaml", ".png", ".txt", ".csv", ".zip", ".ipynb", ".c", ".java", ".m")
+"""Endings of files that are no programs of Python."""
+
+OTHER_LANGUAGES = "Programs in other languages reach robots by kiks serve."
 
 Seed = Annotated[int, typer.Option(help="Seed: the same seed, the same run.", min=0)]
 Address = Annotated[
@@ -305,11 +311,9 @@ def parse_words(words: list[str]) -> list[Command]:
                 f"a project must come first, but {shown(word)} stands among the programs. Put it before them."
             )
         if Command(Path(word)).file.is_file() and (word.endswith(".py") or not commands):
-            if not word.endswith(".py") and _is_other(Path(word)):
-                raise ParameterError(
-                    f"PROGRAM must be a Python file, but {shown(word)} is none. An arena stands after --arena, and "
-                    "programs in other languages reach robots by kiks serve."
-                )
+            if Path(word).suffix.lower() in OTHERS:
+                hint = f"Did you mean 'kiks {meant}'?" if (meant := opening(Path(word))) else OTHER_LANGUAGES
+                raise ParameterError(f"PROGRAM must be a Python file, but {shown(word)} is none. {hint}")
             commands.append(Command(Path(word)))
         elif len(parts) > 1 and parts[0] == "-m":
             commands.append(module_command(parts[1], parts[2:]))
@@ -328,11 +332,6 @@ def parse_words(words: list[str]) -> list[Command]:
                 f"{nearest_file(Path(word), [*demonstrations(), *(f'--arena {name}' for name in shipped_arenas())])}"
             )
     return commands
-
-
-def _is_other(file: Path) -> bool:
-    """Return whether a file's ending is that of an arena, of a picture or of another language."""
-    return file.suffix.lower() in (".toml", ".kad", ".yaml", ".png", ".ipynb", ".c", ".java", ".m")
 
 
 def _split(word: str) -> list[str]:

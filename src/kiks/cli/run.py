@@ -170,6 +170,8 @@ def run(
     if desk:
         _run_on_desk(job, thinking, Labels(names or [""]), rules, record=record, export=export, waits=not no_wait)
         return
+    for each in filter(None, commands):
+        each.check_file()
     ready = partial(ready_engine, as_needed=is_alone and job.needs_little)
     sim = simulation_of(project, job.home, kinds=job.kinds, thinking=thinking, program_count=len(commands), ready=ready)
     # What is loaded by now stays to the end of the process: no collection looks at it again, not even those at the end,

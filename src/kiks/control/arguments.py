@@ -10,6 +10,7 @@ from collections.abc import Callable
 from functools import lru_cache, wraps
 from typing import Any, Literal, ParamSpec, TypeVar, cast, get_type_hints
 
+from kiks.meant import nearest
 from kiks.model.data_file import record
 
 _Arguments = ParamSpec("_Arguments")
@@ -46,6 +47,11 @@ def checked_call(
 
     @wraps(function)
     def call(*args: _Arguments.args, **named: _Arguments.kwargs) -> _Made:
-        return make(arguments(**signature.bind(*args, **named).arguments))
+        try:
+            given = signature.bind(*args, **named).arguments
+        except TypeError as error:
+            hint = "".join(nearest(name, signature.parameters) for name in named if name not in signature.parameters)
+            raise TypeError(f"{function.__name__}() {error}.{hint}") from None
+        return make(arguments(**given))
 
     return call

@@ -7,7 +7,8 @@ import re
 from kiks.firmware.commands import COMMANDS
 
 _PARAMETERS = {command.letter: command.parameters for command in COMMANDS if command.letter != "T"}
-_BETWEEN = r"[\s,;:=()]*"
+_BETWEEN = r"[\s,;:=()\"']*"
+_LETTER = re.compile(rf"{_BETWEEN}([A-Za-z])(?![A-Za-z])")
 _LINE = re.compile(rf"{_BETWEEN}([A-Za-z])((?:{_BETWEEN}[+-]?[0-9]+(?:\.[0-9]*)?)*){_BETWEEN}(?:\\[rn])*")
 
 
@@ -17,13 +18,14 @@ def hint_for(line: bytes) -> str:
     Example:
         >>> hint_for(b"d,0,0"), hint_for(b"D 5.0 -5.0"), hint_for(b"D,5")
         ("Did you mean 'D,0,0'?", "Did you mean 'D,5,-5'?", "It is written 'D,left,right'.")
-        >>> hint_for(b"forward")
-        ''
+        >>> hint_for(b"D,five,5"), hint_for(b"forward")
+        ("It is written 'D,left,right'.", '')
     """
-    found = _LINE.fullmatch(line.decode("latin-1"))
+    text = line.decode("latin-1")
+    found = _LINE.fullmatch(text) or _LETTER.match(text)
     if found is None or (letter := found[1].upper()) not in _PARAMETERS:
         return ""
-    numbers = [str(round(float(each))) for each in re.findall(r"[+-]?[0-9]+(?:\.[0-9]*)?", found[2])]
-    is_whole = len(numbers) == len(_PARAMETERS[letter])
+    numbers = [str(round(float(each))) for each in re.findall(r"[+-]?[0-9]+(?:\.[0-9]*)?", text)]
+    is_whole = found.re is _LINE and len(numbers) == len(_PARAMETERS[letter])
     written = ",".join([letter, *(numbers if is_whole else _PARAMETERS[letter])])
     return f"Did you mean {written!r}?" if is_whole else f"It is written {written!r}."

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import ast
+import re
 import warnings
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -31,7 +33,20 @@ _NODES = (
     *(ast.UnaryOp, ast.UAdd, ast.USub, ast.Not, ast.BinOp, ast.Add, ast.Sub, ast.Mult, ast.Div),
     *(ast.BoolOp, ast.And, ast.Or, ast.Compare, ast.Lt, ast.LtE, ast.Gt, ast.GtE, ast.Eq, ast.NotEq),
 )
+_NOTATIONS = {"&&": " and ", r"\|\|": " or ", "!(?!=)": " not ", "=>": ">=", "=<": "<=", "(?<![<>=!])=(?!=)": "=="}
+"""What other languages write, and what Python does."""
+
 _EXAMPLE = "Write one such as 'light_mm < 100 and contacts == 0'."
+
+
+def _in_python(text: str) -> str:
+    """Return a formula in the notation of another language as Python writes it; empty if it is in none."""
+    found = re.sub(r"\b(?:AND|OR|NOT)\b", lambda word: word[0].lower(), text)
+    for pattern, instead in _NOTATIONS.items():
+        found = re.sub(pattern, instead, found)
+    with suppress(ParameterError):
+        return Formula(" ".join(found.split())).text if found != text else ""
+    return ""
 
 
 @dataclass(frozen=True)
@@ -87,7 +102,9 @@ class Formula:
             raise
         except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
             reason = error.msg if isinstance(error, SyntaxError) else one_line(error)
-            raise ParameterError(f"must be a formula, but {shown(text)} is none: {reason}. {_EXAMPLE}") from None
+            meant = _in_python(text) if isinstance(error, SyntaxError) else ""
+            advice = f"Did you mean {meant!r}?" if meant else _EXAMPLE
+            raise ParameterError(f"must be a formula, but {shown(text)} is none: {reason}. {advice}") from None
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Formula) and self.text == other.text

@@ -188,6 +188,13 @@ class Project:
         """
         path = project_file(path_of(path))
         if path.suffix.lower() != ".kiks":
+            if path.suffix.lower() in NO_WORLDS or not (path.suffix or path.exists() or str(path) in shipped_arenas()):
+                what = NO_WORLDS.get(path.suffix.lower(), "none")
+                hint = nearest_file(path, shipped_arenas()) if what == "none" else ""
+                raise ArenaError(
+                    "A project must be a file (.kiks), the folder of an exercise or an arena, but "
+                    f"{shown(str(path))} is {what}.{hint} `kiks examples first` copies some."
+                )
             return cls.of_arena(Arena.load(path))
         what = f"Project file {str(path)!r}"
         data = read_file(path, what, bytes_max=PROJECT_FILE_BYTES_MAX, error=ArenaError)
@@ -354,6 +361,9 @@ _READERS: dict[str, Callable[[Path], Arena]] = {
 }
 
 
+NO_WORLDS = {".py": "a program", ".m": "a program", ".mcap": "a recording", ".zip": "an archive", ".txt": "a text"}
+"""Endings of files that are neither a project nor an arena, and what they are."""
+
 EXERCISE_FILE = "exercise.kiks"
 """The project in the folder of an exercise."""
 
@@ -387,6 +397,8 @@ def load_arena_file(path: Path) -> Arena:
             what = f"An arena must be a file or one of {names}, but there is no {shown(str(path))}. {advice}"
             raise ArenaError(what.rstrip())
         path = known[path.as_posix()]
+    if found := NO_WORLDS.get(path.suffix.lower()):
+        raise ArenaError(f"An arena must be an arena file or a picture, but {shown(str(path))} is {found}.")
     read = _READERS.get(path.suffix.lower())
     return _picture_alone(path) if read is None else read(path)
 

@@ -15,7 +15,7 @@ class PortNames:
 
     Args:
         sim: The simulation.
-        by_name: Robots by port name, for all programs.
+        by_name: Robots by port name, for all programs; `ttyUSB0` is `/dev/ttyUSB0`, too.
         programs: Number of programs; the first owns robot 1, and so on.
         are_apart: Whether no program may take the own robot of another one, as in a match.
     """
@@ -84,8 +84,9 @@ class PortNames:
     def _robot(self, name: str, program: int) -> int:
         if name.startswith("kiks:"):
             return self._of_url(name)
-        if name in self._by_name:
-            return self._by_name[name]
+        for mapped in (name, name.removeprefix("/dev/")):
+            if mapped in self._by_name:
+                return self._by_name[mapped]
         if (program, name) not in self._found:
             taken = {*self._by_name.values(), *self._found.values()}
             others = (robot for robot in range(1, self._sim.robot_count + 1) if robot not in self._own)

@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import IO, Any, NamedTuple
 
 from kiks.errors import KiksError, ParameterError, shown
+from kiks.meant import nearest_file
 from kiks.model.atomic_files import program_in
 from kiks.model.project import Project
 from kiks.ports.environment_marks import HASH_SEED
@@ -89,6 +90,7 @@ class Command:
         if not self.file.is_file():
             raise ParameterError(
                 f"a program must be a Python file, but there is none at {str(self.program)!r}. Save it first."
+                f"{nearest_file(self.file)}"
             )
 
 

@@ -280,7 +280,7 @@ def _listen(host: str, port: int, *, or_free: bool = False) -> socket.socket:
         if or_free:
             return _listen(host, 0)
         raise LinkError(
-            f"the desk must be able to listen at {host}:{port}, but it cannot ({error}). Give another --port."
+            f"the desk must be able to listen at {host}:{port}, but it cannot ({error}). Give another --port or --host."
         ) from None
     return listening
 
