@@ -277,6 +277,7 @@ def test_each_program_has_the_robot_of_its_number() -> None:
     names = PortNames(fresh(4), {"/dev/ttyS9": 3}, 2)
     assert [names.robot("COM1", 2), names.robot("COM1", 1), names.robot("COM2", 2)] == [2, 1, 4]
     assert [names.robot("/dev/ttyS9", 1), names.robot("COM1", 2)] == [3, 2]
+    assert PortNames(fresh(2), {"ttyUSB0": 1}).robot("/dev/ttyUSB0") == 1
     with pytest.raises(
         LinkError, match=r"'COM2' is one more than there are robots: '/dev/ttyS9' is robot 3, 'COM1' is robot 1\."
     ):

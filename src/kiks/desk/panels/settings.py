@@ -89,7 +89,7 @@ class SettingsPanel(Panel):
         self._amount.bind_visibility_from(self._policy, "value", lambda policy: policy in ("fixed", "live"))
         self._policy.on_value_change(self._name_amount)
         self._file = named(ui.input("Recorded times"), "thinking-file").classes("w-full")
-        self._file.props('dense outlined hint="A file of this folder, made with kiks run."')
+        self._file.props("dense outlined")
         self._file.bind_visibility_from(self._policy, "value", lambda policy: policy == "replay")
 
     def _build_robots(self) -> None:
@@ -117,6 +117,7 @@ class SettingsPanel(Panel):
         self._policy.value = policy
         self._amount.value = amount if not isinstance(amount, str) else 1.0
         self._file.value = amount if isinstance(amount, str) else ""
+        with_props(self._file, hint=f"A file in {self._desk.home.folder}, made with kiks run --save-thinking.")
         self._name_amount()
         specs = self._desk.sim.specs
         baud = project.baud or (specs[0] if specs else RobotSpec.load("khepera")).firmware.baud

@@ -467,8 +467,14 @@ class Desk:
             file: Its name in the desk's folder; without its ending, that of the arena.
             change: Changes the project first.
         """
-        project, path = change(await self.present_project()), self.folder / file
-        project, beside = await asyncio.to_thread(self.home.moved, project, path.parent)
+        changed, path = change(await self.present_project()), self.folder / file
+        project, beside = await asyncio.to_thread(self.home.moved, changed, path.parent)
+        pairs = zip(self.home.commands(changed), project.robots, strict=True)
+        if left := [command.name for command, robot in pairs if command is not None and robot.program is None]:
+            self.say(
+                f"Not saved with the project: {', '.join(left)}. A project's program is a .py file, which may import "
+                "the folder or module."
+            )
         return replace(project, arena=replace(project.arena, name=path.stem)), beside
 
     # ---- programs of the project ----
