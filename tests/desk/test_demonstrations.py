@@ -46,6 +46,11 @@ def test_a_demonstration_begins_with_its_program_and_supervisor_also_again_and_a
         saved, beside = asyncio.run(desk.project_to_save("mine.kiks"))
         assert (saved.supervisor, saved.robots[0].program, len(saved.arena.cylinders)) == (*sorted(beside)[::-1], 12)
         assert beside == {name: (CLEAN.parent / name).read_bytes() for name in ("clean.py", "supervisors/clean.py")}
+        said: list[str] = []
+        desk.say = said.append
+        desk.attach(Command(Path("this.py"), module="this"), 1)
+        assert asyncio.run(desk.project_to_save("mine.kiks"))[0].robots[0].program is None
+        assert [line.partition(". ")[0] for line in said] == ["Not saved with the project: this"]
 
 
 @pytest.mark.parametrize("name", cases(["soccer", *sorted({*demonstrations()} - {"soccer"})]))
