@@ -207,7 +207,7 @@ def test_a_contact_is_one_however_long_it_lasts(capsys: pytest.CaptureFixture[st
     sim = fresh()
     sim.place(1, 500, 300, 0.0)
     drive_into_a_wall(sim)
-    tell_run(sim, "it was interrupted")
+    tell_run(sim, doubt="it was interrupted")
     said = capsys.readouterr().err.splitlines()
     assert re.fullmatch(r"kiks: robot 1: 0\.0\d m driven, 1 contact, 3\.000 s", said[0])
     assert said[1].endswith("seed 7, not repeatable: it was interrupted")

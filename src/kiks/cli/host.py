@@ -72,7 +72,6 @@ def host(
     from kiks.desk.server.players import Players
     from kiks.desk.server.server import SERVER
     from kiks.ports.program_process import commands_of, supervisor_of
-    from kiks.ports.program_scheduler import check_policy
     from kiks.sim.from_project import simulation_of, with_kinds
 
     show_log()
@@ -86,12 +85,11 @@ def host(
         )
     if policy.startswith("live"):
         leave_out(context, f"with --thinking {policy}, where the world waits for no program", "when_silent", "patience")
-    check_policy(silence.when_silent, silence.patience)
+    rules = silence.rules()
     read = with_kinds(read, world.robot or ())
     read = replace(read, thinking=policy, speed=read.speed if speed is None else speed or None)
 
     def new_programs(desk: Desk, sim: Simulation, commands: Sequence[Command | None], gate: Gate) -> Programs:
-        rules = {"when_silent": silence.when_silent, "patience_s": silence.patience}
         return usual_programs(desk, sim, commands, gate, say=tell, players=robots, gate=gate, thinking=policy, **rules)
 
     def tell(text: str) -> None:
@@ -108,7 +106,7 @@ def host(
 
     def end(sim: Simulation) -> None:
         door.pause()
-        runs.append(tell_run(sim, "thinking was live" if policy.startswith("live") else desk.programs.doubt))
+        runs.append(tell_run(sim, policy, desk.programs.doubt))
 
     own = [None if robot in robots else command for robot, command in enumerate(commands_of(read, home), 1)]
     desk = Desk(

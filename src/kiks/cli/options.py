@@ -148,6 +148,13 @@ class Silence:
     ] = "ignore"
     patience: Annotated[float, typer.Option(help="Time for which it may be silent [s of real time].")] = 2.0
 
+    def rules(self) -> dict[str, Any]:
+        """Return them as options of `Programs` and `Server`; raise if there are no such rules."""
+        from kiks.ports.program_scheduler import check_policy
+
+        check_policy(self.when_silent, self.patience)
+        return {"when_silent": self.when_silent, "patience_s": self.patience}
+
 
 def with_options(function: Callable[..., None]) -> Callable[..., None]:
     """Return a command that takes the fields of its dataclass parameters as options of their own.

@@ -123,13 +123,13 @@ def _command_line() -> str:
     return shlex.join(["kiks", *sys.argv[1:]])
 
 
-def tell_run(sim: Simulation, doubt: str = "") -> dict[str, Any]:
+def tell_run(sim: Simulation, thinking: str = "none", doubt: str = "") -> dict[str, Any]:
     """Say what each robot has done, then how the run has ended: its time, seed and state, or why not repeatable.
 
     Returns:
         The same, for `tell_results`.
     """
-    robots = []
+    robots, doubt = [], "thinking was live" if thinking.startswith("live") else doubt
     for number in range(1, sim.robot_count + 1):
         driven_mm, contacts = float(sim.travelled_mm(number)), sim.contacts(number)
         robots.append({"robot": number, "driven_mm": driven_mm, "contacts": contacts})

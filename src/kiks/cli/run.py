@@ -142,7 +142,6 @@ def run(
         leave_out(context, "with --desk, where a person ends the run", "max_wall", "seconds", "json")
     job = job_of(str(program), arguments or [], world, needs_program=not desk)
     from kiks.ports.program_process import Labels
-    from kiks.ports.program_scheduler import check_policy
     from kiks.ports.programs import Programs
     from kiks.sim.from_project import simulation_of, thinking_of
     from kiks.sim.supervision import Supervision
@@ -151,7 +150,7 @@ def run(
     commands, project = job.commands, job.project
     limits = Limits(project.seconds if seconds is None and not desk else seconds, max_wall)
     mapping = dict(parse_map(entry) for entry in map_ or [])
-    check_policy(silence.when_silent, silence.patience)
+    rules = silence.rules()
     import kiks.script  # noqa: F401  (under an interpreter that it does not know, KiKS ends here)
 
     is_alone = len(commands) == 1 and not desk
@@ -165,8 +164,7 @@ def run(
     # A program may change the working folder.
     thoughts = None if save_thinking is None else save_thinking.absolute()
     names = [each.name for each in commands if each is not None]
-    rules: dict[str, Any] = {"robots_by_name": mapping, "record": thoughts}
-    rules |= {"when_silent": silence.when_silent, "patience_s": silence.patience}
+    rules |= {"robots_by_name": mapping, "record": thoughts}
     if desk:
         _run_on_desk(job, thinking, Labels(names or [""]), rules, record=record, export=export, waits=not no_wait)
         return
@@ -198,7 +196,7 @@ def run(
             doubt = "it was interrupted"
             raise
         finally:
-            tell_results(context, _tell(sim, thinking, doubt) | _judged(supervision))
+            tell_results(context, tell_run(sim, thinking, doubt) | _judged(supervision))
     if code == 0 and sim.now_ns == 0:
         say(
             "nothing was sent to a robot, and no time has passed. A program reaches its robot through a serial port, "
@@ -207,11 +205,6 @@ def run(
     if job.demonstration:
         say(f"picture: {export}")
     raise typer.Exit(code)
-
-
-def _tell(sim: Simulation, thinking: str, doubt: str) -> dict[str, Any]:
-    """Say how the run has ended, and whether it is repeatable, and return it."""
-    return tell_run(sim, "thinking was live" if thinking.startswith("live") else doubt)
 
 
 def _judged(supervision: Supervision) -> dict[str, Any]:
@@ -247,7 +240,7 @@ def _run_on_desk(job: Job, thinking: str, labels: Labels, rules: dict[str, Any],
         if not desk.programs.was_touched:
             # The page shows the last state until a person lets time pass.
             desk.present.gate.pause(sim.now_ns)
-            _tell(sim, thinking, desk.programs.doubt)
+            tell_run(sim, thinking, desk.programs.doubt)
 
     show_job(job, thinking=thinking, new_programs=new_programs, programs_ended=end, **options)
 

@@ -72,7 +72,6 @@ def serve(
     """
     from kiks.clock.patience import Patience
     from kiks.clock.thinking import parse_thinking
-    from kiks.ports.program_scheduler import check_policy
     from kiks.ports.server import Server
     from kiks.sim.from_project import simulation_of
 
@@ -93,7 +92,7 @@ def serve(
     if any(each.program for each in project.robots):
         say(f"The programs of {world.arena} do not start here; other programs may connect. kiks run starts them.")
     parse_thinking(thinking)
-    check_policy(silence.when_silent, silence.patience)
+    rules = silence.rules()
     sim = simulation_of(project, home, kinds=world.robot or (), thinking="none", ready=ready_engine)
     compile_everything()  # or load it, so that the first program does not wait for it
     ports = _Ports(sim, pty, link, tcp, rfc2217, host, by_character, say)
@@ -109,8 +108,7 @@ def serve(
             speed=speed,
             thinking=thinking,
             programs=programs,
-            when_silent=silence.when_silent,
-            patience_s=silence.patience,
+            **rules,
             pace=None if gate is None else gate.pace,
             new_patience=Patience if gate is None else gate.patience,
         )
