@@ -258,11 +258,7 @@ class Batch:
 
     @_alone
     def reset(
-        self,
-        worlds: ArrayLike | None = None,
-        *,
-        seeds: ArrayLike | None = None,
-        starts: ArrayLike | None = None,
+        self, worlds: ArrayLike | None = None, *, seeds: ArrayLike | None = None, starts: ArrayLike | None = None
     ) -> NDArray[np.float64]:
         """Reset worlds to their initial state, and let their robots sense for the first time.
 

@@ -482,9 +482,7 @@ def plastic(
     *,
     neurons: Annotated[Whole, Field(ge=2, le=PLASTIC_NEURONS_MAX, description="The first two are the wheels.")] = 3,
     per: Annotated[
-        str,
-        OneOf(("synapse", "neuron")),
-        Field(description="What has a rule, a sign and a learning rate of its own."),
+        str, OneOf(("synapse", "neuron")), Field(description="What has a rule, a sign and a learning rate of its own.")
     ] = "synapse",
     senses: Senses = ("proximity",),
     speed_limit: SpeedLimit = SPEED_LIMIT,

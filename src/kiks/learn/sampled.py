@@ -87,11 +87,7 @@ def rough_angle(y: Any, x: Any) -> Any:
 
 
 def sampled_proximity(
-    arena: Arena,
-    obstacles: Sequence[tuple[float, float]],
-    radius_mm: float,
-    noise: str = "none",
-    wall_mm: float = 10.0,
+    arena: Arena, obstacles: Sequence[tuple[float, float]], radius_mm: float, noise: str = "none", wall_mm: float = 10.0
 ) -> Sense:
     """Return a sense of a Khepera that reads tables in place of rays, in a box with round obstacles of one size.
 

@@ -556,12 +556,7 @@ class Task(Experiment):
         return measured.reshape(len(candidates), self.worlds, -1, points, 3)
 
     def _measured(
-        self,
-        candidates: Floats,
-        seeds: Integers,
-        threads: int | None,
-        seconds: float,
-        measures: Sequence[Measure],
+        self, candidates: Floats, seeds: Integers, threads: int | None, seconds: float, measures: Sequence[Measure]
     ) -> Floats:
         """Return what measures see, float64 [candidate and world, robot, value]."""
         starts, (turns, timings) = self.start_poses(seeds), self._turns(seeds)

@@ -7,17 +7,7 @@ from collections.abc import Awaitable, Callable
 from nicegui import ui
 
 from kiks.desk.panels.shortcuts import SHORTCUTS, listen
-from kiks.desk.panels.widgets import (
-    WEB,
-    FeedElement,
-    Panel,
-    bar_button,
-    named,
-    place_tip,
-    relabel,
-    told,
-    with_props,
-)
+from kiks.desk.panels.widgets import WEB, FeedElement, Panel, bar_button, named, place_tip, relabel, told, with_props
 from kiks.desk.server.desk import Desk
 
 
