@@ -180,6 +180,5 @@ class Episodes:
                     return taken
         raise ParameterError(
             f"the arena must have room for {counted(self.batch.robot_count, 'robot')}, but places for only "
-            f"{len(taken)} were "
-            "found. Take a larger one, or fewer robots."
+            f"{len(taken)} were found. Take a larger one, or fewer robots."
         )

@@ -514,8 +514,7 @@ class Task(Experiment):
             counts = " and ".join(f"{side.parameter_count} of the {side.name}" for side in self.sides if side.name)
             raise ParameterError(
                 f"a candidate must have {counted(self.parameter_count, 'parameter')}{counts and f' ({counts})'}, but "
-                "their number "
-                f"was {candidates.shape[1]}."
+                f"their number was {candidates.shape[1]}."
             )
         seconds = self.seconds if seconds is None else check_number("seconds", seconds, SECONDS_MIN, SECONDS_MAX)
         size = max(1, BATCH_WORLDS_MAX // self.worlds)

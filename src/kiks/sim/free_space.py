@@ -105,8 +105,7 @@ class FreeSpace:
                 return x, y, 2 * math.pi * turn
         raise ArenaError(
             f"Arena {shown(self.arena.name)} must have room for {counted(count, 'robot')}, but {ATTEMPTS} random "
-            "places for "
-            f"robot {index + 1} were all taken. Ask for fewer, give start poses, or take a larger arena."
+            f"places for robot {index + 1} were all taken. Ask for fewer, give start poses, or take a larger arena."
         )
 
     def discs(self) -> NDArray[np.float64]:
