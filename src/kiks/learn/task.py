@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pickle
-from collections.abc import Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import field, fields, replace
 from functools import cached_property, lru_cache
 from typing import Annotated, Any
@@ -90,6 +90,14 @@ class Axis:
     def __post_init__(self) -> None:
         if self.low >= self.high:
             raise ParameterError(f"an axis must lead from low to high, but it led from {self.low:g} to {self.high:g}.")
+
+
+def check_axes(axes: Iterable[Axis], names: Collection[str]) -> None:
+    """Check that axes lead along some of the measures of these names."""
+    for axis in axes:
+        if axis.measure not in names:
+            named = f"it named {shown(axis.measure)}.{nearest(axis.measure, names)}"
+            raise ParameterError(f"an axis must name one of {', '.join(names)}, but {named}")
 
 
 @record
@@ -245,12 +253,7 @@ class Task(Experiment):
         if self.against is not None and ("" in sides or sides[0] == sides[1]):
             raise ParameterError(f"sides must have different names, but they were {shown(tuple(sides))}.")
         names = self.measure_names
-        for axis in self.axes:
-            if axis.measure not in names:
-                raise ParameterError(
-                    f"an axis must name one of {', '.join(names)}, but it named {shown(axis.measure)}."
-                    f"{nearest(axis.measure, names)}"
-                )
+        check_axes(self.axes, names)
         for objective in self.objectives:
             if objective.removeprefix("-") not in (known := ("fitness", *names)):
                 raise ParameterError(
