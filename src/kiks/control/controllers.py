@@ -65,12 +65,7 @@ __all__ = [
 ]
 
 
-def __dir__() -> list[str]:
-    return __all__
-
-
-__getattr__ = hinting(__name__, __all__)
-
+__getattr__, __dir__ = hinting(__name__, __all__)
 
 SPEED_LIMIT = 10.0
 """Default speed of an output of 1 [pulses/10 ms]: 80 mm/s."""

@@ -131,9 +131,10 @@ class RecordedLog:
         """
         entries = [entry for entry in self.entries_of(block) if entry.time_ns <= time_ns]
         for later in range(block, self.blocks.stop):
-            for note in self.notes_of(later):
-                if note.kind == MARK and note.number <= time_ns < note.time_ns:
-                    entries.append(note._replace(time_ns=time_ns))
+            late = (
+                each for each in self.notes_of(later) if each.kind == MARK and each.number <= time_ns < each.time_ns
+            )
+            entries += [note._replace(time_ns=time_ns) for note in late]
         return block_of([value for entry in entries for value in entry]) if entries else b""
 
     def row_before(self, time_ns: int) -> Row:
