@@ -146,8 +146,7 @@ def _scene(moment: Moment) -> dict[str, Any]:
     for body in moment.bodies:
         name, radius_m = f"body {body['number']}", float(body["radius_mm"]) / 1000
         entities.append(_disc(name, radius_m, body_colour(body), moment.time_ns))
-    deletion = {"timestamp": _time(moment.time_ns), "type": _ALL, "id": ""}
-    return {"deletions": [deletion], "entities": entities}
+    return {"deletions": [{"timestamp": _time(moment.time_ns), "type": _ALL, "id": ""}], "entities": entities}
 
 
 def _disc(name: str, radius_m: float, colour: Colour, time_ns: int) -> dict[str, Any]:
