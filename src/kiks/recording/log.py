@@ -131,10 +131,8 @@ class RecordedLog:
         """
         entries = [entry for entry in self.entries_of(block) if entry.time_ns <= time_ns]
         for later in range(block, self.blocks.stop):
-            late = (
-                each for each in self.notes_of(later) if each.kind == MARK and each.number <= time_ns < each.time_ns
-            )
-            entries += [note._replace(time_ns=time_ns) for note in late]
+            marks = (note for note in self.notes_of(later) if note.kind == MARK)
+            entries += [mark._replace(time_ns=time_ns) for mark in marks if mark.number <= time_ns < mark.time_ns]
         return block_of([value for entry in entries for value in entry]) if entries else b""
 
     def row_before(self, time_ns: int) -> Row:

@@ -143,9 +143,8 @@ class ProgramsPanel(Panel):
                 icon = ICONS.get(handle.state, "error_outline" if handle.code else "check_circle")
                 button = ui.button(on_click=lambda handle=handle: self._choose(handle))
                 button.props("flat no-caps align=left dense")
-                with with_props(button, aria_pressed=str(is_shown).lower()).classes(
-                    "col text-weight-bold" if is_shown else "col"
-                ):
+                look = "col text-weight-bold" if is_shown else "col"
+                with with_props(button, aria_pressed=str(is_shown).lower()).classes(look):
                     ui.icon(icon).classes("q-mr-sm").props("aria-hidden=true")
                     ui.label(f"{handle.command.name} on robot {handle.robot}: {handle.state}")
                     ui.tooltip("Show what this program prints")

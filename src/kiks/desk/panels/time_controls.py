@@ -74,9 +74,7 @@ class TimePanel(Panel):
 
     def _shown_speed(self) -> float:
         speed = self._desk.gate.speed
-        return (
-            0.0 if speed is None else min((each for each in self._speeds if each), key=lambda each: abs(each - speed))
-        )
+        return 0.0 if speed is None else min(filter(None, self._speeds), key=lambda each: abs(each - speed))
 
     def refresh(self) -> None:
         """Show whether time runs, and at which speed."""
