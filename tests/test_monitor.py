@@ -85,7 +85,7 @@ def test_the_command_prints_and_logs_rows_where_there_is_no_terminal(tmp_path: P
     assert result.stdout == path.read_text(), "a log never replaces a file"
 
 
-def test_a_slow_line_gives_what_it_can_and_its_log_is_on_the_disk_after_each_sample(
+def test_a_slow_line_gives_what_it_can_and_logs_each_sample_at_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path, counts = tmp_path / "log.csv", []

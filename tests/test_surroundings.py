@@ -31,13 +31,10 @@ os.environ |= {"LC_ALL": "POSIX", "TZ": "Asia/Tokyo"}
 """
 
 
-def test_signals_rights_and_environment_are_known_here_in_forks_and_in_processes() -> None:
+def test_signals_rights_and_environment_are_known_also_after_a_hostile_start() -> None:
     # This process itself is not asked, as a test before this one may have changed it.
     assert subprocess.run([sys.executable, "-c", SHOW], capture_output=True, text=True, check=False).stdout == KNOWN
     assert forked.run(code=SHOW).stdout == KNOWN
-
-
-def test_what_a_hostile_start_has_set_is_set_back() -> None:
     child = "import subprocess, sys\nsubprocess.run([sys.executable, '-c', SHOW])\n"
     code = f"{HOSTILE}\nfrom tests.surroundings import settle\nsettle()\n{SHOW}\nSHOW = {SHOW!r}\n{child}"
     assert forked.run(code=code).stdout == 2 * KNOWN

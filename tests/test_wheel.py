@@ -74,15 +74,11 @@ def test_a_first_start_from_a_wheel_with_kernels_compiles_nothing(python: Path, 
     assert kept(tmp_path) == []
 
 
-def test_kernels_of_another_version_of_numba_are_quietly_ignored(python: Path, tmp_path: Path) -> None:
+def test_kernels_of_another_numba_or_processor_are_quietly_ignored(python: Path, tmp_path: Path) -> None:
     assert call_one(python, tmp_path) == []
-    (name,) = call_one(python, tmp_path, "import numba; numba.__version__ = '0.0'\n")
-    assert name.startswith("kiks.engine.scalar_math.sin_cos-")
-
-
-def test_kernels_for_another_processor_are_quietly_ignored(python: Path, tmp_path: Path) -> None:
-    (name,) = call_one(python, tmp_path, NUMBA_CPU_NAME="generic", NUMBA_CPU_FEATURES="")
-    assert name.startswith("kiks.engine.scalar_math.sin_cos-")
+    (of_version,) = call_one(python, tmp_path, "import numba; numba.__version__ = '0.0'\n")
+    (of_processor,) = call_one(python, tmp_path, NUMBA_CPU_NAME="generic", NUMBA_CPU_FEATURES="")
+    assert {name.partition("-")[0] for name in (of_version, of_processor)} == {"kiks.engine.scalar_math.sin_cos"}
 
 
 def call_one(python: Path, tmp_path: Path, before: str = "", **changes: str) -> list[str]:
@@ -96,9 +92,7 @@ def test_a_wheel_without_kernels_is_for_all_computers(tmp_path: Path) -> None:
     assert build(tmp_path).name.endswith("-py3-none-any.whl")
 
 
-def test_the_same_functions_are_compiled_for_levels_that_this_computer_may_not_have(
-    kernels: Path, tmp_path: Path
-) -> None:
+def test_the_same_functions_are_compiled_for_levels_that_are_not_here(kernels: Path, tmp_path: Path) -> None:
     (full,) = (kernels / "kiks").iterdir()
     (tmp_path / "small").mkdir()
     for path in full.glob("*.sin_cos-*"):

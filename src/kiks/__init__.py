@@ -21,8 +21,8 @@ import serial  # noqa: TID253  (pyserial has to be told where our plug-in is)
 
 from kiks.unknown_names import hinting as _hinting
 
-_get, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)  # the names of __init__.pyi
-__getattr__ = _hinting(__name__, __all__, _get)
+_get, _, __all__ = lazy_loader.attach_stub(__name__, __file__)  # the names of __init__.pyi
+__getattr__, __dir__ = _hinting(__name__, __all__, _get)
 
 if "kiks.ports.pyserial" not in serial.protocol_handler_packages:
     serial.protocol_handler_packages.append("kiks.ports.pyserial")

@@ -10,10 +10,12 @@ if TYPE_CHECKING:
     from typing import Any
 
 
-def hinting(module: str, names: Sequence[str], get: Callable[[str], Any] | None = None) -> Callable[[str], Any]:
-    """Return the `__getattr__` of a module that says which of its names was meant.
+def hinting(
+    module: str, names: Sequence[str], get: Callable[[str], Any] | None = None
+) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
+    """Return the `__getattr__` of a module that says which of its names was meant, and its `__dir__`.
 
-    Python does so itself, but for `from MODULE import NAME` only from 3.12 on.
+    Python says so itself, but for `from MODULE import NAME` only from 3.12 on.
 
     Args:
         module: Its name.
@@ -34,4 +36,4 @@ def hinting(module: str, names: Sequence[str], get: Callable[[str], Any] | None 
             raise ImportError(f"cannot import name {name!r} from {public!r}.{nearest(name, names)}")
         raise AttributeError(f"module {public!r} has no attribute {name!r}", name=name, obj=sys.modules[module])
 
-    return find
+    return find, lambda: [*names]

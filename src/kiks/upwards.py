@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Callable
-from types import TracebackType
 from typing import Any, Protocol, Self, TypeVar
 
 Kind = TypeVar("Kind")
@@ -64,9 +63,7 @@ class Recorder(Protocol):
 
     def __enter__(self) -> Self: ...
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None, /
-    ) -> None: ...
+    def __exit__(self, *_: object) -> None: ...
 
     def mark(self, note: str) -> None:
         """Write a bookmark."""

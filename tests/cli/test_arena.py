@@ -51,7 +51,6 @@ def test_new_writes_a_box_to_draw_in(tmp_path, given, expected):
         (("new", "n.toml", "--width-mm", 200, "--height-mm", 200, "--brightness", "wod"), "Did you mean 'wood'?"),
         (("new", "n.toml", "--width-mm", 200, "--height-mm", 200, "--brightness=-3"), "but it was -3. 1 is black"),
         (("new", "n.toml", "--width-mm", 200, "--height-mm", 200, "--brightness=--3"), "but it was '--3'."),
-        (("info", "nothing.toml"), "Arena file 'nothing.toml' must exist, but there is no such file."),
     ],
 )
 def test_errors_are_clear_and_nothing_is_written(tmp_path, monkeypatch, arguments, words):

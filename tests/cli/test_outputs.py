@@ -151,9 +151,7 @@ def test_what_an_arena_or_a_project_names_is_an_input(tmp_path: Path) -> None:
         told("run", "--arena", tmp_path / name, "--export", tmp_path / "amaze.png", WANDER)
 
 
-def test_the_place_of_an_output_that_is_left_out_is_checked_too(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_place_of_an_output_that_is_left_out_is_checked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     for words, name in (
         (("compare", "one", "two"), "kiks-compare.png"),
@@ -182,7 +180,7 @@ def test_an_option_that_has_one_value_is_given_once(line: str, option: str) -> N
         told(*line.split())
 
 
-def test_results_for_a_script_are_all_that_reaches_the_output(
+def test_only_results_for_a_script_reach_the_output(
     monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     """What a command has printed may wait in a buffer, as it does where the output is a pipe."""

@@ -63,7 +63,6 @@ def test_factor_zero_costs_nothing() -> None:
 
 def test_errors_name_the_rule_and_the_value() -> None:
     for text, words in (
-        ("nonee", "Did you mean 'none'"),
         ("fixed", "milliseconds from 0"),
         ("fixed:-1", "'fixed:-1'"),
         ("live:nan", "a factor from 0"),

@@ -77,7 +77,7 @@ def test_a_program_that_ran_is_saved_with_the_project_and_shown_when_that_is_ope
     expect(visitor.at("name")).to_have_value("exercise1.py")
 
 
-def test_a_program_is_not_started_when_halt_is_pressed_while_it_is_saved(
+def test_a_program_does_not_start_after_halt_while_it_is_saved(
     visitor: Visitor, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from kiks.desk.panels.programs import ProgramsPanel

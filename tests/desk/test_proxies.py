@@ -1,7 +1,5 @@
 """Proxies that offer a desk below a path, and notebooks whose kernel is on another computer than the browser."""
 
-from __future__ import annotations
-
 import re
 import shutil
 import socket

@@ -3,8 +3,6 @@
 Nothing sleeps: `until` lets the page draw its next picture, again and again, until a fact is so.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -24,7 +22,7 @@ if TYPE_CHECKING:
     from kiks.sim.simulation import Simulation
 else:
     # Tests name them as types alone, and their modules take seconds to import.
-    Browser = Locator = Page = Shown = Any
+    Browser = Locator = Page = Shown = Simulation = Any
 
 SCREENSHOTS = Path(__file__).parents[2] / "screenshots"
 """Where pictures of what tests have seen are left for a person."""
@@ -37,15 +35,14 @@ FIRST_PICTURE = "() => window.kiksDesk?.stats().frames_drawn > 1 && kiksDesk.pos
 
 STILL = """() => {
     const moving = document.getAnimations().filter(
-        (one) => one.playState === "running" && one.animationName !== "desk-fade"
-            && Number.isFinite(one.effect.getComputedTiming().endTime));
+        (one) => one.playState === "running" && Number.isFinite(one.effect.getComputedTiming().endTime));
     for (const one of moving) one.finish();
     return moving.length === 0 && !document.querySelector("[class*='-enter-'], [class*='-leave-']");
 }"""
 """Ends what moves or fades, and says whether all stood still already.
 
-What blinks for ever, as the caret does, and the hint, which waits for half a minute, may go on. Vue marks what appears
-or goes with these classes, from a frame before anything moves.
+What blinks for ever, as the caret does, may go on. Vue marks what appears or goes with these classes, from a frame
+before anything moves.
 """
 
 OUT_OF_REACH = """() => {

@@ -211,9 +211,7 @@ def test_frames_keep_to_the_recording_where_the_run_differs(short: Path, monkeyp
     assert "checkpoints differ" in Tags(page_of(short, tmp_path)).text
 
 
-def test_what_a_killed_run_has_written_becomes_a_page_and_mistakes_get_a_clear_error(
-    short: Path, tmp_path: Path
-) -> None:
+def test_what_a_killed_run_has_written_becomes_a_page_and_mistakes_get_an_error(short: Path, tmp_path: Path) -> None:
     cut = tmp_path / "cut.mcap"
     last = McapReader(short).chunks[-1]
     cut.write_bytes(short.read_bytes()[: last.offset + last.length])

@@ -283,9 +283,7 @@ def test_the_page_of_the_protocol_has_a_section_of_each_command_and_tool() -> No
     page = (DOCS / "reference" / "protocol.md").read_text(encoding="utf-8")
     for name in (*(f"{row.letter}: {row.name}" for row in COMMANDS), *TOOLS):
         assert f"### {name}\n" in page
-
-
-def test_a_new_letter_has_an_example_without_an_entry_for_it() -> None:
+    # A new letter has an example without an entry for it.
     row = Command("X", "new", ("a", "b"), (), "", print)
     section = runpy.run_path(str(DOCS / "pages" / "protocol.py"))["command"](row)
     assert "-> X,1,1" in list(section)

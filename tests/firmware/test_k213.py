@@ -140,15 +140,12 @@ def moving(left: int, right: int, bars: Any = EDGE, y_mm: int = 300) -> list[flo
     return sim.image(1)
 
 
-def test_motion_smears_and_turning_smears_more() -> None:
+def test_motion_smears_turning_smears_more_and_a_curve_less_on_its_side() -> None:
     still, driving, turning = moving(0, 0), moving(5, 5), moving(5, -5)
     assert contrast(turning) < contrast(driving) < contrast(still)
     assert contrast(turning) < 0.5 * contrast(still)
     assert contrast(moving(10, -10)) < contrast(turning)
-
-
-def test_the_side_to_which_a_robot_drives_a_curve_is_the_sharper_half_of_its_picture() -> None:
-    """Driving moves what is on the left to the left of the picture, and a left turn moves it back."""
+    # Driving moves what is on the left to the left of the picture, and a left turn moves it back.
     to_left, to_right = (moving(*speeds, STRIPE, 400) for speeds in ((20, 24), (24, 20)))
     assert contrast(to_left[:32]) > 1.2 * contrast(to_left[32:])
     assert contrast(to_right[32:]) > 1.2 * contrast(to_right[:32])

@@ -216,7 +216,6 @@ def test_the_name_of_an_algorithm_has_the_options_that_differ_from_the_usual_one
 
 def test_wrong_options_and_tasks_are_refused_in_one_line() -> None:
     for text, message in (
-        ("cmaes", "must be one of cma, ga.*Did you mean 'cma"),
         ("cma:restart=ipop", "algorithm cma: Options must have known keys only, but it has 'restart'.*'restarts'"),
         ("cma:restarts=often", "algorithm cma: restarts must be 'none', 'ipop' or 'bipop', but it was 'often'"),
         ("cma:separable=1", "separable must be true or false"),

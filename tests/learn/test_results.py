@@ -115,9 +115,7 @@ def test_exams_that_differ_are_left_out() -> None:
     for group in results.comparable({"a": RESULTS, "b": RESULTS, "c": [other]}).values():
         assert [(each.exam, each.solved) for each in group] == [(None, None)] * len(group)
         assert results.solved_of(group) is None
-
-
-def test_evolutions_that_did_not_solve_the_task_count_until_their_end() -> None:
+    # Those that did not solve the task count until their end.
     assert results.solved_of(RESULTS) == ((52, 24, 24, 24), (False, True, True, True))
 
 

@@ -301,15 +301,12 @@ def test_functions_take_old_calls_and_their_help_names_them_and_gives_an_example
         assert "See also " in said[name], name
 
 
-def test_functions_of_the_robot_itself(tmp_path: Path) -> None:
+def test_functions_of_the_robot_itself_and_of_its_turrets(tmp_path: Path) -> None:
     text = run(ROBOT, tmp_path).text
     assert re.search(r"left  wheel: speed mode, error -?\d+\nright wheel: speed mode, error -?\d+\n", text)
     assert re.search(r"left  wheel: position mode, moving, error -?\d+\nright wheel: position mode, moving", text)
-
-
-def test_functions_of_turrets(tmp_path: Path) -> None:
-    text = run(TURRETS, tmp_path).text
-    assert re.search(r"Turret 2: version \d+, revision \d+\nTurret 17 does not answer\.", text)
+    turrets = r"Turret 2: version \d+, revision \d+\nTurret 17 does not answer\."
+    assert re.search(turrets, run(TURRETS, tmp_path).text)
 
 
 def test_functions_of_worlds(tmp_path: Path) -> None:

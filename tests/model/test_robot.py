@@ -83,4 +83,3 @@ def test_an_error_names_the_wrong_parameter(tmp_path: Path) -> None:
         ("must be named 'section__key'", {"speed": 1}),
     ):
         refused(words, partial(khepera.with_changes, **changes))
-    refused("Did you mean 'khepera'", RobotSpec.load, "kephera")

@@ -202,19 +202,17 @@ def test_error_explains_why_a_port_cannot_be_opened(what: str, tmp_path: Path) -
         PtyEndpoint(f"{tmp_path}/robot") if what == "a serial port" else TcpEndpoint(0)
 
 
+DESK = "the desk must be able to open 32 more files"
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("limit", "arguments", "words"),
     cases(
         [
-            (16, "host --port 0", "the desk must be able to open 32 more files, but this process may have 16 in all"),
-            (16, "serve --desk", "the desk must be able to open 32 more files"),
-            (16, "demo avoid --desk", "the desk must be able to open 32 more files"),
-            (
-                16,
-                "room examples/exercises/lamp --students NAMES --port 0",
-                "the desk must be able to open 32 more files",
-            ),
+            (16, "host --port 0", f"{DESK}, but this process may have 16 in all"),
+            *((16, f"{words} --desk", DESK) for words in ("serve", "demo avoid")),
+            (16, "room examples/exercises/lamp --students NAMES --port 0", DESK),
             (16, "serve --robots 6 --no-pty --tcp 0", "the server of ports must be able to open 9 more files"),
             (100, "serve --robots 40 --tcp 0", "this process may have 100"),
         ],

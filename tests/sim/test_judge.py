@@ -225,7 +225,6 @@ def test_a_formula_without_a_value_ends_the_run_in_one_line(tmp_path: Path) -> N
 
 def test_what_is_wrong_is_said_before_the_run_in_one_line() -> None:
     for text, message in (
-        ("contact > 0", "the goal's solved must name measures, but 'contact' is none. Did you mean 'contacts'?"),
         ("measure > 0", "must name measures, but 'measure' is none"),
         ("contacts(3) > 0", "must use contacts without arguments, but it was 'contacts(3)'"),
         ("goal_mm(1) < 3", "must use goal_mm as its reference says, but 'goal_mm(1)': missing a required argument"),

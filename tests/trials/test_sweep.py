@@ -48,9 +48,7 @@ def test_a_program_that_crashes_has_not_solved_anything() -> None:
     verdict = Sweep((tried(0, 5.0, end=CRASHED, baud=None),)).verdict
     worst = "worst: seed 0, robot 1 with 0 ms (drive.py crashed: no wall)"
     assert verdict == f"does not hold, not even with 0 ms of thinking; {worst}"
-
-
-def test_the_worst_of_what_holds_everywhere_has_the_fewest_points() -> None:
+    # The worst of what holds everywhere has the fewest points.
     found = Sweep((tried(0, 5.0), tried(10, 3.0), tried(20, 4.0)))
     assert found.worst.thinking_ms == 10
     assert found.verdict.endswith("with 10 ms at 9600 baud (3 points)")

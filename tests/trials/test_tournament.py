@@ -91,9 +91,6 @@ def test_the_library_of_ratings_is_missed_before_the_games(tmp_path: Path, monke
 
 
 def test_a_match_or_a_player_that_is_not_there_is_named(tmp_path: Path) -> None:
-    for match, message in (
-        ("summo", "MATCH must be a match that comes with KiKS, .* there is no 'summo'. Did you mean 'sumo'"),
-        ("sumo", "PLAYERS must be files or folders, but there is no 'nobody.py'"),
-    ):
+    for match, message in (("sumo", "PLAYERS must be files or folders, but there is no 'nobody.py'"),):
         done = CliRunner().invoke(app, ["tournament", match, "nobody.py", "--out", str(tmp_path / "out")])
         assert re.search(message, str(done.exception or done.output)), done.output

@@ -157,8 +157,7 @@ class Batch:
         self._reset_worlds(np.arange(self.world_count), self._turrets)
 
     def _make_scenes(self) -> list[Scene]:
-        kinds = self._initial_state.kinds
-        scene = Scene(self.state, kinds, self.arenas, self.networks, self._lamps, self.seeds)
+        scene = Scene(self.state, self._initial_state.kinds, self.arenas, self.networks, self._lamps, self.seeds)
         return [scene.in_arena(arena) for arena in self.arenas]
 
     def __getstate__(self) -> dict[str, Any]:
@@ -258,11 +257,7 @@ class Batch:
 
     @_alone
     def reset(
-        self,
-        worlds: ArrayLike | None = None,
-        *,
-        seeds: ArrayLike | None = None,
-        starts: ArrayLike | None = None,
+        self, worlds: ArrayLike | None = None, *, seeds: ArrayLike | None = None, starts: ArrayLike | None = None
     ) -> NDArray[np.float64]:
         """Reset worlds to their initial state, and let their robots sense for the first time.
 

@@ -153,10 +153,7 @@ class InitialState:
         return self.check_seeds(seed, world_count)
 
     def starts_of(
-        self,
-        seeds: NDArray[np.int64],
-        starts: ArrayLike | None,
-        worlds: NDArray[np.int64] | None = None,
+        self, seeds: NDArray[np.int64], starts: ArrayLike | None, worlds: NDArray[np.int64] | None = None
     ) -> NDArray[np.float64]:
         """Return start poses, float64 [chosen world, robot, 3].
 

@@ -46,8 +46,7 @@ class MeasureSlots:
             check_kind("each of measures", each, Measure, "Take some of kiks.measures, or make one with @kiks.measure.")
             if tuple(senses[: len(each.senses)]) != each.senses:
                 raise ParameterError(
-                    f"the measure {shown(each.name)} must find {named(each.senses)} first among what is "
-                    "sensed, but "
+                    f"the measure {shown(each.name)} must find {named(each.senses)} first among what is sensed, but "
                     f"{subject} senses {named(senses)}. Let it sense that, too."
                 )
         self._ends = list(accumulate((each.note_count for each in self.measures), initial=0))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import time
-from types import TracebackType
 from typing import NamedTuple
 
 from kiks.client.port import TIMEOUT_S, Port, open_port
@@ -94,9 +93,7 @@ class Khepera:
     def __enter__(self) -> Khepera:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     # ---- time ----

@@ -60,11 +60,7 @@ class Gate:
     """
 
     def __init__(
-        self,
-        lock: threading.RLock,
-        *,
-        speed: float | None = 1.0,
-        wall_ns: Callable[[], int] = time.monotonic_ns,
+        self, lock: threading.RLock, *, speed: float | None = 1.0, wall_ns: Callable[[], int] = time.monotonic_ns
     ) -> None:
         self._changed = threading.Condition(lock)
         self._wall_ns = wall_ns

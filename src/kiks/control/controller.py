@@ -162,8 +162,7 @@ class Controller(Compiled):
         if self.parameter_count not in (None, given.shape[-1]):
             raise ParameterError(
                 f"the controller {shown(self.name)} must be given {counted(self.parameter_count or 0, 'parameter')}, "
-                "but got "
-                f"{given.shape[-1]} (shape {given.shape}; the last axis is one controller's)."
+                f"but got {given.shape[-1]} (shape {given.shape}; the last axis is one controller's)."
             )
         return given
 

@@ -65,12 +65,7 @@ __all__ = [
 ]
 
 
-def __dir__() -> list[str]:
-    return __all__
-
-
-__getattr__ = hinting(__name__, __all__)
-
+__getattr__, __dir__ = hinting(__name__, __all__)
 
 SPEED_LIMIT = 10.0
 """Default speed of an output of 1 [pulses/10 ms]: 80 mm/s."""
@@ -482,9 +477,7 @@ def plastic(
     *,
     neurons: Annotated[Whole, Field(ge=2, le=PLASTIC_NEURONS_MAX, description="The first two are the wheels.")] = 3,
     per: Annotated[
-        str,
-        OneOf(("synapse", "neuron")),
-        Field(description="What has a rule, a sign and a learning rate of its own."),
+        str, OneOf(("synapse", "neuron")), Field(description="What has a rule, a sign and a learning rate of its own.")
     ] = "synapse",
     senses: Senses = ("proximity",),
     speed_limit: SpeedLimit = SPEED_LIMIT,

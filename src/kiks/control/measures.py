@@ -57,12 +57,7 @@ __all__ = [
 ]
 
 
-def __dir__() -> list[str]:
-    return __all__
-
-
-__getattr__ = hinting(__name__, __all__)
-
+__getattr__, __dir__ = hinting(__name__, __all__)
 
 Positive = Annotated[Number, Field(gt=0, le=1e6)]
 Points = Annotated[Whole, Field(ge=1, le=10_000)]

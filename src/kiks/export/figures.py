@@ -176,8 +176,7 @@ def figure_of(recordings: Sequence[Recording], *, robot: int = 1) -> Any:
     layout = ConstrainedLayoutEngine(h_pad=0.1)
     arena_inches = _arena_inches(recordings)
     heights = [ROWS.get(name, arena_inches) for name in PANELS]
-    size = COLUMN_INCHES * len(recordings), sum(heights) + 0.8 * len(heights)
-    figure = Figure(figsize=size, layout=layout)
+    figure = Figure(figsize=(COLUMN_INCHES * len(recordings), sum(heights) + 0.8 * len(heights)), layout=layout)
     axes = figure.subplots(len(heights), len(recordings), squeeze=False, height_ratios=heights)
     for column, recording, draw in zip(axes.T, recordings, drawings, strict=True):
         name = f"{recording.log.reader.path.name}: " if len(recordings) > 1 else ""

@@ -13,9 +13,8 @@ from kiks.export.panel import Panel
 from kiks.export.solid_stage import SolidStage
 from kiks.export.stage import Pixels, Stage
 from kiks.export.video_file import GIF, MP4, VideoFile
-from kiks.meant import nearest
 from kiks.model.atomic_files import ending_of, writing
-from kiks.model.checks import check_count, check_number
+from kiks.model.checks import check_choice, check_count, check_number
 from kiks.recording.moments import moments
 from kiks.recording.recording import Recording
 from kiks.units import NS_PER_S, s_from_ns
@@ -96,9 +95,7 @@ def save_film(
         width, height = width // 2 * 2, height // 2 * 2
     fps = check_count("fps", fps, 1, GIF_FPS_MAX if ending == GIF else FPS_MAX)
     speed = check_number("speed", speed, SPEED_MIN, SPEED_MAX)
-    if view not in tuple(VIEWS):
-        hint = nearest(view, VIEWS)
-        raise ParameterError(f"view must be one of {', '.join(map(repr, VIEWS))}, but it was {shown(view)}.{hint}")
+    check_choice("view", view, VIEWS)
     follow, zoom = checked_follow(recording, follow, zoom)
     if is_plain and robot is not None:
         raise ParameterError(f"robot must be left out of a plain film, but it was {shown(robot)}.")

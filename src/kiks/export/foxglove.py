@@ -141,15 +141,12 @@ def _scene(moment: Moment) -> dict[str, Any]:
             "head_diameter": 0.012,
             "color": dict.fromkeys("rgba", 1.0),
         }
-        entities.append(
-            _disc(f"robot {number}", radius_m, robot_colour(number - 1), moment.time_ns) | {"arrows": [arrow]}
-        )
+        disc = _disc(f"robot {number}", radius_m, robot_colour(number - 1), moment.time_ns)
+        entities.append(disc | {"arrows": [arrow]})
     for body in moment.bodies:
-        entities.append(
-            _disc(f"body {body['number']}", float(body["radius_mm"]) / 1000, body_colour(body), moment.time_ns)
-        )
-    deletion = {"timestamp": _time(moment.time_ns), "type": _ALL, "id": ""}
-    return {"deletions": [deletion], "entities": entities}
+        name, radius_m = f"body {body['number']}", float(body["radius_mm"]) / 1000
+        entities.append(_disc(name, radius_m, body_colour(body), moment.time_ns))
+    return {"deletions": [{"timestamp": _time(moment.time_ns), "type": _ALL, "id": ""}], "entities": entities}
 
 
 def _disc(name: str, radius_m: float, colour: Colour, time_ns: int) -> dict[str, Any]:

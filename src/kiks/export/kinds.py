@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from kiks.errors import ParameterError, shown
 from kiks.meant import nearest
 from kiks.model.atomic_files import ending_of
+from kiks.model.checks import check_choice
 
 if TYPE_CHECKING:
     from kiks.recording.recording import Recording
@@ -90,10 +91,7 @@ def kind_of(path: str | Path, kind: str | None = None) -> str:
     if kind is None:
         ending = ending_of(path, "the file", ENDINGS)
         return next(name for name, each in KINDS.items() if ending in each.endings)
-    if kind not in KINDS:
-        raise ParameterError(
-            f"kind must be one of {', '.join(map(repr, KINDS))}, but it was {shown(kind)}.{nearest(kind, KINDS)}"
-        )
+    check_choice("kind", kind, KINDS)
     ending_of(path, f"a {kind}", KINDS[kind].endings)
     return kind
 

@@ -51,8 +51,7 @@ class Panel:
         self._robot = robot
         self._scale = max(min(size[0] / 1280, size[1] / 720), LEAST_SCALE)
         width = round(WIDTH * self._scale)
-        has_room = width <= SHARE_MAX * size[0] and size[1] >= HEIGHT * self._scale
-        self.width = width if has_room else 0
+        self.width = width if width <= SHARE_MAX * size[0] and size[1] >= HEIGHT * self._scale else 0
         self._speed_most = _SPEED_LEAST
         self._paper = Image.new("RGB", (width, size[1]), _PAPER)
         self._pen = ImageDraw.Draw(self._paper)

@@ -104,9 +104,7 @@ class VectorPen:
         """Fill the area above a level; the middle of the first cell is so many cells from the lower left corner."""
         x_mm, y_mm = ((np.arange(count) + first) * cell_mm for count in cells.shape[::-1])
         levels = [level, 2.0]
-        areas = self._axes.contourf(
-            x_mm, y_mm, cells.astype(np.float64), levels=levels, colors=[_colour(colour)], zorder=1
-        )
+        areas = self._axes.contourf(x_mm, y_mm, cells.astype(float), levels=levels, colors=[_colour(colour)], zorder=1)
         areas.set_paths([_corners(path) for path in areas.get_paths()])
 
     def ellipse(

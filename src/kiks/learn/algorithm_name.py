@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from kiks.errors import ParameterError, shown
-from kiks.meant import nearest
+from kiks.model.checks import check_choice
 
 
 class AlgorithmName(enum.StrEnum):
@@ -32,11 +32,8 @@ def parts_of(algorithm: str) -> tuple[str, dict[str, Any]]:
         ('cma', {'separable': True, 'restarts': 'ipop'})
     """
     name, colon, text = algorithm.partition(":")
-    if name not in set(AlgorithmName):
-        raise ParameterError(
-            f"algorithm must be one of {', '.join(AlgorithmName)}, or an object with ask and tell, but it was "
-            f"{shown(name)}.{nearest(name, map(str, AlgorithmName))}"
-        )
+    names = [*map(str, AlgorithmName)]
+    check_choice("algorithm", name, names, f"one of {', '.join(names)}, or an object with ask and tell")
     options: dict[str, Any] = {}
     for pair in text.split(",") if colon else ():
         key, equals, value = (word.strip() for word in pair.partition("="))

@@ -18,8 +18,7 @@ from kiks.errors import ParameterError, counted, shown
 from kiks.export.tables import write_parquet
 from kiks.learn.champion import Champion
 from kiks.learn.evolution_log import Folder
-from kiks.learn.task import Axis
-from kiks.meant import nearest
+from kiks.learn.task import Axis, check_axes
 from kiks.model.atomic_files import path_of
 from kiks.model.checks import check_number
 from kiks.upwards import shown_in_notebooks
@@ -84,12 +83,7 @@ class Archive:
 
     def __init__(self, axes: Sequence[Axis], value_names: Sequence[str], champion: Champion) -> None:
         self.axes, self.value_names, self.champion = tuple(axes), tuple(value_names), champion
-        for axis in self.axes:
-            if axis.measure not in self.value_names:
-                raise ParameterError(
-                    f"an axis must name one of {', '.join(self.value_names)}, but it named {shown(axis.measure)}."
-                    f"{nearest(axis.measure, self.value_names)}"
-                )
+        check_axes(self.axes, self.value_names)
         self.shape = tuple(axis.cells for axis in self.axes)
         self.cell_count = int(np.prod([float(cells) for cells in self.shape]))
         if self.cell_count > CELLS_MAX:

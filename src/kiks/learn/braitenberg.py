@@ -9,9 +9,8 @@ import numpy as np
 
 from kiks.control import controllers
 from kiks.control.controller import Controller
-from kiks.errors import ParameterError, shown
 from kiks.learn.champion import Champion
-from kiks.meant import nearest
+from kiks.model.checks import check_choice
 
 
 class _Vehicle(NamedTuple):
@@ -100,9 +99,6 @@ def vehicle(name: str) -> Champion:
         >>> round(sim.travelled_mm(1))
         210
     """
-    if not isinstance(name, str) or name not in VEHICLES:
-        raise ParameterError(
-            f"name must be one of {', '.join(VEHICLES)}, but it was {shown(name)}.{nearest(name, VEHICLES)}"
-        )
+    check_choice("name", name, VEHICLES, f"one of {', '.join(VEHICLES)}")
     found = VEHICLES[name]
     return Champion(found.controller, found.parameters, task=f"vehicle {name}")

@@ -47,14 +47,7 @@ class Episodes:
         step_counts: Number of steps of each world's episode, int64 [world].
     """
 
-    def __init__(
-        self,
-        task: Task,
-        worlds: int = 1,
-        *,
-        response: str | None = None,
-        threads: int | None = None,
-    ) -> None:
+    def __init__(self, task: Task, worlds: int = 1, *, response: str | None = None, threads: int | None = None) -> None:
         self.task, self.senses = task, task.controller.senses
         reward: Any = environment_of(task).reward
         self._reward: Measure = reward
@@ -187,6 +180,5 @@ class Episodes:
                     return taken
         raise ParameterError(
             f"the arena must have room for {counted(self.batch.robot_count, 'robot')}, but places for only "
-            f"{len(taken)} were "
-            "found. Take a larger one, or fewer robots."
+            f"{len(taken)} were found. Take a larger one, or fewer robots."
         )

@@ -85,8 +85,7 @@ def fitness_of(fitness: Fitness | None, measure_names: Sequence[str], values: Fl
     if numbers.shape != (len(values),) or not np.isfinite(numbers).all():
         raise ParameterError(
             f"fitness must return a finite number for each of {counted(len(values), 'candidate')}, but returned "
-            f"{shown(result)}. "
-            "The measures have the shape [candidate, world]: take a mean over axis 1."
+            f"{shown(result)}. The measures have the shape [candidate, world]: take a mean over axis 1."
         )
     return numbers
 

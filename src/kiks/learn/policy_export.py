@@ -40,12 +40,7 @@ ACCEPTED = (
 
 
 def champion_of_policy(
-    policy: Any,
-    task: str | Task,
-    *,
-    activation: str | None = None,
-    output: str | None = None,
-    robot: str = "khepera",
+    policy: Any, task: str | Task, *, activation: str | None = None, output: str | None = None, robot: str = "khepera"
 ) -> Champion:
     """Return a champion that drives as a policy does in its environment.
 

@@ -505,13 +505,7 @@ def maze() -> Task:
         spread=1.0,
         algorithm="map-elites",
         population=200,
-        exam=Exam(
-            training("kheperax"),
-            (goal_mm,),
-            maze_solved,
-            "reached the goal",
-            starts="arena",
-        ),
+        exam=Exam(training("kheperax"), (goal_mm,), maze_solved, "reached the goal", starts="arena"),
     )
 
 

@@ -316,8 +316,7 @@ def of_sides(groups: Mapping[str, Sequence[Result]]) -> dict[str, dict[str, list
     first = next(iter(groups.values()))[0]
     named = {first.side: {name: list(group) for name, group in groups.items()}}
     if first.against is not None:
-        second = {name: [_second(each) for each in group] for name, group in groups.items()}
-        named[first.against.side] = second
+        named[first.against.side] = {name: [_second(each) for each in group] for name, group in groups.items()}
     return named
 
 

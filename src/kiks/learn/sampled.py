@@ -19,11 +19,9 @@ from numpy.typing import NDArray
 from kiks.control.senses import Sense, sense
 from kiks.engine.compiling import kernel
 from kiks.engine.numbers import at_instant, draw, sin_cos, stream_of
-from kiks.errors import ParameterError, shown
-from kiks.meant import nearest
 from kiks.model.arena import Arena
 from kiks.model.array_checks import check_numbers
-from kiks.model.checks import check_number
+from kiks.model.checks import check_choice, check_number
 from kiks.model.robot import SENSOR_COUNT, RobotSpec
 from kiks.model.walls import Wall
 from kiks.sim.simulation import Simulation
@@ -88,11 +86,7 @@ def rough_angle(y: Any, x: Any) -> Any:
 
 
 def sampled_proximity(
-    arena: Arena,
-    obstacles: Sequence[tuple[float, float]],
-    radius_mm: float,
-    noise: str = "none",
-    wall_mm: float = 10.0,
+    arena: Arena, obstacles: Sequence[tuple[float, float]], radius_mm: float, noise: str = "none", wall_mm: float = 10.0
 ) -> Sense:
     """Return a sense of a Khepera that reads tables in place of rays, in a box with round obstacles of one size.
 
@@ -110,10 +104,7 @@ def sampled_proximity(
         >>> sampled_proximity(Arena.box(600, 350), [(300.0, 175.0)], 27.0)
         <Sense 'sampled': N>
     """
-    if noise not in NOISES:
-        raise ParameterError(
-            f"noise must be one of {', '.join(NOISES)}, but it was {shown(noise)}.{nearest(noise, NOISES)}"
-        )
+    check_choice("noise", noise, NOISES, f"one of {', '.join(NOISES)}")
     radius_mm = check_number("radius_mm", radius_mm, 1, 0.25 * _ROOM_MM)
     discs = check_numbers("obstacles", obstacles, (None, 2)) if len(obstacles) else np.zeros((0, 2))
     of_wall, of_disc = sampled_table(math.inf), sampled_table(radius_mm)

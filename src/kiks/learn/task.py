@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pickle
-from collections.abc import Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import field, fields, replace
 from functools import cached_property, lru_cache
 from typing import Annotated, Any
@@ -91,6 +91,14 @@ class Axis:
     def __post_init__(self) -> None:
         if self.low >= self.high:
             raise ParameterError(f"an axis must lead from low to high, but it led from {self.low:g} to {self.high:g}.")
+
+
+def check_axes(axes: Iterable[Axis], names: Collection[str]) -> None:
+    """Check that axes lead along some of the measures of these names."""
+    for axis in axes:
+        if axis.measure not in names:
+            named = f"it named {shown(axis.measure)}.{nearest(axis.measure, names)}"
+            raise ParameterError(f"an axis must name one of {', '.join(names)}, but {named}")
 
 
 @record
@@ -246,12 +254,7 @@ class Task(Experiment):
         if self.against is not None and ("" in sides or sides[0] == sides[1]):
             raise ParameterError(f"sides must have different names, but they were {shown(tuple(sides))}.")
         names = self.measure_names
-        for axis in self.axes:
-            if axis.measure not in names:
-                raise ParameterError(
-                    f"an axis must name one of {', '.join(names)}, but it named {shown(axis.measure)}."
-                    f"{nearest(axis.measure, names)}"
-                )
+        check_axes(self.axes, names)
         for objective in self.objectives:
             if objective.removeprefix("-") not in (known := ("fitness", *names)):
                 raise ParameterError(
@@ -515,8 +518,7 @@ class Task(Experiment):
             counts = " and ".join(f"{side.parameter_count} of the {side.name}" for side in self.sides if side.name)
             raise ParameterError(
                 f"a candidate must have {counted(self.parameter_count, 'parameter')}{counts and f' ({counts})'}, but "
-                "their number "
-                f"was {candidates.shape[1]}."
+                f"their number was {candidates.shape[1]}."
             )
         seconds = self.seconds if seconds is None else check_number("seconds", seconds, SECONDS_MIN, SECONDS_MAX)
         size = max(1, BATCH_WORLDS_MAX // self.worlds)
@@ -557,12 +559,7 @@ class Task(Experiment):
         return measured.reshape(len(candidates), self.worlds, -1, points, 3)
 
     def _measured(
-        self,
-        candidates: Floats,
-        seeds: Integers,
-        threads: int | None,
-        seconds: float,
-        measures: Sequence[Measure],
+        self, candidates: Floats, seeds: Integers, threads: int | None, seconds: float, measures: Sequence[Measure]
     ) -> Floats:
         """Return what measures see, float64 [candidate and world, robot, value]."""
         starts, (turns, timings) = self.start_poses(seeds), self._turns(seeds)

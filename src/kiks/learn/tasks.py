@@ -52,12 +52,7 @@ __all__ = [
 ]
 
 
-def __dir__() -> list[str]:
-    return __all__
-
-
-__getattr__ = hinting(__name__, __all__)
-
+__getattr__, __dir__ = hinting(__name__, __all__)
 
 Name = Annotated[
     Text,

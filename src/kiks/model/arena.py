@@ -23,13 +23,7 @@ from kiks.model.atomic_files import path_of
 from kiks.model.box import Box
 from kiks.model.checks import check_kind, check_number
 from kiks.model.maze import draw_maze
-from kiks.model.raster import (
-    MAX_CELLS,
-    PAD,
-    SIZE_MIN_MM,
-    between,
-    cells_per_pixel,
-)
+from kiks.model.raster import MAX_CELLS, PAD, SIZE_MIN_MM, between, cells_per_pixel
 from kiks.model.room import draw_room
 from kiks.model.wall_tables import WallTables, tables_of
 from kiks.model.walls import AnyShape, Wall, Zone, painted

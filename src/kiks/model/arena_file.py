@@ -38,8 +38,7 @@ MIDDLE = 128
 """Grey from which on an inverted picture is floor."""
 
 Pitch = Annotated[
-    Number,
-    Field(ge=MM_PER_PIXEL_MIN, le=MM_PER_PIXEL_MAX, description="Most arenas are drawn with 1 mm per pixel."),
+    Number, Field(ge=MM_PER_PIXEL_MIN, le=MM_PER_PIXEL_MAX, description="Most arenas are drawn with 1 mm per pixel.")
 ]
 At = Annotated[Point, Field(description="Give at_mm = [x, y]; y counts upwards from the lower edge.")]
 Size = Annotated[

@@ -28,8 +28,7 @@ def rectangle(
     arena: Arena, x0_mm: float, y0_mm: float, x1_mm: float, y1_mm: float, brightness: int | str = 255
 ) -> Arena:
     """Return an arena with a box between two corners [mm], the same one if that changes nothing."""
-    corners = _checked([(x0_mm, y0_mm), (x1_mm, y1_mm)])
-    return draw(arena, Wall(box_mm=corners, brightness=_grey(brightness)))
+    return draw(arena, Wall(box_mm=_checked([(x0_mm, y0_mm), (x1_mm, y1_mm)]), brightness=_grey(brightness)))
 
 
 def line(arena: Arena, points_mm: Sequence[Point], *, width_mm: float, brightness: int | str = 255) -> Arena:

@@ -7,10 +7,12 @@ call the value, and `advice` what they say at the end.
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from numbers import Integral, Real
 from typing import TypeVar
 
 from kiks.errors import ParameterError, figure, shown
+from kiks.meant import nearest
 
 ROBOTS_MAX = 1000
 """Most robots of a world."""
@@ -63,6 +65,14 @@ def check_kind(name: str, value: object, kind: type[_Kind], advice: str = "") ->
         return value
     wanted = _KINDS.get(kind, f"a {kind.__module__.partition('.')[0]}.{kind.__name__}")
     raise ParameterError(f"{name} must be {wanted}, but it was {shown(value)}.{advice and ' ' + advice}")
+
+
+def check_choice(name: str, value: object, choices: Collection[str], rule: str = "", advice: str = "") -> None:
+    """Check that a value is one of some names; `rule` says so where messages do not just list them."""
+    if not isinstance(value, str) or value not in choices:
+        rule = rule or f"one of {', '.join(map(repr, choices))}"
+        hint = f"{nearest(value, choices)}{advice and ' ' + advice}"
+        raise ParameterError(f"{name} must be {rule}, but it was {shown(value)}.{hint}")
 
 
 _KINDS: dict[type, str] = {str: "a text", bytes: "bytes", bool: "True or False"}

@@ -175,9 +175,7 @@ def _raster(walls: npt.NDArray[np.int64]) -> npt.NDArray[np.uint8]:
     return np.ascontiguousarray(picture[::-1])
 
 
-def _pieces(
-    walls: npt.NDArray[np.int64],
-) -> Iterator[tuple[npt.NDArray[np.int64], npt.NDArray[np.int64], int]]:
+def _pieces(walls: npt.NDArray[np.int64]) -> Iterator[tuple[npt.NDArray[np.int64], npt.NDArray[np.int64], int]]:
     """Yield columns and rows of the corners of each piece, and its grey."""
     position = 2
     while position < len(walls):

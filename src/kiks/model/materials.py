@@ -10,8 +10,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from kiks.errors import ParameterError, shown
-from kiks.meant import nearest
+from kiks.model.checks import check_choice
 
 BLACK_REFLECTANCE = 0.02
 """Reflectance of the darkest surface, at brightness 0."""
@@ -36,10 +35,7 @@ def brightness_of(material: Any) -> Any:
     """
     if not isinstance(material, str):
         return material
-    if material not in REFLECTANCES:
-        raise ParameterError(
-            f"brightness must be a number from 1 to 255 or one of {list(REFLECTANCES)}, but it was {shown(material)}."
-            f"{nearest(material, REFLECTANCES)} 1 is a black wall, 255 a white one."
-        )
+    rule = f"a number from 1 to 255 or one of {list(REFLECTANCES)}"
+    check_choice("brightness", material, REFLECTANCES, rule, "1 is a black wall, 255 a white one.")
     share = (REFLECTANCES[material] - BLACK_REFLECTANCE) / (1.0 - BLACK_REFLECTANCE)
     return max(round(255 * share), 1)

@@ -423,8 +423,7 @@ def specs_of(
     if len(named) not in (1, count):
         raise ParameterError(
             f"robot must name one kind for all or one for each of {counted(count, 'robot')}, but it named "
-            f"{len(named)}. "
-            "Leave robots out to have one of each."
+            f"{len(named)}. Leave robots out to have one of each."
         )
     specs = [each if isinstance(each, RobotSpec) else RobotSpec.load(each) for each in named]
     if response is not None:

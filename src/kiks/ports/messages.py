@@ -210,12 +210,7 @@ def _unpacked(data: bytes) -> Any:
     try:
         # Bytes and texts are no longer than the message. An array may say so, too, and takes eight times its length.
         return msgpack.unpackb(
-            data,
-            use_list=False,
-            unicode_errors="surrogatepass",
-            max_array_len=ITEMS_MAX,
-            max_map_len=0,
-            max_ext_len=0,
+            data, use_list=False, unicode_errors="surrogatepass", max_array_len=ITEMS_MAX, max_map_len=0, max_ext_len=0
         )
     except (ValueError, msgpack.UnpackException):
         raise ProtocolError("sent something to the world that is no message") from None

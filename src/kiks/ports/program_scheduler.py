@@ -29,8 +29,8 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 
 from kiks.clock.patience import Patience
-from kiks.errors import ParameterError, counted, shown
-from kiks.meant import nearest
+from kiks.errors import counted
+from kiks.model.checks import check_choice
 from kiks.sim.read_completion import NEVER_NS
 from kiks.sim.simulation import Simulation
 
@@ -378,9 +378,5 @@ class ProgramScheduler:
 
 def check_policy(when_silent: str, patience_s: float) -> None:
     """Check the policy for silent programs."""
-    if when_silent not in POLICIES:
-        raise ParameterError(
-            f"when_silent must be 'wait', 'drop' or 'ignore', but it was {shown(when_silent)}."
-            f"{nearest(when_silent, POLICIES)}"
-        )
+    check_choice("when_silent", when_silent, POLICIES, "'wait', 'drop' or 'ignore'")
     Patience(patience_s)

@@ -79,8 +79,7 @@ class Rfc2217Channel(TcpChannel):
             is_sound = False
         if not is_sound:
             _log.warning(
-                "the client of %s must speak RFC 2217, but it sent something else. Use the plain TCP port.",
-                self.name,
+                "the client of %s must speak RFC 2217, but it sent something else. Use the plain TCP port.", self.name
             )
             return None
         return data

@@ -128,11 +128,7 @@ class Sandbox:
             self._warm()
 
     def start(
-        self,
-        start: Start,
-        connection: socket.socket,
-        progress: Progress,
-        streams: tuple[int, int] | None,
+        self, start: Start, connection: socket.socket, progress: Progress, streams: tuple[int, int] | None
     ) -> Child:
         """Start a program.
 

@@ -10,6 +10,7 @@ from urllib.parse import parse_qsl, urlsplit
 
 from kiks.errors import LinkError, ParameterError, shown
 from kiks.meant import nearest
+from kiks.model.checks import check_choice
 
 if TYPE_CHECKING:
     from kiks.sim.port import VirtualPort
@@ -112,11 +113,7 @@ def _new_simulation(options: dict[str, str], url: str) -> Simulation:
 
     settings: dict[str, Any] = {}
     for key, value in options.items():
-        if key not in _OPTIONS:
-            raise ParameterError(
-                f"an option of {shown(url)} must be one of {list(_OPTIONS)}, but it was "
-                f"{shown(key)}.{nearest(key, _OPTIONS)}"
-            )
+        check_choice(f"an option of {shown(url)}", key, _OPTIONS, f"one of {list(_OPTIONS)}")
         if key in ("robots", "seed"):
             if not (value.isascii() and value.isdigit()):
                 raise ParameterError(

@@ -131,9 +131,8 @@ class RecordedLog:
         """
         entries = [entry for entry in self.entries_of(block) if entry.time_ns <= time_ns]
         for later in range(block, self.blocks.stop):
-            for note in self.notes_of(later):
-                if note.kind == MARK and note.number <= time_ns < note.time_ns:
-                    entries.append(note._replace(time_ns=time_ns))
+            marks = (note for note in self.notes_of(later) if note.kind == MARK)
+            entries += [mark._replace(time_ns=time_ns) for mark in marks if mark.number <= time_ns < mark.time_ns]
         return block_of([value for entry in entries for value in entry]) if entries else b""
 
     def row_before(self, time_ns: int) -> Row:

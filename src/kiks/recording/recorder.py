@@ -15,7 +15,6 @@ from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from time import monotonic
-from types import TracebackType
 from typing import Protocol, cast
 
 from kiks.ending import postponing_endings
@@ -304,9 +303,7 @@ class RunRecorder:
         """Return itself."""
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         """End the recording."""
         self.close()
 

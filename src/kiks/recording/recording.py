@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks import upwards
-from kiks.errors import ParameterError, counted, shown
-from kiks.meant import nearest
-from kiks.model.checks import check_count, check_number
+from kiks.errors import ParameterError, counted
+from kiks.model.checks import check_choice, check_count, check_number
 from kiks.model.project import Project
 from kiks.recording import tables
 from kiks.recording.log import RecordedLog, Source
@@ -219,11 +218,7 @@ class Recording:
             0
         """
         for name in names:
-            if name not in tables.TABLES:
-                raise ParameterError(
-                    f"name must be one of {', '.join(map(repr, tables.TABLES))}, but it was {shown(name)}."
-                    f"{nearest(name, list(tables.TABLES))}"
-                )
+            check_choice("name", name, tables.TABLES)
         return tables.tables(self.log, names)
 
     def table(self, name: str, robot: int | None = None) -> NDArray[np.void]:

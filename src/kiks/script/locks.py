@@ -265,12 +265,7 @@ def _queues(scheduler: Scheduler, room: WaitingRoom) -> dict[str, Any]:
         _real_put(simple_queue, item)
         room.hand_over(simple_queue)
 
-    return {
-        "get": get,
-        "get_nowait": lambda simple_queue: get(simple_queue, False),
-        "put": put,
-        "put_nowait": put,
-    }
+    return {"get": get, "get_nowait": lambda simple_queue: get(simple_queue, False), "put": put, "put_nowait": put}
 
 
 def replacements(scheduler: Scheduler) -> dict[str, dict[str, Any]]:
@@ -304,7 +299,7 @@ def replacements(scheduler: Scheduler) -> dict[str, dict[str, Any]]:
         "_queue.SimpleQueue": _queues(scheduler, room),
         "threading": {
             # The first thread of a program is Thread-1, even if other threads ran in this process before.
-            "_counter": itertools.count(1).__next__,
+            "_counter": itertools.count(1).__next__
         },
         "threading.Event": {"is_set": for_program(scheduler, Reading(is_set, real_is_set), real_is_set)},
         "threading.Condition": {"_is_owned": is_owned},

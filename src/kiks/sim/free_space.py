@@ -105,8 +105,7 @@ class FreeSpace:
                 return x, y, 2 * math.pi * turn
         raise ArenaError(
             f"Arena {shown(self.arena.name)} must have room for {counted(count, 'robot')}, but {ATTEMPTS} random "
-            "places for "
-            f"robot {index + 1} were all taken. Ask for fewer, give start poses, or take a larger arena."
+            f"places for robot {index + 1} were all taken. Ask for fewer, give start poses, or take a larger arena."
         )
 
     def discs(self) -> NDArray[np.float64]:
@@ -178,13 +177,7 @@ class FreeSpace:
         return lambda x_mm, y_mm: self.obstacle(x_mm, y_mm, radius_mm, discs, disc) is None
 
     def check_free(
-        self,
-        what: str,
-        x_mm: float,
-        y_mm: float,
-        radius_mm: float,
-        but: int = -1,
-        overlap_mm: float = OVERLAP_MM,
+        self, what: str, x_mm: float, y_mm: float, radius_mm: float, but: int = -1, overlap_mm: float = OVERLAP_MM
     ) -> None:
         """Check that a disc [mm] would overlap neither a wall nor another disc than `but`."""
         obstacle = self.obstacle(x_mm, y_mm, radius_mm, self.discs(), but, overlap_mm)

@@ -214,8 +214,7 @@ def project_of(sim: Simulation, project: Project) -> Project:
     # Without robots, the arena's starts wait for those to come.
     kept = tuple(starts) or arena.starts
     return replace(
-        project,
-        arena=replace(arena, starts=kept, lamps=tuple(hung), balls=tuple(balls), cylinders=tuple(cylinders)),
+        project, arena=replace(arena, starts=kept, lamps=tuple(hung), balls=tuple(balls), cylinders=tuple(cylinders))
     )
 
 

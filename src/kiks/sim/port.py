@@ -11,7 +11,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager
 from io import DEFAULT_BUFFER_SIZE
 from operator import index
-from types import TracebackType
 from typing import Any, Protocol, Self
 
 from kiks.clock.program_clock import ProgramClock
@@ -367,9 +366,7 @@ class VirtualPort:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     # ---- the program's time ----

@@ -20,8 +20,7 @@ from kiks.firmware.k213 import K213
 from kiks.firmware.khepera import Firmware
 from kiks.firmware.radio import Radio, deliver
 from kiks.firmware.turret import AnyTurret, Met, Turret
-from kiks.meant import nearest
-from kiks.model.checks import check_count, check_heading, check_number
+from kiks.model.checks import check_choice, check_count, check_heading, check_number
 from kiks.model.data_file import Rule, Whole, check, record
 from kiks.model.robot import RobotSpec
 from kiks.model.turrets import TURRETS
@@ -203,12 +202,8 @@ class _RobotSite:
 def named(turret: object) -> Turret:
     """Return a turret of a name, or what is one already."""
     if isinstance(turret, str):
-        if turret not in TURRETS:
-            raise ParameterError(
-                f"turret must be one of {', '.join(map(repr, TURRETS))} or an object of your own, but it was "
-                f"{shown(turret)}."
-                f'{nearest(turret, TURRETS)} The page "Turrets" of the documentation says how to make one.'
-            )
+        rule = f"one of {', '.join(map(repr, TURRETS))} or an object of your own"
+        check_choice("turret", turret, TURRETS, rule, 'The page "Turrets" of the documentation says how to make one.')
         module, _, name = TURRETS[turret].rpartition(".")
         made: Turret = getattr(import_module(module), name)()
         return made

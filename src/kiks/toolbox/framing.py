@@ -96,13 +96,7 @@ class Exchange(AwaitedAnswer):
     """
 
     def __init__(
-        self,
-        source: int,
-        sink: int,
-        *,
-        close: Callable[[], None] = lambda: None,
-        parent: int = 0,
-        said: bytes = b"",
+        self, source: int, sink: int, *, close: Callable[[], None] = lambda: None, parent: int = 0, said: bytes = b""
     ) -> None:
         super().__init__()
         self.source = source

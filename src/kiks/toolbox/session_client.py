@@ -452,5 +452,4 @@ class SessionClient:
 def _rounded(number: re.Match[str]) -> str:
     """Return a number as a whole one, rounded like `round` of Octave and MATLAB."""
     value = float(number[0])
-    whole = int(math.copysign(math.floor(abs(value) + 0.5), value))
-    return str(whole)
+    return str(int(math.copysign(math.floor(abs(value) + 0.5), value)))

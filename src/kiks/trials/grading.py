@@ -117,12 +117,7 @@ def load_exercise(path: Path) -> tuple[Project, Path]:
 
 
 def trials_of(
-    project: Project,
-    folder: Path,
-    submissions: Sequence[Submission],
-    *,
-    is_trusted: bool = False,
-    command: str = "",
+    project: Project, folder: Path, submissions: Sequence[Submission], *, is_trusted: bool = False, command: str = ""
 ) -> list[Trial]:
     """Return a trial for each submission in each case of an exercise; the submission drives robot 1.
 

@@ -136,12 +136,7 @@ class Row:
             "runs": len(self.tried),
             "solved": self.solved,
             "points": {"least": self.points[0], "median": median(self.points), "most": self.points[-1]},
-            "worst": {
-                "seed": worst.seed,
-                "robot": worst.robot,
-                "how": worst.how,
-                "recording": worst.outcome.recording,
-            },
+            "worst": {"seed": worst.seed, "robot": worst.robot, "how": worst.how, "recording": worst.outcome.recording},
         }
 
 

@@ -96,8 +96,7 @@ class Played:
     @property
     def notes(self) -> list[str]:
         """A line for each player that has failed."""
-        named = zip(self.names, self.failures, strict=True)
-        return [f"{name} {end}" for name, end in named if end is not None]
+        return [f"{name} {end}" for name, end in zip(self.names, self.failures, strict=True) if end is not None]
 
 
 @dataclass(frozen=True)
@@ -333,8 +332,7 @@ def _outcome(
         if outcome.name not in known:
             on_played(played(outcome), len(games))
 
-    outcomes = run_trials(trials, out, workers=workers, on_outcome=note)
-    return replace(before, played=tuple(map(played, outcomes)))
+    return replace(before, played=tuple(map(played, run_trials(trials, out, workers=workers, on_outcome=note))))
 
 
 def _next_groups(found: Tournament, sides: int) -> list[tuple[int, ...]]:

@@ -87,10 +87,7 @@ class ExerciseDialog:
 
     def _build(self, project: Project) -> None:
         exercise, goal = project.exercise or Exercise(), project.goal or Goal()
-        labels = {
-            "text": "Text (Markdown)",
-            "is_locked": "Students may not change walls, things and settings",
-        }
+        labels = {"text": "Text (Markdown)", "is_locked": "Students may not change walls, things and settings"}
         self._exercise = RecordForm(
             Exercise,
             vars(exercise),

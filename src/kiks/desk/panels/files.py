@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable
 from pathlib import Path, PurePosixPath
 
 from nicegui import ui
@@ -88,10 +87,8 @@ class FilesPanel:
                 text_button("Upload a file", "upload", "upload-file", tip).on("click", js_handler=pick)
                 ui.element("q-uploader-add-trigger")
             with_props(named(self._upload, "upload"), accept=",".join(OPENED))
-            self._mm_per_pixel = NumberField("mm per pixel", "mm-per-pixel", 1.0, min=0.1, max=100, step=0.1).classes(
-                "w-28"
-            )
-            self._mm_per_pixel.tooltip("Size of a pixel of an uploaded picture")
+            self._mm_per_pixel = NumberField("mm per pixel", "mm-per-pixel", 1.0, min=0.1, max=100, step=0.1)
+            self._mm_per_pixel.classes("w-28").tooltip("Size of a pixel of an uploaded picture")
 
     def _list(self) -> None:
         names = self._folder.names()
@@ -128,17 +125,12 @@ class FilesPanel:
 
     @told
     async def _save(self) -> None:
-        name, others = str(self._name.value or ""), []
-
-        async def encoded() -> Encoded:
-            data, beside = await self._encoded(name)
-            others.extend(sorted(beside))
-            return data, beside
-
-        saved = await save_in(self._folder, encoded, name, "a project")
+        name = str(self._name.value or "")
+        data, beside = await self._encoded(name)
+        saved = await save_in(self._folder, (data, beside), name, "a project")
         self._list()
         if saved is not None:
-            also = f", with {', '.join(others)} beside it" if others else ""
+            also = f", with {', '.join(sorted(beside))} beside it" if beside else ""
             ui.notify(f"Saved as {saved} in {self._desk.folder}{also}.", type="positive")
 
     @told
@@ -160,14 +152,12 @@ class FilesPanel:
             await self._open_file(name, project, self._desk.folder)
 
 
-async def save_in(
-    folder: Folder, encoded: Callable[[], Awaitable[Encoded]], name: str, what: str, *, is_own: bool = False
-) -> str | None:
+async def save_in(folder: Folder, encoded: Encoded, name: str, what: str, *, is_own: bool = False) -> str | None:
     """Save a file after a person has agreed, where one would be replaced.
 
     Args:
         folder: The folder.
-        encoded: Makes what the file holds, and what has to be beside it.
+        encoded: What the file holds, and what has to be beside it.
         name: Name of the file.
         what: What messages call it.
         is_own: Whether it is the file that the person edits: if that is as it was, there is no question.
@@ -178,6 +168,5 @@ async def save_in(
     question = "" if is_own and folder.is_known(folder.full_name(name)) else folder.question(name)
     if question and not await agrees(question):
         return None
-    data, beside = await encoded()
-    may_replace = is_own or bool(question)
-    return await asyncio.to_thread(folder.save, data, name, what, may_replace=may_replace, beside=beside)
+    may_replace, beside = is_own or bool(question), encoded[1]
+    return await asyncio.to_thread(folder.save, encoded[0], name, what, may_replace=may_replace, beside=beside)

@@ -39,9 +39,8 @@ class FilmDialog:
                 self._end = NumberField("To [s]", "film-end", min=0.0).classes("col")
                 self._speed = NumberField("Times real time", "film-speed", 1.0, min=0.0).classes("col")
             self._follow = select("What is seen", "film-follow", {0: "the whole arena"}, 0).classes("w-full")
-            self._kind = ui.toggle(endings := list(KINDS["film"].endings), value=endings[0]).props(
-                "dense no-caps data-testid=film-kind"
-            )
+            self._kind = ui.toggle(endings := list(KINDS["film"].endings), value=endings[0])
+            self._kind.props("dense no-caps data-testid=film-kind")
             bar = ui.linear_progress(show_value=False).props('aria-label="How much of the film is done"')
             bar.bind_value_from(self, "_done")
             with ui.row().classes("w-full justify-end"):

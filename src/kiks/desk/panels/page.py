@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from typing import TypeVar
 
 from nicegui import ui
 
@@ -25,6 +26,8 @@ from kiks.desk.panels.wire import WirePanel
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.live_editing import Editing
 from kiks.ports.program_process import Command
+
+AnyPanel = TypeVar("AnyPanel", bound=Panel)
 
 PRIMARY, ACCENT, POSITIVE = "#174a63", "#b85c00", "#1b7a34"
 """Background colours for white text, with contrasts of 9.4, 4.7 and 5.4 to 1. On dark pages, text in these colours is
@@ -166,28 +169,26 @@ class Page:
         if is_exercise or self._tabs.value in (None, "exercise"):
             self._tabs.value = "exercise" if is_exercise else "robot"
 
-    def _panel(self, name: str) -> Panel:
-        """Return a panel, which is built when it is first needed."""
+    def _panel(self, name: str, kind: type[AnyPanel]) -> AnyPanel:
+        """Return a panel of a kind, which is built when it is first needed."""
         if name not in self._panels:
             with self._places[name]:
                 self._panels[name] = self._builders[name]()
-        return self._panels[name]
+        panel = self._panels[name]
+        assert isinstance(panel, kind)
+        return panel
 
     async def _program(self) -> Command | None:
         """Save the program in the editor, and return it."""
-        programs = self._panel("programs")
-        assert isinstance(programs, ProgramsPanel)
-        return await programs.command()
+        return await self._panel("programs", ProgramsPanel).command()
 
     def _template(self) -> str:
         """Return the program in the editor."""
-        programs = self._panel("programs")
-        assert isinstance(programs, ProgramsPanel)
-        return programs.text
+        return self._panel("programs", ProgramsPanel).text
 
     def _open(self, name: str) -> None:
         """Show a panel, and let the others rest."""
-        self._panel(name)
+        self._panel(name, Panel)
         for each, panel in self._panels.items():
             panel.set_visible(each == name)
 
@@ -199,8 +200,7 @@ class Page:
             await panel.properties.show(await self._editing.select(what, index, *place))
         if what in ("robot", "sensor"):
             self._tabs.value = "robot"
-            monitor = self._panels["robot"]
-            assert isinstance(monitor, MonitorPanel)
+            monitor = self._panel("robot", MonitorPanel)
             monitor.show_robot(index + 1)
             if what == "sensor":
                 await monitor.explain(sensor)
@@ -212,9 +212,7 @@ class Page:
             self._view.run_method("fit")
             return
         self._tabs.value = "arena"
-        editor = self._panels["arena"]
-        assert isinstance(editor, EditorPanel)
-        await editor.properties.show(selected, has_focus=True)
+        await self._panel("arena", EditorPanel).properties.show(selected, has_focus=True)
 
     async def _draw(self, kind: str, points: Points) -> None:
         """Pass a stroke to the editor."""

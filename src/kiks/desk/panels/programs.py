@@ -96,9 +96,8 @@ class ProgramsPanel(Panel):
             self._attached = named(ui.column().classes("w-full gap-0"), "attached")
             with ui.expansion("Output", value=True).classes("w-full").props("dense"):
                 label = "What the program has printed"
-                self._log = LogBox(
-                    "clamp(5rem, 17vh, 14rem)", "output", label, rows_max=SHOWN_LINES, new_max=NEWEST_LINES
-                )
+                height = "clamp(5rem, 17vh, 14rem)"
+                self._log = LogBox(height, "output", label, rows_max=SHOWN_LINES, new_max=NEWEST_LINES)
         self.refresh()
 
     # ---- the list and the output ----
@@ -144,9 +143,8 @@ class ProgramsPanel(Panel):
                 icon = ICONS.get(handle.state, "error_outline" if handle.code else "check_circle")
                 button = ui.button(on_click=lambda handle=handle: self._choose(handle))
                 button.props("flat no-caps align=left dense")
-                with with_props(button, aria_pressed=str(is_shown).lower()).classes(
-                    "col text-weight-bold" if is_shown else "col"
-                ):
+                look = "col text-weight-bold" if is_shown else "col"
+                with with_props(button, aria_pressed=str(is_shown).lower()).classes(look):
                     ui.icon(icon).classes("q-mr-sm").props("aria-hidden=true")
                     ui.label(f"{handle.command.name} on robot {handle.robot}: {handle.state}")
                     ui.tooltip("Show what this program prints")
@@ -247,11 +245,8 @@ class ProgramsPanel(Panel):
             run.props("unelevated no-caps color=primary")
             run.tooltip("Save and run this program (Ctrl-Enter); first stops a program that runs on this robot")
         # Here, the page's shortcut keys (space, .) are text.
-        with (
-            ui.element("div")
-            .classes("w-full desk-program")
-            .on("keydown", js_handler="(event) => event.stopPropagation()")
-        ):
+        program = ui.element("div").classes("w-full desk-program")
+        with program.on("keydown", js_handler="(event) => event.stopPropagation()"):
             keys: dict[str, Any] = {"Ctrl-Enter": act, "Cmd-Enter": act}
             self._editor = ui.codemirror(NEW, language="Python", theme=LIGHT, keymap=keys)
             named(self._editor, "editor").on_value_change(self._note_draft)
@@ -384,11 +379,8 @@ class ProgramsPanel(Panel):
     async def _stored(self) -> Path | None:
         """Save the program under its name and return its file; None if another one would be replaced and is to stay."""
         script, text, folder = self._script, self._editor.value or "", self._folder
-        name, data = self._name.value or "", scripts.encode_script(text)
-
-        async def encoded() -> Encoded:
-            return data, {}
-
+        name = self._name.value or ""
+        encoded: Encoded = scripts.encode_script(text), {}
         is_own = script == folder.path / folder.full_name(name)
         saved = await save_in(folder, encoded, name, "a program", is_own=is_own)
         if saved is None:

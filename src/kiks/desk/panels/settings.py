@@ -68,9 +68,8 @@ class SettingsPanel(Panel):
 
     def _build_buttons(self) -> None:
         with ui.row().classes("w-full"):
-            apply = ui.button("Apply", icon="check", on_click=self.acting(self._apply)).props(
-                "no-caps data-testid=apply"
-            )
+            apply = ui.button("Apply", icon="check", on_click=self.acting(self._apply))
+            apply.props("no-caps data-testid=apply")
             apply.tooltip("Restart at time 0 with these settings; everything stays in place")
             over = ui.button("Start over", icon="replay", on_click=self.acting(self._start_over))
             over.props("no-caps outline data-testid=start-over")

@@ -7,17 +7,7 @@ from collections.abc import Awaitable, Callable
 from nicegui import ui
 
 from kiks.desk.panels.shortcuts import SHORTCUTS, listen
-from kiks.desk.panels.widgets import (
-    WEB,
-    FeedElement,
-    Panel,
-    bar_button,
-    named,
-    place_tip,
-    relabel,
-    told,
-    with_props,
-)
+from kiks.desk.panels.widgets import WEB, FeedElement, Panel, bar_button, named, place_tip, relabel, told, with_props
 from kiks.desk.server.desk import Desk
 
 
@@ -84,9 +74,7 @@ class TimePanel(Panel):
 
     def _shown_speed(self) -> float:
         speed = self._desk.gate.speed
-        return (
-            0.0 if speed is None else min((each for each in self._speeds if each), key=lambda each: abs(each - speed))
-        )
+        return 0.0 if speed is None else min(filter(None, self._speeds), key=lambda each: abs(each - speed))
 
     def refresh(self) -> None:
         """Show whether time runs, and at which speed."""

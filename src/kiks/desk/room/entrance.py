@@ -125,8 +125,7 @@ class Entrance:
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer a request."""
-        request = Request(scope, receive)
-        await (await self._answer(request))(scope, receive, send)
+        await (await self._answer(Request(scope, receive)))(scope, receive, send)
 
     async def _answer(self, request: Request) -> Response:
         if request.method not in ("GET", "POST"):
@@ -157,8 +156,7 @@ class Entrance:
         headers = {"cache-control": "no-store"} | ({"set-cookie": cookie} if cookie else {})
         names = self._names() if step == "names" else {}
         texts = {"title": self._title, "code": self._code, "path": self._door.path, "fault": fault, **more}
-        text = _PAGE.render(step=step, names=names, **texts)
-        return HTMLResponse(text, status, headers)
+        return HTMLResponse(_PAGE.render(step=step, names=names, **texts), status, headers)
 
     def _address(self, request: Request) -> str:
         """Return whose guess it is: the connection's other end, or what a proxy of this computer says of its own."""

@@ -79,13 +79,8 @@ def usual_programs(
     desk: Desk, sim: Simulation, commands: Sequence[Command | None], gate: Gate, /, **options: Any
 ) -> Programs:
     """Return what runs the programs of a world on a desk, as its project says; with other options of `Programs`."""
-    own: dict[str, Any] = {
-        "thinking": desk.project.thinking,
-        "say": desk.say,
-        "sandbox": desk.sandbox,
-        "keeps_output": True,
-    }
-    return Programs(sim, commands, new_patience=gate.patience, **own | options)
+    usual: dict[str, Any] = {"thinking": desk.project.thinking, "say": desk.say, "sandbox": desk.sandbox}
+    return Programs(sim, commands, new_patience=gate.patience, **{"keeps_output": True} | usual | options)
 
 
 class Desk:

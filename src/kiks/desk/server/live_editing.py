@@ -349,8 +349,7 @@ class Editing:
             if then.walls is not now.walls:
                 await asyncio.to_thread(lambda: then.walls.faces)
             time_ns = await desk.do(lambda sim: _change(sim, now, then))
-            robots = tuple(each.robot for each in then.of(Robot).values())
-            desk.project = replace(desk.project, robots=robots)
+            desk.project = replace(desk.project, robots=tuple(each.robot for each in then.of(Robot).values()))
             # Resets return to here: the places of the old checkpoint may be walls by now.
             await desk.do(desk.mark)
             desk.project = await desk.present_project()

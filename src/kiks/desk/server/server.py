@@ -99,8 +99,7 @@ class DeskServer:
             self._socket = _listen(host, PORT, or_free=True) if port is None else _listen(host, port)
             self.door.public = public.at(self.port) if public else None
             begun = threading.Event()
-            server = threading.Thread(target=self._serve, args=(begun,), name="kiks desk", daemon=True)
-            server.start()
+            threading.Thread(target=self._serve, args=(begun,), name="kiks desk", daemon=True).start()
             if not begun.wait(START_S) or self._loop is None:
                 self._socket.close()
                 self._socket = None

@@ -113,11 +113,7 @@ class Tries:
             ]
             with self._turn():
                 run_trials(
-                    trials,
-                    self._path(),
-                    workers=self.workers,
-                    on_outcome=self._take,
-                    goes_on=lambda: self._is_wanted,
+                    trials, self._path(), workers=self.workers, on_outcome=self._take, goes_on=lambda: self._is_wanted
                 )
         except (KiksError, OSError) as error:
             self.error = str(error)

@@ -61,15 +61,7 @@ def curve(parameters: Any, distance_mm: Any) -> Any:
 
 @kernel
 def expected_ambient(
-    walls: Any,
-    lamps: Any,
-    parameters: Any,
-    seen: Any,
-    seen_count: Any,
-    x: Any,
-    y: Any,
-    heading: Any,
-    sensor: Any,
+    walls: Any, lamps: Any, parameters: Any, seen: Any, seen_count: Any, x: Any, y: Any, heading: Any, sensor: Any
 ) -> Any:
     """Return the mean count of a sensor of a robot at a pose.
 

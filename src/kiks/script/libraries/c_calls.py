@@ -139,11 +139,7 @@ def date_functions(now_ns: Callable[[], int]) -> dict[str, tuple[Any, Any]]:
         seconds[0], seconds[1] = divmod(time_ns, NS_PER_S)
         return 0
 
-    return {
-        "time": (_Time, tell),
-        "gettimeofday": (_TimeOfDay, tell_exactly),
-        "clock_gettime": (_GetTime, tell_clock),
-    }
+    return {"time": (_Time, tell), "gettimeofday": (_TimeOfDay, tell_exactly), "clock_gettime": (_GetTime, tell_clock)}
 
 
 @cache
