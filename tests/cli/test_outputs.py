@@ -162,6 +162,7 @@ def test_the_place_of_an_output_that_is_left_out_is_checked(tmp_path: Path, monk
         Path(name).write_text("precious")
         with pytest.raises(ParameterError, match=f"must be new.*{name}' exists"):
             told(*words)
+    told("demo", "follow", "--desk")  # there a person takes pictures
 
 
 @pytest.mark.parametrize(

@@ -113,6 +113,7 @@ def test_fingers_reach_everything_on_small_screens(new_page: NewPage, shown: Sho
         visitor.picture(f"{tab}_{width}x{height}")
         assert visitor.answer("document.documentElement.scrollWidth") == width
         check_reach(visitor.page, tab)
+    assert visitor.answer("document.querySelector('.q-header').offsetHeight") < 90  # the bar has two rows at most
     fingers = visitor.page.context.new_cdp_session(visitor.page)
     for kind, x_mm in (("touchStart", 150), ("touchMove", 180), ("touchMove", 200), ("touchEnd", None)):
         places = [] if x_mm is None else [dict(zip("xy", visitor.on_page(x_mm, 200), strict=True))]

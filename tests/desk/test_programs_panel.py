@@ -75,6 +75,14 @@ def test_a_program_that_ran_is_saved_with_the_project_and_shown_when_that_is_ope
     visitor.page.reload()
     visitor.tab("programs")
     expect(visitor.at("name")).to_have_value("exercise1.py")
+    for text in ("# the first draft", "# the second draft"):  # what is not saved is there on the next page, too
+        visitor.write(text)
+        visitor.until(lambda text=text: text in visitor.desk.drafts.values())
+        visitor.page.reload()
+        visitor.tab("programs")
+        expect(visitor.at("editor")).to_contain_text(text)
+        visitor.at("new-program").click()
+        expect(visitor.at("editor")).not_to_contain_text(text)
 
 
 def test_a_program_does_not_start_after_halt_while_it_is_saved(

@@ -41,7 +41,8 @@ from kiks.version import __version__
 
 DEMO_HELP = """Run a demonstration, or list them.
 
-A demonstration is a program in a world of its own, and leaves a picture, kiks-NAME.png. With --desk you can watch it.
+A demonstration is a program in a world of its own, and leaves a picture, kiks-NAME.png; with --desk you watch it
+instead.
 
 Example: kiks demo avoid --desk
 

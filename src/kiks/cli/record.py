@@ -27,7 +27,7 @@ UNFINISHED_CHARACTERS_MAX = 1 << 20
 def _picture_of_demonstration(given: Mapping[str, Any]) -> Path | None:
     from kiks.cli.job import demonstration_of
 
-    name = demonstration_of(str(given["program"]))
+    name = None if given["desk"] else demonstration_of(str(given["program"]))
     return Path(f"kiks-{name}.png") if name else None
 
 
@@ -46,7 +46,7 @@ ExportFile = Annotated[
     typer.Option(
         "--export",
         help="Write this file of the run when it ends, as kiks export does: .png, .csv, .mp4, .html ...; kiks-NAME.png "
-        "for a demonstration, if left out.",
+        "for a demonstration without --desk, if left out.",
         callback=output(*ENDINGS, default=_picture_of_demonstration),
     ),
 ]

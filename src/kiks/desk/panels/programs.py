@@ -82,7 +82,7 @@ class ProgramsPanel(Panel):
         self._script: Path | None = None
         self._exercise: Exercise | None = None
         self._text: str | None = NEW  # as it was read or saved last; None with a draft
-        self._drafts: dict[Path | None, str] = {}
+        self._drafts = desk.drafts  # so a page that is closed or loaded again loses nothing
         self._shown_arguments = ""  # where something else stands, a person has typed it
         self._is_saving = False
         self._seen = self._checked = NEW
@@ -184,6 +184,10 @@ class ProgramsPanel(Panel):
         """
         self._offer()
         project = self._desk.project
+        if is_first and self._drafts:
+            self._exercise = project.exercise
+            self._go_on_writing(next(reversed(self._drafts)))
+            return
         if (exercise := project.exercise) is not None:
             if (command := attached.get(STUDENT)) is not None:
                 attached = {STUDENT: command}
@@ -204,9 +208,20 @@ class ProgramsPanel(Panel):
         if is_first:
             self._choice.value = EXAMPLES / "first_steps.py"
 
+    def _go_on_writing(self, script: Path | None) -> None:
+        """Show what was written last, maybe on a page that was closed since."""
+        if script in self._choice.options:
+            self._choice.value = script
+        else:
+            text, self._text = self._drafts[script], None
+            self._edit(None, self._name_of_exercise(self._exercise) if self._exercise else self._name.value, text)
+
+    def _name_of_exercise(self, exercise: Exercise) -> str:
+        return scripts.name_of(exercise.title or self._desk.project.arena.name)
+
     def _begin_exercise(self, exercise: Exercise) -> None:
         """Show the student's program of an exercise, which may be there from an earlier day; else its template."""
-        name = scripts.name_of(exercise.title or self._desk.project.arena.name)
+        name = self._name_of_exercise(exercise)
         self._robot.value = STUDENT
         if (program := self._folder.path / name) in self._choice.options:
             self._choice.value = program
@@ -309,9 +324,9 @@ class ProgramsPanel(Panel):
         self._check()
 
     def _note_draft(self) -> None:
-        self._drafts[self._script] = self._editor.value or ""
-        if self._drafts[self._script] == self._text:
-            del self._drafts[self._script]
+        self._drafts.pop(self._script, None)
+        if (text := self._editor.value or "") != self._text:
+            self._drafts[self._script] = text
 
     def _check_pause(self) -> bool:
         """Look for a mistake when the person has stopped to type; return whether that is so."""
@@ -344,8 +359,8 @@ class ProgramsPanel(Panel):
     async def _save_silently(self) -> None:
         """Save the program under its name, if no other one has it."""
         script, text, folder = self._script, self._editor.value or "", self._folder
-        name = folder.full_name(script.name if script is not None else self._name.value or "")
         try:
+            name = folder.full_name(script.name if script is not None else self._name.value or "")
             if script is not None:
                 folder.question(name)
             data = scripts.encode_script(text)

@@ -123,6 +123,7 @@ class Desk:
         outside: The programs in the world that this desk has not started.
         news: Messages to people, the newest last.
         log: These and what programs of Octave and MATLAB tell, each line with the time of day, the newest last.
+        drafts: What people have written in programs and not saved, by file; None: in a new one. The newest is the last.
         tries: How a person's program has done in all cases of the exercise.
         hand_in: Takes a file that a person hands in, its bytes and its name; None: the browser downloads it. Raises
             a `ParameterError` with a message for that person if it is not taken.
@@ -168,6 +169,7 @@ class Desk:
         self.hand_in: Callable[[bytes, str], None] | None = None
         self.may_hand_in = True
         self.hall: Showing | None = None
+        self.drafts: dict[Path | None, str] = {}
         self.tries = Tries(is_for_others=is_for_others, is_trusted=sandbox is None)
         self.is_seen = threading.Event()
         self.looking = LookingBack(lambda: self.present, self.say)

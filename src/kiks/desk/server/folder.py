@@ -136,7 +136,8 @@ class Folder:
 
     def full_name(self, name: str) -> str:
         """Add the default ending to a name without a known ending."""
-        typed = name.strip()
+        if not (typed := name.strip()):
+            raise ParameterError("The name must have a letter or more, but it was empty. Write one first.")
         return typed if PurePosixPath(typed).suffix.lower() in self.opened else f"{typed}{self.saved[0]}"
 
     def _path(self, name: str, endings: tuple[str, ...]) -> Path:
