@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from tests.at_length import cases
 from tests.desk.test_desk_command import started, stop, url_of
-from tests.desk.visitor import Guest, NewPage, expect
+from tests.desk.visitor import Guest, NewPage, expect, in_each_browser
 from tests.served import called
 from tests.wheels import build, install
 
@@ -16,7 +16,7 @@ from kiks import Champion, controllers
 from kiks.model.project import Project
 from kiks.model.shipped import shipped
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, in_each_browser]
 
 
 @pytest.fixture(scope="module")
@@ -70,7 +70,7 @@ def test_the_desk_step_by_step(kiks: str, new_page: NewPage, tmp_path: Path) -> 
         # 3. Drag the robot, and turn it by its rim.
         x_mm, y_mm, _ = guest.seen(1)
         drag(guest, (x_mm, y_mm), (250, 540))
-        guest.until(lambda: guest.seen(1)[:2] == pytest.approx((250, 540), abs=1))
+        guest.until(lambda: guest.seen(1)[:2] == pytest.approx((250, 540), abs=2))
         *_, heading_rad = guest.seen(1)
         drag(guest, (250, 515), (275, 540))
         guest.until(lambda: abs(guest.seen(1)[2] - heading_rad) > 1)
@@ -89,7 +89,7 @@ def test_the_desk_step_by_step(kiks: str, new_page: NewPage, tmp_path: Path) -> 
         guest.click("go-on-from-here", "dialog-yes", shows={"bar-state": "Now"})
         x_mm, y_mm, _ = guest.seen(1)
         drag(guest, (x_mm, y_mm), (250, 200))
-        guest.until(lambda: guest.seen(1)[:2] == pytest.approx((250, 200), abs=1))
+        guest.until(lambda: guest.seen(1)[:2] == pytest.approx((250, 200), abs=2))
         guest.click("run")
         guest.until(lambda: time_s(guest) > past_s + 0.2)
         # 7. Write a program.
