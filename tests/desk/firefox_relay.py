@@ -6,7 +6,6 @@ each context, and takes no for a failure; Firefox has no such command yet. Run a
 
 import asyncio
 import json
-import os
 import re
 import shutil
 import sys
