@@ -1,13 +1,17 @@
-"""Chromium for all browser tests, which are skipped if it is missing."""
+"""Browsers: Chromium for nearly all tests, and Firefox for a few. What is missing skips its tests."""
 
 from __future__ import annotations
 
+import shlex
+import sys
 from collections.abc import Iterator
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
 from tests.at_length import AT_LENGTH
+from tests.desk import firefox_relay
 from tests.desk.visitor import Browser, NewPage, Page, Shown, Visitor, make_project, open_desk
 from tests.guard import GUARD_S
 
@@ -38,22 +42,36 @@ def playwright() -> Iterator[Playwright]:
     call `asyncio.run`. Chromium begins within 0.3 s."""
     from playwright.sync_api import expect, sync_playwright
 
-    if not CHROMIUM.exists():
-        pytest.skip(f"tests in a browser need Chromium at {CHROMIUM}")
     expect.set_options(timeout=1000 * GUARD_S)
     with sync_playwright() as playwright:
         yield playwright
 
 
 @pytest.fixture(scope="module")
-def browser(playwright: Playwright) -> Iterator[Browser]:
-    with playwright.chromium.launch(executable_path=CHROMIUM, args=ARGUMENTS) as browser:
+def browser(request: Any, playwright: Playwright, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    """Chromium, or what a test's parameter names (`in_each_browser`)."""
+    if getattr(request, "param", "chromium") == "chromium":
+        launched = chromium(playwright)
+    elif firefox_relay.FIREFOX is None:
+        pytest.skip("tests in Firefox need it as firefox-esr or firefox")
+    else:
+        command = tmp_path_factory.mktemp("firefox") / "firefox"
+        command.write_text(f'#!/bin/sh\nexec {shlex.join([sys.executable, firefox_relay.__file__])} "$@"\n')
+        command.chmod(0o755)
+        launched = playwright.firefox.launch(channel="moz-firefox", executable_path=command)
+    with launched as browser:
         yield browser
+
+
+def chromium(playwright: Playwright, *arguments: str) -> AbstractContextManager[Browser]:
+    if not CHROMIUM.exists():
+        pytest.skip(f"tests in a browser need Chromium at {CHROMIUM}")
+    return playwright.chromium.launch(executable_path=CHROMIUM, args=[*ARGUMENTS, *arguments])
 
 
 @pytest.fixture
 def browser_without_3d(playwright: Playwright) -> Iterator[Browser]:
-    with playwright.chromium.launch(executable_path=CHROMIUM, args=[*ARGUMENTS, "--disable-3d-apis"]) as browser:
+    with chromium(playwright, "--disable-3d-apis") as browser:
         yield browser
 
 

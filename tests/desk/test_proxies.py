@@ -102,17 +102,17 @@ def test_a_notebook_that_does_not_reach_its_desk_shows_a_picture(shown: Any, mon
 
 
 class PathProxy:
-    """A proxy that offers a server below /robots, a request for each connection.
+    """A proxy that offers the server of this process below /robots, a request for each connection.
 
     Args:
-        to: The server's port.
         strips: Whether the server gets paths without /robots.
     """
 
-    def __init__(self, to: int, *, strips: bool) -> None:
-        self._to, self._strips = to, strips
+    def __init__(self, *, strips: bool = True) -> None:
+        self._strips = strips
         self._listener = socket.create_server(("127.0.0.1", 0))
         self.port = self._listener.getsockname()[1]
+        self.address = public_address(f"http://localhost:{self.port}/robots/")
         threading.Thread(target=self._serve, daemon=True).start()
 
     def _serve(self) -> None:
@@ -121,7 +121,7 @@ class PathProxy:
                 threading.Thread(target=self._pass_on, args=self._listener.accept()[:1], daemon=True).start()
 
     def _pass_on(self, browser: socket.socket) -> None:
-        with suppress(OSError), browser, socket.create_connection(("127.0.0.1", self._to)) as server:
+        with suppress(OSError), browser, socket.create_connection(("127.0.0.1", SERVER.port)) as server:
             head = b""
             while b"\r\n\r\n" not in head and (data := browser.recv(65536)):
                 head += data
@@ -178,7 +178,7 @@ def test_a_desk_behind_a_proxy_at_a_path_draws_and_is_dragged(kind: str, tmp_pat
         if kind == "nginx":
             port, scheme = stack.enter_context(nginx(tmp_path)), "https"
         else:
-            port, scheme = stack.enter_context(closing(PathProxy(SERVER.port, strips=kind == "strips"))).port, "http"
+            port, scheme = stack.enter_context(closing(PathProxy(strips=kind == "strips"))).port, "http"
         stack.callback(setattr, SERVER.door, "public", None)
         SERVER.start(public=public_address(f"{scheme}://localhost:{port}/robots/"))
         shown.url = SERVER.url(shown.gateway.number)

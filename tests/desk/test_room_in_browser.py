@@ -1,11 +1,14 @@
 """A room in Chromium: three students and the lecturer, from the first click to what is handed in."""
 
+from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import Any
 
 import pytest
+from tests.at_length import cases
 from tests.desk import visitor
 from tests.desk.test_exercise import DRIVE, make_exercise
+from tests.desk.test_proxies import PathProxy
 from tests.desk.visitor import FIRST_PICTURE, Browser, NewPage, Page, check_access, check_reach, expect, leave_picture
 
 NAMES = ["Ada Lovelace", "Alan Turing", "Grace <b>Hopper</b>", "J\xf6rg M\xfcller"]
@@ -35,7 +38,10 @@ def solve(page: Page) -> None:
 
 
 @pytest.mark.slow
-def test_a_class_comes_solves_and_hands_in(tmp_path: Path, new_page: NewPage, browser: Browser) -> None:
+@pytest.mark.parametrize("is_behind_a_path", cases([False, True]))
+def test_a_class_comes_solves_and_hands_in(
+    is_behind_a_path: bool, tmp_path: Path, new_page: NewPage, browser: Browser
+) -> None:
     from tests.namespaces import has_namespaces
 
     from kiks.desk.room.page import open_room
@@ -43,8 +49,10 @@ def test_a_class_comes_solves_and_hands_in(tmp_path: Path, new_page: NewPage, br
     from kiks.trials.submissions import submissions_in
 
     project, is_trusted = make_exercise(), not has_namespaces()
-    room = Room(project, tmp_path, NAMES, tmp_path / "room", is_trusted=is_trusted)
-    with open_room(room, port=0):
+    with ExitStack() as stack:
+        address = stack.enter_context(closing(PathProxy())).address if is_behind_a_path else None
+        room = Room(project, tmp_path, NAMES, tmp_path / "room", address=address, is_trusted=is_trusted)
+        stack.enter_context(open_room(room, port=0))
         lecturer = new_page(1366, 768, color_scheme="light")
         lecturer.goto(room.lecturer_address)
         expect(lecturer.get_by_test_id("sum")).to_have_text("0 of 4 have come, 0 solved it, 0 handed in")

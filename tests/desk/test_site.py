@@ -5,6 +5,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Iterator
+from contextlib import contextmanager
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
@@ -28,6 +29,15 @@ class QuietHandler(SimpleHTTPRequestHandler):
         pass
 
 
+@contextmanager
+def served(folder: Path) -> Iterator[str]:
+    """Serve the files of a folder; return the address."""
+    with ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(QuietHandler, directory=folder)) as server:
+        threading.Thread(target=server.serve_forever).start()
+        yield f"http://127.0.0.1:{server.server_port}"
+        server.shutdown()
+
+
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     """Build the site and serve it: search reads pages by requests, which a browser allows for files only in part."""
@@ -35,11 +45,8 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
     command = (sys.executable, "-m", "sphinx", "-q", "-W", "--keep-going", "-d", folder / "state")
     result = subprocess.run([*command, ROOT / "docs", folder / "html"], capture_output=True, text=True)
     assert result.returncode == 0, result.stderr
-    handler = functools.partial(QuietHandler, directory=folder / "html")
-    with ThreadingHTTPServer(("127.0.0.1", 0), handler) as server:
-        threading.Thread(target=server.serve_forever).start()
-        yield f"http://127.0.0.1:{server.server_port}"
-        server.shutdown()
+    with served(folder / "html") as site:
+        yield site
 
 
 @pytest.mark.parametrize("width", [390, 1280])
@@ -65,5 +72,5 @@ def test_axe_finds_nothing_serious(site: str, new_page: NewPage) -> None:
 def test_search_finds_a_name(site: str, new_page: NewPage) -> None:
     page = new_page()
     page.goto(f"{site}/search.html?q=travelled_mm")
-    page.locator("#search-results li a").first.wait_for()
-    assert "simulation.html" in (page.locator("#search-results li a").first.get_attribute("href") or "")
+    page.locator(".pagefind-ui__result-link").first.wait_for()
+    assert "simulation.html" in (page.locator(".pagefind-ui__result-link").first.get_attribute("href") or "")

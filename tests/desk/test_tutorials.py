@@ -2,21 +2,24 @@
 
 import re
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
-from tests.at_length import cases
+from tests.at_length import at_length, cases
 from tests.desk.test_desk_command import started, stop, url_of
-from tests.desk.visitor import Guest, NewPage, expect
-from tests.served import called
-from tests.wheels import build, install
+from tests.desk.test_site import served
+from tests.desk.visitor import FIRST_PICTURE, Guest, NewPage, expect, in_each_browser
+from tests.documents import blocks
+from tests.guard import GUARD_S
+from tests.served import PROGRAMS, called
+from tests.wheels import ROOT, build, install
 
 from kiks import Champion, controllers
 from kiks.model.project import Project
 from kiks.model.shipped import shipped
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, in_each_browser]
 
 
 @pytest.fixture(scope="module")
@@ -70,7 +73,7 @@ def test_the_desk_step_by_step(kiks: str, new_page: NewPage, tmp_path: Path) -> 
         # 3. Drag the robot, and turn it by its rim.
         x_mm, y_mm, _ = guest.seen(1)
         drag(guest, (x_mm, y_mm), (250, 540))
-        guest.until(lambda: guest.seen(1)[:2] == pytest.approx((250, 540), abs=1))
+        guest.until(lambda: guest.seen(1)[:2] == pytest.approx((250, 540), abs=2))
         *_, heading_rad = guest.seen(1)
         drag(guest, (250, 515), (275, 540))
         guest.until(lambda: abs(guest.seen(1)[2] - heading_rad) > 1)
@@ -89,7 +92,7 @@ def test_the_desk_step_by_step(kiks: str, new_page: NewPage, tmp_path: Path) -> 
         guest.click("go-on-from-here", "dialog-yes", shows={"bar-state": "Now"})
         x_mm, y_mm, _ = guest.seen(1)
         drag(guest, (x_mm, y_mm), (250, 200))
-        guest.until(lambda: guest.seen(1)[:2] == pytest.approx((250, 200), abs=1))
+        guest.until(lambda: guest.seen(1)[:2] == pytest.approx((250, 200), abs=2))
         guest.click("run")
         guest.until(lambda: time_s(guest) > past_s + 0.2)
         # 7. Write a program.
@@ -114,6 +117,80 @@ def test_the_desk_step_by_step(kiks: str, new_page: NewPage, tmp_path: Path) -> 
     for words in (["mine.kiks", "my_program.py"], ["mine.kiks"]):
         ran = called(kiks, "run", *words, cwd=tmp_path)
         assert (ran.returncode, ran.stderr.count("robot 1:")) == (0, 1), ran.stderr
+
+
+@at_length
+def test_a_class_step_by_step(kiks: str, new_page: NewPage, tmp_path: Path) -> None:
+    assert called(kiks, "examples", "examples", cwd=tmp_path).returncode == 0
+    with desk_of(kiks, new_page, tmp_path, *CLASS) as guest:
+        guest.shows({"exercise-text": "Somewhere in the room a lamp burns"})
+        guest.tab("programs")
+        guest.write((ROOT / "tests/exercises/solutions/lamp.py").read_text())
+        guest.click("run-program", shows={"programs": "find_the_lamp.py on robot 1"})
+        guest.until(lambda: time_s(guest) > 0.5)
+        guest.click("tab-exercise", "try-all")
+        expect(guest.at("tries-state")).to_contain_text(re.compile(r"(\d+) of \1 solved"))
+        guest.picture("class")
+        (submissions := tmp_path / "submissions").mkdir()
+        with guest.page.expect_download() as download:
+            guest.click("hand-in")
+        assert download.value.suggested_filename == "find_the_lamp.zip"
+        download.value.save_as(submissions / "ada.zip")
+    graded = called(kiks, "grade", "--trusted", "examples/exercises/lamp", "submissions", cwd=tmp_path)
+    assert graded.returncode == 0, graded.stderr
+    assert "ada" in graded.stdout
+    assert (tmp_path / "grades-lamp" / "report.html").exists()
+
+
+def test_an_old_program_is_seen_again(kiks: str, new_page: NewPage, tmp_path: Path) -> None:
+    drive = PROGRAMS / "drive.py"
+    assert called(kiks, "run", "--record", "run.mcap", drive, "COM1", "20", "5", "3", cwd=tmp_path).returncode == 0
+    with desk_of(kiks, new_page, tmp_path, "replay", "run.mcap") as guest:
+        guest.until(lambda: time_s(guest) > 0.2)
+        guest.at("time-slider").press("Home")
+        guest.until(lambda: time_s(guest) < 0.1)
+        start = guest.seen(1)
+        guest.at("time-slider").press("End")
+        guest.until(lambda: guest.seen(1) != start)
+
+
+SHOWN = blocks(ROOT / "docs/tutorials/first_program.md")[-2].code.replace("while sim.", "sim.show()\nwhile sim.")
+"""The last program of the tutorial, with the line that shows it."""
+
+
+def test_the_first_program_is_watched_from_a_terminal(kiks: str, new_page: NewPage, tmp_path: Path) -> None:
+    (tmp_path / "clear.py").write_text(SHOWN)
+    with started("clear.py", folder=tmp_path, command=[str(Path(kiks).with_name("python"))]) as (_, output):
+        guest = Guest(new_page(), url_of(output))
+        place = guest.seen(1)
+        guest.until(lambda: guest.seen(1) != place)
+        guest.page.goto("about:blank")
+
+
+def test_the_first_program_is_watched_in_a_notebook(kiks: str, new_page: NewPage, tmp_path: Path) -> None:
+    from jupyter_client.manager import KernelManager
+
+    kernel = KernelManager()
+    kernel.kernel_spec.argv[0] = str(Path(kiks).with_name("python"))
+    kernel.start_kernel(cwd=str(tmp_path))
+    cells = kernel.blocking_client()
+    with ExitStack() as stack:
+        stack.callback(kernel.shutdown_kernel, now=True)
+        cells.start_channels()
+        stack.callback(cells.stop_channels)
+        cells.wait_for_ready(timeout=GUARD_S)
+        cells.execute(SHOWN)
+        while (message := cells.get_iopub_msg(timeout=GUARD_S))["msg_type"] != "display_data":
+            assert message["msg_type"] != "error", message
+        (tmp_path / "index.html").write_text(
+            f'<link rel="icon" href="data:,">{message["content"]["data"]["text/html"]}'
+        )
+        page = new_page()
+        page.goto(stack.enter_context(served(tmp_path)))
+        frame = page.wait_for_selector("iframe").content_frame()
+        frame.wait_for_function(FIRST_PICTURE)
+        place = frame.evaluate("kiksDesk.pose(0).x_mm")
+        frame.wait_for_function("(place) => kiksDesk.pose(0).x_mm !== place", arg=place)
 
 
 CLASS = ("desk", "examples/exercises/lamp", "--no-browser", "--port", "0")

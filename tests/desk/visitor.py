@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import pytest
-from tests.at_length import AT_LENGTH
+from tests.at_length import AT_LENGTH, at_length
 
 from kiks.model.arena import Arena
 from kiks.model.arena_objects import Ball, Cylinder, Lamp, Pose
@@ -78,6 +78,11 @@ NewPage = Callable[..., Page]
 """What the fixture `new_page` of conftest.py is."""
 
 Fact = TypeVar("Fact")
+
+in_each_browser = pytest.mark.parametrize(
+    "browser", ["chromium", pytest.param("firefox", marks=at_length)], indirect=True, scope="module"
+)
+"""Marks a test that `make test` does in Chromium, and `make test-all` in Firefox, too."""
 
 
 def expect(what: Locator | Page) -> Any:

@@ -9,7 +9,16 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.at_length import at_length, cases, share
-from tests.desk.visitor import COLOURS, Browser, NewPage, Page, check_access, check_reach, leave_picture
+from tests.desk.visitor import (
+    COLOURS,
+    Browser,
+    NewPage,
+    Page,
+    check_access,
+    check_reach,
+    in_each_browser,
+    leave_picture,
+)
 
 from kiks import Arena, Khepera, ParameterError, Recording, Simulation
 from kiks.export import page_contents as contents
@@ -265,6 +274,7 @@ def shown_pose(page: Page, time_s: float, robot: int = 0) -> list[float]:
 
 
 @pytest.mark.slow
+@in_each_browser
 def test_the_player_shows_the_recording_plays_jumps_and_ends(plain: Files, visit: Visit) -> None:
     page, recording = visit(plain[1]), Recording(plain[0])
     poses = recording.table("poses")

@@ -42,7 +42,7 @@ DESKS, HANDED_IN = "desks", "handed-in"
 LOOK_S = 1.0
 """Period at which the room looks how the desks do [s]."""
 
-STUDENT_ADVICE = """<p><a href="/">Choose your name again</a>, or ask your teacher.</p>
+STUDENT_ADVICE = """<p><a href="HOME">Choose your name again</a>, or ask your teacher.</p>
 <p>For the teacher: open the complete address that KiKS printed when it started. It ends in <code>?token=</code> and a
 long word.</p>"""
 
@@ -115,8 +115,8 @@ class Room:
             LinkError: If the room cannot listen there.
         """
         door = SERVER.door
-        door.advice = STUDENT_ADVICE
         SERVER.start(host=host, port=port, public=self._public)
+        door.advice = STUDENT_ADVICE.replace("HOME", f"{door.path}/")
         for seat in self.seats.values():
             if seat.number:
                 self._open(seat)
