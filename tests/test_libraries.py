@@ -1,4 +1,4 @@
-"""Each name of a library that `src` uses is there, private ones too: a version that lacks some is told by their names."""
+"""Each name of a library that `src` uses is there, private ones too, whatever its version."""
 
 import ast
 import sys
@@ -25,13 +25,13 @@ def used_names(source: str) -> Iterator[str]:
             root = path.partition(".")[0]
             if root not in ("kiks", *sys.stdlib_module_names) and find_spec(root):
                 yield path
-                known |= {each.asname: path} if each.asname else {each.name.partition(".")[0]: root}
-                if isinstance(node, ast.ImportFrom):
-                    known[each.asname or each.name] = path
+                # `import a.b` makes the name a; all other ways make the last name.
+                is_root = isinstance(node, ast.Import) and not each.asname
+                known[root if is_root else each.asname or each.name] = root if is_root else path
     for node in nodes:
         # `_Result: Any = CompileResult` is the same under a name that has no types.
-        if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name) and (path := path_of(node.value, known)):
-            known[node.target.id] = path
+        if isinstance(node, ast.AnnAssign) and (path := path_of(node.value, known)):
+            known[ast.unparse(node.target)] = path
     yield from filter(None, (path_of(node, known) for node in nodes))
     for node in nodes:
         bases = [path for each in getattr(node, "bases", ()) if (path := path_of(each, known))]
