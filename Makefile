@@ -11,7 +11,7 @@ PYTEST = $(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
 # The tests start hundreds of Python processes: Python keeps the bytecode of the modules, whatever the environment says.
 export PYTHONDONTWRITEBYTECODE =
 
-.PHONY: demo test test-all quick checked interpreters user setup system lint types docs benchmarks wheel octave-package clean
+.PHONY: demo test test-all quick checked interpreters libraries user setup system lint types docs benchmarks wheel octave-package clean
 
 demo: user
 	$(BIN)/kiks demo follow --arena examples/arenas/office.toml --seconds 300 --export kiks-demo.png
@@ -35,6 +35,10 @@ checked: setup
 interpreters: setup system
 	PATH="$(BIN):$$PATH" $(BIN)/nox
 
+# Tests with the lowest and the newest versions of libraries that `pyproject.toml` allows.
+libraries: setup
+	PATH="$(BIN):$$PATH" $(BIN)/nox --session libraries
+
 user: $(VENV)/.user
 setup: $(VENV)/.developer
 
@@ -55,7 +59,8 @@ $(VENV)/.developer: $(VENV)/.user
 # uv takes a tenth of the time of pip. Where it cannot get the packages, for instance because only pip knows the mirror, pip installs them,
 # and builds those that have no wheel for a new Python yet.
 install = $(UV) pip install --quiet --python $(BIN)/python --only-binary :all: --no-binary kiks --editable '$(1)' || \
-	$(BIN)/python -m pip install -qq --disable-pip-version-check --prefer-binary --editable '$(1)'
+	{ echo 'uv cannot install these. pip tries next, and builds what has no wheel.'; \
+	$(BIN)/python -m pip install -qq --disable-pip-version-check --prefer-binary --editable '$(1)'; }
 
 system:
 	@PYTHON="$(PYTHON)" sh tools/system-packages.sh tests

@@ -29,6 +29,9 @@ PYTEST = ("-m", "pytest", "-n", str(1 + (os.cpu_count() or 1)), "--dist", "works
 PACKAGES, ALL = "tests/script/test_packages.py", {"KIKS_AT_LENGTH": "1"}
 """`make test` runs few of the programs with packages; here, all of them run."""
 
+USE_LIBRARIES = tuple(f"tests/{name}" for name in ("test_libraries.py", "engine", "recording", "client", "cli", "desk"))
+"""Most private names of Numba and NiceGUI are used in these, and most of KiKS."""
+
 nox.options.default_venv_backend = "uv|venv"
 nox.options.reuse_venv = "yes"
 nox.options.error_on_missing_interpreters = True
@@ -79,6 +82,19 @@ def tests(session: nox.Session) -> None:
     session.run("python", *PYTEST, *left_out, "tests/script", "tests/client")
     session.run("python", *PYTEST, PACKAGES, env=ALL)
     session.run("python", *PYTEST, "-m", "not slow", "tests/ports", "tests/cli")
+
+
+@nox.session(venv_backend="uv", default=False)
+@nox.parametrize("resolution", [nox.param("lowest-direct", id="lowest"), nox.param("highest", id="newest")])
+def libraries(session: nox.Session, resolution: str) -> None:
+    """Test the lowest or the newest versions of libraries that are allowed, or others, which stand after `--`."""
+    bounds = ("--upgrade", "--resolution", resolution)
+    session.install("--quiet", *bounds, "--editable", ".", *session.posargs)
+    session.install("--quiet", *TESTED_WITH)
+    session.run("python", "-m", "kiks", "warmup")
+    # Old libraries use what the newest ones that they bring will take away.
+    quiet = ("-W", "ignore::DeprecationWarning") if resolution == "lowest-direct" else ()
+    session.run("python", *PYTEST, *quiet, "-m", "not slow", *USE_LIBRARIES)
 
 
 @nox.session(python=False)

@@ -18,7 +18,8 @@ from typing import Any
 
 from llvmlite import binding, ir
 from numba import extending, njit
-from numba.core import cgutils, codegen, compiler, event
+from numba.core import cgutils, codegen, compiler
+from numba.core.event import TimingListener, register
 
 from kiks.ending import send_again_what_is_dropped
 from kiks.engine.code_cache import CodeCache, at_load, tell
@@ -37,8 +38,8 @@ _njit: Any = njit
 _intrinsic: Any = extending.intrinsic
 _Library: Any = codegen.JITCodeLibrary
 _Pipeline: Any = compiler.Compiler
-_Listener: Any = event.TimingListener
-_register: Any = event.register
+_Listener: Any = TimingListener
+_register: Any = register
 _is_null: Any = cgutils.is_null
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from pathlib import Path, PurePosixPath
+from weakref import WeakMethod
 
 from nicegui import ui
 from nicegui.events import UploadEventArguments
@@ -70,11 +71,18 @@ class FilesPanel:
             text_button("", "movie", "film", "Make a film of the run and download it", FilmDialog(self._desk).open)
 
     def _build_upload(self) -> None:
+        # FastAPI's cache of routes outlives the page, and the route of an upload holds its handler.
+        weakly = WeakMethod(self._take)
+
+        async def take(event: UploadEventArguments) -> None:
+            if (of_this_page := weakly()) is not None:
+                await of_this_page(event)
+
         with ui.row().classes("w-full items-center no-wrap gap-1"):
             self._upload = ui.upload(
                 auto_upload=True,
                 max_file_size=UPLOAD_BYTES_MAX,
-                on_upload=self._take,
+                on_upload=take,
                 on_rejected=lambda: ui.notify(
                     f"A file must have at most {UPLOAD_BYTES_MAX >> 20} MiB and be one of {', '.join(OPENED)}.",
                     type="negative",
