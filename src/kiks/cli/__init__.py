@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+from contextlib import suppress
 
 import typer
 
@@ -126,7 +127,8 @@ def main() -> None:
     except OSError as error:
         # The error of a file has its own line; this is one of the standard output, such as a full disk.
         tell(f"Cannot go on: {error.strerror or error}. Is there room for the output?")
-        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # what is still in its buffer
+        with suppress(OSError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # what is still in its buffer
         sys.exit(2)
     except KeyboardInterrupt:
         sys.exit(INTERRUPTED)
