@@ -132,13 +132,16 @@ def prepare(app, what, name, obj, options, lines):
 
 
 SCROLLED = re.compile(r'<pre(?=[ >])|<div(?= class="table-wrapper)')
+SECTION = re.compile(r'<section id="([^"]+)">((?:\s*<span id="[^"]+"></span>)*\s*<h[1-6])>')
 
 
 def help_readers_and_keys(app, page, template, context, doctree):
     """Give captions of the list of pages their level for readers of screens; let keys reach what can be scrolled."""
     tree = context.get("furo_navigation_tree", "")
     context["furo_navigation_tree"] = tree.replace('role="heading"', 'role="heading" aria-level="2"')
-    context["body"] = SCROLLED.sub(r'\g<0> tabindex="0"', context.get("body", ""))
+    body = SCROLLED.sub(r'\g<0> tabindex="0"', context.get("body", ""))
+    # The search leads to headings that have the address themselves, where Sphinx gives it to the section.
+    context["body"] = SECTION.sub(r'<section>\2 id="\1">', body)
 
 
 NOT_SEARCHED = ".headerlink, .genindextable, .indextable, .genindex-jumpbox"

@@ -25,7 +25,7 @@ def test_what_visitors_type_leads_to_the_right_page(new_page: NewPage) -> None:
         page.locator("input.sidebar-search").fill(question.strip())
         page.locator("input.sidebar-search").press("Enter")
         page.locator(".pagefind-ui__result-link").first.wait_for()
-        found = page.locator(".pagefind-ui__result-title > a").evaluate_all(
+        found = page.locator(".pagefind-ui__result-inner > .pagefind-ui__result-title > a").evaluate_all(
             "all => all.slice(0, 3).map(a => a.pathname)"
         )
         if f"/{answer}.html" not in found:

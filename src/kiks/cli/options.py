@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from kiks.model.project import Project
     from kiks.ports.program_process import Command
 
-OTHERS = (".mcap", ".toml", ".kad", ".yaml", ".png", ".txt", ".csv", ".zip", ".ipynb", ".c", ".java", ".m")
+OTHERS = (".mcap", ".toml", ".kad", ".yaml", ".png", ".csv", ".ipynb", ".c", ".java", ".m")
 """Endings of files that are no programs of Python."""
 
 OTHER_LANGUAGES = "Programs in other languages reach robots by kiks serve."
