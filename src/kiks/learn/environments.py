@@ -53,12 +53,15 @@ def exploring(moment: Any, notes: Any) -> None:
 
 @measure(notes=2)
 def nearer_to_light(moment: Any, notes: Any) -> None:
-    """Distance by which it has come nearer to a burning lamp since its first step [0.1 m], plus 1 once it arrives."""
+    """Distance by which it has come nearer to a burning lamp since its first step [0.1 m], plus 1 once it arrives.
+
+    Steps in which no lamp burns do not count.
+    """
     distance_mm = nearest_lamp_mm(moment)
-    if notes[1] > 0.0:
+    if notes[1] > 0.0 and distance_mm < np.inf:
         notes[0] += (notes[1] - distance_mm) / 100.0
         notes[0] += 1.0 if distance_mm <= ARRIVED_MM < notes[1] else 0.0
-    notes[1] = distance_mm
+    notes[1] = distance_mm if distance_mm < np.inf else 0.0
 
 
 @measure(notes=2)

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import cycle
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -118,6 +118,7 @@ class Exam(Experiment):
     worlds: Annotated[Whole, Field(ge=1, le=STARTS_MAX)] = 20
     starts: Starts = "random"
     until: Annotated[Measure | None, Field(description="Write @kiks.measure over the function.")] = None
+    other_columns: ClassVar = ("start", "solved")
 
     # Functions cannot be compared: an exam equals itself only.
     __eq__ = object.__eq__
