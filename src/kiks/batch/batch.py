@@ -232,7 +232,7 @@ class Batch:
         callbacks = deciders, watching.watchers, watching.until_note
         self._on_all_cores(worlds, (0, UNLIMITED, until_ns), callbacks, functions)
         names = tuple(name for each in measures for name in each.value_names)
-        return Rollouts(watching.values(worlds.notes), worlds.steps.copy(), names)
+        return Rollouts(watching.values(worlds.notes), worlds.steps.copy(), names, self.seeds.copy())
 
     # ---- step by step ----
 
