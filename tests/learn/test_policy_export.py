@@ -170,8 +170,9 @@ def test_the_champion_drives_the_episode_of_the_policy(tmp_path: Path) -> None:
     seed, start = by_policy.batch.seeds, by_policy.batch.poses[0, 0].tolist()
     arena = by_policy.batch.arenas[by_policy.batch.arena_indices[0]]
     for _ in range(100):
-        by_policy.step(actions_of(layers, by_policy.observations()[0, 0].astype(np.float64), "relu", "clip")[None])
-        by_champion.step(speeds_of(champion, np.rint(1023.0 * by_champion.observations()[0].astype(np.float64))))
+        seen = by_policy.observations()[0, 0].astype(np.float64)
+        by_policy.step(actions_of(layers, seen, "relu", "clip")[None, None])
+        by_champion.step(speeds_of(champion, np.rint(1023.0 * by_champion.observations()[0].astype(np.float64)))[None])
     assert by_champion.batch.state_hash(0) == by_policy.batch.state_hash(0)
     batch = kiks.Batch(arena, 1, seed=seed, starts=start, senses=spec.controller.senses, timing=spec.timing)
     batch.run(champion.controller, champion.parameters, seconds=by_policy.batch.times_s[0])
