@@ -79,7 +79,7 @@ def set_baud(port: Any, baud: int) -> None:
     """
     baud = check_count("baud", baud, BAUD_MIN, BAUD_MAX, "Usual: 9600 bit/s.")
     try:
-        if port.baudrate != baud:
+        if port.baudrate != baud:  # an object without one would take any
             port.baudrate = baud
     except (AttributeError, ValueError, OSError) as error:
         raise LinkError(
@@ -98,16 +98,6 @@ class FastPort:
             self._descriptor = int(port.fileno()) if os.name == "posix" else None
         except (AttributeError, OSError):
             self._descriptor = None  # not a port of the operating system: RFC 2217
-
-    @property
-    def baudrate(self) -> int:
-        """Speed of the line [bit/s]."""
-        baud: int = self.port.baudrate
-        return baud
-
-    @baudrate.setter
-    def baudrate(self, baud: int) -> None:
-        self.port.baudrate = baud
 
     @property
     def timeout(self) -> float | None:

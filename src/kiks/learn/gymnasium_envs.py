@@ -332,7 +332,8 @@ def episodes_of(task: str | Task, worlds: int, changes: dict[str, Any], robots: 
     task = environment_of(task)
     if robots is None and task.robots > 1:
         raise ParameterError(f"the task must have one robot, but has {task.robots}. KheperaTeam takes several.")
-    return Episodes(task.with_changes(**changes, robots=robots or 1), worlds, **of_episodes)
+    changes["robots"] = 1 if robots is None else robots
+    return Episodes(task.with_changes(**changes), worlds, **of_episodes)
 
 
 def checked_seed(seed: int | None) -> int | None:

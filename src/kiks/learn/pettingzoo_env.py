@@ -12,7 +12,7 @@ from kiks.learn.environments import environment_of, step_limit
 from kiks.learn.episode_batch import SEED_LIMIT, checked_action
 from kiks.learn.gymnasium_envs import checked_mode, checked_seed, episodes_of, metadata_of, spaces_of
 from kiks.learn.task import Task
-from kiks.model.checks import ROBOTS_MAX, check_count
+from kiks.model.checks import check_count
 
 try:
     from pettingzoo import ParallelEnv
@@ -63,7 +63,6 @@ class KheperaTeam(ParallelEnv[str, Floats32, Floats32]):  # type: ignore[misc, u
         self.render_mode, task = checked_mode(render_mode), environment_of(task)
         if robots is None:
             robots = task.robots if task.robots > 1 else TEAM
-        check_count("robots", robots, 1, ROBOTS_MAX)
         self.episodes = episodes_of(task, 1, {"threads": 1} | changes, robots)
         self.metadata = metadata_of(self.episodes.task, self.metadata)
         steps = step_limit(self.episodes.task.timings[0].period_s) if max_cycles is None else max_cycles

@@ -33,9 +33,6 @@ CONFIDENCE = 0.95
 RESAMPLES = 9999
 """Number of samples of a bootstrap."""
 
-VALUES_AT_ONCE = 1_000_000
-"""Most values that a bootstrap draws at once, which bounds its memory."""
-
 EFFECTS = ((0.06, "negligible"), (0.14, "small"), (0.21, "medium"), (0.5, "large"))
 """Names of effect sizes: largest |A - 0.5|, and the name."""
 
@@ -119,16 +116,9 @@ def bootstrap_interval(statistic: Callable[..., Any], values: Sequence[float]) -
     sample = _sample(values)
     if len(sample) < 2:
         return None
-    given: dict[str, Any] = {"n_resamples": RESAMPLES, "confidence_level": CONFIDENCE, "vectorized": True}
-    found = bootstrap(
-        [sample],
-        statistic,
-        batch=max(1, VALUES_AT_ONCE // len(sample)),
-        method="percentile",
-        random_state=np.random.default_rng(0),
-        **given,
-    ).confidence_interval
-    return Interval(float(found.low), float(found.high))
+    drawing: dict[str, Any] = {"n_resamples": RESAMPLES, "random_state": np.random.default_rng(0), "vectorized": True}
+    found = bootstrap([sample], statistic, method="percentile", confidence_level=CONFIDENCE, **drawing)
+    return Interval(*map(float, found.confidence_interval))
 
 
 def a_interval(a: float, first: int, second: int) -> Interval:
