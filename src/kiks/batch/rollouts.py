@@ -73,9 +73,9 @@ class Rollouts:
         They are world, robot (both from 0), seed, steps, and a column for each value.
 
         Example:
-            >>> Rollouts(np.array([[[120.5]], [[80.25]]]), np.array([10, 10]), ("path_mm",), np.array([7, 8])).columns()
-            {'world': array([0, 1]), 'robot': array([0, 0]), 'seed': array([7, 8]), 'steps': array([10, 10]),
-             'path_mm': array([120.5 ,  80.25])}
+            >>> rollouts = Rollouts(np.array([[[120.5]], [[80.25]]]), np.array([10, 10]), ("path_mm",), np.array([7, 8]))
+            >>> {name: column.tolist() for name, column in rollouts.columns().items()}
+            {'world': [0, 1], 'robot': [0, 0], 'seed': [7, 8], 'steps': [10, 10], 'path_mm': [120.5, 80.25]}
         """
         worlds, robots, _ = self.values.shape
         of_worlds = {"seed": self.seeds, "steps": self.step_counts}

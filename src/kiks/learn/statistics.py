@@ -135,7 +135,7 @@ def a_interval(a: float, first: int, second: int) -> Interval:
     Example:
         >>> low, high = a_interval(1.0, 5, 5)
         >>> round(low, 3), high
-        (0.632, 1.0)
+        (0.643, 1.0)
     """
     from scipy.optimize import brentq
     from scipy.special import ndtri

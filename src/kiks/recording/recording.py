@@ -259,8 +259,9 @@ class Recording:
             >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
             >>> with sim.record(file):
             ...     _ = kiks.Khepera(sim.port(1)).encoders()
-            >>> kiks.Recording(file).columns("H")
-            {'time_s': array([0.002]), 'robot': array([1], dtype=int32), 'value_0': array([0]), 'value_1': array([0])}
+            >>> columns = kiks.Recording(file).columns("positions")
+            >>> list(columns), columns["value_0"]
+            (['time_s', 'robot', 'value_0', 'value_1'], array([0]))
         """
         table = self.table(name, robot)
         return columns_of({each: table[each] for each in table.dtype.names or ()})
