@@ -33,7 +33,7 @@ def findings_of(evolutions: list[kiks.Evolution], out: Path) -> list[Finding]:
     with column_figure(out, 215, nrows=3, height_ratios=[1, 1.25, 1]) as (above, middle, below):
         for side, (name, colour) in enumerate(zip(names, SIDE_COLOURS, strict=True)):
             draw_generations(above, evolutions, side, colour=colour, name=name)
-            mean, low, high = mean_interval([each.means[side] for each in tournaments])
+            mean, low, high = mean_interval([each.means[side] for each in tournaments], within=SHARE)
             numbers = tournaments[0].generations
             below.fill_between(numbers, low, high, color=colour, alpha=0.2, linewidth=0)
             below.plot(numbers, mean, color=colour, label=name)

@@ -73,7 +73,8 @@ class Rollouts:
         They are world, robot (both from 0), seed, steps, and a column for each value.
 
         Example:
-            >>> rollouts = Rollouts(np.array([[[120.5]], [[80.25]]]), np.array([10, 10]), ("path_mm",), np.array([7, 8]))
+            >>> values, seeds = np.array([[[120.5]], [[80.25]]]), np.array([7, 8])
+            >>> rollouts = Rollouts(values, np.array([10, 10]), ("path_mm",), seeds)
             >>> {name: column.tolist() for name, column in rollouts.columns().items()}
             {'world': [0, 1], 'robot': [0, 0], 'seed': [7, 8], 'steps': [10, 10], 'path_mm': [120.5, 80.25]}
         """
