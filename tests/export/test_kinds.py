@@ -9,6 +9,7 @@ from PIL import Image
 from kiks import Arena, Batch, Khepera, ParameterError, Recording, Simulation, controllers, measures
 from kiks.export.kinds import ENDINGS, KINDS, export, kind_of, options_of
 from kiks.export.pictures import Picture
+from kiks.learn.exam import ExamResult
 from kiks.recording.tables import TABLES
 
 ENCODERS = (10, 4)
@@ -75,12 +76,13 @@ def test_tables_enter_pandas_and_are_the_same_in_each_kind_of_file(recording: Re
     batch = Batch(Arena.box(400, 300), worlds=3, robots=2, seed=[5, 7, 6])
     ahead, watching = [0.5] * 18, [measures.path_mm, measures.trajectory(seconds=1, points=2)]
     rollouts = batch.run(controllers.linear(), ahead, seconds=1, measures=watching)
-    tables["rollouts"] = rollouts.columns()
+    exam = ExamResult(np.array([True, False]), np.array([[31.0], [2.5]]), ("path_mm",), "drives")
+    tables |= {"rollouts": rollouts.columns(), "exam": exam.columns()}
     for name, wanted in tables.items():
         frame, file = pd.DataFrame(wanted), tmp_path / name
         for ending in (".csv", ".parquet", ".mat"):
-            if name == "rollouts":
-                rollouts.save(file.with_suffix(ending))
+            if name in ("rollouts", "exam"):
+                {"rollouts": rollouts.save, "exam": exam.save}[name](file.with_suffix(ending))
             else:
                 recording.export(file.with_suffix(ending), table=name, robot=1)
         pd.testing.assert_frame_equal(pd.read_parquet(file.with_suffix(".parquet")), frame)
