@@ -1,6 +1,5 @@
 """Statistics with answers that are known."""
 
-import tracemalloc
 from itertools import combinations
 from statistics import NormalDist
 from typing import Any
@@ -113,13 +112,6 @@ def test_a_sample_without_values_or_with_others_than_numbers_is_an_error(bad: An
     ):
         refused("a sample must", wrong)
     refused("p must be from 0 to 1", statistics.holm, [0.5, float("nan")])
-
-
-def test_large_samples_take_little_memory() -> None:
-    tracemalloc.start()
-    statistics.compare({"a": np.arange(120.0).tolist(), "b": np.arange(120.0).tolist()})
-    assert tracemalloc.get_traced_memory()[1] < 100e6
-    tracemalloc.stop()
 
 
 def test_all_settings_together_and_each_two() -> None:

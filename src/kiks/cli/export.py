@@ -68,8 +68,8 @@ def export(
     table: Annotated[
         str | None,
         typer.Option(
-            help="Table: poses, wheels, readings, wire, events, a command such as T,2,N or a sense such as camera; poses if "
-            "left out."
+            help="Table: poses, wheels, readings, wire, events, a command such as T,2,N or a sense such as camera; "
+            "poses if left out."
         ),
     ] = None,
     robot: Annotated[
