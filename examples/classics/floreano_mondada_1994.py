@@ -6,7 +6,7 @@ import numpy as np
 
 import kiks
 from kiks.export.figures import column_figure, draw_paths
-from kiks.learn.classics import Finding, command, evolved, path_of
+from kiks.learn.classics import AMOUNT, Finding, command, evolved, path_of
 from kiks.learn.plots import draw_generations
 from kiks.model.ranges import seeds_in
 
@@ -55,7 +55,9 @@ def main(
             f"{sum(ahead)} of {len(ahead)} seeds",
         ),
         Finding("cruising speed [mm/s]", "usually quoted as about 48", [np.median(each) for each in speeds], 1),
-        Finding("contacts of the champion in 24 s", "", [each.measures["contacts"] for each in champions]),
+        Finding(
+            "contacts of the champion in 24 s", "", [each.measures["contacts"] for each in champions], within=AMOUNT
+        ),
         Finding("with V as printed: stay where they are", "", f"{stayed} of {len(as_printed)} seeds"),
     ]
 

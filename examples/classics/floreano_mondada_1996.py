@@ -21,7 +21,7 @@ from kiks.learn.classic_tasks import (
     battery_empty,
     charges,
 )
-from kiks.learn.classics import Finding, command, evolved
+from kiks.learn.classics import AMOUNT, SHARE, Finding, command, evolved
 from kiks.learn.plots import draw_generations
 from kiks.model.ranges import seeds_in
 
@@ -133,13 +133,21 @@ def found(evolutions: Any, out: Path) -> list[Finding]:
         Finding("parameters", "102 (secondary)", str(evolutions[0].task.parameter_count)),
         Finding("fitness of the last generation, best", "not recovered", [each.max() for each in last], 3),
         Finding("fitness of the last generation, mean", "not recovered", [each.mean() for each in last], 3),
-        Finding("actions in a fresh life, of 150", "", [each[:, 0].mean() for each in lit], 1),
-        Finding("share of fresh lives that last to the end", "", full),
+        Finding("actions in a fresh life, of 150", "", [each[:, 0].mean() for each in lit], 1, (0, LIFE_ACTIONS)),
+        Finding("share of fresh lives that last to the end", "", full, within=SHARE),
         Finding(
-            "visits of the zone in a life", "returns repeatedly (usually quoted)", [each[:, 1].mean() for each in lit]
+            "visits of the zone in a life",
+            "returns repeatedly (usually quoted)",
+            [each[:, 1].mean() for each in lit],
+            within=AMOUNT,
         ),
-        Finding("charge left on arrival", "usually quoted as about 0.1", arrivals),
-        Finding("visits with the lamp off", "misses it (usually quoted)", [each[:, 1].mean() for each in dark]),
+        Finding("charge left on arrival", "usually quoted as about 0.1", arrivals, within=SHARE),
+        Finding(
+            "visits with the lamp off",
+            "misses it (usually quoted)",
+            [each[:, 1].mean() for each in dark],
+            within=AMOUNT,
+        ),
     ]
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 import kiks
 from kiks.export.figures import column_figure
-from kiks.learn.classics import Finding, command, evolved
+from kiks.learn.classics import AMOUNT, SHARE, Finding, command, evolved
 from kiks.learn.plots import SIDE_COLOURS, draw_generations, draw_squares, legend_below
 from kiks.learn.statistics import mean_interval
 from kiks.model.ranges import seeds_in
@@ -33,7 +33,7 @@ def findings_of(evolutions: list[kiks.Evolution], out: Path) -> list[Finding]:
     with column_figure(out, 215, nrows=3, height_ratios=[1, 1.25, 1]) as (above, middle, below):
         for side, (name, colour) in enumerate(zip(names, SIDE_COLOURS, strict=True)):
             draw_generations(above, evolutions, side, colour=colour, name=name)
-            mean, low, high = mean_interval([each.means[side] for each in tournaments])
+            mean, low, high = mean_interval([each.means[side] for each in tournaments], within=SHARE)
             numbers = tournaments[0].generations
             below.fill_between(numbers, low, high, color=colour, alpha=0.2, linewidth=0)
             below.plot(numbers, mean, color=colour, label=name)
@@ -58,14 +58,23 @@ def findings_of(evolutions: list[kiks.Evolution], out: Path) -> list[Finding]:
     gain = "later generations are not generally better (1998, secondary)"
     return [
         Finding("synapses of predator and prey", "usually quoted as 30 and 20", _counts(evolutions[0])),
-        Finding("share of generations in which the prey is ahead, on average", "usually quoted as most", ahead),
-        Finding("correlation of both average curves", "usually quoted as mirror images", np.nan_to_num(mirrored)),
-        Finding("fitness of the last predators, mean", "not recovered", [each[0][-1] for each in averages]),
-        Finding("fitness of the last preys, mean", "not recovered", [each[1][-1] for each in averages]),
+        Finding(
+            "share of generations in which the prey is ahead, on average", "usually quoted as most", ahead, within=SHARE
+        ),
+        Finding(
+            "correlation of both average curves",
+            "usually quoted as mirror images",
+            np.nan_to_num(mirrored),
+            within=(-1.0, 1.0),
+        ),
+        Finding(
+            "fitness of the last predators, mean", "not recovered", [each[0][-1] for each in averages], within=SHARE
+        ),
+        Finding("fitness of the last preys, mean", "not recovered", [each[1][-1] for each in averages], within=SHARE),
         Finding("tournament: last fifth of predators less the first", gain, gained[0]),
         Finding("tournament: last fifth of preys less the first", gain, gained[1]),
-        Finding("generation of the best predator", "", [float(each.best[0]) for each in tournaments], 0),
-        Finding("generation of the best prey", "", [float(each.best[1]) for each in tournaments], 0),
+        Finding("generation of the best predator", "", [float(each.best[0]) for each in tournaments], 0, AMOUNT),
+        Finding("generation of the best prey", "", [float(each.best[1]) for each in tournaments], 0, AMOUNT),
     ]
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 import kiks
 from kiks.export.figures import column_figure, draw_paths
-from kiks.learn.classics import Finding, command, evolved, path_of
+from kiks.learn.classics import AMOUNT, Finding, command, evolved, path_of
 from kiks.learn.statistics import mean_interval
 from kiks.model.arena import Pose
 from kiks.model.family import family
@@ -69,7 +69,7 @@ def main(
             Finding(
                 "  fitness in reality", f"behaviour rated {BEHAVIOUR[noise]} of 10 (secondary)", fitness[noise][:, 1]
             ),
-            Finding("  paths apart [mm]", f"match rated {MATCH[noise]} of 10 (secondary)", apart_mm[noise], 0),
+            Finding("  paths apart [mm]", f"match rated {MATCH[noise]} of 10 (secondary)", apart_mm[noise], 0, AMOUNT),
         ]
     return findings
 

@@ -62,6 +62,7 @@ def main(
             f"{name}: cylinders outside after 120 s, of 5",
             {"E": "cleans the arena with 7 of 10 (secondary)", "A": "below the others (secondary)"}.get(name[0], ""),
             outside[each],
+            within=(0, 5),
         )
         for each, name in ARCHITECTURES.items()
     ]

@@ -99,5 +99,8 @@ plot_simulation = Hook("kiks.export.notebook", "plot_run")
 plot_recordings = Hook("kiks.export.notebook", "plot")
 """Draws figures of recordings."""
 
+save_columns = Hook("kiks.export.tables", "save_columns")
+"""Writes a table of any columns."""
+
 export_recording = Hook("kiks.export.kinds", "export")
 """Writes a film, a picture, figures, a photo, a table or a page of a recording."""

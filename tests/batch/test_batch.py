@@ -239,8 +239,9 @@ def test_controllers_get_their_own_counts_of_numbers_and_measures_see_all_robots
     batch = kiks.Batch(kiks.Arena.box(400, 400), 1, robots=3)
     rollouts = batch.run([small, large, small], [[1, 2.0], [-1.0], [1, 2, 3]], seconds=0.1, measures=[seen])
     assert rollouts.values[0, :, 3].tolist() == [8 + 10 + 2 + 2, 16 + 30 + 1 - 1, 8 + 10 + 3 + 3]
-    batch = kiks.Batch(kiks.Arena.box(500, 500), 10, robots=3, seed=2)
-    values = batch.run(vehicle, [1.0, 0.01], seconds=2.0, measures=[seen]).values
+    batch = kiks.Batch(kiks.Arena.box(500, 500), 10, robots=3, seed=2, measures=[seen])
+    values = batch.run(vehicle, [1.0, 0.01], seconds=2.0).values  # the measures of the batch
+    assert batch.run(vehicle, [1.0, 0.01], seconds=0.1, measures=[]).measures == ()
     assert (values[..., 0] == 0.0).all()
     assert np.array_equal(values[..., 1], np.roll(values[..., 2], -1, axis=1))
 

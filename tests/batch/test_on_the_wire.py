@@ -68,10 +68,8 @@ def check_worlds(
         for number, each in enumerate(controller if isinstance(controller, list) else [], 1):
             if "camera" in each.senses:
                 sim.fit(number, "k213")
-        for port in ports:
-            port.baudrate = timing.baud
         hashes = noted(sim, ports[0])
-        loops = kiks.drive(ports, controller, parameters, seconds=8.0, period_s=timing.period_s)
+        loops = kiks.drive(ports, controller, parameters, seconds=8.0, period_s=timing.period_s, baud=timing.baud)
         # The last line that it sends stops the robot.
         assert (loops, hashes[-1]) == (rollouts.step_counts[world], batch.state_hash(world))
 
@@ -158,9 +156,7 @@ def test_a_trial_ends_with_its_robots_first_note_and_leaves_the_world_as_a_wire_
     for world, steps in enumerate(until.step_counts.tolist()):
         sim = kiks.Simulation(arena(), robots=2, seed=5 + world)
         ports = [sim.port(1), sim.port(2)]
-        for port in ports:
-            port.baudrate = 19200
-        driver = Driver(ports, wander, speeds[world], period_s=timing.period_s)
+        driver = Driver(ports, wander, speeds[world], period_s=timing.period_s, baud=19200)
         for _ in range(steps):
             driver.step()
         assert sim.state_hash() == batch.state_hash(world)

@@ -241,6 +241,22 @@ def test_a_port_whose_settings_are_refused_stays_free(sim: kiks.Simulation) -> N
     kiks.Khepera(sim.url(1)).close()
 
 
+def test_a_speed_is_that_of_the_line_and_an_open_port_that_has_none_is_refused(sim: kiks.Simulation) -> None:
+    port = serial.serial_for_url(sim.url(1), timeout=1)
+    for baud, found in ((38400, 38400), (None, 38400), (19200, 19200)):
+        assert kiks.Khepera(sim.port(1), baud=baud).encoders() == (0, 0)
+        assert sim.port(1).baudrate == found
+    assert kiks.Khepera(port, baud=57600).encoders() == (0, 0)
+    assert port.baudrate == sim.port(1).baudrate == 57600
+    assert kiks.Champion(kiks.controllers.linear(), [0.0] * 18).drive(port, seconds=0) == 0
+    assert port.baudrate == 57600
+    port.close()
+    with pytest.raises(kiks.LinkError, match="baud must be a speed that the open port can be set to, but it was 9600"):
+        kiks.Khepera(Silent(), baud=9600)
+    with pytest.raises(kiks.ParameterError, match="baud must be a whole number from 75"):
+        kiks.drive(sim.port(1), kiks.controllers.linear(), [0.0] * 18, seconds=1, baud=10)
+
+
 @pytest.mark.parametrize("timeout", [-1, "1", math.nan])
 def test_a_wrong_timeout_leaves_no_reply_unread(sim: kiks.Simulation, timeout: float) -> None:
     ref = kiks.kopen([-1])

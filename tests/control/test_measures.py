@@ -1,5 +1,6 @@
 """Measures that come with KiKS against plain NumPy over all that they saw."""
 
+import pickle
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -8,12 +9,15 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from tests.at_length import at_length
 from tests.learn.small import refused, small
 
 import kiks
 from kiks.control.measure import Moment
 from kiks.engine.state import BODY
+from kiks.learn.environments import nearer_to_light
 from kiks.model.arena import Cylinder, Lamp
+from kiks.model.arena_objects import LampSwitch
 
 WORLDS, STEPS, COLUMNS = 4, 150, 16
 
@@ -230,6 +234,47 @@ def test_groups_and_closeness_follow_from_the_distances_of_pairs(places_mm: Any,
     pairs = squares_mm2[np.tril_indices(len(places_mm), -1)]
     wanted = (1 / (1 + pairs / 1e4)).mean() if len(pairs) else 0.0
     assert after(kiks.measures.closeness, moment(bodies=bodies)) == pytest.approx(wanted)
+
+
+def test_a_measure_is_the_same_under_another_name_which_a_table_needs_if_it_is_there_twice() -> None:
+    goal_mm, names = kiks.measures.goal_mm, ("goal_mm", "near_mm", "far_mm", "end_x_mm_1", "end_y_mm_1")
+    given = [goal_mm(60, 200), goal_mm(60, 200).named("near_mm"), goal_mm(440, 200).named("far_mm")]
+    given.append(pickle.loads(pickle.dumps(WAYS[0].named("first").named("end"))))
+    batch, still = kiks.Batch(arena(), worlds=2, seed=1), np.zeros(FULL.parameter_count)
+    rollouts = batch.run(FULL, still, seconds=0.3, measures=given)
+    assert rollouts.measures == (*names, "end_heading_rad_1")
+    one, same, other, *end = np.moveaxis(rollouts.values[:, 0], -1, 0)
+    assert one.tolist() == same.tolist() != other.tolist()
+    assert end[0].tolist() == batch.poses[:, 0, 0].tolist()
+    refused("name must", given[0].named, "")
+    for measures in (given[:1] * 2, [given[0].named("seconds")], [given[0].named("fitness")]):
+        refused(r"must have different names, .* measure\.named\(", small, measures=measures)
+
+    @kiks.measure
+    def beyond(moment: Any, notes: Any) -> None:
+        notes[1] = moment.x_mm
+
+    refused("'mine' must stay .*notes=2", batch.run, FULL, still, seconds=1, measures=[beyond.named("mine")])
+
+
+@at_length
+def test_ready_measures_are_finite_where_nothing_is_about_but_lamps_that_a_task_misses() -> None:
+    room = kiks.Arena.box(400, 400)
+    needs: dict[str, tuple[Any, ...]] = dict.fromkeys(("goal_mm", "closest_mm", "reached_s", "gathered"), (9, 9))
+    needs["coverage"] = (room,)
+    watching: list[Any] = [WAYS[0], nearer_to_light]
+    for name in set(kiks.measures.__all__) - {"trajectory"}:
+        found = getattr(kiks.measures, name)
+        watching.append(found if isinstance(found, kiks.Measure) else found(*needs.get(name, ())))
+    switches = (LampSwitch(0.2, lamp=1, is_on=False), LampSwitch(0.6, lamp=1, is_on=True), LampSwitch(0.8, 1, False))
+    unlit = replace(room, lamps=(Lamp(100, 350),), lamp_switches=switches)
+    ahead = np.full(FULL.parameter_count, 0.1)
+    for world in (room, unlit):
+        values = kiks.Batch(world, 2, seed=1).run(FULL, ahead, seconds=1, measures=watching)
+        broken = {name for k, name in enumerate(values.measures) if not np.isfinite(values.values[..., k]).all()}
+        assert broken == {"light_mm"}
+        task = small(arenas=world, measures=[kiks.measures.light_mm], axes=())
+        refused("'light_mm' was inf. No lamp burned", task.evaluate, np.zeros((1, 18)), np.zeros(1, np.int64), 1)
 
 
 def test_the_same_arguments_make_the_same_measure() -> None:

@@ -13,7 +13,7 @@ import pytest
 from tests.at_length import cases
 
 import kiks
-from kiks.learn.classics import Finding, table_of
+from kiks.learn.classics import AMOUNT, Finding, table_of
 from kiks.model.arena import Pose
 
 ROOT = Path(__file__).parents[2]
@@ -71,9 +71,11 @@ def test_a_script_is_a_command(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_table_has_a_row_for_each_finding() -> None:
-    text = table_of([Finding("speed", "48", [40.0, 42.0, 44.0], 1), Finding("a word", "", "so")])
-    assert [line.split("  ")[0] for line in text.splitlines()] == ["what", "speed", "a word"]
+    contacts = Finding("contacts", "", [0.0, 0.0, 1.2], within=AMOUNT)
+    text = table_of([Finding("speed", "48", [40.0, 42.0, 44.0], 1), contacts, Finding("a word", "", "so")])
+    assert [line.split("  ")[0] for line in text.splitlines()] == ["what", "speed", "contacts", "a word"]
     assert "42.0 (37.0 to 47.0, 3 seeds)" in text
+    assert "0.40 (0.00 to 2.12, 3 seeds)" in text
 
 
 MIDDLE = replace(kiks.Arena.box(2000, 2000), starts=(Pose(1000, 1000, 0.0),))

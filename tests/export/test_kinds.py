@@ -6,9 +6,14 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from kiks import Arena, Khepera, ParameterError, Recording, Simulation
+from kiks import Arena, Batch, Khepera, ParameterError, Recording, Simulation, controllers, measures
 from kiks.export.kinds import ENDINGS, KINDS, export, kind_of, options_of
 from kiks.export.pictures import Picture
+from kiks.learn.exam import ExamResult
+from kiks.recording.tables import TABLES
+
+ENCODERS = (10, 4)
+"""What the robot's first `H` is answered."""
 
 
 @pytest.fixture(scope="module")
@@ -28,6 +33,7 @@ def recording(world: Simulation, tmp_path_factory: pytest.TempPathFactory) -> Re
         robot = Khepera(world.port(1))
         robot.set_speed(9, 5)
         robot.proximity()
+        assert robot.encoders() == ENCODERS
         world.run(2.0)
         world.move_body(1, 300, 220, speed_mm_s=100.0)
         world.add_robot()
@@ -61,19 +67,43 @@ def test_lines_stay_sharp_and_a_caption_says_what_is_seen(recording: Recording, 
     assert document == (tmp_path / "again.pdf").read_bytes()
 
 
-def test_tables_are_the_same_in_each_kind_of_file(recording: Recording, tmp_path: Path) -> None:
+def test_tables_enter_pandas_and_are_the_same_in_each_kind_of_file(recording: Recording, tmp_path: Path) -> None:
+    import pandas as pd
     from scipy.io import loadmat
 
-    for name in ("poses", "wire", "events"):
-        wanted = recording.table(name, 1)
+    names = *TABLES, "proximity", "positions", "H", "floor", "T,2,N"
+    tables = {name: recording.columns(name, 1) for name in names}
+    batch = Batch(Arena.box(400, 300), worlds=3, robots=2, seed=[5, 7, 6])
+    ahead, watching = [0.5] * 18, [measures.path_mm, measures.trajectory(seconds=1, points=2)]
+    rollouts = batch.run(controllers.linear(), ahead, seconds=1, measures=watching)
+    exam = ExamResult(np.array([True, False]), np.array([[31.0], [2.5]]), ("path_mm",), "drives")
+    tables |= {"rollouts": rollouts.columns(), "exam": exam.columns()}
+    for name, wanted in tables.items():
+        frame, file = pd.DataFrame(wanted), tmp_path / name
         for ending in (".csv", ".parquet", ".mat"):
-            recording.export(tmp_path / f"{name}{ending}", table=name, robot=1)
-        found = loadmat(tmp_path / f"{name}.mat")
-        np.testing.assert_array_equal(found["time_s"][:, 0], wanted["time_s"])
-        lines = (tmp_path / f"{name}.csv").read_text().splitlines()
-        assert len(lines) == 1 + len(wanted)
-        assert lines[0].split(",") == [column for column in found if not column.startswith("__")]
+            if name in ("rollouts", "exam"):
+                {"rollouts": rollouts.save, "exam": exam.save}[name](file.with_suffix(ending))
+            else:
+                recording.export(file.with_suffix(ending), table=name, robot=1)
+        pd.testing.assert_frame_equal(pd.read_parquet(file.with_suffix(".parquet")), frame)
+        kinds = {column: "str" for column, values in wanted.items() if values.dtype.kind == "U"}
+        read = pd.read_csv(file.with_suffix(".csv"), dtype=kinds, keep_default_na=False)
+        pd.testing.assert_frame_equal(read, frame, check_dtype=False, check_exact=True)
+        found = loadmat(file.with_suffix(".mat"))
+        assert [column for column in found if not column.startswith("__")] == list(wanted)
+        np.testing.assert_array_equal(found[next(iter(wanted))].ravel(), frame.iloc[:, 0])
     assert loadmat(tmp_path / "wire.mat")["data"][0, 0][0] == r"D,9,5\n"
+    (counts,) = recording.table("readings")["counts"].tolist()
+    assert [tables["readings"][f"counts_{k}"][0] for k in range(8)] == counts
+    assert [tables["proximity"][f"value_{k}"][0] for k in range(8)] == counts
+    assert [tables["H"][f"value_{k}"].tolist() for k in (0, 1)] == [[value] for value in ENCODERS]
+    assert (list(tables["floor"]), list(tables["T,2,N"])) == (["time_s", "robot", "value_0"], ["time_s", "robot"])
+    in_rows = zip(*(tables["rollouts"][name].tolist() for name in ("world", "robot", "seed")), strict=True)
+    assert [*in_rows] == [(world, robot, (5, 7, 6)[world]) for world in range(3) for robot in range(2)]
+    assert (tables["rollouts"]["heading_rad_2"] == rollouts.values[..., -1].ravel()).all()
+    twice = batch.run(controllers.linear(), ahead, seconds=0.1, measures=[measures.goal_mm(1, k) for k in (1, 2)])
+    with pytest.raises(ParameterError, match=r"must have different names, .*measure\.named"):
+        twice.columns()
 
 
 def test_each_ending_has_a_kind_whose_options_are_those_of_its_function() -> None:

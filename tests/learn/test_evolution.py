@@ -11,6 +11,7 @@ from tests.at_length import share
 from tests.learn.small import candidates_of, refused, small
 
 import kiks
+from kiks.learn.task import LOGGED
 
 pytestmark = pytest.mark.slow
 
@@ -62,12 +63,12 @@ def test_the_log_has_a_row_for_each_evaluation(tmp_path: Path) -> None:
 
     evolution = run(tmp_path)
     log = parquet.read_table(tmp_path / "log.parquet").to_pydict()
+    assert set(log) == {*LOGGED, *evolution.task.measure_names}
     counts = [8, 16, 16, 16]
     assert log["generation"] == [number for number, count in enumerate(counts, start=1) for _ in range(count)]
     assert log["candidate"] == [number for count in counts for number in range(count)]
     assert log["is_trial"] == [number >= 8 for number in log["candidate"]]
     assert log["fitness"] == [value for each in evolution.generations for value in each.values[:, 0].tolist()]
-    assert {"avoidance", "contacts", "path_mm", "seconds", "champion_fitness"} <= set(log)
     assert log["evaluations"] == [sum(counts[:number]) for number in log["generation"]]
     candidates = np.concatenate([each.candidates for each in evolution.generations])
     again = small().evaluate(candidates, np.array(log["seed"]), 1)

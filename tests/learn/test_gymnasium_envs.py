@@ -3,9 +3,11 @@
 import copy
 import importlib
 import pickle
+import re
 import subprocess
 import sys
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,7 +17,7 @@ from tests.at_length import cases
 from tests.learn.small import refused
 
 import kiks
-from kiks.learn.environments import ENVIRONMENTS, without_contacts
+from kiks.learn.environments import ENVIRONMENTS, LIT_ROOMS, without_contacts
 
 pytestmark = pytest.mark.slow
 
@@ -71,7 +73,9 @@ def test_environments_pass_the_checks_of_gymnasium(name: str) -> None:
     from gymnasium.utils.env_checker import check_env
 
     env = registered(f"kiks/{name}-v0", render_mode="rgb_array")
-    assert env.spec.max_episode_steps == 600
+    timing = env.unwrapped.episodes.task.timings[0]
+    assert env.spec.max_episode_steps * timing.period_s == pytest.approx(60.0)
+    assert env.get_wrapper_attr("metadata")["render_fps"] == 1.0 / timing.period_s
     check_env(env.unwrapped)
 
 
@@ -219,6 +223,23 @@ def test_the_sum_of_rewards_is_the_measure_and_a_contact_lowers_it() -> None:
     assert without_contacts(kiks.measures.path_mm, 7.0) is costly.episodes.task.reward
 
 
+def test_the_page_says_what_environments_are() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "howto" / "learning.md").read_text(encoding="utf-8")
+    rows = [line.split("|")[1:-1] for line in page.splitlines() if line.startswith("| `kiks/")]
+    assert [row[0].strip() for row in rows] == [f"`kiks/{name}-v0`" for name in ENVIRONMENTS]
+    others = []
+    for usual in (r"0\.1 s", "10 pulses"):  # with those that differ behind a semicolon
+        (words,) = re.findall(rf"\({usual}[^;)]*; ([^)]*)\)", page)
+        others.append({name: float(number) for number, name in re.findall(r"([\d.]+)(?: s)? in\s+`(\w+)`", words)})
+    for (name, make), row in zip(ENVIRONMENTS.items(), rows, strict=True):
+        task = make()
+        assert row[3].strip() == ", ".join(map(str, task.controller.senses))
+        assert bool(row[4].strip()) == (task.until is not None)
+        assert others[0].get(name, 0.1) == task.timings[0].period_s
+        assert others[1].get(name, 10.0) == task.speed_limit
+    assert (LIT_ROOMS, "eighteen random rooms" in page) == (18, True)
+
+
 def test_arguments_change_timing_and_response() -> None:
     env = begun(single(timing=kiks.Timing(0.05, None), response="fast"))
     assert env.step(np.zeros(2, np.float32))[4]["time_s"] == 0.05
@@ -241,8 +262,20 @@ def test_wrong_arguments_are_errors() -> None:
     refused("reset", single().step, still)
     refused("from -1 to 1, but among them was 1.5", begun(single()).step, np.array([0.0, 1.5]))
     refused("from -1 to 1, but among them was nan", begun(single()).step, np.array([0.0, np.nan]))
-    refused("two for each robot", begun(single()).step, np.zeros(3))
-    refused("two for each robot", begun(single()).step, "ahead")
+    for action in (np.zeros(3), np.zeros((1, 2)), "ahead", [None, 1.0], [[0.0], [1.0, 2.0]]):
+        refused(r"the action must be numbers of the shape \(2,\), .* was given", begun(single()).step, action)
+    refused(r"the actions must be numbers of the shape \(3, 2\)", begun(vector()).step, np.zeros((2, 2)))
+    both = {"robot_1": still, "robot_2": np.zeros(1)}
+    refused(r"action of robot_2 must be numbers of the shape \(2,\)", begun(team(robots=2)).step, both)
+    for name, value in (("seconds", 9), ("fitness", None), ("measures", [path_mm]), ("robots", 2), ("worlds", 4)):
+        refused(f"must be some of arenas, .*, but {name} was among them", single, **{name: value})
+    pair = small_task().with_changes(robots=2)
+    refused("must have one robot, but has 2. KheperaTeam", single, pair)
+    assert (len(team(pair).possible_agents), len(team().possible_agents)) == (2, 3)
+    timings = [kiks.Timing(), kiks.Timing(0.05)]
+    more: Any
+    for more in ({"timing": timings}, {"robot": ["khepera", "khepera_ii"]}):
+        refused("must have one timing and one kind of robot, but 'go' has more", single, small_task(), **more)
     refused("reset", vector().step, np.zeros((3, 2), np.float32))
     refused("room for 40 robots", team(robots=40, arenas=kiks.Arena.box(500, 500)).reset, seed=1)
     refused("one for each of 3 worlds", vector().reset, seed=[1])

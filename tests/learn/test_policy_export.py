@@ -158,22 +158,25 @@ def test_a_state_dict_is_the_same_champion() -> None:
 
 
 def test_the_champion_drives_the_episode_of_the_policy(tmp_path: Path) -> None:
-    spec = environment_of("Maze").with_changes(timing=kiks.Timing(0.05, 38400))
+    spec = environment_of("Maze").with_changes(timing=kiks.Timing(0.05, 38400), robot="khepera_ii")
     layers = network((16, 12, 2))
     path = tmp_path / "learnt.toml"
     kiks.champion_of_policy(layers, spec, activation="relu").save(path)
     champion = kiks.Champion.load(path)
-    assert (champion.timing, champion.task) == (spec.timing, "Maze")
+    assert (champion.timing, champion.task, champion.robot) == (spec.timing, "Maze", "khepera_ii")
     by_policy, by_champion = Episodes(spec, 1, threads=1), Episodes(spec, 1, threads=1)
     for episodes in (by_policy, by_champion):
         episodes.begin([0], [1])
     seed, start = by_policy.batch.seeds, by_policy.batch.poses[0, 0].tolist()
     arena = by_policy.batch.arenas[by_policy.batch.arena_indices[0]]
     for _ in range(100):
-        by_policy.step(actions_of(layers, by_policy.observations()[0, 0].astype(np.float64), "relu", "clip")[None])
-        by_champion.step(speeds_of(champion, np.rint(1023.0 * by_champion.observations()[0].astype(np.float64))))
+        seen = by_policy.observations()[0, 0].astype(np.float64)
+        by_policy.step(actions_of(layers, seen, "relu", "clip")[None, None])
+        by_champion.step(speeds_of(champion, np.rint(1023.0 * by_champion.observations()[0].astype(np.float64)))[None])
     assert by_champion.batch.state_hash(0) == by_policy.batch.state_hash(0)
-    batch = kiks.Batch(arena, 1, seed=seed, starts=start, senses=spec.controller.senses, timing=spec.timing)
+    batch = kiks.Batch(
+        arena, 1, seed=seed, starts=start, senses=spec.controller.senses, timing=spec.timing, robot=spec.robot
+    )
     batch.run(champion.controller, champion.parameters, seconds=by_policy.batch.times_s[0])
     # A step has sensed once more, a few milliseconds later.
     np.testing.assert_allclose(batch.poses[0, 0, :2], by_policy.batch.poses[0, 0, :2], atol=2.0)

@@ -120,6 +120,7 @@ def test_wrong_tasks_and_calls_are_errors() -> None:
     ):
         refused(message, small(**changes).evaluate, np.zeros(shape), np.zeros(shape[0], np.int64), 1)
     refused("opponents must be a whole number from 1", evolution_of, opponents=0)
+    refused("opponents must be left out .* it was 3", kiks.Evolution, kiks.tasks.avoid(), opponents=3)
     evolution = evolution_of(population=4, opponents=2)
     refused("before there is a champion", evolution.champion_of, "prey")
     refused("before a tournament", evolution.master_tournament)

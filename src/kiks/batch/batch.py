@@ -82,7 +82,7 @@ class Batch:
         senses: Readings that `reset` and `step` return, as for `kiks.Controller`; `run` uses its controller's. Robots
             carry the turrets that their senses need; a camera takes a picture every 200 ms.
         actuators: Actuators that `step` takes outputs for, likewise.
-        measures: Measures for step-by-step use, see `values`; `run` has an argument of its own.
+        measures: Measures for step-by-step use, see `values`, and for a `run` that names no others.
         timing: Timing of the control loop.
         response: Response of the proximity sensors, if not that of the robots' files.
         threads: Number of threads; the number of cores if left out. Results do not depend on it.
@@ -184,7 +184,7 @@ class Batch:
         parameters: Any = (),
         *,
         seconds: float,
-        measures: Sequence[Measure] = (),
+        measures: Sequence[Measure] | None = None,
         until: Measure | None = None,
     ) -> Rollouts:
         """Reset all worlds, let controllers drive the robots, and return the values of the measures.
@@ -196,7 +196,7 @@ class Batch:
                 [world, robot, parameter]. With a list of controllers, a list with the parameters of each: [parameter]
                 or [world, parameter].
             seconds: Simulated time after which no loop begins [s].
-            measures: The measures.
+            measures: The measures; those of the batch if left out.
             until: A measure that ends the trial of a world: no further loop begins there once its first note is above
                 zero for one of its robots.
 
@@ -209,6 +209,7 @@ class Batch:
         """
         until_ns = ns_from_s(check_number("seconds", seconds, 0, SECONDS_MAX))
         driving = RobotControllers(controller, parameters, self.world_count, self.robot_count)
+        measures = self._watching.measures if measures is None else measures
         watching = MeasureSlots(measures, driving.common_senses, driving.names, until)
         shape = (self.world_count, self.robot_count)
         self._reset_worlds(np.arange(self.world_count), driving.turrets)
@@ -231,7 +232,7 @@ class Batch:
         callbacks = deciders, watching.watchers, watching.until_note
         self._on_all_cores(worlds, (0, UNLIMITED, until_ns), callbacks, functions)
         names = tuple(name for each in measures for name in each.value_names)
-        return Rollouts(watching.values(worlds.notes), worlds.steps.copy(), names)
+        return Rollouts(watching.values(worlds.notes), worlds.steps.copy(), names, self.seeds.copy())
 
     # ---- step by step ----
 

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kiks.batch.number_table import NumberTable
+from kiks.control.measure import check_names
 from kiks.errors import counted
-from kiks.upwards import shown_in_notebooks
+from kiks.model.columns import Columns
+from kiks.upwards import save_columns, shown_in_notebooks
 
 
 @shown_in_notebooks("kiks.export.notebook", "table")
@@ -24,6 +27,7 @@ class Rollouts:
         values: Values of the measures, float64 [world, robot, value].
         step_counts: Number of control steps, int64 [world].
         measures: Names of the values: of the measures, or of those that a measure has several of.
+        seeds: Seed of each world, int64 [world]; None if they are not known.
 
     Example:
         >>> print(Rollouts(np.array([[[120.5]], [[80.25]]]), np.array([10, 10]), ("path_mm",)))
@@ -39,6 +43,7 @@ class Rollouts:
     values: NDArray[np.float64]
     step_counts: NDArray[np.int64]
     measures: tuple[str, ...]
+    seeds: NDArray[np.int64] | None = None
 
     def __repr__(self) -> str:
         worlds, robots, _ = self.values.shape
@@ -61,3 +66,37 @@ class Rollouts:
         return NumberTable(
             {"world": worlds, **({"robot": robots} if robots > 1 else {})}, ("steps", *self.measures), values
         )
+
+    def columns(self) -> Columns:
+        """Return all values as columns, [world and robot] each, as `pandas.DataFrame` takes them.
+
+        They are world, robot (both from 0), seed, steps, and a column for each value.
+
+        Example:
+            >>> values, seeds = np.array([[[120.5]], [[80.25]]]), np.array([7, 8])
+            >>> rollouts = Rollouts(values, np.array([10, 10]), ("path_mm",), seeds)
+            >>> {name: column.tolist() for name, column in rollouts.columns().items()}
+            {'world': [0, 1], 'robot': [0, 0], 'seed': [7, 8], 'steps': [10, 10], 'path_mm': [120.5, 80.25]}
+        """
+        worlds, robots, _ = self.values.shape
+        of_worlds = {"seed": self.seeds, "steps": self.step_counts}
+        check_names(self.measures, ("world", "robot", *of_worlds))
+        numbers = {name: np.repeat(each, robots) for name, each in of_worlds.items() if each is not None}
+        world, robot = np.indices((worlds, robots)).reshape(2, -1)
+        named = dict(zip(self.measures, self.values.reshape(worlds * robots, -1).T, strict=True))
+        return {"world": world, "robot": robot, **numbers, **named}
+
+    def save(self, path: str | Path) -> None:
+        """Write all values as a table, a row for each robot of each world: see `columns`.
+
+        Args:
+            path: The file: .csv, .parquet, or .mat for Octave and MATLAB.
+
+        Example:
+            >>> import tempfile
+            >>> file = Path(tempfile.mkdtemp(), "rollouts.csv")
+            >>> Rollouts(np.array([[[120.5]], [[80.25]]]), np.array([10, 10]), ("path_mm",)).save(file)
+            >>> file.read_text().split()
+            ['world,robot,steps,path_mm', '0,0,10,120.5', '1,0,10,80.25']
+        """
+        save_columns(self.columns(), path)

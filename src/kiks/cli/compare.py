@@ -105,11 +105,9 @@ def lines_of(name: str, comparison: Comparison) -> Iterator[str]:
         yield f"  all {omnibus.method}: H = {omnibus.statistic:.3g}, p = {omnibus.p:.3g}"
     for pair in comparison.pairs:
         line = f"  {pair.first} - {pair.second}   {pair.test.method}: p = {pair.p:.3g}"
-        if pair.a is not None:
-            interval = (
-                "" if pair.a_interval is None else "{:.2f} to {:.2f} at {:.0%}, ".format(*pair.a_interval, CONFIDENCE)
-            )
-            line += f", A = {pair.a:.2f} ({interval}{pair.effect})"
+        if pair.a is not None and pair.a_interval is not None:
+            low, high = pair.a_interval
+            line += f", A = {pair.a:.2f} ({low:.2f} to {high:.2f} at {CONFIDENCE:.0%}, {pair.effect})"
         yield line
 
 

@@ -66,7 +66,11 @@ def export(
         int | None, typer.Option(help="Photo: rays through a pixel; more are slower and less grainy; 48 if left out.")
     ] = None,
     table: Annotated[
-        str | None, typer.Option(help="Table: poses, wheels, readings, wire or events; poses if left out.")
+        str | None,
+        typer.Option(
+            help="Table: poses, wheels, readings, wire, events, a command such as T,2,N or a sense such as camera; "
+            "poses if left out."
+        ),
     ] = None,
     robot: Annotated[
         int | None, typer.Option(help="Film, figures, page: the robot whose readings they show. Table: of it alone.")

@@ -27,7 +27,7 @@ def drive(
     *,
     seconds: float,
     period_s: float = 0.1,
-    baud: int = 9600,
+    baud: int | None = None,
 ) -> int:
     """Let a controller drive: each loop reads the sensors, lets it decide, sends the speeds and waits.
 
@@ -43,7 +43,7 @@ def drive(
             those of each.
         seconds: Time after which no loop begins [s].
         period_s: Time from the beginning of one loop to that of the next [s]; a loop that takes longer delays the next.
-        baud: Speed of ports that are opened by name [bit/s].
+        baud: Speed of the lines [bit/s]. Left out, open ports keep their own, and those opened by name have 9600.
 
     Returns:
         Number of loops.
@@ -89,7 +89,7 @@ class Driver:
         parameters: Any = (),
         *,
         period_s: float = 0.1,
-        baud: int = 9600,
+        baud: int | None = None,
     ) -> None:
         self._period_ns = ns_from_s(check_number("period_s", period_s, 0, SECONDS_MAX))
         ports = [port] if isinstance(port, str) or not isinstance(port, Sequence) else list(port)

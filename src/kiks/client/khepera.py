@@ -6,7 +6,7 @@ import re
 import time
 from typing import NamedTuple
 
-from kiks.client.port import TIMEOUT_S, Port, open_port
+from kiks.client.port import BAUD, TIMEOUT_S, Port, open_port, set_baud
 from kiks.errors import LinkError, ParameterError, shown
 from kiks.model.checks import SECONDS_MAX, check_count, check_kind, check_number
 from kiks.sim.port import CLOSED, VirtualPort
@@ -45,7 +45,7 @@ class Khepera:
     Args:
         port: A port of a simulation (`sim.port(1)`), a name ('kiks://1', '/dev/ttyUSB0', 'socket://127.0.0.1:10020'),
             or an open pyserial port with a timeout.
-        baud: Speed of a port that is opened by name [bit/s].
+        baud: Speed of the line [bit/s]. Left out, an open port keeps its own, and one that is opened by name has 9600.
 
     Raises:
         LinkError: If the port cannot be opened; from every method, if it was closed or the robot does not send the
@@ -61,11 +61,13 @@ class Khepera:
         (965, 965)
     """
 
-    def __init__(self, port: str | Port, *, baud: int = 9600) -> None:
+    def __init__(self, port: str | Port, *, baud: int | None = None) -> None:
         if isinstance(port, str):
-            self.port: Port = open_port(port, baud)
+            self.port: Port = open_port(port, BAUD if baud is None else baud)
         elif all(hasattr(port, name) for name in ("write", "read_until", "close")):
             self.port = port
+            if baud is not None:
+                set_baud(port, baud)
         else:
             raise ParameterError(
                 f"port must be a simulation's port, a name or an open pyserial port, but it was {shown(port)}. "

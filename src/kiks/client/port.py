@@ -12,6 +12,9 @@ from kiks.errors import LinkError, shown
 from kiks.model.checks import check_count
 from kiks.sim.port import BAUD_MAX, BAUD_MIN
 
+BAUD = 9600
+"""Speed of a line unless another is named [bit/s]."""
+
 TIMEOUT_S = 2.0
 """Default timeout of a reply [s]: the longest, 264 characters at 9600 baud, takes 0.3 s (khepera-protocol.md 2.2)."""
 
@@ -35,7 +38,7 @@ class Port(Protocol):
         """Hang up."""
 
 
-def open_port(name: str, baud: int = 9600, timeout_s: float | None = TIMEOUT_S) -> Port:
+def open_port(name: str, baud: int = BAUD, timeout_s: float | None = TIMEOUT_S) -> Port:
     """Open a simulated or a real port by name.
 
     Args:
@@ -66,6 +69,23 @@ def open_port(name: str, baud: int = 9600, timeout_s: float | None = TIMEOUT_S) 
         ) from None
     # A simulated port, as under `kiks run`, reads lines quickly by itself.
     return port if hasattr(port, "sim_port") else FastPort(port)
+
+
+def set_baud(port: Any, baud: int) -> None:
+    """Set an open port to a speed [bit/s]; a simulated robot's end follows.
+
+    Raises:
+        LinkError: If it cannot have that speed.
+    """
+    baud = check_count("baud", baud, BAUD_MIN, BAUD_MAX, "Usual: 9600 bit/s.")
+    try:
+        if port.baudrate != baud:  # an object without one would take any
+            port.baudrate = baud
+    except (AttributeError, ValueError, OSError) as error:
+        raise LinkError(
+            f"baud must be a speed that the open port can be set to, but it was {baud}: {error}. "
+            "Leave it out, and set the speed where you open the port."
+        ) from None
 
 
 class FastPort:

@@ -119,7 +119,7 @@ class Compiled:
             return ParameterError(f"{subject} must not fail, but{at} {type(error).__name__}: {error}")
         given, index = error.args
         own = {**dict(zip(self._code.co_varnames, self.arguments, strict=False)), "moment.sensors": "sensors"}
-        array = own.get(given, "") if place.name == self.name else ""
+        array = own.get(given, "") if place.name == self._code.co_name else ""
         size = self.sizes.get(array)
         if array in self.options:
             advice = f"Write @kiks.{self.what}({array}={'...' if index is None or index < 0 else index + 1})."
@@ -156,7 +156,7 @@ def explained(error: Exception, functions: Iterable[Compiled]) -> Exception:
     """Return the message for an error that one of some functions has raised; the error itself if none has."""
     place = traceback.extract_tb(error.__traceback__)[-1]
     users = [each for each in functions if not is_trusted(each.function)]
-    own = [each for each in users if (each._code.co_filename, each.name) == (place.filename, place.name)]
+    own = [each for each in users if (each._code.co_filename, each._code.co_name) == (place.filename, place.name)]
     found = own or users
     if not found or isinstance(error, KiksError):
         return error

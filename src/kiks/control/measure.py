@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import namedtuple
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import Any
 
 import numpy as np
@@ -71,6 +71,7 @@ class Measure(Compiled):
         senses: The senses that must come first in `moment.sensors`, as for `kiks.Controller`; controllers with others
             are rejected.
         names: Names of its values, if it has several.
+        advice: What to do if a value is not finite, which a task refuses.
 
     Example:
         >>> import kiks
@@ -83,6 +84,7 @@ class Measure(Compiled):
     """
 
     what, arguments, options = "measure", ("moment", "notes"), ("notes",)
+    prefix = ""
 
     def __init__(
         self,
@@ -92,6 +94,7 @@ class Measure(Compiled):
         result: Result = first_note,
         senses: AnySense | Sequence[AnySense] = (),
         names: Sequence[str] = (),
+        advice: str = "Check its divisions.",
     ) -> None:
         super().__init__(function)
         self.own_names = tuple(check_kind("each of names", each, str) for each in names)
@@ -100,9 +103,28 @@ class Measure(Compiled):
             raise ParameterError(f"result must be a function from notes to values, but it was {shown(result)}.")
         self.result = result
         self.senses = check_senses(senses)
+        self.advice = check_kind("advice", advice, str)
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {self.name!r}>"
+
+    def named(self, name: str) -> Measure:
+        """Return the same measure under another name; the names of several values begin with it.
+
+        So a measure with arguments can be taken twice.
+
+        Example:
+            >>> import kiks
+            >>> kiks.measures.goal_mm(60, 350).named("left_mm").value_names
+            ('left_mm',)
+            >>> kiks.measures.trajectory(seconds=2, points=1).named("end").value_names
+            ('end_x_mm_1', 'end_y_mm_1', 'end_heading_rad_1')
+        """
+        if not check_kind("name", name, str):
+            raise ParameterError("name must have a character, but it was ''.")
+        other = object.__new__(type(self))
+        vars(other).update(vars(self), name=name, prefix=f"{name}_")
+        return other
 
     @property
     def sizes(self) -> dict[str, int | None]:
@@ -124,7 +146,7 @@ class Measure(Compiled):
             >>> kiks.measures.path_mm.value_names
             ('path_mm',)
         """
-        return self.own_names or (self.name,)
+        return tuple(self.prefix + each for each in self.own_names) or (self.name,)
 
     def value(self, notes: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the values of all worlds and robots for their notes [world, robot, note].
@@ -150,6 +172,17 @@ class Measure(Compiled):
                 f"robot, but it was {found}. Work along the last axis, as notes[..., 0] does."
             )
         return values
+
+
+def check_names(names: Sequence[str], others: Collection[str]) -> None:
+    """Check that the names of the values of measures differ, also from the other columns of their table."""
+    for name in names:
+        if name in others or names.count(name) > 1:
+            but = "is another column of their table" if name in others else "was there more than once"
+            raise ParameterError(
+                f"measures must have different names, but {shown(name)} {but}. "
+                f"Give another name, as in measure.named({shown(f'other_{name}')})."
+            )
 
 
 measure = decorator(Measure)

@@ -559,9 +559,12 @@ def escaped_share(*, radius_mm: Radius = 57.0) -> Measure:
 # ---- what is about ----
 
 
-@measure
+@measure(
+    advice="No lamp burned at the end of a trial: take goal_mm(x_mm, y_mm) of its place, light_approach or "
+    "near_light_share."
+)
 def light_mm(moment: Any, notes: Any) -> None:
-    """How far the nearest lamp that burns is [mm]; infinite if there is none.
+    """How far the nearest lamp that burns is [mm]; infinite if there is none, which a task refuses.
 
     Example:
         >>> import kiks

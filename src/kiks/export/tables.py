@@ -4,18 +4,12 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
 
 from kiks.errors import library
 from kiks.model.atomic_files import ending_of, replace_file
+from kiks.model.columns import Columns
 from kiks.recording.recording import Recording
-
-Columns = Mapping[str, NDArray[Any]]
 
 
 def save_table(recording: Recording, path: str | Path, *, table: str = "poses", robot: int | None = None) -> None:
@@ -27,24 +21,19 @@ def save_table(recording: Recording, path: str | Path, *, table: str = "poses", 
         table: Which: see `kiks.Recording.table`.
         robot: Of this robot alone; of all if left out.
     """
-    write = _WRITERS[ending_of(path, "a table", _WRITERS)]
-    rows = recording.table(table, robot)
-    columns: dict[str, NDArray[Any]] = {}
-    for name in rows.dtype.names or ():
-        values = rows[name]
-        if values.dtype.kind == "S":
-            values = np.array(
-                [each.decode("latin-1").encode("unicode_escape").decode() for each in values.tolist()], "U"
-            )
-        columns |= {name: values} if values.ndim == 1 else {f"{name}_{k}": values[:, k] for k in range(values.shape[1])}
-    write(columns, path, "a table")
+    save_columns(recording.columns(table, robot), path)
+
+
+def save_columns(columns: Columns, path: str | Path) -> None:
+    """Write columns as a .csv, .parquet or .mat file."""
+    _WRITERS[ending_of(path, "a table", _WRITERS)](columns, path, "a table")
 
 
 def write_parquet(columns: Columns, path: str | Path, what: str) -> None:
     """Write columns of equal length as a Parquet file."""
     pyarrow, parquet = library("pyarrow"), library("pyarrow.parquet")
     buffer = io.BytesIO()
-    parquet.write_table(pyarrow.table(dict(columns)), buffer)
+    parquet.write_table(pyarrow.table(columns), buffer)
     replace_file(path, buffer.getvalue(), what)
 
 

@@ -13,7 +13,7 @@ from pydantic import BeforeValidator, Field
 
 from kiks.batch.loop_timing import Baud, Timing
 from kiks.client.drive import drive
-from kiks.client.port import Port
+from kiks.client.port import Port, open_port
 from kiks.control.controller import Controller
 from kiks.control.controllers import Recipe, controller_of, recipe_for
 from kiks.control.recipes import file_of
@@ -126,7 +126,7 @@ class Champion:
         self.controller.check_parameters(self.parameters)
 
     def drive(self, port: str | Port | Sequence[str | Port], *, seconds: float) -> int:
-        """Drive one or more robots, simulated or real; see `kiks.drive`.
+        """Drive one or more robots, simulated or real; see `kiks.drive`. Ports that are open keep their speed.
 
         Returns:
             Number of loops.
@@ -141,8 +141,9 @@ class Champion:
             >>> champion.drive(sim.port(1), seconds=2)
             20
         """
-        period_s = self.timing.period_s
-        return drive(port, self.controller, self.parameters, seconds=seconds, period_s=period_s, baud=self.baud)
+        given = [port] if isinstance(port, str) or not isinstance(port, Sequence) else port
+        ports = [open_port(each, self.baud) if isinstance(each, str) else each for each in given]
+        return drive(ports, self.controller, self.parameters, seconds=seconds, period_s=self.timing.period_s)
 
     @property
     def baud(self) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 import sys
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
@@ -19,6 +20,9 @@ from kiks.learn.task import Task
 
 Floats = NDArray[np.float64]
 
+SHARE, AMOUNT = (0.0, 1.0), (0.0, math.inf)
+"""What shares can be, and amounts and counts."""
+
 
 class Finding(NamedTuple):
     """A row of the table of a script.
@@ -28,12 +32,14 @@ class Finding(NamedTuple):
         known: What is known of the paper, and how it is known; empty if nothing is.
         here: What comes out here: a number, or one for each seed, or words.
         digits: Decimals with which the numbers are printed.
+        within: The least and the greatest possible value, where the interval ends.
     """
 
     what: str
     known: str
     here: Any
     digits: int = 2
+    within: tuple[float, float] = (-math.inf, math.inf)
 
     @property
     def text(self) -> str:
@@ -46,7 +52,8 @@ class Finding(NamedTuple):
         if isinstance(self.here, str):
             return self.here
         numbers = np.atleast_1d(np.asarray(self.here, np.float64))
-        mean, low, high = (f"{float(each):.{self.digits}f}" for each in mean_interval(numbers))
+        found = mean_interval(numbers, within=self.within)
+        mean, low, high = (f"{float(each):.{self.digits}f}" for each in found)
         return mean if len(numbers) == 1 else f"{mean} ({low} to {high}, {len(numbers)} seeds)"
 
 

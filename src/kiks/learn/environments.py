@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from kiks.batch.loop_timing import Timing
 from kiks.control.actuators import orders_of
 from kiks.control.arguments import made_once
 from kiks.control.controllers import linear
@@ -35,6 +36,12 @@ from kiks.model.data_file import Number
 CONTACT_COST = 5.0
 """What a contact takes off the rewards of `Avoid` and `Follow`: half a second of following at best is worth as much."""
 
+EPISODE_S = 60.0
+"""Time after which an episode is truncated [s]."""
+
+PERIODS_S = {"Avoid": ready_tasks.AVOID_PERIOD_S}
+"""Periods of the control loops of environments that have another one than usual [s]: known before a task is made."""
+
 LIT_ROOMS = 18
 """Number of rooms of `Light`."""
 
@@ -54,12 +61,15 @@ def exploring(moment: Any, notes: Any) -> None:
 
 @measure(notes=2)
 def nearer_to_light(moment: Any, notes: Any) -> None:
-    """Distance by which it has come nearer to a burning lamp since its first step [0.1 m], plus 1 once it arrives."""
+    """Distance by which it has come nearer to a burning lamp since its first step [0.1 m], plus 1 once it arrives.
+
+    Steps in which no lamp burns do not count.
+    """
     distance_mm = nearest_lamp_mm(moment)
-    if notes[1] > 0.0:
+    if notes[1] > 0.0 and distance_mm < np.inf:
         notes[0] += (notes[1] - distance_mm) / 100.0
         notes[0] += 1.0 if distance_mm <= ARRIVED_MM < notes[1] else 0.0
-    notes[1] = distance_mm
+    notes[1] = distance_mm if distance_mm < np.inf else 0.0
 
 
 @measure(notes=2)
@@ -156,6 +166,11 @@ ENVIRONMENTS: dict[str, Callable[[], Task]] = {
 """Functions that return the environments, by name; each time the same one."""
 
 
+def step_limit(period_s: float) -> int:
+    """Return the number of steps after which an episode is truncated, with a period of the control loop [s]."""
+    return round(EPISODE_S / (period_s or Timing().period_s))
+
+
 def environment_of(task: str | Task) -> Task:
     """Return an environment, given or by its name."""
     if isinstance(task, str) and task in ENVIRONMENTS:
@@ -175,5 +190,10 @@ def environment_of(task: str | Task) -> Task:
         raise ParameterError(
             f"the controller of an environment must command wheels alone, but that of {shown(task.name)} commands "
             f"{names}, too. Evolve it, or give the task another controller."
+        )
+    if len(task.timings) > 1 or len(task.sides[0].specs) > 1:
+        raise ParameterError(
+            f"an environment must have one timing and one kind of robot, but {shown(task.name)} has more. "
+            "Choose: task.with_changes(timing=kiks.Timing(), robot='khepera')."
         )
     return task

@@ -14,7 +14,7 @@ from kiks.batch.initial_state import random_starts
 from kiks.control.measure import Measure
 from kiks.control.measures import contacts, path_mm
 from kiks.control.senses import sense_of
-from kiks.errors import ParameterError, counted
+from kiks.errors import ParameterError, counted, shown
 from kiks.export.pictures import Picture
 from kiks.learn.environments import environment_of
 from kiks.learn.task import Task
@@ -29,6 +29,20 @@ SEED_LIMIT = 2**63 - 1
 
 PICTURE_SIDE_PX = 480
 """Length of the longer side of a rendered picture [pixels]."""
+
+
+def checked_action(action: ArrayLike, shape: tuple[int, ...], name: str = "the action") -> NDArray[Any]:
+    """Return an action of a robot, or of several, as an array of the shape of its action space."""
+    try:
+        given = np.asarray(action)
+    except (TypeError, ValueError, OverflowError):
+        given = np.zeros(0)
+    if given.shape != shape or given.dtype.kind not in "fiu":
+        raise ParameterError(
+            f"{name} must be numbers of the shape {shape}, the speeds of the left and the right wheel, but "
+            f"{shown(action)} was given."
+        )
+    return given
 
 
 class Episodes:
@@ -72,11 +86,6 @@ class Episodes:
         self._rngs: dict[int, np.random.Generator] = {}
         self.step_counts = np.zeros(worlds, np.int64)
 
-    @property
-    def shape(self) -> tuple[int, int]:
-        """Number of worlds, and of robots in each."""
-        return self.batch.world_count, self.batch.robot_count
-
     def begin(self, worlds: ArrayLike, seeds: Sequence[int | None] | None = None) -> None:
         """Begin new episodes in some worlds; the first call must name all worlds.
 
@@ -101,28 +110,18 @@ class Episodes:
         self._sensors = self.batch.reset(selected, seeds=drawn, starts=starts)
         self._scores[chosen], self.step_counts[chosen] = 0.0, 0
 
-    def step(self, actions: ArrayLike, ignored: NDArray[np.bool_] | None = None) -> NDArray[np.float64]:
+    def step(self, actions: NDArray[Any], ignored: NDArray[np.bool_] | None = None) -> NDArray[np.float64]:
         """Let all robots act, then read their sensors.
 
         Args:
-            actions: Speeds of the left and right wheels as shares of the speed limit, [world, robot, 2]; or [world, 2]
-                with one robot per world.
+            actions: Speeds of the left and right wheels as shares of the speed limit, [world, robot, 2], which
+                `checked_action` has checked.
             ignored: Worlds whose actions do not count, bool [world]: their robots stand.
 
         Returns:
             Rewards, float64 [world, robot].
         """
-        try:
-            given = np.asarray(actions)
-        except (TypeError, ValueError, OverflowError):
-            given = np.zeros(0)
-        if given.ndim == 2:
-            given = given[:, None]
-        if given.shape != (*self.shape, 2) or given.dtype.kind not in "fiu":
-            raise ParameterError(
-                f"actions must be numbers of the shape {(*self.shape, 2)}, two for each robot, but they were "
-                f"{given.dtype} of the shape {given.shape}."
-            )
+        given = actions
         if ignored is not None:
             given = np.where(ignored[:, None, None], 0, given)
         if not (np.abs(given) <= 1).all():
@@ -170,7 +169,7 @@ class Episodes:
     def _draw_starts(self, world: int, rng: np.random.Generator) -> list[list[float]]:
         """Return start poses of a world's robots that do not overlap."""
         places = self._places[self.batch.arena_indices[world]]
-        distance_min_mm = 2 * self._body.radius_mm + CLEAR_MM
+        distance_min_mm = 2 * self._body.radius_mm + self.task.apart_mm
         taken: list[list[float]] = []
         for _ in range(100 * self.batch.robot_count):
             pose = places[rng.integers(len(places))].tolist()

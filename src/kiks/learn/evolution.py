@@ -73,7 +73,7 @@ class Evolution:
         population: Number of candidates of a side in a generation; the task's own if left out, or as many as `ask`
             returns, if the algorithm is an object.
         opponents: Number of opponents of each candidate in a task of two sides: champions of the last generations, in
-            turn if there are fewer; in the first generation, candidates of the other side.
+            turn if there are fewer; in the first generation, candidates of the other side. Ten if left out.
         folder: Folder of its generations, its champions, its archive and its log. If it holds generations of the same
             evolution, the evolution continues after them, as if it had never stopped. Left out, nothing is written.
 
@@ -105,12 +105,15 @@ class Evolution:
         *,
         seed: int = 0,
         population: int | None = None,
-        opponents: int = OPPONENTS,
+        opponents: int | None = None,
         folder: str | Path | None = None,
     ) -> None:
         self.task = check_kind("task", task, Task, "kiks.tasks.load() returns one.")
         self.seed = check_count("seed", seed, most=2**63 - 1)
-        self.opponents = check_count("opponents", opponents, 1, 1000) if task.against else 1
+        if opponents is not None and not task.against:
+            raise ParameterError(f"opponents must be left out of a task of one side, but it was {shown(opponents)}.")
+        given = OPPONENTS if opponents is None else opponents
+        self.opponents = check_count("opponents", given, 1, 1000) if task.against else 1
         self.generations: list[Generation] = []
         self.finals: Finals | None = None
         self.tournament: Tournament | None = None

@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import cycle
-from typing import Annotated, Any
+from pathlib import Path
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,12 +27,13 @@ from kiks.learn.experiment import Experiment
 from kiks.model.arena import Arena
 from kiks.model.arena_objects import THINGS_MAX
 from kiks.model.checks import check_kind
+from kiks.model.columns import Columns
 from kiks.model.data_file import Number, Text, Whole, record
 from kiks.model.family import family
 from kiks.model.project import Project, ProjectRobot
 from kiks.model.robot import RobotSpec, specs_of
 from kiks.sim.from_project import rounded_pose
-from kiks.upwards import shown_in_notebooks
+from kiks.upwards import save_columns, shown_in_notebooks
 
 Solved = Callable[[Mapping[str, Floats]], NDArray[np.bool_]]
 
@@ -83,6 +85,15 @@ class ExamResult:
         values = np.column_stack([self.solved, self.values])
         return NumberTable({"start": len(self.solved)}, ("solved", *self.measures), values)
 
+    def columns(self) -> Columns:
+        """Return all starts as columns, [start] each, as `pandas.DataFrame` takes them: start, solved, the measures."""
+        numbers = dict(zip(self.measures, self.values.T, strict=True))
+        return {"start": np.arange(len(self.solved)), "solved": self.solved, **numbers}
+
+    def save(self, path: str | Path) -> None:
+        """Write all starts as a table, a .csv, .parquet or .mat file: see `columns`."""
+        save_columns(self.columns(), path)
+
 
 @record
 class Exam(Experiment):
@@ -118,6 +129,7 @@ class Exam(Experiment):
     worlds: Annotated[Whole, Field(ge=1, le=STARTS_MAX)] = 20
     starts: Starts = "random"
     until: Annotated[Measure | None, Field(description="Write @kiks.measure over the function.")] = None
+    other_columns: ClassVar = ("start", "solved")
 
     # Functions cannot be compared: an exam equals itself only.
     __eq__ = object.__eq__

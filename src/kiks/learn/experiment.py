@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from kiks.batch.initial_state import random_starts
-from kiks.control.measure import Measure
+from kiks.control.measure import Measure, check_names
 from kiks.errors import ParameterError, counted, shown
 from kiks.learn.evaluation import Floats
 from kiks.model.arena import Arena
@@ -23,20 +23,23 @@ CLEAR_MM = 8.0
 
 @shown_in_notebooks("kiks.export.notebook", "arenas")
 class Experiment:
-    """The common base of tasks and exams: robots drive in worlds, which arenas share evenly, and are measured."""
+    """The common base of tasks and exams: robots drive in worlds, which arenas share evenly, and are measured.
+
+    Attributes:
+        other_columns: Columns of the table of its results beside the measures.
+    """
 
     arenas: tuple[Arena, ...]
     measures: tuple[Measure, ...]
     worlds: int
+    other_columns: ClassVar[tuple[str, ...]]
 
     def __post_init__(self) -> None:
         if self.worlds % len(self.arenas) and not self.draws_arenas:
             raise ParameterError(
                 f"worlds must be a multiple of the number of arenas, {len(self.arenas)}, but it was {self.worlds}."
             )
-        names = self.measure_names
-        if len(set(names)) != len(names):
-            raise ParameterError(f"measures must have different names, but they were {shown(names)}.")
+        check_names(self.measure_names, self.other_columns)
 
     @property
     def draws_arenas(self) -> bool:
@@ -68,18 +71,21 @@ class Experiment:
         return np.stack(poses, axis=1).reshape(self.worlds, robots, 3)
 
 
-def fitness_of(fitness: Fitness | None, measure_names: Sequence[str], values: Floats) -> Floats:
+def fitness_of(fitness: Fitness | None, measures: Sequence[Measure], values: Floats) -> Floats:
     """Return the fitness of candidates, float64 [candidate].
 
     Args:
         fitness: The fitness function; None for `cautious_mean` of the first measure.
-        measure_names: Names of the measures.
-        values: Values of the measures, float64 [candidate, world, measure].
+        measures: The measures.
+        values: Their values, float64 [candidate, world, value].
     """
-    for number, name in enumerate(measure_names):
-        if not np.isfinite(values[:, :, number]).all():
-            raise ParameterError(f"measures must be finite, but {shown(name)} was not. Check its divisions.")
-    named = {name: values[:, :, number] for number, name in enumerate(measure_names)}
+    named: dict[str, Floats] = {}
+    for each in measures:
+        for name in each.value_names:
+            found = named[name] = values[:, :, len(named)]
+            if not np.isfinite(found).all():
+                number = found[~np.isfinite(found)][0]
+                raise ParameterError(f"measures must be finite, but {shown(name)} was {number}. {each.advice}")
     result = cautious_mean(values[:, :, 0]) if fitness is None else fitness(named)
     numbers = np.asarray(result, np.float64)
     if numbers.shape != (len(values),) or not np.isfinite(numbers).all():

@@ -19,9 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.batch.initial_state import WORLDS_LIMIT
+from kiks.batch.loop_timing import Timing
 from kiks.errors import ParameterError, installing, shown
-from kiks.learn.environments import ENVIRONMENTS, environment_of
-from kiks.learn.episode_batch import SEED_LIMIT, Episodes
+from kiks.learn.environments import ENVIRONMENTS, PERIODS_S, environment_of, step_limit
+from kiks.learn.episode_batch import SEED_LIMIT, Episodes, checked_action
 from kiks.learn.task import Task
 from kiks.meant import nearest
 from kiks.model.checks import check_count
@@ -39,13 +40,22 @@ except ModuleNotFoundError as error:
 Floats32 = NDArray[np.float32]
 Bools = NDArray[np.bool_]
 
-STEP_LIMIT = 600
-"""Steps after which a registered environment is truncated: a minute, as each takes 0.1 s."""
+CHANGES = ("arenas", "controller", "reward", "until", "starts", "apart_mm", "robot", "timing", "response", "threads")
+"""What of an environment can be changed; the other arguments of a task have no effect here."""
+
+FASTEST_FPS = 20.0
+"""Pictures a second of an environment whose loops follow each other at once: about what 9600 bit/s let through."""
 
 
 def spaces_of(task: Task) -> tuple[Any, Any]:
     """Return the observation space and the action space of one robot, two `gymnasium.spaces.Box`."""
     return Box(0.0, 1.0, (task.controller.sensor_count,), np.float32), Box(-1.0, 1.0, (2,), np.float32)
+
+
+def metadata_of(task: Task, known: dict[str, Any]) -> dict[str, Any]:
+    """Return metadata with the number of pictures a second that shows an environment in real time."""
+    period_s = task.timings[0].period_s
+    return {**known, "render_fps": 1.0 / period_s if period_s else FASTEST_FPS}
 
 
 class KheperaEnv(gymnasium.Env[Floats32, Floats32]):
@@ -54,7 +64,8 @@ class KheperaEnv(gymnasium.Env[Floats32, Floats32]):
     Args:
         task: The environment: a task with a reward, or the name of one of `kiks.learn.environments`.
         render_mode: 'rgb_array' for pictures from above, None for none.
-        **changes: Changed arguments of the task, such as `arenas` or `timing`; and `response` as for `Episodes`.
+        **changes: Changed arguments of the task: `arenas`, `controller`, `reward`, `until`, `starts`, `apart_mm`,
+            `robot` or `timing`; `response` and `threads` as for `kiks.Batch`.
 
     Example:
         >>> import numpy as np
@@ -66,11 +77,12 @@ class KheperaEnv(gymnasium.Env[Floats32, Floats32]):
         ((8,), False, False)
     """
 
-    metadata = {"render_modes": ["rgb_array"], "render_fps": 10}  # noqa: RUF012  (a class attribute in Gymnasium)
+    metadata = {"render_modes": ["rgb_array"]}  # noqa: RUF012  (a class attribute in Gymnasium)
 
     def __init__(self, task: str | Task, *, render_mode: str | None = None, **changes: Any) -> None:
         self.render_mode = checked_mode(render_mode)
-        self.episodes = episodes_of(task, 1, changes | {"threads": 1})
+        self.episodes = episodes_of(task, 1, {"threads": 1} | changes)
+        self.metadata = metadata_of(self.episodes.task, self.metadata)
         self.observation_space, self.action_space = spaces_of(self.episodes.task)
 
     def reset(
@@ -110,7 +122,7 @@ class KheperaEnv(gymnasium.Env[Floats32, Floats32]):
             >>> seen.shape, terminated, truncated
             ((8,), False, False)
         """
-        reward = self.episodes.step([action])[0, 0]
+        reward = self.episodes.step(checked_action(action, (2,))[None, None])[0, 0]
         is_over = bool(self.episodes.terminations()[0])
         return self.episodes.observations()[0, 0], float(reward), is_over, False, self._info()
 
@@ -177,11 +189,12 @@ class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[An
                 f"autoreset_mode must be one of {modes}, but it was {shown(autoreset_mode)}."
                 f"{nearest(autoreset_mode, modes)}"
             ) from None
-        self.metadata = {**self.metadata, "autoreset_mode": self.autoreset_mode}
         self.max_episode_steps = max_episode_steps
         if max_episode_steps is not None:
             check_count("max_episode_steps", max_episode_steps, 1, SEED_LIMIT)
         self.episodes = episodes_of(task, num_envs, changes | {"threads": threads})
+        known = {**self.metadata, "autoreset_mode": self.autoreset_mode}
+        self.metadata = metadata_of(self.episodes.task, known)
         self.single_observation_space, self.single_action_space = spaces_of(self.episodes.task)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
@@ -243,7 +256,8 @@ class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[An
                 f"{np.count_nonzero(self._done)} were not. Call reset(options={{'reset_mask': mask}})."
             )
         # In the other modes none has ended here.
-        rewards = self.episodes.step(actions, ignored=self._done)[:, 0]
+        given = checked_action(actions, (self.num_envs, 2), "the actions")[:, None]
+        rewards = self.episodes.step(given, ignored=self._done)[:, 0]
         terminations = self.episodes.terminations()
         truncations = self.episodes.step_counts >= (self.max_episode_steps or np.inf)
         resetting, self._done = self._done, terminations | truncations
@@ -305,12 +319,22 @@ class KheperaVectorEnv(gymnasium.vector.VectorEnv[Floats32, Floats32, NDArray[An
         return {"final_obs": seen, "_final_obs": done, "final_info": infos, "_final_info": done.copy()}
 
 
-def episodes_of(task: str | Task, worlds: int, changes: dict[str, Any]) -> Episodes:
-    """Return episodes; changes are arguments of `Episodes` or of the task."""
+def episodes_of(task: str | Task, worlds: int, changes: dict[str, Any], robots: int | None = None) -> Episodes:
+    """Return episodes of so many robots, one if left out; changes are some of `CHANGES`."""
+    for name, value in changes.items():
+        if name not in CHANGES:
+            raise ParameterError(
+                f"changes of an environment must be some of {', '.join(CHANGES)}, but {name} was among them, "
+                f"{shown(value)}.{nearest(name, CHANGES)}"
+            )
     of_episodes = {name: changes.pop(name) for name in ("response", "threads") if name in changes}
     if (arenas := changes.get("arenas")) is not None:
         changes["worlds"] = len(arenas) if isinstance(arenas, Sequence) else 1
-    return Episodes(environment_of(task).with_changes(**changes), worlds, **of_episodes)
+    task = environment_of(task)
+    if robots is None and task.robots > 1:
+        raise ParameterError(f"the task must have one robot, but has {task.robots}. KheperaTeam takes several.")
+    changes["robots"] = 1 if robots is None else robots
+    return Episodes(task.with_changes(**changes), worlds, **of_episodes)
 
 
 def checked_seed(seed: int | None) -> int | None:
@@ -330,6 +354,6 @@ for _name in ENVIRONMENTS:
         f"kiks/{_name}-v0",
         entry_point="kiks.learn.gymnasium_envs:KheperaEnv",
         vector_entry_point="kiks.learn.gymnasium_envs:KheperaVectorEnv",
-        max_episode_steps=STEP_LIMIT,
+        max_episode_steps=step_limit(PERIODS_S.get(_name, Timing().period_s)),
         kwargs={"task": _name},
     )

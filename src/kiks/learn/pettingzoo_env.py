@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from kiks.errors import ParameterError, installing, shown
-from kiks.learn.episode_batch import SEED_LIMIT
-from kiks.learn.gymnasium_envs import STEP_LIMIT, checked_mode, checked_seed, episodes_of, spaces_of
+from kiks.learn.environments import environment_of, step_limit
+from kiks.learn.episode_batch import SEED_LIMIT, checked_action
+from kiks.learn.gymnasium_envs import checked_mode, checked_seed, episodes_of, metadata_of, spaces_of
 from kiks.learn.task import Task
 from kiks.model.checks import check_count
 
@@ -23,13 +24,17 @@ except ModuleNotFoundError as error:
 Floats32 = NDArray[np.float32]
 
 
+TEAM = 3
+"""Usual number of robots."""
+
+
 class KheperaTeam(ParallelEnv[str, Floats32, Floats32]):  # type: ignore[misc, unused-ignore]
     """Robots that act at the same time; each gets the reward of its own measure. An episode ends for all at once.
 
     Args:
         task: The environment: a task with a reward, or the name of one of `kiks.learn.environments`.
-        robots: Number of robots.
-        max_cycles: Number of steps after which an episode is truncated.
+        robots: Number of robots; of a task with several, theirs if left out, else 3.
+        max_cycles: Number of steps after which an episode is truncated; a minute if left out.
         render_mode: 'rgb_array' for pictures from above, None for none.
         **changes: As for `kiks.learn.gymnasium_envs.KheperaEnv`.
 
@@ -44,20 +49,24 @@ class KheperaTeam(ParallelEnv[str, Floats32, Floats32]):  # type: ignore[misc, u
         ['robot_1', 'robot_2', 'robot_3']
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"name": "kiks_team_v0", "render_modes": ["rgb_array"], "render_fps": 10}
+    metadata: dict[str, Any] = {"name": "kiks_team_v0", "render_modes": ["rgb_array"]}  # noqa: RUF012
 
     def __init__(
         self,
         task: str | Task = "Gather",
         *,
-        robots: int = 3,
-        max_cycles: int = STEP_LIMIT,
+        robots: int | None = None,
+        max_cycles: int | None = None,
         render_mode: str | None = None,
         **changes: Any,
     ) -> None:
-        self.render_mode = checked_mode(render_mode)
-        self.max_cycles = check_count("max_cycles", max_cycles, 1, SEED_LIMIT)
-        self.episodes = episodes_of(task, 1, changes | {"threads": 1, "robots": robots})
+        self.render_mode, task = checked_mode(render_mode), environment_of(task)
+        if robots is None:
+            robots = task.robots if task.robots > 1 else TEAM
+        self.episodes = episodes_of(task, 1, {"threads": 1} | changes, robots)
+        self.metadata = metadata_of(self.episodes.task, self.metadata)
+        steps = step_limit(self.episodes.task.timings[0].period_s) if max_cycles is None else max_cycles
+        self.max_cycles = check_count("max_cycles", steps, 1, SEED_LIMIT)
         self.possible_agents = [f"robot_{number + 1}" for number in range(robots)]
         self.agents: list[str] = []
         spaces = {agent: spaces_of(self.episodes.task) for agent in self.possible_agents}
@@ -127,7 +136,8 @@ class KheperaTeam(ParallelEnv[str, Floats32, Floats32]):  # type: ignore[misc, u
                 f"actions must be given for {', '.join(self.agents) or 'no robot: the episode is over, call reset()'}, "
                 f"but they were for {shown(list(actions) if isinstance(actions, dict) else actions)}."
             )
-        rewards = self.episodes.step([[actions[agent] for agent in self.agents]])[0]
+        given = [checked_action(actions[agent], (2,), f"the action of {agent}") for agent in self.agents]
+        rewards = self.episodes.step(np.array([given]))[0]
         is_terminated = bool(self.episodes.terminations()[0])
         is_truncated = bool(self.episodes.step_counts[0] >= self.max_cycles)
         result = (

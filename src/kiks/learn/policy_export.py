@@ -40,7 +40,12 @@ ACCEPTED = (
 
 
 def champion_of_policy(
-    policy: Any, task: str | Task, *, activation: str | None = None, output: str | None = None, robot: str = "khepera"
+    policy: Any,
+    task: str | Task,
+    *,
+    activation: str | None = None,
+    output: str | None = None,
+    robot: str | None = None,
 ) -> Champion:
     """Return a champion that drives as a policy does in its environment.
 
@@ -57,7 +62,7 @@ def champion_of_policy(
         activation: The function of hidden units, 'tanh' or 'relu'; a policy of Stable-Baselines3 says it itself.
         output: What keeps the actions within +-1, 'clip' or 'tanh'; a policy of Stable-Baselines3 says it itself, for
             others it is 'clip' if left out.
-        robot: The kind of robot that it drove.
+        robot: The kind of robot that it drove; that of the environment if left out.
 
     Example:
         >>> import numpy as np
@@ -89,7 +94,7 @@ def champion_of_policy(
         controller,
         np.concatenate(parts).tolist(),
         task=task.name,
-        robot=robot,
+        robot=robot or (task.robot[0] if isinstance(task.robot, tuple) else task.robot),
         timing=task.timings[0],
         algorithm=type(policy).__name__ if hasattr(policy, "policy") else "",
     )

@@ -2,9 +2,11 @@
 
 Sources: Wilson, Probable inference, the law of succession, and statistical inference (1927), for the interval of a
 share; Mann and Whitney (1947) for U; Kruskal and Wallis (1952) for H; Vargha and Delaney, A critique and improvement of
-the CL common language effect size statistics (2000), section 5, for the effect size A and its names; Holm, A simple
-sequentially rejective multiple test procedure (1979); Kaplan and Meier (1958) for curves with evolutions that ended
-unsolved, and Mantel (1966) for the log-rank test of two of them. SciPy calculates all but Holm's correction.
+the CL common language effect size statistics (2000), section 5, for the effect size A and its names; Newcombe,
+Confidence intervals for an effect size measure based on the Mann-Whitney statistic, part 2, Statistics in Medicine 25
+(2006), method 5, for the interval of A; Holm, A simple sequentially rejective multiple test procedure (1979); Kaplan
+and Meier (1958) for curves with evolutions that ended unsolved, and Mantel (1966) for the log-rank test of two of them.
+SciPy calculates all but Holm's correction and Newcombe's interval.
 """
 
 from __future__ import annotations
@@ -30,9 +32,6 @@ CONFIDENCE = 0.95
 
 RESAMPLES = 9999
 """Number of samples of a bootstrap."""
-
-PAIRS_AT_ONCE = 1_000_000
-"""Most pairs of values that a bootstrap compares at once, which bounds its memory."""
 
 EFFECTS = ((0.06, "negligible"), (0.14, "small"), (0.21, "medium"), (0.5, "large"))
 """Names of effect sizes: largest |A - 0.5|, and the name."""
@@ -73,12 +72,15 @@ def wilson_interval(count: int, total: int) -> Interval:
     return Interval(float(interval.low), float(interval.high))
 
 
-def mean_interval(values: ArrayLike, axis: int = 0) -> tuple[Floats, Floats, Floats]:
+def mean_interval(
+    values: ArrayLike, axis: int = 0, *, within: tuple[float, float] = (-math.inf, math.inf)
+) -> tuple[Floats, Floats, Floats]:
     """Return means along an axis, and both ends of their 95 % intervals by Student's t; those of one value are itself.
 
     Args:
         values: Numbers of any shape.
         axis: The axis of what was repeated, such as seeds.
+        within: The least and the greatest possible value, such as 0 and 1 for shares. Intervals end there.
 
     Example:
         >>> [round(float(each), 2) for each in mean_interval([1.0, 2.0, 3.0])]
@@ -93,17 +95,17 @@ def mean_interval(values: ArrayLike, axis: int = 0) -> tuple[Floats, Floats, Flo
     if count < 2:
         return mean, mean, mean
     half = t.ppf(0.5 + 0.5 * CONFIDENCE, count - 1) * numbers.std(axis=axis, ddof=1) / np.sqrt(count)
-    return mean, mean - half, mean + half
+    return mean, np.maximum(mean - half, within[0]), np.minimum(mean + half, within[1])
 
 
-def bootstrap_interval(statistic: Callable[..., Any], *samples: Sequence[float]) -> Interval | None:
-    """Return the interval, of 95 %, of a statistic of samples, by the percentiles of their bootstrap.
+def bootstrap_interval(statistic: Callable[..., Any], values: Sequence[float]) -> Interval | None:
+    """Return the interval, of 95 %, of a statistic of a sample, by the percentiles of its bootstrap.
 
-    The same samples give the same interval. None if a sample has one value only.
+    The same sample gives the same interval. None if it has one value only.
 
     Args:
-        statistic: A function of the samples, which calculates along `axis`.
-        samples: The samples.
+        statistic: A function of the sample, which calculates along `axis`.
+        values: The sample.
 
     Example:
         >>> bootstrap_interval(np.median, [1.0, 2.0, 3.0, 4.0, 5.0])
@@ -111,19 +113,44 @@ def bootstrap_interval(statistic: Callable[..., Any], *samples: Sequence[float])
     """
     from scipy.stats import bootstrap
 
-    checked = [_sample(each) for each in samples]
-    if min(map(len, checked)) < 2:
+    sample = _sample(values)
+    if len(sample) < 2:
         return None
-    given: dict[str, Any] = {"n_resamples": RESAMPLES, "confidence_level": CONFIDENCE, "vectorized": True}
-    found = bootstrap(
-        checked,
-        statistic,
-        batch=max(1, PAIRS_AT_ONCE // math.prod(map(len, checked))),
-        method="percentile",
-        random_state=np.random.default_rng(0),
-        **given,
-    ).confidence_interval
-    return Interval(float(found.low), float(found.high))
+    drawing: dict[str, Any] = {"n_resamples": RESAMPLES, "random_state": np.random.default_rng(0), "vectorized": True}
+    found = bootstrap([sample], statistic, method="percentile", confidence_level=CONFIDENCE, **drawing)
+    return Interval(*map(float, found.confidence_interval))
+
+
+def a_interval(a: float, first: int, second: int) -> Interval:
+    """Return Newcombe's interval, of 95 %, for Vargha and Delaney's A. It has a width also where A is 0 or 1.
+
+    It holds each A that the one found is no farther away from than 1.96 standard deviations: by Hanley and McNeil's
+    formula, with the mean size of both samples in the place of either.
+
+    Args:
+        a: The A found.
+        first: Size of the first sample.
+        second: Size of the second sample.
+
+    Example:
+        >>> low, high = a_interval(1.0, 5, 5)
+        >>> round(low, 3), high
+        (0.643, 1.0)
+    """
+    from scipy.optimize import brentq
+    from scipy.special import ndtri
+
+    z, others = float(ndtri(0.5 + 0.5 * CONFIDENCE)), 0.5 * (first + second) - 1.0
+
+    def lower_end(a: float) -> float:
+        def beyond(truth: float) -> float:
+            spread = 1.0 + others * ((1.0 - truth) / (2.0 - truth) + truth / (1.0 + truth))
+            return float((a - truth) ** 2 - z**2 * truth * (1.0 - truth) * spread / (first * second))
+
+        # Of an A of 1, 1 is an end as well: the upper one.
+        return float(brentq(beyond, 0.0, min(a, 1.0 - 1e-9))) if a > 0.0 else 0.0
+
+    return Interval(lower_end(a), 1.0 - lower_end(1.0 - a))
 
 
 def _sample(values: Sequence[float]) -> Floats:
@@ -163,7 +190,7 @@ class Pair:
         p: Its p, corrected by Holm's method for the number of pairs.
         a: Vargha and Delaney's A: the probability that one of the first exceeds one of the second, ties half; None if
             that is not asked.
-        a_interval: Interval of A; None as above, or if a sample has one value.
+        a_interval: Interval of A; None as above.
     """
 
     first: str
@@ -210,16 +237,12 @@ def compare(samples: Mapping[str, Sequence[float]]) -> Comparison:
     """
     from scipy.stats import kruskal
 
-    pairs = [
-        Pair(
-            *names,
-            test := mann_whitney(*pair),
-            test.p,
-            test.statistic / (len(pair[0]) * len(pair[1])),
-            bootstrap_interval(_exceeding, *pair),
-        )
-        for names, pair in ((names, [samples[name] for name in names]) for names in combinations(samples, 2))
-    ]
+    pairs = []
+    for names in combinations(samples, 2):
+        first, second = (samples[name] for name in names)
+        test = mann_whitney(first, second)
+        a = test.statistic / (len(first) * len(second))
+        pairs.append(Pair(*names, test, test.p, a, a_interval(a, len(first), len(second))))
     omnibus = None
     if len(samples) > 2:
         is_constant = len({value for sample in samples.values() for value in sample}) == 1
@@ -244,12 +267,6 @@ def mann_whitney(first: Sequence[float], second: Sequence[float]) -> Finding:
     method = MANN_WHITNEY if has_ties else MANN_WHITNEY_EXACT if is_small else MANN_WHITNEY_LARGE
     found = mannwhitneyu(first, second, method="exact" if method == MANN_WHITNEY_EXACT else "asymptotic")
     return Finding(method, float(found.statistic), float(found.pvalue))
-
-
-def _exceeding(first: Floats, second: Floats, axis: int = -1) -> Any:
-    """Return Vargha and Delaney's A of samples along an axis."""
-    one, other = np.moveaxis(first, axis, -1)[..., :, None], np.moveaxis(second, axis, -1)[..., None, :]
-    return ((one > other) + 0.5 * (one == other)).mean(axis=(-2, -1))
 
 
 def holm(ps: Sequence[float]) -> list[float]:

@@ -6,7 +6,7 @@ import pickle
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import field, fields, replace
 from functools import cached_property, lru_cache
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -47,6 +47,9 @@ BATCH_WORLDS_MAX = 20_000
 
 SECONDS_MIN, SECONDS_MAX = 1e-3, 1e6
 """Shortest and longest time for which candidates drive [s]."""
+
+LOGGED = ("generation", "candidate", "is_trial", "seed", "fitness", "champion_fitness", "seconds", "evaluations")
+"""Columns of the log of an evolution beside the measures."""
 
 _UNCOUNTED = {"name", "side", "reward", "file", "algorithm", "population", "generations"}
 """Arguments on which no value depends."""
@@ -239,6 +242,7 @@ class Task(Experiment):
     reward: Watched | None = None
     until: Watched | None = None
     file: str = ""
+    other_columns: ClassVar = LOGGED
 
     # Functions cannot be compared: a task equals itself only.
     __eq__ = object.__eq__
@@ -531,7 +535,7 @@ class Task(Experiment):
         values = []
         for side, part in zip(self.sides, np.split(measured, [self.robots], axis=1), strict=False):
             means = part.mean(axis=1).reshape(len(candidates), self.worlds, -1)
-            values += [fitness_of(side.fitness, self.measure_names, means), means.mean(axis=1)]
+            values += [fitness_of(side.fitness, self.measures, means), means.mean(axis=1)]
         return np.column_stack(values)
 
     def ways(self, candidates: Floats, seeds: Integers, points: int, threads: int | None = None) -> Floats:

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from kiks import upwards
 from kiks.errors import ParameterError, counted
-from kiks.model.checks import check_choice, check_count, check_number
+from kiks.model.checks import check_count, check_number
+from kiks.model.columns import Columns, columns_of
 from kiks.model.project import Project
 from kiks.recording import tables
 from kiks.recording.log import RecordedLog, Source
@@ -217,8 +218,6 @@ class Recording:
             >>> len(events)
             0
         """
-        for name in names:
-            check_choice("name", name, tables.TABLES)
         return tables.tables(self.log, names)
 
     def table(self, name: str, robot: int | None = None) -> NDArray[np.void]:
@@ -226,8 +225,9 @@ class Recording:
 
         Args:
             name: 'poses': where robots were, tick by tick. 'wheels': counters, speeds and contacts, every 40 ms.
-                'readings': what programs read of the sensors. 'wire': characters both ways. 'events': contacts,
-                scores, lines of output, bookmarks, changes by hand.
+                'readings': what programs read of the proximity and light sensors. 'wire': characters both ways.
+                'events': contacts, scores, lines of output, bookmarks, changes by hand. Or what programs read by a
+                command, such as 'E' or 'T,2,N', or by a sense of controllers, such as 'camera'.
             robot: Of this robot alone; of all if left out.
 
         Example:
@@ -243,6 +243,28 @@ class Recording:
             self.check_robot(robot, "Leave it out for all.")
         (table,) = self.tables(name)
         return table if robot is None else table[table["robot"] == robot]
+
+    def columns(self, name: str, robot: int | None = None) -> Columns:
+        """Return a table as columns, [row] each, as files have it and `pandas.DataFrame` takes it.
+
+        There is a column for each number, such as counts_0 to counts_7, and bytes are texts.
+
+        Args:
+            name: As for `table`.
+            robot: As for `table`.
+
+        Example:
+            >>> import tempfile, kiks
+            >>> file = tempfile.mkdtemp() + "/run.mcap"
+            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
+            >>> with sim.record(file):
+            ...     _ = kiks.Khepera(sim.port(1)).encoders()
+            >>> columns = kiks.Recording(file).columns("positions")
+            >>> list(columns), columns["value_0"]
+            (['time_s', 'robot', 'value_0', 'value_1'], array([0]))
+        """
+        table = self.table(name, robot)
+        return columns_of({each: table[each] for each in table.dtype.names or ()})
 
     # ---- the world at a time ----
 

@@ -9,7 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from kiks.errors import ParameterError
+from kiks.control.senses import SENSES
+from kiks.errors import ParameterError, shown
+from kiks.meant import nearest
 from kiks.model.limits import TEXT_COLUMN_BYTES_MAX
 from kiks.recording.entries import Entry
 from kiks.recording.events import contacts_of, notes_of
@@ -42,13 +44,19 @@ _READINGS = np.dtype([("time_s", "f8"), ("robot", "i4"), ("command", "U1"), ("co
 
 _COUNTS = re.compile(rb"[0-9]{1,9}(,[0-9]{1,9}){7}")
 
+_COMMAND = re.compile("[A-Z]|T,[0-9]{1,3},[A-Z]")
+"""What begins a command, and its reply in small letters."""
+
+_NUMBERS = re.compile(rb"([a-z]|t,[0-9]{1,3},[a-z])((?:,-?[0-9]{1,18})+),?\s*")
+"""A reply of whole numbers."""
+
 
 def tables(log: RecordedLog, names: Sequence[str]) -> list[Table]:
     """Return tables of a recording; the run is made again once for all of them.
 
     Args:
         log: The log of the recording.
-        names: Of `TABLES`.
+        names: As for `kind_of`.
     """
     parts = TableParts(names)
     for piece in run_again(log):
@@ -57,31 +65,38 @@ def tables(log: RecordedLog, names: Sequence[str]) -> list[Table]:
 
 
 class TableParts:
-    """Tables that are put together while a run is made again; `names` are of `TABLES`."""
+    """Tables that are put together while a run is made again; `names` are those that `kind_of` knows."""
 
     def __init__(self, names: Iterable[str]) -> None:
-        self._parts: list[tuple[str, list[Any]]] = [(name, []) for name in names]
+        self._parts: list[tuple[TableKind, list[Any]]] = [(kind_of(name), []) for name in names]
 
     def add(self, piece: Piece) -> None:
         """Add what is in a piece of the run."""
-        for name, found in self._parts:
-            found.extend(TABLES[name].parts_of(piece))
+        for kind, found in self._parts:
+            found.extend(kind.parts_of(piece))
 
     def tables(self, log: RecordedLog) -> list[Table]:
         """Return the tables; the log is that of the recording."""
-        return [_made(log, name, found) for name, found in self._parts]
+        return [_made(log, kind.columns, found) for kind, found in self._parts]
 
 
-def _made(log: RecordedLog, name: str, parts: list[Any]) -> Table:
-    """Return a table of its parts: arrays, or rows by time, whose last column is as wide as its longest text."""
-    columns: Any = TABLES[name].columns
+def _made(log: RecordedLog, columns: Any, parts: list[Any]) -> Table:
+    """Return a table of its parts: arrays, or rows by time, whose last column is as wide as its longest text or list.
+
+    Of lists, those that are as long are there.
+    """
     if not parts or isinstance(parts[0], np.ndarray):
         return np.concatenate([np.zeros(0, columns), *parts])
     parts.sort(key=lambda row: row[0])
     if not columns[-1].itemsize:
         last = columns.names[-1]
-        longest = max(len(row[-1]) for row in parts)
-        columns = np.dtype([*columns.descr[:-1], (last, f"{columns[last].char}{max(longest, 1)}")])
+        longest = max(max(len(row[-1]) for row in parts), 1)
+        if columns[last].subdtype:
+            parts = [row for row in parts if len(row[-1]) == longest]
+            widest: Any = (last, columns[last].base, (longest,))
+        else:
+            widest = (last, f"{columns[last].char}{longest}")
+        columns = np.dtype([*columns.descr[:-1], widest])
         if columns[last].itemsize * len(parts) > TEXT_COLUMN_BYTES_MAX:
             raise ParameterError(
                 f"{log.reader.what} must have texts that fit into a table, but one has {longest} characters, and there "
@@ -181,3 +196,26 @@ TABLES: Mapping[str, TableKind] = {
     "events": TableKind(events, np.dtype([("time_s", "f8"), ("robot", "i4"), ("kind", "U8"), ("text", "U0")])),
 }
 """The tables by name."""
+
+
+def kind_of(name: str) -> TableKind:
+    """Return a kind of table: of `TABLES`, or of the numbers replied to a command, such as 'T,2,N', or to a sense."""
+    if name in TABLES:
+        return TABLES[name]
+    command, size = (SENSES[name].command, SENSES[name].size) if name in SENSES else (name, 0)
+    if not isinstance(command, str) or not _COMMAND.fullmatch(command):
+        known = [*TABLES, *SENSES]
+        raise ParameterError(
+            f"name must be one of {', '.join(map(repr, known))}, or a command such as 'H' or 'T,2,N', but it was "
+            f"{shown(name)}.{nearest(name, known)}"
+        )
+    head = command.lower().encode()
+
+    def replies(piece: Piece) -> Iterator[tuple[Any, ...]]:
+        for entry in piece.entries:
+            if entry.kind == Kind.ACT and (found := _NUMBERS.fullmatch(entry.data)) and found[1] == head:
+                values = tuple(map(int, found[2][1:].split(b",")))
+                if len(values) == (size or len(values)):
+                    yield s_from_ns(entry.time_ns), entry.robot + 1, values
+
+    return TableKind(replies, np.dtype([("time_s", "f8"), ("robot", "i4"), ("value", "i8", (size,))]))
