@@ -209,6 +209,57 @@ class Batch:
             (3, 1, 1)
         """
         until_ns = ns_from_s(check_number("seconds", seconds, 0, SECONDS_MAX))
+        worlds, watching, roll = self._begin(controller, parameters, measures, until)
+        roll(0, UNLIMITED, until_ns)
+        names = tuple(name for each in measures for name in each.value_names)
+        return Rollouts(watching.values(worlds.notes), worlds.steps.copy(), names)
+
+    @_alone
+    def loops(
+        self, controller: Controller | Sequence[Controller], parameters: Any = (), *, seconds: float
+    ) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+        """Do what `run` does, one control loop at a time: reset all worlds at once, and yield after each loop.
+
+        `poses`, `times_s` and `state_hash` then are those of its end. A world whose time is over stays as it is.
+
+        Args:
+            controller: As for `run`.
+            parameters: As for `run`.
+            seconds: As for `run` [s].
+
+        Returns:
+            For each loop the readings, float64 [world, robot, sensor], and the outputs that were sent,
+            float64 [world, robot, output]; copies.
+
+        Example:
+            >>> import kiks
+            >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 3, seed=1)
+            >>> loops = batch.loops(kiks.controllers.linear(), [0.5] * 18, seconds=2)
+            >>> [round(batch.poses[0, 0, 0]) for _ in loops][:5]
+            [250, 250, 250, 250, 250]
+        """
+        until_ns = ns_from_s(check_number("seconds", seconds, 0, SECONDS_MAX))
+        worlds, _, roll = self._begin(controller, parameters)
+
+        def yielded() -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+            while worlds.begins_ns.min() < until_ns:
+                with self._lock:
+                    roll(0, 2, until_ns)
+                yield worlds.sensors.copy(), worlds.wheels.copy()
+
+        return yielded()
+
+    def _begin(
+        self,
+        controller: Controller | Sequence[Controller],
+        parameters: Any,
+        measures: Sequence[Measure] = (),
+        until: Measure | None = None,
+    ) -> tuple[Any, MeasureSlots, Callable[[int, int, int], None]]:
+        """Reset all worlds; return them with their controllers, the measures, and a function that does halves of loops.
+
+        That takes the first half, the first one not to do, and a time at and after which no loop begins [ns].
+        """
         driving = RobotControllers(controller, parameters, self.world_count, self.robot_count)
         watching = MeasureSlots(measures, driving.common_senses, driving.names, until)
         shape = (self.world_count, self.robot_count)
@@ -230,9 +281,11 @@ class Batch:
         deciders = deciders_of(driving.controllers, driving.parameter_counts)
         functions = [*driving.controllers, *driving.parts, *watching.measures]
         callbacks = deciders, watching.watchers, watching.until_note
-        self._on_all_cores(worlds, (0, UNLIMITED, until_ns), callbacks, functions)
-        names = tuple(name for each in measures for name in each.value_names)
-        return Rollouts(watching.values(worlds.notes), worlds.steps.copy(), names)
+
+        def roll(first: int, end: int, until_ns: int) -> None:
+            self._on_all_cores(worlds, (first, end, until_ns), callbacks, functions)
+
+        return worlds, watching, roll
 
     # ---- step by step ----
 
@@ -422,12 +475,25 @@ class Batch:
             >>> len(batch.state_hash(0))
             16
         """
+        return self.state_of(world).hash()
+
+    @_alone
+    def state_of(self, world: int) -> State:
+        """Return a copy of a world's state, the same as a simulation in that state has.
+
+        Example:
+            >>> import kiks
+            >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 3, seed=1)
+            >>> sensed = batch.reset()
+            >>> batch.state_of(0).hash() == batch.state_hash(0)
+            True
+        """
         world = check_count("world", world, 0, self.world_count - 1)
         robots: Any = self.state.robots[world : world + 1].copy()
         # A simulation numbers only the kinds of its own robots.
         kinds = robots["kind"][0].tolist()
         robots["kind"] = [list(dict.fromkeys(kinds)).index(kind) for kind in kinds]
-        return State(robots, self.state.bodies[world : world + 1], int(self._worlds.ticks[world])).hash()
+        return State(robots, self.state.bodies[world : world + 1].copy(), int(self._worlds.ticks[world]))
 
     # ---- inside ----
 

@@ -55,6 +55,16 @@ class Timing:
         if self.baud is None and self.period_s < 0.01:
             raise ParameterError(f"period_s must be at least 0.01 without a line, but it was {self.period_s:g}.")
 
+    @property
+    def thinking(self) -> str:
+        """The thinking policy of a program with this pace.
+
+        Example:
+            >>> Timing(think_s=0.0025).thinking
+            'fixed:2.5'
+        """
+        return f"fixed:{ns_from_s(self.think_s) / 1e6}" if self.think_s else "none"
+
     def line(self, spec: RobotSpec) -> Any:
         """Return the timing of the line to a robot of a kind, for kernels.
 
