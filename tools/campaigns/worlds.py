@@ -100,18 +100,18 @@ class SetUp:
 
 def _arena(rng: random.Random, bodies: tuple[int, int], lamps: int) -> kiks.Arena:
     """Return an arena with so many balls, cylinders and lamps."""
-    sides = {"width_mm": rng.randint(500, 900), "height_mm": rng.randint(500, 900)}
+    sides = {"width_mm": rng.randint(600, 1000), "height_mm": rng.randint(600, 1000)}
     if rng.random() < 0.4:
-        things = {"walls": rng.randint(0, 3), "pillars": rng.randint(0, 3), "lamps": 0}
+        things = {"walls": rng.randint(0, 3), "pillars": rng.randint(0, 2), "lamps": 0}
         arena = kiks.Arena.room(**sides, **things, seed=rng.getrandbits(30))
     else:
         arena = kiks.Arena.box(**sides, rounded_mm=rng.choice((0, 0, 120)))
 
     def places(count: int) -> list[Any]:
-        free = random_starts(arena, 20, seed=rng.getrandbits(30), radius_mm=25)
+        free = random_starts(arena, 20, seed=rng.getrandbits(30), radius_mm=35)
         apart: list[Any] = []
         for x_mm, y_mm, _ in free.tolist():
-            if len(apart) < count and all(np.hypot(x_mm - x, y_mm - y) > 60 for x, y in apart):
+            if len(apart) < count and all(np.hypot(x_mm - x, y_mm - y) > 70 for x, y in apart):
                 apart.append((x_mm, y_mm))
         return apart
 
@@ -141,7 +141,7 @@ CHANGES: dict[str, tuple[Any, ...]] = {
     "firmware__baud": (19_200,),
     "quirks__d_reply_trailing_comma": (True,),
     "quirks__answer_empty_lines": (True,),
-    "body__diameter_mm": (60.0, 75.0),
+    "body__diameter_mm": (75.0,),
     "ambient__model": ("thesis",),
     "camera__adapts_exposure": (False,),
     "proximity__range_mm": (25.0, 150.0),
@@ -188,7 +188,7 @@ def set_up(rng: random.Random) -> SetUp:
     given: dict[str, Any] = {"robots": robots, "robot": _robots(rng, worlds, robots), "timing": _timing(rng)}
     if rng.random() < 0.3:
         given["starts"] = [
-            random_starts(arenas[world % len(arenas)], 1, seed=rng.getrandbits(30), robots=robots)[0]
+            random_starts(arenas[world % len(arenas)], 1, seed=rng.getrandbits(30), robots=robots, radius_mm=38)[0]
             for world in range(worlds)
         ]
     if rng.random() < 0.2:
