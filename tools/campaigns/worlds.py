@@ -19,6 +19,7 @@ from tools.campaigns.runner import Broken, Campaign
 import kiks
 from kiks.batch.initial_state import random_starts
 from kiks.control.senses import SENSES
+from kiks.errors import KiksError
 from kiks.firmware.turret import Turret
 from kiks.model.arena import Ball, Cylinder, Lamp, Zone
 from kiks.model.arena_objects import LampSwitch
@@ -210,7 +211,12 @@ def set_up(rng: random.Random) -> SetUp:
 
 
 def _play(rng: random.Random) -> int:
-    if found := set_up(rng).differences():
+    drawn = set_up(rng)
+    try:
+        found = drawn.differences()
+    except KiksError as error:  # a batch that no program on the line can follow
+        raise Broken("lost", str(error), "the line fails") from error
+    if found:
         raise Broken("lost", str(found[0]), f"{found[0].quantity} differs")
     return 1
 

@@ -102,6 +102,7 @@ def verify(
         for world, line in lines.items():
             if world not in found and line.driver.begin_ns < until_ns:
                 line.driver.step()
+                line.sim.sync()
                 compared = chain(line.exchanged(sensors[world], wheels[world]), line.states())
                 if difference := line.difference(loop, compared):
                     found[world] = difference
@@ -165,7 +166,6 @@ class _Line:
 
     def states(self) -> Iterator[Compared]:
         """Yield the times, and the states of robots and bodies."""
-        self.sim.sync()
         batch, line = self._batch.state_of(self._world), self.sim.world.state
         yield None, "time_s", self._batch.times_s[self._world], self.driver.begin_ns / NS_PER_S
         yield None, "tick", batch.tick_count, line.tick_count
