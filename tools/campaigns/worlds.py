@@ -80,7 +80,7 @@ def _mixed(senses: tuple[Any, ...], actuators: tuple[Any, ...]) -> kiks.Controll
     return kiks.controller(senses=senses, actuators=actuators, memory=2, parameters=size)(mixed)
 
 
-KINDS = ("linear", "mlp", "elman", "ctrnn", "graph", "gru", "plastic")
+KINDS = ("linear", "mlp", "elman", "ctrnn", "graph", "gru", "plastic", "collector")
 """Controllers that come with KiKS."""
 
 
@@ -99,8 +99,8 @@ class SetUp:
         return kiks.verify(self.batch, self.controller, self.parameters, seconds=self.seconds, worlds=worlds)
 
 
-def _arena(rng: random.Random, bodies: tuple[int, int], lamps: int) -> kiks.Arena:
-    """Return an arena with so many balls, cylinders and lamps."""
+def _arena(rng: random.Random, bodies: tuple[int, int]) -> kiks.Arena:
+    """Return an arena with so many balls and cylinders."""
     sides = {"width_mm": rng.randint(600, 1000), "height_mm": rng.randint(600, 1000)}
     if rng.random() < 0.4:
         things = {"walls": rng.randint(0, 3), "pillars": rng.randint(0, 2), "lamps": 0}
@@ -118,7 +118,7 @@ def _arena(rng: random.Random, bodies: tuple[int, int], lamps: int) -> kiks.Aren
 
     balls, cylinders = bodies
     placed = places(balls + cylinders)
-    hung = tuple(Lamp(*place, rng.uniform(0.2, 30), rng.random() < 0.8) for place in places(lamps))
+    hung = tuple(Lamp(*place, rng.uniform(0.2, 30), rng.random() < 0.8) for place in places(rng.choice((0, 1, 3))))
     switches = tuple(
         LampSwitch(rng.choice((0.0, 1.0, rng.uniform(0, 4))), rng.randint(1, len(hung)), rng.random() < 0.5)
         for _ in range(rng.choice((0, 0, 1, 4)) if hung else 0)
@@ -151,14 +151,17 @@ CHANGES: dict[str, tuple[Any, ...]] = {
 
 
 def _robots(rng: random.Random, worlds: int, robots: int) -> Any:
-    """Return the kind of all robots, or a family, whose robots differ."""
+    """Return the kind of all robots, or one for each: Kheperas and Kheperas II, or a family."""
     changes = {name: rng.choice(values) for name, values in CHANGES.items() if rng.random() < 0.15}
-    spec = kiks.RobotSpec.load(rng.choice(("khepera", "khepera_ii"))).with_changes(**changes)
-    if rng.random() < 0.2:
-        spec = spec.without_noise()
-    if rng.random() < 0.5:
-        return spec
-    made = family(spec, worlds * robots, seed=rng.getrandbits(30), dead_share=rng.choice((0.0, 0.2)))
+    noise = rng.random() < 0.8
+    kinds = [kiks.RobotSpec.load(name).with_changes(**changes) for name in ("khepera", "khepera_ii")]
+    kinds = [kind if noise else kind.without_noise() for kind in kinds]
+    if (drawn := rng.random()) < 0.4:
+        return rng.choice(kinds)
+    if drawn < 0.6:
+        return [[rng.choice(kinds) for _ in range(robots)] for _ in range(worlds)]
+    spec, dead_share = rng.choice(kinds), rng.choice((0.0, 0.2))
+    made = family(spec, worlds * robots, seed=rng.getrandbits(30), dead_share=dead_share)
     return [made[world * robots : (world + 1) * robots] for world in range(worlds)]
 
 
@@ -173,8 +176,9 @@ def _controllers(rng: random.Random, robots: int) -> list[kiks.Controller]:
     senses = rng.sample([*SENSES, Tally.total], rng.randint(1, 4))
     actuators = ["wheels", *rng.sample(["gripper", Tally.add], rng.choice((0, 0, 1, 2)))]
     if rng.random() < 0.25:
-        kind = getattr(kiks.controllers, rng.choice(KINDS))
-        return [kind() if kind is kiks.controllers.plastic else kind(senses=tuple(senses))] * robots
+        kind = rng.choice(KINDS)
+        given = {} if kind in ("plastic", "collector") else {"senses": tuple(senses)}
+        return [getattr(kiks.controllers, kind)(**given)] * robots
     # Which turret's memory lies where follows from all parts: so robots that differ have turrets in the same order.
     most = _mixed(tuple(senses), tuple(actuators))
     fewer = _mixed(tuple(senses[: rng.randint(1, len(senses))]), tuple(actuators[: rng.randint(1, len(actuators))]))
@@ -184,8 +188,8 @@ def _controllers(rng: random.Random, robots: int) -> list[kiks.Controller]:
 def set_up(rng: random.Random) -> SetUp:
     """Draw a set-up."""
     worlds, robots = rng.choice((1, 2, 3, 9, 20)), rng.choice((1, 2, 3, 4, 4, 7))
-    bodies, lamps = (rng.choice((0, 0, 1, 3)), rng.choice((0, 0, 1, 3))), rng.choice((0, 1, 3))
-    arenas = [_arena(rng, bodies, lamps) for _ in range(rng.choice((1, 1, 2)))]
+    bodies = rng.choice((0, 0, 1, 3)), rng.choice((0, 0, 1, 3))
+    arenas = [_arena(rng, bodies) for _ in range(rng.choice((1, 1, 2)))]
     given: dict[str, Any] = {"robots": robots, "robot": _robots(rng, worlds, robots), "timing": _timing(rng)}
     if rng.random() < 0.3:
         given["starts"] = [
@@ -194,20 +198,24 @@ def set_up(rng: random.Random) -> SetUp:
         ]
     if rng.random() < 0.2:
         given["response"] = rng.choice(("thesis", "fast"))
-    batch = kiks.Batch(arenas, worlds, seed=rng.getrandbits(40), threads=rng.randint(1, 2), **given)
+    batch = kiks.Batch(arenas, worlds, seed=rng.getrandbits(rng.choice((8, 62))), threads=rng.randint(1, 2), **given)
     if batch.lamps.size and rng.random() < 0.3:
-        batch.lamps[:, 0, 0] += 20.0
+        batch.lamps[:, 0, 0] += rng.choice((20.0, np.nan))
+    elif rng.random() < 0.1:
+        hung = [(rng.uniform(50, 550), rng.uniform(50, 550), 5.0, 1.0)] * worlds
+        batch.lamps = np.concatenate([batch.lamps, np.array(hung)[:, None]], axis=1)
     draw, controllers = np.random.default_rng(rng.getrandbits(40)), _controllers(rng, robots)
 
     def numbers(each: kiks.Controller, *shape: int) -> Any:
         if each.function is mixed:
-            return draw.normal(0.0, 0.1, (*shape, each.parameter_count))
+            return draw.normal(0.0, rng.choice((0.01, 0.1, 0.1, 3.0)), (*shape, each.parameter_count))
         drawn = kiks.controllers.random_parameters(each, int(np.prod(shape)), seed=rng.getrandbits(30))
         return drawn.reshape(*shape, -1)
 
+    seconds = rng.choice((rng.uniform(1, 8), rng.uniform(1, 8), rng.uniform(1, 40) / robots))
     if len(set(controllers)) == 1 and rng.random() < 0.7:
-        return SetUp(batch, controllers[0], numbers(controllers[0], worlds, robots), rng.uniform(1, 8))
-    return SetUp(batch, controllers, [numbers(each, worlds) for each in controllers], rng.uniform(1, 8))
+        return SetUp(batch, controllers[0], numbers(controllers[0], worlds, robots), seconds)
+    return SetUp(batch, controllers, [numbers(each, worlds) for each in controllers], seconds)
 
 
 def _play(rng: random.Random) -> int:

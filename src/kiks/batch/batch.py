@@ -305,7 +305,11 @@ class Batch:
             >>> readings = batch.reset()  # now both worlds are 900 x 900 mm
         """
         self.arena_indices[worlds] = arenas
-        self._lamps[worlds] = self._initial_state.lamps[arenas]
+        hung = self._initial_state.lamps[arenas]
+        if (missing := hung.shape[1] - self._lamps.shape[1]) > 0:  # a user has set fewer lamps, or more
+            self.lamps = np.pad(self._lamps, ((0, 0), (0, missing), (0, 0)))
+        self._lamps[worlds] = 0.0
+        self._lamps[worlds, : hung.shape[1]] = hung
         ticks, codes = self._initial_state.switches
         self._worlds.switch_ticks[worlds], self._worlds.switch_codes[worlds] = ticks[arenas], codes[arenas]
 
@@ -507,7 +511,8 @@ class Batch:
         self.notes[chosen], worlds.sent[chosen] = 0.0, NOTHING
         if worlds.switch_ticks.shape[1]:
             worlds.switched[chosen] = 0
-            self._lamps[chosen, :, 3] = self._initial_state.lamps[self.arena_indices[chosen], :, 3]
+            hung = self._initial_state.lamps[self.arena_indices[chosen], : self._lamps.shape[1], 3]
+            self._lamps[chosen, : hung.shape[1], 3] = hung
         enter_worlds(self._scenes[0].record, chosen)
 
     def _do_halves(self, first: int, end: int, chosen: NDArray[np.int64] | None = None) -> None:

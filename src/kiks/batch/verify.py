@@ -129,7 +129,8 @@ class _Line:
             poses = tuple(Pose(*pose) for pose in starts.tolist())
             self.sim = Simulation(replace(arena, starts=poses), **options)
         if not np.array_equal(self.sim.lamps, lamps[: len(self.sim.lamps)]) or lamps[len(self.sim.lamps) :, 3].any():
-            self.sim.lamps = lamps.copy()
+            self.sim.lamps = np.zeros(lamps.shape)
+            self.sim.lamps[:] = lamps  # some may have no place, which only an array that is written to may hold
         ports = []
         for number, turrets in enumerate(driving.turrets, 1):
             for turret in turrets:
