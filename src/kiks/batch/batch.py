@@ -67,7 +67,8 @@ class Batch:
     """Many worlds with the same number of robots, each with its own seed, start poses and kinds of robots.
 
     A world agrees to the bit with a `kiks.Simulation` of the same seed whose robots `kiks.drive` drives with the same
-    `timing`: the same readings, the same poses, the same hash. Threads may share a batch; they take turns.
+    `timing`: the same readings, the same poses, the same hash; `kiks.verify` compares them. Threads may share a batch;
+    they take turns.
 
     Args:
         arena: One arena for all worlds, or several, which the worlds take in turn. All arenas must hold the same number
@@ -233,10 +234,10 @@ class Batch:
 
         Example:
             >>> import kiks
-            >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 3, seed=1)
-            >>> loops = batch.loops(kiks.controllers.linear(), [0.5] * 18, seconds=2)
-            >>> [round(batch.poses[0, 0, 0]) for _ in loops][:5]
-            [250, 250, 250, 250, 250]
+            >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 3, starts=(250, 250, 0))
+            >>> loops = batch.loops(kiks.controllers.linear(), [0.5, 0.5] + [0.0] * 16, seconds=0.5)
+            >>> [round(batch.poses[0, 0, 0]) for readings, outputs in loops]  # where world 0's robot is
+            [252, 255, 259, 263, 267]
         """
         until_ns = ns_from_s(check_number("seconds", seconds, 0, SECONDS_MAX))
         worlds, _, roll = self._begin(controller, parameters)

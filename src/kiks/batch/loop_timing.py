@@ -40,7 +40,8 @@ class Timing:
         period_s: Time from the beginning of one loop to that of the next [s]; after a loop that takes longer, the next
             one begins at once.
         baud: Speed of the lines [bit/s]; None for a robot that senses and acts at once, without a line.
-        think_s: Thinking time of the program before each command [s], like the thinking policy 'fixed'.
+        think_s: Thinking time of the program before each command [s], or before the commands that it sends to several
+            robots at once, like the thinking policy 'fixed'.
 
     Example:
         >>> Timing(period_s=0.05, baud=None)

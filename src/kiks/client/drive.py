@@ -31,8 +31,8 @@ def drive(
 ) -> int:
     """Let a controller drive: each loop reads the sensors, lets it decide, sends the speeds and waits.
 
-    A batch with the same timing (`kiks.Timing`), controller and seed gives the same run, to the bit. The robots stop at
-    the end, also after an error.
+    A batch with the same timing (`kiks.Timing`), controller and seed gives the same run, to the bit: `kiks.verify`
+    compares them. The robots stop at the end, also after an error.
 
     Args:
         port: As for `kiks.Khepera`: a simulation's port, a port's name, or an open port. One program drives several
