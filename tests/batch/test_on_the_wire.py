@@ -1,6 +1,10 @@
 """A batch and the line: the same controller, seed and timing, the same run to the bit."""
 
+import json
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,6 +17,7 @@ from tools.campaigns.worlds import set_up
 import kiks
 from kiks.client.drive import Driver
 from kiks.model.arena import Ball, Lamp
+from kiks.model.project import Project, ProjectRobot
 
 pytestmark = pytest.mark.slow
 
@@ -51,6 +56,17 @@ def test_a_program_thinks_once_for_all_its_robots(robots: int, baud: int) -> Non
     hashes = noted(sim, ports[0])
     champion.drive(ports, seconds=4.0)
     assert hashes[-1] == batch.state_hash(1)  # the last line that it sends stops the robot
+
+
+def test_kiks_run_gives_a_champion_of_two_robots_the_time_of_its_batch(tmp_path: Path) -> None:
+    world = Project(kiks.Arena.box(500, 500), robots=(ProjectRobot(), ProjectRobot()), seed=3)
+    weights = [0.6, 0.6, 0.5, -0.5, 1, -2, 1, -2, -2, 1, -2, 1, -0.5, 0.5, 0, 0, 0, 0]
+    champion = kiks.Champion(kiks.controllers.linear(), weights, timing=kiks.Timing(think_s=0.007), world=world)
+    champion.save(tmp_path / "two.toml")
+    batch = kiks.Batch(world.arena, 1, robots=2, seed=3, timing=champion.timing)
+    batch.run(champion.controller, weights, seconds=2.95)
+    words = [sys.executable, "-m", "kiks", "run", "--json", "--seconds", "3", str(tmp_path / "two.toml")]
+    assert json.loads(subprocess.run(words, capture_output=True, check=True).stdout)["state"] == batch.state_hash(0)
 
 
 @kiks.sense(command="E", readings=2, least=-127, most=127)
