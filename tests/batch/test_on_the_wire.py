@@ -58,6 +58,13 @@ def test_a_program_thinks_once_for_all_its_robots(robots: int, baud: int) -> Non
     assert hashes[-1] == batch.state_hash(1)  # the last line that it sends stops the robot
 
 
+def test_robots_of_other_sizes_and_gains_begin_as_those_of_simulations() -> None:
+    plain = kiks.RobotSpec.load("khepera")
+    large = plain.with_changes(body__diameter_mm=110.0, reset__speed_gains=(2000, 500, 50))
+    batch = kiks.Batch(arena(), 4, robots=2, robot=[[plain, plain], [large, plain], [large, large], [plain, plain]])
+    assert kiks.verify(batch, wander, [1.0], seconds=3.0) == []
+
+
 def test_kiks_run_gives_a_champion_of_two_robots_the_time_of_its_batch(tmp_path: Path) -> None:
     world = Project(kiks.Arena.box(500, 500), robots=(ProjectRobot(), ProjectRobot()), seed=3)
     weights = [0.6, 0.6, 0.5, -0.5, 1, -2, 1, -2, -2, 1, -2, 1, -0.5, 0.5, 0, 0, 0, 0]

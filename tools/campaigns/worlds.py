@@ -151,10 +151,11 @@ CHANGES: dict[str, tuple[Any, ...]] = {
 
 
 def _robots(rng: random.Random, worlds: int, robots: int) -> Any:
-    """Return the kind of all robots, or one for each: Kheperas and Kheperas II, or a family."""
+    """Return the kind of all robots, or one for each: of three kinds, or a family."""
     changes = {name: rng.choice(values) for name, values in CHANGES.items() if rng.random() < 0.15}
     noise = rng.random() < 0.8
     kinds = [kiks.RobotSpec.load(name).with_changes(**changes) for name in ("khepera", "khepera_ii")]
+    kinds.append(kinds[0].with_changes(body__diameter_mm=90.0, reset__speed_gains=(3000, 700, 50)))
     kinds = [kind if noise else kind.without_noise() for kind in kinds]
     if (drawn := rng.random()) < 0.4:
         return rng.choice(kinds)
@@ -193,7 +194,7 @@ def set_up(rng: random.Random) -> SetUp:
     given: dict[str, Any] = {"robots": robots, "robot": _robots(rng, worlds, robots), "timing": _timing(rng)}
     if rng.random() < 0.3:
         given["starts"] = [
-            random_starts(arenas[world % len(arenas)], 1, seed=rng.getrandbits(30), robots=robots, radius_mm=38)[0]
+            random_starts(arenas[world % len(arenas)], 1, seed=rng.getrandbits(30), robots=robots, radius_mm=47)[0]
             for world in range(worlds)
         ]
     if rng.random() < 0.2:

@@ -90,6 +90,7 @@ class Batch:
 
     Attributes:
         notes: State slots of the measures for step-by-step use, float64 [world, robot, note].
+        has_own_starts: Whether a world has start poses that were given, not those of a simulation, bool [world].
 
     Example:
         >>> import kiks
@@ -136,6 +137,7 @@ class Batch:
         self._lamps = initial.lamps[self.arena_indices]
         self.seeds = initial.seeds_of(seed)
         self._starts = initial.starts_of(self.seeds, starts)
+        self.has_own_starts = np.full(self.world_count, starts is not None)
         self._scenes = self._make_scenes()
         self._watching = MeasureSlots(measures, self.senses, "the batch")
         shape = self.state.robots.shape
@@ -354,6 +356,7 @@ class Batch:
             self.seeds[chosen] = self._initial_state.check_seeds(seeds, len(chosen))
         if starts is not None or seeds is not None:
             self._starts[chosen] = self._initial_state.starts_of(self.seeds[chosen], starts, chosen)
+            self.has_own_starts[chosen] = starts is not None
         self._reset_worlds(chosen, self._turrets)
         if len(chosen) and (self._is_sensed or worlds is None):
             self._do_halves(0, 1, chosen)

@@ -124,10 +124,9 @@ class _Line:
             "seed": int(batch.seeds[world]),
             "thinking": batch.timing.thinking,
         }
+        if batch.has_own_starts[world]:
+            arena = replace(arena, starts=tuple(Pose(*pose) for pose in starts.tolist()))
         self.sim = Simulation(arena, **options)
-        if (self.sim.poses() != starts).any():  # the batch has starts of its own
-            poses = tuple(Pose(*pose) for pose in starts.tolist())
-            self.sim = Simulation(replace(arena, starts=poses), **options)
         if not np.array_equal(self.sim.lamps, lamps[: len(self.sim.lamps)]) or lamps[len(self.sim.lamps) :, 3].any():
             self.sim.lamps = np.zeros(lamps.shape)
             self.sim.lamps[:] = lamps  # some may have no place, which only an array that is written to may hold
