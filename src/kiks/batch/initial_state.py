@@ -104,8 +104,8 @@ class InitialState:
         self.arena_indices = np.array([indices[each] for each in turns], np.int64)[np.arange(worlds) % len(turns)]
         # How a world begins depends on its arena, and on this of its robots.
         begins = [tuple((spec.reset, spec.body.radius_mm) for spec in row) for row in named]
-        rows = dict(zip(begins, named, strict=True))
-        self._rows, places = list(rows.values()), {key: place for place, key in enumerate(rows)}
+        alike = dict(zip(begins, named, strict=True))
+        self._rows, places = list(alike.values()), {key: place for place, key in enumerate(alike)}
         self._groups = np.array([places[key] for key in begins], np.int64)
         self._models: dict[tuple[int, int], Simulation] = {}
         models = [self._model(index, 0) for index in range(len(self.arenas))]
