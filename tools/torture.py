@@ -34,7 +34,21 @@ from tools.campaigns.runner import (
 )
 
 GROUPS = (
-    *("files", "calls", "messages", "compiled", "names", "wire", "faults", "octave", "crowd", "users", "soak", "tests"),
+    *(
+        "files",
+        "calls",
+        "messages",
+        "compiled",
+        "names",
+        "wire",
+        "faults",
+        "octave",
+        "crowd",
+        "users",
+        "soak",
+        "tests",
+        "worlds",
+    ),
     "planted",
 )
 """Groups of campaigns: modules of `tools.campaigns`."""

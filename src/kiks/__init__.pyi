@@ -2,6 +2,7 @@
 
 from .batch.batch import Batch as Batch
 from .batch.loop_timing import Timing as Timing
+from .batch.verify import verify as verify
 from .client.drive import drive as drive
 from .client.khepera import Khepera as Khepera
 from .client.khepera import Status as Status

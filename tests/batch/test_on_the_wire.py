@@ -1,17 +1,23 @@
-"""A batch and a wire: the same controller, seed and timing, the same run to the bit."""
+"""A batch and the line: the same controller, seed and timing, the same run to the bit."""
 
-from collections.abc import Sequence
+import json
+import subprocess
+import sys
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from tests.at_length import cases, share
-from tests.learn.small import noted
+from tests.learn.small import noted, refused
+from tools.campaigns.runner import rng_of
+from tools.campaigns.worlds import set_up
 
 import kiks
 from kiks.client.drive import Driver
 from kiks.model.arena import Ball, Lamp
+from kiks.model.project import Project, ProjectRobot
 
 pytestmark = pytest.mark.slow
 
@@ -27,27 +33,6 @@ def wander(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
     wheels[1] = parameters[0] * (8.0 + right / 200.0 - waver)
 
 
-@kiks.controller(senses=("proximity", "ambient"))
-def peer(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
-    """Turn to the darker side, away from what is near."""
-    wheels[0] = 6.0 + (sensors[8] - sensors[13]) / 50.0 - sensors[4] / 100.0
-    wheels[1] = 6.0 - (sensors[8] - sensors[13]) / 50.0 - sensors[1] / 100.0
-
-
-@kiks.controller(senses=("proximity", "camera"))
-def gaze(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
-    """Turn to the brighter side of the picture, away from what is near."""
-    left, right = sensors[8:16].sum(), sensors[16:24].sum()
-    wheels[0] = 6.0 + (right - left) / 150.0 - sensors[4] / 100.0
-    wheels[1] = 6.0 + (left - right) / 150.0 - sensors[1] / 100.0
-
-
-@kiks.controller(senses=("camera",))
-def gaze_only(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
-    """Turn to the darker side of the picture."""
-    wheels[0], wheels[1] = 4.0 + sensors[12:].sum() / 500.0, 4.0 + sensors[:4].sum() / 500.0
-
-
 def arena(*, ball: bool = False) -> kiks.Arena:
     walls = np.zeros((500, 600), np.uint8)
     walls[200:210, 150:400] = 255
@@ -55,68 +40,71 @@ def arena(*, ball: bool = False) -> kiks.Arena:
     return replace(kiks.Arena.from_array(walls), balls=(Ball(300, 100),) * ball, lamps=(Lamp(100, 400),))
 
 
-def check_worlds(
-    worlds: Sequence[int], timing: kiks.Timing, controller: Any, parameters: Any, *, ball: bool = False, **options: Any
-) -> None:
-    """Check that worlds of a batch take as many loops as drives on the wire, and end in the same states."""
-    batch = kiks.Batch(arena(ball=ball), worlds[-1] + 1, seed=11, timing=timing, **options)
-    rollouts = batch.run(controller, parameters, seconds=8.0)
-    for world in worlds:
-        thinking = f"fixed:{timing.think_s * 1e3}"
-        sim = kiks.Simulation(arena(ball=ball), seed=11 + world, thinking=thinking, **options)
-        ports = [sim.port(number) for number in range(1, sim.robot_count + 1)]
-        for number, each in enumerate(controller if isinstance(controller, list) else [], 1):
-            if "camera" in each.senses:
-                sim.fit(number, "k213")
-        hashes = noted(sim, ports[0])
-        loops = kiks.drive(ports, controller, parameters, seconds=8.0, period_s=timing.period_s, baud=timing.baud)
-        # The last line that it sends stops the robot.
-        assert (loops, hashes[-1]) == (rollouts.step_counts[world], batch.state_hash(world))
+@pytest.mark.parametrize("case", range(share(6, 120)))
+def test_random_worlds_are_those_of_the_line(case: int) -> None:
+    assert set_up(rng_of(52, "worlds", case)).differences() == []
 
 
-@pytest.mark.parametrize(
-    "timing",
-    [kiks.Timing(0.1, 9600), kiks.Timing(0.0, 9600), kiks.Timing(0.05, 38400, 0.0031)],
-    ids=["each 100 ms", "as fast as it goes", "with thinking"],
-)
-@pytest.mark.parametrize(
-    ("controller", "parameters", "ball"),
-    cases([(wander, [1.0], False), (peer, [], True), (wander, [1.0], True), (peer, [], False)], 2),
-)
-def test_batch_and_wire_agree_to_the_bit(timing: kiks.Timing, controller: Any, parameters: Any, ball: bool) -> None:
-    check_worlds(share((0, 2), (0, 1, 2)), timing, controller, parameters, ball=ball)
+@pytest.mark.parametrize("baud", cases([9600, 38400]))
+@pytest.mark.parametrize("robots", [1, 2, 4])
+def test_a_program_thinks_once_for_all_its_robots(robots: int, baud: int) -> None:
+    timing = kiks.Timing(0.05, baud, think_s=0.0070000001)
+    batch = kiks.Batch(arena(ball=True), 2, robots=robots, seed=11, timing=timing)
+    assert kiks.verify(batch, wander, [1.0], seconds=4.0) == []
+    champion = kiks.Champion(wander, [1.0], timing=timing)
+    sim, ports = champion.simulation(arena(ball=True), robots=robots, seed=12)
+    hashes = noted(sim, ports[0])
+    champion.drive(ports, seconds=4.0)
+    assert hashes[-1] == batch.state_hash(1)  # the last line that it sends stops the robot
 
 
-@pytest.mark.parametrize("response", ["thesis", "fast"])
-def test_every_response_is_that_of_the_wire(response: str) -> None:
-    check_worlds((0, 1), kiks.Timing(0.1, 9600), wander, [0.7], response=response)
+def test_robots_of_other_sizes_and_gains_begin_as_those_of_simulations() -> None:
+    plain = kiks.RobotSpec.load("khepera")
+    large = plain.with_changes(body__diameter_mm=110.0, reset__speed_gains=(2000, 500, 50))
+    batch = kiks.Batch(arena(), 4, robots=2, robot=[[plain, plain], [large, plain], [large, large], [plain, plain]])
+    assert kiks.verify(batch, wander, [1.0], seconds=3.0) == []
 
 
-@pytest.mark.parametrize("kind", cases(["plastic", "elman", "linear", "mlp", "ctrnn", "graph", "gru"], 2))
-def test_controllers_that_come_with_kiks_agree(kind: str) -> None:
-    controller = getattr(kiks.controllers, kind)()
-    check_worlds((0,), kiks.Timing(0.1, 9600), controller, kiks.controllers.random_parameters(controller, 1, seed=7)[0])
+def test_kiks_run_gives_a_champion_of_two_robots_the_time_of_its_batch(tmp_path: Path) -> None:
+    world = Project(kiks.Arena.box(500, 500), robots=(ProjectRobot(), ProjectRobot()), seed=3)
+    weights = [0.6, 0.6, 0.5, -0.5, 1, -2, 1, -2, -2, 1, -2, 1, -0.5, 0.5, 0, 0, 0, 0]
+    champion = kiks.Champion(kiks.controllers.linear(), weights, timing=kiks.Timing(think_s=0.007), world=world)
+    champion.save(tmp_path / "two.toml")
+    batch = kiks.Batch(world.arena, 1, robots=2, seed=3, timing=champion.timing)
+    batch.run(champion.controller, weights, seconds=2.95)
+    words = [sys.executable, "-m", "kiks", "run", "--json", "--seconds", "3", str(tmp_path / "two.toml")]
+    assert json.loads(subprocess.run(words, capture_output=True, check=True).stdout)["state"] == batch.state_hash(0)
 
 
-def test_one_program_with_a_controller_for_each_robot() -> None:
-    given = [wander, peer, wander], [[1.0], [], [0.5]]
-    check_worlds((0, 1), kiks.Timing(0.1, 19200), *given, ball=True, robots=3)
+@kiks.sense(command="E", readings=2, least=-127, most=127)
+def slower(view: Any, readings: Any) -> None:
+    """Read less than the command does, from tick 100 on."""
+    for wheel in range(2):
+        readings[wheel] = view.robots[view.robot].measured_speed[wheel] - (view.robot == 1 and view.tick_count >= 100)
 
 
-@pytest.mark.parametrize(
-    ("timing", "controllers", "parameters"),
-    cases(
-        [
-            (kiks.Timing(0.1, 19200), [gaze, wander], [[], [1.0]]),
-            (kiks.Timing(0.03, 57600), [gaze_only, gaze_only], [[], []]),
-            (kiks.Timing(0.03, 57600), [gaze, wander], [[], [1.0]]),
-            (kiks.Timing(0.1, 19200), [gaze_only, gaze_only], [[], []]),
-        ],
-        2,
-    ),
-)
-def test_pictures_are_those_of_the_wire(timing: kiks.Timing, controllers: Any, parameters: Any) -> None:
-    check_worlds((0, 10), timing, controllers, parameters, ball=True, robots=2)
+def test_the_first_difference_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    batch = kiks.Batch(arena(), 3, robots=2, seed=1, starts=[[100, 100, 0], [500, 100, 0]], timing=kiks.Timing(0.1))
+
+    @kiks.controller(senses=slower)
+    def ahead(sensors: Any, memory: Any, parameters: Any, wheels: Any) -> None:
+        wheels[0], wheels[1] = 3.0, 3.0
+
+    first, second = kiks.verify(batch, ahead, seconds=3.0, worlds=(2, 1))
+    assert (first.world, first.robot, first.quantity, first.batch, first.line) == (2, 2, "slower 0", 2.0, 3.0)
+    assert (first.loop, first.tick, second.world) == (11, 110, 1)
+    assert str(first) == "world 2, loop 11, tick 110, robot 2: slower 0 is 2.0 in the batch, 3.0 on the line"
+    # A line with other thinking, and a run that is not that of its loops.
+    monkeypatch.setattr(kiks.Timing, "thinking", "fixed:5")
+    (found,) = kiks.verify(batch, wander, [1.0], seconds=1.0, worlds=[0])
+    assert (found.loop, found.quantity.split()[0]) == (1, "proximity")
+    monkeypatch.undo()
+    monkeypatch.setattr(kiks.Batch, "run", lambda *_, **__: batch.reset())
+    assert [each.quantity for each in kiks.verify(batch, wander, [1.0], seconds=1.0, worlds=[0])] == ["time_s"]
+    monkeypatch.undo()
+    without = kiks.Batch(arena(), 1, timing=kiks.Timing(0.1, baud=None))
+    refused("timing must have a baud rate, but it was None", kiks.verify, without, wander, [1.0], seconds=1.0)
+    refused("world must be .* but it was 3", kiks.verify, batch, wander, [1.0], seconds=1.0, worlds=[3])
 
 
 def test_step_by_step_is_the_same_as_at_once() -> None:

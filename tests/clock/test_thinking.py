@@ -1,5 +1,6 @@
 """Thinking time: the cost of the program's own computing."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -42,6 +43,35 @@ def test_burst_of_commands_costs_one_thinking_time() -> None:
     same.readline()
     same.readline()
     assert sim.time_s - quick.time_s == pytest.approx(0.005, abs=1e-12)
+
+
+def thinking_s(course: Callable[[list[kiks.Khepera]], None]) -> float:
+    """Return how long a program of three robots has thought in all [s]."""
+    times = []
+    for thinking in ("fixed:5", "none"):
+        sim = kiks.Simulation(robots=3, thinking=thinking)
+        course([kiks.Khepera(sim.port(number)) for number in (1, 2, 3)])
+        times.append(sim.time_s)
+    return times[0] - times[1]
+
+
+def test_commands_to_several_robots_follow_from_one_thought() -> None:
+    def all_at_once(robots: list[kiks.Khepera]) -> None:
+        for robot in robots:
+            robot.port.write(b"D,3,3\n")
+        for robot in robots:
+            robot.read_confirmation(b"D")
+
+    def leader_first(robots: list[kiks.Khepera]) -> None:
+        robots[0].speed()
+        all_at_once(robots)
+
+    def one_by_one(robots: list[kiks.Khepera]) -> None:
+        for robot in robots:
+            robot.set_speed(3, 3)
+
+    for course, thoughts in ((all_at_once, 1), (leader_first, 2), (one_by_one, 3)):
+        assert thinking_s(course) == pytest.approx(thoughts * 0.005, abs=1e-12)
 
 
 def test_live_thinking_charges_measured_time_and_replay_repeats_it(tmp_path: Path) -> None:

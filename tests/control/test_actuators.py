@@ -7,12 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from tests.at_length import cases, share
-from tests.learn.small import noted, refused
+from tests.at_length import cases
+from tests.learn.small import refused
 
 import kiks
 from kiks.control.actuators import ACTUATORS, check_actuators, value_of
-from kiks.control.turret_parts import turrets_of
 from kiks.firmware.turret import Turret
 from kiks.model.arena import Cylinder
 
@@ -75,17 +74,7 @@ def test_a_batch_does_what_the_wire_does(controllers: list[kiks.Controller], per
     count = len(controllers)
     parameters = [[2.0, 13.0 * k] if each is clutch else [] for k, each in enumerate(controllers)]
     batch = kiks.Batch(arena(), worlds=3, seed=8, robots=count, timing=kiks.Timing(period_s, 9600))
-    rollouts = batch.run(controllers, parameters, seconds=6.0)
-    for world in share((0, 2), (0, 1, 2)):
-        sim = kiks.Simulation(arena(), seed=8 + world, robots=count)
-        for number, controller in enumerate(controllers, 1):
-            for turret in turrets_of(controller.parts):
-                sim.fit(number, turret if isinstance(turret, str) else turret())
-        ports = [sim.port(number) for number in range(1, 1 + count)]
-        hashes = noted(sim, ports[0])
-        loops = kiks.drive(ports, controllers, parameters, seconds=6.0, period_s=period_s)
-        # The last line that it sends stops the robot.
-        assert (loops, hashes[-1]) == (rollouts.step_counts[world], batch.state_hash(world))
+    assert kiks.verify(batch, controllers, parameters, seconds=6.0, worlds=(0, 2)) == []
 
 
 def test_a_gripper_takes_a_cylinder_away() -> None:

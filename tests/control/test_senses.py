@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 from tests.at_length import cases
-from tests.learn.small import noted, refused
+from tests.learn.small import refused
 
 import kiks
 from kiks.batch.loop_timing import answer_length
 from kiks.control.senses import SENSES, AnySense, check_senses, recipes_for, sense_of
-from kiks.control.turret_parts import turrets_of
 from kiks.engine.compiling import callable_kernel
 from kiks.firmware.turret import Turret
 from kiks.model.arena import Cylinder, Lamp, Zone
@@ -71,16 +70,7 @@ def test_a_batch_reads_what_the_wire_reads(senses: tuple[AnySense, ...]) -> None
     parameters = np.random.default_rng(3).normal(0.0, 0.1, (2, controller.sensor_count))
     for period_s in (0.0, 0.13):
         batch = kiks.Batch(arena(), worlds=2, seed=4, timing=kiks.Timing(period_s, 9600))
-        rollouts = batch.run(controller, parameters, seconds=4.0)
-        for world in range(2):
-            sim = kiks.Simulation(arena(), seed=4 + world)
-            for turret in turrets_of(controller.parts):
-                sim.fit(1, turret if isinstance(turret, str) else turret())
-            port = sim.port(1)
-            hashes = noted(sim, port)
-            loops = kiks.drive(port, controller, parameters[world], seconds=4.0, period_s=period_s)
-            # The last line that it sends stops the robot.
-            assert (loops, hashes[-1]) == (rollouts.step_counts[world], batch.state_hash(world))
+        assert kiks.verify(batch, controller, parameters, seconds=4.0) == []
 
 
 def test_packets_are_the_function_of_the_sense() -> None:

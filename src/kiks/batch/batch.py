@@ -67,7 +67,8 @@ class Batch:
     """Many worlds with the same number of robots, each with its own seed, start poses and kinds of robots.
 
     A world agrees to the bit with a `kiks.Simulation` of the same seed whose robots `kiks.drive` drives with the same
-    `timing`: the same readings, the same poses, the same hash. Threads may share a batch; they take turns.
+    `timing`: the same readings, the same poses, the same hash; `kiks.verify` compares them. Threads may share a batch;
+    they take turns.
 
     Args:
         arena: One arena for all worlds, or several, which the worlds take in turn. All arenas must hold the same number
@@ -89,6 +90,7 @@ class Batch:
 
     Attributes:
         notes: State slots of the measures for step-by-step use, float64 [world, robot, note].
+        has_own_starts: Whether a world has start poses that were given, not those of a simulation, bool [world].
 
     Example:
         >>> import kiks
@@ -135,6 +137,7 @@ class Batch:
         self._lamps = initial.lamps[self.arena_indices]
         self.seeds = initial.seeds_of(seed)
         self._starts = initial.starts_of(self.seeds, starts)
+        self.has_own_starts = np.full(self.world_count, starts is not None)
         self._scenes = self._make_scenes()
         self._watching = MeasureSlots(measures, self.senses, "the batch")
         shape = self.state.robots.shape
@@ -208,8 +211,59 @@ class Batch:
             (3, 1, 1)
         """
         until_ns = ns_from_s(check_number("seconds", seconds, 0, SECONDS_MAX))
-        driving = RobotControllers(controller, parameters, self.world_count, self.robot_count)
         measures = self._watching.measures if measures is None else measures
+        worlds, watching, roll = self._begin(controller, parameters, measures, until)
+        roll(0, UNLIMITED, until_ns)
+        names = tuple(name for each in measures for name in each.value_names)
+        return Rollouts(watching.values(worlds.notes), worlds.steps.copy(), names, self.seeds.copy())
+
+    @_alone
+    def loops(
+        self, controller: Controller | Sequence[Controller], parameters: Any = (), *, seconds: float
+    ) -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+        """Do what `run` does, one control loop at a time: reset all worlds at once, and yield after each loop.
+
+        `poses`, `times_s` and `state_hash` then are those of its end. A world whose time is over stays as it is.
+
+        Args:
+            controller: As for `run`.
+            parameters: As for `run`.
+            seconds: As for `run` [s].
+
+        Returns:
+            For each loop the readings, float64 [world, robot, sensor], and the outputs that were sent,
+            float64 [world, robot, output]; copies.
+
+        Example:
+            >>> import kiks
+            >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 3, starts=(250, 250, 0))
+            >>> loops = batch.loops(kiks.controllers.linear(), [0.5, 0.5] + [0.0] * 16, seconds=0.5)
+            >>> [round(batch.poses[0, 0, 0]) for readings, outputs in loops]  # where world 0's robot is
+            [252, 255, 259, 263, 267]
+        """
+        until_ns = ns_from_s(check_number("seconds", seconds, 0, SECONDS_MAX))
+        worlds, _, roll = self._begin(controller, parameters)
+
+        def yielded() -> Iterator[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+            while worlds.begins_ns.min() < until_ns:
+                with self._lock:
+                    roll(0, 2, until_ns)
+                yield worlds.sensors.copy(), worlds.wheels.copy()
+
+        return yielded()
+
+    def _begin(
+        self,
+        controller: Controller | Sequence[Controller],
+        parameters: Any,
+        measures: Sequence[Measure] = (),
+        until: Measure | None = None,
+    ) -> tuple[Any, MeasureSlots, Callable[[int, int, int], None]]:
+        """Reset all worlds; return them with their controllers, the measures, and a function that does halves of loops.
+
+        That takes the first half, the first one not to do, and a time at and after which no loop begins [ns].
+        """
+        driving = RobotControllers(controller, parameters, self.world_count, self.robot_count)
         watching = MeasureSlots(measures, driving.common_senses, driving.names, until)
         shape = (self.world_count, self.robot_count)
         self._reset_worlds(np.arange(self.world_count), driving.turrets)
@@ -230,9 +284,11 @@ class Batch:
         deciders = deciders_of(driving.controllers, driving.parameter_counts)
         functions = [*driving.controllers, *driving.parts, *watching.measures]
         callbacks = deciders, watching.watchers, watching.until_note
-        self._on_all_cores(worlds, (0, UNLIMITED, until_ns), callbacks, functions)
-        names = tuple(name for each in measures for name in each.value_names)
-        return Rollouts(watching.values(worlds.notes), worlds.steps.copy(), names, self.seeds.copy())
+
+        def roll(first: int, end: int, until_ns: int) -> None:
+            self._on_all_cores(worlds, (first, end, until_ns), callbacks, functions)
+
+        return worlds, watching, roll
 
     # ---- step by step ----
 
@@ -252,7 +308,11 @@ class Batch:
             >>> readings = batch.reset()  # now both worlds are 900 x 900 mm
         """
         self.arena_indices[worlds] = arenas
-        self._lamps[worlds] = self._initial_state.lamps[arenas]
+        hung = self._initial_state.lamps[arenas]
+        if (missing := hung.shape[1] - self._lamps.shape[1]) > 0:  # a user has set fewer lamps, or more
+            self.lamps = np.pad(self._lamps, ((0, 0), (0, missing), (0, 0)))
+        self._lamps[worlds] = 0.0
+        self._lamps[worlds, : hung.shape[1]] = hung
         ticks, codes = self._initial_state.switches
         self._worlds.switch_ticks[worlds], self._worlds.switch_codes[worlds] = ticks[arenas], codes[arenas]
 
@@ -292,6 +352,7 @@ class Batch:
             self.seeds[chosen] = self._initial_state.check_seeds(seeds, len(chosen))
         if starts is not None or seeds is not None:
             self._starts[chosen] = self._initial_state.starts_of(self.seeds[chosen], starts, chosen)
+            self.has_own_starts[chosen] = starts is not None
         self._reset_worlds(chosen, self._turrets)
         if len(chosen) and (self._is_sensed or worlds is None):
             self._do_halves(0, 1, chosen)
@@ -418,12 +479,25 @@ class Batch:
             >>> len(batch.state_hash(0))
             16
         """
+        return self.state_of(world).hash()
+
+    @_alone
+    def state_of(self, world: int) -> State:
+        """Return a copy of a world's state, the same as a simulation in that state has.
+
+        Example:
+            >>> import kiks
+            >>> batch = kiks.Batch(kiks.Arena.box(500, 500), 3, seed=1)
+            >>> sensed = batch.reset()
+            >>> batch.state_of(0).hash() == batch.state_hash(0)
+            True
+        """
         world = check_count("world", world, 0, self.world_count - 1)
         robots: Any = self.state.robots[world : world + 1].copy()
         # A simulation numbers only the kinds of its own robots.
         kinds = robots["kind"][0].tolist()
         robots["kind"] = [list(dict.fromkeys(kinds)).index(kind) for kind in kinds]
-        return State(robots, self.state.bodies[world : world + 1], int(self._worlds.ticks[world])).hash()
+        return State(robots, self.state.bodies[world : world + 1].copy(), int(self._worlds.ticks[world]))
 
     # ---- inside ----
 
@@ -437,7 +511,8 @@ class Batch:
         self.notes[chosen], worlds.sent[chosen] = 0.0, NOTHING
         if worlds.switch_ticks.shape[1]:
             worlds.switched[chosen] = 0
-            self._lamps[chosen, :, 3] = self._initial_state.lamps[self.arena_indices[chosen], :, 3]
+            hung = self._initial_state.lamps[self.arena_indices[chosen], : self._lamps.shape[1], 3]
+            self._lamps[chosen, : hung.shape[1], 3] = hung
         enter_worlds(self._scenes[0].record, chosen)
 
     def _do_halves(self, first: int, end: int, chosen: NDArray[np.int64] | None = None) -> None:

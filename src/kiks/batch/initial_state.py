@@ -54,7 +54,7 @@ Starts = Annotated[str, OneOf(("random", "arena"))]
 class InitialState:
     """The initial state of the worlds of a batch.
 
-    It holds one simulation of each arena; each world of that arena begins as a copy of it.
+    It holds a simulation for each arena, and for other sizes and resets of the robots; worlds begin as copies of these.
 
     Args:
         arena: One arena, or several that the worlds take in turn.
@@ -102,8 +102,14 @@ class InitialState:
         self.networks = networks_for(*dict.fromkeys(spec.proximity.response for spec in self.specs))
         indices = {each: index for index, each in enumerate(self.arenas)}
         self.arena_indices = np.array([indices[each] for each in turns], np.int64)[np.arange(worlds) % len(turns)]
-        self._models = [Simulation(each, robot=list(named[0])) for each in self.arenas]
-        body_counts = {model.world.state.bodies.shape[1] for model in self._models}
+        # How a world begins depends on its arena, and on this of its robots.
+        begins = [tuple((spec.reset, spec.body.radius_mm) for spec in row) for row in named]
+        alike = dict(zip(begins, named, strict=True))
+        self._rows, places = list(alike.values()), {key: place for place, key in enumerate(alike)}
+        self._groups = np.array([places[key] for key in begins], np.int64)
+        self._models: dict[tuple[int, int], Simulation] = {}
+        models = [self._model(index, 0) for index in range(len(self.arenas))]
+        body_counts = {model.world.state.bodies.shape[1] for model in models}
         if len(body_counts) > 1:
             raise ParameterError(
                 f"the arenas of one batch must hold the same number of balls and cylinders, but they hold "
@@ -113,9 +119,9 @@ class InitialState:
         self._fields: dict[tuple[Any, ...], dict[str, Any]] = {(): {}}
         self._given = turns, worlds, robot, robots, response
         self._kind_numbers = np.array([[numbers[spec] for spec in row] for row in named], np.int64)
-        lamp_count = max(len(model.lamps) for model in self._models)
+        lamp_count = max(len(model.lamps) for model in models)
         self.lamps = np.zeros((len(self.arenas), lamp_count, 4))
-        for lamps, model in zip(self.lamps, self._models, strict=True):
+        for lamps, model in zip(self.lamps, models, strict=True):
             lamps[: len(model.lamps)] = model.lamps
         switch_count = max(len(each.lamp_switches) for each in self.arenas)
         self.switches = np.full((2, len(self.arenas), switch_count), NEVER_TICK)
@@ -131,6 +137,16 @@ class InitialState:
 
     def __reduce__(self) -> tuple[Any, ...]:
         return InitialState, self._given, {"arena_indices": self.arena_indices}
+
+    def _model(self, arena: int, group: int) -> Simulation:
+        """Return a simulation in an arena with robots of a group, at its start."""
+        if (arena, group) not in self._models:
+            self._models[arena, group] = Simulation(self.arenas[arena], robot=list(self._rows[group]))
+        return self._models[arena, group]
+
+    def _model_of(self, world: int) -> Simulation:
+        """Return the one that begins as a world does."""
+        return self._model(int(self.arena_indices[world]), int(self._groups[min(world, len(self._groups) - 1)]))
 
     def check_seeds(self, seeds: ArrayLike, count: int) -> NDArray[np.int64]:
         """Return seeds as int64 [count]."""
@@ -167,7 +183,7 @@ class InitialState:
         if starts is None:
             poses = np.zeros(shape)
             for k, world in enumerate(chosen):
-                poses[k] = self._models[self.arena_indices[world]].world.free_space.start_poses(int(seeds[k]))
+                poses[k] = self._model_of(world).world.free_space.start_poses(int(seeds[k]))
             return poses
         given = check_numbers("starts", starts)
         try:
@@ -178,7 +194,7 @@ class InitialState:
                 f"{given.shape}."
             ) from None
         for k, world in enumerate(chosen):
-            self._models[self.arena_indices[world]].world.free_space.check_start_poses(poses[k], f"of world {world}")
+            self._model_of(world).world.free_space.check_start_poses(poses[k], f"of world {world}")
         return poses
 
     def reset(self, state: State, worlds: NDArray[np.int64], starts: NDArray[np.float64]) -> None:
@@ -189,8 +205,10 @@ class InitialState:
             worlds: Indices of the worlds.
             starts: Start poses of their robots, float64 [chosen world, robot, 3].
         """
-        for index, model in enumerate(self._models):
-            here = worlds[self.arena_indices[worlds] == index]
+        kinds = self._groups[np.minimum(worlds, len(self._groups) - 1)]
+        codes = self.arena_indices[worlds] * len(self._rows) + kinds
+        for code in dict.fromkeys(codes.tolist()):
+            here, model = worlds[codes == code], self._model(*divmod(code, len(self._rows)))
             state.robots[here] = model.world.state.robots[0]
             state.bodies[here] = model.world.state.bodies[0]
         robots: Any = state.robots[worlds]

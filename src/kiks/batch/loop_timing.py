@@ -40,7 +40,8 @@ class Timing:
         period_s: Time from the beginning of one loop to that of the next [s]; after a loop that takes longer, the next
             one begins at once.
         baud: Speed of the lines [bit/s]; None for a robot that senses and acts at once, without a line.
-        think_s: Thinking time of the program before each command [s], like the thinking policy 'fixed'.
+        think_s: Thinking time of the program before each command [s], or before the commands that it sends to several
+            robots at once, like the thinking policy 'fixed'.
 
     Example:
         >>> Timing(period_s=0.05, baud=None)
@@ -54,6 +55,16 @@ class Timing:
     def __post_init__(self) -> None:
         if self.baud is None and self.period_s < 0.01:
             raise ParameterError(f"period_s must be at least 0.01 without a line, but it was {self.period_s:g}.")
+
+    @property
+    def thinking(self) -> str:
+        """The thinking policy of a program with this pace.
+
+        Example:
+            >>> Timing(think_s=0.0025).thinking
+            'fixed:2.5'
+        """
+        return f"fixed:{ns_from_s(self.think_s) / 1e6}" if self.think_s else "none"
 
     def line(self, spec: RobotSpec) -> Any:
         """Return the timing of the line to a robot of a kind, for kernels.

@@ -31,8 +31,8 @@ def drive(
 ) -> int:
     """Let a controller drive: each loop reads the sensors, lets it decide, sends the speeds and waits.
 
-    A batch with the same timing (`kiks.Timing`), controller and seed gives the same run, to the bit. The robots stop at
-    the end, also after an error.
+    A batch with the same timing (`kiks.Timing`), controller and seed gives the same run, to the bit: `kiks.verify`
+    compares them. The robots stop at the end, also after an error.
 
     Args:
         port: As for `kiks.Khepera`: a simulation's port, a port's name, or an open port. One program drives several
@@ -77,6 +77,8 @@ class Driver:
     Attributes:
         begin_ns: Time at which the next loop begins, by the robots' clock [ns].
         loop_count: Number of loops so far.
+        sensors: The last readings, float64 [robot, sensor].
+        wheels: The last sent speeds [pulses/10 ms], and outputs of other actuators, float64 [robot, 2 + order].
 
     Raises:
         LinkError: If a port cannot be opened.
@@ -101,15 +103,15 @@ class Driver:
         driving = RobotControllers(controller, parameters, 1, len(ports))
         self._senses, self._controllers = driving.senses, driving.controllers
         self._given = [driving.parameters[0, k, :count] for k, count in enumerate(driving.parameter_counts)]
-        self._sensors = np.zeros((len(ports), reading_count(driving.senses)))
+        self.sensors = np.zeros((len(ports), reading_count(driving.senses)))
         self._memory = [np.zeros(each.memory_count) for each in driving.controllers]
         self._orders, self._order_counts = driving.orders, driving.order_counts
-        self._wheels = np.zeros((len(ports), 2 + len(self._orders)))
+        self.wheels = np.zeros((len(ports), 2 + len(self._orders)))
         self._sent = np.full((len(ports), len(self._orders)), NOTHING)
         # Compiles the controllers, so that a faulty one raises before a robot moves.
         for k in range(len(ports)):
             self._decide(k, self._memory[k].copy())
-        self._wheels[:] = 0.0
+        self.wheels[:] = 0.0
         self._robots = [Khepera(each, baud=baud) for each in ports]
         self.begin_ns = ns_from_s(self._robots[0].time_s)
         self.loop_count = 0
@@ -120,7 +122,7 @@ class Driver:
         Raises:
             LinkError: If a robot does not send the expected reply.
         """
-        robots, sensors, wheels = self._robots, self._sensors, self._wheels
+        robots, sensors, wheels = self._robots, self.sensors, self.wheels
         first = 0
         for number, name in enumerate(self._senses):
             sense = sense_of(name)
@@ -146,7 +148,7 @@ class Driver:
 
     def _send(self, place: int, order: Actuator) -> None:
         """Send an order to the robots for which its number has changed, and read their replies."""
-        wanted, sent, asked = self._wheels[:, 2 + place], self._sent[:, place], list[int]()
+        wanted, sent, asked = self.wheels[:, 2 + place], self._sent[:, place], list[int]()
         for k in np.flatnonzero(place < self._order_counts).tolist():
             wanted[k] = value_of(wanted[k], float(order.least), float(order.most), sent[k])
             if not math.isnan(wanted[k]) and wanted[k] != sent[k]:
@@ -159,8 +161,8 @@ class Driver:
     def _decide(self, robot: int, memory: NDArray[np.float64]) -> None:
         """Let the controller of a robot write its speeds."""
         decide = self._controllers[robot]
-        outputs = self._wheels[robot, : decide.output_count]
-        decide(self._sensors[robot, : decide.sensor_count], memory, self._given[robot], outputs)
+        outputs = self.wheels[robot, : decide.output_count]
+        decide(self.sensors[robot, : decide.sensor_count], memory, self._given[robot], outputs)
 
     def stop(self) -> None:
         """Stop the robots."""

@@ -479,7 +479,10 @@ class Khepera:
             check_kind("request", request, bytes)
         reply = self.port.read_until(b"\n")
         words = 3 if request[:1] == b"T" else 1
-        if reply != b",".join(request.rstrip().lower().split(b",")[:words]) + b"\r\n":
+        head = b",".join(request.rstrip().lower().split(b",")[:words])
+        if (
+            reply != head + b"\r\n" and reply != head + b",\r\n"
+        ):  # as some robots reply to D: quirks.d_reply_trailing_comma
             raise self._unexpected(request, reply)
 
     def read_numbers(self, request: bytes, count: int) -> list[int]:

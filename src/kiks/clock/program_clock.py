@@ -12,22 +12,26 @@ FREE_POLLS = 100
 """Consecutive polls of locks and the like that cost nothing."""
 
 
-class PollCost:
-    """The cost of consecutive polls (is a byte there? what time is it?).
+class ThreadClock:
+    """What a thread of a program pays: for consecutive polls (is a byte there? what time is it?), and for thinking.
 
     Polling takes no simulated time by itself, so a program that polls in a loop would spin while time stands still.
     Therefore each consecutive poll costs twice the last, from 1 us up to 1 ms. The first one is free, so a program that
     reads the clock once per loop is not slowed.
 
+    Attributes:
+        has_read: Whether it has read since it last thought: one thought may lead to commands to several robots.
+
     Example:
-        >>> cost = PollCost()
-        >>> [cost.ask() for _ in range(4)]
+        >>> thread = ThreadClock()
+        >>> [thread.ask() for _ in range(4)]
         [0, 1000, 2000, 4000]
-        >>> cost.act(); cost.ask()
+        >>> thread.act(); thread.ask()
         0
     """
 
     def __init__(self) -> None:
+        self.has_read = False
         self._next_ns = 0
         self._poll_count = 0
 
@@ -64,7 +68,7 @@ class ProgramClock:
     Attributes:
         thinks: Whether thinking costs time.
         measures: Whether thinking costs the real time that it takes.
-        waiting: The cost of polls of the running thread.
+        thread: What the running thread pays.
         act_count: Number of calls of ports and clocks.
     """
 
@@ -73,7 +77,7 @@ class ProgramClock:
         self._policy = None if isinstance(policy, ThinkingFixed) and policy.time_ns == 0 else policy
         self.thinks = self._policy is not None
         self.measures = isinstance(policy, ThinkingLive)
-        self.waiting = PollCost()
+        self.thread = ThreadClock()
         self.act_count = 0
 
     def enter(self, *, is_command: bool) -> int:
@@ -82,12 +86,12 @@ class ProgramClock:
 
     def ask(self) -> int:
         """Return the cost of a poll [ns], which grows while the program does nothing else."""
-        return self.waiting.ask()
+        return self.thread.ask()
 
     def poll(self) -> int:
-        """Return the cost of a poll [ns] of a lock or the like; see `PollCost.poll`."""
+        """Return the cost of a poll [ns] of a lock or the like; see `ThreadClock.poll`."""
         self.act_count += 1
-        return self.waiting.poll()
+        return self.thread.poll()
 
     def go_on(self) -> None:
         """Note that another thread of the program thinks now."""
@@ -98,7 +102,7 @@ class ProgramClock:
         """Note that the program goes on now, after an action or a poll."""
         self.act_count += 1
         if has_acted:
-            self.waiting.act()
+            self.thread.act()
         if self._policy is not None:
             self._policy.leave()
 

@@ -1,5 +1,8 @@
 """Thinking time: the time that the user's program needs between a reply and its next command.
 
+Commands that a program sends without reading in between, also to several robots, follow from one thought. Threads think
+for themselves, as programs do.
+
 `none` and `fixed` are repeatable; `live` measures the program on this computer and is not; `replay` repeats, to the
 nanosecond, what an earlier `live` run measured.
 """

@@ -166,4 +166,5 @@ def memory_of(parts: Sequence[TurretPart]) -> list[tuple[int, int]]:
         if each.turret not in begins:
             begins[each.turret] = first
             first += each.memory_count
-    return [(begins[each.turret], begins[each.turret] + each.memory_count) for each in parts]
+    places = ((begins[each.turret], each.memory_count) for each in parts)
+    return [(begin, begin + count) if count else (0, 0) for begin, count in places]

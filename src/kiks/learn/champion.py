@@ -172,9 +172,7 @@ class Champion:
             replace(each, turrets=tuple(dict.fromkeys((*each.turrets, *needed))))
             for each in project.robots or (ProjectRobot(),)
         )
-        think_s = self.timing.think_s
-        thinking = f"fixed:{think_s * 1e3:g}" if think_s else "none"
-        return replace(project, robots=tuple(robots), baud=self.baud, thinking=thinking)
+        return replace(project, robots=tuple(robots), baud=self.baud, thinking=self.timing.thinking)
 
     def simulation(
         self, arena: Arena | None = None, *, robots: int | None = None, seed: int | None = None

@@ -216,7 +216,7 @@ class Files:
             # One more character at any of the ports can end the wait.
             reads = [Read(each.line.robot, count + 1) for each, count in zip(ports, arrived, strict=True)]
             scheduler.wait("files", until_ns=deadline_ns, reads=reads, files=files)
-            scheduler.program.waiting.act()
+            scheduler.program.thread.act()
             if files.found:
                 break
         return files.found  # type: ignore[no-any-return]

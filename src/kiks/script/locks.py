@@ -70,7 +70,7 @@ class WaitingRoom:
                 if not waiters and self.waiters.get(id(key)) is waiters:
                     del self.waiters[id(key)]
             if cause is not SIGNALLED:
-                scheduler.program.waiting.act()
+                scheduler.program.thread.act()
                 return cause is key
             if take():
                 return True

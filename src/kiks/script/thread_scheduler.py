@@ -21,7 +21,7 @@ from typing import Any, NoReturn, Protocol
 
 import greenlet
 
-from kiks.clock.program_clock import PollCost, ProgramClock
+from kiks.clock.program_clock import ProgramClock, ThreadClock
 from kiks.model.checks import SECONDS_MAX
 from kiks.script.cpython import name_of_thread, new_idents, thread_values, unchanged
 from kiks.sim.port import Line
@@ -58,14 +58,14 @@ class Task:
     Attributes:
         ident: Its `threading.get_ident`.
         waits_for: What it waits for, for messages; empty while it does not wait.
-        waiting: The cost of its polls.
+        clock: What it pays for polls and thinking.
         sentinel: A lock that is released when it ends; None if no thread has asked for it.
     """
 
     def __init__(self, ident: int, run: Callable[[], object], hub: greenlet.greenlet) -> None:
         self.ident = ident
         self.waits_for = ""
-        self.waiting = PollCost()
+        self.clock = ThreadClock()
         self.sentinel: Any = None
         self.greenlet = greenlet.greenlet(lambda *_: run(), hub)
         self.number = 0
@@ -142,7 +142,7 @@ class Scheduler:
 
         self._hub = greenlet.getcurrent()
         self.main.greenlet = greenlet.greenlet(run_main, self._hub)
-        self.program.waiting = self.main.waiting
+        self.program.thread = self.main.clock
         take, put = thread_values()
         values = take()
         put(values)
@@ -360,7 +360,7 @@ class Scheduler:
             self._pass_time()
         task = self._ready.popleft()
         self.current = task
-        self.program.waiting = task.waiting
+        self.program.thread = task.clock
         return task
 
     def _next_deadline_ns(self) -> int:

@@ -157,7 +157,9 @@ class VirtualPort:
         self.write_timeout = None
         self.line: Line = line
         self._program = program
-        self._has_read = True
+        # The thread that has read last here: another one may write what follows from that.
+        self._reader = program.thread
+        self._reader.has_read = True
         self._is_read_cancelled = False
         self._is_write_cancelled = False
 
@@ -209,8 +211,8 @@ class VirtualPort:
         line, program = self.line, self._program
         with line.lock:
             if program.thinks:
-                self._think(is_command=self._has_read)
-            self._has_read = False
+                self._think(is_command=self._reader.has_read or program.thread.has_read)
+                self._reader.has_read = program.thread.has_read = False
             count = len(data)
             # Like pyserial, which goes on when the driver would take one more.
             if count and (self._is_write_cancelled or not line.send(data, 1)):
@@ -413,7 +415,8 @@ class VirtualPort:
         with line.lock:
             if program.thinks:
                 self._think(is_command=False)
-            self._has_read = True
+                self._reader = program.thread
+                self._reader.has_read = True
             # A read that does not wait is a poll.
             poll_ns = program.ask() if timeout_ns == 0 and size != 0 else 0
             begin_ns = line.now_ns
