@@ -90,7 +90,7 @@ def test_wrong_recipes_are_errors(tmp_path: Path) -> None:
         ({"function": "shy"}, "function must be 'package.module:name' or 'file.py:name', but it was 'shy'"),
         ({"function": "no_such_module_here:shy"}, "module 'no_such_module_here' must be one that Python can import"),
         ({"function": "kiks.errors:shy"}, "the module 'kiks.errors' must define 'shy', but does not"),
-        ({"function": "kiks.errors:nearest"}, "must name a controller, but it names <function nearest"),
+        ({"function": "kiks.meant:nearest"}, "must name a controller, but it names <function nearest"),
         ({"function": "nowhere.py:shy"}, "must be a Python file that runs, but it raised FileNotFoundError"),
         ({"function": "mine.py:shi"}, "must define 'shi', but does not. Did you mean 'shy'"),
         ({"function": "mine.py:plain"}, "Write @kiks.controller over the function"),
