@@ -299,7 +299,8 @@ def _measure(term: Term, named: dict[str, Any], arena: Arena) -> Measure:
     try:
         return cast(Measure, made(*given, **named))
     except TypeError as error:
-        raise ParameterError(f"must use {term.name} as its reference says, but {shown(str(term))}: {str(error).removesuffix('.')}.") from None
+        what = f"{shown(str(term))}: {str(error).removesuffix('.')}."
+        raise ParameterError(f"must use {term.name} as its reference says, but {what}") from None
 
 
 def _moment(sim: Simulation, robot: int, senses: Sequence[AnySense], period_s: float) -> Any:
