@@ -227,7 +227,10 @@ def test_what_is_wrong_is_said_before_the_run_in_one_line() -> None:
     for text, message in (
         ("measure > 0", "must name measures, but 'measure' is none"),
         ("contacts(3) > 0", "must use contacts without arguments, but it was 'contacts(3)'"),
-        ("goal_mm(1) < 3", "must use goal_mm as its reference says, but 'goal_mm(1)': goal_mm() missing a required argument"),
+        (
+            "goal_mm(1) < 3",
+            "must use goal_mm as its reference says, but 'goal_mm(1)': goal_mm() missing a required argument",
+        ),
         ("goal_mm('a', 1) < 3", "the goal's solved x_mm must be a number, but it was 'a'"),
         ("goal_mm(" + "9" * 900 + ", 1) < 3", "the goal's solved x_mm must be"),
         ("wall_following('up') > 1", "side must be 'left' or 'right', but it was 'up'"),
