@@ -16,8 +16,8 @@ from tests.served import PROGRAMS, called
 from tests.wheels import ROOT, build, install
 
 from kiks import Champion, controllers
+from kiks.model.package import shipped
 from kiks.model.project import Project
-from kiks.model.shipped import shipped
 
 pytestmark = [pytest.mark.slow, in_each_browser]
 

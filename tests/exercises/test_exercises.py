@@ -8,8 +8,8 @@ import pytest
 from tests.at_length import AT_LENGTH, share
 
 from kiks.model.exercise import Case, cases_of
+from kiks.model.package import shipped
 from kiks.model.project import Project
-from kiks.model.shipped import shipped
 from kiks.ports.program_process import Command
 from kiks.sim.from_project import in_case
 from kiks.trials.runner import run_trials

@@ -16,7 +16,7 @@ from kiks.learn.tasks import football
 from kiks.model import pitch
 from kiks.model.arena import Arena, Ball, Pose
 from kiks.model.arena_file import save_arena
-from kiks.model.shipped import shipped
+from kiks.model.package import shipped
 
 pytestmark = pytest.mark.slow
 

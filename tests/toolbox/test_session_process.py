@@ -16,7 +16,7 @@ import pytest
 from tests import forked
 from tests.guard import GUARD_S, wait_until
 
-from kiks.model.shipped import shipped
+from kiks.model.package import shipped
 
 pytestmark = pytest.mark.slow
 

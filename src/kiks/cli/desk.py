@@ -68,7 +68,7 @@ def desk(
 
     Example: kiks desk --arena maze
     """
-    from kiks.desk.server.access import LOOPBACK
+    from kiks.desk.server.access import is_private
 
     public = public_address_of(address)
     words = program or []
@@ -80,7 +80,7 @@ def desk(
         folder=folder,
         record=record,
         waits=not no_wait,
-        may_run_programs=run_programs or (host in LOOPBACK and public is None),
+        may_run_programs=run_programs or is_private(host, public),
         may_edit=edit,
         page={"host": host, "port": port, "public": public, "browser": browser},
     )

@@ -66,7 +66,7 @@ def examples(out: Annotated[Path, typer.Argument(help="A new folder.")]) -> None
     """
     import shutil
 
-    from kiks.model.shipped import shipped
+    from kiks.model.package import shipped
 
     if out.exists():
         raise ParameterError(f"OUT must be a new folder, but {shown(str(out))} exists. Choose another name.")

@@ -67,7 +67,7 @@ def host(
 
     Example: kiks host --arena office --players 2 --host 0.0.0.0
     """
-    from kiks.desk.server.access import LOOPBACK
+    from kiks.desk.server.access import is_private
     from kiks.desk.server.desk import Desk, usual_programs
     from kiks.desk.server.players import Players
     from kiks.desk.server.server import SERVER
@@ -115,7 +115,7 @@ def host(
         speed=read.speed,
         folder=home,
         owns_world=True,
-        may_run_programs=host in LOOPBACK and public is None,
+        may_run_programs=is_private(host, public),
         commands=own,
         supervisor=supervisor_of(read, home) if project is not None else None,
         new_programs=new_programs,

@@ -138,7 +138,7 @@ def _is_champion(word: str) -> bool:
 
 def _driver(files: Sequence[Path]) -> Command:
     """Return the program that drives each robot with the controller of a champion's file."""
-    from kiks.model.shipped import shipped
+    from kiks.model.package import shipped
     from kiks.ports.program_process import Command
 
     words = [word for number, file in enumerate(files, 1) for word in (str(file.absolute()), f"kiks://{number}")]
@@ -147,6 +147,8 @@ def _driver(files: Sequence[Path]) -> Command:
 
 def _champion_job(path: Path, world: World) -> Job:
     from kiks.learn.champion import Champion
+    from kiks.model.data_file import read_file
+    from kiks.model.limits import CHAMPION_FILE_BYTES_MAX
 
     file = path / "champion.toml" if path.is_dir() else path
     if path.is_dir() and not file.exists():
@@ -156,7 +158,8 @@ def _champion_job(path: Path, world: World) -> Job:
             f"PROGRAM must be a program, a project or the folder of an evolution, but {shown(str(path))} has neither a "
             "__main__.py nor a champion. Name a file in it."
         )
-    if file.is_file() and not re.search(rb"^\s*champion\s*=", file.read_bytes(), re.MULTILINE):
+    data = read_file(file, f"Champion's file {str(file)!r}", bytes_max=CHAMPION_FILE_BYTES_MAX)
+    if not re.search(rb"^\s*champion\s*=", data, re.MULTILINE):
         raise ParameterError(
             f"PROGRAM must be a program, a project or a champion, but {shown(str(file))} is none. An arena stands "
             "after --arena, a robot after --robot, a task after kiks evolve."
@@ -177,7 +180,7 @@ def _two_sided_job(folder: Path, world: World) -> Job | None:
     from kiks.learn import tasks
     from kiks.learn.champion import Champion
     from kiks.model.arena import Pose
-    from kiks.model.shipped import shipped
+    from kiks.model.package import shipped
 
     for task in map(tasks.load, TWO_SIDED):
         files = [folder / f"{side.name}.toml" for side in task.sides]

@@ -12,7 +12,7 @@ def matlab() -> None:
 
     Example: octave --eval "$(kiks matlab) kiks; follow"
     """
-    from kiks.model.shipped import shipped
+    from kiks.model.package import shipped
 
     folder = shipped("matlab")
     typer.echo(f"addpath('{folder}'); addpath('{folder / 'demos'}');")

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
 
 import typer
 
-from kiks.cli.command_line import opening
+from kiks.cli.command_line import ARENAS, opening
 from kiks.cli.outputs import is_quiet
 from kiks.errors import ParameterError, printable, shown
 from kiks.meant import nearest_file
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from kiks.model.project import Project
     from kiks.ports.program_process import Command
 
-OTHERS = (".mcap", ".toml", ".kad", ".yaml", ".png", ".csv", ".ipynb", ".c", ".java", ".m")
+OTHERS = (*ARENAS, ".mcap", ".csv", ".ipynb", ".c", ".java", ".m")
 """Endings of files that are no programs of Python."""
 
 OTHER_LANGUAGES = "Programs in other languages reach robots by kiks serve."

@@ -175,10 +175,9 @@ class Command(OneLineCommand):
             param: Any = error.param
             if param is None:
                 raise
-            given = self.make_parser(ctx).parse_args(list(args))[0]
+            given, alone, _ = self.make_parser(ctx).parse_args(list(args))
             value = given.get(param.name)
             if value in (None, ()):
-                alone = self.make_parser(ctx).parse_args(list(args))[1]
                 raise ParameterError(self._missing(ctx, param, given, alone)) from None
             if not (rule := _rule(param)):
                 raise

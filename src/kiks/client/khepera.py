@@ -480,9 +480,8 @@ class Khepera:
         reply = self.port.read_until(b"\n")
         words = 3 if request[:1] == b"T" else 1
         head = b",".join(request.rstrip().lower().split(b",")[:words])
-        if (
-            reply != head + b"\r\n" and reply != head + b",\r\n"
-        ):  # as some robots reply to D: quirks.d_reply_trailing_comma
+        # Some robots end their reply to D with a comma: quirks.d_reply_trailing_comma.
+        if reply != head + b"\r\n" and reply != head + b",\r\n":
             raise self._unexpected(request, reply)
 
     def read_numbers(self, request: bytes, count: int) -> list[int]:

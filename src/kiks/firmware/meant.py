@@ -7,9 +7,10 @@ import re
 from kiks.firmware.commands import COMMANDS
 
 _PARAMETERS = {command.letter: command.parameters for command in COMMANDS if command.letter != "T"}
+_NUMBER = r"[+-]?[0-9]+(?:\.[0-9]*)?"
 _BETWEEN = r"[\s,;:=()\"']*"
 _LETTER = re.compile(rf"{_BETWEEN}([A-Za-z])(?![A-Za-z])")
-_LINE = re.compile(rf"{_BETWEEN}([A-Za-z])((?:{_BETWEEN}[+-]?[0-9]+(?:\.[0-9]*)?)*){_BETWEEN}(?:\\[rn])*")
+_LINE = re.compile(rf"{_BETWEEN}([A-Za-z])((?:{_BETWEEN}{_NUMBER})*){_BETWEEN}(?:\\[rn])*")
 
 
 def hint_for(line: bytes) -> str:
@@ -25,7 +26,7 @@ def hint_for(line: bytes) -> str:
     found = _LINE.fullmatch(text) or _LETTER.match(text)
     if found is None or (letter := found[1].upper()) not in _PARAMETERS:
         return ""
-    numbers = [str(round(float(each))) for each in re.findall(r"[+-]?[0-9]+(?:\.[0-9]*)?", text)]
+    numbers = [str(round(float(each))) for each in re.findall(_NUMBER, text)]
     is_whole = found.re is _LINE and len(numbers) == len(_PARAMETERS[letter])
     written = ",".join([letter, *(numbers if is_whole else _PARAMETERS[letter])])
     return f"Did you mean {written!r}?" if is_whole else f"It is written {written!r}."

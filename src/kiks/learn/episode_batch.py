@@ -121,15 +121,14 @@ class Episodes:
         Returns:
             Rewards, float64 [world, robot].
         """
-        given = actions
         if ignored is not None:
-            given = np.where(ignored[:, None, None], 0, given)
-        if not (np.abs(given) <= 1).all():
+            actions = np.where(ignored[:, None, None], 0, actions)
+        if not (np.abs(actions) <= 1).all():
             raise ParameterError(
-                f"actions must be from -1 to 1, but among them was {given[~(np.abs(given) <= 1)][0]}. Clip them, "
+                f"actions must be from -1 to 1, but among them was {actions[~(np.abs(actions) <= 1)][0]}. Clip them, "
                 "for example with gymnasium.wrappers.ClipAction."
             )
-        self._sensors = self.batch.step(given * self.task.speed_limit)
+        self._sensors = self.batch.step(actions * self.task.speed_limit)
         self.step_counts += 1
         before, self._scores = self._scores, self.batch.notes[:, :, 0].copy()
         return self._scores - before

@@ -6,7 +6,7 @@ from functools import cache
 from pathlib import Path
 
 from kiks.model.arena import Arena
-from kiks.model.package import shipped as shipped
+from kiks.model.package import shipped
 
 
 @cache

@@ -27,6 +27,12 @@ from kiks.model.limits import REQUEST_BYTES_MAX
 LOOPBACK = frozenset({"127.0.0.1", "localhost", "::1"})
 """Host names of this computer."""
 
+
+def is_private(host: str, public: PublicAddress | None) -> bool:
+    """Return whether this computer alone reaches a server there, so that whoever opens its pages may start programs."""
+    return host in LOOPBACK and public is None
+
+
 HEADERS = [
     # Only notebooks of this computer may embed the page: other pages could trick people into clicks.
     ("content-security-policy", "frame-ancestors 'self' http://localhost:* http://127.0.0.1:* vscode-webview:"),

@@ -37,7 +37,7 @@ HISTORY_BYTES_MAX = 64 << 20
 STEPS_MAX = 1000
 """Most steps that can be undone."""
 
-MOMENTS_MAX = 100
+HISTORIES_MAX = 100
 """Most edits to whose times people can go back and still undo the steps before."""
 
 _LARGE_CELLS = 4_000_000
@@ -135,7 +135,7 @@ class _Step(NamedTuple):
     is_another_arena: bool
 
 
-class _Moment(NamedTuple):
+class _History(NamedTuple):
     """The history after an edit, for people who go on from that time: what was known, and what could be undone then."""
 
     time_ns: int
@@ -164,7 +164,7 @@ class Editing:
         self._fresh = count(1)
         self._known: tuple[Any, ...] = ()  # what of the world only edits change
         self._run: object = None
-        self._moments: deque[_Moment] = deque(maxlen=MOMENTS_MAX)  # of this run
+        self._histories: deque[_History] = deque(maxlen=HISTORIES_MAX)  # of this run
 
     @property
     def can_undo(self) -> bool:
@@ -293,16 +293,16 @@ class Editing:
         """Note the history after an edit at a time [ns]."""
         if self._run is not (run := self._desk.looking.run):
             self._run = run
-            self._moments.clear()
+            self._histories.clear()
         known = _lasting(self._known)
-        self._moments.append(_Moment(time_ns, known, self._numbers, [*self._undoable], [*self._redoable]))
+        self._histories.append(_History(time_ns, known, self._numbers, [*self._undoable], [*self._redoable]))
 
-    def _earlier(self) -> list[_Moment]:
-        """Return the moments up to the present of a world that goes on from the past, the last one first."""
+    def _earlier(self) -> list[_History]:
+        """Return the histories up to the present of a world that goes on from the past, the last one first."""
         if self._run is not self._desk.looking.run or self._desk.past is not None:
             return []
         now_ns = self._desk.sim.now_ns
-        return [each for each in reversed(self._moments) if each.time_ns <= now_ns]
+        return [each for each in reversed(self._histories) if each.time_ns <= now_ns]
 
     def _recall(self, known: tuple[Any, ...], count: int) -> None:
         """Go back to the history of a world that goes on from the past; it is empty in any other unknown world.
@@ -320,8 +320,8 @@ class Editing:
             self._redoable.clear()
         else:
             self._numbers, self._undoable[:], self._redoable[:] = found[2:]
-            while self._moments[-1] is not found:
-                self._moments.pop()
+            while self._histories[-1] is not found:
+                self._histories.pop()
         self._known = known
 
     # ---- the world ----

@@ -14,7 +14,7 @@ from kiks.desk.server.folder import Folder
 from kiks.errors import ParameterError, shown
 from kiks.model.atomic_files import program_in
 from kiks.model.limits import PROGRAM_BYTES_MAX
-from kiks.model.shipped import shipped
+from kiks.model.package import shipped
 from kiks.ports.program_process import Command
 
 EXAMPLES = shipped("examples/demos").resolve()
