@@ -20,4 +20,5 @@ def remember(name: str, value: object) -> None:
     """Let the browser of this page remember a word or a number."""
     # A browser runs this text: nothing that comes from outside may be in it.
     assert re.fullmatch(r"[\w.-]+", f"{name}{value}", re.ASCII)
-    ui.run_javascript(f"document.cookie = 'kiks-{name}={value}; path=/; max-age={YEAR_S}; samesite=lax'")
+    code = f"document.cookie = 'kiks-{name}={value}; path=/; max-age={YEAR_S}; samesite=lax'"
+    ui.run_javascript(code)
