@@ -38,7 +38,7 @@ def click(visitor: Visitor, x_mm: float, y_mm: float) -> None:
 def use(visitor: Visitor, tool: str, *places: tuple[float, float]) -> None:
     """Click a place with a tool, or draw with it from one place to another."""
     visitor.take(tool)
-    click(visitor, *places[0]) if len(places) == 1 else visitor.drag(*places)
+    click(visitor, *places[0]) if len(places) == 1 else visitor.stroke(*places)
 
 
 def wait_for_step(visitor: Visitor, *, undo: bool = True, redo: bool = False) -> None:
@@ -98,7 +98,7 @@ def test_strokes_snap_to_the_grid_end_at_the_arena_and_are_dropped_with_escape(v
     visitor.pull((200, 250), (250, 250))
     visitor.page.keyboard.press("Escape")
     visitor.page.mouse.up()
-    visitor.drag((400, 300), (620, 300))
+    visitor.stroke((400, 300), (620, 300))
     wait_for_step(visitor)
     use(visitor, "rectangle", (198, 382), (263, 417))
     visitor.until(lambda: np.array_equal(desk.sim.arena.brightness, walls))

@@ -293,7 +293,14 @@ class Visitor(Guest):
 
     def drag(self, start: tuple[float, float], end: tuple[float, float]) -> None:
         self.pull(start, end)
+        # On a busy computer the desk has not heard of the hand yet: then it is empty, too.
+        self.until(lambda: not self.desk.shown.hands.are_empty)
         self.let_go()
+
+    def stroke(self, start: tuple[float, float], end: tuple[float, float]) -> None:
+        """Draw with the tool in use."""
+        self.pull(start, end)
+        self.page.mouse.up()
 
     def drag_refused(self) -> None:
         """Try to drag robot 1, and wait for the message that the past stays as it was."""
