@@ -74,7 +74,7 @@ EXERCISE = '''"""
 import subprocess
 
 folder = "../../../{path}"
-command = ["kiks", "run", "--export", "{name}.png", folder, f"{{folder}}/template.py"]
+command = ["kiks", "run", "--export", "exercise_{name}.png", folder, f"{{folder}}/template.py"]
 run = subprocess.run(command, capture_output=True, text=True, check=True)
 print(run.stdout + run.stderr)
 '''
@@ -125,9 +125,17 @@ def entry(name: str, path: Path) -> str:
 
 def keep_pictures(block: Any, variables: dict[str, Any], settings: dict[str, Any]) -> str:
     """Return the pictures that a script has written, in that order, as its page shows them."""
+    script = Path(variables["src_file"])
+    pictures = (path for path in script.parent.iterdir() if path.suffix in (".png", ".webp"))
+    made = (path for path in pictures if maker_of(path) == script.stem)
     kept = []
-    for path in sorted(SOURCE.rglob("*"), key=lambda path: path.stat().st_mtime_ns):
-        if path.suffix in (".png", ".webp"):
-            place = Path(next(variables["image_path_iterator"])).with_suffix(path.suffix)
-            kept.append(str(shutil.move(path, place)))
-    return figure_rst(kept, settings["src_dir"], Path(variables["src_file"]).stem.replace("_", " "))
+    for path in sorted(made, key=lambda path: path.stat().st_mtime_ns):
+        place = Path(next(variables["image_path_iterator"])).with_suffix(path.suffix)
+        kept.append(str(shutil.move(path, place)))
+    return figure_rst(kept, settings["src_dir"], script.stem.replace("_", " "))
+
+
+def maker_of(picture: Path) -> str:
+    """Return the script whose name that of a picture holds: another one may be writing its own beside it."""
+    names = (script.stem for script in picture.parent.glob("*.py"))
+    return max((name for name in names if name in picture.stem), key=len, default="")
