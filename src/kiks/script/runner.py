@@ -173,6 +173,8 @@ def run_program(
     except EndedError as end:
         if end.message:
             _complain(f"kiks: {end.message}")
+        if signals.were_ended:
+            raise KeyboardInterrupt from None
         return end.code
     finally:
         cpython.forget_threads(scheduler.tasks)
