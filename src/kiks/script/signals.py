@@ -282,15 +282,19 @@ class Signals:
             name = "Ctrl-C" if number == signal.SIGINT else signal.Signals(number).name
             self._scheduler.end(INTERRUPTED, f"the program had not ended after {name}, and was stopped where it was.")
         self.were_ended = True
-        main = threading.get_ident()
+        main, begun = threading.get_ident(), list[bool]()
 
         def insist() -> None:
+            begun.append(True)
             time.sleep(PROGRAM_GRACE_S)
             with self._insisting:
                 if not self._is_over:
                     signal.pthread_kill(main, number)
 
         start_new_thread(insist, ())
+        # Before it begins, Python takes it for this thread, and an exception for this one would come up there.
+        while not begun:
+            time.sleep(0.001)
 
 
 class _FromOutside:
