@@ -66,6 +66,7 @@ class ProgramClock:
         measures: Whether thinking costs the real time that it takes.
         waiting: The cost of polls of the running thread.
         act_count: Number of calls of ports and clocks.
+        doubt: Why the program might do something else next time; empty if it will not.
     """
 
     def __init__(self, thinking: str) -> None:
@@ -75,6 +76,7 @@ class ProgramClock:
         self.measures = isinstance(policy, ThinkingLive)
         self.waiting = PollCost()
         self.act_count = 0
+        self.doubt = ""
 
     def enter(self, *, is_command: bool) -> int:
         """Return the thinking time to charge at a call [ns]; see `Thinking.enter`."""

@@ -213,6 +213,13 @@ class Files:
         scheduler = self._scheduler
         ports = [each for each in self._ports.values() if descriptors is None or each.descriptor in descriptors]
         deadline_ns = NEVER_NS if timeout_s is None else scheduler.world.now_ns + timeout_ns(timeout_s)
+        outside = [
+            each
+            for each in descriptors or ()
+            if each not in self._ports and (state := status(each)) is not None and self._is_outside(state)
+        ]
+        if timeout_s is not None and any(map(os.isatty, outside)):
+            scheduler.program.doubt = "it looked for keys"
         if timeout_s is not None and timeout_s <= 0:
             _fill(ports)
             if not (found := look(0)):
@@ -220,11 +227,7 @@ class Files:
                 _fill(ports)
                 found = look(0)
             return found
-        is_for_person = timeout_s is None and any(
-            each not in self._ports and (state := status(each)) is not None and self._is_outside(state)
-            for each in descriptors or ()
-        )
-        files = _Wait(self, look, descriptors, is_for_person=is_for_person)
+        files = _Wait(self, look, descriptors, is_for_person=bool(outside) and timeout_s is None)
         while True:
             ports = [each for each in ports if each.descriptor in self._ports]
             arrived = _fill(ports)

@@ -281,7 +281,7 @@ class Signals:
         if self.were_ended:
             name = "Ctrl-C" if number == signal.SIGINT else signal.Signals(number).name
             self._scheduler.end(INTERRUPTED, f"the program had not ended after {name}, and was stopped where it was.")
-        self.were_ended = True
+        self.were_ended, self._scheduler.program.doubt = True, "it was interrupted"
         main, begun = threading.get_ident(), list[bool]()
 
         def insist() -> None:

@@ -395,7 +395,8 @@ class Scheduler:
         is_for_person = self._waits_for_person
         if self._watchers and self._look_at_files(self._ahead_ms() if is_for_person else 0):
             return
-        if is_for_person and until_ns < NEVER_NS:
+        if is_for_person and (self._readers or until_ns < NEVER_NS):
+            self.program.doubt = "it looked for keys"
             until_ns = min(until_ns, self.world.now_ns + PERSON_STEP_NS)
         readers = [(task, read) for task, reads in self._readers.items() for read in reads]
         began_ns = self.world.now_ns
