@@ -25,7 +25,7 @@ from kiks.script.file_system import FileSystem
 from kiks.script.patching import for_program
 from kiks.script.shared_line import SharedLine
 from kiks.script.terminals import SETTLED_MS, Identity, OwnTerminals, identity, patience, status
-from kiks.script.thread_scheduler import Scheduler, timeout_ns
+from kiks.script.thread_scheduler import LOOKED_FOR_KEYS, Scheduler, timeout_ns
 from kiks.sim.read_completion import NEVER_NS, Read
 
 TERMINAL_CHARACTERS = 4000
@@ -119,13 +119,12 @@ def _children() -> set[str]:
 class _Wait:
     """A wait for files; see `thread_scheduler.FileWait`."""
 
-    def __init__(
-        self, files: Files, look: Callable[[int], Any], descriptors: Iterable[int] | None, *, is_for_person: bool
-    ) -> None:
+    is_for_person = False
+
+    def __init__(self, files: Files, look: Callable[[int], Any], descriptors: Iterable[int] | None) -> None:
         self._files = files
         self._look = look
         self._descriptors = descriptors
-        self.is_for_person = is_for_person
         # What is ready. It is kept, because the system may report an event only once (EPOLLONESHOT, EPOLLET).
         self.found: Any = None
 
@@ -198,6 +197,14 @@ class Files:
             return False
         return stat.S_ISCHR(state.st_mode) or identity(state) == self._input
 
+    def _waits_for_person(self, descriptors: Iterable[int] | None, timeout_s: float | None) -> bool:
+        """Return whether a wait lasts until a person acts; note a look, too, as the run depends on what it finds."""
+        states = {each: status(each) for each in descriptors or () if each not in self._ports}
+        outside = [each for each, state in states.items() if state is not None and self._is_outside(state)]
+        if timeout_s is not None and any(map(os.isatty, outside)):
+            self._scheduler.program.doubt = LOOKED_FOR_KEYS
+        return timeout_s is None and bool(outside)
+
     # ---- waiting ----
 
     def wait(
@@ -213,26 +220,21 @@ class Files:
         scheduler = self._scheduler
         ports = [each for each in self._ports.values() if descriptors is None or each.descriptor in descriptors]
         deadline_ns = NEVER_NS if timeout_s is None else scheduler.world.now_ns + timeout_ns(timeout_s)
-        outside = [
-            each
-            for each in descriptors or ()
-            if each not in self._ports and (state := status(each)) is not None and self._is_outside(state)
-        ]
-        if timeout_s is not None and any(map(os.isatty, outside)):
-            scheduler.program.doubt = "it looked for keys"
         if timeout_s is not None and timeout_s <= 0:
             _fill(ports)
             if not (found := look(0)):
+                self._waits_for_person(descriptors, timeout_s)
                 scheduler.poll()
                 _fill(ports)
                 found = look(0)
             return found
-        files = _Wait(self, look, descriptors, is_for_person=bool(outside) and timeout_s is None)
+        files = _Wait(self, look, descriptors)
         while True:
             ports = [each for each in ports if each.descriptor in self._ports]
             arrived = _fill(ports)
             if files.is_over(0) or scheduler.world.now_ns >= deadline_ns:
                 break
+            files.is_for_person = self._waits_for_person(descriptors, timeout_s)
             # One more character at any of the ports can end the wait.
             reads = [Read(each.line.robot, count + 1) for each, count in zip(ports, arrived, strict=True)]
             scheduler.wait("files", until_ns=deadline_ns, reads=reads, files=files)

@@ -33,6 +33,9 @@ SIGNALLED, COMPLETE, ALONE, STUCK = object(), object(), object(), object()
 """Reasons for which a thread goes on: a signal; a complete read; no other thread can go on before its read is complete;
 no thread can go on at all."""
 
+LOOKED_FOR_KEYS = "it looked for keys"
+"""Why a program with a person might do something else next time."""
+
 PERSON_STEP_NS = 20_000_000
 """Longest time that passes between two looks for what a person does [ns]."""
 
@@ -124,7 +127,8 @@ class Scheduler:
         self._readers: dict[Task, Sequence[Read]] = {}
         self._watchers: dict[Task, FileWait] = {}
         self._patient: list[Task] = []
-        self._pace = Pace()
+        # The waits for a person, and the time in which a person lives meanwhile.
+        self._person_waits, self._pace = 0, Pace()
         self.lock_count = 0
         self.tasks: dict[int, Task] = {}
         self.main = Task(get_ident(), lambda: None, self._hub)
@@ -293,9 +297,10 @@ class Scheduler:
         if reads:
             self._readers[task] = reads
         if files:
-            if files.is_for_person and not self._waits_for_person:
-                self._pace.start(self.world.now_ns)
             self._watchers[task] = files
+            if files.is_for_person:
+                self._person_waits += 1
+                self._pace.start(self.world.now_ns)
         if when_stuck:
             self._patient.append(task)
         try:
@@ -304,6 +309,7 @@ class Scheduler:
             task.waits_for = ""
             self._readers.pop(task, None)
             self._watchers.pop(task, None)
+            self._person_waits -= files is not None and files.is_for_person
             if when_stuck:
                 self._patient.remove(task)
         return task.cause
@@ -392,11 +398,10 @@ class Scheduler:
             if reader.may_go_alone and (until_ns == NEVER_NS or self._deadlines[0][2] is reader):
                 self.wake(reader, ALONE)
                 return
-        is_for_person = self._waits_for_person
-        if self._watchers and self._look_at_files(self._ahead_ms() if is_for_person else 0):
+        if self._watchers and self._look_at_files(self._ahead_ms() if self._person_waits else 0):
             return
-        if is_for_person and (self._readers or until_ns < NEVER_NS):
-            self.program.doubt = "it looked for keys"
+        if self._person_waits and (self._readers or until_ns < NEVER_NS):
+            self.program.doubt = LOOKED_FOR_KEYS
             until_ns = min(until_ns, self.world.now_ns + PERSON_STEP_NS)
         readers = [(task, read) for task, reads in self._readers.items() for read in reads]
         began_ns = self.world.now_ns
@@ -421,10 +426,6 @@ class Scheduler:
             # Only a real file can wake a thread; simulated time stands still meanwhile.
             self._look_at_files(BLOCK_MS)
             self._pace.start(now_ns)
-
-    @property
-    def _waits_for_person(self) -> bool:
-        return any(files.is_for_person for files in self._watchers.values())
 
     def _ahead_ms(self) -> int:
         """Return how far simulated time is ahead of a person's [ms]; one that was behind does not hurry later."""

@@ -127,7 +127,7 @@ class _Watch:
             count, cpu_s, now_s = self._scheduler.program.act_count, time.process_time(), time.monotonic()
             before_s, own_cpu_s = own_cpu_s, time.clock_gettime(clock)
             if count != last:
-                last, spun_s = count, 0.0
+                last, spun_s, before_s = count, 0.0, own_cpu_s
             what = self._waits_for()
             if what == "lock" and cpu_s - locked_cpu_s < LOCKED_S / 10:
                 if now_s - locked_s > LOCKED_S:
