@@ -181,73 +181,59 @@ def test_what_a_destructor_drops_is_sent_again_and_other_errors_are_shown_as_eve
     assert "ValueError: mine" in errors
 
 
-# Compiled code that hears no signal: it lets other threads run, as the kernels of KiKS do.
+# Code in C that hears no signal. Some lets other threads run, as the kernels of KiKS do, and some does not.
 NEVER_RETURNS = """
-import signal, sys
+import sys
 from kiks.ending import end_as_with_ctrl_c, end_at_once, ended_after
 end_at_once()
-import threading, time
-import numba, numpy as np
+import ctypes, itertools
 
-@numba.njit(nogil=True)
-def never(number, runs):
-    runs[0] = True
-    while number > 0:
-        number += 1.0
-        if number > 1e6:
-            number = 1.0
-    return number
-
-def tell():
-    while not runs[0]:
-        time.sleep(0.01)
-    print("ready", flush=True)
-
-never(-1.0, np.zeros(1, bool))
-runs = np.zeros(1, bool)
+lock = ctypes.create_string_buffer(100)
+ctypes.CDLL(None).pthread_mutex_lock(lock)
+call, argument = {
+    "waits": (ctypes.CDLL(None).pthread_mutex_lock, lock),
+    "waits with the lock of Python": (ctypes.PyDLL(None).pthread_mutex_lock, lock),
+    "computes": (sum, itertools.repeat(0)),
+}[sys.argv[2]]
 end_as_with_ctrl_c()
-limit_s = float(sys.argv[1]) or None
-with ended_after(limit_s, lambda: print("told", flush=True)):
-    threading.Thread(target=tell, daemon=True).start()
-    never(1.0, runs)
+with ended_after(float(sys.argv[1]) or None, lambda: print("told", flush=True)):
+    # All in C, so that no signal is heard in between.
+    sum(itertools.chain(map(sys.stdout.buffer.raw.write, [b"ready\\n"]), map(call, [argument])))
 """
 
 STUCK = "stopped in the middle of code that did not return, such as a controller without an end: there is no summary."
 
 
-def never_returning(limit_s: float, *signals: signal.Signals) -> tuple[int, list[str], list[str]]:
-    """Run code that never returns, and send signals, each when the last one has been told of."""
-    words = [sys.executable, "-c", NEVER_RETURNS, str(limit_s)]
+def never_returning(limit_s: float, kind: str, ending: signal.Signals | None = None) -> tuple[int, str, str]:
+    """Run code that never returns, and send a signal; return the exit code, what it has said, and its errors."""
+    words = [sys.executable, "-c", NEVER_RETURNS, str(limit_s), kind]
     with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         try:
-            said, errors = [process.stdout.readline()], []
-            for number in signals:
-                process.send_signal(number)
-                errors.append(process.stderr.readline())
-            out, error = process.communicate(timeout=GUARD_S)
+            said = process.stdout.readline()
+            if ending is not None:
+                process.send_signal(ending)
+            out, errors = process.communicate(timeout=GUARD_S)
         finally:
             process.kill()
-    return process.returncode, (("".join(said)) + out).splitlines(), ("".join(errors) + error).splitlines()
+    return process.returncode, said + out, errors
 
 
-def test_code_that_never_returns_ends_at_the_second_ctrl_c() -> None:
-    code, _, errors = never_returning(0, signal.SIGINT, signal.SIGINT)
-    assert code == 130
-    assert errors == [
-        "kiks: compiled code that runs has not returned yet. Ctrl-C once more ends it at once.",
-        f"kiks: {STUCK}",
-    ]
-
-
-@pytest.mark.parametrize("ending", [signal.SIGTERM, signal.SIGHUP])
-def test_code_that_never_returns_ends_by_one_signal_that_nobody_repeats(ending: signal.Signals) -> None:
-    assert never_returning(0, ending) == (130, ["ready"], [f"kiks: {STUCK}"])
+@pytest.mark.parametrize(
+    ("kind", "ending"),
+    [
+        ("waits", signal.SIGINT),
+        ("waits", signal.SIGHUP),
+        ("waits with the lock of Python", signal.SIGTERM),
+        ("computes", signal.SIGINT),
+    ],
+)
+def test_code_that_never_returns_ends_by_one_signal_that_nobody_repeats(kind: str, ending: signal.Signals) -> None:
+    assert never_returning(0, kind, ending) == (-signal.SIGKILL, "ready\n", f"kiks: {STUCK}\n")
 
 
 def test_code_that_never_returns_ends_when_its_real_time_is_over() -> None:
-    code, out, errors = never_returning(0.2)
-    assert (code, out) == (124, ["ready"])
-    assert errors == [f"kiks: stopped after 0.2 s of real time, in the middle of {STUCK.partition('of ')[2]}"]
+    line = f"kiks: stopped after 0.2 s of real time, in the middle of {STUCK.partition('of ')[2]}\n"
+    assert never_returning(0.2, "waits") == (124, "ready\n", line)
 
 
 HEARS = """

@@ -3,8 +3,8 @@
 Need: Ctrl-C always works. An exception that a signal raises may come up in a callback of a library, which drops it, or
 in an import, which makes another one of it.
 Method: while a command loads there is nothing to bring to an end, so that the signal's handler ends the process itself.
-Later an interruption that was dropped is sent again. Compiled code that never returns hears no signal: a thread of its
-own, which hears them as they come (`signal.set_wakeup_fd`), then ends the process.
+Later an interruption that was dropped is sent again. Code in C that does not return hears no signal, and may let no
+other thread run: a process of its own, which hears them as they come (`signal.set_wakeup_fd`), then kills this one.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ INTERRUPTED = 130
 OUT_OF_TIME = 124
 """Exit code of what ran for too long, as that of timeout(1)."""
 
-UNHEARD_S = 1.0
-"""Time after which a Ctrl-C that the main thread has not heard is told [s]."""
+UNHEARD_S = 1.2
+"""Time that the main thread has to hear a signal that ends the process [s]."""
 
-TERMINATED_S = 4.0
-"""Time after which another signal that it has not heard ends the process [s]; compiled code may take a while."""
+PROGRAM_GRACE_S = 0.6
+"""Time that a program has to end after such a signal [s]; with the time above it is less than two seconds."""
 
 LIMIT_GRACE_S = 2.0
 """Time that what runs has to end after its time is over [s]."""
@@ -45,14 +45,13 @@ _DIE_WITH_PARENT = 1
 """PR_SET_PDEATHSIG of Linux (linux/prctl.h)."""
 
 _CODE = "code that did not return, such as a controller without an end: there is no summary"
-_STUCK = f"stopped in the middle of {_CODE}."
 
 
 def end_at_once() -> None:
     """Let Ctrl-C, SIGTERM and SIGHUP end the process where it stands, with one line; for the start of a process."""
     _handle(lambda _number, _frame: leave(INTERRUPTED, "stopped."))
     if _HAS_OWN_SIGNALS:
-        _Guard().start()
+        _start_guard()
 
 
 def end_with_parent() -> None:
@@ -156,43 +155,59 @@ def _endings() -> Iterator[signal.Signals]:
             yield number
 
 
-class _Guard:
-    """Ends the process if the main thread is in compiled code that does not return, and so hears no signal."""
+def _start_guard() -> None:
+    """Start the process that kills this one if its main thread is in code that does not return, and so hears no signal.
 
-    def __init__(self) -> None:
-        self._is_unheard = False
-        self._heard = allocate_lock()
-        self._main = get_ident()
+    The interpreter's own handler, in C, passes each signal on through a pipe, whatever holds the interpreter's lock.
+    """
+    import atexit
 
-    def start(self) -> None:
-        """Start to listen, in a thread that `threading` does not know: a program may count those."""
-        signal.signal(_HEARD, self._hear)
-        self._receiver, sender = os.pipe()
+    numbers, sender = os.pipe()
+    answers, answerer = os.pipe()
+    guarded = os.getpid()
+    if helper := os.fork():
+        os.waitpid(helper, 0)
+        for each in (numbers, answers):
+            os.close(each)
         os.set_blocking(sender, False)
+        signal.signal(_HEARD, lambda _number, _frame: os.write(answerer, b"!"))
         signal.set_wakeup_fd(sender, warn_on_full_buffer=False)
-        start_new_thread(self._listen, ())
+        # Python takes its handlers away before its process ends.
+        atexit.register(signal.signal, _HEARD, signal.SIG_IGN)
+        return
+    # No child of the guarded process: a program may wait for all of those.
+    if os.fork():
+        os._exit(0)
+    os.setsid()
+    for number in _ENDINGS:
+        signal.signal(number, signal.SIG_IGN)
+    for each in (0, 1, sender, answerer):
+        with suppress(OSError):
+            os.close(each)
+    with suppress(OSError):
+        _guard(guarded, numbers, answers)
+    os._exit(0)
 
-    def _hear(self, _number: int, _frame: FrameType | None) -> None:
-        """Note, in the main thread, that it hears signals."""
-        self._is_unheard = False
-        if self._heard.locked():
-            self._heard.release()
 
-    def _listen(self) -> None:
-        while numbers := os.read(self._receiver, 1):
-            if numbers[0] not in _ENDINGS:
-                continue
-            if self._is_unheard:
-                leave(INTERRUPTED, _STUCK)
-            self._is_unheard, is_ctrl_c = True, numbers[0] == signal.SIGINT
-            self._heard.acquire(blocking=False)
-            # A true signal: it also wakes a wait that has gone on after the first one was handled.
-            signal.pthread_kill(self._main, _HEARD)
-            if self._heard.acquire(timeout=UNHEARD_S if is_ctrl_c else TERMINATED_S):
-                continue
-            if not is_ctrl_c:
-                leave(INTERRUPTED, _STUCK)
-            tell("compiled code that runs has not returned yet. Ctrl-C once more ends it at once.")
+def _guard(process: int, numbers: int, answers: int) -> None:
+    """Kill a process that does not answer soon after a signal that ends it; return when it has ended.
+
+    Args:
+        process: Its number.
+        numbers: Where the numbers of its signals come.
+        answers: Where its main thread answers.
+    """
+    import select
+
+    while number := os.read(numbers, 1):
+        if number[0] not in _ENDINGS:
+            continue
+        # A true signal: it also wakes a wait that has gone on after the first one was handled.
+        os.kill(process, _HEARD)
+        if not select.select([answers], [], [], UNHEARD_S)[0]:
+            tell(f"stopped in the middle of {_CODE}.")
+            os.kill(process, signal.SIGKILL)
+        os.read(answers, 1)
 
 
 @contextmanager

@@ -162,6 +162,28 @@ a.close(); b.close()
 > b'x'
 > b'y'
 > ([], [], []) True 1000000000
+=== a thread plays the robot on a pseudo-terminal, also for a class of one's own
+import tty
+class Mine(serial.Serial):
+    def write(self, data): return super().write(data + b'\n')
+master, slave = os.openpty()
+tty.setraw(slave)
+def play():
+    while True:
+        data = os.read(master, 100)
+        time.sleep(0.25)
+        os.write(master, b'fake ' + data)
+threading.Thread(target=play, daemon=True).start()
+with Mine(os.ttyname(slave), timeout=1) as fake, Mine('/dev/ttyUSB0', timeout=1) as robot:
+    for port in fake, robot, fake:
+        port.write(b'B')
+        print(port.readline())
+    fake.timeout, began = 0.5, time.monotonic()
+    print(fake.read(), round(time.monotonic() - began, 1), isinstance(fake, Mine))
+> b'fake B\n'
+> b'b,5.02,5.01\r\n'
+> b'fake B\n'
+> b'' 0.5 True
 === much goes through a pipe and a socket
 r, w = os.pipe()
 a, b = socket.socketpair()

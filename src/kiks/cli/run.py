@@ -185,7 +185,7 @@ def run(
         try:
             if len(commands) == 1 and commands[0] is not None:
                 code = _run_one(sim, commands[0], mapping, thoughts, limits)
-                doubt = limits.doubt
+                doubt = limits.doubt or sim.program.doubt
             else:
                 tell = say if labels is None else labels.say
                 programs = Programs(sim, commands, thinking=thinking, say=tell, labels=labels, **rules)

@@ -70,6 +70,7 @@ class ProgramClock:
         measures: Whether thinking costs the real time that it takes.
         thread: What the running thread pays.
         act_count: Number of calls of ports and clocks.
+        doubt: Why the program might do something else next time; empty if it will not.
     """
 
     def __init__(self, thinking: str) -> None:
@@ -79,6 +80,7 @@ class ProgramClock:
         self.measures = isinstance(policy, ThinkingLive)
         self.thread = ThreadClock()
         self.act_count = 0
+        self.doubt = ""
 
     def enter(self, *, is_command: bool) -> int:
         """Return the thinking time to charge at a call [ns]; see `Thinking.enter`."""

@@ -8,6 +8,7 @@ import os
 import signal
 import threading
 import time
+from _thread import allocate_lock, start_new_thread
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from functools import partial
@@ -16,6 +17,7 @@ from typing import Any
 from weakref import WeakKeyDictionary
 
 import kiks
+from kiks.ending import INTERRUPTED, PROGRAM_GRACE_S
 from kiks.script.thread_scheduler import SIGNALLED, Scheduler, Task, timeout_ns
 from kiks.sim.read_completion import NEVER_NS
 from kiks.units import s_from_ns
@@ -34,13 +36,22 @@ _HARMLESS = frozenset({signal.SIGCHLD, signal.SIGCONT, signal.SIGURG, signal.SIG
 
 
 class Signals:
-    """The signal handlers and the alarm of a program."""
+    """The signal handlers and the alarm of a program.
+
+    Attributes:
+        were_ended: Whether the program was told from outside to end, such as by Ctrl-C.
+    """
 
     def __init__(self, scheduler: Scheduler) -> None:
         self._scheduler = scheduler
         self._handlers: dict[int, Any] = {}
         # The handlers from before the program.
         self._before: dict[int, Any] = {}
+        # The signals that end a program, and those of them that it has sent to itself and not yet handled.
+        self._endings: set[int] = set()
+        self._own: list[int] = []
+        self.were_ended = False
+        self._is_over, self._insisting = False, allocate_lock()
         self._wakeup = -1
         # What each thread has blocked; the main thread's counts. The operating system blocks nothing: it would give the
         # signal to a thread of KiKS, or of a library, and end the process.
@@ -61,11 +72,14 @@ class Signals:
             for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
             if (handler := signal.getsignal(number)) is signal.default_int_handler
         }
+        self._endings.update(before)
         for name, handler in before.items():
             self._set(name, handler)
         try:
             yield
         finally:
+            with self._insisting:
+                self._is_over = True
             for changed, handler in self._before.items():
                 signal.signal(changed, handler)
 
@@ -86,7 +100,9 @@ class Signals:
                 "sigwaitinfo": lambda signals, /: _told(self._wait_for(signals, NEVER_NS)),
                 "sigtimedwait": self._wait_until,
                 "pthread_kill": self._kill_thread,
+                "raise_signal": lambda number, /: self._kill(os.getpid(), number),
             },
+            "_thread": {"interrupt_main": lambda number=signal.SIGINT, /: self._kill(os.getpid(), number)},
             "posix": {"kill": self._kill},
         }
 
@@ -94,7 +110,11 @@ class Signals:
 
     def _set(self, number: int, handler: Any, /) -> Any:
         before = self._get(number)
-        is_heard = callable(handler) or (handler == signal.SIG_DFL and number in self._blocked - _OF_FAULTS)
+        is_heard = (
+            callable(handler)
+            or number in self._endings
+            or (handler == signal.SIG_DFL and number in self._blocked - _OF_FAULTS)
+        )
         before_here = signal.signal(number, self._come if is_heard else handler)
         self._before.setdefault(number, before_here)
         self._handlers[number] = handler
@@ -180,6 +200,8 @@ class Signals:
     def _kill(self, process: int, number: int, /) -> None:
         # Other threads of this process, such as the watchdog, must not take what this one blocks.
         if process == os.getpid() and number:
+            if number in self._endings:
+                self._own.append(number)
             signal.raise_signal(number)
         else:
             os.kill(process, number)
@@ -238,18 +260,47 @@ class Signals:
 
     def _come(self, number: int, frame: FrameType | None) -> None:
         """Handle a signal of the operating system, in the running thread."""
+        if number in self._own:
+            self._own.remove(number)
+        elif number in self._endings:
+            self._note_ending(number)
         if self._hold(number):
             return
         handler = self._handlers.get(number, signal.default_int_handler)
+        if handler == signal.SIG_DFL and number in self._endings:
+            self._raise(number)
         if not callable(handler):
             return  # it has come while the program changed its mask
         self._scheduler.interrupt(partial(handler, number, frame), at_once=_is_in_program(frame))
+
+    def _note_ending(self, number: int) -> None:
+        """Let the program end by itself, after what it does at its end; end it at the second signal, or later.
+
+        It may ignore the signal, or be in code in C that goes on after one.
+        """
+        if self.were_ended:
+            name = "Ctrl-C" if number == signal.SIGINT else signal.Signals(number).name
+            self._scheduler.end(INTERRUPTED, f"the program had not ended after {name}, and was stopped where it was.")
+        self.were_ended, self._scheduler.program.doubt = True, "it was interrupted"
+        main, begun = threading.get_ident(), list[bool]()
+
+        def insist() -> None:
+            begun.append(True)
+            time.sleep(PROGRAM_GRACE_S)
+            with self._insisting:
+                if not self._is_over:
+                    signal.pthread_kill(main, number)
+
+        start_new_thread(insist, ())
+        # Before it begins, Python takes it for this thread, and an exception for this one would come up there.
+        while not begun:
+            time.sleep(0.001)
 
 
 class _FromOutside:
     """Signals that may come from other processes; see `thread_scheduler.FileWait`."""
 
-    is_inside = False
+    is_inside = is_for_person = False
 
     def is_over(self, block_ms: int) -> bool:
         """Give signals some real time; their handler ends the wait."""

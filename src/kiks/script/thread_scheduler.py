@@ -21,6 +21,7 @@ from typing import Any, NoReturn, Protocol
 
 import greenlet
 
+from kiks.clock.pace import Pace
 from kiks.clock.program_clock import ProgramClock, ThreadClock
 from kiks.model.checks import SECONDS_MAX
 from kiks.script.cpython import name_of_thread, new_idents, thread_values, unchanged
@@ -31,6 +32,12 @@ from kiks.units import wait_ns
 SIGNALLED, COMPLETE, ALONE, STUCK = object(), object(), object(), object()
 """Reasons for which a thread goes on: a signal; a complete read; no other thread can go on before its read is complete;
 no thread can go on at all."""
+
+LOOKED_FOR_KEYS = "it looked for keys"
+"""Why a program with a person might do something else next time."""
+
+PERSON_STEP_NS = 20_000_000
+"""Longest time that passes between two looks for what a person does [ns]."""
 
 BLOCK_MS = 50
 """Longest wait for files between two checks for signals [ms of real time]."""
@@ -47,6 +54,10 @@ class FileWait(Protocol):
     @property
     def is_inside(self) -> bool:
         """Whether threads of the program alone can end the wait."""
+
+    @property
+    def is_for_person(self) -> bool:
+        """Whether it waits for what a person does, so that time passes as it does for people."""
 
     def is_over(self, block_ms: int) -> bool:
         """Return whether a file is ready, after at most this real time [ms]."""
@@ -116,6 +127,8 @@ class Scheduler:
         self._readers: dict[Task, Sequence[Read]] = {}
         self._watchers: dict[Task, FileWait] = {}
         self._patient: list[Task] = []
+        # The waits for a person, and the time in which a person lives meanwhile.
+        self._person_waits, self._pace = 0, Pace()
         self.lock_count = 0
         self.tasks: dict[int, Task] = {}
         self.main = Task(get_ident(), lambda: None, self._hub)
@@ -285,6 +298,9 @@ class Scheduler:
             self._readers[task] = reads
         if files:
             self._watchers[task] = files
+            if files.is_for_person:
+                self._person_waits += 1
+                self._pace.start(self.world.now_ns)
         if when_stuck:
             self._patient.append(task)
         try:
@@ -293,6 +309,7 @@ class Scheduler:
             task.waits_for = ""
             self._readers.pop(task, None)
             self._watchers.pop(task, None)
+            self._person_waits -= files is not None and files.is_for_person
             if when_stuck:
                 self._patient.remove(task)
         return task.cause
@@ -381,8 +398,11 @@ class Scheduler:
             if reader.may_go_alone and (until_ns == NEVER_NS or self._deadlines[0][2] is reader):
                 self.wake(reader, ALONE)
                 return
-        if self._watchers and self._look_at_files(block=False):
+        if self._watchers and self._look_at_files(self._ahead_ms() if self._person_waits else 0):
             return
+        if self._person_waits and (self._readers or until_ns < NEVER_NS):
+            self.program.doubt = LOOKED_FOR_KEYS
+            until_ns = min(until_ns, self.world.now_ns + PERSON_STEP_NS)
         readers = [(task, read) for task, reads in self._readers.items() for read in reads]
         began_ns = self.world.now_ns
         complete: set[Task] = set()
@@ -404,12 +424,21 @@ class Scheduler:
             if all(files.is_inside for files in self._watchers.values()):
                 self.end_stuck()
             # Only a real file can wake a thread; simulated time stands still meanwhile.
-            self._look_at_files(block=True)
+            self._look_at_files(BLOCK_MS)
+            self._pace.start(now_ns)
 
-    def _look_at_files(self, *, block: bool) -> bool:
-        """Wake the threads whose files are ready; with `block`, wait some real time for that."""
-        block_ms = BLOCK_MS // len(self._watchers) if block else 0
-        woken = [task for task, files in self._watchers.items() if files.is_over(block_ms)]
+    def _ahead_ms(self) -> int:
+        """Return how far simulated time is ahead of a person's [ms]; one that was behind does not hurry later."""
+        now_ns = self.world.now_ns
+        ahead_s = self._pace.wall_wait_s(now_ns)
+        if not ahead_s:
+            self._pace.start(now_ns)
+        return int(ahead_s * 1000)
+
+    def _look_at_files(self, block_ms: int) -> bool:
+        """Wake the threads whose files are ready; wait some real time for that [ms]."""
+        each_ms = block_ms // len(self._watchers)
+        woken = [task for task, files in self._watchers.items() if files.is_over(each_ms)]
         for task in sorted(woken, key=lambda task: task.number):
             self.wake(task, None)
         return bool(woken)

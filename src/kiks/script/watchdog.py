@@ -35,7 +35,7 @@ LOCKED_S = 10.0
 """Longest wait for a lock of a library [s of real time]; a library that computes on all processors waits, too."""
 
 SPINNING_S = 30.0
-"""Longest computation of a thread while others wait for a time or a robot [s of processor time]."""
+"""Longest computation of a thread while others wait for a time or a robot [s of its own processor time]."""
 
 WARNING_SHARE = 0.2
 """Share of that time after which a line tells of the computation, whatever others do."""
@@ -43,7 +43,7 @@ WARNING_SHARE = 0.2
 GRACE_S = 5.0
 """Time after which the process of a program that stays in code in C is killed [s of real time]."""
 
-_KIKS = str(Path(__file__).parent.parent)
+_HERE, _KIKS = str(Path(__file__).parent), str(Path(__file__).parent.parent)
 _ROOTS = (thread_scheduler.__file__, str(Path(__file__).with_name("main_module.py")))
 """Files of KiKS that call the program: the others work for it."""
 
@@ -119,13 +119,15 @@ class _Watch:
             self._sampling.release()
 
     def _sample(self) -> None:
-        waits, last, has_warned = 0, -1, False
-        active_cpu_s = locked_cpu_s = time.process_time()
-        locked_s = time.monotonic()
+        waits, last, has_warned, spun_s = 0, -1, False, 0.0
+        # Neither the threads of KiKS nor those of a library count as computations of the program.
+        clock = time.pthread_getcpuclockid(self._watched)
+        own_cpu_s, locked_cpu_s, locked_s = time.clock_gettime(clock), time.process_time(), time.monotonic()
         while not self._going_on.acquire(timeout=SAMPLE_S):
             count, cpu_s, now_s = self._scheduler.program.act_count, time.process_time(), time.monotonic()
+            before_s, own_cpu_s = own_cpu_s, time.clock_gettime(clock)
             if count != last:
-                last, active_cpu_s = count, cpu_s
+                last, spun_s, before_s = count, 0.0, own_cpu_s
             what = self._waits_for()
             if what == "lock" and cpu_s - locked_cpu_s < LOCKED_S / 10:
                 if now_s - locked_s > LOCKED_S:
@@ -139,9 +141,9 @@ class _Watch:
                 return
             frame = _computing(self._frame())
             if frame is None:
-                active_cpu_s = cpu_s
                 continue
-            spun_s, has_others = cpu_s - active_cpu_s, bool(self._scheduler.tasks)
+            spun_s += own_cpu_s - before_s
+            has_others = bool(self._scheduler.tasks)
             if spun_s > SPINNING_S and (self._scheduler.has_timed or (has_others and _only_reads(frame))):
                 self._tell(
                     f"it asked for neither time nor bytes for {spun_s:.0f} s while its other threads waited"
@@ -195,13 +197,19 @@ class _Watch:
 
 
 def _computing(frame: FrameType | None) -> FrameType | None:
-    """Return where a program computes: its innermost frame, or that of a library; None while KiKS works for it."""
+    """Return where a program computes: its innermost frame, or that of a library; None while KiKS works for it.
+
+    What stands in for functions of Python is as much part of its loop as they are.
+    """
     found = None
     while frame is not None:
         name = frame.f_code.co_filename
+        if name in _ROOTS:
+            return found
         if name.startswith(_KIKS):
-            return found if name in _ROOTS else None
-        if "site-packages" in name:
+            if not name.startswith(_HERE):
+                return None
+        elif "site-packages" in name:
             found = found or frame
         elif not name.startswith(("<", *OURS)):
             return found or frame

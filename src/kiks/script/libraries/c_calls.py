@@ -76,9 +76,11 @@ def _for_program(function: Callable[..., int], real: Callable[..., int], host: H
         try:
             return function(*args)
         except BaseException as error:
-            # No exception, such as that of Ctrl-C, passes through C: it comes up where C returns to Python.
+            # No exception, such as that of Ctrl-C, passes through C: it comes up where C returns to Python. The loop
+            # puts it there; after a call it would come up here.
             thread, kind = ctypes.c_ulong(host.scheduler.os_thread), ctypes.py_object(type(error))
-            ctypes.pythonapi.PyThreadState_SetAsyncExc(thread, kind)
+            for _ in map(ctypes.pythonapi.PyThreadState_SetAsyncExc, [thread], [kind]):
+                break
             return 0
 
     return call
