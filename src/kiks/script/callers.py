@@ -26,8 +26,8 @@ _KINDS = {
 }
 """Kinds of packages; all others are a program's."""
 
-_CLIENT = "kiks.client"
-"""The part of KiKS that programs use."""
+_FOR_PROGRAM = ("kiks.client", "kiks.script.keyboard")
+"""The parts of KiKS that act for a program."""
 
 _kind_of = {package: kind for kind, packages in _KINDS.items() for package in packages.split()}
 
@@ -37,8 +37,8 @@ class _Kinds(dict[str | None, Caller]):
 
     def __missing__(self, module: str | None) -> Caller:
         name = str(module)
-        is_client = name.startswith(_CLIENT)
-        kind = Caller.PROGRAM if is_client else _kind_of.get(name.partition(".")[0], Caller.PROGRAM)
+        is_for_program = name.startswith(_FOR_PROGRAM)
+        kind = Caller.PROGRAM if is_for_program else _kind_of.get(name.partition(".")[0], Caller.PROGRAM)
         self[module] = kind
         return kind
 

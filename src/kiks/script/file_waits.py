@@ -1,8 +1,8 @@
-"""Waiting for files, simulated ports among them: `select`, `poll`, `epoll`, pipes and sockets, and so all event loops.
+"""Waiting for files, simulated ports among them: `select`, `poll`, `epoll`, pipes, sockets and keyboards.
 
 A port's descriptor is a real one, the end of a terminal. Before anybody looks at it, as many characters are put into it
 as have arrived at the port, so that whatever Python or the operating system can do with a descriptor is right. A call
-that would wait is made again and again with no wait, and simulated time passes in between.
+that would wait is made again and again with no wait, and simulated time passes in between. So all event loops work.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import fcntl
 import math
 import os
 import select
+import stat
 import struct
 import termios
 import tty
@@ -23,6 +24,7 @@ from typing import Any, TypeVar
 from kiks.script.file_system import FileSystem
 from kiks.script.patching import for_program
 from kiks.script.shared_line import SharedLine
+from kiks.script.terminals import SETTLED_MS, Identity, OwnTerminals, identity, patience, status
 from kiks.script.thread_scheduler import Scheduler, timeout_ns
 from kiks.sim.read_completion import NEVER_NS, Read
 
@@ -32,11 +34,11 @@ TERMINAL_CHARACTERS = 4000
 PIPE_CHARACTERS = 1 << 16
 """Most characters that are read from a pipe at once."""
 
-SETTLED_MS = 100
-"""Longest time that the operating system may need to carry characters through a terminal [ms of real time]."""
-
 TASKS = "/proc/self/task"
 """Where Linux lists the threads of this process, each with its child processes (man 5 proc)."""
+
+_NOTHING = {"read": b"", "readinto": 0}
+"""What a method of files returns at the end of its file, or of a terminal's patience."""
 
 _Poll = type(select.poll())
 _file_methods = dict(vars(_io.FileIO))
@@ -88,12 +90,8 @@ class _PortFile:
         Raises:
             BlockingIOError: If nothing has arrived, and the descriptor does not block.
         """
-        timeout_s: float | None = 0.0
-        least = 1
-        if is_blocking := os.get_blocking(self.descriptor):
-            characters = termios.tcgetattr(self.descriptor)[-1]
-            least, tenths = characters[termios.VMIN], characters[termios.VTIME]
-            timeout_s = None if least else tenths / 10
+        is_blocking = os.get_blocking(self.descriptor)
+        least, timeout_s = patience(self.descriptor) if is_blocking else (1, 0.0)
         port = self.port
         before, port.timeout = port.timeout, timeout_s
         try:
@@ -121,10 +119,13 @@ def _children() -> set[str]:
 class _Wait:
     """A wait for files; see `thread_scheduler.FileWait`."""
 
-    def __init__(self, files: Files, look: Callable[[int], Any], descriptors: Iterable[int] | None) -> None:
+    def __init__(
+        self, files: Files, look: Callable[[int], Any], descriptors: Iterable[int] | None, *, is_for_person: bool
+    ) -> None:
         self._files = files
         self._look = look
         self._descriptors = descriptors
+        self.is_for_person = is_for_person
         # What is ready. It is kept, because the system may report an event only once (EPOLLONESHOT, EPOLLET).
         self.found: Any = None
 
@@ -133,7 +134,8 @@ class _Wait:
         return self._descriptors is not None and self._files.are_inside(self._descriptors)
 
     def is_over(self, block_ms: int) -> bool:
-        self.found = self.found or self._look(block_ms)
+        settle_ms = self._files.terminals.settle_ms(self._descriptors or ())
+        self.found = self.found or self._look(max(block_ms, settle_ms))
         return bool(self.found)
 
 
@@ -143,14 +145,20 @@ class Files:
     Args:
         scheduler: The program's threads.
         system: The file system, which is told what the program writes.
+
+    Attributes:
+        terminals: The pseudo-terminals of the program.
     """
 
     def __init__(self, scheduler: Scheduler, system: FileSystem) -> None:
         self._scheduler = scheduler
         self._system = system
+        self.terminals = OwnTerminals()
         self._ports: dict[int, _PortFile] = {}
-        # What the program has opened to talk to itself, by device and inode.
-        self._inside: set[tuple[int, int]] = set()
+        # What the program has opened to talk to itself.
+        self._inside: set[Identity] = set()
+        # Where a person, or another program, writes to this one.
+        self._input = None if (state := status(0)) is None else identity(state)
         # Processes that were there before the program, such as the one that multiprocessing keeps, know nothing of it.
         self._elders = _children()
 
@@ -171,8 +179,7 @@ class Files:
     def note_inside(self, *descriptors: int) -> None:
         """Note descriptors whose other ends the program has."""
         for each in descriptors:
-            state = os.fstat(each)
-            self._inside.add((state.st_dev, state.st_ino))
+            self._inside.add(identity(os.fstat(each)))
 
     def are_inside(self, descriptors: Iterable[int]) -> bool:
         """Return whether only the program can do something at the other ends of descriptors."""
@@ -180,10 +187,16 @@ class Files:
             return False  # a child may have got the other end
         for each in descriptors:
             if each not in self._ports:
-                state = _status(each)
-                if state is not None and (state.st_dev, state.st_ino) not in self._inside:
+                state = status(each)
+                if state is not None and identity(state) not in self._inside:
                     return False
         return True
+
+    def _is_outside(self, state: os.stat_result) -> bool:
+        """Return whether a file is a device, such as a person's keyboard, or the input of this process."""
+        if stat.S_ISREG(state.st_mode) or identity(state) in self._inside:
+            return False
+        return stat.S_ISCHR(state.st_mode) or identity(state) == self._input
 
     # ---- waiting ----
 
@@ -207,7 +220,11 @@ class Files:
                 _fill(ports)
                 found = look(0)
             return found
-        files = _Wait(self, look, descriptors)
+        is_for_person = timeout_s is None and any(
+            each not in self._ports and (state := status(each)) is not None and self._is_outside(state)
+            for each in descriptors or ()
+        )
+        files = _Wait(self, look, descriptors, is_for_person=is_for_person)
         while True:
             ports = [each for each in ports if each.descriptor in self._ports]
             arrived = _fill(ports)
@@ -260,19 +277,24 @@ class Files:
         def read(descriptor: int, length: int, /) -> bytes:
             if descriptor in ports:
                 return ports[descriptor].read(length)
-            self.wait_for_pipe(descriptor, select.POLLIN)
-            return bytes(os.read(descriptor, length))
+            return bytes(os.read(descriptor, length)) if self.wait_to_read(descriptor) else b""
 
         def put(descriptor: int, data: Any, write: Callable[[Any], Any]) -> Any:
             """Write by a function: into a pipe as much at once as a pipe that is ready takes."""
-            if not self._is_pipe(descriptor):
-                self.wait_for_pipe(descriptor, select.POLLOUT)
+            state = status(descriptor) if self._inside else None
+            if state is None or identity(state) not in self._inside:
                 return write(data)
+            if not os.get_blocking(descriptor):
+                self.wait_for(descriptor, select.POLLOUT, 0)
+                count = write(data)
+                self.terminals.note_write(state)
+                return count
             left = memoryview(data).cast("B")
             size = len(left)
             while True:
-                self.wait_for_pipe(descriptor, select.POLLOUT)
+                self.wait_for(descriptor, select.POLLOUT)
                 left = left[write(left[: select.PIPE_BUF]) :]
+                self.terminals.note_write(state)
                 if not left:
                     return size
 
@@ -286,6 +308,12 @@ class Files:
         def pipe() -> tuple[int, int]:
             ends: tuple[int, int] = os.pipe()
             self.note_inside(*ends)
+            return ends
+
+        def openpty() -> tuple[int, int]:
+            ends = os.openpty()
+            self.note_inside(*ends)
+            self.terminals.add(*ends)
             return ends
 
         def ioctl(fd: Any, request: int, *rest: Any) -> Any:
@@ -312,9 +340,8 @@ class Files:
             """Return a method of files that waits before it reads."""
 
             def call(file: Any, *args: Any) -> Any:
-                if not file.closed:
-                    self.wait_for_pipe(file.fileno(), select.POLLIN)
-                return _file_methods[name](file, *args)
+                is_over = not file.closed and not self.wait_to_read(file.fileno())
+                return _NOTHING[name] if is_over else _file_methods[name](file, *args)
 
             return call
 
@@ -326,14 +353,9 @@ class Files:
             return count
 
         def read_all(file: Any) -> Any:
-            if file.closed or not self._is_pipe(file.fileno()):
+            if file.closed or not self._waits(os.fstat(file.fileno())) or not os.get_blocking(file.fileno()):
                 return _file_methods["readall"](file)
-
-            def read_piece() -> Any:
-                self.wait_for_pipe(file.fileno(), select.POLLIN)
-                return _file_methods["read"](file, PIPE_CHARACTERS)
-
-            return b"".join(iter(read_piece, b""))
+            return b"".join(iter(lambda: of_file["read"](file, PIPE_CHARACTERS), b""))
 
         def close_file(file: Any) -> None:
             if not file.closed and file.writable():
@@ -354,26 +376,31 @@ class Files:
             "select": {"select": simulated_select},
             f"{__name__}._Poll": {"poll": for_program(scheduler, poll, _real_poll)},
             "select.epoll": {"poll": for_program(scheduler, epoll, _real_epoll)},
-            "posix": {"read": read, "write": write, "pipe": pipe},
+            "posix": {"read": read, "write": write, "pipe": pipe, "openpty": openpty},
             "fcntl": {"ioctl": ioctl},
             "termios": {"tcdrain": drain, "tcflush": flush},
         }
 
-    def _is_pipe(self, descriptor: int) -> bool:
-        """Return whether a descriptor leads to the program itself, and reading it waits."""
-        return self._is_inside(descriptor) and os.get_blocking(descriptor)
+    def _waits(self, state: os.stat_result) -> bool:
+        """Return whether a read of a file waits for other threads of the program, or for a person."""
+        return identity(state) in self._inside or self._is_outside(state)
 
-    def _is_inside(self, descriptor: int) -> bool:
-        state = _status(descriptor) if self._inside else None
-        return state is not None and (state.st_dev, state.st_ino) in self._inside
-
-    def wait_for_pipe(self, descriptor: int, event: int) -> None:
-        """Wait until a pipe or socket to which other threads of the program have the other end can be used.
+    def wait_to_read(self, descriptor: int) -> bool:
+        """Wait until a file can be read, if another one than the operating system can make it wait.
 
         If it does not block, looking at it is a poll.
+
+        Returns:
+            False if a terminal's patience is over, and the read is to return nothing.
         """
-        if self._is_inside(descriptor):
-            self.wait_for(descriptor, event, None if os.get_blocking(descriptor) else 0)
+        state = status(descriptor)
+        if state is None or not self._waits(state):
+            return True
+        if not os.get_blocking(descriptor):
+            self.wait_for(descriptor, select.POLLIN, 0)
+            return True
+        has_patience = os.isatty(descriptor) and not self.terminals.is_master(state)
+        return self.wait_for(descriptor, select.POLLIN, patience(descriptor)[1] if has_patience else None)
 
 
 def _descriptor(file: Any) -> int:
@@ -383,11 +410,3 @@ def _descriptor(file: Any) -> int:
 
 def _fill(ports: Iterable[_PortFile]) -> list[int]:
     return [each.fill() for each in ports]
-
-
-def _status(descriptor: int) -> os.stat_result | None:
-    """Return the status of a descriptor; None if it is closed."""
-    try:
-        return os.fstat(descriptor)
-    except OSError:
-        return None

@@ -15,12 +15,12 @@ from weakref import WeakSet
 from kiks.clock.program_clock import ProgramClock
 from kiks.errors import KiksError
 from kiks.ports import environment_marks
-from kiks.script import clocks, cpython, event_loops, locks, serial_ports, socket_waits, unsupported
+from kiks.script import clocks, cpython, event_loops, keyboard, locks, serial_ports, socket_waits, unsupported
 from kiks.script.chance import Chance
 from kiks.script.file_system import FileSystem
 from kiks.script.file_waits import Files
 from kiks.script.libraries.adapters import adapted
-from kiks.script.libraries.host import Host, keyboard
+from kiks.script.libraries.host import Host
 from kiks.script.main_module import main_module
 from kiks.script.patching import replaced
 from kiks.script.shared_line import SharedLine
@@ -120,7 +120,8 @@ def run_program(
 
     clock = VirtualPort(SharedLine(world, 1, scheduler), policy)
     chance, system = Chance(scheduler, seed), FileSystem(scheduler, offered)
-    host, files = Host(scheduler, clock, chance), Files(scheduler, system)
+    files = Files(scheduler, system)
+    host = Host(scheduler, clock, chance, files)
     ends, signals = _AtExit(), Signals(scheduler)
     opened: WeakSet[Any] = WeakSet()
 
@@ -142,7 +143,7 @@ def run_program(
         signals.replacements(),
         unsupported.replacements(scheduler),
         ends.replacements(),
-        keyboard(host),
+        keyboard.replacements(scheduler),
         {"posix": {"_exit": end_at_once}},
         {"threading": {"excepthook": _print_thread_trace, "__excepthook__": _print_thread_trace}},
     )

@@ -1,7 +1,8 @@
 """What a program finds in `serial`: every port is a simulated robot's, whatever name it is given.
 
 pyserial's own classes stay, and get other methods while the program runs. So `loop://` is pyserial's, and `spy://`,
-`alt://` and `hwgrep://` are pyserial's around a robot's port.
+`alt://` and `hwgrep://` are pyserial's around a robot's port. A port at a pseudo-terminal of the program leads to what
+the program does at the other end: it gets pyserial's methods back.
 """
 
 from __future__ import annotations
@@ -65,6 +66,11 @@ def replacements(
         _descriptor: int | None = None
 
         def open(self) -> None:
+            if self._port is not None and ports.terminals.has(self._port):
+                kind: type = type(self)
+                self.__class__ = real_port if kind is serial.Serial else type(kind.__name__, (kind, real_port), {})
+                self.open()
+                return
             RobotPort.open(self)
             opened.add(self)
 
@@ -137,6 +143,8 @@ def replacements(
     def methods_of(cls: type) -> dict[str, Any]:
         return {name: value for name, value in vars(cls).items() if not name.startswith(("__", "_abc"))}
 
+    # A subclass of the program's has its own methods before these, and these before a robot's.
+    real_port = type("Serial", (serial.Serial,), {"fd": None, **methods_of(serial.Serial)})
     return {
         **dict.fromkeys(ROBOT_CLASSES, methods_of(RobotPort) | methods_of(Port)),
         "serial.VTIMESerial": methods_of(PortInPieces),

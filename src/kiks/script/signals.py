@@ -249,7 +249,7 @@ class Signals:
 class _FromOutside:
     """Signals that may come from other processes; see `thread_scheduler.FileWait`."""
 
-    is_inside = False
+    is_inside = is_for_person = False
 
     def is_over(self, block_ms: int) -> bool:
         """Give signals some real time; their handler ends the wait."""

@@ -21,6 +21,7 @@ from typing import Any, NoReturn, Protocol
 
 import greenlet
 
+from kiks.clock.pace import Pace
 from kiks.clock.program_clock import PollCost, ProgramClock
 from kiks.model.checks import SECONDS_MAX
 from kiks.script.cpython import name_of_thread, new_idents, thread_values, unchanged
@@ -31,6 +32,9 @@ from kiks.units import wait_ns
 SIGNALLED, COMPLETE, ALONE, STUCK = object(), object(), object(), object()
 """Reasons for which a thread goes on: a signal; a complete read; no other thread can go on before its read is complete;
 no thread can go on at all."""
+
+PERSON_STEP_NS = 20_000_000
+"""Longest time that passes between two looks for what a person does [ns]."""
 
 BLOCK_MS = 50
 """Longest wait for files between two checks for signals [ms of real time]."""
@@ -47,6 +51,10 @@ class FileWait(Protocol):
     @property
     def is_inside(self) -> bool:
         """Whether threads of the program alone can end the wait."""
+
+    @property
+    def is_for_person(self) -> bool:
+        """Whether it waits for what a person does, so that time passes as it does for people."""
 
     def is_over(self, block_ms: int) -> bool:
         """Return whether a file is ready, after at most this real time [ms]."""
@@ -116,6 +124,7 @@ class Scheduler:
         self._readers: dict[Task, Sequence[Read]] = {}
         self._watchers: dict[Task, FileWait] = {}
         self._patient: list[Task] = []
+        self._pace = Pace()
         self.lock_count = 0
         self.tasks: dict[int, Task] = {}
         self.main = Task(get_ident(), lambda: None, self._hub)
@@ -284,6 +293,8 @@ class Scheduler:
         if reads:
             self._readers[task] = reads
         if files:
+            if files.is_for_person and not self._waits_for_person:
+                self._pace.start(self.world.now_ns)
             self._watchers[task] = files
         if when_stuck:
             self._patient.append(task)
@@ -381,8 +392,11 @@ class Scheduler:
             if reader.may_go_alone and (until_ns == NEVER_NS or self._deadlines[0][2] is reader):
                 self.wake(reader, ALONE)
                 return
-        if self._watchers and self._look_at_files(block=False):
+        is_for_person = self._waits_for_person
+        if self._watchers and self._look_at_files(self._ahead_ms() if is_for_person else 0):
             return
+        if is_for_person and until_ns < NEVER_NS:
+            until_ns = min(until_ns, self.world.now_ns + PERSON_STEP_NS)
         readers = [(task, read) for task, reads in self._readers.items() for read in reads]
         began_ns = self.world.now_ns
         complete: set[Task] = set()
@@ -404,12 +418,25 @@ class Scheduler:
             if all(files.is_inside for files in self._watchers.values()):
                 self.end_stuck()
             # Only a real file can wake a thread; simulated time stands still meanwhile.
-            self._look_at_files(block=True)
+            self._look_at_files(BLOCK_MS)
+            self._pace.start(now_ns)
 
-    def _look_at_files(self, *, block: bool) -> bool:
-        """Wake the threads whose files are ready; with `block`, wait some real time for that."""
-        block_ms = BLOCK_MS // len(self._watchers) if block else 0
-        woken = [task for task, files in self._watchers.items() if files.is_over(block_ms)]
+    @property
+    def _waits_for_person(self) -> bool:
+        return any(files.is_for_person for files in self._watchers.values())
+
+    def _ahead_ms(self) -> int:
+        """Return how far simulated time is ahead of a person's [ms]; one that was behind does not hurry later."""
+        now_ns = self.world.now_ns
+        ahead_s = self._pace.wall_wait_s(now_ns)
+        if not ahead_s:
+            self._pace.start(now_ns)
+        return int(ahead_s * 1000)
+
+    def _look_at_files(self, block_ms: int) -> bool:
+        """Wake the threads whose files are ready; wait some real time for that [ms]."""
+        each_ms = block_ms // len(self._watchers)
+        woken = [task for task, files in self._watchers.items() if files.is_over(each_ms)]
         for task in sorted(woken, key=lambda task: task.number):
             self.wake(task, None)
         return bool(woken)

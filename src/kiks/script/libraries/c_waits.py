@@ -1,17 +1,18 @@
 """curses and pygame: what their code in C asks of others, a wait or the time, becomes simulated.
 
-A person's key is there when it is looked for, or it is not.
+A wait for a key ends with one, as any wait for a file does.
 """
 
 from __future__ import annotations
 
 import ctypes
+import select
 from itertools import count
 from types import ModuleType
 from typing import Any
 
 from kiks.script.libraries.c_calls import date_functions, loaded, redirect
-from kiks.script.libraries.host import Host, refuse_keyboard
+from kiks.script.libraries.host import Host
 from kiks.script.patching import Replacements
 from kiks.script.thread_scheduler import timeout_ns
 from kiks.sim.read_completion import NEVER_NS
@@ -34,18 +35,12 @@ def adapt_curses(_: ModuleType, host: Host) -> Replacements:
     real_poll, real_read = _Poll(("poll", system)), _Read(("read", system))
 
     def poll(files: Any, file_count: int, timeout_ms: int) -> int:
-        found = int(real_poll(files, file_count, 0))
-        if found or timeout_ms == 0:
-            host.clock.ask_ns()
-            return found
-        if timeout_ms > 0:
-            host.clock.sleep(timeout_ms / 1000)
-            return int(real_poll(files, file_count, 0))
-        refuse_keyboard(host.scheduler, ctypes.c_int.from_address(files).value)
-        return int(real_poll(files, file_count, timeout_ms))
+        keyboard, timeout_s = ctypes.c_int.from_address(files).value, None if timeout_ms < 0 else timeout_ms / 1000
+        host.files.wait(lambda block_ms: real_poll(files, file_count, block_ms), timeout_s, (keyboard,))
+        return int(real_poll(files, file_count, 0))
 
     def read(descriptor: int, data: Any, size: int) -> int:
-        refuse_keyboard(host.scheduler, descriptor)
+        host.files.wait_for(descriptor, select.POLLIN)
         return int(real_read(descriptor, data, size))
 
     def sleep(duration: Any, _rest: object) -> int:
