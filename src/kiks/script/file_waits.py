@@ -105,14 +105,15 @@ class Files:
         """Return a file descriptor for a port."""
         file = PortFile(self._scheduler, line, port)
         self._ports[file.number] = file
-        self._scheduler.before_time[file.number] = file.settle
+        self._scheduler.before_time.append(file.settle)
         return file.descriptor
 
     def remove(self, descriptor: int) -> None:
         """Close the descriptor of a port."""
         (file,) = (each for each in self._ports.values() if each.descriptor == descriptor)
         file.settle()
-        del self._ports[file.number], self._scheduler.before_time[file.number]
+        del self._ports[file.number]
+        self._scheduler.before_time.remove(file.settle)
         file.close()
 
     def port_of(self, descriptor: int) -> PortFile | None:

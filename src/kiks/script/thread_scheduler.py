@@ -103,14 +103,14 @@ class Scheduler:
         tasks: Started threads that have not ended, by ident.
         lock_count: Number of free locks that the running thread has taken since it went on.
         os_thread: The thread of the operating system that runs the program; 0 when none does.
-        before_time: Functions that are called before time passes, by number.
+        before_time: What must be done before time passes.
         carried: Functions that take away, and put back, values that libraries keep per thread of the operating system.
     """
 
     def __init__(self, world: Line, program: ProgramClock) -> None:
         self.world = world
         self.program = program
-        self.before_time: dict[int, Callable[[], object]] = {}
+        self.before_time: list[Callable[[], object]] = []
         self.carried: list[tuple[Callable[[], object], Callable[[Any], object]]] = []
         self.os_thread = get_ident()
         self._hub = greenlet.getcurrent()
@@ -255,9 +255,8 @@ class Scheduler:
 
     def settle(self) -> None:
         """Do what must be done before time passes."""
-        if self.before_time:
-            for each in list(self.before_time.values()):
-                each()
+        for each in self.before_time:
+            each()
 
     def give_way(self) -> None:
         """Let ready threads go on, then this thread."""
