@@ -281,6 +281,8 @@ class Files:
             file = self.port_of(_descriptor(fd))
             if file is not None:
                 file.fill()
+                if request == termios.TCFLSH and rest:
+                    return file.flush(rest[0])
                 if request == termios.TIOCOUTQ and rest and isinstance(rest[0], bytes):
                     return struct.pack("i", file.port.out_waiting)
             return fcntl.ioctl(fd, request, *rest)
