@@ -10,13 +10,14 @@ from __future__ import annotations
 import os
 import re
 import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from inspect import signature
 from pathlib import Path
 from subprocess import Popen
 from typing import Any
 
+from kiks.script.cpython import unchanged
 from kiks.script.devices import serial_in
 from kiks.script.file_waits import Files
 from kiks.script.patching import for_program
@@ -135,8 +136,8 @@ class Children:
                 code = wait(popen)
             return code << 8 if code >= 0 else -code
 
-        def spawn(path: Any, argv: Any, env: Any, /, **how: Any) -> int:
-            return os.posix_spawn(path, argv, self._environment(env), **how)
+        def spawning(real: Callable[..., int]) -> Callable[..., int]:
+            return lambda path, argv, env, /, **how: real(path, argv, self._environment(env), **how)
 
         return {
             "subprocess.Popen": {
@@ -146,5 +147,9 @@ class Children:
                 "poll": for_program(scheduler, wait, real_poll),
                 "communicate": communicate,
             },
-            "posix": {"system": system, "posix_spawn": spawn},
+            "posix": {
+                "system": system,
+                "posix_spawn": spawning(unchanged(os.posix_spawn)),
+                "posix_spawnp": spawning(unchanged(os.posix_spawnp)),
+            },
         }
