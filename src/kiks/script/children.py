@@ -108,9 +108,10 @@ class Children:
     def replacements(self) -> dict[str, dict[str, Any]]:
         """Return the replacements for names of `subprocess` and `os`, by module."""
         scheduler = self._scheduler
-        real_start = Popen._execute_child  # type: ignore[attr-defined]
+        real_start: Any = Popen._execute_child  # type: ignore[attr-defined]
         real_wait, real_poll, real_communicate = Popen.wait, Popen.poll, Popen.communicate
         names = signature(real_start)
+        spawns = {name: unchanged(getattr(os, name)) for name in ("posix_spawn", "posix_spawnp")}
 
         def start(*arguments: Any) -> None:
             given = names.bind(*arguments)
@@ -127,9 +128,7 @@ class Children:
 
         def communicate(popen: Popen[Any], input: Any = None, timeout: float | None = None) -> Any:
             with scheduler.real_time():
-                said = real_communicate(popen, input, None)
-            self.check()
-            return said
+                return real_communicate(popen, input, None)  # it calls `wait`
 
         def system(command: Any) -> int:
             with Popen(command, shell=True, close_fds=False) as popen:
@@ -147,9 +146,5 @@ class Children:
                 "poll": for_program(scheduler, wait, real_poll),
                 "communicate": communicate,
             },
-            "posix": {
-                "system": system,
-                "posix_spawn": spawning(unchanged(os.posix_spawn)),
-                "posix_spawnp": spawning(unchanged(os.posix_spawnp)),
-            },
+            "posix": {"system": system, **{name: spawning(real) for name, real in spawns.items()}},
         }
