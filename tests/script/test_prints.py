@@ -243,6 +243,62 @@ for wait in (lambda: select.select([port], [], [], 0.5)[0] == [port], lambda: bo
 > b'h,0,0\r\n' True
 > False 500000000
 > b'h,0,0\r\n' True
+=== every copy of a port's descriptor is the port, and what is written past Python goes to the robot
+import ctypes, fcntl, io, subprocess
+port = serial.Serial('COM1', timeout=1)
+fd, copy = port.fd, os.dup(port.fd)
+def ask(write, read):
+    write(b'B\n')
+    time.sleep(0.1)
+    said = read()
+    said, left = said if isinstance(said, tuple) else (said, None)
+    if said != b'b,5.02,5.01\r\n' or left or port.in_waiting: print(said, left, port.read_all())
+def scattered():
+    first, second = bytearray(3), bytearray(20)
+    count = os.readv(copy, [first, second])
+    return bytes(first + second)[:count]
+def into(file):
+    piece = bytearray(20)
+    return bytes(piece[:file.readinto(piece)])
+file = io.FileIO(copy, 'r+', closefd=False)
+third = fcntl.fcntl(os.dup2(fd, 50), fcntl.F_DUPFD, 60)
+ask(lambda data: os.write(copy, data), lambda: os.read(third, 20))
+ask(lambda data: os.writev(fd, [data[:1], data[1:]]), scattered)
+ask(file.write, lambda: (file.read(20), file.read(20)))
+ask(file.write, lambda: (file.read(), file.readall()))
+with open(os.ttyname(fd), 'r+b', 0) as other: ask(other.write, lambda: into(file))
+with open(f'/proc/self/fd/{fd}', 'rb') as other: ask(file.write, other.readline)
+ask(lambda data: ctypes.CDLL(None).write(fd, data, 2), port.readline)
+ask(lambda data: subprocess.run(['echo', 'B'], stdout=port), port.readline)
+with open('B', 'wb') as source: source.write(b'B\n')
+with open('B', 'rb') as source: ask(lambda data: os.sendfile(third, source.fileno(), 0, 2), port.readline)
+begin = time.time()
+os.write(copy, b'B\n')
+print(select.select([third], [], [], 1)[0] == [third], 0 < time.time() - begin < 0.01)
+print(os.read(copy, 20)[:1])
+os.set_blocking(copy, True)
+print(os.read(copy, 1), port.readline())
+> True True
+> b'b'
+> b',' b'5.02,5.01\r\n'
+=== a terminal's speed is that of the line
+import termios
+port = serial.Serial('COM1', 9600, timeout=1)
+def ask():
+    begin = time.time()
+    port.write(b'B\n')
+    port.readline()
+    return termios.tcgetattr(port.fd)[4:6] == [termios.B9600] * 2, 0.01 < time.time() - begin
+print(ask())
+attributes = termios.tcgetattr(port.fd)
+attributes[4:6] = [termios.B38400] * 2
+termios.tcsetattr(port.fd, termios.TCSAFLUSH, attributes)
+print(ask())
+port.timeout = 2
+print(ask())
+> (True, True)
+> (False, False)
+> (True, True)
 === a port may be opened twice unless exclusively
 first = serial.Serial('COM1', timeout=1)
 second = serial.Serial('COM1', timeout=1)

@@ -1,6 +1,8 @@
 """Whole programs in simulated time: what `kiks run` does with their threads, clocks, signals and files."""
 
+import os
 import re
+import select
 import signal
 import subprocess
 import sys
@@ -12,7 +14,7 @@ from tests import forked
 from tests.script import seen
 from tests.script.conftest import Run, programs_of
 
-from kiks.script import watchdog
+from kiks.script import devices, watchdog
 
 
 @pytest.mark.slow
@@ -92,12 +94,34 @@ def test_alarm_without_a_handler_ends_the_program(run: Run) -> None:
     assert (ran.code, ran.time_s) == (128 + signal.SIGALRM, 2.0)
 
 
-def test_program_that_leaves_simulated_time_ends_with_one_line(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_program_that_leaves_simulated_time_ends_with_one_line(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name, text in (
+        ("driver", f"#!{sys.executable}\n"),
+        ("hidden", f'#!/bin/sh\n{sys.executable} -c \'open("wrong", "w")\' 2>/dev/null\n'),
+    ):
+        (tmp_path / name).write_text(text)
+        (tmp_path / name).chmod(0o700)
+    (tmp_path / "bin").mkdir()
+    (tmp_path / "bin/driver").symlink_to("../driver")
+    (tmp_path / "bin/python").symlink_to(sys.executable)
     for text, must in (
         ("import socket\nsocket.create_connection(('127.0.0.1', 9))", "talk to its robots alone, but it used the net"),
         ("import socket\nsocket.getaddrinfo('example.org', 80)", "talk to its robots alone"),
         ("import subprocess, sys\nsubprocess.run([sys.executable, '-c', ''])", "start no process of Python by itself"),
         ("import os\nos.system('python3 -c 1')", "start no process of Python by itself"),
+        ("import subprocess\nsubprocess.run(['./driver'])", "start no process of Python by itself, but it did ("),
+        ("import subprocess\nsubprocess.run('driver', cwd='bin', env={})", "start no process of Python by itself"),
+        ("import subprocess\nsubprocess.run(['env', 'python3'])", "start no process of Python by itself"),
+        ("import subprocess\nsubprocess.run(['bin/python'])", "start no process of Python by itself, but it did ("),
+        ("import os\nos.system('./hidden')", "start no process of Python by itself, but it did, by another program"),
+        ("import subprocess\nsubprocess.run(['./hidden'], env={})", "start no process of Python by itself"),
+        ("import subprocess\nsubprocess.Popen('./hidden', close_fds=False).communicate()", "start no process of Py"),
+        ("import os, time; os.posix_spawn('hidden', ['hidden'], {}); os.wait()\ntime.sleep(1)", "start no process of"),
+        ("import os\nos.execvp('ls', ['ls'])", "stay in its process, but it replaced itself by ls"),
+        ("import os\nos.system('stty -F /dev/ttyUSB0')", "open a serial port by pyserial, but it gave /dev/ttyUSB0"),
+        ("import serial, subprocess\nsubprocess.run(['cat'], stdin=serial.Serial('COM1'))", "read a port by Python"),
         ("import multiprocessing as m\nm.Process(target=print).start()", "start no process of Python by itself"),
         ("import os\nos.fork()", "be one process, but it started one more by fork"),
         ("import os\nos.open('/dev/ttyUSB0', os.O_RDWR)", "open a serial port by pyserial, but it opened /dev/ttyUSB0"),
@@ -117,6 +141,42 @@ def test_program_that_leaves_simulated_time_ends_with_one_line(run: Run, monkeyp
         assert "(program.py, line 3)" in ran.err
         assert ran.err.endswith("kiks serve, where time is real.\n")
         assert ran.err.count("\n") == 1
+    assert not (tmp_path / "wrong").exists()
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "open('link', 'r+b', 0)",
+        "os.open(os.path.abspath('link').encode(), os.O_RDWR)",
+        "pathlib.Path('link').write_bytes(b'')",
+        "io.FileIO('bin/../link', 'r+')",
+        "io.open_code(os.path.realpath('link'))",
+        "os.open('../link', os.O_RDWR, dir_fd=os.open('bin', os.O_RDONLY))",
+        "os.chdir('bin'); open('/proc/self/cwd/../link', 'wb', 0)",
+        "shutil.copyfile('program.py', 'link')",
+        "subprocess.run(['tee', 'link'], input=b'D')",
+        "os.system('echo D>link')",
+        "ctypes.CDLL(None).open(b'link', 1)",
+        "open(b'/dev/ttyUSB0', 'wb', 0)",
+        "os.open('/dev/serial/by-id/usb-1', os.O_RDWR)",
+        "os.open('gone', os.O_RDWR)",
+    ],
+)
+def test_no_way_leads_to_a_real_device(text: str, run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    # A pseudo-terminal of this test stands for the device: its number is in the system's list of serial drivers.
+    (tmp_path / "drivers").write_text("stand_in /dev/pts 136 0-1048575 serial\n")
+    monkeypatch.setattr(devices, "DRIVERS", tmp_path / "drivers")
+    robot, device = os.openpty()
+    (tmp_path / "link").symlink_to(os.ttyname(device))
+    (tmp_path / "gone").symlink_to("/dev/ttyUSB77")
+    (tmp_path / "bin").mkdir()
+    ran = run(f"import ctypes, io, os, pathlib, shutil, subprocess\n{text}\nprint('wrong')\n")
+    assert (ran.code, ran.out) == (1, "")
+    assert re.fullmatch(r"kiks: a program in simulated time must open .*\(program.py, line 2\).*\n", ran.err)
+    assert not select.select([robot], [], [], 0)[0]
+    for end in (robot, device):
+        os.close(end)
 
 
 def test_loop_that_asks_for_nothing_is_told(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -187,7 +187,7 @@ class FileSystem:
             return call
 
         def is_port(path: Any) -> bool:
-            return isinstance(path, str | os.PathLike) and os.fspath(path) in self._ports
+            return isinstance(path, str | bytes | os.PathLike) and os.fsdecode(path) in self._ports
 
         def status(real: Any) -> Any:
             """Return the function for a status; a port is a device, as any terminal is."""

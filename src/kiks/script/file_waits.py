@@ -1,14 +1,12 @@
 """Waiting for files, simulated ports among them: `select`, `poll`, `epoll`, pipes, sockets and keyboards.
 
-A port's descriptor is a real one, the end of a terminal. Before anybody looks at it, as many characters are put into it
-as have arrived at the port, so that whatever Python or the operating system can do with a descriptor is right. A call
-that would wait is made again and again with no wait, and simulated time passes in between. So all event loops work.
+A call that would wait is made again and again with no wait, and simulated time passes in between. So all event loops
+work. Ports have descriptors, too (`port_file.py`).
 """
 
 from __future__ import annotations
 
 import _io
-import errno
 import fcntl
 import math
 import os
@@ -16,20 +14,17 @@ import select
 import stat
 import struct
 import termios
-import tty
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from typing import Any, TypeVar
 
 from kiks.script.file_system import FileSystem
 from kiks.script.patching import for_program
+from kiks.script.port_file import PortFile
 from kiks.script.shared_line import SharedLine
-from kiks.script.terminals import SETTLED_MS, Identity, OwnTerminals, identity, patience, status
+from kiks.script.terminals import Identity, OwnTerminals, identity, patience, status
 from kiks.script.thread_scheduler import LOOKED_FOR_KEYS, Scheduler, timeout_ns
 from kiks.sim.read_completion import NEVER_NS, Read
-
-TERMINAL_CHARACTERS = 4000
-"""Most characters in a port's descriptor; the operating system takes a few more."""
 
 PIPE_CHARACTERS = 1 << 16
 """Most characters that are read from a pipe at once."""
@@ -45,65 +40,6 @@ _file_methods = dict(vars(_io.FileIO))
 _real_poll, _real_epoll = _Poll.poll, select.epoll.poll
 
 Found = TypeVar("Found")
-
-
-def is_readable(descriptor: int, timeout_ms: int) -> bool:
-    """Wait in real time until a file can be read; return whether it can."""
-    poll = select.poll()
-    poll.register(descriptor, select.POLLIN)
-    return bool(_real_poll(poll, timeout_ms))
-
-
-class _PortFile:
-    """The descriptor of a port: the end of a terminal, whose other end has sent what has arrived at the port."""
-
-    def __init__(self, line: SharedLine, port: Any) -> None:
-        self.line = line
-        self.port = port
-        self._other, self.descriptor = os.openpty()
-        tty.setraw(self.descriptor)
-        for end in (self._other, self.descriptor):
-            os.set_blocking(end, False)
-
-    def close(self) -> None:
-        os.close(self.descriptor)
-        os.close(self._other)
-
-    def fill(self) -> int:
-        """Put as many characters into the terminal as have arrived at the port; return their number."""
-        arrived = self.line.arrived_count()
-        wanted, there = min(arrived, TERMINAL_CHARACTERS), self._count()
-        if wanted < there:
-            os.read(self.descriptor, there - wanted)
-        elif wanted > there:
-            os.write(self._other, bytes(wanted - there))
-            while self._count() < wanted and is_readable(self.descriptor, SETTLED_MS):
-                pass
-        return arrived
-
-    def _count(self) -> int:
-        return int(struct.unpack("i", fcntl.ioctl(self.descriptor, termios.FIONREAD, bytes(4)))[0])
-
-    def read(self, length: int) -> bytes:
-        """Read what has arrived, as a terminal would: wait as its settings say unless it does not block.
-
-        Raises:
-            BlockingIOError: If nothing has arrived, and the descriptor does not block.
-        """
-        is_blocking = os.get_blocking(self.descriptor)
-        least, timeout_s = patience(self.descriptor) if is_blocking else (1, 0.0)
-        port = self.port
-        before, port.timeout = port.timeout, timeout_s
-        try:
-            data: bytes = port.read(min(max(least, 1), length))
-            if data:
-                port.timeout = 0
-                data += port.read(length - len(data))
-        finally:
-            port.timeout = before
-        if not data and not is_blocking:
-            raise BlockingIOError(errno.EAGAIN, os.strerror(errno.EAGAIN))
-        return data
 
 
 def _children() -> set[str]:
@@ -153,7 +89,8 @@ class Files:
         self._scheduler = scheduler
         self._system = system
         self.terminals = OwnTerminals()
-        self._ports: dict[int, _PortFile] = {}
+        # By the number of its terminal, which all copies of its descriptor share.
+        self._ports: dict[int, PortFile] = {}
         # What the program has opened to talk to itself.
         self._inside: set[Identity] = set()
         # Where a person, or another program, writes to this one.
@@ -165,13 +102,23 @@ class Files:
 
     def add(self, line: SharedLine, port: Any) -> int:
         """Return a file descriptor for a port."""
-        file = _PortFile(line, port)
-        self._ports[file.descriptor] = file
+        file = PortFile(self._scheduler, line, port)
+        self._ports[file.number] = file
+        self._scheduler.before_time.append(file.settle)
         return file.descriptor
 
     def remove(self, descriptor: int) -> None:
-        """Close a descriptor."""
-        self._ports.pop(descriptor).close()
+        """Close the descriptor of a port."""
+        (file,) = (each for each in self._ports.values() if each.descriptor == descriptor)
+        file.settle()
+        del self._ports[file.number]
+        self._scheduler.before_time.remove(file.settle)
+        file.close()
+
+    def port_of(self, descriptor: int) -> PortFile | None:
+        """Return the port behind a descriptor, which may be a copy of the port's own."""
+        state = status(descriptor) if self._ports else None
+        return None if state is None else self._ports.get(state.st_rdev)
 
     # ---- what ends only by the program itself ----
 
@@ -185,7 +132,7 @@ class Files:
         if _children() - self._elders:
             return False  # a child may have got the other end
         for each in descriptors:
-            if each not in self._ports:
+            if self.port_of(each) is None:
                 state = status(each)
                 if state is not None and identity(state) not in self._inside:
                     return False
@@ -199,7 +146,7 @@ class Files:
 
     def _waits_for_person(self, descriptors: Iterable[int] | None, timeout_s: float | None) -> bool:
         """Return whether a wait lasts until a person acts; note a look, too, as the run depends on what it finds."""
-        states = {each: status(each) for each in descriptors or () if each not in self._ports}
+        states = {each: status(each) for each in descriptors or () if self.port_of(each) is None}
         outside = [each for each, state in states.items() if state is not None and self._is_outside(state)]
         if timeout_s is not None and any(map(os.isatty, outside)):
             self._scheduler.program.doubt = LOOKED_FOR_KEYS
@@ -218,7 +165,8 @@ class Files:
             descriptors: What is looked at; None if that is not known.
         """
         scheduler = self._scheduler
-        ports = [each for each in self._ports.values() if descriptors is None or each.descriptor in descriptors]
+        looked_at = None if descriptors is None else set(map(self.port_of, descriptors))
+        ports = [each for each in self._ports.values() if looked_at is None or each in looked_at]
         deadline_ns = NEVER_NS if timeout_s is None else scheduler.world.now_ns + timeout_ns(timeout_s)
         if timeout_s is not None and timeout_s <= 0:
             _fill(ports)
@@ -230,7 +178,7 @@ class Files:
             return found
         files = _Wait(self, look, descriptors)
         while True:
-            ports = [each for each in ports if each.descriptor in self._ports]
+            ports = [each for each in ports if each.number in self._ports]
             arrived = _fill(ports)
             if files.is_over(0) or scheduler.world.now_ns >= deadline_ns:
                 break
@@ -253,7 +201,7 @@ class Files:
 
     def replacements(self) -> dict[str, dict[str, Any]]:
         """Return the replacements, by module."""
-        ports, scheduler = self._ports, self._scheduler
+        scheduler = self._scheduler
 
         def simulated_select(
             rlist: Iterable[Any], wlist: Iterable[Any], xlist: Iterable[Any], timeout: float | None = None, /
@@ -280,8 +228,8 @@ class Files:
             return self.wait(lambda block_ms: _real_epoll(epoll, block_ms / 1000, maxevents), timeout_s)
 
         def read(descriptor: int, length: int, /) -> bytes:
-            if descriptor in ports:
-                return ports[descriptor].read(length)
+            if (port := self.port_of(descriptor)) is not None:
+                return port.read(length, descriptor)
             return bytes(os.read(descriptor, length)) if self.wait_to_read(descriptor) else b""
 
         def put(descriptor: int, data: Any, write: Callable[[Any], Any]) -> Any:
@@ -304,11 +252,24 @@ class Files:
                     return size
 
         def write(descriptor: int, data: Any, /) -> int:
-            if descriptor in ports:
-                return int(ports[descriptor].port.write(data))
+            if (port := self.port_of(descriptor)) is not None:
+                return int(port.port.write(data))
             count: int = put(descriptor, data, lambda piece: os.write(descriptor, piece))
             self._system.note_write(descriptor)
             return count
+
+        def read_into(descriptor: int, buffers: Any, /) -> int:
+            if self.port_of(descriptor) is None:
+                return os.readv(descriptor, buffers) if self.wait_to_read(descriptor) else 0
+            views = [memoryview(each).cast("B") for each in buffers]
+            data = left = read(descriptor, sum(map(len, views)))
+            for view in views:
+                piece, left = left[: len(view)], left[len(view) :]
+                view[: len(piece)] = piece
+            return len(data)
+
+        def write_from(descriptor: int, buffers: Any, /) -> int:
+            return write(descriptor, b"".join(buffers))
 
         def pipe() -> tuple[int, int]:
             ends: tuple[int, int] = os.pipe()
@@ -322,24 +283,33 @@ class Files:
             return ends
 
         def ioctl(fd: Any, request: int, *rest: Any) -> Any:
-            file = ports.get(_descriptor(fd))
+            file = self.port_of(_descriptor(fd))
             if file is not None:
                 file.fill()
+                if request == termios.TCFLSH and rest:
+                    return file.flush(rest[0])
                 if request == termios.TIOCOUTQ and rest and isinstance(rest[0], bytes):
                     return struct.pack("i", file.port.out_waiting)
             return fcntl.ioctl(fd, request, *rest)
 
         def drain(fd: Any, /) -> None:
-            file = ports.get(_descriptor(fd))
+            file = self.port_of(_descriptor(fd))
             termios.tcdrain(fd) if file is None else file.port.flush()
 
         def flush(fd: Any, queue: int, /) -> None:
-            file = ports.get(_descriptor(fd))
-            termios.tcflush(fd, queue)
-            if file is not None and queue in (termios.TCIFLUSH, termios.TCIOFLUSH):
-                file.port.reset_input_buffer()
-            if file is not None and queue in (termios.TCOFLUSH, termios.TCIOFLUSH):
-                file.port.reset_output_buffer()
+            file = self.port_of(_descriptor(fd))
+            termios.tcflush(fd, queue) if file is None else file.flush(queue)
+
+        def get_attributes(fd: Any, /) -> list[Any]:
+            file, attributes = self.port_of(_descriptor(fd)), termios.tcgetattr(fd)
+            return attributes if file is None else file.attributes(attributes)
+
+        def set_attributes(fd: Any, when: int, attributes: list[Any], /) -> None:
+            file = self.port_of(_descriptor(fd))
+            if file is None:
+                termios.tcsetattr(fd, when, attributes)
+            else:
+                file.set_attributes(_descriptor(fd), when, attributes)
 
         def reading(name: str) -> Callable[..., Any]:
             """Return a method of files that waits before it reads."""
@@ -360,30 +330,67 @@ class Files:
         def read_all(file: Any) -> Any:
             if file.closed or not self._waits(os.fstat(file.fileno())) or not os.get_blocking(file.fileno()):
                 return _file_methods["readall"](file)
-            return b"".join(iter(lambda: of_file["read"](file, PIPE_CHARACTERS), b""))
+            return b"".join(iter(lambda: reading("read")(file, PIPE_CHARACTERS), b""))
 
         def close_file(file: Any) -> None:
             if not file.closed and file.writable():
                 self._system.note_close(file.fileno())
             _file_methods["close"](file)
 
-        reads = {name: reading(name) for name in ("read", "readinto")}
-        of_file: dict[str, Callable[..., Any]] = {
-            **reads,
-            "readall": read_all,
-            "write": write_file,
-            "close": close_file,
+        def pieces_of(descriptor: int) -> Iterator[bytes]:
+            with suppress(BlockingIOError):
+                while piece := read(descriptor, PIPE_CHARACTERS):
+                    yield piece
+
+        def read_port(file: Any, size: int | None = -1, /) -> bytes:
+            if size is not None and size >= 0:
+                return read(file.fileno(), size)
+            if not (data := b"".join(pieces_of(file.fileno()))) and not os.get_blocking(file.fileno()):
+                raise BlockingIOError
+            return data
+
+        def method(name: str, for_port: Callable[..., Any], for_others: Callable[..., Any]) -> Callable[..., Any]:
+            """Return a method of files; a file may be at a port."""
+
+            def call(file: Any, *args: Any) -> Any:
+                is_port = not file.closed and self.port_of(file.fileno()) is not None
+                if is_port and (file.writable() if name == "write" else file.readable()):
+                    with suppress(BlockingIOError):
+                        return for_port(file, *args)
+                    return None
+                return for_others(file, *args)
+
+            return for_program(scheduler, call, _file_methods[name])
+
+        methods = {
+            "read": method("read", read_port, reading("read")),
+            "readinto": method(
+                "readinto", lambda file, buffer, /: read_into(file.fileno(), [buffer]), reading("readinto")
+            ),
+            "readall": method("readall", lambda file, /: read_port(file), read_all),
+            "write": method("write", lambda file, data, /: write(file.fileno(), data), write_file),
+            "close": for_program(scheduler, close_file, _file_methods["close"]),
         }
         return {
-            "_io.FileIO": {
-                name: for_program(scheduler, method, _file_methods[name]) for name, method in of_file.items()
-            },
+            "_io.FileIO": methods,
             "select": {"select": simulated_select},
             f"{__name__}._Poll": {"poll": for_program(scheduler, poll, _real_poll)},
             "select.epoll": {"poll": for_program(scheduler, epoll, _real_epoll)},
-            "posix": {"read": read, "write": write, "pipe": pipe, "openpty": openpty},
+            "posix": {
+                "read": read,
+                "readv": read_into,
+                "write": write,
+                "writev": write_from,
+                "pipe": pipe,
+                "openpty": openpty,
+            },
             "fcntl": {"ioctl": ioctl},
-            "termios": {"tcdrain": drain, "tcflush": flush},
+            "termios": {
+                "tcdrain": drain,
+                "tcflush": flush,
+                "tcgetattr": get_attributes,
+                "tcsetattr": set_attributes,
+            },
         }
 
     def _waits(self, state: os.stat_result) -> bool:
@@ -413,5 +420,5 @@ def _descriptor(file: Any) -> int:
     return file if isinstance(file, int) else int(file.fileno())
 
 
-def _fill(ports: Iterable[_PortFile]) -> list[int]:
+def _fill(ports: Iterable[PortFile]) -> list[int]:
     return [each.fill() for each in ports]

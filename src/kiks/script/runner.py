@@ -6,7 +6,7 @@ import sys
 import threading
 import traceback
 from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, closing, nullcontext
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, NoReturn
@@ -17,6 +17,7 @@ from kiks.errors import KiksError
 from kiks.ports import environment_marks
 from kiks.script import clocks, cpython, event_loops, keyboard, locks, serial_ports, socket_waits, unsupported
 from kiks.script.chance import Chance
+from kiks.script.children import Children
 from kiks.script.file_system import FileSystem
 from kiks.script.file_waits import Files
 from kiks.script.libraries.adapters import adapted
@@ -122,7 +123,7 @@ def run_program(
     chance, system = Chance(scheduler, seed), FileSystem(scheduler, offered)
     files = Files(scheduler, system)
     host = Host(scheduler, clock, chance, files)
-    ends, signals = _AtExit(), Signals(scheduler)
+    ends, signals, children = _AtExit(), Signals(scheduler), Children(scheduler, files)
     opened: WeakSet[Any] = WeakSet()
 
     def end_at_once(code: int) -> None:
@@ -141,6 +142,7 @@ def run_program(
         serial_ports.replacements(open_port, files, offered, opened),
         event_loops.replacements(scheduler),
         signals.replacements(),
+        children.replacements(),
         unsupported.replacements(scheduler),
         ends.replacements(),
         keyboard.replacements(scheduler),
@@ -152,6 +154,7 @@ def run_program(
         code = _run_main_thread(start)
         _wait_for_threads(scheduler)
         ends.run()
+        children.check()
         return code
 
     environment_marks.hide()
@@ -166,6 +169,7 @@ def run_program(
             chance.taken(),
             replaced(replacements, scheduler),
             serial_ports.left_open(opened),
+            closing(children),
             adapted(host),
             unsupported.watched(scheduler, system),
         ):

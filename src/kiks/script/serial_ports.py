@@ -87,9 +87,9 @@ def replacements(
             RobotPort._reconfigure_port(self)
 
         def close(self) -> None:
-            if self._descriptor is not None:
-                ports.remove(self._descriptor)
-                self._descriptor = None
+            descriptor, self._descriptor = self._descriptor, None
+            if descriptor is not None:
+                ports.remove(descriptor)
             unlock(self)
             RobotPort.close(self)
 

@@ -74,6 +74,7 @@ class SharedLine:
     def read(self, size: int | None, terminator: bytes | None, timeout_ns: int | None, poll_ns: int) -> bytes:
         """Wait for `size` characters or a terminator; see `Line.read`."""
         line, scheduler = self._line, self._scheduler
+        scheduler.settle()
         if scheduler.is_alone:
             return line.read(size, terminator, timeout_ns, poll_ns)
         if timeout_ns == 0:

@@ -106,12 +106,14 @@ class Scheduler:
         tasks: Started threads that have not ended, by ident.
         lock_count: Number of free locks that the running thread has taken since it went on.
         os_thread: The thread of the operating system that runs the program; 0 when none does.
+        before_time: What must be done before time passes.
         carried: Functions that take away, and put back, values that libraries keep per thread of the operating system.
     """
 
     def __init__(self, world: Line, program: ProgramClock) -> None:
         self.world = world
         self.program = program
+        self.before_time: list[Callable[[], object]] = []
         self.carried: list[tuple[Callable[[], object], Callable[[Any], object]]] = []
         self.os_thread = get_ident()
         self._hub = greenlet.getcurrent()
@@ -248,11 +250,17 @@ class Scheduler:
 
     def sleep_until(self, time_ns: int) -> None:
         """Let time pass up to an instant [ns]; other threads go on meanwhile."""
+        self.settle()
         if self._ready or self._readers or self._watchers or self._next_deadline_ns() <= time_ns:
             while self.wait("a time", until_ns=time_ns) is SIGNALLED:
                 pass
         else:
             self.world.pass_to(time_ns)
+
+    def settle(self) -> None:
+        """Do what must be done before time passes."""
+        for each in self.before_time:
+            each()
 
     def give_way(self) -> None:
         """Let ready threads go on, then this thread."""
@@ -392,6 +400,7 @@ class Scheduler:
 
     def _pass_time(self) -> None:
         """Let time pass until a thread may go on."""
+        self.settle()
         until_ns = self._next_deadline_ns()
         if len(self._readers) == 1 and not self._watchers:
             (reader,) = self._readers
