@@ -66,6 +66,7 @@ class ProgramClock:
         measures: Whether thinking costs the real time that it takes.
         waiting: The cost of polls of the running thread.
         act_count: Number of calls of ports and clocks.
+        is_real_time: Whether thinking takes as long as it does on this computer.
     """
 
     def __init__(self, thinking: str) -> None:
@@ -73,6 +74,7 @@ class ProgramClock:
         self._policy = None if isinstance(policy, ThinkingFixed) and policy.time_ns == 0 else policy
         self.thinks = self._policy is not None
         self.measures = isinstance(policy, ThinkingLive)
+        self.is_real_time = isinstance(policy, ThinkingLive) and policy.factor == 1
         self.waiting = PollCost()
         self.act_count = 0
 
