@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import _random
+import os
 import random
 import sys
 from collections.abc import Iterator
@@ -52,6 +53,8 @@ class Chance:
             _real_seed(generator, self._source.getrandbits(256) if value is None else value)
 
         def read(size: int, flags: int = 0, /) -> bytes:
+            if size < 0:
+                os.urandom(size)  # says what is wrong
             return self._source.randbytes(size)
 
         return {

@@ -26,7 +26,7 @@ from _threading_local import local
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from itertools import count
-from types import BuiltinFunctionType, ModuleType
+from types import BuiltinFunctionType, FrameType, ModuleType
 from typing import Any
 
 from kiks.errors import KiksError
@@ -410,6 +410,33 @@ def thread_starts(scheduler: Any) -> dict[str, dict[str, Any]]:
         "_thread": {**starts, "start_joinable_thread": start_joinable_thread, "_ThreadHandle": Handle},
         "threading": {"_ThreadHandle": Handle},
     }
+
+
+_FRAMES_OF_A_THREAD = 3
+"""Calls of KiKS between the hub of the scheduler and the function of a thread."""
+
+
+@contextmanager
+def whole_recursion() -> Iterator[dict[str, dict[str, Any]]]:
+    """Let each thread of a program recurse as deeply as without KiKS, whose calls lie below those of the program.
+
+    Yields:
+        What stands in for the functions that tell and set the limit.
+    """
+    frame: FrameType | None = sys._getframe()
+    below = _FRAMES_OF_A_THREAD
+    while frame is not None:
+        below, frame = below + 1, frame.f_back
+    before = sys.getrecursionlimit()
+    sys.setrecursionlimit(before + below)
+
+    def set_limit(limit: int, /) -> None:
+        sys.setrecursionlimit(limit + below if limit > 0 else limit)
+
+    try:
+        yield {"sys": {"getrecursionlimit": lambda: sys.getrecursionlimit() - below, "setrecursionlimit": set_limit}}
+    finally:
+        sys.setrecursionlimit(before)
 
 
 def name_of_thread(ident: int) -> str:
