@@ -20,6 +20,7 @@ from kiks.cli.options import Silence, World, say, show_log
 from kiks.cli.outputs import Command as CheckedCommand
 from kiks.cli.outputs import has_results, leave_out, output, tell_results
 from kiks.cli.record import ExportFile, RecordFile, noting_output, recorded, tell_run
+from kiks.clock.program_clock import library_doubt
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import ParameterError, shown
 
@@ -185,7 +186,7 @@ def run(
         try:
             if len(commands) == 1 and commands[0] is not None:
                 code = _run_one(sim, commands[0], mapping, thoughts, limits)
-                doubt = limits.doubt
+                doubt = limits.doubt or library_doubt(sim.program.doubted)
             else:
                 tell = say if labels is None else labels.say
                 programs = Programs(sim, commands, thinking=thinking, say=tell, labels=labels, **rules)

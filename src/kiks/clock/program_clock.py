@@ -67,6 +67,7 @@ class ProgramClock:
         waiting: The cost of polls of the running thread.
         act_count: Number of calls of ports and clocks.
         is_real_time: Whether thinking takes as long as it does on this computer.
+        doubted: Name of a library of the program whose chance or clock is its own; empty for none.
     """
 
     def __init__(self, thinking: str) -> None:
@@ -77,6 +78,7 @@ class ProgramClock:
         self.is_real_time = isinstance(policy, ThinkingLive) and policy.factor == 1
         self.waiting = PollCost()
         self.act_count = 0
+        self.doubted = ""
 
     def enter(self, *, is_command: bool) -> int:
         """Return the thinking time to charge at a call [ns]; see `Thinking.enter`."""
@@ -108,6 +110,11 @@ class ProgramClock:
     def measured_ns(self) -> list[int]:
         """Times that thinking 'live' has measured so far [ns]; `save_thinking` stores them for 'replay'."""
         return self._policy.measured_ns if isinstance(self._policy, ThinkingLive) else []
+
+
+def library_doubt(library: str) -> str:
+    """Return why a run with a library is not repeatable; nothing without one."""
+    return library and f"{library} has random numbers or a clock of its own"
 
 
 def calendar_ns(now_ns: int) -> int:

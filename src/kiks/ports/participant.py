@@ -6,6 +6,7 @@ import logging
 from collections import deque
 from collections.abc import Callable, Sequence
 
+from kiks.clock.program_clock import library_doubt
 from kiks.clock.serial_timing import BACKLOG_LIMIT
 from kiks.errors import KiksError
 from kiks.model.checks import CLOCK_END_NS
@@ -282,6 +283,8 @@ class ProgramParticipant(Participant):
             wire.send(data, at_ns)
         elif kind == Kind.END:
             self._end()
+        elif kind == Kind.DOUBT:
+            self._scheduler.note_doubt(library_doubt(request.arguments[0]))
         elif kind == Kind.MEET:
             self._answer(at_ns)
         elif kind == Kind.FIND:
