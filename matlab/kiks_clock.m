@@ -14,6 +14,13 @@ function answer = kiks_clock(what, seconds)
 %
 %   See also kiks_ktime, kiks_pause.
 
+if nargin < 1
+    what = [];
+end
+if ~any(strcmp(what, {'clock', 'tic', 'toc', 'rest'}))
+    error('kiks:argument', ['The question must be clock, tic, toc or rest, but it was %s. ' ...
+        'Call kiks_clock(''clock'').'], shown(what));
+end
 answer = [];
 if simulator('--is-running', []) && isempty(robot_link('numbers', []))
     if nargin > 1
