@@ -39,7 +39,8 @@ kGetEncoders(ref)  %= [[100], [-200]]
 kSetEncoders(ref)  %= 0
 kGetEncoders(ref)  %= [[0], [0]]
 kSetSpeed(ref, 5.4, -5.4)  %= 0
-kiks_pause(0.5)
+begin = kiks_clock('clock'); kiks_pause(0.5)
+(kiks_clock('clock') - begin) / 1e6  %= 0.5 +- 0.001
 kGetSpeed(ref)  %= [[5], [-5]] +- 1
 kGetStatus(ref)([2 5])  %= [[0], [0]]
 kStatus(ref)
