@@ -19,7 +19,7 @@ from tests.matlab.octave import DEMOS, TOOLBOX
 FILES = sorted(TOOLBOX.rglob("*.m"))
 
 WRITTEN_IN_MATLAB = """
-    addpath angle axis bar datenum datestr datetime datevec fileparts fileread fullfile gca help hold ind2sub
+    addpath angle axis bar datenum datetime datevec fileparts fileread fullfile gca help hold ind2sub
     inpolygon ispc isunix linspace mat2str mean meshgrid now onCleanup path pathsep posixtime pwd read rmfield
     rmpath serialport setdiff start stop str2double strcat strjoin strsplit strtok tcpclient tempname timer title
     union unique write xlabel ylabel
