@@ -31,7 +31,7 @@ KIKS_THINKING = 'none'; KIKS_SEED = 1; KIKS_WINDOW = {window};
 kiks();
 ref = kiks_kopen([-1 {baud} 1]);
 since = kiks_ktime(-1); now_s = since;
-begin = tic(); characters = 0; replies = 0; loops = 0;
+begin = builtin('tic'); characters = 0; replies = 0; loops = 0;
 for piece = 1:{pieces}
     while now_s < piece * {piece_s}
         reply = kiks_ksend(['N' 10], ref);
@@ -49,9 +49,9 @@ for piece = 1:{pieces}
     end
     drift_s = now_s - since - characters * {character_s} - replies * 1e-3;
     points = columns(kiks_siminfo_robotpath);
-    printf('piece %d %.9f %.9f %d %g\\n', loops, now_s, drift_s, points, toc(begin));
+    printf('piece %d %.9f %.9f %d %g\\n', loops, now_s, drift_s, points, builtin('toc', begin));
     fflush(stdout);
-    begin = tic();
+    begin = builtin('tic');
     % Reading the path has let time pass.
     since = since - now_s;
     now_s = kiks_ktime(-1);

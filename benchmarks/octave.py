@@ -27,29 +27,29 @@ kiks();
 follow(-1, 9600, 60);
 runs = zeros(1, {repeats});
 for k = 1:{repeats}
-    begin = tic(); follow(-1, 9600, {seconds}); runs(k) = {seconds} / toc(begin);
+    begin = builtin('tic'); follow(-1, 9600, {seconds}); runs(k) = {seconds} / builtin('toc', begin);
 end
 fprintf('follow %g\\n', median(runs));
 ref = kiks_kopen([-1 9600 1]);
 for k = 1:{repeats}
-    begin = tic();
+    begin = builtin('tic');
     for each = 1:2000, kiks_ksend(['N' 10], ref); end
-    runs(k) = 2000 / toc(begin);
+    runs(k) = 2000 / builtin('toc', begin);
 end
 fprintf('exchanges %g\\n', median(runs));
 kiks_kclose(ref); kiks_quit
 [to, from, process] = popen2('{python}', {{'{echo}'}}, true);
 for k = 1:{repeats}
-    begin = tic();
+    begin = builtin('tic');
     for each = 1:2000, fputs(to, ['N' 10]); fflush(to); fread(from, [1 32], '*char'); end
-    runs(k) = 2000 / toc(begin);
+    runs(k) = 2000 / builtin('toc', begin);
 end
 fprintf('pipe %g\\n', median(runs));
 fclose(to); fclose(from);
 pkg load instrument-control
 link = tcpclient('127.0.0.1', {port});
 for k = 1:{repeats}
-    begin = tic();
+    begin = builtin('tic');
     for each = 1:1000
         write(link, uint8(['N' 10]));
         reply = '';
@@ -58,7 +58,7 @@ for k = 1:{repeats}
             if count > 0, reply = [reply char(read(link, count))]; end
         end
     end
-    runs(k) = 1000 / toc(begin);
+    runs(k) = 1000 / builtin('toc', begin);
 end
 fprintf('tcpclient %g\\n', median(runs));
 """

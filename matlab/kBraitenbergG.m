@@ -38,7 +38,7 @@ kSetEncoders(ref, 0, 0);
 pose = [0; 0; 0];
 path_ = pose(1:2);
 before = [0; 0];
-drawn = tic();
+drawn = builtin('tic');
 stopper = onCleanup(@() stop_robot(ref)); %#ok<NASGU>
 while ishandle(window) && (seconds == Inf || kiks_ktime(ref(1)) - start < seconds)
     braitenberg_step(ref, gain);
@@ -50,10 +50,10 @@ while ishandle(window) && (seconds == Inf || kiks_ktime(ref(1)) - start < second
             path_(:, end + 1) = pose(1:2); %#ok<AGROW>
         end
     end
-    if toc(drawn) > 0.05 && ishandle(line_)
+    if builtin('toc', drawn) > 0.05 && ishandle(line_)
         set(line_, 'XData', [path_(1, :) pose(1)], 'YData', [path_(2, :) pose(2)]);
         drawnow();
-        drawn = tic();
+        drawn = builtin('tic');
     end
 end
 end

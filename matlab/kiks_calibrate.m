@@ -63,9 +63,9 @@ simulated_ref = kiks_kopen([-1 baud 1]);
 count = round(baud / 64);
 differences = zeros(1, 10);
 for k = 1:10
-    begin = tic();
+    begin = builtin('tic');
     exchange(real_ref, count);
-    real_s = toc(begin);
+    real_s = builtin('toc', begin);
     begin_s = kiks_ktime(-1);
     exchange(simulated_ref, count);
     differences(k) = (real_s - (kiks_ktime(-1) - begin_s)) / count * baud;

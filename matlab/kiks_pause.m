@@ -21,6 +21,6 @@ sec = max(sec, 0);
 if ~isempty(open_ports('list')) && isempty(robot_link('numbers', []))
     simulator(sprintf('pause %.17g', sec));
 else
-    pause(sec);
+    builtin('pause', sec);
 end
 end

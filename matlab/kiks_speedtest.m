@@ -20,9 +20,9 @@ end
 check_whole('The number of repetitions', n, 1, 1000, 'Call kiks_speedtest(4).');
 index = Inf;
 for k = 1:n
-    begin = cputime();
+    begin = builtin('cputime');
     work();
-    index = min(index, cputime() - begin);
+    index = min(index, builtin('cputime') - begin);
 end
 % A coarse clock may measure 0.
 index = max(index, 0.001);

@@ -36,7 +36,7 @@ if nargin > 0
         if nargin > 1 && ~isempty(dual) && any(dual)
             show(line_{1});
         end
-        history = [history; {[datestr(now(), 'HH:MM:SS') ' ' line_{1}]}]; %#ok<AGROW>
+        history = [history; {[time_of_day() ' ' line_{1}]}]; %#ok<AGROW>
         if is_active()
             simulator([request escaped(line_{1})]);
         end
@@ -46,6 +46,15 @@ if nargin > 0
 end
 if nargout > 0
     lines = history;
+end
+end
+
+function text = time_of_day()
+% The computer's: the log goes on while the world is paused.
+if is_octave()
+    text = strftime('%H:%M:%S', localtime(builtin('time')));
+else
+    text = char(datetime('now'), 'HH:mm:ss');
 end
 end
 

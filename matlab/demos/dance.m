@@ -56,7 +56,7 @@ while sender ~= partner
     if ~isempty(status) && status(1)
         kRadio_send(ref, partner, hello(), 1);
     end
-    pause(0.2);  % people are slow: real time, not the robot's
+    builtin('pause', 0.2);  % people are slow: real time, not the robot's
     [sender, ~] = heard(ref);
 end
 order = [1 2 3 4 5 6 3 4];

@@ -30,7 +30,7 @@ switch what
         return
     case 'time'
         if ~isempty(at)
-            result = toc(links{at}.begin);
+            result = builtin('toc', links{at}.begin);
         end
         return
     case 'close'
@@ -55,7 +55,7 @@ switch what
                 number = number + 1;
             end
         end
-        link = struct('port', robot_port('open', name, baud), 'rest', '', 'owed', 0, 'begin', tic());
+        link = struct('port', robot_port('open', name, baud), 'rest', '', 'owed', 0, 'begin', builtin('tic'));
         % The longest reply has about 270 characters; its duration is an upper bound of any silence within a reply.
         link.patience = 0.05 + 11 * 270 / baud;
         numbers(end + 1) = number;
@@ -124,8 +124,8 @@ end
 function settle(link)
 % Read and drop the outstanding replies, until they are complete or the robot is silent.
 lines_ = sum(link.rest == 10);
-begin = tic();
-while lines_ < link.owed && toc(begin) < 10 * link.patience
+begin = builtin('tic');
+while lines_ < link.owed && builtin('toc', begin) < 10 * link.patience
     news = robot_port('read', link.port, link.patience);
     if isempty(news)
         break
@@ -136,7 +136,7 @@ robot_port('read', link.port, 0);
 end
 
 function [line, rest] = next_line(port, timeout)
-begin = tic();
+begin = builtin('tic');
 line = -1;
 rest = '';
 left = timeout;
@@ -149,6 +149,6 @@ while left >= 0
         rest = rest(stops + 1:end);
         return
     end
-    left = timeout - toc(begin);
+    left = timeout - builtin('toc', begin);
 end
 end

@@ -127,14 +127,14 @@ if strcmp(port.kind, 'file')
 end
 text = '';
 line = port.to;
-begin = tic();
+begin = builtin('tic');
 while true
     count = line.NumBytesAvailable;
     if count > 0
         text = char(read(line, double(count), 'uint8'));
         return
     end
-    waited = toc(begin);
+    waited = builtin('toc', begin);
     left = seconds - waited;
     if left <= 0
         return
@@ -152,24 +152,24 @@ function text = wait(port, line, seconds)
 % Wait up to a timeout; may return the first character.
 text = '';
 if ~is_octave()
-    pause(0.001);
+    builtin('pause', 0.001);
 elseif strcmp(port.kind, 'tcp')
     % This call notices the end of the connection; reading the count does not.
     line.Timeout = min(seconds, 0.5);
     text = char(read(line, 1, 'uint8'));
 elseif seconds < 0.1
-    pause(0.001);
+    builtin('pause', 0.001);
 else
-    begin = tic();
+    begin = builtin('tic');
     text = char(read(line, 1, 'uint8'));
-    if isempty(text) && toc(begin) < 0.05
+    if isempty(text) && builtin('toc', begin) < 0.05
         lost(port, 'it has hung up');
     end
 end
 end
 
 function text = received_file(port, seconds)
-begin = tic();
+begin = builtin('tic');
 next_look = 0.2;
 while true
     % After reading to the end, the file stays at its end until the end mark is cleared.
@@ -178,7 +178,7 @@ while true
     if ~isempty(text)
         return
     end
-    waited = toc(begin);
+    waited = builtin('toc', begin);
     if waited >= seconds
         return
     elseif waited > next_look
@@ -187,7 +187,7 @@ while true
             lost(port, 'it has gone');
         end
     elseif waited > 0.002
-        pause(0.001);
+        builtin('pause', 0.001);
     end
 end
 end

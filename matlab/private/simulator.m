@@ -22,7 +22,7 @@ if nargin > 1
             if ~isempty(answer) && ~is_behind
                 told = sscanf(answer(10:28), '%f');
                 % A negative number means that thinking is measured: then the time is soon outdated.
-                if told(1) == argument || (told(1) == -argument && toc(answered) < 0.005)
+                if told(1) == argument || (told(1) == -argument && builtin('toc', answered) < 0.005)
                     payload = told(2);
                 end
             end
@@ -44,6 +44,7 @@ if nargin > 1
             is_behind = false;
             link = simulator_link('open', {'--join', sprintf('%d', argument)});
             simulator('version');  % a process without a request would end after a timeout
+            session_clocks(true);
         case '--end'
             if ~isempty(link)
                 ending = link;
@@ -51,6 +52,7 @@ if nargin > 1
             end
             is_ready = false;
             answer = '';
+            session_clocks(false);
             if ~isempty(ending)
                 simulator_link('close', ending);
                 ending = [];
@@ -76,7 +78,7 @@ if is_ready
         length_ = str2double(answer(1:8));
         if length_ <= 88
             is_behind = false;
-            answered = tic();
+            answered = builtin('tic');
             payload = answer(29:length_ + 8);
             is_ready = true;
             return
@@ -87,6 +89,7 @@ else
         mlock;  % `clear all` in a user's program would lose the process
         link = new_link(request, ending);
         ending = [];
+        session_clocks(true);
     elseif is_behind
         link = simulator_link('catch up', link);
     end
@@ -104,7 +107,7 @@ while true
     elseif answer(9) ~= '~'
         is_behind = false;
         is_ready = link.is_polled;
-        answered = tic();
+        answered = builtin('tic');
         if answer(9) == '!'
             % A person has typed a command on the desk: it is evaluated first, and then the request is sent again.
             evaluate_typed(unescaped(answer(10:end)), strcmp(request, 'poll'));

@@ -98,9 +98,9 @@ else
     system([line ' < /dev/null > /dev/null &']);
 end
 first = '';
-begin = tic();
-while isempty(first) && toc(begin) < 60
-    pause(0.05);
+begin = builtin('tic');
+while isempty(first) && builtin('toc', begin) < 60
+    builtin('pause', 0.05);
     if exist(file, 'file')
         first = fileread(file);
         delete(file);
@@ -169,7 +169,7 @@ if link.is_pipe
     return
 end
 answer = '';
-silence = tic();
+silence = builtin('tic');
 try
     while isempty(answer)
         [answer, link.rest] = first_frame(link.rest);
@@ -177,8 +177,8 @@ try
             news = robot_port('read', link.port, 0.5);
             link.rest = [link.rest news];
             if ~isempty(news)
-                silence = tic();
-            elseif toc(silence) > 60
+                silence = builtin('tic');
+            elseif builtin('toc', silence) > 60
                 % Even during a slow answer, four frames a second arrive.
                 return
             end
@@ -239,11 +239,11 @@ end
 try
     robot_port('write', link.port, line);
     link.rest = '';
-    silence = tic();
-    while isempty(strfind(link.rest, ending)) && toc(silence) < 60 %#ok<STREMP>
+    silence = builtin('tic');
+    while isempty(strfind(link.rest, ending)) && builtin('toc', silence) < 60 %#ok<STREMP>
         news = robot_port('read', link.port, 0.5);
         if ~isempty(news)
-            silence = tic();
+            silence = builtin('tic');
         end
         link.rest = [link.rest(max(1, end):end) news];
     end

@@ -16,7 +16,7 @@ NAMES = re.findall(
     kiks kiks_arena kiks_tif2arena kiks_kad2arena kiks_generate_maze kiks_arena_new_create kiks_quit kiks_setup
     kiks_checkpoint kiks_reset kiks_record kiks_recordmovie kiks_print kiks_status kiks_speedtest kiks_calibrate
     kiks_mm2p kiks_p2mm kiks_demo kiks_kiksnet kiks_preferences kiks_load kiks_save
-    kiks_kopen kiks_ksend kiks_kclose kiks_ktime kiks_pause
+    kiks_kopen kiks_ksend kiks_kclose kiks_ktime kiks_clock kiks_pause
     kiks_siminfo_robotpos kiks_siminfo_robotpath kiks_siminfo_robotdist kiks_siminfo_objects kiks_siminfo_setobject
     kiks_siminfo_setrobot kiks_siminfo_speed kiks_spawn kiks_delete_object
     kcmd kProximity kAmbient kSetSpeed kGetSpeed kSetEncoders kGetEncoders kMoveTo kGetStatus kStatus kStop kSetProfile
@@ -39,7 +39,8 @@ kGetEncoders(ref)  %= [[100], [-200]]
 kSetEncoders(ref)  %= 0
 kGetEncoders(ref)  %= [[0], [0]]
 kSetSpeed(ref, 5.4, -5.4)  %= 0
-kiks_pause(0.5)
+begin = kiks_clock('clock'); kiks_pause(0.5)
+(kiks_clock('clock') - begin) / 1e6  %= 0.5 +- 0.001
 kGetSpeed(ref)  %= [[5], [-5]] +- 1
 kGetStatus(ref)([2 5])  %= [[0], [0]]
 kStatus(ref)

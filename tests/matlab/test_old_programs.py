@@ -19,7 +19,7 @@ backed = 0;
 loops = 0;
 ref = kiks_kopen([-1, 9600, 1]);
 kSetEncoders(ref, 0, 0);
-t0 = clock;
+real = builtin('tic');
 while (kiks_ktime(-1) < 20)
     prox = kProximity(ref);
     light = kAmbient(ref);
@@ -45,7 +45,7 @@ while (kiks_ktime(-1) < 20)
     kiks_pause(0.05);
     loops = loops + 1;
 end;
-etime(clock, t0) < 20  %= 1
+builtin('toc', real) < 20  %= 1
 % It has met a wall and felt it, and took no real second for each simulated one.
 backed >= 1  %= 1
 loops > 50  %= 1

@@ -210,7 +210,7 @@ for seconds = [0 0.01]
         kSetSpeed(ref, 5, 4);
         kiks_siminfo_robotpos();
         kiks_siminfo_objects();
-        pause(seconds)
+        builtin('pause', seconds)
         t = kiks_ktime(-1);
     end
     kiks_pause(1)
@@ -293,7 +293,7 @@ WRONG = [f"{name}({ref})" for name in ONLY_REF.split() for ref in WRONG_REFS] + 
     kiks_kad2arena()  kiks_kad2arena([100 100 4 1])
     kiks_generate_maze(0)  kiks_generate_maze(2, 2, 10)
     kiks_arena_new_create()  kiks_arena_new_create(50, 50)  kiks_arena_new_create(200, 200, 0, 300)
-    kiks_speedtest(0)
+    kiks_speedtest(0)  kiks_clock('date')
     kiks_calibrate(-5)  kiks_calibrate(-1, 5)
     kBraitenberg(ref, NaN)  kBraitenberg(ref, 1, -1)
     kBraitenbergG(ref, NaN)

@@ -133,7 +133,7 @@ def run(programs: Sequence[Steps], choose: Choose) -> Log:
             chosen.send()
             may_advance = True
     assert all(fake.has_left for fake in fakes)
-    assert scheduler.is_repeatable
+    assert not scheduler.doubt
     return [*world.log, ("end", world.now_ns)]
 
 

@@ -73,7 +73,11 @@ class Changes:
         """Return the structures of all functions, and the structures and names of all classes and modules."""
         state: dict[str, Any] = {name: words(each, FUNCTION_WORDS) for name, each in self.functions.items()}
         for path, owner in self.owners.items():
-            state[path] = {name: id(value) for name, value in vars(owner).items() if not name.startswith("_abc_")}
+            state[path] = {
+                name: id(value)
+                for name, value in vars(owner).items()
+                if not name.startswith("_abc_") and name not in ("argv", "excepthook")
+            }
             if isinstance(owner, type):
                 state[f"{path} in memory"] = words(owner, TYPE_WORDS)
         return state

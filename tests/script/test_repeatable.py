@@ -66,3 +66,42 @@ def test_chance_follows_from_the_seed(tmp_path: Path) -> None:
     assert alone == first
     assert len({each.partition("]")[0] for each in (alone, second, other)}) == 3
     assert len({each.partition("]")[2] for each in (alone, second, other)}) == 1
+
+
+STAND_INS = {
+    "torch": "def manual_seed(seed): print(seed)",
+    "tensorflow": "class random:\n    def set_seed(seed): print(seed)",
+    "paddle": "version = 'without a seed'",
+    "cupy/__init__": "",
+    "cupy/random": "def seed(seed): raise RuntimeError('no device')",
+    "duckdb": "",
+}
+"""Libraries with chance of their own: their files, with the names that matter."""
+
+
+@pytest.mark.parametrize(
+    ("library", "doubted"),
+    cases(
+        [("torch", ""), ("duckdb", "duckdb"), ("paddle", "paddle"), ("cupy", "cupy"), ("tensorflow", "")], normally=2
+    ),
+)
+def test_chance_of_compiled_libraries_is_seeded_or_told(library: str, doubted: str, tmp_path: Path) -> None:
+    (tmp_path / "cupy").mkdir()
+    for name, text in STAND_INS.items():
+        (tmp_path / f"{name}.py").write_text(text)
+    (tmp_path / "loads.py").write_text(f"import {library}.random\n" if library == "cupy" else f"import {library}\n")
+    (tmp_path / "waits.py").write_text("import time\ntime.sleep(1)\n")
+
+    def ended(*words: str) -> tuple[list[str], str]:
+        code, lines, told = run(tmp_path, *words)
+        assert code == 0, told
+        (last,) = [line for line in told if "simulated" in line]
+        return lines, last.partition("seed 0, ")[2]
+
+    ends = f"not repeatable: {doubted} has random numbers or a clock of its own" if doubted else "state "
+    lines, alone = ended("loads.py")
+    assert len(lines) == (not doubted)
+    assert alone.startswith(ends)
+    assert ended("loads.py") == (lines, alone)
+    # The process of a program tells the world.
+    assert ended("loads.py", "waits.py")[1].startswith(ends)

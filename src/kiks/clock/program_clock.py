@@ -71,6 +71,7 @@ class ProgramClock:
         thread: What the running thread pays.
         act_count: Number of calls of ports and clocks.
         doubt: Why the program might do something else next time; empty if it will not.
+        is_real_time: Whether thinking takes as long as it does on this computer.
     """
 
     def __init__(self, thinking: str) -> None:
@@ -81,6 +82,7 @@ class ProgramClock:
         self.thread = ThreadClock()
         self.act_count = 0
         self.doubt = ""
+        self.is_real_time = isinstance(policy, ThinkingLive) and policy.factor == 1
 
     def enter(self, *, is_command: bool) -> int:
         """Return the thinking time to charge at a call [ns]; see `Thinking.enter`."""

@@ -36,6 +36,9 @@ REQUEST_BYTES_MAX = 1 << 16
 ANSWER_BYTES_MAX = 2 << 20
 """Longest answer: the characters that a line keeps for its reader (`OUTPUT_LIMIT`), and more."""
 
+DOUBT_MAX = 200
+"""Longest reason why a program might do something else next time [characters]."""
+
 ITEMS_MAX = 1024
 """Most items of an array in a message, such as the reads of `Kind.WAIT`."""
 
@@ -77,6 +80,8 @@ class Kind:
     """Asks for an answer when one of several reads, each a tuple, is complete, or at a time [ns]."""
     END = 15
     """Represents the end of the connection; never sent."""
+    DOUBT = 16
+    """Tells why the program might do something else next time, in at most `DOUBT_MAX` characters."""
 
 
 ASKING = frozenset(range(1, 15)) - {Kind.REACHED, Kind.HANG_UP, Kind.SEND, Kind.DROP, Kind.SET_BAUD}
@@ -312,6 +317,7 @@ _ARGUMENTS: dict[int, Callable[[tuple[Any, ...]], bool]] = {
     Kind.SEND: lambda each: len(each) == 1 and each[0].__class__ is bytes and len(each[0]) <= BACKLOG_LIMIT,
     Kind.ROOM: _are(lambda count: count.__class__ is int and 0 <= count < 1 << 32),
     Kind.READ: _are_read,
+    Kind.DOUBT: _are(lambda why: why.__class__ is str and why.isprintable() and len(why) <= DOUBT_MAX),
     Kind.SET_BAUD: _are(lambda baud: baud.__class__ is int and BAUD_MIN <= baud <= BAUD_MAX),
     Kind.WAIT: _are(
         lambda reads: (

@@ -282,6 +282,8 @@ class ProgramParticipant(Participant):
             wire.send(data, at_ns)
         elif kind == Kind.END:
             self._end()
+        elif kind == Kind.DOUBT:
+            self._scheduler.note_doubt(request.arguments[0])
         elif kind == Kind.MEET:
             self._answer(at_ns)
         elif kind == Kind.FIND:

@@ -130,7 +130,7 @@ class ProgramScheduler:
         loop: The event loop of the world.
         participants: The programs, in the order in which they have come.
         has_begun: Whether the world has begun.
-        is_repeatable: Whether the world has waited for all programs so far.
+        doubt: Why the run might not be repeatable; empty if the world has waited for all programs so far.
     """
 
     def __init__(
@@ -150,7 +150,7 @@ class ProgramScheduler:
         check_policy(when_silent, patience_s)
         self.participants: list[Participant] = []
         self.has_begun = expected == 0
-        self.is_repeatable = True
+        self.doubt = ""
         self.loop = sim.loop
         self._expected = expected
         self._is_once = is_once
@@ -311,6 +311,10 @@ class ProgramScheduler:
         self._begin_without(f"which did not come within {self._start_patience_s:g} s")
         return 0.0
 
+    def note_doubt(self, why: str) -> None:
+        """Note why the run might not be repeatable; the first reason is told."""
+        self.doubt = self.doubt or why
+
     def _begin_without(self, why: str) -> None:
         """Begin without the missing programs."""
         self._log.warning(
@@ -319,7 +323,7 @@ class ProgramScheduler:
             self._missing(),
             why,
         )
-        self.is_repeatable = False
+        self.note_doubt("the world did not wait for every program")
         for participant in self.participants:
             participant.is_waited_for = participant.is_waited_for and participant.is_here
         self._expected = 1
@@ -353,7 +357,7 @@ class ProgramScheduler:
         return wait_s
 
     def _give_up(self, participant: Participant, waited_s: float) -> None:
-        self.is_repeatable = False
+        self.note_doubt("the world did not wait for every program")
         if self._when_silent == "drop":
             self._log.warning(
                 "%s must act within %g s while others wait, but it did not: it is disconnected. "

@@ -266,7 +266,7 @@ class Programs:
             return "it was interrupted"
         if self.was_touched:
             return "a program was started or stopped while the world was there"
-        return "" if self._scheduler.is_repeatable else "the world did not wait for every program"
+        return self._scheduler.doubt
 
     # ---- starting and stopping ----
 

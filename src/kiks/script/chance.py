@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import _random
+import os
 import random
 import sys
 from collections.abc import Iterator
@@ -41,9 +42,19 @@ class Chance:
             if numpy_random is not None:
                 numpy_random.set_state(before[1])
 
+    def doubt(self, library: str) -> None:
+        """Note that a library draws by chance, or tells a time, by itself."""
+        self._scheduler.program.doubt = f"{library} has random numbers or a clock of its own"
+
     def number(self, library: str, bits: int) -> int:
         """Return a seed for the generator of a library, which it seeds by itself when it is imported."""
         return random.Random(f"{self._seed} {library}").getrandbits(bits)
+
+    def read(self, size: int, flags: int = 0, /) -> bytes:
+        """Return random bytes; see `os.urandom`."""
+        if size < 0:
+            os.urandom(size)  # says what is wrong
+        return self._source.randbytes(size)
 
     def replacements(self) -> dict[str, dict[str, Any]]:
         """Return the replacements for names of `os` and `random`."""
@@ -51,10 +62,7 @@ class Chance:
         def seed(generator: Any, value: Any = None, /) -> None:
             _real_seed(generator, self._source.getrandbits(256) if value is None else value)
 
-        def read(size: int, flags: int = 0, /) -> bytes:
-            return self._source.randbytes(size)
-
         return {
-            "posix": {"urandom": read, "getrandom": read},
+            "posix": {"urandom": self.read, "getrandom": self.read},
             "_random.Random": {"seed": for_program(self._scheduler, seed, _real_seed)},
         }

@@ -54,6 +54,8 @@ def main(descriptor: int, start: Start) -> int:
     except KeyboardInterrupt:
         return 130
     finally:
+        if policy.doubt:
+            connection.tell(Kind.DOUBT, 0, policy.doubt)
         connection.tell(Kind.REACHED)
         if start.record:
             try:

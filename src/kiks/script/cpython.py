@@ -17,6 +17,7 @@ import ctypes
 import gc
 import logging
 import mmap
+import os
 import runpy
 import sys
 import threading
@@ -25,7 +26,7 @@ from _threading_local import local
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from itertools import count
-from types import BuiltinFunctionType, ModuleType
+from types import BuiltinFunctionType, FrameType, ModuleType
 from typing import Any
 
 from kiks.errors import KiksError
@@ -88,6 +89,16 @@ _type_modified.restype = None
 _own, _disown = ctypes.pythonapi.Py_IncRef, ctypes.pythonapi.Py_DecRef
 _own.argtypes = _disown.argtypes = [ctypes.py_object]
 _own.restype = _disown.restype = None
+_run_file = ctypes.pythonapi.PyRun_FileExFlags
+_run_file.restype = ctypes.py_object
+_run_file.argtypes = [
+    ctypes.c_void_p,
+    ctypes.c_char_p,
+    ctypes.c_int,
+    *[ctypes.py_object] * 2,
+    ctypes.c_int,
+    ctypes.c_void_p,
+]
 _CALL = ctypes.cast(ctypes.pythonapi.PyObject_Call, ctypes.c_void_p)
 
 
@@ -171,6 +182,24 @@ def uncollected() -> Iterator[None]:
     finally:
         if was_enabled:
             gc.enable()
+
+
+_FILE_INPUT = 257
+"""Py_file_input (compile.h)."""
+
+
+def run_source(path: str, names: dict[str, Any]) -> None:
+    """Run a file of source text with the globals `names`.
+
+    Python reads it itself: what has been read already, as bytes, it compiles without checking that they are what the
+    file declares.
+    """
+    open_file = ctypes.CDLL(None, use_errno=True).fopen
+    open_file.restype, open_file.argtypes = ctypes.c_void_p, [ctypes.c_char_p] * 2
+    file = open_file(os.fsencode(path), b"rbe")
+    if not file:
+        raise OSError(ctypes.get_errno(), os.strerror(ctypes.get_errno()), path)
+    _run_file(file, os.fsencode(path), _FILE_INPUT, names, names, True, None)
 
 
 class Undo:
@@ -381,6 +410,33 @@ def thread_starts(scheduler: Any) -> dict[str, dict[str, Any]]:
         "_thread": {**starts, "start_joinable_thread": start_joinable_thread, "_ThreadHandle": Handle},
         "threading": {"_ThreadHandle": Handle},
     }
+
+
+_FRAMES_OF_A_THREAD = 3
+"""Calls of KiKS between the hub of the scheduler and the function of a thread."""
+
+
+@contextmanager
+def whole_recursion() -> Iterator[dict[str, dict[str, Any]]]:
+    """Let each thread of a program recurse as deeply as without KiKS, whose calls lie below those of the program.
+
+    Yields:
+        What stands in for the functions that tell and set the limit.
+    """
+    frame: FrameType | None = sys._getframe()
+    below = _FRAMES_OF_A_THREAD
+    while frame is not None:
+        below, frame = below + 1, frame.f_back
+    before = sys.getrecursionlimit()
+    sys.setrecursionlimit(before + below)
+
+    def set_limit(limit: int, /) -> None:
+        sys.setrecursionlimit(limit + below if limit > 0 else limit)
+
+    try:
+        yield {"sys": {"getrecursionlimit": lambda: sys.getrecursionlimit() - below, "setrecursionlimit": set_limit}}
+    finally:
+        sys.setrecursionlimit(before)
 
 
 def name_of_thread(ident: int) -> str:

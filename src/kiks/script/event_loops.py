@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import sys
 import weakref
 from _threading_local import local
 from collections.abc import Iterator
@@ -34,13 +35,26 @@ def _put(taken: tuple[Any, Any]) -> None:
         _enter_task(loop, task)
 
 
+def _take_hooks() -> Any:
+    """Take away what this thread does with new coroutines and generators."""
+    hooks, depth = sys.get_asyncgen_hooks(), sys.get_coroutine_origin_tracking_depth()
+    _put_hooks(((None, None), 0))
+    return hooks, depth
+
+
+def _put_hooks(taken: Any) -> None:
+    hooks, depth = taken
+    sys.set_asyncgen_hooks(*hooks)
+    sys.set_coroutine_origin_tracking_depth(depth)
+
+
 def replacements(scheduler: Scheduler) -> dict[str, dict[str, Any]]:
     """Return the replacements for names of `asyncio` and `concurrent.futures`, by module.
 
     Args:
         scheduler: The program's threads; each gets a running loop of its own.
     """
-    scheduler.carried.append((_take, _put))
+    scheduler.carried += [(_take, _put), (_take_hooks, _put_hooks)]
 
     class Local(local):
         """The loop of each thread."""

@@ -10,6 +10,7 @@ import _queue
 import _thread
 import concurrent.futures.thread
 import itertools
+import os
 import queue
 import sys
 import threading
@@ -18,6 +19,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any
 
+from kiks.script.cpython import FIRST_IDENT, IDENT_STEP
 from kiks.script.patching import Reading, for_program
 from kiks.script.thread_scheduler import SIGNALLED, Scheduler, Task, get_ident, timeout_ns
 from kiks.sim.read_completion import NEVER_NS
@@ -285,6 +287,11 @@ def replacements(scheduler: Scheduler) -> dict[str, dict[str, Any]]:
     def get_ident() -> int:
         return scheduler.current.ident
 
+    def get_native_id() -> int:
+        # The operating system numbers threads on from the process.
+        task = scheduler.current
+        return os.getpid() + (0 if task is scheduler.main else (task.ident - FIRST_IDENT) // IDENT_STEP + 1)
+
     # Running executors: those of this process are not the program's.
     executors: dict[str, dict[str, Any]] = {
         concurrent.futures.thread.__name__: {"_shutdown": False, "_threads_queues": weakref.WeakKeyDictionary()}
@@ -293,7 +300,7 @@ def replacements(scheduler: Scheduler) -> dict[str, dict[str, Any]]:
         executors[processes] = {"_global_shutdown": False, "_threads_wakeups": weakref.WeakKeyDictionary()}
     real_is_set, real_is_owned = threading.Event.is_set, threading.Condition._is_owned  # type: ignore[attr-defined]
     return {
-        "_thread": {"get_ident": get_ident},
+        "_thread": {"get_ident": get_ident, "get_native_id": get_native_id},
         "_thread.LockType": _plain_locks(scheduler, room),
         "_thread.RLock": _reentrant_locks(scheduler, room),
         "_queue.SimpleQueue": _queues(scheduler, room),

@@ -17,6 +17,8 @@ from types import ModuleType
 from typing import Any
 from warnings import catch_warnings
 
+from kiks.script.cpython import run_source
+
 
 @contextmanager
 def main_module(program: Path, arguments: list[str], module: str) -> Iterator[Callable[[], None]]:
@@ -71,14 +73,14 @@ def clear_names(names: dict[str, Any]) -> None:
 
 def _run_file(path: str, main: ModuleType) -> None:
     """Run a file as Python runs the file that its command line names (Python/pythonrun.c)."""
-    if path.endswith(".pyc"):
-        loader: SourceFileLoader | SourcelessFileLoader = SourcelessFileLoader("__main__", path)
-        code = loader.get_code("__main__")
-    else:
-        loader = SourceFileLoader("__main__", path)
-        code = compile(loader.get_data(path), path, "exec", dont_inherit=True)
-    assert code is not None
+    is_compiled = path.endswith(".pyc")
+    loader = SourcelessFileLoader("__main__", path) if is_compiled else SourceFileLoader("__main__", path)
     vars(main).update(__file__=path, __loader__=loader)
     if sys.version_info < (3, 15):
         vars(main).update(__cached__=None)
-    exec(code, vars(main))
+    if isinstance(loader, SourcelessFileLoader):
+        code = loader.get_code("__main__")
+        assert code is not None
+        exec(code, vars(main))
+    else:
+        run_source(path, vars(main))

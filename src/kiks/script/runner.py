@@ -162,12 +162,13 @@ def run_program(
     sys.excepthook = lambda _kind, error, _trace: _print_program_trace(error)
     try:
         with (
+            cpython.whole_recursion() as limits,
             main_module(program, arguments, module) as start,
             watched(scheduler),
             limited(scheduler.end),
             signals.taken(),
             chance.taken(),
-            replaced(replacements, scheduler),
+            replaced((*replacements, limits), scheduler),
             serial_ports.left_open(opened),
             closing(children),
             adapted(host),

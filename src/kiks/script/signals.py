@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import operator
 import os
 import signal
 import threading
@@ -90,7 +91,7 @@ class Signals:
                 "signal": self._set,
                 "getsignal": self._get,
                 "set_wakeup_fd": self._set_wakeup,
-                "alarm": lambda seconds, /: -int(-self._set_alarm(seconds, 0)[0] // 1),
+                "alarm": lambda seconds, /: -int(-self._set_alarm(max(operator.index(seconds), 0), 0)[0] // 1),
                 "setitimer": self._set_timer,
                 "getitimer": self._get_timer,
                 "pause": self._pause,
@@ -109,6 +110,7 @@ class Signals:
     # ---- calls of the program ----
 
     def _set(self, number: int, handler: Any, /) -> Any:
+        self._check_main_thread("signal")
         before = self._get(number)
         is_heard = (
             callable(handler)
@@ -124,10 +126,15 @@ class Signals:
         return self._handlers[number] if number in self._handlers else signal.getsignal(number)
 
     def _set_wakeup(self, descriptor: int, /, **options: Any) -> int:
+        self._check_main_thread("set_wakeup_fd")
         # The real one is KiKS's; this checks what the program gives.
         signal.set_wakeup_fd(signal.set_wakeup_fd(descriptor, **options), warn_on_full_buffer=False)
         before, self._wakeup = self._wakeup, descriptor
         return before
+
+    def _check_main_thread(self, name: str) -> None:
+        if self._scheduler.current is not self._scheduler.main:
+            raise ValueError(f"{name} only works in main thread of the main interpreter")
 
     def _set_timer(self, which: int, seconds: float, interval: float = 0.0, /) -> tuple[float, float]:
         self._check_timer(which)
@@ -156,7 +163,7 @@ class Signals:
         return self._masks.get(self._scheduler.main, set())
 
     def _set_mask(self, how: int, mask: Iterable[int], /) -> set[int]:
-        task, given = self._scheduler.current, {int(each) for each in mask}
+        task, given = self._scheduler.current, _checked(mask)
         before = self._masks.get(task, self._blocked)
         masks: dict[int, set[int]] = {
             signal.SIG_BLOCK: before | given,
@@ -178,7 +185,7 @@ class Signals:
 
     def _wait_for(self, signals: Iterable[int], until_ns: int) -> int:
         """Wait for one of several signals until a time [ns]; return its number, or 0."""
-        wanted = {int(each) for each in signals}
+        wanted = _checked(signals)
         while not (found := wanted & self._pending):
             if self._scheduler.world.now_ns >= until_ns:
                 return 0
@@ -307,6 +314,12 @@ class _FromOutside:
         if block_ms:
             time.sleep(block_ms / 1000)
         return False
+
+
+def _checked(signals: Iterable[int]) -> set[int]:
+    given = {int(each) for each in signals}
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, given)  # says what is wrong; the operating system has blocked none
+    return given
 
 
 def _told(number: int) -> signal.struct_siginfo:

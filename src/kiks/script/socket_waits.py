@@ -79,7 +79,8 @@ def replacements(scheduler: Scheduler, files: Files) -> dict[str, dict[str, Any]
 
     def wait(sock: Any, event: int) -> None:
         timeout_s = sock.gettimeout()
-        if not files.wait_for(sock.fileno(), event, timeout_s) and timeout_s != 0:
+        # Of a closed one, its method says so.
+        if sock.fileno() >= 0 and not files.wait_for(sock.fileno(), event, timeout_s) and timeout_s != 0:
             raise TimeoutError("timed out")
 
     def reading(name: str) -> Any:

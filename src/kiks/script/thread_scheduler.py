@@ -116,7 +116,7 @@ class Scheduler:
         self.before_time: list[Callable[[], object]] = []
         self.carried: list[tuple[Callable[[], object], Callable[[Any], object]]] = []
         self.os_thread = get_ident()
-        self._hub = greenlet.getcurrent()
+        self._hub = self._starter = greenlet.getcurrent()
         self._end: EndedError | None = None
         self._new_idents, self._free_idents = new_idents(), list[int]()
         self._numbers = count(1)
@@ -156,6 +156,7 @@ class Scheduler:
                 errors.append(error)
 
         self._hub = greenlet.getcurrent()
+        self._starter = greenlet.greenlet(self._start_threads, self._hub)
         self.main.greenlet = greenlet.greenlet(run_main, self._hub)
         self.program.thread = self.main.clock
         take, put = thread_values()
@@ -164,6 +165,7 @@ class Scheduler:
         self._switch(self.main)
         # The program may have ended in any of its threads.
         put(values)
+        self._starter.throw()
         # What libraries in C keep of this program must not take later callers for it.
         self.os_thread = 0
         if self.tasks or not self.main.greenlet.dead:
@@ -198,7 +200,7 @@ class Scheduler:
             heapq.heappush(self._free_idents, task.ident)
             # When a greenlet ends, its parent goes on: the next thread.
             self._is_choosing = True
-            task.greenlet.parent = self._choose().greenlet
+            task.greenlet.parent = self._way_to(self._choose())
             self._is_choosing = False
 
         ident = heapq.heappop(self._free_idents) if self._free_idents else next(self._new_idents)
@@ -375,9 +377,21 @@ class Scheduler:
     def _switch(self, task: Task) -> None:
         """Let a thread go on, which finds no values of this one; return when this one goes on."""
         saved = [(put, take()) for take, put in self.carried]
-        task.greenlet.switch()
+        self._way_to(task).switch()
         for put, value in reversed(saved):
             put(value)
+
+    def _way_to(self, task: Task) -> greenlet.greenlet:
+        """Return the greenlet of the current thread, or the one that lets it begin."""
+        return task.greenlet if task.greenlet else self._starter
+
+    def _start_threads(self) -> NoReturn:
+        """Let the current thread begin, at each switch to here.
+
+        A greenlet begins as deep in the limit of recursion as the one that switches to it: so none begins from another.
+        """
+        while True:
+            self.current.greenlet.switch()
 
     def _choose(self) -> Task:
         """Return the next thread; let time pass until one is ready."""

@@ -83,13 +83,13 @@ def answer(client: SessionClient, line: str) -> str:
             )
         if client.awaited.is_halted:
             raise HaltError(HALT_MESSAGE)
-        return f"+{client.clock()}{result}"
+        return f"+{client.stamp()}{result}"
     except TurretOrder as asked:
         number, order = asked.args
-        return f"?{client.clock()}{number} {escape(order)}"
+        return f"?{client.stamp()}{number} {escape(order)}"
     except KiksError as error:
         if client.take_halt():
-            return f"{HALTED}{client.clock()}{escape(HALT_MESSAGE)}"
+            return f"{HALTED}{client.stamp()}{escape(HALT_MESSAGE)}"
         why = str(error)
     except OSError as error:
         why = f"{shown(name)} must be able to use its file, but is not: {shown(error.strerror)}. Give another."
@@ -100,7 +100,7 @@ def answer(client: SessionClient, line: str) -> str:
         why = f"KiKS itself has failed at {shown(name)}: {shown(error)}. Please tell its makers."
     if len(why) > REASON_MAX:
         why = f"{why[: REASON_MAX // 2]} ... {why[-REASON_MAX // 4 :]}"
-    return f"{REFUSED}{client.clock()}{escape(why)}"
+    return f"{REFUSED}{client.stamp()}{escape(why)}"
 
 
 # ---- the desk ----
@@ -259,6 +259,24 @@ def _pause(client: SessionClient, words: str) -> None:
     client.pause(seconds)
 
 
+def _rest(client: SessionClient, words: str) -> str:
+    """Pause, unless the program must do so itself; return which."""
+    if client.waits_itself():
+        return "1"
+    _pause(client, words)
+    return "0"
+
+
+def _tic(client: SessionClient, words: str) -> None:
+    (ago_s,) = numbers_of(words.split() or ["0"], 1, "a time")
+    client.ask_clock().tic(round(ago_s * 1e6))
+
+
+def _toc(client: SessionClient, words: str) -> str:
+    passed_us = client.ask_clock().toc_us()
+    return "" if passed_us is None else str(passed_us)
+
+
 REQUESTS: dict[str, Act] = {
     "version": lambda client, words: __version__,
     "set": _set,
@@ -289,6 +307,10 @@ REQUESTS: dict[str, Act] = {
     "time": _time,
     "pass": _pass,
     "pause": _pause,
+    "rest": _rest,
+    "clock": lambda client, words: str(client.ask_clock().now_us()),
+    "tic": _tic,
+    "toc": _toc,
     "pace": lambda client, words: numbers_text(100.0 * speed for speed in client.pace()),
     "pulse": ask_pulse,
     "pose": ask_pose,

@@ -24,6 +24,7 @@ from kiks.sim.simulation import Simulation
 from kiks.toolbox.own_turrets import OwnTurret, TurretOrder, turret_of
 from kiks.toolbox.robot_elsewhere import ElsewhereConnection
 from kiks.toolbox.session import Session
+from kiks.toolbox.session_clock import SessionClock
 from kiks.toolbox.session_film import SessionFilm
 from kiks.toolbox.wire_format import escape
 from kiks.units import s_from_ns
@@ -102,6 +103,7 @@ class SessionClient:
         turrets: The names of the turrets that are functions of the program, by their numbers.
         last_line: Number of the line of the desk's log that it has printed last; 0 for none.
         typed: Commands for the program to evaluate that people have typed on the desk, the oldest first.
+        clock: What `tic`, `toc` and the like of the program tell.
     """
 
     def __init__(self, session: Session, number: int, awaited: AwaitedAnswer | None = None) -> None:
@@ -116,6 +118,7 @@ class SessionClient:
         self.turrets: dict[int, str] = {}
         self.last_line = 0
         self.typed: deque[str] = deque()
+        self.clock = SessionClock()
         self._place: object = None
         self._connection: LocalConnection | ElsewhereConnection | None = None
         self._pace = 1.0, 1.0
@@ -353,11 +356,12 @@ class SessionClient:
 
     # ---- time ----
 
-    def clock(self) -> str:
+    def stamp(self) -> str:
         """Return the port of the request and the time since its opening [s], in 19 characters; 0 for no port.
 
         The number is negative if thinking is measured: then time passes on between requests.
         """
+        self._set_clock()
         opened = self.ports.get(self.asked)
         if opened is None or self._connection is None:
             return "  0     0.000000000"
@@ -370,6 +374,19 @@ class SessionClient:
             return None
         opened = self.opened(number)
         return s_from_ns(opened.port.ask_ns() - opened.opened_ns)
+
+    def ask_clock(self) -> SessionClock:
+        """Return the program's clock; looking at it may take simulated time, as a poll does."""
+        if self.ports:
+            self.opened(next(iter(self.ports))).port.ask_ns()
+        self._set_clock()
+        return self.clock
+
+    def waits_itself(self) -> bool:
+        """Return whether a real pause of the program lets the right time pass: it is measured, and not scaled."""
+        desk = self.session.desk
+        is_paced = desk is not None and desk.present.gate.speed is not None
+        return not self.ports or (self._program.is_real_time and not is_paced)
 
     def pause(self, seconds: float) -> None:
         """Let simulated time pass [s].
@@ -430,6 +447,10 @@ class SessionClient:
     def _usual_robot(self, number: int) -> int:
         """Return the preferred robot of a port: the ports of program 1 begin with robot 1, and so on."""
         return self.number + number - 1
+
+    def _set_clock(self) -> None:
+        """Let the program's clock follow the world while a port is open; called after each request."""
+        self.clock.follow(self._connection if self.ports else None)
 
     def _meet(self) -> None:
         """Advance the world to the program's time."""

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from importlib.abc import MetaPathFinder
 from importlib.machinery import ModuleSpec
+from operator import attrgetter
 from types import ModuleType
 
 from kiks.script.cpython import Undo
@@ -28,16 +29,46 @@ def _adapters() -> dict[str, Adapter]:
         "curses": c_waits.adapt_curses,
         "cv2": _adapt_cv2,
         "numpy": c_calls.adapt_extension("numpy._core._multiarray_umath"),
-        "numpy.random": _seed_numpy,
         "pydantic_core": c_calls.adapt_extension("pydantic_core._pydantic_core"),
         "sqlite3": c_calls.adapt_sqlite,
+        "ssl": lambda _, host: {"_ssl": dict.fromkeys(("RAND_bytes", "RAND_priv_bytes"), host.chance.read)},
+        **{name: _adapt_chance(seed, bits) for name, (seed, bits) in _SEEDS.items()},
+        **dict.fromkeys(_OF_THEIR_OWN.split(), _adapt_chance()),
     }
 
 
-def _seed_numpy(module: ModuleType, host: Host) -> Replacements:
-    """Seed the generator that NumPy's functions share."""
-    module.seed(host.chance.number("numpy", 32))
-    return {}
+_SEEDS = {
+    "cupy.random": ("seed", 32),
+    "graph_tool": ("seed_rng", 31),
+    "numpy.random": ("seed", 32),
+    "paddle": ("seed", 31),
+    "polars": ("set_random_seed", 63),
+    "tensorflow": ("random.set_seed", 31),
+    "torch": ("manual_seed", 63),
+}
+"""Libraries with a generator in C that one call seeds, with the bits of the seed.
+
+Others need none: their generators are Python's or NumPy's (igraph, scikit-learn), are seeded by the same number in each
+process (OpenCV, XGBoost, LightGBM), or want a seed at each call (JAX, PyArrow).
+"""
+
+_OF_THEIR_OWN = "cryptography duckdb fastuuid nacl panda3d rpy2 rustworkx uuid_utils whenever"
+"""Libraries that draw by chance, or tell a time, in C, and let nobody seed that."""
+
+
+def _adapt_chance(seed: str = "", bits: int = 0) -> Adapter:
+    """Return an adapter that seeds a library by its function `seed`, or notes that its chance is its own."""
+
+    def adapt(module: ModuleType, host: Host) -> Replacements:
+        library = module.__name__.partition(".")[0]
+        try:
+            attrgetter(seed)(module)(host.chance.number(library, bits))
+        except Exception:
+            # It has none, or none in this version, or lacks its device.
+            host.chance.doubt(library)
+        return {}
+
+    return adapt
 
 
 def _adapt_cv2(_: ModuleType, host: Host) -> Replacements:

@@ -37,6 +37,7 @@ _LOADED_ALREADY = 4
 _SEED = 28
 """SQLITE_TESTCTRL_PRNG_SEED (sqlite3.h)."""
 
+_Ident = ctypes.CFUNCTYPE(ctypes.c_ulong)
 _Time = ctypes.CFUNCTYPE(ctypes.c_int64, ctypes.POINTER(ctypes.c_int64))
 _TimeOfDay = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.POINTER(ctypes.c_int64), ctypes.c_void_p)
 _GetTime = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_int, ctypes.POINTER(ctypes.c_int64))
@@ -64,7 +65,9 @@ def redirect(path: str, functions: Mapping[str, tuple[Any, Any]], host: Host) ->
         library = ctypes.CDLL(path, mode=_LOADED_ALREADY)
         for name, place in _entries(path, tuple(functions)):
             kind, function = functions[name]
-            body = kind(_for_program(function, kind((name, library)), host))
+            # A function of Python itself is not in a library if that is in one piece.
+            real = kind((name, library if hasattr(library, name) else ctypes.pythonapi))
+            body = kind(_for_program(function, real, host))
             _KEPT.append(body)
             _write(place, ctypes.cast(body, ctypes.c_void_p).value or 0)
 
@@ -110,7 +113,12 @@ def adapt_extension(name: str) -> Callable[[ModuleType, Host], Replacements]:
 
 
 def adapt_sqlite(module: ModuleType, host: Host) -> Replacements:
-    """Let `current_timestamp` and the like tell the program's date, and `random` follow from its seed."""
+    """Let `current_timestamp` and the like tell the program's date, and `random` follow from its seed.
+
+    An object refuses another thread than its own, which is one of the program.
+    """
+    ident = {"PyThread_get_thread_ident": (_Ident, lambda: host.scheduler.current.ident)}
+    redirect(sys.modules["_sqlite3"].__file__ or "", ident, host)
     for each in loaded("sqlite3"):
         redirect(each, date_functions(lambda: host.scheduler.world.now_ns), host)
         with suppress(OSError, AttributeError):
