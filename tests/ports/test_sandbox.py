@@ -52,12 +52,12 @@ while True: pass
 """
 
 HOSTILE = {
-    # Forks that KiKS sees are refused already, as a program in simulated time is one process. The pause spares the other
+    # What KiKS sees of forks it refuses, as a program in simulated time is one process. The pause spares the other
     # tests: where they run as the superuser, only the sandbox counts processes.
     "started more than 8 processes": "c = ctypes.CDLL(None)\nwhile True: c.__fork(), c.usleep(5000)",
     "used more than 150 MB of memory": "kept = []\nwhile True: kept.append(b'x' * (1 << 20))",
     "computed for 0.5 s without using its robot": "while True: pass",
-    "waited for 1.5 s without using its robot": "ctypes.CDLL(None).sleep(100)",
+    "waited for 1.5 s without using its robot": 'ctypes.CDLL(None).execl(b"/bin/sleep", b"sleep", b"100", None)',
     "printed more than 0.5 MB": "while True: os.write(1, b'x' * 4095 + b'\\n')",
     "sent a message of 4294967295 bytes to the world": SENDS.replace("DATA", r'b"\xff" * 1000'),
     "sent something to the world that is no message": SENDS.replace("DATA", r'b"\x02\0\0\0\x01\x02"'),
@@ -131,7 +131,8 @@ import ctypes, os, sys
 words = [sys.executable, os.path.join(os.path.dirname(__file__), "program.py"), *sys.argv[1:]]
 words = [os.fsencode(word) for word in words]
 c = ctypes.CDLL(None)
-c.fexecve(os.open(words[0], os.O_RDONLY), (ctypes.c_char_p * (len(words) + 1))(*words), ctypes.c_void_p.in_dll(c, "environ"))
+words, environment = (ctypes.c_char_p * (len(words) + 1))(*words), ctypes.c_void_p.in_dll(c, "environ")
+c.fexecve(os.open(words[0], os.O_RDONLY), words, environment)
 """
 
 PROWLER = """

@@ -89,6 +89,8 @@ _type_modified.restype = None
 _own, _disown = ctypes.pythonapi.Py_IncRef, ctypes.pythonapi.Py_DecRef
 _own.argtypes = _disown.argtypes = [ctypes.py_object]
 _own.restype = _disown.restype = None
+_open_file = ctypes.CDLL(None, use_errno=True).fopen
+_open_file.restype, _open_file.argtypes = ctypes.c_void_p, [ctypes.c_char_p] * 2
 _run_file = ctypes.pythonapi.PyRun_FileExFlags
 _run_file.restype = ctypes.py_object
 _run_file.argtypes = [
@@ -194,9 +196,7 @@ def run_source(path: str, names: dict[str, Any]) -> None:
     Python reads it itself: what has been read already, as bytes, it compiles without checking that they are what the
     file declares.
     """
-    open_file = ctypes.CDLL(None, use_errno=True).fopen
-    open_file.restype, open_file.argtypes = ctypes.c_void_p, [ctypes.c_char_p] * 2
-    file = open_file(os.fsencode(path), b"rbe")
+    file = _open_file(os.fsencode(path), b"rbe")
     if not file:
         raise OSError(ctypes.get_errno(), os.strerror(ctypes.get_errno()), path)
     _run_file(file, os.fsencode(path), _FILE_INPUT, names, names, True, None)
