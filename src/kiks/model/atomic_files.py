@@ -328,7 +328,7 @@ def within(folder: Path, text: str, what: str) -> Path:
     except (OSError, ValueError, RuntimeError):
         # A NUL character, or links that lead in a circle.
         home, path = folder, folder.parent
-    if not path.is_relative_to(home) or path == home or Path(text).is_absolute():
+    if not path.is_relative_to(home) or path == home:
         raise ParameterError(
             f"{what} must lie in the folder of the file that names it, or below, but {shown(text)} leads elsewhere. "
             "Copy it there."
