@@ -11,11 +11,12 @@ import typer
 
 from kiks.cli.engine_start import ready_engine
 from kiks.cli.job import demonstration_of
-from kiks.cli.options import SeedOrOwn, Trusted, Workers, print_table, progress_bar, say
+from kiks.cli.options import SeedOrOwn, Trusted, Workers, progress_bar, say
 from kiks.cli.outputs import has_results, leave_out, shows_progress, tell_results
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import KiksError, ParameterError, counted, printable
 from kiks.meant import nearest_file
+from kiks.table import Table
 
 if TYPE_CHECKING:
     from kiks.trials.submissions import Submission
@@ -119,7 +120,7 @@ def tournament(
     except KeyboardInterrupt:
         say(f"stopped after {counted(done, 'game')}. The same command goes on from there.")
         raise
-    print_table(HEADS, rows_of(made))
+    typer.echo(Table(HEADS, rows_of(made)).for_output())
     for each_played in made.played:
         for text in each_played.notes:
             say(printable(f"{' - '.join(each_played.names)}, seed {each_played.game.seed}: {text}."))
