@@ -9,6 +9,7 @@ from PIL import Image
 from kiks import Arena, Khepera, ParameterError, Recording, Simulation
 from kiks.export.kinds import ENDINGS, KINDS, export, kind_of, options_of
 from kiks.export.pictures import Picture
+from kiks.model.replaceable import FOXGLOVE, RECORDING, is_replaceable
 
 
 @pytest.fixture(scope="module")
@@ -74,6 +75,30 @@ def test_tables_are_the_same_in_each_kind_of_file(recording: Recording, tmp_path
         assert len(lines) == 1 + len(wanted)
         assert lines[0].split(",") == [column for column in found if not column.startswith("__")]
     assert loadmat(tmp_path / "wire.mat")["data"][0, 0][0] == r"D,9,5\n"
+
+
+@pytest.mark.parametrize(
+    ("kind", "ending"), [(kind, ending) for kind in KINDS if kind != "photo" for ending in KINDS[kind].endings]
+)
+def test_what_an_export_has_written_may_be_replaced(
+    recording: Recording, tmp_path: Path, kind: str, ending: str
+) -> None:
+    recording.export(file := tmp_path / f"run{ending}", kind=kind)
+    assert is_replaceable(file, ending)
+    others = {each for each in ENDINGS if is_replaceable(file, each)} - {ending}
+    assert not others & {".csv", ".html", ".mcap"}
+    assert not is_replaceable(file, RECORDING)
+    if ending in (".gif", ".webp"):
+        with Image.open(file) as image:
+            assert getattr(image, "n_frames", 1) > 2
+
+
+def test_a_recording_is_not_replaced_by_what_is_made_of_it(recording: Recording) -> None:
+    file = recording.log.reader.path  # type: ignore[attr-defined]
+    assert is_replaceable(file, RECORDING)
+    assert not is_replaceable(file, FOXGLOVE)
+    with pytest.raises(ParameterError, match=r"must be another file than its recording, but '.*run\.mcap' is that"):
+        recording.export(file)
 
 
 def test_each_ending_has_a_kind_whose_options_are_those_of_its_function() -> None:

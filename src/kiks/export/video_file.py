@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import struct
 from collections.abc import Iterable
 from fractions import Fraction
 from pathlib import Path
@@ -11,6 +13,7 @@ import numpy as np
 
 from kiks.export.palette import Palette
 from kiks.export.stage import Pixels
+from kiks.model.replaceable import MADE_BY
 
 MP4, GIF, WEBP = ".mp4", ".gif", ".webp"
 
@@ -32,6 +35,7 @@ class VideoFile:
         import av
         from av.video.stream import VideoStream
 
+        self._path, self._ending = path, ending
         self._palette = Palette(samples) if ending == GIF else None
         self._count, self._time_base = 0, Fraction(1, fps)
         codec, pixel_format = _CODECS[ending]
@@ -65,3 +69,22 @@ class VideoFile:
                 self._container.mux(self._stream.encode(None))
         finally:
             self._container.close()
+        if kind is None:
+            _sign(self._path, self._ending)
+
+
+def _sign(path: Path, ending: str) -> None:
+    """Leave `MADE_BY` at the end of a film's file, where its format has a comment, which its writer cannot write."""
+    mark = MADE_BY.encode()
+    with path.open("r+b") as file:
+        size = file.seek(0, os.SEEK_END)
+        if ending == MP4:
+            file.write(struct.pack(">I", 8 + len(mark)) + b"free" + mark)
+        elif ending == GIF:
+            file.seek(size - 1)  # before the trailer
+            file.write(b"!\xfe" + bytes([len(mark)]) + mark + b"\0;")
+        else:
+            file.write(b"KiKS" + struct.pack("<I", len(mark)) + mark + b"\0" * (len(mark) % 2))
+            size = file.tell() - 8
+            file.seek(4)
+            file.write(struct.pack("<I", size))
