@@ -57,6 +57,7 @@ def grade(
     from kiks.trials.grading import grade as graded_of
     from kiks.trials.grading import load_exercise, trials_of
     from kiks.trials.report import save_grades
+    from kiks.trials.runner import OUTCOMES
     from kiks.trials.submissions import submissions_in
 
     project, folder = load_exercise(exercise)
@@ -64,7 +65,7 @@ def grade(
         with Sandbox() as sandbox:
             sandbox.warm()  # Without one nothing is copied or compiled.
     out = Path(f"grades-{exercise.stem}") if out is None else out
-    with alone_in(out, "--out"):
+    with alone_in(out, "--out", OUTCOMES):
         found = submissions_in(submissions, out / "programs")
         count = len(trials_of(project, folder, found))
         ready_engine()

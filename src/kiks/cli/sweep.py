@@ -88,6 +88,7 @@ def sweep(
     Example: kiks sweep wander.py --baud 9600,19200 --think 0..40:2 --family 10 --seeds 20
     """
     from kiks.model.atomic_files import alone_in
+    from kiks.trials.runner import OUTCOMES
     from kiks.trials.sweep import Axes
     from kiks.trials.sweep import sweep as swept
     from kiks.trials.sweep_plot import save_sweep_plot
@@ -102,7 +103,7 @@ def sweep(
     )
     count = len(axes.cases())
     folder = out or Path(f"kiks-sweep-{Path(program).stem}")
-    context.with_resource(alone_in(folder, "--out"))
+    context.with_resource(alone_in(folder, "--out", OUTCOMES))
     goal, name = project.goal, Path(program).name
     assert goal is not None
     end_as_with_ctrl_c()

@@ -66,6 +66,7 @@ def tournament(
     """
     from kiks.model.atomic_files import alone_in
     from kiks.model.shipped import demonstrations
+    from kiks.trials.runner import OUTCOMES
     from kiks.trials.submissions import submissions_in
     from kiks.trials.tournament import Match, play
     from kiks.trials.tournament_report import HEADS, PAGE, results_of, rows_of, save_tournament
@@ -78,7 +79,7 @@ def tournament(
         )
     chosen = Match.load(path)
     out = out or Path(f"tournament-{chosen.title}")
-    context.with_resource(alone_in(out, "--out"))
+    context.with_resource(alone_in(out, "--out", OUTCOMES))
     found = submissions_in(players, out / "programs", "PLAYERS")
     for each in found:
         if each.problem:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import struct
 from collections.abc import Iterable
 from fractions import Fraction
@@ -35,8 +34,7 @@ class VideoFile:
         import av
         from av.video.stream import VideoStream
 
-        self._path, self._ending = path, ending
-        self._palette = Palette(samples) if ending == GIF else None
+        self._path, self._palette = path, Palette(samples) if ending == GIF else None
         self._count, self._time_base = 0, Fraction(1, fps)
         codec, pixel_format = _CODECS[ending]
         self._container = av.open(str(path), "w", format=ending[1:], container_options=_CONTAINERS[ending])
@@ -70,21 +68,6 @@ class VideoFile:
         finally:
             self._container.close()
         if kind is None:
-            _sign(self._path, self._ending)
-
-
-def _sign(path: Path, ending: str) -> None:
-    """Leave `MADE_BY` at the end of a film's file, where its format has a comment, which its writer cannot write."""
-    mark = MADE_BY.encode()
-    with path.open("r+b") as file:
-        size = file.seek(0, os.SEEK_END)
-        if ending == MP4:
-            file.write(struct.pack(">I", 8 + len(mark)) + b"free" + mark)
-        elif ending == GIF:
-            file.seek(size - 1)  # before the trailer
-            file.write(b"!\xfe" + bytes([len(mark)]) + mark + b"\0;")
-        else:
-            file.write(b"KiKS" + struct.pack("<I", len(mark)) + mark + b"\0" * (len(mark) % 2))
-            size = file.tell() - 8
-            file.seek(4)
-            file.write(struct.pack("<I", size))
+            # A box that no player reads; what follows a whole GIF or WebP, none reads either.
+            with self._path.open("ab") as file:
+                file.write(struct.pack(">I4s", 8 + len(MADE_BY), b"free") + MADE_BY.encode())
