@@ -20,6 +20,7 @@ LAYERS = [
         "meant",
         "unknown_names",
         "units",
+        "table",
         "ending",
         "model",
         "engine",

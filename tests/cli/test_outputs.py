@@ -13,19 +13,32 @@ import typer
 from tests.cli.test_cli import RESULTS, WANDER
 
 from kiks.cli import app
-from kiks.cli.outputs import _RESULTS, BEGINNINGS, _alone
+from kiks.cli.outputs import _RESULTS, _alone
 from kiks.errors import ParameterError
 from kiks.model.arena import Arena
 from kiks.model.arena_file import save_arena
+from kiks.model.replaceable import MADE_BY
 
+MCAP = b"\x89MCAP0\r\n\x01" + bytes(8)
 LIKE = {
-    "": b"12345\n",
-    ".csv": b"time_s,robot\n",
-    ".mp4": b"\0\0\0\x20ftypisom",
-    ".svg": b"<svg ",
-    ".webp": b"RIFF\x01\x02\x03\x04WEBP",
+    "thinking times": b"12345\n678\n",
+    "recording": MCAP + b"\x04\0\0\0kiks\x0a\0\0\0kiks 3.0.0",
+    ".mcap": MCAP + b"\0\0\0\0\x0a\0\0\0kiks 3.0.0",
+    ".csv": b"time_s,robot,x_mm\n",
+    ".html": b'<!DOCTYPE html>\n<html>\n<meta name="generator" content="KiKS 3.0.0">',
 }
-"""How files of a kind begin whose `BEGINNINGS` are no plain bytes."""
+"""How files begin that KiKS has written, of the kinds without a mark."""
+
+PRECIOUS = {
+    "": b"12345\n678 not a number\n",
+    ".mcap": LIKE["recording"],
+    ".csv": b"time_s,proximity_0_counts\n",
+    ".html": b"<!DOCTYPE html>\n<p>KiKS</p>",
+    ".pdf": b"%PDF-1.4 a thesis",
+    ".png": b"\x89PNG a drawing",
+    ".svg": b"<svg ",
+}
+"""How files begin that end as those of KiKS, and that nothing can make again."""
 
 
 @cache
@@ -43,14 +56,14 @@ def told(*words: object) -> dict[str, Any]:
     return found
 
 
-def outputs() -> Iterator[tuple[tuple[str, str], str]]:
-    """Yield all outputs of all commands, with each of their endings."""
+def outputs() -> Iterator[tuple[tuple[str, str], str, str]]:
+    """Yield all outputs of all commands, with each of their endings, and the kind of such a file."""
     commands = {**group().commands, **group().commands["arena"].commands}
     del commands["demo"]  # another name of run
     for name, command in commands.items():
-        for param, (endings, _, _, is_new) in getattr(command, "_outputs", ()):
+        for param, (endings, _, _, kind, is_new) in getattr(command, "_outputs", ()):
             for ending in () if is_new else endings or ("",):
-                yield (name, str(param.name)), ending
+                yield (name, str(param.name)), ending, kind or ending
 
 
 OUTPUTS = list(outputs())
@@ -62,29 +75,31 @@ def words_for(output: tuple[str, str], path: Path) -> list[str]:
 
 def test_all_outputs_are_known() -> None:
     unchecked = {("monitor", "csv"), ("evolve", "out"), ("sweep", "out")}  # a new file; folders
-    assert {output for output, _ in OUTPUTS} == set(RESULTS) - unchecked
+    assert {output for output, _, _ in OUTPUTS} == set(RESULTS) - unchecked
 
 
-@pytest.mark.parametrize(("output", "ending"), OUTPUTS)
-def test_only_its_like_is_replaced_without_force(output: tuple[str, str], ending: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("output", "ending", "kind"), OUTPUTS)
+def test_only_what_kiks_has_written_of_its_kind_is_replaced_without_force(
+    output: tuple[str, str], ending: str, kind: str, tmp_path: Path
+) -> None:
     path = tmp_path / f"place{ending}"
     words = words_for(output, path)
     assert told(*words)[output[1]] == path
     path.write_bytes(b"")  # nothing is lost with it
     told(*words)
-    beginning = BEGINNINGS.get(ending)
-    if beginning is not None:
-        path.write_bytes(LIKE.get(ending) or beginning.replace(b"\\x89", b"\x89").replace(b"\\xff\\xd8", b"\xff\xd8"))
+    if ending != ".toml":
+        path.write_bytes(LIKE.get(kind) or bytes(200_000) + MADE_BY.encode())
         told(*words)
-    path.write_bytes(b"precious")
+    precious = LIKE[".mcap"] if kind == "recording" else PRECIOUS.get(ending, b"precious")
+    path.write_bytes(precious)
     with pytest.raises(ParameterError, match=r"must be new.*exists\. Choose another name or add --force"):
         told(*words)
     names = 1 + (words[0] == "arena")
     assert told(*words[:names], "--force", *words[names:])[output[1]] == path
-    assert path.read_bytes() == b"precious"
+    assert path.read_bytes() == precious
 
 
-@pytest.mark.parametrize("output", sorted({output for output, ending in OUTPUTS if ending}))
+@pytest.mark.parametrize("output", sorted({output for output, ending, _ in OUTPUTS if ending}))
 def test_an_output_has_one_of_its_endings_and_is_no_folder(output: tuple[str, str], tmp_path: Path) -> None:
     (tmp_path / "folder.html").mkdir()
     for name, why in (("student.py", "must end in "), ("other", "must end in "), ("folder.html", "it is a folder")):

@@ -14,6 +14,7 @@ from kiks.recording.tables import TABLES
 
 ENCODERS = (10, 4)
 """What the robot's first `H` is answered."""
+from kiks.model.replaceable import FOXGLOVE, RECORDING, is_replaceable
 
 
 @pytest.fixture(scope="module")
@@ -104,6 +105,30 @@ def test_tables_enter_pandas_and_are_the_same_in_each_kind_of_file(recording: Re
     twice = batch.run(controllers.linear(), ahead, seconds=0.1, measures=[measures.goal_mm(1, k) for k in (1, 2)])
     with pytest.raises(ParameterError, match=r"must have different names, .*measure\.named"):
         twice.columns()
+
+
+@pytest.mark.parametrize(
+    ("kind", "ending"), [(kind, ending) for kind in KINDS if kind != "photo" for ending in KINDS[kind].endings]
+)
+def test_what_an_export_has_written_may_be_replaced(
+    recording: Recording, tmp_path: Path, kind: str, ending: str
+) -> None:
+    recording.export(file := tmp_path / f"run{ending}", kind=kind)
+    assert is_replaceable(file, ending)
+    others = {each for each in ENDINGS if is_replaceable(file, each)} - {ending}
+    assert not others & {".csv", ".html", ".mcap"}
+    assert not is_replaceable(file, RECORDING)
+    if ending in (".gif", ".webp"):
+        with Image.open(file) as image:
+            assert getattr(image, "n_frames", 1) > 2
+
+
+def test_a_recording_is_not_replaced_by_what_is_made_of_it(recording: Recording) -> None:
+    file = recording.log.reader.path  # type: ignore[attr-defined]
+    assert is_replaceable(file, RECORDING)
+    assert not is_replaceable(file, FOXGLOVE)
+    with pytest.raises(ParameterError, match=r"must be another file than its recording, but '.*run\.mcap' is that"):
+        recording.export(file)
 
 
 def test_each_ending_has_a_kind_whose_options_are_those_of_its_function() -> None:

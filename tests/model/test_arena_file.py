@@ -1,6 +1,7 @@
 """Pictures and arena files: every format that is read, and the words of every refusal."""
 
 import math
+import re
 import struct
 from dataclasses import replace
 from itertools import product
@@ -296,22 +297,106 @@ def test_a_picture_with_black_walls_is_turned_round(tmp_path, caplog):
     refused("invert must come with a picture", Arena.load, file, error=ArenaError)
 
 
-def test_what_a_map_of_ros_does_not_know_to_be_free_is_wall_and_a_damaged_one_one_line(tmp_path):
-    walls = with_black_walls(tmp_path)
-    (tmp_path / "map.yaml").write_text(
-        "image: room.png\nresolution: 0.002\norigin: [0.0, 0.0, 0.0]\n"
-        "negate: 0\noccupied_thresh: 0.65\nfree_thresh: 0.196\n"
+def test_what_is_transparent_is_floor_black_or_white_and_a_picture_without_walls_draws_a_line(tmp_path, caplog):
+    """Black lines on a clear background, with a light shadow, as drawing programs write them."""
+    drawing = np.zeros((120, 150, 4), np.uint8)
+    drawing[20:100, 70:80], drawing[100:110, 70:80] = (0, 0, 0, 255), (0, 0, 0, 60)
+    Image.fromarray(drawing).save(tmp_path / "room.png")
+    assert not Arena.load(tmp_path / "room.png").brightness.any()
+    assert not Arena.load(write(tmp_path, 'picture = "room.png"')).brightness.any()
+    assert caplog.text.count("has no wall: black (0) is floor, and all else wall. In most other programs walls") == 2
+    inverted = Arena.load(write(tmp_path, 'picture = "room.png"\ninvert = true\nfloor = "room.png"'))
+    assert np.array_equal(np.argwhere(inverted.brightness[::-1]), np.argwhere(drawing[..., 3] == 255))
+    assert np.array_equal(inverted.floor[::-1], 255 - drawing[..., 3])
+    caplog.clear()
+    assert not Arena.load(write(tmp_path, 'picture = "room.png"\ninvert = false')).brightness.any()
+    assert not caplog.text, "who says which way round it is knows"
+    for grey, words in ((0, "have floor, but all of it is wall: with invert = true, what is darker"), (255, "")):
+        Image.new("L", (120, 120), grey).save(tmp_path / "room.png")
+        file = write(tmp_path, 'picture = "room.png"\ninvert = true')
+        if words:
+            refused(words, Arena.load, file, error=ArenaError)
+    assert not Arena.load(file).brightness.any()
+    assert "has no wall: with invert = true, what is darker than a middle grey" in caplog.text
+
+
+def test_a_start_from_which_most_of_the_floor_is_out_of_reach_draws_a_line(tmp_path, caplog):
+    shapes = "size_mm = [600, 400]\n[[wall]]\nline_mm = [[150, 0], [150, 400]]\n"
+    starts = "[[start]]\nat_mm = [{}, 200]\n[[start]]\nat_mm = [400, 200]\n"
+    Arena.load(write(tmp_path, shapes + starts.format(300)))
+    door = "[[wall]]\nbox_mm = [[140, 170], [160, 230]]\nbrightness = 0\n"
+    Arena.load(write(tmp_path, shapes + door + starts.format(70)))
+    assert not caplog.text
+    Arena.load(write(tmp_path, shapes + starts.format(70)))
+    assert re.search(r"Start 1 of '.*a.toml', \(70, 200\) mm, lies in a part with 1\d % of the floor", caplog.text)
+    assert "Start 2" not in caplog.text
+    rooms = "".join(f"[[wall]]\nline_mm = [[{x_mm}, 0], [{x_mm}, 400]]\n" for x_mm in (200, 400))
+    Arena.load(write(tmp_path, f"size_mm = [600, 400]\n{rooms}"))
+    assert "The roomiest place of" in caplog.text
+
+
+MAP = "image: room.png\nresolution: 0.002\norigin: [-1.0, 2.0, 0.0]\nnegate: 0\noccupied_thresh: 0.65\n"
+"""A map without its free_thresh; keys in a row below replace those of the same name."""
+
+
+def ros_map(folder, keys):
+    lines = dict(line.split(": ", 1) for line in (MAP + "free_thresh: 0.196\n" + keys.format(folder)).splitlines())
+    (folder / "map.yaml").write_text("".join(f"{key}: {value}\n" for key, value in lines.items()))
+    return folder / "map.yaml"
+
+
+@pytest.mark.parametrize(
+    ("keys", "greys", "turns"),
+    [
+        ("", (0, 205, 254), 0),
+        ("free_thresh: 0.25\nmode: trinary", (0, 205, 254), 0),  # as Nav2 writes it
+        ("free_thresh: 0.9", (0, 205, 100), 0),
+        ("free_thresh: 0.25\nmode: scale", (0, None, 254), 0),
+        ("free_thresh: 0.25", (0, None, 254), 0),
+        ("free_thresh: 0.25\nnegate: 1", (255, 50, 1), 0),
+        ("free_thresh: 0.25\nnegate: 1", (255, None, 1), 0),
+        ("free_thresh: 0.25\nmode: raw", (100, 255, 0), 0),
+        ("origin: [0, 0, 1.570796]", (0, 205, 254), 1),
+        ("origin: [0, 0, -1.570796]", (0, 205, 254), -1),
+        ("image: {}/room.png", (0, 205, 254), 0),
+    ],
+)
+def test_what_a_map_of_ros_does_not_know_to_be_free_is_wall(tmp_path, keys, greys, turns):
+    """Walls at the top and on the left, unknown below, the rest free; no grey: transparent."""
+    drawn = np.full((120, 150), 2)
+    drawn[:10], drawn[:, :20], drawn[-5:] = 0, 0, 1
+    grey = np.array([each or 0 for each in greys], np.uint8)[drawn]
+    opacity = np.where(np.array([each is None for each in greys])[drawn], 0, 255).astype(np.uint8)
+    layers = (grey, opacity) if None in greys else (grey,)
+    Image.merge("LA" if len(layers) == 2 else "L", [Image.fromarray(each) for each in layers]).save(
+        tmp_path / "room.png"
     )
-    arena = Arena.load(tmp_path / "map.yaml")
-    assert (arena.width_mm, arena.height_mm, arena.name) == (300, 240, "map")
-    assert np.array_equal(arena.brightness[::2, ::2] > 0, walls)
+    arena = Arena.load(ros_map(tmp_path, keys))
+    assert np.array_equal(arena.brightness[::-2, ::2] > 0, np.rot90(drawn < 2, turns))
+    assert (arena.mm_per_cell, arena.name) == (1.0, "map")
+
+
+def test_a_map_of_ros_that_is_turned_a_little_is_wall_around(tmp_path):
+    Image.new("L", (120, 100), 254).save(tmp_path / "room.png")
+    arena = Arena.load(ros_map(tmp_path, "resolution: 0.001\norigin: [0, 0, 0.5]"))
+    assert (arena.width_mm, arena.height_mm) == pytest.approx((153, 145), abs=3)
+    assert (arena.brightness == 0).sum() == pytest.approx(120 * 100, rel=0.01)
+
+
+def test_a_damaged_map_of_ros_is_one_line(tmp_path):
+    with_black_walls(tmp_path)
     rest = "resolution: 0.01\noccupied_thresh: 0.65\nfree_thresh:"
     for text, words in (
         ("image: [room.png\n", "must be YAML, but: while parsing a flow sequence"),
         ("- a\n", "must be a table"),
         (f"image: ../room.png\n{rest} 0.2\n", "image"),
+        (f"image: {tmp_path.parent}/room.png\n{rest} 0.2\n", "image must lie in the folder of the file"),
         (f"image: room.png\n{rest} 2\n", "free_thresh must be at most 1"),
+        (f"image: room.png\n{rest} 0\n", "have floor, but all of it is wall: what the map does not know to be free"),
+        (f"image: room.png\nmode: raw\nnegate: 1\n{rest} 0.2\n", "negate must be 0 in mode raw"),
+        (f"image: room.png\norigin: [0, 0, .nan]\n{rest} 0.2\n", "origin"),
+        (f"image: room.png\norigin: [0, 0]\n{rest} 0.2\n", "origin"),
         (f"image: &a [*a, *a]\n{rest} 0.2\n", "image must be a text"),
     ):
         (tmp_path / "map.yaml").write_text(text)
-        refused(words, Arena.load, tmp_path / "map.yaml", error=ArenaError)
+        refused(f"^Map '.*map.yaml'.*{words}", Arena.load, tmp_path / "map.yaml", error=ArenaError)

@@ -25,8 +25,9 @@ def test_a_picture_is_what_its_parts_are(mode: str, monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr("kiks.model.picture._BAND_PIXELS", 1 << 14)
     whole = noise(mode, 130, 600)
     parts = [whole.crop((0, top, 130, top + 120)) for top in range(0, 600, 120)]
-    greys = [decode_picture(file_of(part), 1.0) for part in parts]
-    assert np.array_equal(decode_picture(file_of(whole), 1.0), np.concatenate(greys))
+    pixels = [decode_picture(file_of(part), 1.0) for part in parts]
+    for all_of_it, of_parts in zip(decode_picture(file_of(whole), 1.0), zip(*pixels, strict=True), strict=True):
+        assert np.array_equal(all_of_it, np.concatenate(of_parts))
 
 
 def file_of(image: Image.Image) -> bytes:

@@ -26,7 +26,6 @@ from kiks.model.goal import Goal
 from kiks.model.project import Project
 from kiks.ports.program_process import python_line
 from kiks.trials.grading import load_exercise
-from kiks.trials.tables import cell
 from kiks.trials.trial import Outcome
 
 GOOD = """
@@ -207,17 +206,19 @@ def test_what_cannot_be_graded_is_refused(tmp_path: Path) -> None:
 
 def test_two_runs_do_not_write_into_one_folder(tmp_path: Path) -> None:
     project, programs = exercise(tmp_path), write(tmp_path / "class", {"ann": GOOD})
-    with alone_in(tmp_path / "out", "it"):
+    with alone_in(tmp_path / "out", "it", "outcomes.jsonl"):
         done = grade(project, programs, "--trusted", "--out", tmp_path / "out")
     assert done.returncode == 2
     assert "--out must belong to one run, but another one writes into" in done.stderr
 
 
-def test_no_cell_begins_a_formula() -> None:
-    for text in ("=1+1", "+1", "-1", "@sum", "\t=1", " =1"):
-        assert str(cell(text)).startswith("'")
-    assert cell("a\r\nb\0") == "a  b "
-    assert cell(-1.5) == -1.5
+def test_what_lies_in_a_folder_of_others_is_not_replaced(tmp_path: Path) -> None:
+    (tmp_path / "moodle.csv").write_text("the class")
+    project = exercise(tmp_path)
+    done = grade(project, write(tmp_path / "class", {"ann": GOOD}), "--trusted", "--out", tmp_path)
+    assert done.returncode == 2
+    assert "--out must be a new folder, an empty one, or that of an earlier run, but" in done.stderr
+    assert (tmp_path / "moodle.csv").read_text() == "the class"
 
 
 def test_without_a_sandbox_nothing_runs(tmp_path: Path) -> None:

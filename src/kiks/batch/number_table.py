@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kiks.errors import counted
+from kiks.table import Table
 
 FIRST = 10
 """Number of rows that a table shows before it summarizes the others."""
@@ -60,9 +61,7 @@ class NumberTable:
         return f"<NumberTable: {counted(self.row_count, 'row')} of {', '.join(self.head)}>"
 
     def __str__(self) -> str:
-        rows = self.head, *self.rows, *self.sums
-        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-        lines = ["  ".join(map(str.rjust, row, widths)) for row in rows]
+        lines = str(Table(self.head, (*self.rows, *self.sums), left_count=0)).splitlines()
         if self.left_out:
             lines.insert(len(self.rows) + 1, f"... {self.left_out}")
         return "\n".join(lines)

@@ -12,6 +12,7 @@ from kiks.cli.command_line import Group
 from kiks.cli.options import arena_names
 from kiks.cli.outputs import Command, has_results, output, tell_results
 from kiks.errors import counted
+from kiks.table import Table
 
 if TYPE_CHECKING:
     from kiks.model.arena import Arena
@@ -110,17 +111,17 @@ def list_(context: typer.Context) -> None:
     """
     from kiks.model.shipped import shipped_arena, shipped_arenas
 
-    found, lines = [], []
+    found, rows = [], []
     for name in shipped_arenas():
         if "/" not in name:
             place = shipped_arena(name)
             things = {"start": place.starts, "lamp": place.lamps, "ball": place.balls, "cylinder": place.cylinders}
             counts = {thing: len(each) for thing, each in things.items()}
             contents = ", ".join(counted(count, thing) for thing, count in counts.items() if count)
-            lines.append(f"{name:<10} {place.width_mm:g} x {place.height_mm:g} mm, {contents}")
+            rows.append((name, f"{place.width_mm:g} x {place.height_mm:g} mm, {contents}"))
             size = {"name": name, "width_mm": place.width_mm, "height_mm": place.height_mm}
             found.append(size | {f"{thing}s": count for thing, count in counts.items()})
-    tell_results(context, found, lines)
+    tell_results(context, found, [str(Table((), rows, left_count=2))])
 
 
 @arena.command(cls=Command)

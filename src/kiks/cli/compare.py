@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from kiks.cli.options import print_table
 from kiks.cli.outputs import has_results, output, tell_results
 from kiks.errors import ParameterError, counted
 from kiks.export.kinds import KINDS
+from kiks.table import Table
 
 FIGURES = KINDS["figures"].endings
 
@@ -143,14 +143,16 @@ def _print_seeds(results: Sequence[Result]) -> None:
     ]
     _, middle, _, passed, *costs = _figures(results)
     rows.append(("all", middle, "", passed, "", *costs))
-    print_table(("seed", "fitness", "found in", "exam", "imperfect", "evaluations", "seconds"), rows)
+    heads = ("seed", "fitness", "found in", "exam", "imperfect", "evaluations", "seconds")
+    typer.echo(Table(heads, rows).for_output())
     _print_intervals(results, "all: ")
 
 
 def print_groups(groups: Mapping[str, Sequence[Result]]) -> None:
     """Print a table of groups of evolutions: quartiles and medians, and how many champions passed the exam."""
     columns = ("folder", "runs", "quartile", "median", "quartile", "exams", "evaluations", "seconds")
-    print_table(columns, [(name, str(len(group)), *_figures(group)) for name, group in groups.items()])
+    rows = [(name, len(group), *_figures(group)) for name, group in groups.items()]
+    typer.echo(Table(columns, rows).for_output())
     for name, group in groups.items():
         _print_intervals(group, f"{name}: ")
 

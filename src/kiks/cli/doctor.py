@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import typer
 
 from kiks.cli.outputs import has_results, tell_results
+from kiks.table import Table
 
 if TYPE_CHECKING:
     from kiks.client.khepera import Khepera
@@ -88,13 +89,15 @@ def doctor(context: typer.Context) -> None:
         f"KiKS {found['kiks']} in {found['folder']}",
         f"Python {found['python']} in {sys.prefix}, {found['system']}",
         ", ".join(f"{name} {version}" for name, version in versions.items()),
-        *(
-            f"{'found  ' if is_there else 'missing'}  {name}, {use}{'' if is_there else ': ' + cure}"
-            for name, is_there, use, cure in parts
-        ),
+        str(Table((), map(_row, parts), left_count=3)),
         f"A program drives {speed:.0f} times as fast as the robot: {share:.0f} % of the reference ({REFERENCE}).",
     ]
     tell_results(context, found, lines)
+
+
+def _row(part: Part) -> tuple[str, str, str]:
+    name, is_there, use, cure = part
+    return ("found", name, use) if is_there else ("missing", name, f"{use}: {cure}")
 
 
 def _parts() -> Iterator[Part]:

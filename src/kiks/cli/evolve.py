@@ -21,6 +21,7 @@ from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import ParameterError, shown
 from kiks.learn.algorithm_name import AlgorithmName
 from kiks.meant import nearest
+from kiks.table import Table
 
 if TYPE_CHECKING:
     from kiks.control.controller import Controller
@@ -104,8 +105,7 @@ def evolve(
         leave_out(context, "with --list", *(set(context.params) - {"list_"}))
         # The first line of their docstrings: a task itself takes up to two seconds to make.
         found = [{"name": name, "about": (make.__doc__ or "").partition("\n")[0]} for name, make in tasks.TASKS.items()]
-        width = max(len(name) for name in tasks.TASKS)
-        tell_results(context, found, [f"{each['name']:{width}}  {each['about']}" for each in found])
+        tell_results(context, found, [str(Table((), (each.values() for each in found), left_count=2))])
         return
     if seeds is not None:
         leave_out(context, "with --seeds", "record")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from textwrap import indent
 from typing import Annotated, Any
 
 import typer
@@ -11,6 +12,7 @@ import typer
 from kiks.cli.outputs import json_of
 from kiks.cli.run import RunCommand
 from kiks.errors import ParameterError, shown
+from kiks.table import Table
 
 
 class DemoCommand(RunCommand):
@@ -54,8 +56,7 @@ def first_program(project: Path) -> tuple[Path, str]:
 
 def _lines_of(found: list[dict[str, str]]) -> Iterator[str]:
     yield "kiks demo NAME runs a demonstration, kiks demo NAME --desk shows it in the browser:\n"
-    for each in found:
-        yield f"  {each['name']:<13} {each['about']}"
+    yield indent(str(Table((), (each.values() for each in found), left_count=2)), "  ")
     yield "\nkiks examples OUT copies their programs into a folder, to be changed."
 
 

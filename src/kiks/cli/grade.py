@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from kiks.cli.engine_start import ready_engine
-from kiks.cli.options import Trusted, Workers, print_table, progress_bar, say
+from kiks.cli.options import Trusted, Workers, progress_bar, say
 from kiks.cli.outputs import has_results, shows_progress, tell_results
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import counted, printable
+from kiks.table import Table
 
 if TYPE_CHECKING:
     from kiks.trials.grading import Graded
@@ -56,6 +57,7 @@ def grade(
     from kiks.trials.grading import grade as graded_of
     from kiks.trials.grading import load_exercise, trials_of
     from kiks.trials.report import save_grades
+    from kiks.trials.runner import OUTCOMES
     from kiks.trials.submissions import submissions_in
 
     project, folder = load_exercise(exercise)
@@ -63,7 +65,7 @@ def grade(
         with Sandbox() as sandbox:
             sandbox.warm()  # Without one nothing is copied or compiled.
     out = Path(f"grades-{exercise.stem}") if out is None else out
-    with alone_in(out, "--out"):
+    with alone_in(out, "--out", OUTCOMES):
         found = submissions_in(submissions, out / "programs")
         count = len(trials_of(project, folder, found))
         ready_engine()
@@ -95,7 +97,7 @@ def _tell(graded: Graded, out: Path) -> None:
 
     typer.echo(printable(graded.title))
     heads = ["name", "points", "solved", *COUNTED, "said last"]
-    print_table(heads, rows_of(graded), last_is_text=True)
+    typer.echo(Table(heads, rows_of(graded), ends_in_text=True).for_output())
     for line in likenesses_of(graded):
         typer.echo(printable(line))
     for grade in graded.grades:

@@ -18,10 +18,11 @@ from kiks.cli.outputs import output
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import counted
 from kiks.model.atomic_files import explained
+from kiks.table import Table
 
 if TYPE_CHECKING:
     from rich.console import Console
-    from rich.table import Table
+    from rich.table import Table as Grid
 
     from kiks.client.khepera import Khepera, Status
 
@@ -193,7 +194,7 @@ def _display(console: Console, title: str) -> Iterator[Callable[[Sample, float],
         yield lambda sample, rate_hz: live.update(picture(sample, rate_hz, title, console.width), refresh=True)
 
 
-def picture(sample: Sample, rate_hz: float, title: str, width: int = 80) -> Table:
+def picture(sample: Sample, rate_hz: float, title: str, width: int = 80) -> Grid:
     """Return a sample as the robot seen from above, its front at the top, with a table of the rest below.
 
     Args:
@@ -202,9 +203,8 @@ def picture(sample: Sample, rate_hz: float, title: str, width: int = 80) -> Tabl
         title: The title.
         width: Characters of a line, at least 60.
     """
-    from rich import box
     from rich.bar import Bar
-    from rich.table import Table
+    from rich.table import Table as Grid
     from rich.text import Text
 
     # A row has four sensors, each with its number, bar and reading, and a blank after each of them.
@@ -218,21 +218,20 @@ def picture(sample: Sample, rate_hz: float, title: str, width: int = 80) -> Tabl
         bar = Bar(FULL_COUNTS, 0, count, width=bar_width, color=colour)
         return [Text(str(sensor), "dim"), bar, Text(f"{count:4d}", colour)]
 
-    around = Table.grid(padding=(0, 1))
+    around = Grid.grid(padding=(0, 1))
     for row in ((None, 2, 3, None), (1, None, None, 4), (0, None, None, 5), (None, 7, 6, None)):
         around.add_row(*chain.from_iterable(map(cells, row)))
-    wheels = Table(box=box.SIMPLE, padding=(0, 1))
-    for name in ("wheel", "pulses", "pulses/10 ms", "mode", "on target", "error"):
-        wheels.add_column(name, justify="left" if name == "wheel" else "right")
-    for side, counter, speed, motor in zip(
-        ("left", "right"), sample.encoders, sample.speed, sample.status, strict=True
-    ):
-        on_target = "yes" if motor.on_target else "no"
-        mode = _MODES.get(motor.mode, str(motor.mode))
-        wheels.add_row(side, str(counter), str(speed), mode, on_target, str(motor.error))
-    whole = Table.grid()
+    rows = [
+        (side, counter, speed, _MODES.get(motor.mode, motor.mode), "yes" if motor.on_target else "no", motor.error)
+        for side, counter, speed, motor in zip(
+            ("left", "right"), sample.encoders, sample.speed, sample.status, strict=True
+        )
+    ]
+    wheels = Table(("wheel", "pulses", "pulses/10 ms", "mode", "on target", "error"), rows).for_output()
+    whole = Grid.grid()
     whole.add_row(Text(title, "bold"))
     whole.add_row(f"{sample.time_s:.2f} s   {rate_hz:.1f} samples per second   Ctrl-C ends")
-    for part in ("", around, "", f"ambient, 0 to 7  {''.join(f'{count:5d}' for count in sample.ambient)}", wheels):
+    ambient = f"ambient, 0 to 7  {''.join(f'{count:5d}' for count in sample.ambient)}"
+    for part in ("", around, "", ambient, "", wheels):
         whole.add_row(part)
     return whole

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import shlex
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, fields, is_dataclass, replace
 from functools import wraps
@@ -16,7 +16,7 @@ import typer
 
 from kiks.cli.command_line import ARENAS, opening
 from kiks.cli.outputs import is_quiet
-from kiks.errors import ParameterError, printable, shown
+from kiks.errors import ParameterError, shown
 from kiks.meant import nearest_file
 from kiks.model.atomic_files import make_folder, path_of
 from kiks.model.checks import ROBOTS_MAX
@@ -232,35 +232,6 @@ def progress_bar(work: str) -> Iterator[Callable[..., None]]:
     with Progress(console=console, transient=True, disable=is_quiet() or not console.is_terminal) as progress:
         bar = progress.add_task(work, total=None)
         yield lambda done, count=1: progress.update(bar, completed=done, total=count)
-
-
-def print_table(columns: Sequence[str], rows: Sequence[Sequence[str]], *, last_is_text: bool = False) -> None:
-    """Print a table without the columns that are empty; the first column stands left, the numbers right.
-
-    Args:
-        columns: The heads.
-        rows: The cells; what would steer the terminal is left out.
-        last_is_text: Whether the last column is a text, which stands left and is cut where the line ends.
-    """
-    from rich.box import SIMPLE
-    from rich.console import Console
-    from rich.table import Table
-
-    used = [place for place in range(len(columns)) if any(row[place] for row in rows)]
-    table = Table(box=SIMPLE, pad_edge=False)
-    for place in used:
-        is_text = last_is_text and place == len(columns) - 1
-        table.add_column(
-            columns[place],
-            justify="right" if place and not is_text else "left",
-            overflow="ellipsis" if is_text else "fold",
-            min_width=max(map(len, columns[place].split()), default=0),
-            no_wrap=is_text,
-        )
-    for row in rows:
-        table.add_row(*(printable(row[place], "?") for place in used))
-    console = Console(markup=False, highlight=False)
-    console.print(table)
 
 
 def parse_turret(entry: str, robot_count: int) -> tuple[str, int | None]:

@@ -25,22 +25,14 @@ from kiks.cli.command_line import OneLineCommand
 from kiks.errors import ParameterError, figure, printable, shown
 from kiks.meant import nearest
 from kiks.model.atomic_files import check_writable, ending_of
-
-# fmt: off
-BEGINNINGS = {
-    "": rb"\d+\n", ".csv": rb"time_s,", ".gif": rb"GIF8", ".html": rb"<!DOCTYPE html>", ".jpg": rb"\xff\xd8",
-    ".mat": rb"MATLAB 5.0", ".mcap": rb"\x89MCAP0", ".mp4": rb"....ftyp", ".parquet": rb"PAR1", ".pdf": rb"%PDF",
-    ".png": rb"\x89PNG", ".svg": rb"<\?xml|<svg", ".webp": rb"RIFF....WEBP",
-}
-# fmt: on
-"""How files begin that one of the same kind may replace, by their endings; thinking times have none. Others, such as
-arenas, are the work of people."""
+from kiks.model.replaceable import is_replaceable
 
 
 def output(
     *endings: str,
     default: Callable[[Mapping[str, Any]], Path | None] | None = None,
     beside: str = "",
+    kind: str = "",
     is_new: bool = False,
 ) -> Callable[[Path | None], Path | None]:
     """Return the callback of an option or argument that names a file to be written; `Command` checks it.
@@ -49,15 +41,19 @@ def output(
         endings: What its name may end in; anything if there is none.
         default: The file if it is left out, from all values; none if left out.
         beside: Ending of another file that is written beside it.
+        kind: What it is, where its ending does not say that; see `kiks.model.replaceable`.
         is_new: Whether it replaces no file, not even with --force.
     """
 
     def unchanged(value: Path | None) -> Path | None:
         return value
 
-    unchanged.output = (endings, default, beside, is_new)  # type: ignore[attr-defined]
+    unchanged.output = (endings, default, beside, kind, is_new)  # type: ignore[attr-defined]
     return unchanged
 
+
+_OF_PEOPLE = (".toml",)
+"""Endings of files that are always the work of people: arenas, robots, champions."""
 
 _JSON, _RESULTS = "kiks.json", "kiks.results"
 _quiet = ContextVar("quiet", default=False)
@@ -211,12 +207,12 @@ class Command(OneLineCommand):
     def _check_outputs(self, told: dict[str, Any], *, is_forced: bool) -> None:
         outputs = {param.name: param for param, _ in self._outputs}
         others = [path for name, value in told.items() if name not in outputs for path in _files(value)]
-        for param, (endings, default, beside, is_new) in self._outputs:
+        for param, (endings, default, beside, kind, is_new) in self._outputs:
             value = told[param.name] = told[param.name] or (default and default(told))
             if value is None:
                 continue
             check_writable(value, what := _name(param), is_new=is_new)
-            beginning = BEGINNINGS.get(ending_of(value, what, endings) if endings else "")
+            ending = ending_of(value, what, endings) if endings else ""
             own = (value, value.with_suffix(beside)) if beside else (value,)
             for path in own:
                 if found := next((each for each in others if _is_same(path, each)), None):
@@ -224,8 +220,8 @@ class Command(OneLineCommand):
                         f"{what} must be a file that the command does not need besides, but {str(path)!r} belongs to "
                         f"{str(found)!r}. Choose another name."
                     )
-                if not (is_forced or _is_replaceable(path, beginning)):
-                    like = " or replace a file of its kind" if beginning else ""
+                if not (is_forced or is_replaceable(path, kind or ending)):
+                    like = "" if ending in _OF_PEOPLE else " or replace a file of its kind that KiKS has written"
                     raise ParameterError(
                         f"{what} must be new{like}, but {str(path)!r} exists. Choose another name or add --force."
                     )
@@ -309,12 +305,3 @@ def _is_same(path: Path, other: Path) -> bool:
         if other.suffix.lower() in (".toml", ".kiks") and path.resolve().is_relative_to(other.resolve().parent):
             return re.search(rb"[\"'/]%b[\"']" % re.escape(os.fsencode(path.name)), other.read_bytes()) is not None
     return os.path.realpath(path) == os.path.realpath(other)
-
-
-def _is_replaceable(path: Path, beginning: bytes | None) -> bool:
-    """Return whether there is no file, or one that is empty or begins so."""
-    if not path.is_file():
-        return True
-    with path.open("rb") as file:
-        data = file.read(1000)
-    return not data or (beginning is not None and re.match(beginning, data, re.DOTALL) is not None)

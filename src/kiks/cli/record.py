@@ -16,6 +16,7 @@ from kiks.cli.options import say
 from kiks.cli.outputs import output
 from kiks.errors import counted
 from kiks.export.kinds import ENDINGS
+from kiks.model.replaceable import RECORDING
 
 if TYPE_CHECKING:
     from kiks.sim.simulation import Simulation
@@ -36,7 +37,7 @@ RecordFile = Annotated[
     typer.Option(
         "--record",
         help="Record the whole run here, .mcap: kiks replay shows it again.",
-        callback=output(".mcap"),
+        callback=output(".mcap", kind=RECORDING),
     ),
 ]
 

@@ -22,6 +22,7 @@ from kiks.cli.outputs import has_results, leave_out, output, tell_results
 from kiks.cli.record import ExportFile, RecordFile, noting_output, recorded, tell_run
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import ParameterError, shown
+from kiks.model.replaceable import THINKING
 
 if TYPE_CHECKING:
     from kiks.clock.gate import Gate
@@ -105,7 +106,9 @@ def run(
     ] = None,
     save_thinking: Annotated[
         Path | None,
-        typer.Option(help="Write the thinking times of a live run here, for replay:FILE.", callback=output()),
+        typer.Option(
+            help="Write the thinking times of a live run here, for replay:FILE.", callback=output(kind=THINKING)
+        ),
     ] = None,
     seconds: Seconds = None,
     max_wall: MaxWall = None,

@@ -12,11 +12,12 @@ import typer
 from kiks.cli.compare import FIGURES
 from kiks.cli.engine_start import ready_engine
 from kiks.cli.job import job_of
-from kiks.cli.options import World, print_table, progress_bar, say
+from kiks.cli.options import World, progress_bar, say
 from kiks.cli.outputs import has_results, is_quiet, output, shows_progress, tell_results
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import counted
 from kiks.model.ranges import numbers_of
+from kiks.table import Table
 
 if TYPE_CHECKING:
     from kiks.cli.job import Job
@@ -87,6 +88,7 @@ def sweep(
     Example: kiks sweep wander.py --baud 9600,19200 --think 0..40:2 --family 10 --seeds 20
     """
     from kiks.model.atomic_files import alone_in
+    from kiks.trials.runner import OUTCOMES
     from kiks.trials.sweep import Axes
     from kiks.trials.sweep import sweep as swept
     from kiks.trials.sweep_plot import save_sweep_plot
@@ -101,7 +103,7 @@ def sweep(
     )
     count = len(axes.cases())
     folder = out or Path(f"kiks-sweep-{Path(program).stem}")
-    context.with_resource(alone_in(folder, "--out"))
+    context.with_resource(alone_in(folder, "--out", OUTCOMES))
     goal, name = project.goal, Path(program).name
     assert goal is not None
     end_as_with_ctrl_c()
@@ -119,9 +121,8 @@ def sweep(
             on_outcome=lambda outcome, done: progress(done, count),
         )
     save_sweep_plot(found, file := picture or folder / "sweep.png", f"{name}: {goal.text or goal.solved}")
-    print_table(
-        ("baud", "thinking [ms]", "solved", "least points", "median", "most", "worst"), list(map(_cells, found.rows))
-    )
+    heads = ("baud", "thinking [ms]", "solved", "least points", "median", "most", "worst")
+    typer.echo(Table(heads, map(_cells, found.rows), ends_in_text=True).for_output())
     see = f"see it with kiks replay {folder / found.worst.outcome.recording}"
     results: dict[str, Any] = {
         "program": program,

@@ -11,11 +11,12 @@ import typer
 
 from kiks.cli.engine_start import ready_engine
 from kiks.cli.job import demonstration_of
-from kiks.cli.options import SeedOrOwn, Trusted, Workers, print_table, progress_bar, say
+from kiks.cli.options import SeedOrOwn, Trusted, Workers, progress_bar, say
 from kiks.cli.outputs import has_results, leave_out, shows_progress, tell_results
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import KiksError, ParameterError, counted, printable
 from kiks.meant import nearest_file
+from kiks.table import Table
 
 if TYPE_CHECKING:
     from kiks.trials.submissions import Submission
@@ -65,6 +66,7 @@ def tournament(
     """
     from kiks.model.atomic_files import alone_in
     from kiks.model.shipped import demonstrations
+    from kiks.trials.runner import OUTCOMES
     from kiks.trials.submissions import submissions_in
     from kiks.trials.tournament import Match, play
     from kiks.trials.tournament_report import HEADS, PAGE, results_of, rows_of, save_tournament
@@ -77,7 +79,7 @@ def tournament(
         )
     chosen = Match.load(path)
     out = out or Path(f"tournament-{chosen.title}")
-    context.with_resource(alone_in(out, "--out"))
+    context.with_resource(alone_in(out, "--out", OUTCOMES))
     found = submissions_in(players, out / "programs", "PLAYERS")
     for each in found:
         if each.problem:
@@ -119,7 +121,7 @@ def tournament(
     except KeyboardInterrupt:
         say(f"stopped after {counted(done, 'game')}. The same command goes on from there.")
         raise
-    print_table(HEADS, rows_of(made))
+    typer.echo(Table(HEADS, rows_of(made)).for_output())
     for each_played in made.played:
         for text in each_played.notes:
             say(printable(f"{' - '.join(each_played.names)}, seed {each_played.game.seed}: {text}."))

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from mcap.writer import CompressionType, Writer
 
+from kiks.errors import ParameterError
 from kiks.export.looks import Colour, body_colour, robot_colour
 from kiks.export.sheet import coarse_cells
 from kiks.model.arena import Arena
@@ -48,6 +49,11 @@ def save_foxglove(
 ) -> None:
     """Write a recording as an MCAP file that Foxglove shows."""
     ending_of(path, "a recording for Foxglove", (ENDING,))
+    if (source := getattr(recording.log.reader, "path", None)) and Path(path).exists() and source.samefile(path):
+        raise ParameterError(
+            f"a recording for Foxglove must be another file than its recording, but {str(path)!r} is that. Choose "
+            "another name."
+        )
     begin_ns, end_ns = recording.log.begin_ns, recording.log.end_ns
     channels: dict[str, int] = {}
     with writing(path, "a recording for Foxglove") as beside:

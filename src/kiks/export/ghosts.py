@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from io import BytesIO
 from pathlib import Path
 from typing import NamedTuple
 
@@ -30,11 +29,12 @@ from kiks.export.film import (
 from kiks.export.kinds import KINDS
 from kiks.export.looks import CYLINDER_COLOUR, robot_colour
 from kiks.export.panel import draw_sign
+from kiks.export.pictures import save_image
 from kiks.export.sheet import FLOOR, LAMP_MM, ground_picture, mixed
 from kiks.export.stage import MARGIN, OUTSIDE, TRAIL_PIXELS, Canvas, Pixels
 from kiks.export.video_file import GIF, MP4, VideoFile
 from kiks.model.arena import Arena
-from kiks.model.atomic_files import ending_of, replace_file, writing
+from kiks.model.atomic_files import ending_of, writing
 from kiks.model.checks import check_count, check_number
 from kiks.model.robot import RobotSpec
 
@@ -105,9 +105,7 @@ def save_ghosts(
         from PIL import Image
 
         (picture,) = _pictures(scenes[-1], (width, height), np.array([scenes[-1].seconds]))
-        buffer = BytesIO()
-        Image.fromarray(picture).save(buffer, "PNG")
-        replace_file(path, buffer.getvalue(), "a picture")
+        save_image(Image.fromarray(picture), path)
         return 1
     library("av", "film")
     if ending == MP4:

@@ -19,6 +19,7 @@ from kiks.export.sheet import FINER, LAMP_MM, WHITE, Place, Sheet, ground_pictur
 from kiks.export.vector_pen import UNIT_POINTS, VectorPen, file_of
 from kiks.model.arena import Arena, Ball
 from kiks.model.atomic_files import ending_of, replace_file
+from kiks.model.replaceable import MADE_BY
 from kiks.model.robot import Body, RobotSpec
 from kiks.recording.moments import moments
 from kiks.recording.recording import Recording
@@ -283,6 +284,12 @@ def save_picture(recording: Recording, path: str | Path, *, time_s: float | None
 
 def save_image(image: Image, path: str | Path) -> None:
     """Write an image in pixels; the type follows from the ending, .png or .jpg."""
-    pixels = BytesIO()
-    image.save(pixels, "PNG" if ending_of(path, "a picture", PICTURES) == ".png" else "JPEG")
+    from PIL.PngImagePlugin import PngInfo
+
+    pixels, about = BytesIO(), PngInfo()
+    about.add_text("Software", MADE_BY)
+    if ending_of(path, "a picture", PICTURES) == ".png":
+        image.save(pixels, "PNG", pnginfo=about)
+    else:
+        image.save(pixels, "JPEG", comment=MADE_BY)
     replace_file(path, pixels.getvalue(), "a picture")

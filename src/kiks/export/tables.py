@@ -9,7 +9,11 @@ from pathlib import Path
 from kiks.errors import library
 from kiks.model.atomic_files import ending_of, replace_file
 from kiks.model.columns import Columns
+from kiks.model.replaceable import MADE_BY
 from kiks.recording.recording import Recording
+
+_MAT_TEXT_BYTES = 116
+"""Length of the text with which a file of MATLAB's level 5 begins."""
 
 
 def save_table(recording: Recording, path: str | Path, *, table: str = "poses", robot: int | None = None) -> None:
@@ -33,7 +37,7 @@ def write_parquet(columns: Columns, path: str | Path, what: str) -> None:
     """Write columns of equal length as a Parquet file."""
     pyarrow, parquet = library("pyarrow"), library("pyarrow.parquet")
     buffer = io.BytesIO()
-    parquet.write_table(pyarrow.table(columns), buffer)
+    parquet.write_table(pyarrow.table(columns, metadata={"creator": MADE_BY}), buffer)
     replace_file(path, buffer.getvalue(), what)
 
 
@@ -51,7 +55,8 @@ def _write_mat(columns: Columns, path: str | Path, what: str) -> None:
     buffer = io.BytesIO()
     texts = {name: values.astype(object) for name, values in columns.items() if values.dtype.kind == "U"}
     savemat(buffer, {**columns, **texts}, oned_as="column", do_compression=True)
-    replace_file(path, buffer.getvalue(), what)
+    header = f"MATLAB 5.0 MAT-file, {MADE_BY}".encode().ljust(_MAT_TEXT_BYTES)  # in place of a date and a system
+    replace_file(path, header + buffer.getvalue()[_MAT_TEXT_BYTES:], what)
 
 
 _WRITERS = {".csv": _write_csv, ".parquet": write_parquet, ".mat": _write_mat}

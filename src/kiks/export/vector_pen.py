@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from kiks.export.looks import Colour
 from kiks.export.sheet import FLOOR, Place, coarse_cells, darkness, lit_floor, wall_grey
 from kiks.model.arena import Arena
+from kiks.model.replaceable import MADE_BY
 from kiks.model.robot import RobotSpec
 
 if TYPE_CHECKING:
@@ -52,12 +53,13 @@ def file_of(figure: Figure, kind: str, dots_per_inch: int = DOTS_PER_INCH) -> by
     """
     from matplotlib import rc_context
 
-    dated = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}.get(kind)
+    creator = {"Creator": MADE_BY}
+    about = {"svg": creator | {"Date": None}, "pdf": creator | {"CreationDate": None}, "png": {"Software": MADE_BY}}
     buffer = io.BytesIO()
     # Journals want TrueType in a PDF. What the font lacks, such as Chinese, is a box, and no reason for a warning.
     with rc_context({"svg.hashsalt": "kiks", "pdf.fonttype": 42}), warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Glyph .* missing from")
-        figure.savefig(buffer, format=kind, dpi=dots_per_inch, metadata=dated)
+        figure.savefig(buffer, format=kind, dpi=dots_per_inch, metadata=about.get(kind))
     if kind != "svg":
         return buffer.getvalue()
     return _PATH.sub(_shortened, buffer.getvalue().decode()).replace(_SQUARE, "").encode()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Iterable
 from fractions import Fraction
 from pathlib import Path
@@ -11,6 +12,7 @@ import numpy as np
 
 from kiks.export.palette import Palette
 from kiks.export.stage import Pixels
+from kiks.model.replaceable import MADE_BY
 
 MP4, GIF, WEBP = ".mp4", ".gif", ".webp"
 
@@ -32,7 +34,7 @@ class VideoFile:
         import av
         from av.video.stream import VideoStream
 
-        self._palette = Palette(samples) if ending == GIF else None
+        self._path, self._palette = path, Palette(samples) if ending == GIF else None
         self._count, self._time_base = 0, Fraction(1, fps)
         codec, pixel_format = _CODECS[ending]
         self._container = av.open(str(path), "w", format=ending[1:], container_options=_CONTAINERS[ending])
@@ -65,3 +67,7 @@ class VideoFile:
                 self._container.mux(self._stream.encode(None))
         finally:
             self._container.close()
+        if kind is None:
+            # A box that no player reads; what follows a whole GIF or WebP, none reads either.
+            with self._path.open("ab") as file:
+                file.write(struct.pack(">I4s", 8 + len(MADE_BY), b"free") + MADE_BY.encode())

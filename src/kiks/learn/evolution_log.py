@@ -150,10 +150,11 @@ class Folder:
     def check_identity(self, identity: Identity) -> None:
         """Write the identity of an evolution into the folder, or compare it with the one that is there."""
         file = self.path / IDENTITY
-        if not file.exists() and (self.path / CHAMPION).exists():
+        champions = [each for side in identity.sides if (each := self.champion_file(side)).exists()]
+        if champions and not file.exists():
             raise ParameterError(
-                f"the folder {str(self.path)!r} must hold an evolution or no champion.toml, but it holds one without "
-                f"{IDENTITY}, which would be replaced. Take a new folder."
+                f"the folder {str(self.path)!r} must hold an evolution or no {champions[0].name}, but it holds one "
+                f"without {IDENTITY}, which would be replaced. Take a new folder."
             )
         make_folder(self.path / GENERATIONS, "an evolution")
         if not file.exists():

@@ -219,7 +219,7 @@ class Arena:
         from kiks.model.picture import read_picture
 
         path = path_of(path)
-        return cls.from_array(read_picture(path, mm_per_pixel), mm_per_pixel=mm_per_pixel, name=path.stem)
+        return cls.from_array(read_picture(path, mm_per_pixel).brightness, mm_per_pixel=mm_per_pixel, name=path.stem)
 
     @classmethod
     def load(cls, path: str | Path) -> Arena:
@@ -464,7 +464,7 @@ class Arena:
             >>> kiks.Arena.box(500, 500).find_start(radius_mm=27.5)
             Pose(x_mm=249.5, y_mm=249.5, heading_rad=1.5707963267948966)
         """
-        pose = self.starts[0] if self.starts else self._widest_place()
+        pose = self.starts[0] if self.starts else self.widest_place()
         if not self.free_for(pose.x_mm, pose.y_mm, radius_mm):
             room_mm = 2 * self.clearance_at_mm(pose.x_mm, pose.y_mm)
             where, advice = (
@@ -487,7 +487,14 @@ class Arena:
             return TURN_ROUND
         return "Draw wider passages or give a larger mm_per_pixel."
 
-    def _widest_place(self) -> Pose:
+    def widest_place(self) -> Pose:
+        """Return the place with most room, where a robot starts if there are no `starts`.
+
+        Example:
+            >>> import kiks
+            >>> kiks.Arena.box(400, 300).widest_place().y_mm
+            149.5
+        """
         inside = self.clearance[PAD:-PAD, PAD:-PAD]
         rows, columns = np.nonzero(inside == inside.max())
         # Twice the offset from the middle, in cells, is a whole number, so rounding cannot decide between equals.

@@ -15,6 +15,7 @@ from pydantic import Field
 
 from kiks.errors import ArenaError, KiksError, ParameterError
 from kiks.model.arena import Arena
+from kiks.model.arena_doubts import check_has_floor, doubt_colours
 from kiks.model.arena_objects import (
     THINGS_MAX,
     Ball,
@@ -30,12 +31,14 @@ from kiks.model.arena_objects import (
 from kiks.model.atomic_files import path_of, replace_files, within
 from kiks.model.box import PartMm, SideMm
 from kiks.model.data_file import Coordinate, Number, Point, Rule, Switch, Text, check, parse_toml, read_file, record
-from kiks.model.picture import encode_picture, read_picture
+from kiks.model.picture import Pixels, encode_picture, read_picture
 from kiks.model.raster import MM_PER_PIXEL_MAX, MM_PER_PIXEL_MIN
 from kiks.model.walls import WALLS_MAX, Wall, Zone
 
 MIDDLE = 128
 """Grey from which on an inverted picture is floor."""
+
+DARK_IS_WALL = "with invert = true, what is darker than a middle grey is wall."
 
 Pitch = Annotated[
     Number, Field(ge=MM_PER_PIXEL_MIN, le=MM_PER_PIXEL_MAX, description="Most arenas are drawn with 1 mm per pixel.")
@@ -157,28 +160,32 @@ class ArenaFile(Walls):
 def load_arena(path: Path) -> Arena:
     """Read an arena file, whose picture lies in the same folder or below."""
     what = f"Arena file {str(path)!r}"
-    return _decode(read_file(path, what, error=ArenaError), what, path.stem, path.parent)
+    arena, file = _decode(read_file(path, what, error=ArenaError), what, path.stem, path.parent)
+    if file.picture is not None and file.invert is not False:
+        doubt_colours(arena, path, DARK_IS_WALL if file.invert else None)
+    return arena
 
 
 def decode_arena(data: bytes, name: str = "arena", what: str = "The arena file") -> Arena:
     """Read the bytes of an arena file that has no picture; it is called `name` if it does not say."""
-    return _decode(data, what, name, None)
+    return _decode(data, what, name, None)[0]
 
 
-def _decode(data: bytes, what: str, name: str, folder: Path | None) -> Arena:
+def _decode(data: bytes, what: str, name: str, folder: Path | None) -> tuple[Arena, ArenaFile]:
     file = check(ArenaFile, parse_toml(data, what, error=ArenaError), what, error=ArenaError)
     try:
-        arena = file.box() if file.picture is None else _picture_arena(file, folder)
+        name = name if file.name is None else file.name
+        arena = file.box() if file.picture is None else _picture_arena(file, folder, name)
         floor = None
         if file.floor is not None:
             mm_per_pixel = file.mm_per_pixel or 1.0
             floor = floor_of(_picture_beside(folder, file.floor, "floor", mm_per_pixel), mm_per_pixel, arena)
-        return replace(arena, name=name if file.name is None else file.name, floor=floor, **places_of(file))
+        return replace(arena, name=name, floor=floor, **places_of(file)), file
     except KiksError as error:
         raise ArenaError(f"{what}: {error}") from None
 
 
-def _picture_beside(folder: Path | None, name: str, key: str, mm_per_pixel: float) -> npt.NDArray[np.uint8]:
+def _picture_beside(folder: Path | None, name: str, key: str, mm_per_pixel: float) -> Pixels:
     if folder is None:
         raise ArenaError(
             f"an arena that comes alone must have no {key} beside it, but it names one. Make a project of it, which "
@@ -187,8 +194,9 @@ def _picture_beside(folder: Path | None, name: str, key: str, mm_per_pixel: floa
     return read_picture(within(folder, name, key), mm_per_pixel)
 
 
-def floor_of(picture: npt.NDArray[np.uint8], mm_per_pixel: float, arena: Arena) -> npt.NDArray[np.uint8]:
-    """Return the floor of an arena, row 0 below, from its picture, row 0 on top, both uint8 [row, column]."""
+def floor_of(pixels: Pixels, mm_per_pixel: float, arena: Arena) -> npt.NDArray[np.uint8]:
+    """Return the floor of an arena, uint8 [row, column], row 0 below, from its picture."""
+    picture = pixels.on_white
     step = round(mm_per_pixel / arena.mm_per_cell)
     rows, columns = (side // step for side in arena.ground.shape)
     if picture.shape != (rows, columns):
@@ -199,13 +207,17 @@ def floor_of(picture: npt.NDArray[np.uint8], mm_per_pixel: float, arena: Arena) 
     return np.flipud(picture).repeat(step, axis=0).repeat(step, axis=1)
 
 
-def _picture_arena(file: ArenaFile, folder: Path | None) -> Arena:
+def _picture_arena(file: ArenaFile, folder: Path | None, name: str) -> Arena:
     mm_per_pixel = file.mm_per_pixel or 1.0
-    brightness = _picture_beside(folder, file.picture or "", "picture", mm_per_pixel)
+    pixels = _picture_beside(folder, file.picture or "", "picture", mm_per_pixel)
     if file.invert:
-        # White is often 254, and edges are smoothed.
-        brightness = np.where(brightness < MIDDLE, 255 - brightness, 0).astype(np.uint8)
-    return Arena.from_array(brightness, mm_per_pixel=mm_per_pixel)
+        grey = pixels.on_white
+        is_wall = grey < MIDDLE  # white is often 254, and edges are smoothed
+        check_has_floor(is_wall, DARK_IS_WALL)
+        brightness = np.where(is_wall, 255 - grey, np.uint8(0))
+    else:
+        brightness = pixels.brightness
+    return Arena.from_array(brightness, mm_per_pixel=mm_per_pixel, name=name)
 
 
 def places_of(file: Any) -> dict[str, Any]:

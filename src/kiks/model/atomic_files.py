@@ -220,13 +220,26 @@ def make_folder(path: str | Path, what: str) -> None:
 
 
 @contextmanager
-def alone_in(folder: Path, what: str) -> Iterator[None]:
+def alone_in(folder: Path, what: str, mark: str) -> Iterator[None]:
     """Make a folder if it is not there, and lock it meanwhile against other runs that write into it.
 
+    Args:
+        folder: The folder.
+        what: What messages call it.
+        mark: Name of a file in it that tells that all files there are of such runs, which may replace them.
+
     Raises:
-        ParameterError: If another one does.
+        ParameterError: If another run writes into it, or it has files of others.
     """
     make_folder(folder, what)
+    others = sorted(each.name for each in folder.iterdir() if not each.name.startswith("."))
+    if others and not (folder / mark).exists():
+        raise ParameterError(
+            f"{what} must be a new folder, an empty one, or that of an earlier run, but {str(folder)!r} has other "
+            f"files, such as {shown(others[0])}. Choose another name."
+        )
+    with explained(folder / mark, what):
+        (folder / mark).touch()
     descriptor = os.open(folder, os.O_RDONLY)
     try:
         try:
@@ -328,7 +341,7 @@ def within(folder: Path, text: str, what: str) -> Path:
     except (OSError, ValueError, RuntimeError):
         # A NUL character, or links that lead in a circle.
         home, path = folder, folder.parent
-    if not path.is_relative_to(home) or path == home or Path(text).is_absolute():
+    if not path.is_relative_to(home) or path == home:
         raise ParameterError(
             f"{what} must lie in the folder of the file that names it, or below, but {shown(text)} leads elsewhere. "
             "Copy it there."

@@ -1,6 +1,7 @@
-"""Pictures of arenas: any lossless picture becomes brightness, 0 for floor and 1..255 for walls.
+"""Pictures of arenas: any lossless picture becomes greys, and how far each pixel covers the floor.
 
-Black is floor. Any other colour must stay wall, so each conversion below keeps non-zero values at least 1.
+Black is floor. Any other colour must stay wall, so each conversion below keeps non-zero values at least 1. What is
+transparent shows the floor, whether that is drawn black or white.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ import warnings
 from functools import lru_cache
 from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -33,22 +34,42 @@ _SAVE_AGAIN = "Save it again, or fetch it again."
 _TILE_WIDTH, _TILE_LENGTH = 322, 323  # tags of TIFF 6.0, section 15
 
 
-def read_picture(path: Path, mm_per_pixel: float) -> npt.NDArray[np.uint8]:
-    """Read the brightness of a picture, its first frame if it has several.
+class Pixels(NamedTuple):
+    """The pixels of a picture.
+
+    Attributes:
+        grey: uint8 [row, column] with row 0 on top: 0 for black alone.
+        opacity: uint8 [row, column]: 0 where it is fully transparent, 255 where it is not at all.
+    """
+
+    grey: npt.NDArray[np.uint8]
+    opacity: npt.NDArray[np.uint8]
+
+    @property
+    def brightness(self) -> npt.NDArray[np.uint8]:
+        """The walls of a picture with a black floor: 0 where it is fully transparent, else `grey`."""
+        return np.where(self.opacity == 0, np.uint8(0), self.grey)
+
+    @property
+    def on_white(self) -> npt.NDArray[np.uint8]:
+        """The greys of a picture with a white floor, as a drawing program shows them."""
+        darkness = (255 - self.grey).astype(np.uint16) * self.opacity // 255
+        return (255 - darkness).astype(np.uint8)
+
+
+def read_picture(path: Path, mm_per_pixel: float) -> Pixels:
+    """Read the pixels of a picture, its first frame if it has several.
 
     Args:
         path: The picture.
         mm_per_pixel: Edge of a pixel [mm]; with it the size is checked from the header, before pixels are decoded.
-
-    Returns:
-        uint8 [row, column] with row 0 on top: 0 = floor.
     """
     what = f"Picture {shown(str(path))}"
     return decode_picture(read_file(path, what, bytes_max=PICTURE_FILE_BYTES_MAX, error=ArenaError), mm_per_pixel, what)
 
 
-def decode_picture(data: bytes, mm_per_pixel: float, what: str = "The picture") -> npt.NDArray[np.uint8]:
-    """Read the brightness of a picture that is in memory, by the rules of `read_picture`."""
+def decode_picture(data: bytes, mm_per_pixel: float, what: str = "The picture") -> Pixels:
+    """Read the pixels of a picture that is in memory, by the rules of `read_picture`."""
     from PIL import Image, UnidentifiedImageError
 
     check_size(data, what, bytes_max=PICTURE_FILE_BYTES_MAX, error=ArenaError)
@@ -60,7 +81,7 @@ def decode_picture(data: bytes, mm_per_pixel: float, what: str = "The picture") 
                 _check_type(image, data)
                 cells_per_pixel(image.height, image.width, mm_per_pixel)
                 _check_tiles(image)
-                return _brightness(image)
+                return _pixels(image)
         except ArenaError as error:
             raise ArenaError(f"{what}: {error}") from None
         except ParameterError:
@@ -113,7 +134,7 @@ def _check_tiles(image: Image.Image) -> None:
         raise ArenaError(f"Its tiles must be smaller than the picture, but they have {pixels} pixels. {_SAVE_AS}")
 
 
-def _brightness(image: Image.Image) -> npt.NDArray[np.uint8]:
+def _pixels(image: Image.Image) -> Pixels:
     """Decode a picture, and convert it to grey in bands of rows: a whole copy in colours takes hundreds of MB."""
     image.load()
     rows = max(_BAND_PIXELS // image.width, 1)
@@ -123,22 +144,21 @@ def _brightness(image: Image.Image) -> npt.NDArray[np.uint8]:
         return image.crop((0, top, image.width, bottom))
 
     grey = np.empty((image.height, image.width), np.uint8)
+    opacity = np.broadcast_to(np.uint8(255), grey.shape)
     if image.mode.startswith(("I", "F")):
         ends = [(values.min(), values.max()) for values in (np.asarray(band(*each)) for each in bands)]
         white = _white(image, float(np.min(ends)), float(np.max(ends)))
         for top, bottom in bands:
             grey[top:bottom] = _grey_of_deep(np.asarray(band(top, bottom)), white)
-        return grey
-    turn = _grey_of_clear if image.has_transparency_data else _grey_of_colour
-    for top, bottom in bands:
-        grey[top:bottom] = turn(band(top, bottom))
-    return grey
-
-
-def _grey_of_clear(image: Image.Image) -> npt.NDArray[np.uint8]:
-    layered = image.convert("RGBA")
-    is_clear = np.asarray(layered.getchannel("A")) == 0
-    return np.where(is_clear, np.uint8(0), _grey_of_colour(layered))
+    elif image.has_transparency_data:
+        opacity = np.empty_like(grey)
+        for top, bottom in bands:
+            layered = band(top, bottom).convert("RGBA")
+            grey[top:bottom], opacity[top:bottom] = _grey_of_colour(layered), np.asarray(layered.getchannel("A"))
+    else:
+        for top, bottom in bands:
+            grey[top:bottom] = _grey_of_colour(band(top, bottom))
+    return Pixels(grey, opacity)
 
 
 def _grey_of_colour(image: Image.Image) -> npt.NDArray[np.uint8]:

@@ -5,7 +5,6 @@ The file is an arena file with its raster within, the robots, and the settings o
 
 from __future__ import annotations
 
-import logging
 from base64 import b64decode, b64encode
 from collections.abc import Callable
 from dataclasses import fields, replace
@@ -19,7 +18,8 @@ from pydantic import AfterValidator, Field, InstanceOf
 
 from kiks.errors import ArenaError, KiksError, ParameterError, counted, shown
 from kiks.meant import nearest, nearest_file
-from kiks.model.arena import MOSTLY_WALL, TURN_ROUND, Arena
+from kiks.model.arena import Arena
+from kiks.model.arena_doubts import doubt_colours, doubt_starts
 from kiks.model.arena_file import (
     Balls,
     Cylinders,
@@ -59,14 +59,12 @@ from kiks.model.goal import Goal
 from kiks.model.kad import load_kad
 from kiks.model.limits import PROJECT_FILE_BYTES_MAX
 from kiks.model.package import where_from
-from kiks.model.picture import decode_picture, encode_picture
-from kiks.model.robot import Baud, Brightness, Response, robot_names
+from kiks.model.picture import Pixels, decode_picture, encode_picture
+from kiks.model.robot import Baud, Brightness, Response, RobotSpec, robot_names
 from kiks.model.ros_map import load_ros_map
 from kiks.model.settings import Seconds, Seed, Speed, ThinkingPolicy
 from kiks.model.shipped import shipped_arenas
 from kiks.model.turrets import TURRETS
-
-_log = logging.getLogger("kiks.model")
 
 FASTEST = "fastest"
 """Value in a file for no speed limit."""
@@ -235,7 +233,8 @@ class Project:
             )
         file = check(ProjectFile, table, what, error=ArenaError)
         try:
-            arena = replace(file.walls.arena(), name=name if file.name is None else file.name, **places_of(file))
+            name = name if file.name is None else file.name
+            arena = replace(file.walls.arena(name), name=name, **places_of(file))
             settings = {each: getattr(file, each) for each in _SETTINGS}
             if file.speed == FASTEST:
                 settings["speed"] = None
@@ -296,13 +295,14 @@ class ProjectWalls(Walls):
         elif self.mm_per_cell is not None:
             raise ParameterError("mm_per_cell must come with a png, but there is none. Boxes have cells of 1 mm.")
 
-    def arena(self) -> Arena:
-        """Return the walls as an arena."""
+    def arena(self, name: str) -> Arena:
+        """Return the walls as an arena of this name."""
         mm_per_cell = self.mm_per_cell or 1.0
         if self.png is None:
             arena = self.box()
         else:
-            arena = Arena.from_array(_unpacked(self.png, "png", mm_per_cell), mm_per_pixel=mm_per_cell)
+            brightness = _unpacked(self.png, "png", mm_per_cell).brightness
+            arena = Arena.from_array(brightness, mm_per_pixel=mm_per_cell, name=name)
         if self.floor is None:
             return arena
         return replace(arena, floor=floor_of(_unpacked(self.floor, "floor", mm_per_cell), mm_per_cell, arena))
@@ -315,7 +315,7 @@ def _packed(raster: NDArray[np.uint8]) -> str:
     return f"'''\n{rows}\n'''"
 
 
-def _unpacked(text: str, name: str, mm_per_cell: float) -> NDArray[np.uint8]:
+def _unpacked(text: str, name: str, mm_per_cell: float) -> Pixels:
     try:
         data = b64decode("".join(text.split()), validate=True)
     except ValueError as error:
@@ -389,7 +389,8 @@ def _with_files_beside(project: Project, folder: Path) -> Project:
 
 def load_arena_file(path: Path) -> Arena:
     """Read an arena that comes with KiKS, or a file: see `Arena.load`."""
-    if not path.exists() and (not path.suffix or path.stem in shipped_arenas()):
+    is_shipped = not path.exists() and (not path.suffix or path.stem in shipped_arenas())
+    if is_shipped:
         known = shipped_arenas()
         if path.as_posix() not in known:
             names = ", ".join(name for name in known if "/" not in name)
@@ -399,15 +400,13 @@ def load_arena_file(path: Path) -> Arena:
         path = known[path.as_posix()]
     if found := NO_WORLDS.get(path.suffix.lower()):
         raise ArenaError(f"An arena must be an arena file or a picture, but {shown(str(path))} is {found}.")
-    read = _READERS.get(path.suffix.lower())
-    return _picture_alone(path) if read is None else read(path)
+    arena = _READERS.get(path.suffix.lower(), _picture_alone)(path)
+    if not is_shipped:
+        doubt_starts(arena, path, RobotSpec.load("khepera").body.radius_mm)
+    return arena
 
 
 def _picture_alone(path: Path) -> Arena:
-    """Read a picture; say if it is mostly wall, for a robot would then stand in what was drawn as a wall."""
     arena = Arena.from_image(path)
-    if (share := float((arena.brightness > 0).mean())) > MOSTLY_WALL:
-        _log.warning(
-            "%.0f %% of %r is wall: black (0) is floor, and all else wall. %s", 100 * share, str(path), TURN_ROUND
-        )
+    doubt_colours(arena, path)
     return arena

@@ -1,17 +1,11 @@
-"""Grades as tables: a CSV for spreadsheets, one that Moodle takes, and results as Gradescope reads them.
-
-What a student has written may begin a formula of a spreadsheet, which could send what is in it elsewhere. So such a
-cell gets an apostrophe before it.
-"""
+"""Grades as tables: a CSV for spreadsheets, one that Moodle takes, and results as Gradescope reads them."""
 
 from __future__ import annotations
 
-import csv
-import io
-from collections.abc import Iterable, Sequence
 from typing import Any
 
-from kiks.errors import counted, figure, printable
+from kiks.errors import counted, figure
+from kiks.table import Table
 from kiks.trials.grading import Grade, Graded
 from kiks.trials.trial import CRASHED, ENDLESS, OUT_OF_TIME, RUNNING, STOPPED, Outcome
 
@@ -20,30 +14,6 @@ COUNTED = (CRASHED, ENDLESS, OUT_OF_TIME, STOPPED)
 
 LIKENESSES_MAX = 20
 """Most sentences about programs that are alike."""
-
-
-def cell(value: object) -> object:
-    """Return a value for a CSV: of a text a line, with an apostrophe where a spreadsheet would take it for a formula.
-
-    Example:
-        >>> cell("=1+1"), cell("ann"), cell(-2.5)
-        ("'=1+1", 'ann', -2.5)
-    """
-    if not isinstance(value, str):
-        return value
-    value = printable(value)
-    if value.lstrip()[:1] in ("=", "+", "-", "@", "|", "%"):
-        return f"'{value}"
-    return value
-
-
-def csv_of(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """Return a table as CSV that no spreadsheet takes for formulas."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow([cell(name) for name in head])
-    writer.writerows([[cell(value) for value in row] for row in rows])
-    return text.getvalue()
 
 
 def how_it_went(outcome: Outcome) -> str:
@@ -105,7 +75,7 @@ def grades_csv(graded: Graded) -> str:
         rows.append(
             (grade.submission.name, grade.points, grade.solved, len(cases), *counts, grade.time_s, *told, *points)
         )
-    return csv_of(head, rows)
+    return Table(head, rows).csv()
 
 
 def moodle_csv(graded: Graded) -> str:
@@ -121,7 +91,7 @@ def moodle_csv(graded: Graded) -> str:
         solved = f"{grade.solved} of {len(graded.cases)} cases solved"
         said = f"{solved}. {grade.said_last}" if grade.said_last else f"{solved}."
         rows.append((participant, submission.name, submission.email, grade.points, "", said))
-    return csv_of(head, rows)
+    return Table(head, rows).csv()
 
 
 def gradescope_results(graded: Graded, grade: Grade) -> dict[str, Any]:

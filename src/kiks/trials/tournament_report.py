@@ -9,8 +9,8 @@ from typing import Any
 from kiks.errors import figure
 from kiks.export.page import page_template
 from kiks.model.atomic_files import replace_file
+from kiks.table import Table
 from kiks.trials.report_parts import page_parts, shown_runs
-from kiks.trials.tables import csv_of
 from kiks.trials.tournament import Standing, Tournament
 
 PAGE = "tournament.html"
@@ -75,7 +75,7 @@ def save_tournament(
         on_progress: Called with how many are ready, and of how many.
     """
     table = [tuple(vars(each).values()) for each in tournament.table]
-    replace_file(out / "tournament.csv", csv_of(list(Standing.__dataclass_fields__), table), "the table")
+    replace_file(out / "tournament.csv", Table([*Standing.__dataclass_fields__], table).csv(), "the table")
     sides = len(tournament.played[0].names) if tournament.played else 2
     heads = [
         "round",
@@ -87,7 +87,7 @@ def save_tournament(
         (each.game.round, each.game.seed, *each.names, *each.score, "; ".join(each.notes), each.outcome.recording)
         for each in tournament.played
     ]
-    replace_file(out / "games.csv", csv_of([*heads, "failed", "recording"], games), "the games")
+    replace_file(out / "games.csv", Table([*heads, "failed", "recording"], games).csv(), "the games")
     recorded = [each.outcome for each in tournament.played if each.outcome.recording][:SHOWN_MAX]
     runs = shown_runs({each.name: out / each.recording for each in recorded}, workers, on_progress)
     left = SHOWN_BYTES_MAX

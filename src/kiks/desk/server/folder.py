@@ -202,5 +202,5 @@ def decode(name: str, data: bytes, mm_per_pixel: float = 1.0) -> Project:
         return Project.of_arena(decode_kad(data, stem))
     if ending == ".toml":
         return Project.of_arena(decode_arena(data, stem))
-    raster = decode_picture(data, mm_per_pixel)
+    raster = decode_picture(data, mm_per_pixel).brightness
     return Project.of_arena(Arena.from_array(raster, mm_per_pixel=mm_per_pixel, name=stem))
