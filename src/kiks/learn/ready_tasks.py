@@ -8,6 +8,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache
+from itertools import cycle
 from typing import Any
 
 import numpy as np
@@ -42,6 +43,12 @@ CONTACT_COST = 3.0
 
 CONTACTS_COUNTED = 3.0
 """Largest number of contacts of a world that counts: a stuck robot has hundreds."""
+
+EXAM_ROOM_SEED = 1000
+"""Seed of the first random room of an exam; rooms of training have those from 0 on."""
+
+FURNITURE = (40, 90, 140)
+"""Brightness of dark furniture, as in the arena `office`: the sensors notice it from 10 to 20 mm away."""
 
 PLACES = 200
 """Places of a room among which its dark starts are found."""
@@ -81,6 +88,31 @@ def training(*names: str) -> tuple[Arena, ...]:
 def rooms(count: int, **sizes: int) -> tuple[Arena, ...]:
     """Return random rooms, the same objects each time; `sizes` are arguments of `kiks.Arena.room`."""
     return tuple(Arena.room(seed=seed, **sizes) for seed in range(count))
+
+
+@cache
+def furnished_rooms(count: int, first: int = 0, **sizes: int) -> tuple[Arena, ...]:
+    """Return random rooms without a lamp, the same objects each time; every second one is as dark as furniture.
+
+    Args:
+        count: Number of rooms.
+        first: Seed of the first one.
+        sizes: Arguments of `kiks.Arena.room`.
+    """
+    drawn = (Arena.room(seed=first + number, lamps=0, **sizes) for number in range(count))
+    return tuple(darkened(room) if number % 2 else room for number, room in enumerate(drawn))
+
+
+def darkened(room: Arena) -> Arena:
+    """Return a room whose walls and pillars have the shades of `FURNITURE` in turn; its frame stays white."""
+    walls = tuple(replace(wall, brightness=shade) for wall, shade in zip(room.walls, cycle(FURNITURE), strict=False))
+    return replace(room, walls=walls)
+
+
+def exam_rooms() -> tuple[Arena, ...]:
+    """Return arenas unlike those of training, for exams: random rooms, one of them dark, and `office`."""
+    drawn = furnished_rooms(2, EXAM_ROOM_SEED, width_mm=1200, height_mm=1000, walls=5, pillars=4)
+    return *drawn, shipped_arena("office")
 
 
 @cache
@@ -124,9 +156,13 @@ it senses the thing, and 3 mm more before its command acts.
 """
 
 
+AVOID_CONTACT_COST = 10.0
+"""As `CONTACT_COST`, but more: the exam lasts three minutes, and a single contact fails a start."""
+
+
 def avoid_fitness(values: Values) -> Floats:
     """Return the fitness of `avoid`: that of Floreano and Mondada (1994) times `roaming`."""
-    return reduced_by_contacts(cautious_mean(values["avoidance"] * values["roaming"]), values)
+    return reduced_by_contacts(cautious_mean(values["avoidance"] * values["roaming"]), values, AVOID_CONTACT_COST)
 
 
 @ready
@@ -141,18 +177,22 @@ def avoid() -> Task:
     """
     return Task(
         "avoid",
-        training("pillars", "corridors", "alcoves", "wall_ends"),
+        (
+            *training("pillars", "corridors", "alcoves", "wall_ends"),
+            *furnished_rooms(12, width_mm=1000, height_mm=800, walls=4, pillars=3),
+        ),
         controllers.linear(speed_limit=AVOID_SPEED_LIMIT),
         (measures.avoidance, measures.roaming, measures.contacts, measures.path_mm, measures.straightness),
         fitness=avoid_fitness,
-        # Short trials leave time for many generations: robots that stay in dead ends go last.
-        seconds=12.0,
+        # Short trials leave time for many generations; in shorter ones robots do not yet come to dead ends and dark
+        # things.
+        seconds=20.0,
         worlds=16,
         timing=Timing(period_s=AVOID_PERIOD_S),
         axes=(Axis("path_mm", 0, 500), Axis("straightness", 0, 1)),
-        generations=120,
+        generations=100,
         exam=Exam(
-            training("unseen", "rooms"),
+            (*training("unseen", "rooms"), *exam_rooms()),
             (measures.contacts, measures.roaming),
             avoid_solved,
             "got around for three minutes and touched nothing",
