@@ -117,17 +117,18 @@ def exam_rooms() -> tuple[Arena, ...]:
 
 
 @cache
-def dark_rooms(count: int, starts: int, far_mm: float, **sizes: int) -> tuple[Arena, ...]:
+def dark_rooms(count: int, starts: int, far_mm: float, first: int = 0, **sizes: int) -> tuple[Arena, ...]:
     """Return random rooms with a lamp, the same objects each time, whose starts are in the dark and far from the lamp.
 
     Args:
         count: Number of rooms.
         starts: Most starts of a room.
         far_mm: Least distance of a start from the lamp [mm].
+        first: Seed of the first one.
         sizes: Arguments of `kiks.Arena.room`.
     """
     # The room whose places are looked at is not kept: its tables take 10 MB.
-    drawn = (Arena.room(seed=seed, **sizes) for seed in range(count))
+    drawn = (Arena.room(seed=first + number, **sizes) for number in range(count))
     return tuple(replace(room, starts=dark_places(room, far_mm)[:starts]) for room in drawn)
 
 
@@ -291,6 +292,10 @@ light is all that candidates learn to follow, and not to search in the dark.
 """
 
 
+LIGHT_SIZES = {"width_mm": 1500, "height_mm": 1200, "walls": 8}
+"""Arguments of `kiks.Arena.room` for the rooms of `light`."""
+
+
 def light_fitness(values: Values) -> Floats:
     """Return the fitness of `light`: the share of the way that was made, more if it ends at the lamp; 0 of standing."""
     scores = values["light_approach"] * (1 + values["near_light_share"])
@@ -306,7 +311,8 @@ def light_solved(values: Values) -> NDArray[np.bool_]:
 def light() -> Task:
     """The task to find the lamp, go to it and stay there.
 
-    In the exam the robot starts at least 1 m from the lamp, in the shadow of walls.
+    In the exam the robot starts at least 1 m from the lamp, in the shadow of walls; half of the starts are in a random
+    room.
 
     Example:
         >>> import kiks
@@ -317,7 +323,7 @@ def light() -> Task:
     default = controllers.mlp(hidden=(4,), senses=("proximity", "ambient"), speed_limit=LIGHT_SPEED_LIMIT)
     return Task(
         "light",
-        dark_rooms(LIGHT_ROOMS, LIGHT_STARTS, FROM_LIGHT_MM, width_mm=1500, height_mm=1200, walls=8),
+        dark_rooms(LIGHT_ROOMS, LIGHT_STARTS, FROM_LIGHT_MM, **LIGHT_SIZES),
         default,
         (
             measures.light_approach,
@@ -334,7 +340,8 @@ def light() -> Task:
         # Fitness rises late: first candidates must learn to search, then to stay.
         generations=70,
         exam=Exam(
-            training("lit_unseen"),
+            # In the first random room of exams, too few places are dark and far from the lamp.
+            (*training("lit_unseen"), *dark_rooms(1, 10, 1000.0, EXAM_ROOM_SEED + 1, **LIGHT_SIZES)),
             (measures.light_stay_s(AT_LAMP_MM),),
             light_solved,
             "reached the lamp from the shadow, 1 m away, and stayed",
