@@ -50,6 +50,9 @@ EXAM_ROOM_SEED = 1000
 FURNITURE = (40, 90, 140)
 """Brightness of dark furniture, as in the arena `office`: the sensors notice it from 10 to 20 mm away."""
 
+DARK_WALL = 60
+"""Brightness of the darkest walls that `kiks.Arena.room` draws: the sensors notice their ends late."""
+
 PLACES = 200
 """Places of a room among which its dark starts are found."""
 
@@ -91,23 +94,27 @@ def rooms(count: int, **sizes: int) -> tuple[Arena, ...]:
 
 
 @cache
-def furnished_rooms(count: int, first: int = 0, **sizes: int) -> tuple[Arena, ...]:
+def furnished_rooms(count: int, first: int = 0, *, dark_walls: bool = False, **sizes: int) -> tuple[Arena, ...]:
     """Return random rooms without a lamp, the same objects each time; the pillars of every second one are dark.
 
     Args:
         count: Number of rooms.
         first: Seed of the first one.
+        dark_walls: Whether the walls of every second one are dark, too.
         sizes: Arguments of `kiks.Arena.room`.
     """
     drawn = (Arena.room(seed=first + number, lamps=0, **sizes) for number in range(count))
-    return tuple(darkened(room) if number % 2 else room for number, room in enumerate(drawn))
+    return tuple(darkened(room, dark_walls) if number % 2 else room for number, room in enumerate(drawn))
 
 
-def darkened(room: Arena) -> Arena:
-    """Return a room whose pillars have the shades of `FURNITURE` in turn."""
-    shades = cycle(FURNITURE)
-    walls = (wall if wall.disc_mm is None else replace(wall, brightness=next(shades)) for wall in room.walls)
-    return replace(room, walls=tuple(walls))
+def darkened(room: Arena, dark_walls: bool) -> Arena:
+    """Return a room whose pillars have shades of `FURNITURE` in turn, and its walls that of `DARK_WALL`, if asked."""
+    shades, changed = cycle(FURNITURE), []
+    for wall in room.walls:
+        is_pillar = wall.disc_mm is not None
+        brightness = next(shades) if is_pillar else DARK_WALL if dark_walls else wall.brightness
+        changed.append(replace(wall, brightness=brightness))
+    return replace(room, walls=tuple(changed))
 
 
 def exam_rooms() -> tuple[Arena, ...]:
@@ -180,7 +187,8 @@ def avoid() -> Task:
     return Task(
         "avoid",
         (
-            *training("pillars", "corridors", "alcoves", "wall_ends"),
+            # Twice: dead ends are rare in random rooms.
+            *training("pillars", "corridors", "alcoves", "wall_ends") * 2,
             *furnished_rooms(12, width_mm=1000, height_mm=800, walls=4, pillars=3),
         ),
         controllers.linear(speed_limit=AVOID_SPEED_LIMIT),
@@ -192,7 +200,7 @@ def avoid() -> Task:
         worlds=16,
         timing=Timing(period_s=AVOID_PERIOD_S),
         axes=(Axis("path_mm", 0, 500), Axis("straightness", 0, 1)),
-        generations=90,
+        generations=120,
         exam=Exam(
             (*training("unseen", "rooms"), *exam_rooms()),
             (measures.contacts, measures.roaming),
@@ -209,6 +217,12 @@ def avoid_solved(values: Values) -> NDArray[np.bool_]:
 
 
 # ---- follow ----
+
+FOLLOW_SPEED_LIMIT, FOLLOW_PERIOD_S = 7.0, 0.06
+"""Highest speed of `follow` [pulses/10 ms], 56 mm/s, and period of its loop [s]: dark walls are noticed late."""
+
+TRACE_S = 3.0
+"""Time after which a trace has forgotten most of what a sensor has shown [s]: half a circle round the end of a wall."""
 
 FOLLOW_SHARE, FOLLOW_CONTACTS = 0.8, 2.0
 """Exam of `follow`: smallest share of time beside a wall, and largest number of contacts."""
@@ -232,7 +246,7 @@ def follow_solved(values: Values) -> NDArray[np.bool_]:
 def follow(side: str = "left") -> Task:
     """The task to drive along walls.
 
-    A perceptron with feedback remembers that it has lost a wall.
+    The traces of a perceptron tell whether it has just lost a wall, whose end it rounds, or must look for one.
 
     Args:
         side: The side of the robot on which the wall is: 'left' or 'right'.
@@ -241,17 +255,22 @@ def follow(side: str = "left") -> Task:
         >>> import kiks
         >>> task = kiks.tasks.follow()
         >>> [measure.name for measure in task.measures], task.parameter_count
-        (['wall_following', 'beside_wall_share', 'contacts', 'path_mm'], 22)
+        (['wall_following', 'beside_wall_share', 'contacts', 'path_mm'], 34)
     """
     return Task(
         # The sides are two tasks: a folder of the one must not be continued as the other.
         "follow-right" if side == "right" else "follow",
-        training("wall_ends", "alcoves", "corridors"),
-        controllers.mlp(hidden=(), feedback=True, speed_limit=SPEED_LIMIT),
+        (
+            *training("wall_ends", "alcoves", "corridors") * 2,
+            *furnished_rooms(6, dark_walls=True, width_mm=1000, height_mm=800, walls=4, pillars=3),
+            *furnished_rooms(6, 20, dark_walls=True, width_mm=1500, height_mm=1200, walls=8, pillars=4),
+        ),
+        controllers.mlp(hidden=(), trace_share=FOLLOW_PERIOD_S / TRACE_S, speed_limit=FOLLOW_SPEED_LIMIT),
         (measures.wall_following(side), measures.beside_wall_share(side), measures.contacts, measures.path_mm),
         fitness=follow_fitness,
         seconds=40.0,
         worlds=12,
+        timing=Timing(period_s=FOLLOW_PERIOD_S),
         axes=(Axis("path_mm", 0, 3000), Axis("wall_following", 0, 1)),
         # Larger parameters saturate the wheels: then a robot without a wall drives straight on or spins. The arc that
         # leads round the end of a wall needs small ones.
@@ -260,7 +279,7 @@ def follow(side: str = "left") -> Task:
         algorithm="cma:starts=3",
         generations=160,
         exam=Exam(
-            training("unseen", "unseen_rooms"),
+            (*training("unseen", "unseen_rooms"), *exam_rooms()),
             (measures.beside_wall_share(side), measures.roaming, measures.contacts),
             follow_solved,
             "followed the wall for 80 % of three minutes",
