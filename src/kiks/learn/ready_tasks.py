@@ -33,7 +33,14 @@ TASKS: dict[str, Callable[..., Task]] = {}
 """The tasks that come with KiKS, by name."""
 
 SPEED_LIMIT = 8.0
-"""Highest speed of most ready-made tasks [pulses/10 ms]: 64 mm/s."""
+"""Highest speed of `disperse` [pulses/10 ms]: 64 mm/s."""
+
+SLOW_SPEED_LIMIT, SLOW_PERIOD_S = 5.0, 0.06
+"""Highest speed [pulses/10 ms], 40 mm/s, and period of the control loop [s] of `avoid` and `follow`.
+
+The sensors notice a dark thing (brightness 40) from 8 mm away. At 64 mm/s and 0.1 s a robot drives up to 6.4 mm before
+it senses the thing, and 3 mm more before its command acts.
+"""
 
 LEAST_ROAMING = 0.2
 """Mean `roaming` from which on a robot gets around: 16 mm/s away from where it was two seconds ago."""
@@ -49,9 +56,6 @@ EXAM_ROOM_SEED = 1000
 
 FURNITURE = (40, 90, 140)
 """Brightness of dark furniture, as in the arena `office`: the sensors notice it from 10 to 20 mm away."""
-
-DARK_WALL = 60
-"""Brightness of the darkest walls that `kiks.Arena.room` draws: the sensors notice their ends late."""
 
 PLACES = 200
 """Places of a room among which its dark starts are found."""
@@ -88,33 +92,29 @@ def training(*names: str) -> tuple[Arena, ...]:
 
 
 @cache
-def rooms(count: int, **sizes: int) -> tuple[Arena, ...]:
-    """Return random rooms, the same objects each time; `sizes` are arguments of `kiks.Arena.room`."""
-    return tuple(Arena.room(seed=seed, **sizes) for seed in range(count))
-
-
-@cache
-def furnished_rooms(count: int, first: int = 0, *, dark_walls: bool = False, **sizes: int) -> tuple[Arena, ...]:
-    """Return random rooms without a lamp, the same objects each time; the pillars of every second one are dark.
+def rooms(count: int, first: int = 0, **sizes: int) -> tuple[Arena, ...]:
+    """Return random rooms, the same objects each time.
 
     Args:
         count: Number of rooms.
         first: Seed of the first one.
-        dark_walls: Whether the walls of every second one are dark, too.
         sizes: Arguments of `kiks.Arena.room`.
     """
-    drawn = (Arena.room(seed=first + number, lamps=0, **sizes) for number in range(count))
-    return tuple(darkened(room, dark_walls) if number % 2 else room for number, room in enumerate(drawn))
+    return tuple(Arena.room(seed=first + number, **sizes) for number in range(count))
 
 
-def darkened(room: Arena, dark_walls: bool) -> Arena:
-    """Return a room whose pillars have shades of `FURNITURE` in turn, and its walls that of `DARK_WALL`, if asked."""
-    shades, changed = cycle(FURNITURE), []
-    for wall in room.walls:
-        is_pillar = wall.disc_mm is not None
-        brightness = next(shades) if is_pillar else DARK_WALL if dark_walls else wall.brightness
-        changed.append(replace(wall, brightness=brightness))
-    return replace(room, walls=tuple(changed))
+@cache
+def furnished_rooms(count: int, first: int = 0, **sizes: int) -> tuple[Arena, ...]:
+    """Return `rooms` without a lamp, the same objects each time; the pillars of every second one are dark."""
+    drawn = rooms(count, first, lamps=0, **sizes)
+    return tuple(darkened(room) if number % 2 else room for number, room in enumerate(drawn))
+
+
+def darkened(room: Arena) -> Arena:
+    """Return a room whose pillars have the shades of `FURNITURE` in turn."""
+    shades = cycle(FURNITURE)
+    walls = (wall if wall.disc_mm is None else replace(wall, brightness=next(shades)) for wall in room.walls)
+    return replace(room, walls=tuple(walls))
 
 
 def exam_rooms() -> tuple[Arena, ...]:
@@ -157,14 +157,6 @@ def dark_places(room: Arena, far_mm: float) -> tuple[Pose, ...]:
 
 # ---- avoid ----
 
-AVOID_SPEED_LIMIT, AVOID_PERIOD_S = 5.0, 0.06
-"""Highest speed [pulses/10 ms], 40 mm/s, and period of the control loop [s] of `avoid`.
-
-The sensors notice a dark thing (brightness 40) from 8 mm away. At 64 mm/s and 0.1 s a robot drives up to 6.4 mm before
-it senses the thing, and 3 mm more before its command acts.
-"""
-
-
 AVOID_CONTACT_COST = 10.0
 """As `CONTACT_COST`, but more: the exam lasts three minutes, and a single contact fails a start."""
 
@@ -191,16 +183,15 @@ def avoid() -> Task:
             *training("pillars", "corridors", "alcoves", "wall_ends") * 2,
             *furnished_rooms(12, width_mm=1000, height_mm=800, walls=4, pillars=3),
         ),
-        controllers.linear(speed_limit=AVOID_SPEED_LIMIT),
+        controllers.linear(speed_limit=SLOW_SPEED_LIMIT),
         (measures.avoidance, measures.roaming, measures.contacts, measures.path_mm, measures.straightness),
         fitness=avoid_fitness,
-        # Short trials leave time for many generations; in shorter ones robots do not yet come to dead ends and dark
-        # things.
-        seconds=20.0,
+        # Short trials leave time for many generations: robots that stay in dead ends go last.
+        seconds=12.0,
         worlds=16,
-        timing=Timing(period_s=AVOID_PERIOD_S),
+        timing=Timing(period_s=SLOW_PERIOD_S),
         axes=(Axis("path_mm", 0, 500), Axis("straightness", 0, 1)),
-        generations=120,
+        generations=190,
         exam=Exam(
             (*training("unseen", "rooms"), *exam_rooms()),
             (measures.contacts, measures.roaming),
@@ -218,10 +209,7 @@ def avoid_solved(values: Values) -> NDArray[np.bool_]:
 
 # ---- follow ----
 
-FOLLOW_SPEED_LIMIT, FOLLOW_PERIOD_S = 7.0, 0.06
-"""Highest speed of `follow` [pulses/10 ms], 56 mm/s, and period of its loop [s]: dark walls are noticed late."""
-
-TRACE_S = 3.0
+TRACE_S = 4.0
 """Time after which a trace has forgotten most of what a sensor has shown [s]: half a circle round the end of a wall."""
 
 FOLLOW_SHARE, FOLLOW_CONTACTS = 0.8, 2.0
@@ -262,15 +250,15 @@ def follow(side: str = "left") -> Task:
         "follow-right" if side == "right" else "follow",
         (
             *training("wall_ends", "alcoves", "corridors") * 2,
-            *furnished_rooms(6, dark_walls=True, width_mm=1000, height_mm=800, walls=4, pillars=3),
-            *furnished_rooms(6, 20, dark_walls=True, width_mm=1500, height_mm=1200, walls=8, pillars=4),
+            *furnished_rooms(6, width_mm=1000, height_mm=800, walls=4, pillars=3),
+            *furnished_rooms(6, 20, width_mm=1500, height_mm=1200, walls=8, pillars=4),
         ),
-        controllers.mlp(hidden=(), trace_share=FOLLOW_PERIOD_S / TRACE_S, speed_limit=FOLLOW_SPEED_LIMIT),
+        controllers.mlp(hidden=(), trace_share=SLOW_PERIOD_S / TRACE_S, speed_limit=SLOW_SPEED_LIMIT),
         (measures.wall_following(side), measures.beside_wall_share(side), measures.contacts, measures.path_mm),
         fitness=follow_fitness,
         seconds=40.0,
         worlds=12,
-        timing=Timing(period_s=FOLLOW_PERIOD_S),
+        timing=Timing(period_s=SLOW_PERIOD_S),
         axes=(Axis("path_mm", 0, 3000), Axis("wall_following", 0, 1)),
         # Larger parameters saturate the wheels: then a robot without a wall drives straight on or spins. The arc that
         # leads round the end of a wall needs small ones.
