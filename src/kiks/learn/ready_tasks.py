@@ -32,9 +32,6 @@ Values = Mapping[str, Floats]
 TASKS: dict[str, Callable[..., Task]] = {}
 """The tasks that come with KiKS, by name."""
 
-SPEED_LIMIT = 8.0
-"""Highest speed of `disperse` [pulses/10 ms]: 64 mm/s."""
-
 SLOW_SPEED_LIMIT, SLOW_PERIOD_S = 5.0, 0.06
 """Highest speed [pulses/10 ms], 40 mm/s, and period of the control loop [s] of `avoid` and `follow`.
 
@@ -429,6 +426,9 @@ def gather_solved(values: Values) -> NDArray[np.bool_]:
 SWARM_ROBOTS = 20
 """Robots of `disperse`."""
 
+DISPERSE_SPEED_LIMIT = 8.0
+"""Highest speed of `disperse` [pulses/10 ms]: 64 mm/s."""
+
 SPREAD_SHARE = 0.85
 """Share of the mean distance of random neighbours that a swarm must reach in the exam of `disperse`."""
 
@@ -481,7 +481,7 @@ def disperse() -> Task:
     return Task(
         "disperse",
         (heap(1400, 700, 700, 1), heap(1600, 400, 500, 2)),
-        controllers.mlp(hidden=(), feedback=True, speed_limit=SPEED_LIMIT),
+        controllers.mlp(hidden=(), feedback=True, speed_limit=DISPERSE_SPEED_LIMIT),
         (measures.neighbour_mm, measures.contacts, measures.path_mm),
         fitness=disperse_fitness,
         seconds=60.0,
