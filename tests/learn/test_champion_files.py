@@ -64,7 +64,7 @@ def test_the_world_begins_where_the_exam_does() -> None:
     assert starts.shape == (4, 3)
     turned = (starts[:, 2] - poses[:, 2] + 0.1) % (2 * np.pi) - 0.1
     np.testing.assert_allclose(np.column_stack([starts[:, :2], turned]), poses * [1, 1, 0], atol=1e-3)
-    assert task.with_changes(exam=None).world().arena.brightness is task.arenas_of(0)[0].brightness
+    assert task.with_changes(exam=None).world().arena.walls == task.arenas_of(0)[0].walls
 
 
 def test_robots_and_seed_may_be_others_than_those_of_the_world_or_of_the_default_box(tmp_path: Path) -> None:
