@@ -56,7 +56,7 @@ INPUTS = 1 + 2 * SENSORS + WHEELS
 USED = {"Avoid": INPUTS - WHEELS, "Follow": INPUTS}
 """How many of the inputs have weights that are learnt; those of the others are 0."""
 
-CHECK_EVERY, STARTS_PER_ARENA = 10, 5
+CHECK_EVERY, STARTS_PER_ARENA = 10, 20
 """Generations from one trial exam to the next, and its starts in each arena of training."""
 
 ATTEMPTS, GOOD_SHARE = {"Avoid": 1, "Follow": 3}, 0.9

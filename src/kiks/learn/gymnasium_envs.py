@@ -121,7 +121,7 @@ class KheperaEnv(gymnasium.Env[Floats32, Floats32]):
             >>> env = KheperaEnv("Avoid", render_mode="rgb_array")
             >>> _ = env.reset(seed=1)
             >>> env.render().shape
-            (384, 480, 3)
+            (480, 480, 3)
         """
         return None if self.render_mode is None else self.episodes.picture(0)
 
