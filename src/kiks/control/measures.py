@@ -81,8 +81,8 @@ ROAMING_S = 2.0
 FOLLOWING_MM_S = 30.0
 """Speed at which a robot gets along a wall well enough [mm/s]: beyond it, keeping the wall counts, and not haste."""
 
-WALL_LOST_S = 3.0
-"""Longest time without a wall in which a robot still follows the same one [s]: at 40 mm/s, half a circle at an end."""
+WALL_LOST_S = 2.0
+"""Longest time without a wall in which a robot still follows the same one [s]: at 64 mm/s, half a circle at an end."""
 
 KEPT_S = 10.0
 """Time for which a robot must have followed a wall to score in full [s]."""
@@ -271,7 +271,7 @@ def wall_following(side: Side = "left", *, counts: Counts = 50.0) -> Measure:
     """Mean of m k w: it gets along a wall on that side, and keeps it.
 
     m is how far it is from where it was in the last two seconds, as in `roaming`, and 1 from 30 mm/s on. k grows from
-    0 to 1 within ten seconds of following, and begins again when the robot was without a wall for more than three
+    0 to 1 within ten seconds of following, and begins again when the robot was without a wall for more than two
     seconds. w is 1 while a wall is at its side, else 0. So a robot that stays in a corner or shuttles scores next to
     nothing, and one that crosses the room from wall to wall scores little. A measure of our own.
 

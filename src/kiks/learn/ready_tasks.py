@@ -32,8 +32,8 @@ Values = Mapping[str, Floats]
 TASKS: dict[str, Callable[..., Task]] = {}
 """The tasks that come with KiKS, by name."""
 
-SLOW_SPEED_LIMIT, SLOW_PERIOD_S = 5.0, 0.06
-"""Highest speed [pulses/10 ms], 40 mm/s, and period of the control loop [s] of `avoid` and `follow`.
+AVOID_SPEED_LIMIT, PERIOD_S = 5.0, 0.06
+"""Highest speed of `avoid` [pulses/10 ms], 40 mm/s, and period of the control loop of `avoid` and `follow` [s].
 
 The sensors notice a dark thing (brightness 40) from 8 mm away. At 64 mm/s and 0.1 s a robot drives up to 6.4 mm before
 it senses the thing, and 3 mm more before its command acts.
@@ -180,13 +180,13 @@ def avoid() -> Task:
             *training("pillars", "corridors", "alcoves", "wall_ends") * 2,
             *furnished_rooms(12, width_mm=1000, height_mm=800, walls=4, pillars=3),
         ),
-        controllers.linear(speed_limit=SLOW_SPEED_LIMIT),
+        controllers.linear(speed_limit=AVOID_SPEED_LIMIT),
         (measures.avoidance, measures.roaming, measures.contacts, measures.path_mm, measures.straightness),
         fitness=avoid_fitness,
         # Short trials leave time for many generations: robots that stay in dead ends go last.
         seconds=12.0,
         worlds=16,
-        timing=Timing(period_s=SLOW_PERIOD_S),
+        timing=Timing(period_s=PERIOD_S),
         axes=(Axis("path_mm", 0, 500), Axis("straightness", 0, 1)),
         generations=190,
         exam=Exam(
@@ -206,7 +206,10 @@ def avoid_solved(values: Values) -> NDArray[np.bool_]:
 
 # ---- follow ----
 
-TRACE_S = 4.0
+FOLLOW_SPEED_LIMIT = 7.0
+"""Highest speed of `follow` [pulses/10 ms]: 56 mm/s. It has to find a wall, and may touch something twice."""
+
+TRACE_S = 3.0
 """Time after which a trace has forgotten most of what a sensor has shown [s]: half a circle round the end of a wall."""
 
 FOLLOW_SHARE, FOLLOW_CONTACTS = 0.8, 2.0
@@ -250,12 +253,12 @@ def follow(side: str = "left") -> Task:
             *furnished_rooms(6, width_mm=1000, height_mm=800, walls=4, pillars=3),
             *furnished_rooms(6, 20, width_mm=1500, height_mm=1200, walls=8, pillars=4),
         ),
-        controllers.mlp(hidden=(), trace_share=SLOW_PERIOD_S / TRACE_S, speed_limit=SLOW_SPEED_LIMIT),
+        controllers.mlp(hidden=(), trace_share=PERIOD_S / TRACE_S, speed_limit=FOLLOW_SPEED_LIMIT),
         (measures.wall_following(side), measures.beside_wall_share(side), measures.contacts, measures.path_mm),
         fitness=follow_fitness,
         seconds=40.0,
         worlds=12,
-        timing=Timing(period_s=SLOW_PERIOD_S),
+        timing=Timing(period_s=PERIOD_S),
         axes=(Axis("path_mm", 0, 3000), Axis("wall_following", 0, 1)),
         # Larger parameters saturate the wheels: then a robot without a wall drives straight on or spins. The arc that
         # leads round the end of a wall needs small ones.
