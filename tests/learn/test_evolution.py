@@ -227,7 +227,7 @@ def test_wrong_tasks_and_files_without_one_are_errors(tmp_path: Path) -> None:
     (tmp_path / "bad.py").write_text("1 / 0\n")
     refused("ZeroDivisionError", kiks.tasks.load, str(tmp_path / "bad.py"))
     refused("Did you mean 'avoid'", kiks.tasks.load, "avoyd")
-    refused("worlds must be a multiple of the number of arenas, 20", small, worlds=30)
+    refused("worlds must be a multiple of the number of arenas, 16", small, worlds=30)
     refused("an axis must name one of", small, axes=(kiks.Axis("nothing", 0, 1),))
     task = small(fitness=lambda values: values["contacts"])
     words = "fitness must return a finite number for each of 1"
