@@ -15,7 +15,8 @@ Settings of tasks are chosen on seeds 1 to 20. So results are to be reported on 
   that of MAP-Elites in Kheperax itself, in the same maze with as many cells, candidates and evaluations
   (benchmarks/kheperax_elites.py). Its environment is made in the folder if it is not there; without --kheperax it is
   left out.
-* `evolve.avoid_maze_solved`, `evolve.avoid_office_solved`: the same exam in two arenas of `examples`.
+* `evolve.NAME_PLACE_solved`: of `avoid` and `follow`, the same exam in small and in large random rooms, and in two
+  arenas of `examples`, `maze` and `office`.
 * `evolve.pursuit_s`: the median time of a co-evolution of predator and prey without its master tournament, which gives
   `evolve.pursuit_SIDE_N`, the mean fitness of the champions of each fifth of the generations against all champions of
   the other side.
@@ -34,6 +35,7 @@ import time
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import cache
 from itertools import chain
 from pathlib import Path
 
@@ -64,10 +66,21 @@ def exams_of(task: kiks.Task) -> dict[str, kiks.Exam]:
     """Return the exams of a task by their names."""
     assert task.exam is not None
     exams = {task.name: task.exam}
-    if task.name == "avoid":
-        for name in ("maze", "office"):
-            exams[f"avoid_{name}"] = replace(task.exam, arenas=(kiks.Arena.load(ARENAS / f"{name}.toml"),))
+    if task.name in ("avoid", "follow"):
+        places = {name: (kiks.Arena.load(ARENAS / f"{name}.toml"),) for name in ("maze", "office")}
+        for place, arenas in (places | random_rooms()).items():
+            exams[f"{task.name}_{place}"] = replace(task.exam, arenas=arenas)
     return exams
+
+
+@cache
+def random_rooms() -> dict[str, tuple[kiks.Arena, ...]]:
+    """Return rooms in which no task trains and that no exam has."""
+    small, large = {"width_mm": 900, "height_mm": 700, "walls": 2}, {"width_mm": 2000, "height_mm": 1500, "walls": 10}
+    return {
+        "small_rooms": tuple(kiks.Arena.room(**small, pillars=2, lamps=0, seed=seed) for seed in range(1001, 1005)),
+        "large_rooms": tuple(kiks.Arena.room(**large, pillars=6, lamps=0, seed=seed) for seed in (1001, 1002)),
+    }
 
 
 def kheperax_coverage(folder: Path, task: kiks.Task, seed: int) -> float:

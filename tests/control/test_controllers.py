@@ -55,17 +55,20 @@ def taken(parameters: Trace, *shapes: tuple[int, ...]) -> list[Trace]:
     return parts
 
 
-def feed_forward(hidden: tuple[int, ...], parameters: Trace, inputs: Trace, *, feedback: bool, is_cut: bool) -> Trace:
-    counts = [inputs.shape[1] + 2 * feedback, *hidden, 2]
+def feed_forward(
+    hidden: tuple[int, ...], parameters: Trace, inputs: Trace, *, feedback: bool, is_cut: bool, share: float = 0.0
+) -> Trace:
+    last, traces = np.zeros(2 * feedback), np.zeros(inputs.shape[1] * (share > 0))
+    counts = [inputs.shape[1] + len(last) + len(traces), *hidden, 2]
     layers = taken(parameters, *((1 + counts[k], counts[k + 1]) for k in range(len(counts) - 1)))
-    wheels, last = [], np.zeros(2)
+    wheels = []
     for each in inputs:
-        x = np.concatenate([each, last]) if feedback else each
+        x = np.concatenate([each, last, traces])
         for layer in layers[:-1]:
             x = np.tanh(layer[0] + x @ layer[1:])
         total = layers[-1][0] + x @ layers[-1][1:]
-        last = np.clip(total, -1, 1) if is_cut else np.tanh(total)
-        wheels.append(last)
+        wheels.append(np.clip(total, -1, 1) if is_cut else np.tanh(total))
+        last, traces = wheels[-1][: len(last)], traces + share * (each[: len(traces)] - traces)
     return np.array(wheels)
 
 
@@ -140,8 +143,8 @@ NETWORKS: list[tuple[str, dict[str, Any], Callable[[Trace, Trace], Trace], float
     ("mlp", {"hidden": (), "feedback": True}, partial(feed_forward, (), feedback=True, is_cut=False), 1e-3),
     (
         "mlp",
-        {"hidden": (5, 3), "senses": BOTH, "feedback": True},
-        partial(feed_forward, (5, 3), feedback=True, is_cut=False),
+        {"hidden": (5, 3), "senses": BOTH, "feedback": True, "trace_share": 0.1},
+        partial(feed_forward, (5, 3), feedback=True, is_cut=False, share=0.1),
         1e-3,
     ),
     ("gru", {"units": 3, "senses": BOTH[::-1]}, gru, 1e-3),
@@ -149,7 +152,7 @@ NETWORKS: list[tuple[str, dict[str, Any], Callable[[Trace, Trace], Trace], float
     ("graph", {"hidden": 3, "senses": BOTH, "speed_limit": 8.0}, graph, 1e-3),
     ("plastic", {"neurons": 4, "senses": BOTH[::-1]}, partial(plastic, "synapse"), 5e-3),
     ("plastic", {"neurons": 4, "per": "neuron"}, partial(plastic, "neuron"), 5e-3),
-    ("linear", {"feedback": True}, partial(feed_forward, (), feedback=True, is_cut=True), 1e-12),
+    ("linear", {"trace_share": 0.3}, partial(feed_forward, (), feedback=False, is_cut=True, share=0.3), 1e-12),
     ("mlp", {"hidden": (6,)}, partial(feed_forward, (6,), feedback=False, is_cut=False), 1e-3),
     ("plastic", {"neurons": 4}, partial(plastic, "synapse"), 5e-3),
     ("plastic", {"neurons": 4, "senses": BOTH[::-1], "per": "neuron"}, partial(plastic, "neuron"), 5e-3),

@@ -10,11 +10,11 @@ from kiks import Arena, Batch, Khepera, ParameterError, Recording, Simulation, c
 from kiks.export.kinds import ENDINGS, KINDS, export, kind_of, options_of
 from kiks.export.pictures import Picture
 from kiks.learn.exam import ExamResult
+from kiks.model.replaceable import FOXGLOVE, RECORDING, is_replaceable
 from kiks.recording.tables import TABLES
 
 ENCODERS = (10, 4)
 """What the robot's first `H` is answered."""
-from kiks.model.replaceable import FOXGLOVE, RECORDING, is_replaceable
 
 
 @pytest.fixture(scope="module")

@@ -75,7 +75,7 @@ def test_wrong_files_are_errors_of_one_short_line(folder: Path) -> None:
         ("", "base must be given"),
         ('base = "avoyd"', "base must be .* Did you mean 'avoid'"),
         ("world = 3", "Did you mean 'worlds'"),
-        ("worlds = 6", "worlds must be a multiple of the number of arenas, 4"),
+        ("worlds = 30", "worlds must be a multiple of the number of arenas, 16"),
         ("seconds = nan", "seconds must be a finite number, but it was nan"),
         ('name = "../../out"', "name must be a text of 1 to 60 letters"),
         ("arenas = []", "arenas must have at least 1 item"),

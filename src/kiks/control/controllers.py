@@ -87,6 +87,7 @@ else:
         tuple[Any, ...], BeforeValidator(check_senses), PlainSerializer(recipes_for), Field(min_length=1)
     ]
     Layers = Annotated[tuple[Units, ...], Field(max_length=LAYERS_MAX, description="One for each hidden layer.")]
+TraceShare = Annotated[Number, Field(ge=0, le=1, description="0 for no traces; the period over the time to forget.")]
 SpeedLimit = Annotated[Number, Field(ge=0, le=127, description="Speed of an output of 1 [pulses/10 ms].")]
 
 WITH_GRIPPER: dict[str, Any] = {"senses": ("proximity", "barrier"), "actuators": ("wheels", "gripper")}
@@ -124,22 +125,30 @@ def kind(function: Callable[_Arguments, Made]) -> Callable[_Arguments, Controlle
 
 
 @kind
-def linear(*, senses: Senses = ("proximity",), speed_limit: SpeedLimit = SPEED_LIMIT, feedback: Switch = False) -> Made:
+def linear(
+    *,
+    senses: Senses = ("proximity",),
+    speed_limit: SpeedLimit = SPEED_LIMIT,
+    feedback: Switch = False,
+    trace_share: TraceShare = 0.0,
+) -> Made:
     """Return a Braitenberg vehicle: each wheel a weighted sum of the sensors, cut to +-1.
 
-    Parameters: 2 biases, a matrix [N, 2]; with feedback [N + 2, 2], the last two inputs being the last outputs.
+    Parameters: 2 biases, a matrix [N, 2]; with feedback [N + 2, 2], the last two inputs being the last outputs; with
+    traces N more rows, the last ones.
 
     Args:
         senses: Its senses, as for `kiks.Controller`.
         speed_limit: The speed of an output of 1 [pulses/10 ms].
         feedback: Whether its last outputs are inputs.
+        trace_share: As for `mlp`.
 
     Example:
         >>> import kiks
         >>> kiks.controllers.linear().parameter_count
         18
     """
-    return feed_forward((), senses, speed_limit, has_feedback=feedback, squash=cut)
+    return feed_forward((), senses, speed_limit, has_feedback=feedback, trace_share=trace_share, squash=cut)
 
 
 @kind
@@ -149,6 +158,7 @@ def mlp(
     senses: Senses = ("proximity",),
     speed_limit: SpeedLimit = SPEED_LIMIT,
     feedback: Switch = False,
+    trace_share: TraceShare = 0.0,
 ) -> Made:
     """Return a network of layers of tanh units.
 
@@ -161,13 +171,15 @@ def mlp(
         senses: Its senses, as for `kiks.Controller`.
         speed_limit: The speed of an output of 1 [pulses/10 ms].
         feedback: Whether its last outputs are inputs, after the sensors.
+        trace_share: If it is above 0, the trace of each sensor is an input, too, after all others: the mean of what it
+            has shown, of which each call renews this share. So 0.02 forgets most of it in 50 calls.
 
     Example:
         >>> import kiks
         >>> kiks.controllers.mlp(hidden=(6,)).parameter_count
         68
     """
-    return feed_forward(hidden, senses, speed_limit, has_feedback=feedback)
+    return feed_forward(hidden, senses, speed_limit, has_feedback=feedback, trace_share=trace_share)
 
 
 @kind

@@ -141,6 +141,7 @@ def feed_forward(
     speed_limit: float,
     *,
     has_feedback: bool = False,
+    trace_share: float = 0.0,
     activation: Any = tanh,
     squash: Any = tanh,
 ) -> tuple[Any, int, int]:
@@ -150,11 +151,14 @@ def feed_forward(
         hidden: Units of each hidden layer.
         senses: The senses of the inputs.
         speed_limit: The speed of an output of 1 [pulses/10 ms].
-        has_feedback: Whether the last two inputs are the last outputs, from the memory.
+        has_feedback: Whether the last two outputs are inputs, from the memory.
+        trace_share: Share of a sensor's trace that a call renews; if it is above 0, the traces are inputs, too.
         activation: Kernel of hidden units.
         squash: Kernel that keeps outputs within +-1.
     """
-    sense_count, memory_count, take_senses = reading_count(senses), 2 * has_feedback, senses_as_inputs(senses)
+    sense_count, take_senses = reading_count(senses), senses_as_inputs(senses)
+    output_count, trace_count = 2 * has_feedback, sense_count * (trace_share > 0.0)
+    memory_count = output_count + trace_count  # what is remembered are the inputs after the sensors
     input_count = sense_count + memory_count
     counts = (input_count, *hidden, 2)
     net = layers(counts, activation)
@@ -170,6 +174,8 @@ def feed_forward(
             wheels[wheel] = speed_limit * output
             if has_feedback:
                 memory[wheel] = output
+        for k in range(trace_count):
+            memory[output_count + k] += trace_share * (inputs[k] - memory[output_count + k])
 
     return decide, memory_count, sum(layer_size(*pair) for pair in pairwise(counts))
 

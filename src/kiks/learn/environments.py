@@ -39,8 +39,11 @@ CONTACT_COST = 5.0
 EPISODE_S = 60.0
 """Time after which an episode is truncated [s]."""
 
-PERIODS_S = {"Avoid": ready_tasks.AVOID_PERIOD_S}
+PERIODS_S = {"Avoid": ready_tasks.PERIOD_S}
 """Periods of the control loops of environments that have another one than usual [s]: known before a task is made."""
+
+FOLLOW_SPEED_LIMIT = 8.0
+"""Highest speed of `Follow` [pulses/10 ms]: 64 mm/s."""
 
 LIT_ROOMS = 18
 """Number of rooms of `Light`."""
@@ -111,13 +114,20 @@ def without_contacts(reward: Watched, cost: Cost = CONTACT_COST) -> Measure:
 
 
 def avoid() -> Task:
-    """Drive fast and straight, explore, and touch nothing: the task `avoid`."""
-    return ready_tasks.avoid(name="Avoid", reward=without_contacts(exploring))
+    """Drive fast and straight, explore, and touch nothing: the task `avoid`, among walls that are always near."""
+    return narrow(ready_tasks.avoid(name="Avoid", reward=without_contacts(exploring)), 4)
 
 
 def follow() -> Task:
-    """Follow a wall on the left, and touch nothing: the task `follow`."""
-    return ready_tasks.follow(name="Follow", reward=without_contacts(wall_following("left")))
+    """Follow a wall on the left, and touch nothing: the task `follow`, faster, among walls that are always near."""
+    reward, fast = without_contacts(wall_following("left")), linear(speed_limit=FOLLOW_SPEED_LIMIT)
+    return narrow(ready_tasks.follow(fast, name="Follow", reward=reward, timing=Timing()), 3)
+
+
+def narrow(task: Task, count: int) -> Task:
+    """Return a task in so many of its arenas, and with an exam in two: the first ones, which are drawn by hand."""
+    exam = task.exam and task.exam.with_changes(arenas=task.exam.arenas[:2])
+    return task.with_changes(arenas=task.arenas[:count], exam=exam)
 
 
 def light() -> Task:

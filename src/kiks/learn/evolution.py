@@ -172,7 +172,7 @@ class Evolution:
             >>> evolution = kiks.Evolution(task, "map-elites", seed=1, population=8)
             >>> _ = evolution.run(generations=2)
             >>> evolution.archive
-            <Archive: 9 elites in 400 cells of path_mm x straightness>
+            <Archive: 4 elites in 400 cells of path_mm x straightness>
         """
         return self.archives[0] if self.archives else None
 

@@ -8,6 +8,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache
+from itertools import cycle
 from typing import Any
 
 import numpy as np
@@ -31,8 +32,12 @@ Values = Mapping[str, Floats]
 TASKS: dict[str, Callable[..., Task]] = {}
 """The tasks that come with KiKS, by name."""
 
-SPEED_LIMIT = 8.0
-"""Highest speed of most ready-made tasks [pulses/10 ms]: 64 mm/s."""
+AVOID_SPEED_LIMIT, PERIOD_S = 5.0, 0.06
+"""Highest speed of `avoid` [pulses/10 ms], 40 mm/s, and period of the control loop of `avoid` and `follow` [s].
+
+The sensors notice a dark thing (brightness 40) from 8 mm away. At 64 mm/s and 0.1 s a robot drives up to 6.4 mm before
+it senses the thing, and 3 mm more before its command acts.
+"""
 
 LEAST_ROAMING = 0.2
 """Mean `roaming` from which on a robot gets around: 16 mm/s away from where it was two seconds ago."""
@@ -42,6 +47,12 @@ CONTACT_COST = 3.0
 
 CONTACTS_COUNTED = 3.0
 """Largest number of contacts of a world that counts: a stuck robot has hundreds."""
+
+EXAM_ROOM_SEED = 1000
+"""Seed of the first random room of an exam; rooms of training have those from 0 on."""
+
+FURNITURE = (40, 90, 140)
+"""Brightness of dark furniture, as in the arena `office`: the sensors notice it from 10 to 20 mm away."""
 
 PLACES = 200
 """Places of a room among which its dark starts are found."""
@@ -78,23 +89,50 @@ def training(*names: str) -> tuple[Arena, ...]:
 
 
 @cache
-def rooms(count: int, **sizes: int) -> tuple[Arena, ...]:
-    """Return random rooms, the same objects each time; `sizes` are arguments of `kiks.Arena.room`."""
-    return tuple(Arena.room(seed=seed, **sizes) for seed in range(count))
+def rooms(count: int, first: int = 0, **sizes: int) -> tuple[Arena, ...]:
+    """Return random rooms, the same objects each time.
+
+    Args:
+        count: Number of rooms.
+        first: Seed of the first one.
+        sizes: Arguments of `kiks.Arena.room`.
+    """
+    return tuple(Arena.room(seed=first + number, **sizes) for number in range(count))
 
 
 @cache
-def dark_rooms(count: int, starts: int, far_mm: float, **sizes: int) -> tuple[Arena, ...]:
+def furnished_rooms(count: int, first: int = 0, **sizes: int) -> tuple[Arena, ...]:
+    """Return `rooms` without a lamp, the same objects each time; the pillars of every second one are dark."""
+    drawn = rooms(count, first, lamps=0, **sizes)
+    return tuple(darkened(room) if number % 2 else room for number, room in enumerate(drawn))
+
+
+def darkened(room: Arena) -> Arena:
+    """Return a room whose pillars have the shades of `FURNITURE` in turn."""
+    shades = cycle(FURNITURE)
+    walls = (wall if wall.disc_mm is None else replace(wall, brightness=next(shades)) for wall in room.walls)
+    return replace(room, walls=tuple(walls))
+
+
+def exam_rooms() -> tuple[Arena, ...]:
+    """Return arenas unlike those of training, for exams: random rooms, one of them with dark pillars, and `office`."""
+    drawn = furnished_rooms(2, EXAM_ROOM_SEED, width_mm=1200, height_mm=1000, walls=5, pillars=4)
+    return *drawn, shipped_arena("office")
+
+
+@cache
+def dark_rooms(count: int, starts: int, far_mm: float, first: int = 0, **sizes: int) -> tuple[Arena, ...]:
     """Return random rooms with a lamp, the same objects each time, whose starts are in the dark and far from the lamp.
 
     Args:
         count: Number of rooms.
         starts: Most starts of a room.
         far_mm: Least distance of a start from the lamp [mm].
+        first: Seed of the first one.
         sizes: Arguments of `kiks.Arena.room`.
     """
     # The room whose places are looked at is not kept: its tables take 10 MB.
-    drawn = (Arena.room(seed=seed, **sizes) for seed in range(count))
+    drawn = (Arena.room(seed=first + number, **sizes) for number in range(count))
     return tuple(replace(room, starts=dark_places(room, far_mm)[:starts]) for room in drawn)
 
 
@@ -116,17 +154,13 @@ def dark_places(room: Arena, far_mm: float) -> tuple[Pose, ...]:
 
 # ---- avoid ----
 
-AVOID_SPEED_LIMIT, AVOID_PERIOD_S = 5.0, 0.06
-"""Highest speed [pulses/10 ms], 40 mm/s, and period of the control loop [s] of `avoid`.
-
-The sensors notice a dark thing (brightness 40) from 8 mm away. At 64 mm/s and 0.1 s a robot drives up to 6.4 mm before
-it senses the thing, and 3 mm more before its command acts.
-"""
+AVOID_CONTACT_COST = 10.0
+"""As `CONTACT_COST`, but more: the exam lasts three minutes, and a single contact fails a start."""
 
 
 def avoid_fitness(values: Values) -> Floats:
     """Return the fitness of `avoid`: that of Floreano and Mondada (1994) times `roaming`."""
-    return reduced_by_contacts(cautious_mean(values["avoidance"] * values["roaming"]), values)
+    return reduced_by_contacts(cautious_mean(values["avoidance"] * values["roaming"]), values, AVOID_CONTACT_COST)
 
 
 @ready
@@ -141,18 +175,21 @@ def avoid() -> Task:
     """
     return Task(
         "avoid",
-        training("pillars", "corridors", "alcoves", "wall_ends"),
+        (
+            *training("pillars", "corridors", "alcoves", "wall_ends"),
+            *furnished_rooms(12, width_mm=1000, height_mm=800, walls=4, pillars=3),
+        ),
         controllers.linear(speed_limit=AVOID_SPEED_LIMIT),
         (measures.avoidance, measures.roaming, measures.contacts, measures.path_mm, measures.straightness),
         fitness=avoid_fitness,
-        # Short trials leave time for many generations: robots that stay in dead ends go last.
-        seconds=12.0,
+        # In shorter trials few robots come to a dead end: then champions stay in those of other rooms for ever.
+        seconds=20.0,
         worlds=16,
-        timing=Timing(period_s=AVOID_PERIOD_S),
+        timing=Timing(period_s=PERIOD_S),
         axes=(Axis("path_mm", 0, 500), Axis("straightness", 0, 1)),
-        generations=120,
+        generations=115,
         exam=Exam(
-            training("unseen", "rooms"),
+            (*training("unseen", "rooms"), *exam_rooms()),
             (measures.contacts, measures.roaming),
             avoid_solved,
             "got around for three minutes and touched nothing",
@@ -167,6 +204,12 @@ def avoid_solved(values: Values) -> NDArray[np.bool_]:
 
 
 # ---- follow ----
+
+FOLLOW_SPEED_LIMIT = 7.0
+"""Highest speed of `follow` [pulses/10 ms]: 56 mm/s. It has to find a wall, and may touch something twice."""
+
+TRACE_S = 3.0
+"""Time after which a trace has forgotten most of what a sensor has shown [s]: half a circle round the end of a wall."""
 
 FOLLOW_SHARE, FOLLOW_CONTACTS = 0.8, 2.0
 """Exam of `follow`: smallest share of time beside a wall, and largest number of contacts."""
@@ -190,7 +233,7 @@ def follow_solved(values: Values) -> NDArray[np.bool_]:
 def follow(side: str = "left") -> Task:
     """The task to drive along walls.
 
-    A perceptron with feedback remembers that it has lost a wall.
+    The traces of a perceptron tell whether it has just lost a wall, whose end it rounds, or must look for one.
 
     Args:
         side: The side of the robot on which the wall is: 'left' or 'right'.
@@ -199,17 +242,22 @@ def follow(side: str = "left") -> Task:
         >>> import kiks
         >>> task = kiks.tasks.follow()
         >>> [measure.name for measure in task.measures], task.parameter_count
-        (['wall_following', 'beside_wall_share', 'contacts', 'path_mm'], 22)
+        (['wall_following', 'beside_wall_share', 'contacts', 'path_mm'], 34)
     """
     return Task(
         # The sides are two tasks: a folder of the one must not be continued as the other.
         "follow-right" if side == "right" else "follow",
-        training("wall_ends", "alcoves", "corridors"),
-        controllers.mlp(hidden=(), feedback=True, speed_limit=SPEED_LIMIT),
+        (
+            *training("wall_ends", "alcoves", "corridors") * 2,
+            *furnished_rooms(6, width_mm=1000, height_mm=800, walls=4, pillars=3),
+            *furnished_rooms(6, 20, width_mm=1500, height_mm=1200, walls=8, pillars=4),
+        ),
+        controllers.mlp(hidden=(), trace_share=PERIOD_S / TRACE_S, speed_limit=FOLLOW_SPEED_LIMIT),
         (measures.wall_following(side), measures.beside_wall_share(side), measures.contacts, measures.path_mm),
         fitness=follow_fitness,
         seconds=40.0,
         worlds=12,
+        timing=Timing(period_s=PERIOD_S),
         axes=(Axis("path_mm", 0, 3000), Axis("wall_following", 0, 1)),
         # Larger parameters saturate the wheels: then a robot without a wall drives straight on or spins. The arc that
         # leads round the end of a wall needs small ones.
@@ -218,7 +266,7 @@ def follow(side: str = "left") -> Task:
         algorithm="cma:starts=3",
         generations=160,
         exam=Exam(
-            training("unseen", "unseen_rooms"),
+            (*training("unseen", "unseen_rooms"), *exam_rooms()),
             (measures.beside_wall_share(side), measures.roaming, measures.contacts),
             follow_solved,
             "followed the wall for 80 % of three minutes",
@@ -250,6 +298,10 @@ light is all that candidates learn to follow, and not to search in the dark.
 """
 
 
+LIGHT_SIZES = {"width_mm": 1500, "height_mm": 1200, "walls": 8}
+"""Arguments of `kiks.Arena.room` for the rooms of `light`."""
+
+
 def light_fitness(values: Values) -> Floats:
     """Return the fitness of `light`: the share of the way that was made, more if it ends at the lamp; 0 of standing."""
     scores = values["light_approach"] * (1 + values["near_light_share"])
@@ -265,7 +317,8 @@ def light_solved(values: Values) -> NDArray[np.bool_]:
 def light() -> Task:
     """The task to find the lamp, go to it and stay there.
 
-    In the exam the robot starts at least 1 m from the lamp, in the shadow of walls.
+    In the exam the robot starts at least 1 m from the lamp, in the shadow of walls; half of the starts are in a random
+    room.
 
     Example:
         >>> import kiks
@@ -276,7 +329,7 @@ def light() -> Task:
     default = controllers.mlp(hidden=(4,), senses=("proximity", "ambient"), speed_limit=LIGHT_SPEED_LIMIT)
     return Task(
         "light",
-        dark_rooms(LIGHT_ROOMS, LIGHT_STARTS, FROM_LIGHT_MM, width_mm=1500, height_mm=1200, walls=8),
+        dark_rooms(LIGHT_ROOMS, LIGHT_STARTS, FROM_LIGHT_MM, **LIGHT_SIZES),
         default,
         (
             measures.light_approach,
@@ -293,7 +346,8 @@ def light() -> Task:
         # Fitness rises late: first candidates must learn to search, then to stay.
         generations=70,
         exam=Exam(
-            training("lit_unseen"),
+            # In the first random room of exams, too few places are dark and far from the lamp.
+            (*training("lit_unseen"), *dark_rooms(1, 10, 1000.0, EXAM_ROOM_SEED + 1, **LIGHT_SIZES)),
             (measures.light_stay_s(AT_LAMP_MM),),
             light_solved,
             "reached the lamp from the shadow, 1 m away, and stayed",
@@ -374,6 +428,9 @@ def gather_solved(values: Values) -> NDArray[np.bool_]:
 SWARM_ROBOTS = 20
 """Robots of `disperse`."""
 
+DISPERSE_SPEED_LIMIT = 8.0
+"""Highest speed of `disperse` [pulses/10 ms]: 64 mm/s."""
+
 SPREAD_SHARE = 0.85
 """Share of the mean distance of random neighbours that a swarm must reach in the exam of `disperse`."""
 
@@ -426,7 +483,7 @@ def disperse() -> Task:
     return Task(
         "disperse",
         (heap(1400, 700, 700, 1), heap(1600, 400, 500, 2)),
-        controllers.mlp(hidden=(), feedback=True, speed_limit=SPEED_LIMIT),
+        controllers.mlp(hidden=(), feedback=True, speed_limit=DISPERSE_SPEED_LIMIT),
         (measures.neighbour_mm, measures.contacts, measures.path_mm),
         fitness=disperse_fitness,
         seconds=60.0,
