@@ -119,6 +119,7 @@ def test_worlds_are_created_saved_and_opened(visitor: Visitor) -> None:
         visitor.at("save-name").fill(bad)
         visitor.click("save", told=words)
     use(visitor, "hand", desk.sim.pose(2)[:2], (500, 350))
+    visitor.until(lambda: desk.sim.pose(2)[:2] == pytest.approx((500, 350), abs=1e-3))
     poses = desk.sim.poses()
     saved = visitor.save_as("mine")
     assert [path.name for path in desk.folder.iterdir()] == ["mine.kiks"]

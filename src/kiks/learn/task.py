@@ -349,7 +349,7 @@ class Task(Experiment):
             >>> import kiks
             >>> task = kiks.tasks.avoid()
             >>> task.driven_s
-            192.0
+            320.0
         """
         return float(self.worlds * len(self.controllers) * self.seconds)
 
