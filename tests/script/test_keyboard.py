@@ -50,6 +50,9 @@ WAITS = {
 def test_threads_go_on_while_one_waits_for_a_key(wait: str, key: str, tmp_path: Path) -> None:
     (tmp_path / "program.py").write_text(DRIVES.format(wait))
     words = [*forked.kiks_command(), "run", str(tmp_path / "program.py")]
+    if wait == UNTIL_A_KEY:
+        (tmp_path / "beside.py").touch()
+        words.append(str(tmp_path / "beside.py"))
     done = called(sys.executable, PROGRAMS / "on_terminal.py", *words)
     assert done.returncode == 0, done.stdout
     assert f"{key} True\n" in done.stdout
