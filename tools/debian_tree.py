@@ -56,6 +56,7 @@ def make_tree(tree: Path, suite: str, packages: str) -> None:
         target = tree / name.lstrip("/")
         target.parent.mkdir(parents=True, exist_ok=True)
         copy(name, target)
+    tree.chmod(0o755)  # other users, such as that of apt, must reach what is in it
     (tree / "kiks").mkdir()
     archive = subprocess.run(["git", "archive", "HEAD"], cwd=ROOT, capture_output=True, check=True).stdout
     subprocess.run(["tar", "-x", "-C", tree / "kiks"], input=archive, check=True)
