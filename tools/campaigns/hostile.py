@@ -29,8 +29,8 @@ OTHERS: tuple[Any, ...] = (
     np.float64("nan"), np.float32(1e30), np.int64(-1), np.uint64(2**64 - 1), np.bool_(True), np.array(5.0),
     np.array([]),
     np.array([1e308, -1e308]), np.full((3, 3), np.nan), np.array(["a", "b"]), np.array([None, 1], object),
-    np.zeros((2, 2, 2)), np.arange(4, dtype=np.uint8), np.array([1 + 2j]), np.datetime64("NaT", "s"), np.zeros((120, 120),
-    np.uint8),
+    np.zeros((2, 2, 2)), np.arange(4, dtype=np.uint8), np.array([1 + 2j]), np.datetime64("NaT", "s"),
+    np.zeros((120, 120), np.uint8),
 )  # fmt: skip
 """Values of other types."""
 
