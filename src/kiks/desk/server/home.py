@@ -6,14 +6,13 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from modulefinder import ModuleFinder
 from pathlib import Path, PurePosixPath
-from typing import Any
 
 from kiks.errors import ParameterError, shown
 from kiks.model.atomic_files import inside, program_in
 from kiks.model.data_file import parse_toml, read_file
 from kiks.model.limits import PICTURE_FILE_BYTES_MAX
+from kiks.model.program_files import ProgramFiles
 from kiks.model.project import Project, ProjectRobot
 from kiks.model.thinking_policy import split_thinking
 from kiks.ports.program_process import Command, commands_of, supervisor_of
@@ -129,12 +128,13 @@ class _Copies:
         self._take(name, data)
 
     def add_program(self, path: Path, wanted: str) -> str:
-        """Add a program with the modules beside it that it imports; return its name."""
+        """Add a program with all files that belong to it; return its name."""
         data = _bytes_of(path)
         name = _free_name(wanted, lambda name: self._takes(name, data))
         self._take(name, data)
-        for module in _modules_beside(path):
-            self.add(module, (PurePosixPath(name).parent / module.relative_to(path.parent).as_posix()).as_posix())
+        for other, file in ProgramFiles(path).files.items():
+            if file != path:
+                self.add(file, (PurePosixPath(name).parent / other).as_posix())
         return name
 
     def _takes(self, name: str, data: bytes) -> bool:
@@ -168,15 +168,6 @@ def _name_in(folder: Path, program: Path) -> str | None:
 
 def _bytes_of(path: Path) -> bytes:
     return read_file(path, f"The file {shown(str(path))}", bytes_max=PICTURE_FILE_BYTES_MAX)
-
-
-def _modules_beside(program: Path) -> list[Path]:
-    """Return the files beside a program or below that it imports."""
-    finder = ModuleFinder([str(program.parent)])
-    with suppress(SyntaxError, ValueError, RecursionError):
-        finder.run_script(str(program))
-    found: list[Any] = [module for name, module in finder.modules.items() if name != "__main__"]
-    return [Path(module.__file__) for module in found if module.__file__]  # a package without an __init__.py has none
 
 
 def _files_named(project: Project, folder: Path) -> Iterator[str]:
