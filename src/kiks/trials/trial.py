@@ -14,6 +14,7 @@ from kiks.errors import ParameterError
 from kiks.model.atomic_files import inside
 from kiks.model.program_files import ProgramFiles
 from kiks.model.project import Project
+from kiks.model.project_files import files_named
 from kiks.model.thinking_policy import split_thinking
 from kiks.ports.program_process import Command, supervisor_of
 from kiks.sim.judge import Judgement
@@ -105,11 +106,8 @@ class Trial:
     def _parts(self) -> Iterator[bytes]:
         project, folder = self.project, self.folder
         yield project.to_bytes()
-        replay = split_thinking(project.thinking)[1]
-        files = [robot.kind for robot in project.robots if robot.kind.lower().endswith(".toml")]
-        files += [replay] if isinstance(replay, str) else []
-        for path in [inside(folder, file, "file") for file in files]:
-            yield _bytes_of(path)
+        for name in files_named(project, folder):
+            yield _bytes_of(inside(folder, name, "file"))
         supervisor = supervisor_of(project, folder)
         yield b"" if supervisor is None else ProgramFiles(supervisor).digest.encode()
         for command in self.programs:
