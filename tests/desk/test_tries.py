@@ -11,14 +11,25 @@ from kiks.errors import ParameterError
 from kiks.model.arena import Arena
 from kiks.model.exercise import Cases, Exercise
 from kiks.model.goal import Goal
-from kiks.model.project import Project
+from kiks.model.project import Project, ProjectRobot
 from kiks.ports.program_process import Command
+from kiks.trials.grading import grade as graded
+from kiks.trials.submissions import submissions_in
 
 CASES = Cases(seed=(1, 2)), Cases("mine", is_hidden=True)
 GOAL = Goal(solved="path_mm > 20")
 PROJECT = Project(Arena.box(400, 400), seconds=2.0, goal=GOAL, exercise=Exercise("Drive"), cases=CASES)
 
 DRIVE = "import kiks\nkiks.Khepera('/dev/ttyUSB0').set_speed(10, 10)\nimport time\ntime.sleep(1)\nprint('there')\n"
+
+
+SPEEDS = """
+import kiks, speeds
+robot = kiks.Khepera("/dev/ttyUSB0")
+robot.set_speed(speeds.SPEED, int(open("turn.txt").read()))
+print("driving", file=open("log.txt", "w"))
+robot.pause(1)
+"""
 
 
 def program(folder: Path, text: str) -> Command:
@@ -61,3 +72,50 @@ def test_what_cannot_be_tried_is_said(tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match=r"'0' cannot begin: a project .* must have a time limit"):
         tries.packed()
     tries.close()
+
+
+def test_what_is_tried_is_what_is_handed_in_with_all_its_files(tmp_path: Path) -> None:
+    home, tries = tmp_path / "home", Tries()
+    home.mkdir()
+    for name, text in {"speeds.py": "SPEED = 10", "turn.txt": "0", "log.txt": "of before", "mine.txt": ""}.items():
+        (home / name).write_text(text)
+    drive, taken = program(home, SPEEDS), []
+    for speed in (10, 10, 0):
+        (home / "speeds.py").write_text(f"SPEED = {speed}")
+        assert not tries.is_of(PROJECT, drive) or speed
+        tries.begin(PROJECT, home, drive, has_hidden=False)
+        tries.wait()
+        taken.append((tries.taken_count, tries.grade.solved))
+    assert taken == [(0, 2), (2, 2), (0, 0)]
+    assert tries.error == ""
+    (tmp_path / "ann.zip").write_bytes(tries.packed())
+    (found,) = submissions_in([tmp_path / "ann.zip"], tmp_path / "copies")
+    assert sorted(found.files) == ["program.py", "speeds.py"]
+    assert {path.name for path in found.command.program.iterdir()} == {
+        "__main__.py",
+        "speeds.py",
+        "turn.txt",
+        "log.txt",
+    }
+    (grade,) = graded(PROJECT, home, [found], tmp_path / "graded", is_trusted=True).grades
+    assert [each.points for each in grade.outcomes[:2]] == [each.points for each in tries.grade.outcomes]
+    (home / "score.json").write_text("")
+    program(home, "open('score.json')")
+    tries.begin(PROJECT, home, drive, has_hidden=False)
+    tries.wait()
+    with pytest.raises(ParameterError, match=r"must not be called score\.json"):
+        tries.packed()
+    tries.close()
+
+
+def test_a_program_of_the_exercise_that_fails_is_said(tmp_path: Path) -> None:
+    write = {"other.py": "import brain\nprint(brain.NAME)", "brain.py": "NAME = 1", "ann/drive.py": DRIVE}
+    (tmp_path / "ann").mkdir()
+    for name, text in write.items():
+        (tmp_path / name).write_text(text)
+    project = replace(PROJECT, robots=(ProjectRobot(), ProjectRobot(program="other.py")), cases=())
+    found = submissions_in([tmp_path / "ann" / "drive.py"], tmp_path / "copies")
+    assert graded(project, tmp_path, found, tmp_path / "out", is_trusted=True).faults == []
+    (tmp_path / "brain.py").write_text("")
+    (fault,) = graded(project, tmp_path, found, tmp_path / "out", is_trusted=True).faults
+    assert fault.startswith("other.py, the exercise's program of robot 2, failed in 1 of 1 runs (crashed: AttributeErr")

@@ -1,5 +1,6 @@
 """Supervisors: programs that act in a world from outside."""
 
+import sys
 from pathlib import Path
 
 import pytest
@@ -79,3 +80,21 @@ def test_a_supervisor_that_fails_ends_the_run(tmp_path: Path) -> None:
     missing = forked.run("run", "game.kiks", cwd=tmp_path)
     assert missing.returncode == 2
     assert "a supervisor must be a Python file, but there is none at" in missing.stderr
+
+
+def test_it_imports_the_modules_beside_it_and_no_others(tmp_path: Path) -> None:
+    acts = "import rules\ndef supervise(sim):\n    while True:\n        yield 0.5\n        import late\n"
+    acts += "        sim.set_score('gain', sim.score.get('gain', 0) + rules.GAIN + late.GAIN)\n"
+    made = []
+    for number in (1, 10):
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        for name, text in {"rules": "import late\nGAIN = 0", "late": f"GAIN = {number}", "referee": acts}.items():
+            (folder / f"{name}.py").write_text(text)
+        sim = Simulation()
+        made.append((sim, Supervision(sim, folder / "referee.py")))
+    before = sys.path[:]
+    for sim, _ in made:
+        sim.run(1.2)
+    assert [sim.score["gain"] for sim, _ in made] == [2, 20]
+    assert (sys.path, {"rules", "late"} & {*sys.modules}) == (before, set())

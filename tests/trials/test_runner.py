@@ -122,9 +122,9 @@ def test_the_same_comes_out_of_two_workers_in_another_order_after_kills_of_runne
     assert kept.stat().st_mtime_ns == kept_at
     assert lost.stat().st_size > 0
 
-    counts = []
-    again = run_trials(trials, folder, on_outcome=lambda outcome, count: counts.append(count))
-    assert (again, counts) == (outcomes, [1, 2, 3])
+    counts, taken = [], []
+    again = run_trials(trials, folder, on_outcome=lambda outcome, count: counts.append(count), on_taken=taken.append)
+    assert (again, counts, taken) == (outcomes, [1, 2, 3], [3])
     assert (folder / OUTCOMES).read_bytes() == (home / "out" / OUTCOMES).read_bytes()
 
 
@@ -134,10 +134,16 @@ def test_a_changed_file_is_another_trial_and_names_differ(tmp_path: Path) -> Non
         run_trials([trial, trial], tmp_path / "out")
     keys = {trial.key, replace(trial).key}
     assert len(keys) == 1
-    for name in ("drives", "judge"):
-        write(tmp_path, name, "pass")
+    # Those of each program belong to it, too: modules that it imports, files that it names.
+    changes = (("drives", "import gains"), ("judge", "open('gains.txt')"), ("gains", "GAIN = 1"), ("gains", "GAIN = 2"))
+    for name, text in changes:
+        write(tmp_path, name, text)
         keys.add(replace(trial).key)
-    assert len(keys | {replace(trial, project=replace(trial.project, seconds=4.0)).key}) == 4
+    (tmp_path / "gains.txt").write_text("3")
+    keys.add(replace(trial).key)
+    write(tmp_path, "crashes", "pass")
+    keys.add(replace(trial).key)
+    assert len(keys | {replace(trial, project=replace(trial.project, seconds=4.0)).key}) == 7
 
 
 def test_a_trial_is_the_run_that_its_recording_and_kiks_run_show(home: Path, outcomes: list[Outcome]) -> None:

@@ -37,7 +37,8 @@ def test_files_and_folders(tmp_path: Path) -> None:
     assert [each.name for each in found] == ["ann", "bob", "carl", "dora", "eve"]
     assert {each.command.file.read_text() for each in single} == {TEXT}
     assert dora.command.program.is_dir()
-    assert set(dora.files) == {"__main__.py", "own/helper.py"}
+    assert set(dora.files) == {"main.py", "own/helper.py"}
+    assert (dora.command.program / "own/helper.py").is_file()
     assert eve.command is None
     assert eve.problem == "it must have one program, but it has a.py, b.py; the one that runs is called __main__.py"
 
@@ -70,7 +71,7 @@ def test_an_export_of_gradescope_names_students(tmp_path: Path) -> None:
 
 
 def test_a_file_of_the_page_alone_and_within_an_export(tmp_path: Path) -> None:
-    data = hand_in.packed(TEXT.encode(), {"points": 1}, recording=b"\x89MCAP", page=b"<html>")
+    data = hand_in.packed({"lamp.py": TEXT.encode()}, {"points": 1}, recording=b"\x89MCAP", page=b"<html>")
     (tmp_path / "ann.zip").write_bytes(data)
     export = zipped(tmp_path / "all.zip", {"Bob_7_assignsubmission_file_/lamp.zip": data})
     for each in found_in(tmp_path, tmp_path / "ann.zip", export):

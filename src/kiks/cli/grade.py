@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from kiks.cli.engine_start import ready_engine
-from kiks.cli.options import Trusted, Workers, progress_bar, say
+from kiks.cli.options import Trusted, Workers, progress_bar, say, tell_taken
 from kiks.cli.outputs import has_results, shows_progress, tell_results
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import counted, printable
@@ -77,11 +77,15 @@ def grade(
             done = number
             show(number, count)
 
+        def note_taken(number: int) -> None:
+            tell_taken(number, count, out)
+
         options: dict[str, Any] = {"title": exercise.stem, "is_trusted": trusted, "workers": workers}
+        options |= {"on_outcome": note, "on_taken": note_taken}
         try:
             with progress_bar(counted(len(found), "submission")) as show:
                 command = shlex.join(["kiks", *sys.argv[1:]])
-                graded = graded_of(project, folder, found, out, command=command, on_outcome=note, **options)
+                graded = graded_of(project, folder, found, out, command=command, **options)
             with progress_bar("report") as show_report:
                 save_grades(graded, out, workers=workers, on_progress=show_report)
         except KeyboardInterrupt:
@@ -96,6 +100,8 @@ def _tell(graded: Graded, out: Path) -> None:
     from kiks.trials.tables import COUNTED, likenesses_of, rows_of
 
     typer.echo(printable(graded.title))
+    for line in graded.faults:
+        typer.echo(printable(line))
     heads = ["name", "points", "solved", *COUNTED, "said last"]
     typer.echo(Table(heads, rows_of(graded), ends_in_text=True).for_output())
     for line in likenesses_of(graded):
@@ -115,6 +121,7 @@ def _results(graded: Graded, out: Path) -> dict[str, Any]:
     return {
         "title": graded.title,
         "folder": str(out),
+        "faults": graded.faults,
         "cases": [case.name for case in graded.cases],
         "submissions": [
             {"name": each.submission.name, "id": each.submission.id, "problem": each.submission.problem or None}

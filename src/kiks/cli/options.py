@@ -16,7 +16,7 @@ import typer
 
 from kiks.cli.command_line import ARENAS, opening
 from kiks.cli.outputs import is_quiet
-from kiks.errors import ParameterError, shown
+from kiks.errors import ParameterError, counted, shown
 from kiks.meant import nearest_file
 from kiks.model.atomic_files import make_folder, path_of
 from kiks.model.checks import ROBOTS_MAX
@@ -220,6 +220,12 @@ Trusted = Annotated[
 def say(text: str) -> None:
     """Print a message for the user on the error output, apart from the results."""
     typer.echo(f"kiks: {text}", err=True)
+
+
+def tell_taken(taken: int, count: int, folder: Path) -> None:
+    """Say how many runs are taken from a folder, if there are any."""
+    if taken:
+        say(f"{taken} of {counted(count, 'run')} taken from {folder}: nothing on which they depend has changed.")
 
 
 @contextmanager

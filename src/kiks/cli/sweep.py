@@ -12,7 +12,7 @@ import typer
 from kiks.cli.compare import FIGURES
 from kiks.cli.engine_start import ready_engine
 from kiks.cli.job import job_of
-from kiks.cli.options import World, progress_bar, say
+from kiks.cli.options import World, progress_bar, say, tell_taken
 from kiks.cli.outputs import has_results, is_quiet, output, shows_progress, tell_results
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import counted
@@ -119,6 +119,7 @@ def sweep(
             folder,
             share=share,
             on_outcome=lambda outcome, done: progress(done, count),
+            on_taken=lambda taken: tell_taken(taken, count, folder),
         )
     save_sweep_plot(found, file := picture or folder / "sweep.png", f"{name}: {goal.text or goal.solved}")
     heads = ("baud", "thinking [ms]", "solved", "least points", "median", "most", "worst")

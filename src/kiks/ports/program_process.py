@@ -23,6 +23,7 @@ from typing import IO, Any, NamedTuple
 from kiks.errors import KiksError, ParameterError, shown
 from kiks.meant import nearest_file
 from kiks.model.atomic_files import program_in
+from kiks.model.program_files import ProgramFiles
 from kiks.model.project import Project
 from kiks.ports.environment_marks import HASH_SEED
 from kiks.ports.messages import Start
@@ -84,6 +85,10 @@ class Command:
     def file(self) -> Path:
         """The file that Python reads first."""
         return self.program / "__main__.py" if self.program.is_dir() else self.program
+
+    def files(self) -> ProgramFiles:
+        """Return all files that belong to it, as they are now."""
+        return ProgramFiles(self.program, self.module, self.arguments)
 
     def check_file(self) -> None:
         """Check that the program's file exists."""

@@ -21,6 +21,7 @@ from kiks.ending import postponing_endings
 from kiks.errors import ParameterError
 from kiks.model.atomic_files import path_of
 from kiks.model.checks import check_kind
+from kiks.model.program_files import ProgramFiles
 from kiks.recording.entries import ENTRIES_MAX, FIELD_COUNT, RECORDED_LAYOUT, block_of, characters_in
 from kiks.recording.mcap_file import McapFile
 from kiks.sim.read_completion import NEVER_NS
@@ -243,8 +244,16 @@ def description_of(sim: Simulation) -> dict[str, str]:
 
 
 def program_texts(programs: Iterable[Path]) -> dict[str, str]:
-    """Return the texts of programs, by their numbers and names; nothing of what is no text, or cannot be read."""
-    return {f"{number}-{path.name}": _text_of(path) for number, path in enumerate(programs, 1)}
+    """Return the texts of programs and their modules, by the program's number and their names.
+
+    There is nothing of what is no text, or cannot be read.
+    """
+    return {
+        f"{number}-{name.encode(errors='replace').decode()}": _text_of(path)
+        for number, files in enumerate(map(ProgramFiles, programs), 1)
+        for name, path in files.files.items()
+        if path.suffix == ".py" or path == files.main
+    }
 
 
 def _text_of(program: Path) -> str:

@@ -50,6 +50,9 @@ TEXT_MAX = 1 << 20
 LINKS_MAX = 1000
 """Most files of a program to which its working folder has links."""
 
+COPIED_BYTES_MAX = 4 << 20
+"""Most bytes of its data of which the working folder has copies: it may write `log.csv` where it has one already."""
+
 
 class Nursery:
     """Forks for each program.
@@ -143,16 +146,23 @@ class Nursery:
         return lambda: child_main.main(connection, start)
 
     def _working_folder(self, start: Start) -> str:
-        """Make a working folder, with links to the files beside the program; return its path."""
+        """Make a working folder, with copies of the data beside the program and links to all else; return its path."""
         count = 1
         while os.path.lexists(folder := os.path.join(self._folders[0], f"work{count}")):
             count += 1
         os.mkdir(folder)
         program = Path(start.program)
         beside = program if program.is_dir() else program.parent
+        left = COPIED_BYTES_MAX
         with contextlib.suppress(OSError):
             for entry in sorted(os.listdir(beside))[:LINKS_MAX]:
-                os.symlink(beside / entry, os.path.join(folder, entry))
+                source, target = beside / entry, os.path.join(folder, entry)
+                is_data = source.is_file() and source.suffix != ".py"
+                if is_data and (size := source.stat().st_size) <= left:
+                    shutil.copy(source, target)
+                    left -= size
+                else:
+                    os.symlink(source, target)
         return folder
 
     def _signal(self, number: int, signal_number: int) -> None:

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import runpy
+import sys
+import threading
 import traceback
-from collections.abc import Callable, Generator
-from contextlib import suppress
+from collections.abc import Callable, Generator, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from inspect import isgeneratorfunction
 from pathlib import Path
+from types import ModuleType
 
 from kiks.errors import KiksError, ParameterError, counted
 from kiks.model.checks import SECONDS_MAX, check_number
 from kiks.model.goal import Goal
+from kiks.model.program_files import ProgramFiles
 from kiks.sim.judge import Judge
 from kiks.sim.read_completion import NEVER_NS
 from kiks.sim.simulation import Simulation
@@ -21,6 +25,9 @@ Acts = Generator[float, None, None]
 
 REFEREE, JUDGE = "the supervisor", "the judge"
 """What messages call those who act."""
+
+_IMPORTING = threading.RLock()
+"""Modules of one supervisor at a time are those that Python finds."""
 
 
 class Supervision:
@@ -46,11 +53,13 @@ class Supervision:
         self._sim, self._file = sim, file
         self.end: Callable[[int, str], object] = lambda code, message: None
         self.judge = None if goal is None else Judge(sim, goal)
+        self._modules = None if file is None else _ModulesBeside(file)
         self._acts: dict[str, Acts] = {}
         self._due_ns: dict[str, int] = {}
         try:
             if file is not None:
-                self._acts[REFEREE] = _supervise_of(file)(sim)
+                with self._importing(REFEREE):
+                    self._acts[REFEREE] = _supervise_of(file)(sim)
             if self.judge is not None:
                 self._acts[JUDGE] = self.judge.supervise(sim)
             for who in self._acts:
@@ -75,8 +84,13 @@ class Supervision:
             self._due_ns[who] = NEVER_NS
 
     def _prepare(self, who: str, now_ns: int) -> None:
-        wait_s = check_number("the time that a supervisor yields", next(self._acts[who]), 0.001, SECONDS_MAX)
+        with self._importing(who):
+            acts_again_s = next(self._acts[who])
+        wait_s = check_number("the time that a supervisor yields", acts_again_s, 0.001, SECONDS_MAX)
         self._due_ns[who] = now_ns + ns_from_s(wait_s)
+
+    def _importing(self, who: str) -> AbstractContextManager[None]:
+        return self._modules.found() if self._modules is not None and who == REFEREE else nullcontext()
 
     def act(self) -> None:
         """Let those act that are due, and end the run when one has returned."""
@@ -115,6 +129,35 @@ class Supervision:
             acts.close()
         with suppress(KiksError):  # what is wrong with the goal ends the run, and is said then
             self.decide()
+
+
+class _ModulesBeside:
+    """The modules beside a supervisor: each supervisor has its own, read anew, as each program has in its process."""
+
+    def __init__(self, file: Path) -> None:
+        self._folder = str(file.resolve().parent)
+        names = {Path(name).parts[0].removesuffix(".py") for name in ProgramFiles(file).files}
+        self._names = names - {*sys.stdlib_module_names, "kiks"}
+        self._own: dict[str, ModuleType] = {}
+
+    @contextmanager
+    def found(self) -> Iterator[None]:
+        """Let `import` find them meanwhile."""
+        with _IMPORTING:
+            others = self._taken()
+            sys.modules.update(self._own)
+            sys.path.insert(0, self._folder)
+            try:
+                yield
+            finally:
+                with suppress(ValueError):
+                    sys.path.remove(self._folder)
+                self._own = self._taken()
+                sys.modules.update(others)
+
+    def _taken(self) -> dict[str, ModuleType]:
+        """Take the modules of these names out of those that Python has."""
+        return {name: sys.modules.pop(name) for name in [*sys.modules] if name.partition(".")[0] in self._names}
 
 
 def _supervise_of(file: Path) -> Callable[[Simulation], Acts]:

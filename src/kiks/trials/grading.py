@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from kiks.errors import ParameterError, shown
-from kiks.model.exercise import Case, cases_of
+from kiks.model.exercise import STUDENT, Case, cases_of
 from kiks.model.project import Project, project_file
 from kiks.ports.program_process import commands_of
 from kiks.sim.from_project import in_case
 from kiks.trials.runner import run_trials
 from kiks.trials.similarity import Likeness, alike
 from kiks.trials.submissions import Submission
-from kiks.trials.trial import CRASHED, ENDLESS, OUT_OF_TIME, STOPPED, Outcome, Trial, limit_of
+from kiks.trials.trial import CRASHED, ENDLESS, FAILURES, OUT_OF_TIME, STOPPED, Outcome, Trial, limit_of
 
 
 @dataclass(frozen=True)
@@ -96,6 +97,22 @@ class Graded:
     grades: tuple[Grade, ...]
     likenesses: tuple[Likeness, ...]
 
+    @property
+    def faults(self) -> list[str]:
+        """Sentences about the exercise's own programs that have failed, for which no student is to blame."""
+        outcomes = [outcome for grade in self.grades for outcome in grade.outcomes if not outcome.doubt]
+        failed = Counter(
+            (end.robot, end.name, str(end))
+            for outcome in outcomes
+            for end in outcome.ends
+            if end.robot != STUDENT and end.how in FAILURES
+        )
+        return [
+            f"{name}, the exercise's program of robot {robot}, failed in {count} of {len(outcomes)} runs ({how}). No "
+            "student is to blame: mend it, and grade again."
+            for (robot, name, how), count in failed.items()
+        ]
+
 
 def load_exercise(path: Path) -> tuple[Project, Path]:
     """Return a project in which programs can be graded, and its folder.
@@ -153,6 +170,7 @@ def grade(
     command: str = "",
     workers: int | None = None,
     on_outcome: Callable[[Outcome, int], object] = lambda outcome, count: None,
+    on_taken: Callable[[int], object] = lambda count: None,
 ) -> Graded:
     """Grade submissions: run each in all cases of an exercise; see `run_trials`.
 
@@ -166,9 +184,10 @@ def grade(
         command: The command that has begun it, for the recordings.
         workers: See `run_trials`.
         on_outcome: See `run_trials`.
+        on_taken: See `run_trials`.
     """
     trials = trials_of(project, folder, submissions, is_trusted=is_trusted, command=command)
-    outcomes = iter(run_trials(trials, out, workers=workers, on_outcome=on_outcome))
+    outcomes = iter(run_trials(trials, out, workers=workers, on_outcome=on_outcome, on_taken=on_taken))
     cases = cases_of(project.cases)
     grades = []
     for submission in submissions:

@@ -1,4 +1,4 @@
-"""What a student hands in: one ZIP file with the program, a run of it as a recording and as a page, and the score."""
+"""What a student hands in: one ZIP file with all files of the program, a run of it in two forms, and the score."""
 
 from __future__ import annotations
 
@@ -8,8 +8,13 @@ import zipfile
 from collections.abc import Mapping
 from typing import Any
 
+from kiks.errors import ParameterError
+
 PROGRAM, RECORDING, PAGE, SCORE = "program.py", "recording.mcap", "run.html", "score.json"
-"""The files in it."""
+"""The files in it, beside those that belong to the program."""
+
+OF_THE_RUN = (RECORDING, PAGE, SCORE)
+"""Those of them that are no part of the program."""
 
 HAND_IN_BYTES_MAX = 64 << 20
 """Most bytes of such a file."""
@@ -17,21 +22,31 @@ HAND_IN_BYTES_MAX = 64 << 20
 _DATE = (1980, 1, 1, 0, 0, 0)  # the same content makes the same file
 
 
-def packed(program: bytes, score: Mapping[str, Any], *, recording: bytes, page: bytes) -> bytes:
+def packed(program: Mapping[str, bytes], score: Mapping[str, Any], *, recording: bytes, page: bytes) -> bytes:
     """Return the file; `kiks.trials.submissions` reads it. Its score is what the student saw: graders run the program.
 
     Args:
-        program: The program.
+        program: The program's files by their names, the one that runs first (`ProgramFiles.pack`).
         score: How it has done in the visible cases, for JSON.
         recording: The recording of one of the runs.
         page: The page of that recording.
 
+    Raises:
+        ParameterError: If another file of the program has one of these names.
+
     Example:
-        >>> data = packed(b"print(1)", {"points": 3}, recording=b"", page=b"")
+        >>> data = packed({"drive.py": b"import speeds", "speeds.py": b""}, {"points": 3}, recording=b"", page=b"")
         >>> zipfile.ZipFile(io.BytesIO(data)).namelist()
-        ['program.py', 'score.json', 'recording.mcap', 'run.html']
+        ['program.py', 'score.json', 'recording.mcap', 'run.html', 'speeds.py']
     """
-    files = {PROGRAM: program, SCORE: json.dumps(score, indent=1).encode(), RECORDING: recording, PAGE: page}
+    main, *others = program.items()
+    files = {PROGRAM: main[1], SCORE: json.dumps(score, indent=1).encode(), RECORDING: recording, PAGE: page}
+    for name, data in others:
+        if name in files:
+            raise ParameterError(
+                f"a file of a program that is handed in must not be called {name}, as a file of the run is. Rename it."
+            )
+        files[name] = data
     made = io.BytesIO()
     with zipfile.ZipFile(made, "w") as archive:
         for name, data in files.items():

@@ -26,6 +26,7 @@ def run_trials(
     *,
     workers: int | None = None,
     on_outcome: Callable[[Outcome, int], object] = lambda outcome, count: None,
+    on_taken: Callable[[int], object] = lambda count: None,
     goes_on: Callable[[], bool] = lambda: True,
 ) -> list[Outcome]:
     """Run trials; return their outcomes in the order of the trials, the same however many workers there are.
@@ -39,6 +40,7 @@ def run_trials(
         workers: How many processes; one for each core if left out.
         on_outcome: Called with each outcome as it comes, also with those that are there at the start, and with how many
             there are by then.
+        on_taken: Called with how many outcomes are taken from the folder, before the others are made.
         goes_on: Asked several times a second; when it says no, the trials under way end, and those that are done are
             returned.
 
@@ -71,6 +73,8 @@ def run_trials(
             on_outcome(found, len(outcomes))
         else:
             missing.append(trial)
+
+    on_taken(len(outcomes))
 
     def take(outcome: Outcome) -> None:
         with explained(file, "outcomes"), file.open("ab") as lines:

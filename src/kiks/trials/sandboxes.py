@@ -21,7 +21,7 @@ class Sandboxes:
 
     def __init__(self, limits: Limits | None = None) -> None:
         self._limits = limits
-        self._kept: OrderedDict[tuple[Path, int, bool], Sandbox] = OrderedDict()
+        self._kept: OrderedDict[tuple[tuple[Path, ...], int, bool], Sandbox] = OrderedDict()
 
     def of(self, trial: Trial) -> dict[int, Sandbox]:
         """Return the sandbox of each robot's program, which runs when this returns.
@@ -34,9 +34,10 @@ class Sandboxes:
             if command is None:
                 continue
             # A program that drives several robots has a sandbox for each.
-            key = (command.program.absolute(), robot, trial.is_trusted)
+            files = tuple(command.files().shown)
+            key = (files, robot, trial.is_trusted)
             if key not in self._kept:
-                self._kept[key] = Sandbox([command.program], limits=self._limits, is_trusted=trial.is_trusted)
+                self._kept[key] = Sandbox(files, limits=self._limits, is_trusted=trial.is_trusted)
             self._kept.move_to_end(key)
             found[robot] = self._kept[key]
         while len(self._kept) > max(KEPT, len(found)):

@@ -20,14 +20,9 @@ from pathlib import Path, PurePosixPath
 from kiks.errors import ParameterError, printable, shown
 from kiks.meant import nearest_file
 from kiks.model.atomic_files import explained
+from kiks.model.program_files import BYTES_MAX, FILES_MAX, MAIN, ProgramFiles
 from kiks.ports.program_process import Command
-from kiks.trials.hand_in import HAND_IN_BYTES_MAX, PROGRAM
-
-FILES_MAX = 200
-"""Most files of a submission."""
-
-BYTES_MAX = 10 << 20
-"""Most bytes of a submission."""
+from kiks.trials.hand_in import HAND_IN_BYTES_MAX, OF_THE_RUN, PROGRAM
 
 ENTRIES_MAX = 20_000
 """Most files in an archive or a folder of submissions."""
@@ -41,8 +36,7 @@ NAME_MAX = 80
 _MARK = "ABOUT.txt"
 """File of a folder of copies, which may be deleted."""
 
-_MAIN = "__main__.py"
-_MAINS = (_MAIN, PROGRAM, "main.py")
+_MAINS = (MAIN, PROGRAM, "main.py")
 """Names of the file that runs, the first one that is there."""
 
 _MOODLE = re.compile(r"(?P<name>.+?)_(?P<id>\d+)_assignsubmission_file_?(?P<file>.*)", re.DOTALL)
@@ -128,7 +122,7 @@ def _found_in(path: Path, what: str) -> list[tuple[str, _Tree, str]]:
     """Return name, files and problem of each submission in a path."""
     if path.is_dir():
         tree = _tree_of_folder(path)
-        return [(path.name, tree, "")] if PurePosixPath(_MAIN) in tree else [*_split(tree)]
+        return [(path.name, tree, "")] if PurePosixPath(MAIN) in tree else [*_split(tree)]
     if not path.is_file():
         raise ParameterError(
             f"{what} must be files or folders, but there is no {shown(str(path))}.{nearest_file(path)}"
@@ -291,14 +285,14 @@ def _submission(name: str, tree: _Tree, problem: str, folder: Path, taken: set[s
                 for path, text in data.items()
                 if path.suffix.lower() == ".py"
             }
-            command = Command(_write(data, folder / word))
+            command = Command(_written(data, folder / word))
         except _ProblemError as error:
             problem = str(error)
     return Submission(plain, word, command, files, problem, participant, email)
 
 
 def _read(tree: _Tree, *, is_nested: bool = False) -> dict[PurePosixPath, bytes]:
-    """Return the files of a submission, within bounds: the program as `__main__.py`, unless it is the only file."""
+    """Return the files of a submission, within bounds, the one that runs first."""
     tree = _descended(tree)
     programs = [path for path in tree if path.suffix.lower() == ".py"]
     archives = [path for path in tree if path.suffix.lower() == ".zip"]
@@ -309,19 +303,19 @@ def _read(tree: _Tree, *, is_nested: bool = False) -> dict[PurePosixPath, bytes]
         here = [path for path in programs if len(path.parts) == 1]
         if len(here) != 1:
             raise _ProblemError(
-                f"it must have one program, but it has {_listed(here)}; the one that runs is called {_MAIN}"
+                f"it must have one program, but it has {_listed(here)}; the one that runs is called {MAIN}"
                 if here
                 else "it has no program, a file that ends in .py"
             )
         (main,) = here
-    if main.name == PROGRAM or len(tree) == 1:
-        return {main: tree[main](BYTES_MAX)}
+    if main.name == PROGRAM:
+        tree = {path: read for path, read in tree.items() if str(path) not in OF_THE_RUN}
     if len(tree) > FILES_MAX:
         raise _ProblemError(f"it has more than {FILES_MAX} files")
     left, data = BYTES_MAX, {}
-    for path, read in tree.items():
-        data[PurePosixPath(_MAIN) if path == main else path] = text = read(left)
-        left -= len(text)
+    for path in sorted(tree, key=lambda path: path != main):
+        data[path] = tree[path](left)
+        left -= len(data[path])
     return data
 
 
@@ -330,13 +324,9 @@ def _listed(paths: Iterable[PurePosixPath]) -> str:
     return ", ".join(names[:5]) + (" and more" if len(names) > 5 else "")
 
 
-def _write(data: dict[PurePosixPath, bytes], folder: Path) -> Path:
-    """Write files below a folder; return the program."""
-    for path, text in data.items():
-        target = folder / path
-        try:
-            target.parent.mkdir(parents=True, exist_ok=True)
-            target.write_bytes(text)
-        except (OSError, ValueError) as error:
-            raise _ProblemError(f"its file {shown(str(path))} cannot be written ({error})") from None
-    return folder / next(iter(data)) if len(data) == 1 and PurePosixPath(_MAIN) not in data else folder
+def _written(data: dict[PurePosixPath, bytes], folder: Path) -> Path:
+    """Write the files of a program below a folder; return the program."""
+    try:
+        return ProgramFiles.unpack({str(path): text for path, text in data.items()}, folder)
+    except (OSError, ValueError) as error:
+        raise _ProblemError(f"its files cannot be written ({error})") from None

@@ -218,6 +218,7 @@ def sweep(
     *,
     share: float = 1.0,
     on_outcome: Callable[[Outcome, int], object] = lambda outcome, count: None,
+    on_taken: Callable[[int], object] = lambda count: None,
 ) -> Sweep:
     """Try programs in all cases, on all cores, and return what has come out. A second call goes on where one ended.
 
@@ -229,6 +230,7 @@ def sweep(
         out: The folder of outcomes and recordings.
         share: Share of the runs that must be solved where a program holds.
         on_outcome: Called with each outcome as it comes, and with how many there are by then.
+        on_taken: See `run_trials`.
     """
     if project.goal is None or project.seconds is None:
         raise ParameterError("a sweep must have a goal and a time limit, but the project has not both.")
@@ -237,7 +239,7 @@ def sweep(
         Trial(_name_of(case), in_case(plain, case, folder), folder, tuple(commands), is_trusted=True)
         for case in axes.cases()
     ]
-    outcomes = run_trials(trials, out, on_outcome=on_outcome)
+    outcomes = run_trials(trials, out, on_outcome=on_outcome, on_taken=on_taken)
     found = [
         Tried(case.baud, _thinking_ms(case), case.family, case.seed or 0, outcome)
         for case, outcome in zip(axes.cases(), outcomes, strict=True)

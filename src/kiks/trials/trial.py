@@ -12,7 +12,9 @@ from typing import Any
 
 from kiks.errors import ParameterError
 from kiks.model.atomic_files import inside
+from kiks.model.program_files import ProgramFiles
 from kiks.model.project import Project
+from kiks.model.project_files import files_named
 from kiks.model.thinking_policy import split_thinking
 from kiks.ports.program_process import Command, supervisor_of
 from kiks.sim.judge import Judgement
@@ -94,7 +96,7 @@ class Trial:
 
     @cached_property
     def key(self) -> str:
-        """A digest of all that its outcome depends on: the bytes of its files and the version of KiKS."""
+        """A digest of all that its outcome depends on: its world, all files of its programs, the version of KiKS."""
         digest = hashlib.sha256(f"{__version__}\0{self.is_trusted}\0".encode())
         for data in self._parts():
             digest.update(b"%d\0" % len(data))
@@ -104,26 +106,13 @@ class Trial:
     def _parts(self) -> Iterator[bytes]:
         project, folder = self.project, self.folder
         yield project.to_bytes()
-        replay = split_thinking(project.thinking)[1]
-        files = [robot.kind for robot in project.robots if robot.kind.lower().endswith(".toml")]
-        files += [replay] if isinstance(replay, str) else []
-        paths = [inside(folder, file, "file") for file in files]
+        for name in files_named(project, folder):
+            yield _bytes_of(inside(folder, name, "file"))
         supervisor = supervisor_of(project, folder)
-        for path in [*paths, *([] if supervisor is None else [supervisor])]:
-            yield _bytes_of(path)
+        yield b"" if supervisor is None else ProgramFiles(supervisor).digest.encode()
         for command in self.programs:
             yield b"" if command is None else json.dumps([command.module, *command.arguments]).encode()
-            yield from () if command is None else _program_parts(command.program)
-
-
-def _program_parts(program: Path) -> Iterator[bytes]:
-    """Yield the bytes of a program: of a folder, the names and bytes of all files in it."""
-    for path in sorted(program.rglob("*")) if program.is_dir() else ():
-        if path.is_file() and path.suffix != ".pyc":
-            yield path.relative_to(program).as_posix().encode("utf-8", "surrogateescape")
-            yield _bytes_of(path)
-    if not program.is_dir():
-        yield _bytes_of(program)
+            yield b"" if command is None else command.files().digest.encode()
 
 
 def _bytes_of(path: Path) -> bytes:

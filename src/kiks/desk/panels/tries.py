@@ -105,7 +105,9 @@ class TriesPanel(Panel):
         if self._is_packing:
             return "Writing what is handed in ..."
         of = "" if tries.is_whole else f", {len(tries.cases) - len(tries.outcomes)} not tried"
-        return f"{grade.solved} of {len(grade.outcomes)} solved, {counted(grade.points, 'point')}{of}."
+        count = tries.taken_count
+        taken = f" {counted(count, 'case')} taken from earlier: nothing has changed." if count else ""
+        return f"{grade.solved} of {len(grade.outcomes)} solved, {counted(grade.points, 'point')}{of}.{taken}"
 
     def _build_table(self) -> None:
         tries = self._desk.tries

@@ -223,7 +223,8 @@ class Room:
         commands = commands_of(self.project, self._home)
         sandbox = None
         if not self._is_trusted:
-            sandbox = Sandbox([folder, EXAMPLES.parent, *(each.program for each in commands if each is not None)])
+            others = [path for command in commands if command is not None for path in command.files().shown]
+            sandbox = Sandbox([folder, EXAMPLES.parent, *others])
             self._sandboxes.append(sandbox)
         desk = Desk(
             simulation_of(self.project, self._home),

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from modulefinder import ModuleFinder
 from pathlib import Path, PurePosixPath
-from typing import Any
 
-from kiks.errors import ParameterError, shown
+from kiks.errors import ParameterError
 from kiks.model.atomic_files import inside, program_in
-from kiks.model.data_file import parse_toml, read_file
-from kiks.model.limits import PICTURE_FILE_BYTES_MAX
+from kiks.model.program_files import ProgramFiles
 from kiks.model.project import Project, ProjectRobot
-from kiks.model.thinking_policy import split_thinking
+from kiks.model.project_files import bytes_of, files_named
 from kiks.ports.program_process import Command, commands_of, supervisor_of
 
 
@@ -75,7 +72,7 @@ class Home:
         """
         files = _Copies(folder.resolve())
         if files.folder != self.folder:
-            for name in _files_named(project, self.folder):
+            for name in files_named(project, self.folder):
                 files.add(inside(self.folder, name, "file"), name)
 
         def name_there(command: Command) -> str | None:
@@ -121,7 +118,7 @@ class _Copies:
 
     def add(self, path: Path, name: str) -> None:
         """Add a file under its name."""
-        if not self._takes(name, data := _bytes_of(path)):
+        if not self._takes(name, data := bytes_of(path)):
             raise ParameterError(
                 f"{name} must be free for a file of the project, but another file in {str(self.folder)!r} has this "
                 "name. Rename that one, or save into another folder."
@@ -129,18 +126,19 @@ class _Copies:
         self._take(name, data)
 
     def add_program(self, path: Path, wanted: str) -> str:
-        """Add a program with the modules beside it that it imports; return its name."""
-        data = _bytes_of(path)
+        """Add a program with all files that belong to it; return its name."""
+        data = bytes_of(path)
         name = _free_name(wanted, lambda name: self._takes(name, data))
         self._take(name, data)
-        for module in _modules_beside(path):
-            self.add(module, (PurePosixPath(name).parent / module.relative_to(path.parent).as_posix()).as_posix())
+        for other, file in ProgramFiles(path).files.items():
+            if file != path:
+                self.add(file, (PurePosixPath(name).parent / other).as_posix())
         return name
 
     def _takes(self, name: str, data: bytes) -> bool:
         """Return whether a name is free, or stands for the same file already."""
         path = self.folder / name
-        return self.missing[name] == data if name in self.missing else not path.exists() or _bytes_of(path) == data
+        return self.missing[name] == data if name in self.missing else not path.exists() or bytes_of(path) == data
 
     def _take(self, name: str, data: bytes) -> None:
         if not (self.folder / name).exists():
@@ -164,29 +162,3 @@ def _name_in(folder: Path, program: Path) -> str | None:
         return name
     except ValueError:  # a ParameterError, too: a project cannot name it
         return None
-
-
-def _bytes_of(path: Path) -> bytes:
-    return read_file(path, f"The file {shown(str(path))}", bytes_max=PICTURE_FILE_BYTES_MAX)
-
-
-def _modules_beside(program: Path) -> list[Path]:
-    """Return the files beside a program or below that it imports."""
-    finder = ModuleFinder([str(program.parent)])
-    with suppress(SyntaxError, ValueError, RecursionError):
-        finder.run_script(str(program))
-    found: list[Any] = [module for name, module in finder.modules.items() if name != "__main__"]
-    return [Path(module.__file__) for module in found if module.__file__]  # a package without an __init__.py has none
-
-
-def _files_named(project: Project, folder: Path) -> Iterator[str]:
-    """Yield the names of the files of a project's folder that are no programs: robots, replays, arenas of cases."""
-    yield from {each.kind for each in project.robots if each.kind.lower().endswith(".toml")}
-    if isinstance(replay := split_thinking(project.thinking)[1], str):
-        yield replay
-    for name in {arena for cases in project.cases for arena in cases.arena if PurePosixPath(arena).suffix}:
-        yield name
-        if name.lower().endswith(".toml"):
-            arena = parse_toml(_bytes_of(inside(folder, name, "arena")), name)
-            pictures = [arena[key] for key in ("picture", "floor") if isinstance(arena.get(key), str)]
-            yield from ((PurePosixPath(name).parent / each).as_posix() for each in pictures)

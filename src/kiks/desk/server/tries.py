@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import tempfile
 import threading
@@ -11,9 +12,8 @@ from dataclasses import asdict
 from pathlib import Path
 
 from kiks.errors import KiksError, ParameterError, WorkError
-from kiks.model.data_file import read_file
 from kiks.model.exercise import STUDENT, Case, cases_of
-from kiks.model.limits import PROGRAM_BYTES_MAX
+from kiks.model.program_files import ProgramFiles
 from kiks.model.project import Project
 from kiks.ports.program_process import Command, commands_of, python_line
 from kiks.ports.resources import processor_count
@@ -43,6 +43,7 @@ class Tries:
         cases: The cases, in order.
         outcomes: What has come out so far, by numbers of the cases, from 0.
         error: Why they cannot begin; empty if they can.
+        taken_count: How many of the outcomes are those of earlier tries, as nothing has changed on which they depend.
         is_waiting: Whether others have their turns first.
     """
 
@@ -53,9 +54,11 @@ class Tries:
         self.cases: list[Case] = []
         self.outcomes: dict[int, Outcome] = {}
         self.error = ""
+        self.taken_count = 0
         self.is_waiting = False
         self._command: Command | None = None
-        self._program = self._packed = b""
+        self._files: dict[str, bytes] = {}
+        self._packed = b""
         self._folder: tempfile.TemporaryDirectory[str] | None = None
         self._thread: threading.Thread | None = None
         self._is_wanted = False
@@ -80,7 +83,7 @@ class Tries:
     def is_of(self, project: Project, command: Command) -> bool:
         """Return whether these are all tries of a program, as it is now, in an exercise."""
         same = self.is_whole and (self.project, self._command) == (project, command)
-        return same and self._program == _bytes_of(command)
+        return same and self._files == command.files().pack()
 
     def begin(self, project: Project, home: Path, command: Command, *, has_hidden: bool) -> None:
         """Begin to try a program.
@@ -95,25 +98,35 @@ class Tries:
             raise ParameterError("These tries must end first. Wait, or stop them.")
         if len(project.robots) < STUDENT:
             raise ParameterError("A world must have a robot for a program to be tried in it. Place one.")
-        self.project, self._command, self._program = project, command, _bytes_of(command)
+        command.check_file()
+        self.project, self._command, self._files = project, command, command.files().pack()
         self.cases = [case for case in cases_of(project.cases) if has_hidden or not case.is_hidden]
-        self.outcomes, self.error, self._is_wanted, self._packed = {}, "", True, b""
+        self.outcomes, self.error, self._is_wanted, self._packed, self.taken_count = {}, "", True, b"", 0
         if self._folder is None:
             self._folder = tempfile.TemporaryDirectory(prefix="kiks-tries-", ignore_cleanup_errors=True)
         programs = commands_of(project, home)
-        programs[STUDENT - 1] = command
-        self._thread = threading.Thread(target=self._run, args=(project, home, tuple(programs)), daemon=True)
+        self._thread = threading.Thread(target=self._run, args=(project, home, command, programs), daemon=True)
         self._thread.start()
 
-    def _run(self, project: Project, home: Path, programs: tuple[Command | None, ...]) -> None:
+    def _run(self, project: Project, home: Path, command: Command, programs: list[Command | None]) -> None:
         try:
+            # What is handed in is what is tried, with nothing beside it.
+            folder = self._path() / "program"
+            shutil.rmtree(folder, ignore_errors=True)
+            copy = ProgramFiles.unpack(self._files, folder / command.program.stem)
+            programs[STUDENT - 1] = Command(copy, command.arguments)
             trials = [
-                Trial(str(number), in_case(project, case, home), home, programs, self._is_trusted)
+                Trial(str(number), in_case(project, case, home), home, tuple(programs), self._is_trusted)
                 for number, case in enumerate(self.cases)
             ]
             with self._turn():
                 run_trials(
-                    trials, self._path(), workers=self.workers, on_outcome=self._take, goes_on=lambda: self._is_wanted
+                    trials,
+                    self._path(),
+                    workers=self.workers,
+                    on_outcome=self._take,
+                    on_taken=self._note_taken,
+                    goes_on=lambda: self._is_wanted,
                 )
         except (KiksError, OSError) as error:
             self.error = str(error)
@@ -132,6 +145,9 @@ class Tries:
 
     def _take(self, outcome: Outcome, _count: int) -> None:
         self.outcomes[int(outcome.name)] = outcome
+
+    def _note_taken(self, count: int) -> None:
+        self.taken_count = count
 
     def _path(self) -> Path:
         assert self._folder is not None
@@ -174,7 +190,7 @@ class Tries:
             "cases": len(self.cases),
             "each": [{**asdict(outcome), "name": self.cases[int(outcome.name)].name} for outcome in grade.outcomes],
         }
-        self._packed = packed(self._program, score, recording=file.read_bytes(), page=page.read_bytes())
+        self._packed = packed(self._files, score, recording=file.read_bytes(), page=page.read_bytes())
         return self._packed
 
     def _write_page(self, recording: Path, page: Path, title: str) -> None:
@@ -192,7 +208,3 @@ class Tries:
         self.wait()
         if self._folder is not None:
             self._folder.cleanup()
-
-
-def _bytes_of(command: Command) -> bytes:
-    return read_file(command.program, f"the program {command.name}", bytes_max=PROGRAM_BYTES_MAX)
