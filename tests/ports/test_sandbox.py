@@ -57,7 +57,7 @@ HOSTILE = {
     "started more than 8 processes": "c = ctypes.CDLL(None)\nwhile True: c.__fork(), c.usleep(5000)",
     "used more than 150 MB of memory": "kept = []\nwhile True: kept.append(b'x' * (1 << 20))",
     "computed for 0.5 s without using its robot": "while True: pass",
-    "waited for 1.5 s without using its robot": 'ctypes.CDLL(None).execl(b"/bin/sleep", b"sleep", b"100", None)',
+    "waited for 1.5 s for what is not simulated": 'ctypes.CDLL(None).execl(b"/bin/sleep", b"sleep", b"100", None)',
     "printed more than 0.5 MB": "while True: os.write(1, b'x' * 4095 + b'\\n')",
     "sent a message of 4294967295 bytes to the world": SENDS.replace("DATA", r'b"\xff" * 1000'),
     "sent something to the world that is no message": SENDS.replace("DATA", r'b"\x02\0\0\0\x01\x02"'),
