@@ -122,8 +122,8 @@ class ProcessorTime:
     """Adds up the processor time of processes.
 
     A process whose parent ignores its end takes its time with it, so time that was seen once is kept. One that begins
-    and ends between two looks is seen by chance; each one that is new counts as if it had computed since the last look.
-    For many processes that is right on average, and those that are waited for tell how long it was.
+    and ends between two looks is seen by chance: each one that is new and computes counts as if it had done so since
+    the last look. For many that is right on average, and those that are waited for tell how long it was.
 
     Attributes:
         total_s: Their time so far [s].
@@ -147,7 +147,7 @@ class ProcessorTime:
         for each in others:
             before = last.get(each.process)
             self._own_s += each.own_s - (before.own_s if before else 0.0)
-            if before is None and each.memory:
+            if before is None and (each.is_running or each.threads > 1):
                 self._short_s += max(passed_s * min(each.threads, self._processors) - each.own_s, 0.0)
         ended_s = sum(
             each.children_s - (last[number].children_s if number in last else 0.0) for number, each in now.items()

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import logging
 import os
 import re
 import select
@@ -55,6 +56,8 @@ THREADS = 8
 
 STREAMS = {"PYTHONUNBUFFERED": "1", "PYTHONIOENCODING": "utf-8:backslashreplace"}
 """The environment of a program whose output another process reads: each line comes at once."""
+
+_log = logging.getLogger("kiks.run")
 
 _ENVIRONMENT = {"PATH": "/usr/bin:/bin", "LANG": "C.UTF-8", "HOME": "/tmp", "TMPDIR": "/tmp"}
 _ADDRESS_SPACE_BYTES = 4 << 30
@@ -462,6 +465,27 @@ class _Processes:
                     with contextlib.suppress(ProcessLookupError, PermissionError):
                         os.kill(sample.process, signal.SIGKILL)
         popen.kill()
+
+
+def check_sandbox() -> None:
+    """Check that programs of others can run in a sandbox, and warn the superuser, who should run none.
+
+    Raises:
+        KiksError: If there can be no sandbox on this computer.
+    """
+    with Sandbox() as sandbox:
+        sandbox.warm()
+    if os.geteuid() == 0:
+        _log.warning(
+            "programs of others should run as a user who has no secrets, but this is the superuser: through a hole in "
+            "their sandbox they would reach everything. Start KiKS as another user."
+        )
+
+
+def limits_in_force() -> str:
+    """Return by what the limits of a sandbox hold on this computer, for a person."""
+    calls = "" if system_call_filter() else f", but no filter of system calls on {os.uname().machine}"
+    return f"limits of each process, all counted {1 / SAMPLE_S:.0f} times a second{calls}"
 
 
 def _counts_by_namespace() -> bool:
