@@ -103,6 +103,44 @@ def test_program_gives_the_same_run_in_its_own_process_and_in_this_one(words, th
     assert not doubt
 
 
+THREADS = """
+import queue, serial, threading
+one, two, replies = serial.Serial("COM1", timeout=1), serial.Serial("COM2", timeout=1), queue.Queue()
+threading.Thread(target=lambda: [replies.put(one.readline()) for _ in range(20)]).start()
+for number in range(20):
+    one.write(b"D,%d,%d\\n" % (number % 7, -number % 5))
+    two.write(b"D,%d,1\\n" % len(replies.get()))
+    if number % 2:
+        two.read(6)
+"""
+
+LOOP = """
+import select, serial
+port = serial.Serial("COM1", timeout=1)
+for number in range(20):
+    port.write(b"D,%d,%d\\n" % (number % 7, -number % 5))
+    if number % 2:
+        select.select([port], [], [])
+    port.readline()
+"""
+
+UNTHINKING = (
+    "import kiks.clock.program_clock as clock\nclock.ProgramClock.enter = lambda *_, **__: 0\n",
+    "import kiks.ports.remote_link as link\nlink.Connection.think = lambda *_: None\n",
+)
+
+
+def test_world_charges_thinking_and_makes_no_command_wait_that_has_paid(tmp_path: Path) -> None:
+    for text, cheats in ((THREADS, ()), (LOOP, UNTHINKING)):
+        here = fresh(2, thinking="fixed:40")
+        assert run_here(here, Path(write(tmp_path, "here.py", text)), [], {}) == 0
+        for number, cheat in enumerate(("", *cheats)):
+            there, command = fresh(2), Command(Path(write(tmp_path, f"{number}.py", cheat + text)))
+            assert Programs(there, [command, None], thinking="fixed:40").run() == 0
+            assert (there.state_hash(), there.now_ns) == (here.state_hash(), here.now_ns), cheat
+        assert here.now_ns > 20 * 40_000_000
+
+
 FOUR = ([DRIVE, "COM1", "40", "3", "7"], [DRIVE, "COM1", "25", "-4", "7"], [SLEEPER, "12"], [WATCHER, "1.5"])
 
 

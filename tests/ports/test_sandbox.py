@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from tests.at_length import share
+from tests.at_length import cases, share
 from tests.namespaces import needs_sandbox
 from tests.ports.helpers import printed, write
 from tests.served import PROGRAMS, fresh
@@ -24,7 +24,7 @@ from kiks.ports.sandbox import Limits, Sandbox
 pytestmark = [pytest.mark.slow, needs_sandbox]
 
 # A busy computer may let a program wait long for its turn.
-LIMITS = Limits(memory_mb=150, processes=8, computing_s=0.5, waiting_s=60, output_mb=0.5, files_mb=8)
+LIMITS = Limits(memory_mb=150, processes=8, computing_s=0.5, waiting_s=60, output_mb=0.5, files_mb=8, files=300)
 
 GOOD = """
 import random, serial
@@ -51,16 +51,84 @@ for each in os.listdir("/proc/self/fd"):
 while True: pass
 """
 
+PLAIN = """
+import ctypes, os, sys
+words = [os.fsencode(word) for word in [sys.executable, "-S", "-c", TEXT, *sys.argv[1:]]]
+c = ctypes.CDLL(None)
+words, environment = (ctypes.c_char_p * (len(words) + 1))(*words), ctypes.c_void_p.in_dll(c, "environ")
+c.fexecve(os.open(words[0], os.O_RDONLY), words, environment)
+"""
+
+
+def plain(text: str) -> str:
+    """Return a program that runs another one in a plain Python: what KiKS itself refuses is not what is tested here."""
+    return f"TEXT = {text!r}" + PLAIN
+
+
+UNCOUNTED = """
+import os, signal, time
+signal.signal(signal.SIGCHLD, signal.SIG_IGN)
+while True:
+    if not os.fork():
+        end_s = time.time() + 0.02
+        while time.time() < end_s: pass
+        os._exit(0)
+    try: os.wait()
+    except ChildProcessError: pass
+"""
+
+UNREAD = """
+import os, signal, socket
+os.fork()
+kept = []
+for _ in range(110):
+    for each in socket.socketpair():
+        kept.append(each)
+        each.setblocking(False)
+        try:
+            while True: each.send(bytes(1 << 16))
+        except BlockingIOError: pass
+signal.pause()
+"""
+
+FILES = """
+import signal
+kept = b"x" * 138_000_000
+for folder in ("/tmp", "/dev/shm"):
+    for number in range(70): open(f"{folder}/{number}", "wb").write(bytes(100_000))
+signal.pause()
+"""
+
+LOCKS = """
+import fcntl, signal
+with open("/tmp/x", "w") as file:
+    for number in range(2000): fcntl.lockf(file, fcntl.LOCK_EX, 1, 2 * number)
+    signal.pause()
+"""
+
 HOSTILE = {
     # What KiKS sees of forks it refuses, as a program in simulated time is one process. The pause spares the other
     # tests: where they run as the superuser, only the sandbox counts processes.
     "started more than 8 processes": "c = ctypes.CDLL(None)\nwhile True: c.__fork(), c.usleep(5000)",
     "used more than 150 MB of memory": "kept = []\nwhile True: kept.append(b'x' * (1 << 20))",
     "computed for 0.5 s without using its robot": "while True: pass",
-    "waited for 1.5 s without using its robot": 'ctypes.CDLL(None).execl(b"/bin/sleep", b"sleep", b"100", None)',
+    "waited for 1.5 s for what is not simulated": 'ctypes.CDLL(None).execl(b"/bin/sleep", b"sleep", b"100", None)',
     "printed more than 0.5 MB": "while True: os.write(1, b'x' * 4095 + b'\\n')",
     "sent a message of 4294967295 bytes to the world": SENDS.replace("DATA", r'b"\xff" * 1000'),
     "sent something to the world that is no message": SENDS.replace("DATA", r'b"\x02\0\0\0\x01\x02"'),
+    "computed for 0.5 s without using its robot, in processes that nobody waits for": plain(UNCOUNTED),
+    "waited for 1.5 s for what is not simulated, between commands": (
+        "import subprocess\nwhile True: subprocess.run(['sleep', '0.4']), port.write(b'N\\n'), port.readline()"
+    ),
+    "made more than 300 files or locks of files": plain(
+        "import signal\nfor n in range(999): open(f'/dev/shm/{n}', 'w').close()\nsignal.pause()"
+    ),
+    "made more than 300 files or locks of files, as locks": plain(LOCKS),
+    "used more than 150 MB of memory, in sockets": plain(UNREAD),
+    "used more than 150 MB of memory, in files": plain(FILES),
+    "started more than 64 threads": plain(
+        "from threading import *\nfor _ in range(99): Thread(target=Event().wait).start()"
+    ),
 }
 
 End = tuple[str, int, list[str]]
@@ -106,7 +174,7 @@ def around_hostile(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[P
         yield path, sandbox
 
 
-@pytest.mark.parametrize(("reason", "text"), HOSTILE.items(), ids=HOSTILE)
+@pytest.mark.parametrize(("reason", "text"), cases(HOSTILE.items(), 10), ids=HOSTILE)
 def test_hostile_program_is_stopped_and_named_and_no_other_one_notices(
     reason, text, good, usual, usual_second, beside, around_hostile
 ):
@@ -119,6 +187,7 @@ def test_hostile_program_is_stopped_and_named_and_no_other_one_notices(
         programs = Programs(fresh(2), [write(path, BEGIN + text), good], sandbox=sandboxes, **options)
         programs.run()
         first, second = programs.handles
+        reason = reason.partition(", ")[0]
         assert (first.reason, first.how) == (reason, f"because it {reason}")
         assert (second.reason, second.code) == ("", 0)
         assert printed(second) == usual_second
@@ -126,18 +195,9 @@ def test_hostile_program_is_stopped_and_named_and_no_other_one_notices(
         assert run(write(path, GOOD), sandbox) == usual
 
 
-PLAIN = """
-import ctypes, os, sys
-words = [sys.executable, os.path.join(os.path.dirname(__file__), "program.py"), *sys.argv[1:]]
-words = [os.fsencode(word) for word in words]
-c = ctypes.CDLL(None)
-words, environment = (ctypes.c_char_p * (len(words) + 1))(*words), ctypes.c_void_p.in_dll(c, "environ")
-c.fexecve(os.open(words[0], os.O_RDONLY), words, environment)
-"""
-
 PROWLER = """
-import ctypes, json, os, resource, shutil, socket, sys
-secret, neighbour, tcp, udp, abstract, pid = json.loads(sys.argv[1])
+import ctypes, fcntl, json, mmap, os, resource, socket, sys
+own, secret, neighbour, tcp, udp, abstract, pid = json.loads(sys.argv[1])
 
 def attempt(name, do):
     try:
@@ -167,7 +227,7 @@ def made(result):
 attempt("reads the home folder", lambda: open(secret).read())
 attempt("lists the home folder", lambda: os.listdir(os.path.dirname(secret)))
 attempt("writes to its neighbour", lambda: open(neighbour, "w"))
-attempt("writes to its own file", lambda: open(__file__, "a"))
+attempt("writes to its own file", lambda: open(own, "a"))
 attempt("writes to KiKS", lambda: open(os.path.join(sys.prefix, "x"), "w"))
 attempt("TCP", lambda: connected(socket.AF_INET, tuple(tcp)))
 attempt("UDP", lambda: connected(socket.AF_INET, tuple(udp), socket.SOCK_DGRAM))
@@ -187,6 +247,18 @@ attempt("one large file", lambda: open("/dev/shm/large", "wb").truncate(1 << 30)
 attempt("memory of no process", lambda: os.memfd_create("x"))
 attempt("a namespace of its own", lambda: made(libc.unshare(0x10000000)))
 attempt("another segment", lambda: made(libc.shmget(0, 1 << 20, 0o1600)))
+attempt("semaphores", lambda: made(libc.semget(0, 32000, 0o1600)))
+attempt("shared memory of no file", lambda: mmap.mmap(-1, 1 << 20))
+attempt("shared zeros", lambda: mmap.mmap(os.open("/dev/zero", os.O_RDWR), 1 << 20))
+attempt("large buffers", lambda: socket.socket(socket.AF_UNIX).setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 1 << 30))
+attempt("locks of no process", lambda: fcntl.fcntl(0, 37, bytes(32)))
+attempt("pages in a pipe", lambda: made(libc.vmsplice(os.pipe()[1], (ctypes.c_void_p * 2)(0, 0), 1, 0)))
+attempt("the host of a virtual machine", lambda: socket.socket(40, socket.SOCK_STREAM))
+attempt("the kernel's log", lambda: made(libc.klogctl(10, None, 0)))
+attempt("stands back", lambda: os.nice(1))
+attempt("settings of the kernel", lambda: open("/proc/sys/kernel/core_pattern", "r+"))
+attempt("rights of a device", lambda: os.chmod("/dev/null", 0o666))
+attempt("rights of its input", lambda: os.fchmod(0, 0o666))
 attempt("10 GB", lambda: bytearray(10 << 30))
 attempt("more memory", lambda: resource.setrlimit(resource.RLIMIT_AS, (1 << 40, 1 << 40)))
 print("processes", sorted(map(int, filter(str.isdigit, os.listdir("/proc"))))[:1] == [1])
@@ -209,14 +281,20 @@ def test_program_reaches_no_file_network_or_neighbour(good: Command, usual: End,
         udp.bind(("127.0.0.1", 0))
         local.bind("\0" + abstract)
         local.listen()
-        told = [str(secret), str(neighbour), tcp.getsockname(), udp.getsockname(), abstract, victim.pid]
-        # A plain Python: what KiKS itself refuses to programs in simulated time is not what is tested here.
-        write(tmp_path / "prowler" / "program.py", PROWLER)
-        plain = write(tmp_path / "prowler" / "plain.py", PLAIN, json.dumps(told))
+        told = [
+            str(path := tmp_path / "prowler" / "program.py"),
+            str(secret),
+            str(neighbour),
+            tcp.getsockname(),
+            udp.getsockname(),
+            abstract,
+            victim.pid,
+        ]
+        prowler = write(path, plain(PROWLER), json.dumps(told))
         with Sandbox([tmp_path / "prowler"], limits=Limits(files_mb=8)) as sandbox:
-            _, code, lines = run(plain, sandbox)
+            _, code, lines = run(prowler, sandbox)
             before = sandbox._processes
-            assert run(write(plain.program, GOOD), sandbox) == usual
+            assert run(write(path, GOOD), sandbox) == usual
             assert sandbox._processes is before, "its warm process lives on"
         for each in (tcp, udp, local):
             each.setblocking(False)

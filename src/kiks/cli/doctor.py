@@ -31,7 +31,6 @@ EXTRAS = {
 PROGRAMS = {
     "octave": (("octave", "octave-cli"), "programs for the Matlab KiKS"),
     "a browser": (("chromium", "google-chrome", "firefox", "firefox-esr"), "the desk"),
-    "bubblewrap": (("bwrap",), "programs of others: kiks grade and kiks room"),
     "make": (("make",), "developers"),
 }
 """Programs, by the names that they may have, and what they are for."""
@@ -105,12 +104,21 @@ def _parts() -> Iterator[Part]:
 
     from kiks.engine.code_cache import cache_folders, is_compiled
     from kiks.engine.compiling import LAST
+    from kiks.errors import KiksError
+    from kiks.ports.sandbox import Sandbox, limits_in_force
 
     for extra, (library, use) in EXTRAS.items():
         is_there = importlib.util.find_spec(library) is not None
         yield Part(f"extra {extra}", is_there, f"for {use}", f"pip install 'kiks[{extra}]'")
     for name, (commands, use) in PROGRAMS.items():
         yield Part(name, any(map(shutil.which, commands)), f"for {use}", "install it with your system's packages")
+    use, why = "programs of others: kiks grade, room and tournament", ""
+    try:
+        with Sandbox() as sandbox:
+            sandbox.warm()
+    except KiksError as error:
+        why = str(error)
+    yield Part("a sandbox", not why, f"{use}; it holds by {limits_in_force()}" if not why else use, why)
     is_there = is_compiled(LAST) and is_compiled("roll_out")
     yield Part("the compiled engine", is_there, f"in {next(cache_folders(), None)}", "kiks warmup compiles it")
 

@@ -53,7 +53,7 @@ def grade(
     Example: kiks grade exercises/wall moodle_export.zip --out grades
     """
     from kiks.model.atomic_files import alone_in
-    from kiks.ports.sandbox import Sandbox
+    from kiks.ports.sandbox import check_sandbox
     from kiks.trials.grading import grade as graded_of
     from kiks.trials.grading import load_exercise, trials_of
     from kiks.trials.report import save_grades
@@ -62,8 +62,7 @@ def grade(
 
     project, folder = load_exercise(exercise)
     if not trusted:
-        with Sandbox() as sandbox:
-            sandbox.warm()  # Without one nothing is copied or compiled.
+        check_sandbox()  # Without one nothing is copied or compiled.
     out = Path(f"grades-{exercise.stem}") if out is None else out
     with alone_in(out, "--out", OUTCOMES):
         found = submissions_in(submissions, out / "programs")

@@ -66,6 +66,7 @@ def tournament(
     """
     from kiks.model.atomic_files import alone_in
     from kiks.model.shipped import demonstrations
+    from kiks.ports.sandbox import check_sandbox
     from kiks.trials.runner import OUTCOMES
     from kiks.trials.submissions import submissions_in
     from kiks.trials.tournament import Match, play
@@ -78,6 +79,8 @@ def tournament(
             f"{nearest_file(path, demonstrations())}"
         )
     chosen = Match.load(path)
+    if not trusted:
+        check_sandbox()
     out = out or Path(f"tournament-{chosen.title}")
     context.with_resource(alone_in(out, "--out", OUTCOMES))
     found = submissions_in(players, out / "programs", "PLAYERS")

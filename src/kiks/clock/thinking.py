@@ -90,6 +90,17 @@ def parse_thinking(text: str) -> Thinking:
     return ThinkingLive(value) if name == "live" else ThinkingFixed(round(value * 1e6))
 
 
+def charged_ns(text: str) -> int:
+    """Return what a policy charges for each command, whatever the program does [ns]; 0 if it follows from the program.
+
+    Example:
+        >>> charged_ns("fixed:2.5"), charged_ns("live")
+        (2500000, 0)
+    """
+    name, value = split_thinking(text)
+    return round(float(value) * 1e6) if name == "fixed" else 0
+
+
 def own_file(file: str, number: int, program_count: int) -> str:
     """Return the file with the thinking times of one of some programs.
 

@@ -15,6 +15,15 @@ from kiks.errors import KiksError
 
 _SYSTEM_FOLDERS = ("/bin", "/sbin", "/lib", "/lib32", "/lib64", "/libx32")
 _SYSTEM_FILES = ("/etc/ld.so.cache", "/etc/alternatives", "/etc/localtime")
+_AS_SUPERUSER = """
+for each in /dev/null /dev/zero /dev/full /dev/random /dev/urandom /dev/tty; do
+    mount --bind $each $each && mount -o remount,bind,ro $each || exit
+done
+exec "$@"
+"""
+"""Script that makes the rights of the devices read-only before bubblewrap takes them: they belong to the superuser, and
+a program could change them for the whole computer. Where bubblewrap does that itself, devices cannot be used."""
+
 WRITABLE = ("/tmp", "/dev/shm")
 """Folders in memory into which a program may write."""
 
@@ -35,7 +44,8 @@ def bubblewrap_line(files: Sequence[str], size: int) -> list[str]:
             "a program of somebody else must run in a sandbox, but bubblewrap (bwrap) is not installed. Install it "
             "(Debian: sudo apt-get install bubblewrap), or say --trusted if you have read the programs."
         )
-    words = [bwrap, "--unshare-all", "--unshare-user", "--die-with-parent", "--new-session", "--as-pid-1"]
+    words = ["unshare", "-r", "-m", "sh", "-c", _AS_SUPERUSER, "sh"] if os.geteuid() == 0 else []
+    words += [bwrap, "--unshare-all", "--unshare-user", "--die-with-parent", "--new-session", "--as-pid-1"]
     words += ["--cap-drop", "ALL", "--ro-bind", "/usr", "/usr"]
     for folder in _SYSTEM_FOLDERS:
         if os.path.islink(folder):
@@ -44,13 +54,15 @@ def bubblewrap_line(files: Sequence[str], size: int) -> list[str]:
             words += ["--ro-bind", folder, folder]
     for file in _SYSTEM_FILES:
         words += ["--ro-bind-try", file, file]
-    words += ["--proc", "/proc", "--dev", "/dev"]
+    # No zeros that processes map together: such memory would be none's. What is read from /dev/full is zeros, too.
+    words += ["--proc", "/proc", "--dev", "/dev", "--dev-bind", "/dev/full", "/dev/zero"]
     for folder in WRITABLE:
         words += ["--size", str(size), "--tmpfs", folder]
     for file in files:
         words += ["--ro-bind", file, file]
-    # What bubblewrap has made in memory itself has no limit.
-    return [*words, "--remount-ro", "/dev", "--remount-ro", "/", "--chdir", "/tmp"]
+    # The settings of the kernel in /proc belong to the superuser, who may be this user. What bubblewrap itself makes in
+    # memory has no limit.
+    return [*words, "--remount-ro", "/proc", "--remount-ro", "/dev", "--remount-ro", "/", "--chdir", "/tmp"]
 
 
 def python_folders() -> list[Path]:

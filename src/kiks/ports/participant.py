@@ -77,6 +77,8 @@ class ProgramParticipant(Participant):
         is_closed: Whether the connection is closed.
         holds_world: Whether the world waits for it while it thinks.
         answer: The last answer to a program in a thread; None until it is there.
+        thinking_ns: Shortest time between what it has read of a robot and its next command to that robot [ns]. It says
+            itself when its commands come; the world makes those wait that come sooner.
     """
 
     is_trusted = True
@@ -85,6 +87,7 @@ class ProgramParticipant(Participant):
     answer: Answer | None = None
     is_closed = False
     holds_world = True
+    thinking_ns = 0
 
     def __init__(self, name: str, rank: int, robot: int, scheduler: ProgramScheduler, names: PortNames) -> None:
         super().__init__(name, rank)
@@ -101,6 +104,7 @@ class ProgramParticipant(Participant):
         self._lines = _Lines(self._wires if self.is_trusted else ())
         self._sent_count, self._sent_limit = 0, NEVER_NS if self.is_trusted else 0
         self._used: set[int] = set()
+        self._thinks_until_ns: dict[int, int] = {}
         self._ticket = 0
         self._has_been_warned = False
 
@@ -234,6 +238,7 @@ class ProgramParticipant(Participant):
             if not data:
                 wire.note_wait(end_ns)
             self._answer(max(end_ns, self.acts_from_ns), (data, wire.line.taken_ns), robot=request.robot)
+            self._note_reading(request.robot)
 
     def _check_wait_for_all(self, request: Request) -> None:
         wires, (reads, until_ns) = self._wires, request.arguments
@@ -244,7 +249,17 @@ class ProgramParticipant(Participant):
         self._pending_read = None
         self.waits = False
         now_ns = self.acts_from_ns if end_ns == NEVER_NS else max(end_ns, self.acts_from_ns)
-        self._answer(now_ns, [is_complete(wires[read.robot - 1], read, now_ns) for read in reads])
+        are_complete = [is_complete(wires[read.robot - 1], read, now_ns) for read in reads]
+        self._answer(now_ns, are_complete)
+        for read, is_read in zip(reads, are_complete, strict=True):
+            # By its terminator, a program may ask for what has arrived.
+            if is_read:
+                self._note_reading(read.robot)
+
+    def _note_reading(self, robot: int) -> None:
+        """Note that the program has an answer of a robot now: its next command to it may follow from that."""
+        if self.thinking_ns:
+            self._thinks_until_ns[robot] = self.acts_from_ns + self.thinking_ns
 
     def _warn_of_backlog(self, robot: int) -> None:
         """Log that the program sends faster than the line carries, once."""
@@ -276,6 +291,10 @@ class ProgramParticipant(Participant):
             self.check_wait()
         elif kind == Kind.SEND:
             wire, data = self._lines[request.robot], request.arguments[0]
+            until_ns = self._thinks_until_ns.get(request.robot, 0)
+            if until_ns > at_ns:
+                self._requests.appendleft(request._replace(at_ns=until_ns, thought_ns=until_ns - at_ns))
+                return
             self._sent_count += len(data)
             if self._sent_count > self._sent_limit:
                 self._check_room(wire)
@@ -302,6 +321,7 @@ class ProgramParticipant(Participant):
             self._lines[request.robot] = wire
             self._used.add(request.robot)
             self._answer(at_ns, robot=request.robot)
+            self._note_reading(request.robot)
         elif kind == Kind.HANG_UP:
             # A program whose claim has failed hangs up, too.
             if request.robot in self._lines or self.is_trusted:

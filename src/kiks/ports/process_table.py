@@ -1,21 +1,48 @@
-"""The processes of a sandbox, as the system's folder /proc tells of them: their time and memory."""
+"""The processes of a sandbox, as the system's folder /proc tells of them: their time and memory.
+
+Some of what they take is in no process when somebody looks: data in sockets that nobody has read, files in memory, and
+the time of processes that come and go between two looks. That is estimated from above.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import os
+import re
+from collections.abc import Sequence
+from pathlib import Path
 from typing import NamedTuple
+
+from kiks.ports.bubblewrap import WRITABLE
+
+THREAD_BYTES = 1 << 15
+"""What the kernel keeps for each thread [bytes]: its stack, and more."""
+
+_SIZES = re.compile(r"^(VmRSS|VmSwap|VmPTE|Threads|Pss|Pss_Shmem|SwapPss):\s*(\d+)", re.MULTILINE)
 
 
 class Sample(NamedTuple):
-    """A process at an instant: its processor time, and that of its ended children [s]; its memory [bytes]."""
+    """A process at an instant.
+
+    Attributes:
+        process: Its number.
+        parent: That of its parent.
+        is_running: Whether it computes, or could if a processor were free.
+        own_s: Its processor time [s].
+        children_s: That of its children which have ended, as far as they were waited for [s].
+        threads: Number of its threads.
+        memory: Its memory, also what is swapped out, and of shared pages all [bytes].
+        kernel_memory: What the kernel keeps for it [bytes].
+    """
 
     process: int
     parent: int
     is_running: bool
     own_s: float
     children_s: float
+    threads: int
     memory: int
+    kernel_memory: int
 
 
 class ProcessTable:
@@ -28,16 +55,18 @@ class ProcessTable:
 
     def __init__(self, process: int, *, is_namespace: bool) -> None:
         self._first, self._is_namespace = 1 if is_namespace else process, is_namespace
-        self._folder = -1
+        self._folder, self._written = -1, [-1] * len(WRITABLE) * is_namespace
+        root = f"/proc/{process}/root" if is_namespace else ""
         with contextlib.suppress(OSError):
-            folder = f"/proc/{process}/root/proc" if is_namespace else "/proc"
-            self._folder = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+            self._folder = os.open(f"{root}/proc", os.O_RDONLY | os.O_DIRECTORY)
+            self._written = [os.open(root + folder, os.O_RDONLY) for folder in WRITABLE * is_namespace]
 
     def close(self) -> None:
-        """Let go of the folder; there are no samples any more."""
-        if self._folder >= 0:
-            folder, self._folder = self._folder, -1
-            os.close(folder)
+        """Let go of the folders; there are no samples any more."""
+        folders, self._folder, self._written = [self._folder, *self._written], -1, []
+        for folder in folders:
+            if folder >= 0:
+                os.close(folder)
 
     def samples(self) -> list[Sample]:
         """Return the processes, the first one first; none if it has ended."""
@@ -64,10 +93,72 @@ class ProcessTable:
         return [found[process] for process in family]
 
     def own_memory(self, sample: Sample) -> int:
-        """Return the memory of a process, of shared pages its share [bytes]."""
-        text = _read(self._folder, f"{sample.process}/smaps_rollup")
-        shares = [line.split()[1] for line in text.splitlines() if line.startswith("Pss:")]
-        return int(shares[0]) * 1024 if shares else sample.memory
+        """Return the memory of a process, of shared pages its share; in a namespace without files in memory."""
+        sizes = _sizes(self._folder, f"{sample.process}/smaps_rollup")
+        if "Pss" not in sizes:
+            return sample.memory
+        files = sizes.get("Pss_Shmem", 0) if self._is_namespace else 0
+        return (sizes["Pss"] - files + sizes.get("SwapPss", 0)) * 1024
+
+    def memory_outside(self) -> int:
+        """Return how much memory of a namespace is at most in no process [bytes]: files in memory, and in sockets."""
+        if not self._is_namespace:
+            return 0
+        used = [(each.f_blocks - each.f_bfree) * each.f_frsize for each in map(_space, self._written)]
+        lines = [_read(self._folder, f"1/net/{name}") for name in ("sockstat", "sockstat6")]
+        counts = dict(re.findall(r"^(sockets|TCP6?): (?:used|inuse) (\d+)", "\n".join(lines), re.MULTILINE))
+        streams = int(counts.get("TCP", 0)) + int(counts.get("TCP6", 0))
+        return sum(used) + int(counts.get("sockets", 0)) * _SOCKET_BYTES + streams * _TCP_BYTES
+
+    def file_count(self) -> int:
+        """Return how many files in memory a namespace has, and locks of files: each takes memory of the kernel."""
+        if not self._is_namespace:
+            return 0
+        files = sum(each.f_files - each.f_ffree for each in map(_space, self._written))
+        return files + _read(self._folder, "locks").count("\n")
+
+
+class ProcessorTime:
+    """Adds up the processor time of processes.
+
+    A process whose parent ignores its end takes its time with it, so time that was seen once is kept. One that begins
+    and ends between two looks is seen by chance: each one that is new and computes counts as if it had done so since
+    the last look. For many that is right on average, and those that are waited for tell how long it was.
+
+    Attributes:
+        total_s: Their time so far [s].
+    """
+
+    def __init__(self) -> None:
+        self.total_s = 0.0
+        self._last: dict[int, Sample] = {}
+        self._own_s = self._ended_s = self._short_s = 0.0
+        self._processors = os.cpu_count() or 1
+
+    def add(self, first: Sample, others: Sequence[Sample], passed_s: float) -> float:
+        """Take a look at the processes; return the time that has come since the last one [s].
+
+        Args:
+            first: The first process, which is trusted: of its time only that of its ended children counts.
+            others: All others.
+            passed_s: Real time since the last look [s].
+        """
+        last, now = self._last, {each.process: each for each in (first, *others)}
+        for each in others:
+            before = last.get(each.process)
+            self._own_s += each.own_s - (before.own_s if before else 0.0)
+            if before is None and (each.is_running or each.threads > 1):
+                self._short_s += max(passed_s * min(each.threads, self._processors) - each.own_s, 0.0)
+        ended_s = sum(
+            each.children_s - (last[number].children_s if number in last else 0.0) for number, each in now.items()
+        )
+        # What of it was seen before they ended.
+        ended_s -= sum(each.own_s + each.children_s for number, each in last.items() if number not in now)
+        self._ended_s += max(ended_s, 0.0)
+        self._last = now
+        total_s = self._own_s + max(self._ended_s, self._short_s)
+        grown_s, self.total_s = total_s - self.total_s, total_s
+        return grown_s
 
 
 def _sample(folder: int, process: int) -> Sample | None:
@@ -76,9 +167,18 @@ def _sample(folder: int, process: int) -> Sample | None:
     fields = text.rpartition(")")[2].split()
     if len(fields) < 22:
         return None
-    ticks_a_second, page_bytes = os.sysconf("SC_CLK_TCK"), os.sysconf("SC_PAGE_SIZE")
+    ticks_a_second = os.sysconf("SC_CLK_TCK")
     own_s, children_s = (sum(map(int, fields[at : at + 2])) / ticks_a_second for at in (11, 13))
-    return Sample(process, int(fields[1]), fields[0] in "RD", own_s, children_s, int(fields[21]) * page_bytes)
+    sizes = _sizes(folder, f"{process}/status")
+    threads = sizes.get("Threads", 1)
+    memory = (sizes.get("VmRSS", 0) + sizes.get("VmSwap", 0)) * 1024
+    kernel_memory = sizes.get("VmPTE", 0) * 1024 + threads * THREAD_BYTES
+    return Sample(process, int(fields[1]), fields[0] == "R", own_s, children_s, threads, memory, kernel_memory)
+
+
+def _sizes(folder: int, name: str) -> dict[str, int]:
+    """Return what a file says of sizes, by their names [kB], and of the number of threads."""
+    return {key: int(value) for key, value in _SIZES.findall(_read(folder, name))}
 
 
 def _read(folder: int, name: str) -> str:
@@ -87,3 +187,25 @@ def _read(folder: int, name: str) -> str:
             return file.read().decode(errors="replace")
     except OSError:
         return ""
+
+
+def _space(folder: int) -> os.statvfs_result:
+    try:
+        return os.statvfs(folder)
+    except OSError:  # another thread has closed it meanwhile
+        return os.statvfs_result((1,) + (0,) * 9)
+
+
+def _most_bytes(name: str, usual: int) -> int:
+    """Return the largest number of a setting of the network [bytes]."""
+    try:
+        return int((Path("/proc/sys/net") / name).read_text().split()[-1])
+    except (OSError, ValueError, IndexError):
+        return usual
+
+
+_SOCKET_BYTES = 2 * max(_most_bytes("core/wmem_default", 212992), _most_bytes("core/rmem_default", 212992))
+"""Most that a socket keeps unread [bytes]: the last message may be as long as all before it."""
+
+_TCP_BYTES = _most_bytes("ipv4/tcp_wmem", 4 << 20) + _most_bytes("ipv4/tcp_rmem", 6 << 20)
+"""Most that one of TCP keeps [bytes]."""

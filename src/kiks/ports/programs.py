@@ -14,7 +14,7 @@ from typing import NoReturn
 
 from kiks.clock.gate import Gate
 from kiks.clock.patience import Patience
-from kiks.clock.thinking import own_file, own_policy, parse_thinking
+from kiks.clock.thinking import charged_ns, own_file, own_policy, parse_thinking
 from kiks.ending import INTERRUPTED, noting_endings
 from kiks.errors import KiksError, ParameterError
 from kiks.ports.messages import Start
@@ -338,6 +338,7 @@ class Programs:
                 before.dismiss(f"Another program has taken robot {robot} with the same token.")
             has_begun = self._scheduler.has_begun
             player = Player(name, connection, robot, self._scheduler, self._names, self._selector)
+            player.thinking_ns = charged_ns(self._thinking)
             player.holds_world = not self._thinking.startswith("live")
             player.is_waited_for = player.holds_world and not has_begun
             self._names.own(robot, is_alone=True)
@@ -507,6 +508,7 @@ class Programs:
         number = self._count + 1
         here, there = socket.socketpair()
         handle = Handle(command, here, number, robot, self._scheduler, self._names, self._selector)
+        handle.thinking_ns = charged_ns(self._policy(number))
         start = self._start_of(robot, self._policy(number))._replace(
             record=own_file(str(self._record), number, self._begun_count) if self._record is not None else "",
             module=command.module,

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import logging
 import os
 import re
 import select
@@ -33,7 +34,7 @@ from kiks.model.thinking_policy import split_thinking
 from kiks.ports.bubblewrap import WRITABLE, bubblewrap_line, complaint_of, python_folders
 from kiks.ports.environment_marks import HASH_SEED
 from kiks.ports.messages import Start
-from kiks.ports.process_table import ProcessTable
+from kiks.ports.process_table import ProcessorTime, ProcessTable
 from kiks.ports.program_process import Child, python_line
 from kiks.ports.system_calls import system_call_filter
 from kiks.units import s_from_ns
@@ -47,11 +48,16 @@ TRUSTED_SAMPLE_S = 0.5
 START_PATIENCE_S = 30.0
 """Longest wait for the start of a sandbox [s of real time]."""
 
-IDLE = "without using its robot"
-"""How a limit is named that only a program breaks which lets no simulated time pass."""
+IDLE = ("without using its robot", "for what is not simulated")
+"""How a limit is named that a program breaks which may never end by itself: the ends of these texts."""
+
+THREADS = 8
+"""Threads for each process that there may be."""
 
 STREAMS = {"PYTHONUNBUFFERED": "1", "PYTHONIOENCODING": "utf-8:backslashreplace"}
 """The environment of a program whose output another process reads: each line comes at once."""
+
+_log = logging.getLogger("kiks.run")
 
 _ENVIRONMENT = {"PATH": "/usr/bin:/bin", "LANG": "C.UTF-8", "HOME": "/tmp", "TMPDIR": "/tmp"}
 _ADDRESS_SPACE_BYTES = 4 << 30
@@ -68,13 +74,15 @@ class Limits:
     """What the programs in a sandbox may take, all processes together.
 
     Attributes:
-        memory_mb: Memory [MB].
-        processes: Number of processes.
+        memory_mb: Memory, with files in memory, and what the kernel keeps for them [MB].
+        processes: Number of processes; each may have eight threads, as the average of all.
         processor_s: Processor time of a run, beyond a second for each simulated second [s].
         computing_s: Processor time in which it lets no simulated time pass [s].
-        waiting_s: Real time in which it waits for something that is not simulated [s].
+        waiting_s: Real time of a run in which it waits for something that is not simulated, beyond a second for each
+            simulated second [s].
         output_mb: What a program prints [MB].
-        files_mb: Files that it writes [MB].
+        files_mb: Files that it writes into each of two folders [MB].
+        files: Number of these files, and of locks of files.
 
     Example:
         >>> Limits(memory_mb=1000).memory_mb
@@ -88,6 +96,7 @@ class Limits:
     waiting_s: float = 30.0
     output_mb: float = 5
     files_mb: float = 64
+    files: int = 20_000
 
 
 class Sandbox:
@@ -197,29 +206,24 @@ class SandboxedProgram(Child):
             self.code = code
             self._has_ended.set()
 
-    def broken_limit(self, is_running: bool, passed_s: float) -> str:
+    def broken_limit(self, idle_s: float) -> str:
         """Return which limit of its own it has broken; empty if none.
 
         Args:
-            is_running: Whether a process of the sandbox computes now, or has since the last look.
-            passed_s: Real time since then [s].
+            idle_s: Real time since the last look in which no process of the sandbox has computed [s].
         """
         limits, now_s = self._processes.limits, self._processes.processor_s
         at_ns, is_held_up = self._progress()
         if now_s - self._begin_s > limits.processor_s + s_from_ns(at_ns):
             return f"computed for {now_s - self._begin_s:.0f} s in all"
+        if not is_held_up:
+            self._waited_s += idle_s
+        if self._waited_s > limits.waiting_s + s_from_ns(at_ns):
+            return f"waited for {limits.waiting_s:g} s {IDLE[1]}"
         if at_ns != self._mark_ns:
-            self._mark_ns, self._mark_s, self._waited_s = at_ns, now_s, 0.0
-            return ""
-        if now_s - self._mark_s > limits.computing_s:
-            return f"computed for {limits.computing_s:g} s {IDLE}"
-        if is_held_up:
-            self._waited_s = 0.0
-        elif not is_running:
-            # More has passed if the thread that looks has itself waited for a processor.
-            self._waited_s += min(passed_s, 2 * self._processes.sample_s)
-        if self._waited_s > limits.waiting_s:
-            return f"waited for {limits.waiting_s:g} s {IDLE}"
+            self._mark_ns, self._mark_s = at_ns, now_s
+        elif now_s - self._mark_s > limits.computing_s:
+            return f"computed for {limits.computing_s:g} s {IDLE[0]}"
         return ""
 
 
@@ -228,14 +232,12 @@ class _Processes:
 
     Attributes:
         limits: What they may take.
-        processor_s: Processor time that they have taken, at the last look [s].
         is_over: Whether they end or have ended.
         sample_s: Time between two looks [s of real time].
     """
 
     def __init__(self, sandbox: Sandbox) -> None:
         self.limits = sandbox.limits
-        self.processor_s = 0.0
         self.is_over = False
         self.sample_s = TRUSTED_SAMPLE_S if sandbox.is_trusted else SAMPLE_S
         self._lock = threading.Lock()
@@ -248,6 +250,7 @@ class _Processes:
         self._is_ready = threading.Event()
         self._complaint = ""
         self._table: ProcessTable | None = None
+        self._time = ProcessorTime()
         try:
             with there:
                 self._begin(sandbox, there)
@@ -295,6 +298,11 @@ class _Processes:
         self._kill()
         self._thread.join()
 
+    @property
+    def processor_s(self) -> float:
+        """Processor time that the programs have taken, at the last look [s]."""
+        return self._time.total_s
+
     # ---- inside ----
 
     def _begin(self, sandbox: Sandbox, there: socket.socket) -> None:
@@ -310,7 +318,7 @@ class _Processes:
         }
         if not self._is_trusted and _counts_by_namespace():
             # With threads. It holds for no superuser, and a watcher outside is late where hundreds compute.
-            each["RLIMIT_NPROC"] = 8 * limits.processes
+            each["RLIMIT_NPROC"] = THREADS * limits.processes
         line = python_line("-m", "kiks.script.nursery", str(there.fileno()), json.dumps([folders, seen, each]))
         environment = HASH_SEED | os.environ | STREAMS if self._is_trusted else HASH_SEED | _ENVIRONMENT | STREAMS
         passed, info = [there.fileno()], None
@@ -423,20 +431,27 @@ class _Processes:
     def _broken_limit(self, passed_s: float) -> tuple[str, SandboxedProgram | None]:
         """Look at all processes; return which limit is broken, empty if none, and by which program if that is known."""
         assert self._table is not None
-        samples = self._table.samples()
-        # Of the nursery's own time only that of the programs that have ended.
-        taken_s = sum(each.children_s for each in samples) + sum(each.own_s for each in samples[1:])
-        is_running = taken_s > self.processor_s or any(each.is_running for each in samples[1:])
-        self.processor_s = max(self.processor_s, taken_s)
-        limits, others = self.limits, samples[1:]
+        if not (samples := self._table.samples()):
+            return "", None
+        first, *others = samples
+        limits, most_memory = self.limits, self.limits.memory_mb * _MEGABYTE
+        # More has passed if the thread that looks has itself waited for a processor.
+        passed_s = min(passed_s, 2 * self.sample_s)
+        grown_s = self._time.add(first, others, passed_s)
+        idle_s = 0.0 if any(each.is_running for each in others) else max(passed_s - grown_s, 0.0)
         if len(others) > limits.processes:
             return f"started more than {limits.processes} processes", None
-        if sum(each.memory for each in others) > limits.memory_mb * _MEGABYTE and (
-            sum(self._table.own_memory(each) for each in others) > limits.memory_mb * _MEGABYTE
+        if sum(each.threads for each in others) > THREADS * limits.processes:
+            return f"started more than {THREADS * limits.processes} threads", None
+        if self._table.file_count() > limits.files:
+            return f"made more than {limits.files} files or locks of files", None
+        besides = self._table.memory_outside() + sum(each.kernel_memory for each in others)
+        if besides + sum(each.memory for each in others) > most_memory and (
+            besides + sum(self._table.own_memory(each) for each in others) > most_memory
         ):
             return f"used more than {limits.memory_mb:g} MB of memory", None
         for program in list(self._programs.values()):
-            reason = program.broken_limit(is_running, passed_s)
+            reason = program.broken_limit(idle_s)
             if reason:
                 return reason, program
         return "", None
@@ -450,6 +465,27 @@ class _Processes:
                     with contextlib.suppress(ProcessLookupError, PermissionError):
                         os.kill(sample.process, signal.SIGKILL)
         popen.kill()
+
+
+def check_sandbox() -> None:
+    """Check that programs of others can run in a sandbox, and warn the superuser, who should run none.
+
+    Raises:
+        KiksError: If there can be no sandbox on this computer.
+    """
+    with Sandbox() as sandbox:
+        sandbox.warm()
+    if os.geteuid() == 0:
+        _log.warning(
+            "programs of others should run as a user who has no secrets, but this is the superuser: through a hole in "
+            "their sandbox they would reach everything. Start KiKS as another user."
+        )
+
+
+def limits_in_force() -> str:
+    """Return by what the limits of a sandbox hold on this computer, for a person."""
+    calls = "" if system_call_filter() else f", but no filter of system calls on {os.uname().machine}"
+    return f"limits of each process, all counted {1 / SAMPLE_S:.0f} times a second{calls}"
 
 
 def _counts_by_namespace() -> bool:

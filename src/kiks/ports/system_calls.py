@@ -8,74 +8,95 @@ from __future__ import annotations
 
 import platform
 import struct
+from collections.abc import Iterable
 
 _LOAD, _JUMP_EQUAL, _JUMP_FROM, _JUMP_SET, _RETURN = 0x20, 0x15, 0x35, 0x45, 0x06
-_NUMBER, _ARCHITECTURE, _FIRST_ARGUMENT = 0, 4, 16  # struct seccomp_data
-_ALLOW, _KILL, _NOT_PERMITTED, _NOT_KNOWN = 0x7FFF0000, 0x80000000, 0x00050000 | 1, 0x00050000 | 38
+_NUMBER, _ARCHITECTURE, _FIRST_ARGUMENT = 0, 4, 16  # struct seccomp_data; the low half of an argument comes first
+_ALLOW, _KILL, _ERROR = 0x7FFF0000, 0x80000000, 0x00050000
+_NOT_PERMITTED, _NOT_KNOWN, _NO_FAMILY = _ERROR | 1, _ERROR | 38, _ERROR | 97
 _NEW_USERS = 0x10000000  # CLONE_NEWUSER
 _OTHER_ABI = 0x40000000  # x32
 
-_MACHINES = {
-    # AUDIT_ARCH_X86_64 and AUDIT_ARCH_AARCH64: clone, and what is refused
+_MACHINES: dict[str, tuple[int, dict[str, tuple[int, ...]], dict[str, int]]] = {
+    # AUDIT_ARCH_X86_64 and AUDIT_ARCH_AARCH64; what is refused; what is refused with some arguments, see below
     "x86_64": (
         0xC000003E,
-        56,
         {
-            "memory": (319, 447, 29, 240, 68),  # memfd_create, memfd_secret, shmget, mq_open, msgget
-            "processes": (
-                101,
-                310,
-                311,
-                438,
-                272,
-                308,
-            ),  # ptrace, process_vm_readv, _writev, pidfd_getfd, unshare, setns
-            "kernel": (
-                321,
-                298,
-                323,
-                425,
-                248,
-                249,
-                250,
-                165,
-            ),  # bpf, perf_event_open, userfaultfd, io_uring, keys, mount
+            # memfd_create, memfd_secret, shmget, mq_open, msgget, semget, vmsplice, inotify_init, _init1, io_setup
+            "memory": (319, 447, 29, 240, 68, 64, 278, 253, 294, 206),
+            # ptrace, process_vm_readv, _writev, pidfd_getfd, unshare, setns; setpriority, sched_setparam,
+            # _setscheduler, _setattr: a process that stands back for all others would neither compute nor wait
+            "processes": (101, 310, 311, 438, 272, 308, 141, 142, 144, 314),
+            # bpf, perf_event_open, userfaultfd, io_uring, keys, mount, syslog, fanotify_init
+            "kernel": (321, 298, 323, 425, 248, 249, 250, 165, 103, 300),
         },
+        {"clone": 56, "mmap": 9, "socket": 41, "socketpair": 53, "setsockopt": 54, "fcntl": 72},
     ),
     "aarch64": (
         0xC00000B7,
-        220,
         {
-            "memory": (279, 447, 194, 180, 186),
-            "processes": (117, 270, 271, 438, 97, 268),
-            "kernel": (280, 241, 282, 425, 217, 218, 219, 40),
+            "memory": (279, 447, 194, 180, 186, 190, 75, 26, 0),
+            "processes": (117, 270, 271, 438, 97, 268, 140, 118, 119, 274),
+            "kernel": (280, 241, 282, 425, 217, 218, 219, 40, 116, 262),
         },
+        {"clone": 220, "mmap": 222, "socket": 198, "socketpair": 199, "setsockopt": 208, "fcntl": 25},
     ),
 }
 _CLONE3 = 435
+_SHARED, _OF_NO_FILE = 0x01, 0x20  # MAP_SHARED, MAP_ANONYMOUS
+_FAMILIES = (1, 2, 10)
+"""AF_UNIX, AF_INET and AF_INET6. Namespaces do not separate all others: AF_VSOCK leads out of a virtual machine."""
+_SOCKET_OPTIONS = (7, 8, 32, 33, 60)
+"""SO_SNDBUF, SO_RCVBUF, the same by force, and SO_ZEROCOPY: what sockets keep is counted by their number."""
+_LOCKS_OF_FILES = (36, 37, 38)
+"""F_OFD_GETLK and so on: these locks belong to no process, so nothing tells whose they are."""
+
+_Step = tuple[int, int, int, int]
 
 
 def system_call_filter() -> bytes:
     """Return the filter; empty on a processor that is not known."""
     if platform.machine() not in _MACHINES:
         return b""
-    architecture, clone, groups = _MACHINES[platform.machine()]
-    refused = [number for group in groups.values() for number in group]
-    steps: list[tuple[int, int, int, int]] = [
+    architecture, groups, numbers = _MACHINES[platform.machine()]
+    steps: list[_Step] = [
         (_LOAD, 0, 0, _ARCHITECTURE),
         (_JUMP_EQUAL, 1, 0, architecture),
         (_RETURN, 0, 0, _KILL),
         (_LOAD, 0, 0, _NUMBER),
-        # To the refusal at the end; the numbers of the steps that are skipped.
-        (_JUMP_FROM, len(refused) + 6, 0, _OTHER_ABI),
-        *((_JUMP_EQUAL, len(refused) + 5 - place, 0, number) for place, number in enumerate(refused)),
-        # Its argument lies in memory, where no filter sees it; without it the library takes `clone`.
-        (_JUMP_EQUAL, 0, 1, _CLONE3),
-        (_RETURN, 0, 0, _NOT_KNOWN),
-        (_JUMP_EQUAL, 0, 2, clone),
-        (_LOAD, 0, 0, _FIRST_ARGUMENT),
-        (_JUMP_SET, 1, 0, _NEW_USERS),
-        (_RETURN, 0, 0, _ALLOW),
+        (_JUMP_FROM, 0, 1, _OTHER_ABI),
         (_RETURN, 0, 0, _NOT_PERMITTED),
+        # Its argument lies in memory, where no filter sees it; without it the library takes `clone`.
+        *_of(_CLONE3, [(_RETURN, 0, 0, _NOT_KNOWN)]),
     ]
-    return b"".join(struct.pack("=HBBI", *step) for step in steps)
+    for number in (number for group in groups.values() for number in group):
+        steps += _of(number, [(_RETURN, 0, 0, _NOT_PERMITTED)])
+    steps += _of(numbers["clone"], [_argument(0), (_JUMP_SET, 1, 0, _NEW_USERS), *_end(_NOT_PERMITTED)])
+    # Such memory outlives its pages in processes. Shared memory is a file in /dev/shm.
+    both = [(_JUMP_SET, 0, 1, _SHARED), (_JUMP_SET, 1, 0, _OF_NO_FILE)]
+    steps += _of(numbers["mmap"], [_argument(3), *both, *_end(_NOT_PERMITTED)])
+    for name in ("socket", "socketpair"):
+        are_known = [*_any(_FAMILIES), (_RETURN, 0, 0, _NO_FAMILY), (_RETURN, 0, 0, _ALLOW)]
+        steps += _of(numbers[name], [_argument(0), *are_known])
+    steps += _of(numbers["setsockopt"], [_argument(2), *_any(_SOCKET_OPTIONS), *_end(_NOT_PERMITTED)])
+    steps += _of(numbers["fcntl"], [_argument(1), *_any(_LOCKS_OF_FILES), *_end(_NOT_PERMITTED)])
+    return b"".join(struct.pack("=HBBI", *step) for step in [*steps, (_RETURN, 0, 0, _ALLOW)])
+
+
+def _of(number: int, steps: list[_Step]) -> list[_Step]:
+    """Return the steps for one system call, which end with a return."""
+    return [(_JUMP_EQUAL, 0, len(steps), number), *steps]
+
+
+def _argument(place: int) -> _Step:
+    return _LOAD, 0, 0, _FIRST_ARGUMENT + 8 * place
+
+
+def _any(values: tuple[int, ...]) -> Iterable[_Step]:
+    """Return steps that jump over the one that follows if what was loaded is one of some values."""
+    return ((_JUMP_EQUAL, len(values) - place, 0, value) for place, value in enumerate(values))
+
+
+def _end(error: int) -> list[_Step]:
+    """Return the end: allowed, or, after a jump over that, the error."""
+    return [(_RETURN, 0, 0, _ALLOW), (_RETURN, 0, 0, error)]

@@ -134,7 +134,8 @@ class Nursery:
         for each_socket in (self._control, self._wake, self._waker):
             each_socket.close()
         os.chdir(folder)
-        for target, each in enumerate(streams, 1):
+        # Its input is the sandbox's: by the one outside, a program of the superuser could change the computer's device.
+        for target, each in enumerate((os.open(os.devnull, os.O_RDONLY), *streams)):
             os.dup2(each, target)
             os.close(each)
         _control_process(DUMPABLE, 1)

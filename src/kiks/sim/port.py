@@ -426,6 +426,10 @@ class VirtualPort:
                 data = line.read(size, terminator, timeout_ns, poll_ns)
                 if len(data) != size and not (terminator and data.endswith(terminator)):
                     data = self._read_on(data, size, terminator, begin_ns, span)
+            if program.thinks:
+                # Again: while this thread waited, the command of another one may have followed from an earlier reply.
+                self._reader = program.thread
+                self._reader.has_read = True
             program.leave(has_acted=bool(data))
         return data
 

@@ -29,7 +29,7 @@ from kiks.model.atomic_files import make_folder, replace_file
 from kiks.model.project import Project
 from kiks.ports.program_process import commands_of, supervisor_of
 from kiks.ports.resources import processor_count
-from kiks.ports.sandbox import Sandbox
+from kiks.ports.sandbox import Sandbox, check_sandbox
 from kiks.sim.from_project import simulation_of
 from kiks.trials.hand_in import HAND_IN_BYTES_MAX
 
@@ -83,8 +83,7 @@ class Room:
         is_trusted: bool = False,
     ) -> None:
         if not is_trusted:
-            with Sandbox() as sandbox:
-                sandbox.warm()
+            check_sandbox()
         self.project = project.for_students()
         self.title = (project.exercise.title if project.exercise is not None else "") or project.arena.name
         self.folder, self._home = folder.resolve(), home
