@@ -92,7 +92,8 @@ def as_unreadable(what: str) -> Iterator[None]:
     except UnreadableError:
         raise
     except Exception as error:
-        raise UnreadableError(f"{what} cannot be read ({str(error) or type(error).__name__})") from None
+        why = str(error).partition("\n")[0].rstrip(":.") or type(error).__name__
+        raise UnreadableError(f"{what} cannot be read ({why})") from None
 
 
 def tree_of_folder(folder: Path) -> Folder:

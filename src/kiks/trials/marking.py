@@ -50,6 +50,10 @@ class Marking:
         return round(min(max(points / self.full, 0.0), 1.0) * self.most * kept, 2)
 
 
+AS_POINTS = Marking()
+"""The points are the grade."""
+
+
 def marking_for(project: Project, most: float | None, full: float | None, due: str | None, penalty: float) -> Marking:
     """Return how grades are made in an exercise.
 
@@ -66,7 +70,9 @@ def marking_for(project: Project, most: float | None, full: float | None, due: s
     if most is None and full is not None:
         raise ParameterError("--full must come with --max, the grade for full points. Write --max 100, for instance.")
     if most is not None and full is None:
-        full = math.inf if project.goal is None else range_of(project.goal.formulas()["points"], project.seconds or 0)[1]
+        full = (
+            math.inf if project.goal is None else range_of(project.goal.formulas()["points"], project.seconds or 0)[1]
+        )
         if not 0 < full < math.inf:
             raise ParameterError(
                 "--max must come with --full where the formula of points has no maximum. Say how many points of the "

@@ -140,7 +140,9 @@ def with_students(
     for student in students:
         for identity in identities(student):
             known.setdefault(identity, []).append(student)
-    found, strangers, seen = [], [], set()
+    found: list[Submission] = []
+    strangers: list[Submission] = []
+    seen: set[int] = set()
     for each in submissions:
         # A group's hand-in has the addresses of all its members.
         shared = [student for email in each.email.casefold().split(", ") for student in known.get(email, ())]
@@ -163,7 +165,15 @@ def with_students(
     for student in students:
         if student.line not in seen:
             name = printable(student.name)
-            word = word_for(name, taken)
-            about = {"participant": student.participant, "email": student.email, "last_graded": student.last_graded}
-            found.append(Submission(name, word, None, problem=NOTHING, **about))
+            found.append(
+                Submission(
+                    name,
+                    word_for(name, taken),
+                    None,
+                    problem=NOTHING,
+                    participant=student.participant,
+                    email=student.email,
+                    last_graded=student.last_graded,
+                )
+            )
     return found, strangers
