@@ -78,7 +78,8 @@ def marking_for(project: Project, most: float | None, full: float | None, due: s
                 "--max must come with --full where the formula of points has no maximum. Say how many points of the "
                 "exercise are full ones: --full 10."
             )
-    return Marking(most, full or 1.0, None if due is None else due_time_s(due), penalty)
+    full = full or 1.0
+    return Marking(most, full) if due is None else Marking(most, full, due_time_s(due), penalty)
 
 
 def due_time_s(text: str) -> float:

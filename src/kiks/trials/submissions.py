@@ -238,10 +238,14 @@ def _listed_by_gradescope(file: File | Folder) -> dict[str, _Found]:
     """Return the students of a list that Gradescope exports, by their folders; nothing of an entry that is none."""
     import yaml
 
+    class Loader(yaml.SafeLoader):  # type: ignore[misc, unused-ignore]
+        """A loader of plain values: what says to be an object of Ruby is a table."""
+
+    Loader.add_multi_constructor("!ruby/", lambda loader, _, node: loader.construct_mapping(node, deep=True))
     found: dict[str, _Found] = {}
     with suppress(Exception):  # the folders are graded without their names
         assert isinstance(file, File)
-        table: dict[str, Any] = yaml.load(file.read(BYTES_MAX), _loader(yaml))
+        table: dict[str, Any] = yaml.load(file.read(BYTES_MAX), Loader)
         for folder, entry in table.items():
             with suppress(Exception):
                 people = entry[":submitters"]
@@ -250,16 +254,6 @@ def _listed_by_gradescope(file: File | Folder) -> dict[str, _Found]:
                 time_s = time.timestamp() if isinstance(time, datetime) else None
                 found[folder] = _Found(names, {}, email=emails, time_s=time_s)
     return found
-
-
-def _loader(yaml: Any) -> Any:
-    """Return a loader of plain values: what says to be an object of Ruby is a table."""
-
-    class Loader(yaml.SafeLoader):  # type: ignore[misc]
-        pass
-
-    Loader.add_multi_constructor("!ruby/", lambda loader, _, node: loader.construct_mapping(node, deep=True))
-    return Loader
 
 
 def _submission(found: _Found, folder: Path, taken: set[str]) -> Submission:
