@@ -104,7 +104,9 @@ def feedback_of(graded: Graded, grade: Grade) -> str:
     seen = graded.seen_by(grade)
     (shown,) = seen.grades
     hidden = len(graded.cases) - len(seen.cases)
-    solved = f"{shown.solved} of {len(seen.cases)} cases solved" + (f", beside {hidden} hidden ones" * bool(hidden))
+    solved = f"{shown.solved} of {len(seen.cases)} cases solved" + f", beside {counted(hidden, 'hidden case')}" * (
+        hidden > 0
+    )
     late = f"{counted(grade.days_late, 'day')} late" if grade.days_late else ""
     return ". ".join(filter(None, (solved, late, shown.said_last.rstrip(".")))) + "."
 
