@@ -2,11 +2,14 @@
 
 import csv
 import json
+import os
 import re
 import signal
 import socket
 import subprocess
+import zipfile
 from dataclasses import replace
+from datetime import datetime
 from pathlib import Path
 from textwrap import dedent
 
@@ -27,6 +30,9 @@ from kiks.model.project import Project
 from kiks.ports.program_process import python_line
 from kiks.trials.grading import load_exercise
 from kiks.trials.trial import Outcome
+
+DUE = "2026-11-20T12:00Z"
+DUE_S = datetime.fromisoformat(DUE).timestamp()
 
 GOOD = """
     import kiks
@@ -101,22 +107,36 @@ def graded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("graded")
     programs = write(folder / "class", {"ann": GOOD, "bob": GOOD.replace("robot", "r") + "    # mine\n", **BROKEN})
     write(programs / "frank", {"a": "", "b": ""})
+    os.utime(programs / "bob.py", (DUE_S + 86401, DUE_S + 86401))
+    os.utime(programs / "ann.py", (DUE_S, DUE_S))
+    (folder / "names.csv").write_text("Name;Email\nAnn;ann@x.org\nBob;\nCarl;\nDora;\nFrank;\nGus;gus@x.org\n")
+    stale = [folder / "out" / name for name in ("results/old.json", "feedback/old.html", "runs/old/1.mcap")]
+    for path in (folder / "out" / "outcomes.jsonl", *stale):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text('{"key": []}\n' + "[" * 10_000)
     project = exercise(folder, Cases(seed=(1,)), Cases("hidden", seed=(3,), is_hidden=True))
-    done = grade(project, programs, "--trusted", "--workers", "1", "--out", folder / "out", "--json")
+    marking = ("--max", "100", "--full", "10", "--due", DUE, "--students", folder / "names.csv")
+    done = grade(project, programs, "--trusted", "--workers", "1", "--out", folder / "out", "--json", *marking)
     assert done.returncode == 0, done.stderr
+    assert not any(path.exists() for path in stale)
     (folder / "out" / "told.json").write_text(done.stdout)
     return folder / "out"
 
 
 def test_a_class_is_graded(graded: Path) -> None:
     told = json.loads((graded / "told.json").read_text())
-    assert [each["name"] for each in told["submissions"]] == ["ann", "bob", "carl", "dora", "frank"]
-    assert told["alike"] == [{"first": "ann", "second": "bob", "share": 1.0}]
+    names = ["Ann", "Bob", "Carl", "Dora", "Frank", "Gus"]
+    assert [each["name"] for each in told["submissions"]] == names
+    assert told["alike"] == [{"first": "Ann", "second": "Bob", "share": 1.0}]
     rows = rows_of(graded)
-    assert (rows["ann"]["solved"], rows["carl"]["crashed"], rows["dora"]["out of time"]) == ("2", "2", "2")
-    assert float(rows["ann"]["points"]) > 7
-    assert rows["carl"]["said_last"] == "ValueError: =1+1 <b>what</b>"
-    for name, words in (("ann", "encoders"), ("frank", "it must have one program")):
+    assert (rows["Ann"]["solved"], rows["Carl"]["crashed"], rows["Dora"]["out of time"]) == ("2", "2", "2")
+    points = float(rows["Ann"]["points"])
+    assert points > 7
+    # One second more than a day late are two days, and what was not graded is empty, not 0.
+    assert [float(rows[name]["grade"]) for name in names[:3]] == [round(10 * points, 2), round(8 * points, 2), 0]
+    assert [(rows[name]["grade"], rows[name]["points"]) for name in ("Frank", "Gus")] == [("", "")] * 2
+    assert rows["Carl"]["said_last"] == "ValueError: =1+1 <b>what</b>"
+    for name, words in (("Ann", "encoders"), ("Frank", "it must have one program"), ("Gus", "nothing was handed in")):
         assert rows[name]["said_last"].startswith(words)
     for number in (1, 2):
         assert (graded / "runs" / "ann" / f"{number}.mcap").is_file()
@@ -128,9 +148,15 @@ def test_a_class_is_graded(graded: Path) -> None:
     assert "Ten &lt;centimetres&gt;" in report
     assert not re.search("<b>what|<script>alert", report)
     assert not re.search(r"(?:src|href)=.?https?:", report)
-    first, *columns = table(graded, "moodle.csv")[0]
-    assert first == "Identifier"
-    assert {"Grade", "Last modified (grade)"} <= {*columns}
+    moodle = {row["Full name"]: row for row in table(graded, "moodle.csv")}
+    assert next(iter(moodle["Ann"])) == "Identifier"
+    assert (moodle["Gus"]["Grade"], moodle["Gus"]["Email address"]) == ("", "gus@x.org")
+    assert moodle["Bob"]["Feedback comments"].startswith("1 of 1 cases solved, beside 1 hidden case. 2 days late. enc")
+    with zipfile.ZipFile(graded / "feedback.zip") as pages:
+        assert sorted(pages.namelist()) == [f"{name}.html" for name in ("Gus", "ann", "bob", "carl", "dora", "frank")]
+    for name in ("ann", "carl"):
+        page = (graded / "feedback" / f"{name}.html").read_text()
+        assert ("seed 1" in page, "hidden, seed" in page, "Bob" in page, "kiks replay" in page) == (True, *3 * (False,))
 
 
 def test_the_report_opens_what_belongs_to_a_name(graded: Path, new_page: NewPage) -> None:
@@ -140,7 +166,7 @@ def test_the_report_opens_what_belongs_to_a_name(graded: Path, new_page: NewPage
         page.set_viewport_size({"width": width, "height": 800})
         page.goto((graded / "report.html").as_uri())
         check_access(page, colours)
-        for name in ("ann", "carl"):
+        for name in ("Ann", "Carl"):
             page.get_by_role("button", name=name, exact=True).click()
             expect(page.locator(".details:visible h2")).to_contain_text(name)
             page.frame_locator("iframe").get_by_role("button", name="Play").click()
@@ -148,8 +174,12 @@ def test_the_report_opens_what_belongs_to_a_name(graded: Path, new_page: NewPage
         assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
         leave_picture(page, f"grades_{colours}_{width}", full_page=True)
         expect(page.locator(".details:visible")).to_contain_text("ValueError: =1+1 <b>what</b>")
-        page.get_by_role("button", name="carl", exact=True).click()
+        page.get_by_role("button", name="Carl", exact=True).click()
         expect(page.locator(".details:visible")).to_have_count(0)
+        page.goto((graded / "feedback" / "ann.html").as_uri())
+        check_access(page, colours)
+        page.frame_locator("iframe").get_by_role("button", name="Play").click()
+        leave_picture(page, f"feedback_{colours}_{width}", full_page=True)
 
 
 @needs_sandbox
@@ -190,6 +220,21 @@ def test_ctrl_c_says_how_to_go_on(tmp_path: Path) -> None:
     assert run.returncode == 130
     assert "stopped after 1 of 2 runs. The same command goes on from there." in said
     assert "Traceback" not in said
+
+
+def test_one_attempt_of_a_student_counts(tmp_path: Path) -> None:
+    project = exercise(tmp_path)
+    folders = [write(tmp_path / name, {"ann": text}) for name, text in (("late", "0"), ("early", GOOD), ("none", ""))]
+    (folders[2] / "ann.py").rename(folders[2] / "ann.txt")
+    for path, time_s in zip(folders, (DUE_S, DUE_S - 9, DUE_S + 9), strict=True):
+        os.utime(next(path.iterdir()), (time_s, time_s))
+    words = [project, *folders, "--trusted", "--out", tmp_path / "out"]
+    assert "ann has 3 rows" in grade(*words).stderr
+    for attempts, solved in (("best", "1"), ("last", "0")):
+        assert grade(*words, "--attempts", attempts).returncode == 0
+        assert [row["solved"] for row in table(tmp_path / "out", "grades.csv")] == [solved]
+    done = grade(*words, "--max", "100")
+    assert "--max must come with --full where the formula of points has no maximum" in done.stderr
 
 
 def test_what_cannot_be_graded_is_refused(tmp_path: Path) -> None:

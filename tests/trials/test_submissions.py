@@ -1,15 +1,20 @@
 """What is handed in: files, folders, archives of platforms; and what a stranger may put into an archive."""
 
 import os
+import random
+import tarfile
 import zipfile
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
 
 from kiks.errors import ParameterError
 from kiks.trials import hand_in
+from kiks.trials.file_tree import BYTES_MAX
 from kiks.trials.similarity import alike
-from kiks.trials.submissions import BYTES_MAX, Submission, submissions_in
+from kiks.trials.students import NOTHING, read_students, with_students
+from kiks.trials.submissions import Submission, submissions_in, text_of
 
 TEXT = "print('hello')\n"
 
@@ -31,16 +36,29 @@ def test_files_and_folders(tmp_path: Path) -> None:
     for name in ("bob.py", "carl/robot.py", "dora/main.py", "dora/own/helper.py", "eve/a.py", "eve/b.py", ".git/x.py"):
         (home / name).parent.mkdir(parents=True, exist_ok=True)
         (home / name).write_text(TEXT)
-    (home / "notes.txt").write_text("none of them")
+    for name in (b"caf\xe9.py", b"fay.m", b"gil.rar", b"ida.tar.gz", b"kim.zip"):
+        Path(os.fsdecode(os.fsencode(home) + b"/" + name)).write_text(TEXT)
+    (home / "empty" / "__pycache__").mkdir(parents=True)
     (home / "link.py").symlink_to("/etc/passwd")
-    *single, dora, eve = found = found_in(tmp_path, tmp_path / "ann.py", home)
-    assert [each.name for each in found] == ["ann", "bob", "carl", "dora", "eve"]
-    assert {each.command.file.read_text() for each in single} == {TEXT}
-    assert dora.command.program.is_dir()
-    assert set(dora.files) == {"main.py", "own/helper.py"}
-    assert (dora.command.program / "own/helper.py").is_file()
-    assert eve.command is None
-    assert eve.problem == "it must have one program, but it has a.py, b.py; the one that runs is called __main__.py"
+    with tarfile.open(home / "joe.tar.gz", "w:gz") as archive:
+        archive.add(home / "dora", "dora")
+    found = {each.name: each for each in found_in(tmp_path, tmp_path / "ann.py", home)}
+    assert {each.command.file.read_text() for each in found.values() if each.command} == {TEXT}
+    assert {name for name, each in found.items() if each.command} == {"ann", "bob", "caf", "carl", "dora", "joe"}
+    assert (found["ann"].time_s is None, found["joe"].command.program.is_dir()) == (False, True)
+    assert set(found["dora"].files) == {"main.py", "own/helper.py"}
+    problems = {
+        "empty": "it has no program, a file that ends in .py, .ipynb, .m: its folder is empty",
+        "eve": "it must have one program, but it has a.py, b.py; the one that runs is called __main__.py",
+        "fay": "fay.m is no program in Python",
+        "gil": "it has no program, a file that ends in .py, .ipynb, .m: there is gil.rar",
+        "ida": "its archive cannot be read (",
+        "kim": "its archive cannot be read (",
+        "link": "'link.py' is a link, which is not followed",
+    }
+    assert {name for name, each in found.items() if each.problem} == set(problems)
+    for name, words in problems.items():
+        assert words in found[name].problem
 
 
 def test_an_export_of_moodle_names_students_and_their_numbers(tmp_path: Path) -> None:
@@ -51,23 +69,45 @@ def test_an_export_of_moodle_names_students_and_their_numbers(tmp_path: Path) ->
         "Zoë_1203_assignsubmission_file_/task/main.py": TEXT,
         "Zoë_1203_assignsubmission_file_/task/other.py": TEXT,
     }
+    files |= {
+        "Ann Lee_1201_assignsubmission_onlinetext/onlinetext.html": "<p>See the file.</p>",
+        "Zoë_1204_assignsubmission_onlinetext_onlinetext.html": "print(1)",
+    }
     found = found_in(tmp_path, zipped(tmp_path / "moodle.zip", files))
     assert [(each.name, each.id, each.participant, each.problem) for each in found] == [
         ("Ann Lee", "Ann-Lee", "1201", ""),
         ("Bob O'Hara", "Bob-O-Hara", "1202", ""),
         ("Zoë", "Zoë", "1203", ""),
+        ("Zoë", "Zoë-2", "1204", "it has a text that was written online, and no file"),
     ]
 
 
 def test_an_export_of_gradescope_names_students(tmp_path: Path) -> None:
-    listed = (
-        "submission_77:\n  :submitters:\n  - :name: Ann Lee\n    :sid: '5'\n    :email: ann@example.org\n"
-        "  :created_at: 2026-11-26\nsubmission_78:\n  :submitters:\n  - :name: Bob\n    :email: bob@example.org\n"
-    )
-    files = {"submission_metadata.yml": listed, "submission_77/p.py": TEXT, "submission_78/p.py": TEXT}
+    listed = """
+submission_77:
+  :submitters:
+  - :name: "Ann \\u00d8"
+    :sid: '5'
+    :email: ann@example.org
+  :created_at: 2026-11-26 10:00:00.000000000 Z
+  :results: !ruby/hash:ActiveSupport::HashWithIndifferentAccess {score: 1}
+submission_78:
+  :submitters:
+  - :name: Bob
+    :email: b@x.org
+  - :name: Cy
+    :email: c@x.org
+submission_79:
+  :submitters: 7
+"""
+    files = {"submission_metadata.yml": listed, **{f"submission_{number}/p.py": TEXT for number in (77, 78, 79)}}
     in_folder = {f"assignment_9_export/{name}": text for name, text in files.items()}
     found = found_in(tmp_path, zipped(tmp_path / "export.zip", {**in_folder}))
-    assert [(each.name, each.email) for each in found] == [("Ann Lee", "ann@example.org"), ("Bob", "bob@example.org")]
+    names = [("Ann Ø", "ann@example.org"), ("Bob, Cy", "b@x.org, c@x.org"), ("submission_79", "")]
+    assert [(each.name, each.email) for each in found] == names
+    assert found[0].time_s == datetime(2026, 11, 26, 10, tzinfo=UTC).timestamp()
+    broken = zipped(tmp_path / "broken.zip", {"submission_metadata.yml": "a: [", "x/p.py": TEXT, "y/p.py": TEXT})
+    assert [each.name for each in found_in(tmp_path, broken)] == ["x", "y"]
 
 
 def test_a_file_of_the_page_alone_and_within_an_export(tmp_path: Path) -> None:
@@ -103,6 +143,68 @@ def test_what_an_archive_of_a_stranger_may_hold_is_named_and_reaches_nothing(tmp
     for each, words in zip(found, ["has a link, 'link.py'", *(words for *_, words in held.values())], strict=True):
         assert words in each.problem
     assert {path for path in set(tmp_path.rglob("*")) - before if path.suffix == ".py"} == set()
+
+
+def test_a_damaged_or_hostile_entry_costs_its_own_row_alone(tmp_path: Path) -> None:
+    held = {
+        "ann.py": TEXT,
+        "../../out.py": TEXT,
+        "a/b": TEXT,
+        "a": TEXT,
+        "d/" * 999 + "e.py": TEXT,
+        "l" * 999 + ".py": TEXT,
+    }
+    found = found_in(tmp_path, zipped(tmp_path / "class.zip", {**held, "bob/p.py": TEXT}))
+    assert {each.name for each in found if each.command} == {"ann", "bob"}
+    assert {each.name for each in found if not each.command} == {"out", "a", "d", "l" * 80}
+    # Whatever bytes change, no other exception comes out.
+    chance, sound = random.Random(1), zipped(tmp_path / "class.zip", {"ann.py": TEXT * 9, "bob.py": TEXT}).read_bytes()
+    with tarfile.open(tmp_path / "class.tar.gz", "w:gz") as archive:
+        archive.add(tmp_path / "class.zip", "ann.zip")
+    for name, whole in (("a.zip", sound), ("b.tar.gz", (tmp_path / "class.tar.gz").read_bytes())):
+        for _ in range(60):
+            data = bytearray(whole)
+            for _ in range(chance.randint(1, 4)):
+                data[chance.randrange(len(data))] = chance.randrange(256)
+            (tmp_path / name).write_bytes(data)
+            assert found_in(tmp_path, tmp_path / name)
+
+
+def test_students_are_found_on_lists_as_platforms_write_them(tmp_path: Path) -> None:
+    home = tmp_path / "class"
+    for name in ("Ann_Lee", "Jörg", "who"):
+        (home / f"{name}.py").parent.mkdir(exist_ok=True)
+        (home / f"{name}.py").write_text(TEXT)
+    found = found_in(
+        tmp_path, home, zipped(tmp_path / "m.zip", {"B_7_assignsubmission_file_/a.py": TEXT, "who.py": ""})
+    )
+    late = "Saturday, 28 November 2026, 5:06 PM"
+    for data, names in (
+        ("Ann Lee\nJörg\n\nCy\n", ["Ann Lee", "Jörg", "Cy"]),
+        ("\ufeffName;E-Mail\r\nAnn Lee;a@x\r\nJörg;\r\nCy;\r\n".encode(), ["Ann Lee", "Jörg", "Cy"]),
+        ("First name\tLast name\nAnn\tLee\n\tJörg\nCy\t\n".encode("utf-16"), ["Ann Lee", "Jörg", "Cy"]),
+        ('"Full name",Email\n"Lee, Ann",a@x\nJo\u0308rg,j\nCy,c'.encode(), ["Lee, Ann", "Jörg", "Cy"]),
+        (
+            "Identifier,Full name,Email address,Status,Last modified (submission),Last modified (grade)\n"
+            f'Participant 7,Ann Lee,a@x,Submitted,"{late}",-\nParticipant 8,Jörg,j@x,,-,\nParticipant 9,Cy,,,-,-\n',
+            ["Ann Lee", "Jörg", "Cy"],
+        ),
+    ):
+        (tmp_path / "names.csv").write_bytes(data if isinstance(data, bytes) else data.encode())
+        students = read_students(tmp_path / "names.csv")
+        assert [each.name for each in students] == names
+        rows, strangers = with_students(found, students)
+        assert [each.name for each in rows if each.problem == NOTHING] == ["Cy"]
+        is_worksheet = bool(students[0].participant)
+        assert [each.name for each in strangers] == ["who", *([] if is_worksheet else ["B"]), "who"]
+        if is_worksheet:
+            assert [(each.name, each.email, each.last_graded) for each in rows if each.participant == "7"] == [
+                ("Ann Lee", "a@x", "-")
+            ] * 2
+            assert rows[0].time_s == datetime(2026, 11, 28, 17, 6).timestamp()
+    (tmp_path / "names.csv").write_text("Ann;a@x\n")
+    with pytest.raises(ParameterError, match="must begin with the names of its columns"):
+        read_students(tmp_path / "names.csv")
 
 
 def test_names_are_words_that_differ(tmp_path: Path) -> None:
@@ -143,6 +245,15 @@ def test_programs_are_alike_whatever_their_names_comments_and_layout_are() -> No
     assert found[("a", "b")] == 1
     assert 0.8 <= found[("a", "c")] < 1
     assert not any("d" in pair for pair in found)
+    # So it is in other encodings and with other line ends.
+    texts = {
+        "bom": b"\xef\xbb\xbf" + one.encode(),
+        "latin": b"# coding: latin-1\r\n# \xe9\r\n" + one.replace("\n", "\r\n").encode(),
+        "no coding": b"# \xe9\r" + one.replace("\n", "\r").encode(),
+        "wide": one.encode("utf-16"),
+    }
+    pairs = alike({"a": one} | {name: text_of(data) for name, data in texts.items()})
+    assert [pair.share for pair in pairs] == [1] * 10
     # What all were given, or what is no Python, is no likeness.
     assert alike({"a": given, "b": given}, given) == []
     assert alike({"a": "\0(((", "b": "x" * 100_000}) == []

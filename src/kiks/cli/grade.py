@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import shlex
 import sys
+from collections import Counter
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 from kiks.cli.engine_start import ready_engine
 from kiks.cli.options import Trusted, Workers, progress_bar, say, tell_taken
-from kiks.cli.outputs import has_results, shows_progress, tell_results
+from kiks.cli.outputs import has_results, leave_out, shows_progress, tell_results
 from kiks.ending import end_as_with_ctrl_c
-from kiks.errors import counted, printable
-from kiks.table import Table
+from kiks.errors import counted, figure, printable
 
 if TYPE_CHECKING:
     from kiks.trials.grading import Graded
@@ -31,13 +31,47 @@ def grade(
     submissions: Annotated[
         list[Path],
         typer.Argument(
-            help="Programs (.py), folders of them, or archives (.zip), such as Moodle and Gradescope export. A folder "
-            "with a __main__.py is one program."
+            help="Programs (.py), folders of them, or archives (.zip, .tar.gz), such as Moodle and Gradescope export. "
+            "A folder with a __main__.py is one program."
         ),
     ],
     out: Annotated[
         Path | None,
         typer.Option(help="Folder of the tables, the report and the recordings; grades-EXERCISE if left out."),
+    ] = None,
+    students: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="The students: a name on each line, or a CSV, such as Moodle's grading worksheet. Who handed in "
+            "nothing is in the tables, too.",
+        ),
+    ] = None,
+    maximum: Annotated[
+        float | None,
+        typer.Option("--max", help="Grade for full points; points are the grade if left out.", min=0.01, max=1e6),
+    ] = None,
+    full: Annotated[
+        float | None,
+        typer.Option(
+            help="Full points; if left out, the most that the exercise's formula of points can give.",
+            min=0.001,
+            max=1e6,
+        ),
+    ] = None,
+    due: Annotated[
+        str | None,
+        typer.Option(
+            metavar="TIME",
+            help="When hand-ins were due, such as 2026-11-28T23:59; each day that has begun since costs --penalty.",
+        ),
+    ] = None,
+    penalty: Annotated[
+        float, typer.Option(help="Share of the grade that each day after --due costs [%].", min=0, max=100)
+    ] = 10.0,
+    attempts: Annotated[
+        Literal["best", "last"] | None,
+        typer.Option(help="Which submission of a student counts: best or last; each has a row if left out."),
     ] = None,
     workers: Workers = None,
     trusted: Trusted = False,
@@ -46,26 +80,34 @@ def grade(
 
     Each drives robot 1 in a sandbox: it reaches no file of yours, no network and no other program. A line says so if
     there is no bubblewrap, which makes the sandbox. What is left is grades.csv, moodle.csv, results/ for Gradescope,
-    report.html, and a recording of each run (kiks replay). A command that was stopped goes on when it starts again.
+    report.html, a page for each student in feedback/, and a recording of each run (kiks replay). A command that was
+    stopped goes on when it starts again.
 
     Example: kiks grade lamp.kiks submissions/
 
-    Example: kiks grade exercises/wall moodle_export.zip --out grades
+    Example: kiks grade exercises/wall moodle_export.zip --students worksheet.csv --max 100 --due 2026-11-28T23:59
     """
     from kiks.model.atomic_files import alone_in
     from kiks.ports.sandbox import check_sandbox
     from kiks.trials.grading import grade as graded_of
     from kiks.trials.grading import load_exercise, trials_of
+    from kiks.trials.marking import marking_for
     from kiks.trials.report import save_grades
     from kiks.trials.runner import OUTCOMES
+    from kiks.trials.students import read_students, with_students
     from kiks.trials.submissions import submissions_in
 
     project, folder = load_exercise(exercise)
+    if due is None:
+        leave_out(context, "without --due", "penalty")
+    marking = marking_for(project, maximum, full, due, penalty)
+    listed = None if students is None else read_students(students)
     if not trusted:
         check_sandbox()  # Without one nothing is copied or compiled.
     out = Path(f"grades-{exercise.stem}") if out is None else out
     with alone_in(out, "--out", OUTCOMES):
         found = submissions_in(submissions, out / "programs")
+        found, strangers = (found, []) if listed is None else with_students(found, listed)
         count = len(trials_of(project, folder, found))
         ready_engine()
         end_as_with_ctrl_c()
@@ -79,8 +121,8 @@ def grade(
         def note_taken(number: int) -> None:
             tell_taken(number, count, out)
 
-        options: dict[str, Any] = {"title": exercise.stem, "is_trusted": trusted, "workers": workers}
-        options |= {"on_outcome": note, "on_taken": note_taken}
+        options: dict[str, Any] = {"title": exercise.stem, "marking": marking, "attempts": attempts}
+        options |= {"is_trusted": trusted, "workers": workers, "on_taken": note_taken}
         try:
             with progress_bar(counted(len(found), "submission")) as show:
                 command = shlex.join(["kiks", *sys.argv[1:]])
@@ -92,25 +134,37 @@ def grade(
             raise
     tell_results(context, _results(graded, out))
     _tell(graded, out)
+    if strangers:
+        names = ", ".join(each.name for each in strangers)
+        say(printable(f"{counted(len(strangers), 'submission')} of nobody in {students}, or of several: {names}."))
 
 
 def _tell(graded: Graded, out: Path) -> None:
     """Print the table, and what people have to look at."""
-    from kiks.trials.tables import COUNTED, likenesses_of, rows_of
+    from kiks.trials.students import identities
+    from kiks.trials.tables import likenesses_of, table_of
 
+    marking = graded.marking
     typer.echo(printable(graded.title))
     for line in graded.faults:
         typer.echo(printable(line))
-    heads = ["name", "points", "solved", *COUNTED, "said last"]
-    typer.echo(Table(heads, rows_of(graded), ends_in_text=True).for_output())
+    typer.echo(table_of(graded).for_output())
+    if marking.most is not None:
+        typer.echo(f"A grade of {figure(marking.most)} is for {counted(marking.full, 'point')}.")
     for line in likenesses_of(graded):
         typer.echo(printable(line))
     for grade in graded.grades:
-        if grade.submission.problem:
-            say(printable(f"{grade.submission.name} was not graded: {grade.submission.problem}."))
+        if grade.problem:
+            say(printable(f"{grade.submission.name} was not graded: {grade.problem}."))
         for outcome in grade.outcomes:
             if outcome.doubt:
                 say(printable(f"{outcome.name} may come out differently next time: {outcome.doubt}."))
+        if marking.due_s is not None and grade.mark is not None and grade.days_late is None:
+            say(printable(f"{grade.submission.name} has no time of handing in, and counts as in time."))
+    handed_in = Counter((identities(grade.submission)[0], grade.submission.name) for grade in graded.grades)
+    for (_, name), count in handed_in.items():
+        if count > 1:
+            say(printable(f"{name} has {count} rows: --attempts best or last chooses one."))
     typer.echo(f"{out / 'report.html'}: open it in a browser. {out / 'grades.csv'}, {out / 'moodle.csv'}")
 
 
@@ -123,8 +177,10 @@ def _results(graded: Graded, out: Path) -> dict[str, Any]:
         "faults": graded.faults,
         "cases": [case.name for case in graded.cases],
         "submissions": [
-            {"name": each.submission.name, "id": each.submission.id, "problem": each.submission.problem or None}
+            {"name": each.submission.name, "id": each.submission.id, "problem": each.problem or None}
             | gradescope_results(graded, each)
+            | {"grade": each.mark, "days_late": each.days_late}
+            | ({"score": None} if each.problem else {})
             for each in graded.grades
         ],
         "alike": [vars(pair) for pair in graded.likenesses],

@@ -18,7 +18,7 @@ def room(
     exercise: Annotated[
         Path, typer.Argument(help="A project, or the folder of an exercise: each desk begins with it.")
     ],
-    students: Annotated[Path, typer.Option(metavar="FILE", help="The students' names, one on each line, at most 200.")],
+    students: Annotated[Path, typer.Option(metavar="FILE", help="The names, one on each line, or a CSV; at most 200.")],
     host: Annotated[str, typer.Option(help="Address to listen at: 0.0.0.0 for all of this computer's.")] = "127.0.0.1",
     port: Annotated[
         int | None, typer.Option(help="TCP port, 0 for a free one; 8123 if left out.", min=0, max=65535)

@@ -6,16 +6,22 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Literal
 
 from kiks.errors import ParameterError, shown
 from kiks.model.exercise import STUDENT, Case, cases_of
 from kiks.model.project import Project, project_file
 from kiks.ports.program_process import commands_of
 from kiks.sim.from_project import in_case
+from kiks.trials.marking import AS_POINTS, Marking
 from kiks.trials.runner import run_trials
 from kiks.trials.similarity import Likeness, alike
+from kiks.trials.students import identities
 from kiks.trials.submissions import Submission
 from kiks.trials.trial import CRASHED, ENDLESS, FAILURES, OUT_OF_TIME, STOPPED, Outcome, Trial, limit_of
+
+Attempts = Literal["best", "last"]
+"""Which one counts of the submissions of a student."""
 
 
 @dataclass(frozen=True)
@@ -26,11 +32,20 @@ class Grade:
         submission: The submission.
         outcomes: What came out in each case, in their order; () if it could not be graded.
         like: Names of submissions that are alike, and how much.
+        mark: What the grade book gets; None if it was not graded.
+        days_late: How many days after the due time have begun when it came; None if that is not known.
     """
 
     submission: Submission
     outcomes: tuple[Outcome, ...]
     like: tuple[tuple[str, float], ...] = ()
+    mark: float | None = None
+    days_late: int | None = None
+
+    @property
+    def problem(self) -> str:
+        """Why it was not graded: it cannot be, or a run was lost; empty if it was."""
+        return self.submission.problem or next((each.doubt for each in self.outcomes if not each.recording), "")
 
     @property
     def points(self) -> float:
@@ -68,8 +83,8 @@ class Grade:
     @property
     def said_last(self) -> str:
         """What it printed last, or what was wrong, in a line."""
-        if self.submission.problem:
-            return self.submission.problem
+        if self.problem:
+            return self.problem
         for outcome in [each for each in (self.worst, *self.outcomes) if each is not None]:
             end = outcome.end_of()
             if text := end.detail or next(filter(None, map(str.strip, reversed(end.printed))), ""):
@@ -88,6 +103,7 @@ class Graded:
         cases: The cases in which programs were tried.
         grades: The grades, in the order of the submissions.
         likenesses: Pairs of programs that are alike.
+        marking: How points became grades.
     """
 
     title: str
@@ -96,6 +112,14 @@ class Graded:
     cases: tuple[Case, ...]
     grades: tuple[Grade, ...]
     likenesses: tuple[Likeness, ...]
+    marking: Marking = AS_POINTS
+
+    def seen_by(self, grade: Grade) -> Graded:
+        """Return what the student of a grade may see: nothing of hidden cases and of others."""
+        tried = zip(self.cases, grade.outcomes, strict=False)
+        outcomes = tuple(outcome for case, outcome in tried if not case.is_hidden)
+        cases = tuple(case for case in self.cases if not case.is_hidden)
+        return replace(self, cases=cases, grades=(replace(grade, outcomes=outcomes, like=()),), likenesses=())
 
     @property
     def faults(self) -> list[str]:
@@ -166,6 +190,8 @@ def grade(
     out: Path,
     *,
     title: str = "",
+    marking: Marking = AS_POINTS,
+    attempts: Attempts | None = None,
     is_trusted: bool = False,
     command: str = "",
     workers: int | None = None,
@@ -180,6 +206,8 @@ def grade(
         submissions: What was handed in.
         out: Where outcomes and recordings go.
         title: Its title if it says none.
+        marking: How points become grades.
+        attempts: Which one of the submissions of a student counts; each is a grade of its own if left out.
         is_trusted: Whether the programs run without a sandbox.
         command: The command that has begun it, for the recordings.
         workers: See `run_trials`.
@@ -192,11 +220,16 @@ def grade(
     grades = []
     for submission in submissions:
         count = 0 if submission.command is None else len(cases)
-        grades.append(Grade(submission, tuple(next(outcomes) for _ in range(count))))
+        made = Grade(submission, tuple(next(outcomes) for _ in range(count)))
+        late = marking.days_late(submission)
+        mark = None if made.problem else marking.grade_of(made.points, late)
+        grades.append(replace(made, mark=mark, days_late=late))
+    if attempts is not None:
+        grades = _chosen(grades, attempts)
     template = project.exercise.template if project.exercise else ""
-    likenesses = alike({each.id: "\n".join(each.files.values()) for each in submissions}, template)
+    likenesses = alike({each.submission.id: "\n".join(each.submission.files.values()) for each in grades}, template)
     like: dict[str, list[tuple[str, float]]] = {}
-    names = {each.id: each.name for each in submissions}
+    names = {each.submission.id: each.submission.name for each in grades}
     for pair in likenesses:
         like.setdefault(pair.first, []).append((names[pair.second], pair.share))
         like.setdefault(pair.second, []).append((names[pair.first], pair.share))
@@ -208,4 +241,21 @@ def grade(
         tuple(cases),
         tuple(replace(each, like=tuple(like.get(each.submission.id, ()))) for each in grades),
         tuple(Likeness(names[each.first], names[each.second], each.share) for each in likenesses),
+        marking,
     )
+
+
+def _chosen(grades: Sequence[Grade], attempts: Attempts) -> list[Grade]:
+    """Return of each student the grade that counts; one that was not graded does so only if there is no other."""
+    chosen: dict[str, Grade] = {}
+    for grade in grades:
+        student = identities(grade.submission)[0]
+        before = chosen.setdefault(student, grade)
+        ranks = [_rank(each, attempts) for each in (before, grade)]
+        if ranks[1] >= ranks[0]:
+            chosen[student] = grade
+    return [*chosen.values()]
+
+
+def _rank(grade: Grade, attempts: Attempts) -> tuple[bool, float]:
+    return grade.mark is not None, (grade.mark if attempts == "best" else grade.submission.time_s) or 0.0

@@ -19,7 +19,8 @@ OF_THE_RUN = (RECORDING, PAGE, SCORE)
 HAND_IN_BYTES_MAX = 64 << 20
 """Most bytes of such a file."""
 
-_DATE = (1980, 1, 1, 0, 0, 0)  # the same content makes the same file
+DATE = (1980, 1, 1, 0, 0, 0)
+"""The date of what is in an archive, so that the same content makes the same file."""
 
 
 def packed(program: Mapping[str, bytes], score: Mapping[str, Any], *, recording: bytes, page: bytes) -> bytes:
@@ -50,5 +51,5 @@ def packed(program: Mapping[str, bytes], score: Mapping[str, Any], *, recording:
     made = io.BytesIO()
     with zipfile.ZipFile(made, "w") as archive:
         for name, data in files.items():
-            archive.writestr(zipfile.ZipInfo(name, _DATE), data, zipfile.ZIP_DEFLATED)
+            archive.writestr(zipfile.ZipInfo(name, DATE), data, zipfile.ZIP_DEFLATED)
     return made.getvalue()

@@ -6,17 +6,24 @@ All that students have written reaches the report through a template that escape
 from __future__ import annotations
 
 import json
+import shutil
+import zipfile
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Container, Sequence
 from pathlib import Path
+from zipfile import ZIP_DEFLATED as DEFLATED
 
 from kiks.errors import figure
 from kiks.export.page import page_template
-from kiks.model.atomic_files import make_folder, replace_file
+from kiks.model.atomic_files import make_folder, replace_file, writing
 from kiks.trials.grading import Graded
+from kiks.trials.hand_in import DATE
+from kiks.trials.marking import AS_POINTS
 from kiks.trials.report_parts import Run, page_parts, shown_runs
 from kiks.trials.tables import (
     COUNTED,
+    feedback_name,
+    feedback_of,
     grades_csv,
     gradescope_results,
     how_it_went,
@@ -32,6 +39,9 @@ REPORT = "report.html"
 RESULTS = "results"
 """The folder of the results for Gradescope, a file for each submission."""
 
+FEEDBACK = "feedback"
+"""The folder of a page for each student, and the archive in which Moodle takes these pages."""
+
 _STRIP = 390.0
 """Width of a strip of points in a figure of the report."""
 
@@ -45,59 +55,91 @@ def save_grades(
     workers: int | None = None,
     on_progress: Callable[[int, int], object] = lambda done, count: None,
 ) -> None:
-    """Write `grades.csv`, `moodle.csv`, `results/` and `report.html` into the output folder.
+    """Write `grades.csv`, `moodle.csv`, `results/`, `feedback/` and `report.html` into the output folder.
+
+    What an earlier grading has left there of submissions that are gone is removed.
 
     Args:
         graded: The grades.
         out: The folder, in which the recordings are.
-        workers: Processes that prepare the players of the report; one for each core if left out.
+        workers: Processes that prepare the players of the pages; one for each core if left out.
         on_progress: Called with how many players are ready, and of how many.
     """
     replace_file(out / "grades.csv", grades_csv(graded), "grades")
     replace_file(out / "moodle.csv", moodle_csv(graded), "grades")
-    make_folder(out / RESULTS, "results")
-    for each in graded.grades:
-        text = json.dumps(gradescope_results(graded, each), indent=2) + "\n"
-        replace_file(out / RESULTS / f"{each.submission.id}.json", text, "results")
-        if len(graded.grades) == 1:
-            # Where Gradescope itself runs the command, for one submission.
-            replace_file(out / "results.json", text, "results")
-    recordings = {
-        each.submission.id: out / each.worst.recording
-        for each in graded.grades
-        if each.worst is not None and each.worst.recording
-    }
+    seen = {each.submission.id: graded.seen_by(each) for each in graded.grades}
+    worst = [each.worst for each in (*graded.grades, *(grade for each in seen.values() for grade in each.grades))]
+    recordings = {each.name: out / each.recording for each in worst if each is not None and each.recording}
     runs = shown_runs(recordings, workers, on_progress)
-    replace_file(out / REPORT, _report(graded, runs, out).encode("utf-8", "replace"), "the report")
+    for folder in (RESULTS, FEEDBACK):
+        make_folder(out / folder, folder)
+    with writing(out / f"{FEEDBACK}.zip", FEEDBACK) as beside, zipfile.ZipFile(beside.file, "w", DEFLATED) as archive:
+        for each in graded.grades:
+            name, own = each.submission.id, seen[each.submission.id]
+            results = json.dumps(gradescope_results(graded, each), indent=2) + "\n"
+            replace_file(out / RESULTS / f"{name}.json", results, RESULTS)
+            if len(graded.grades) == 1:
+                # Where Gradescope itself runs the command, for one submission.
+                replace_file(out / "results.json", results, RESULTS)
+            said = feedback_of(graded, each)
+            page = _page("feedback.html", own, runs, out, grade=own.grades[0], said=said, is_for_student=True)
+            replace_file(out / FEEDBACK / f"{name}.html", page, FEEDBACK)
+            archive.writestr(zipfile.ZipInfo(feedback_name(each.submission), DATE), page, DEFLATED)
+    for folder in (RESULTS, FEEDBACK, "runs"):
+        _prune(out / folder, seen)
+    replace_file(out / REPORT, _report(graded, runs, out), "the report")
 
 
-def _report(graded: Graded, runs: dict[str, Run], out: Path) -> str:
+def _prune(folder: Path, ids: Container[str]) -> None:
+    """Remove what an earlier grading has left of submissions that are gone."""
+    for path in folder.iterdir() if folder.is_dir() else ():
+        if path.stem not in ids:
+            shutil.rmtree(path, ignore_errors=True) if path.is_dir() else path.unlink()
+
+
+def _report(graded: Graded, runs: dict[str, Run], out: Path) -> bytes:
     low, high, spread = _spread(graded)
-    names = {
-        outcome.name: case.name
-        for each in graded.grades
-        for case, outcome in zip(graded.cases, each.outcomes, strict=False)
-    }
-    return page_template("grades.html").render(
-        graded=graded,
-        figure=figure,
-        how=how_it_went,
-        likeness=likeness_of,
+    return _page(
+        "grades.html",
+        graded,
+        runs,
+        out,
         likenesses=likenesses_of(graded),
         ranked=ranked(graded),
         counted=[how for how in COUNTED if any(each.count(how) for each in graded.grades)],
         low=low,
         high=high,
         spread=spread,
-        names=names,
-        **page_parts(runs, out),
+        is_for_student=False,
     )
+
+
+def _page(template: str, graded: Graded, runs: dict[str, Run], out: Path, **values: object) -> bytes:
+    """Return a page about grades, with the player of the worst case of each."""
+    worst = {each.submission.id: each.worst for each in graded.grades if each.worst is not None}
+    own = {id: runs[outcome.name] for id, outcome in worst.items() if outcome.name in runs}
+    names = {
+        outcome.name: case.name
+        for each in graded.grades
+        for case, outcome in zip(graded.cases, each.outcomes, strict=False)
+    }
+    page = page_template(template).render(
+        graded=graded,
+        figure=figure,
+        how=how_it_went,
+        is_marked=graded.marking != AS_POINTS,
+        likeness=likeness_of,
+        names=names,
+        **values,
+        **page_parts(own, out),
+    )
+    return page.encode("utf-8", "replace")
 
 
 def _spread(graded: Graded) -> tuple[float, float, _Spread]:
     """Return the fewest and most points, and for all cases and each: name, bars and a note."""
     rows: list[tuple[str, Sequence[float], int]] = []
-    tried = [each for each in graded.grades if each.outcomes]
+    tried = [each for each in graded.grades if not each.problem]
     rows.append(("All cases", [each.points for each in tried], sum(each.solved for each in tried)))
     for number, case in enumerate(graded.cases):
         outcomes = [each.outcomes[number] for each in tried]

@@ -64,11 +64,11 @@ def run_trials(
     if len({trial.name for trial in trials}) < len(trials):
         raise ParameterError("names of trials must differ, but two are the same. Number them.")
     file = folder / OUTCOMES
-    known = {key: found for key, found in _outcomes_in(file).items() if _is_there(found, folder)}
+    known = _outcomes_in(file)
     outcomes: dict[str, Outcome] = {}
     missing = []
     for trial in trials:
-        if (found := known.get(trial.key)) is not None and found.name == trial.name:
+        if (found := known.get(trial.key)) is not None and _stands_for(found, trial, folder):
             outcomes[trial.name] = found
             on_outcome(found, len(outcomes))
         else:
@@ -114,9 +114,10 @@ def _outcomes_in(file: Path) -> dict[str, Outcome]:
     return found
 
 
-def _is_there(outcome: Outcome, folder: Path) -> bool:
-    """Return whether an outcome stands for its trial: nothing speaks against it, and its recording is there."""
-    return not outcome.doubt and (folder / outcome.recording).is_file()
+def _stands_for(outcome: Outcome, trial: Trial, folder: Path) -> bool:
+    """Return whether an outcome is that of a trial: nothing speaks against it, and its recording is there."""
+    is_own = (outcome.name, outcome.recording) == (trial.name, trial.recording)
+    return is_own and not outcome.doubt and (folder / trial.recording).is_file()
 
 
 def _lost(trial: Trial, why: str) -> Outcome:

@@ -1,46 +1,59 @@
 """What students have handed in: programs in files, folders and archives, such as a platform exports.
 
-Need: an archive may come from anybody. It may claim any size, name files elsewhere and hold links. Method: nothing is
-unpacked where it says. Files are read into memory within bounds, each under a name that was checked, and written into
-a folder of the submission's own. What cannot be graded stays in the table, with a line that says why.
+Need: each hand-in is a row of the grades, whatever it is, and costs its own row only. Method: each entry of a folder or
+an archive is a submission; `file_tree` reads it, and it is written into a folder of its own. What cannot be graded
+stays in the table, with a line that says why.
 """
 
 from __future__ import annotations
 
-import io
-import os
 import re
 import shutil
-import stat
-import zipfile
-from collections.abc import Callable, Iterable, Iterator, Sequence
+import unicodedata
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
+from datetime import datetime
+from importlib.util import decode_source
 from pathlib import Path, PurePosixPath
+from typing import Any
 
 from kiks.errors import ParameterError, printable, shown
 from kiks.meant import nearest_file
 from kiks.model.atomic_files import explained
 from kiks.model.program_files import BYTES_MAX, FILES_MAX, MAIN, ProgramFiles
 from kiks.ports.program_process import Command
+from kiks.trials.file_tree import (
+    File,
+    Folder,
+    UnreadableError,
+    archive_ending,
+    as_unreadable,
+    descended,
+    file_at,
+    files_in,
+    tree_of_archive,
+    tree_of_folder,
+)
 from kiks.trials.hand_in import HAND_IN_BYTES_MAX, OF_THE_RUN, PROGRAM
-
-ENTRIES_MAX = 20_000
-"""Most files in an archive or a folder of submissions."""
 
 SUBMISSIONS_MAX = 2000
 """Most submissions."""
 
 NAME_MAX = 80
-"""Most characters of a submission's name."""
+"""Most characters of a submission's name, and most bytes of its word in paths."""
+
+PROGRAMS = (".py", ".ipynb", ".m")
+"""Endings of programs; of several kinds, the first counts."""
 
 _MARK = "ABOUT.txt"
 """File of a folder of copies, which may be deleted."""
 
-_MAINS = (MAIN, PROGRAM, "main.py")
+_MAINS = [f"{name}{ending}" for ending in PROGRAMS for name in ("__main__", "program", "main")]
 """Names of the file that runs, the first one that is there."""
 
-_MOODLE = re.compile(r"(?P<name>.+?)_(?P<id>\d+)_assignsubmission_file_?(?P<file>.*)", re.DOTALL)
-"""How Moodle names what it exports: a folder for each student, or files."""
+_MOODLE = re.compile(r"(?P<name>.+?)_(?P<id>\d+)_assignsubmission_(?P<kind>[a-z]+)_?(?P<file>.*)", re.DOTALL)
+"""How Moodle names what it exports: folders or files, for each student one for each kind of hand-in."""
 
 _GRADESCOPE = re.compile(r"submission_metadata\.ya?ml")
 """The file in which Gradescope exports who has handed in what."""
@@ -48,16 +61,18 @@ _GRADESCOPE = re.compile(r"submission_metadata\.ya?ml")
 
 @dataclass(frozen=True)
 class Submission:
-    """A program that was handed in.
+    """A program that was handed in, or that a student has not handed in.
 
     Attributes:
-        name: Whose it is, from the name of its file or folder.
+        name: Whose it is, from the name of its file or folder, or from the list of students.
         id: A word for it in paths, which no other submission has.
         command: The program; None if there is none to be graded.
-        files: Texts of its Python files, by their names.
+        files: Texts of its programs' files, by their names.
         problem: Why it cannot be graded; empty if it can.
-        participant: Its number in Moodle; empty if Moodle has not exported it.
-        email: Its student's address, if the export says it.
+        participant: Its student's number in Moodle; empty if it is not known.
+        email: Its student's address; empty if it is not known.
+        time_s: When it was handed in, in seconds since 1970; None if that is not known.
+        last_graded: When Moodle has last changed its grade, as Moodle writes it; empty if that is not known.
     """
 
     name: str
@@ -67,22 +82,29 @@ class Submission:
     problem: str = ""
     participant: str = ""
     email: str = ""
+    time_s: float | None = None
+    last_graded: str = ""
 
 
-class _ProblemError(Exception):
-    """A submission cannot be graded."""
+@dataclass
+class _Found:
+    """A submission whose files are not copied yet; the fields are those of `Submission`."""
 
-
-_Tree = dict[PurePosixPath, Callable[[int], bytes]]
-"""Files by their names, each with a function that reads it: at most some bytes, else it raises."""
+    name: str
+    tree: Folder
+    problem: str = ""
+    participant: str = ""
+    email: str = ""
+    time_s: float | None = None
 
 
 def submissions_in(paths: Sequence[Path], folder: Path, what: str = "SUBMISSIONS") -> list[Submission]:
     """Return the submissions in files, folders and archives; their files are copied below a folder.
 
     Args:
-        paths: Programs (.py); folders, each a program if it has a `__main__.py`, else with a submission in each entry;
-            archives (.zip) of the same, such as Moodle and Gradescope export, or one that the desk's page hands in.
+        paths: Programs; folders, each a program if it has a `__main__.py`, else with a submission in each entry;
+            archives (.zip, .tar.gz) of the same, such as Moodle and Gradescope export, or one that the desk's page
+            hands in.
         folder: Where the copies go: `ID/` for each submission.
         what: What messages call the paths.
 
@@ -93,7 +115,7 @@ def submissions_in(paths: Sequence[Path], folder: Path, what: str = "SUBMISSIONS
         >>> [(each.name, each.command.name) for each in submissions_in([home / "ann.py"], home / "copies")]
         [('ann', 'ann.py')]
     """
-    found: list[tuple[str, _Tree, str]] = []
+    found: list[_Found] = []
     for path in paths:
         found += _found_in(path, what)
         if len(found) > SUBMISSIONS_MAX:
@@ -114,219 +136,201 @@ def submissions_in(paths: Sequence[Path], folder: Path, what: str = "SUBMISSIONS
         shutil.rmtree(folder, ignore_errors=True)
         folder.mkdir(parents=True)
         (folder / _MARK).write_text("KiKS copies programs here, and deletes this folder at its next start.\n")
-        taken: set[str] = set()
-        return [_submission(name, tree, problem, folder, taken) for name, tree, problem in found]
+    taken: set[str] = set()
+    return [_submission(each, folder, taken) for each in found]
 
 
-def _found_in(path: Path, what: str) -> list[tuple[str, _Tree, str]]:
-    """Return name, files and problem of each submission in a path."""
-    if path.is_dir():
-        tree = _tree_of_folder(path)
-        return [(path.name, tree, "")] if PurePosixPath(MAIN) in tree else [*_split(tree)]
-    if not path.is_file():
-        raise ParameterError(
-            f"{what} must be files or folders, but there is no {shown(str(path))}.{nearest_file(path)}"
-        )
-    read = _reader(path)
-    if not zipfile.is_zipfile(path):
-        return [(path.stem, {PurePosixPath(path.name): read}, "")]
-    try:
-        tree = _tree_of_archive(path.read_bytes() if path.stat().st_size <= BYTES_MAX else path)
-    except _ProblemError as problem:
-        return [(path.stem, {}, str(problem))]
-    is_one = any(PurePosixPath(name) in tree for name in _MAINS)
-    found = [(path.stem, tree, "")] if is_one else [*_split(tree)]
-    return found or [(path.stem, {}, "it has no program, a file that ends in .py")]
+def word_for(name: str, taken: set[str]) -> str:
+    """Return a word for a name that is short in paths, which none of those taken is; then it is taken, too.
 
-
-def _reader(path: Path) -> Callable[[int], bytes]:
-    def read(most: int) -> bytes:
-        with path.open("rb") as file:
-            return _bounded(file.read(most + 1), most)
-
-    return read
-
-
-def _bounded(data: bytes, most: int) -> bytes:
-    if len(data) > most:
-        raise _ProblemError(f"it has more than {max(most, BYTES_MAX) >> 20} MiB")
-    return data
-
-
-def _tree_of_folder(folder: Path) -> _Tree:
-    """Return the files in a folder and below, without links and what begins with a dot."""
-    tree: _Tree = {}
-    for home, folders, files in os.walk(folder):
-        folders[:] = sorted(each for each in folders if _is_wanted(each) and not Path(home, each).is_symlink())
-        for name in sorted(files):
-            path = Path(home, name)
-            if _is_wanted(name) and stat.S_ISREG(path.lstat().st_mode):
-                tree[PurePosixPath(path.relative_to(folder).as_posix())] = _reader(path)
-        if len(tree) > ENTRIES_MAX:
-            raise ParameterError(
-                f"a folder of submissions must have at most {ENTRIES_MAX} files, but {shown(str(folder))} has more. "
-                "Give the folder in which the programs are."
-            )
-    return tree
-
-
-def _is_wanted(name: str) -> bool:
-    return not name.startswith(".") and name not in ("__pycache__", "__MACOSX")
-
-
-def _tree_of_archive(source: Path | bytes) -> _Tree:
-    """Return the files of an archive; nothing is unpacked yet."""
-    try:
-        archive = zipfile.ZipFile(source if isinstance(source, Path) else io.BytesIO(source))
-        entries = archive.infolist()
-    except (zipfile.BadZipFile, OSError, NotImplementedError, ValueError) as error:
-        raise _ProblemError(f"its archive cannot be read ({error})") from None
-    if len(entries) > ENTRIES_MAX:
-        raise _ProblemError(f"its archive has more than {ENTRIES_MAX} files")
-    tree: _Tree = {}
-    for entry in entries:
-        # Archives of Windows have backslashes.
-        name = PurePosixPath(entry.filename.replace("\\", "/"))
-        if entry.is_dir() or not name.parts:
-            continue
-        if name.is_absolute() or ".." in name.parts or ":" in name.parts[0]:
-            raise _ProblemError(f"its archive names a file outside of it, {shown(entry.filename)}")
-        if stat.S_ISLNK(entry.external_attr >> 16):
-            raise _ProblemError(f"its archive has a link, {shown(entry.filename)}")
-        if all(map(_is_wanted, name.parts)):
-            tree[name] = _entry_reader(archive, entry)
-    return tree
-
-
-def _entry_reader(archive: zipfile.ZipFile, entry: zipfile.ZipInfo) -> Callable[[int], bytes]:
-    def read(most: int) -> bytes:
-        try:
-            with archive.open(entry) as file:
-                return _bounded(file.read(most + 1), most)
-        except (zipfile.BadZipFile, OSError, NotImplementedError, RuntimeError, EOFError, ValueError) as error:
-            raise _ProblemError(f"{shown(entry.filename)} in its archive cannot be read ({error})") from None
-
-    return read
-
-
-def _split(tree: _Tree) -> Iterator[tuple[str, _Tree, str]]:
-    """Yield the submissions in a tree: one for each entry, but those that Moodle marks as one student's."""
-    tree = _descended(tree)
-    groups: dict[str, _Tree] = {}
-    for path, read in tree.items():
-        top = path.parts[0]
-        if len(path.parts) == 1 and path.suffix.lower() not in (".py", ".zip") and not _GRADESCOPE.fullmatch(top):
-            continue
-        moodle = _MOODLE.fullmatch(top)
-        key, rest = (top, path.parts[1:]) if len(path.parts) > 1 else (top, (top,))
-        if moodle is not None:
-            key = f"{moodle['name']}_{moodle['id']}_assignsubmission_file"
-            rest = rest if len(path.parts) > 1 else (moodle["file"] or PROGRAM,)
-        groups.setdefault(key, {})[PurePosixPath(*rest)] = read
-    names = _names_of_gradescope(groups)
-    for key in sorted(groups):
-        if key not in names:
-            is_file = len(groups[key]) == 1 and PurePosixPath(key) in groups[key]
-            yield PurePosixPath(key).stem if is_file else key, groups[key], ""
-            continue
-        yield names[key], groups[key], ""
-
-
-def _descended(tree: _Tree) -> _Tree:
-    """Return the tree without folders that hold all of it."""
-    while tree and all(len(path.parts) > 1 for path in tree) and len({path.parts[0] for path in tree}) == 1:
-        (top,) = {path.parts[0] for path in tree}
-        if _MOODLE.fullmatch(top):
-            break
-        tree = {PurePosixPath(*path.parts[1:]): read for path, read in tree.items()}
-    return tree
-
-
-def _names_of_gradescope(groups: dict[str, _Tree]) -> dict[str, str]:
-    """Take the list of students of an export of Gradescope out of some groups; return their names, by folders."""
-    file = next((key for key in groups if _GRADESCOPE.fullmatch(key)), None)
-    if file is None:
-        return {}
-    (read,) = groups.pop(file).values()
-    try:
-        text = read(BYTES_MAX).decode("utf-8", "replace")
-    except _ProblemError:
-        return {}
-    names: dict[str, list[str]] = {}
-    folder = ""
-    for line in text.splitlines():
-        if found := re.fullmatch(r"(submission_\d+):\s*", line):
-            folder = found[1]
-        elif folder and (found := re.fullmatch(r"\s+(?:- )?:(name|email): (.+)", line)):
-            names.setdefault(folder, []).append(found[2].strip("'\" "))
-    # Name and address of each student, side by side.
-    return {key: ", ".join(values[::2]) + f" <{', '.join(values[1::2])}>" for key, values in names.items() if values}
-
-
-def _submission(name: str, tree: _Tree, problem: str, folder: Path, taken: set[str]) -> Submission:
-    """Return a submission, its files copied into a folder of its own."""
-    moodle = _MOODLE.fullmatch(name)
-    participant = moodle["id"] if moodle else ""
-    email = found[1] if (found := re.search(r" <([^<>]*)>$", name)) else ""
-    plain = moodle["name"] if moodle else name.removesuffix(f" <{email}>")
-    plain = " ".join(printable(plain).split())[:NAME_MAX] or "nameless"
-    word = base = re.sub(r"[^\w-]+", "-", plain).strip("-")[:NAME_MAX] or "nameless"
+    Example:
+        >>> word_for("Zoë O'Hara", {"zoë-o-hara"})
+        'Zoë-O-Hara-2'
+    """
+    word = base = cut_to_bytes(re.sub(r"[^\w-]+", "-", unicodedata.normalize("NFC", name)).strip("-")) or "nameless"
     number = 1
     while word.lower() in taken:
         word = f"{base}-{(number := number + 1)}"
     taken.add(word.lower())
-    files: dict[str, str] = {}
-    command = None
+    return word
+
+
+def cut_to_bytes(name: str) -> str:
+    """Return as much of a name as a path takes in any file system."""
+    return name.encode("utf-8", "ignore")[:NAME_MAX].decode("utf-8", "ignore")
+
+
+def text_of(program: bytes) -> str:
+    r"""Return the text of a program as Python reads it, or nearly so if Python cannot.
+
+    Example:
+        >>> text_of("\ufeffgo = 1\r\n".encode()), text_of("go = 1\n".encode("utf-16"))
+        ('go = 1\n', 'go = 1\n')
+    """
+    with suppress(SyntaxError, UnicodeError, LookupError):
+        if b"\0" not in program:
+            return decode_source(program)
+    wide = program.startswith((b"\xff\xfe", b"\xfe\xff"))
+    text = program.decode("utf-16" if wide else "utf-8-sig", "replace")
+    return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def _found_in(path: Path, what: str) -> list[_Found]:
+    """Return the submissions in a path."""
+    if path.is_dir():
+        tree = tree_of_folder(path)
+        return [_Found(path.name, tree)] if MAIN in tree else _split(tree)
+    if not path.is_file():
+        raise ParameterError(
+            f"{what} must be files or folders, but there is no {shown(str(path))}.{nearest_file(path)}"
+        )
+    file = file_at(path)
+    found = _Found(_stem(path.name), {path.name: file}, time_s=file.time_s)
+    if not archive_ending(path.name):
+        return [found]
+    try:
+        # As bytes it needs no open file.
+        tree = tree_of_archive(path.read_bytes() if path.stat().st_size <= BYTES_MAX else path)
+    except UnreadableError as problem:
+        found.problem = str(problem)
+        return [found]
+    is_one = not tree or any(name in tree for name in _MAINS)
+    return [found] if is_one else _split(tree)
+
+
+def _stem(name: str) -> str:
+    ending = archive_ending(name)
+    return name[: -len(ending)] if ending else PurePosixPath(name).stem
+
+
+def _split(tree: Folder) -> list[_Found]:
+    """Return the submissions in a tree: one for each entry, but those that Moodle marks as one student's."""
+    tree = descended(tree, _MOODLE.fullmatch)
+    listed: dict[str, _Found] = {}
+    for name in [each for each in tree if _GRADESCOPE.fullmatch(each)]:
+        listed |= _listed_by_gradescope(tree.pop(name))
+    found: dict[str, _Found] = {}
+    for name, entry in sorted(tree.items()):
+        if moodle := _MOODLE.fullmatch(name):
+            student = found.setdefault(
+                f"participant/{moodle['id']}", _Found(moodle["name"], {}, participant=moodle["id"])
+            )
+            if moodle["kind"] != "file":
+                # A text that was written beside the files; as an id cannot have it, the row is the student's.
+                student.problem = student.problem or "it has a text that was written online, and no file"
+                continue
+            student.tree.update({moodle["file"] or PROGRAM: entry} if isinstance(entry, File) else entry)
+        elif isinstance(entry, File):
+            found[name] = _Found(_stem(name), {name: entry})
+        else:
+            found[name] = listed.get(name) or _Found(name, {})
+            found[name].tree = entry
+    for each in found.values():
+        each.problem = "" if each.tree else each.problem
+    return [*found.values()]
+
+
+def _listed_by_gradescope(file: File | Folder) -> dict[str, _Found]:
+    """Return the students of a list that Gradescope exports, by their folders; nothing of an entry that is none."""
+    import yaml
+
+    class Loader(yaml.SafeLoader):  # type: ignore[misc, unused-ignore]
+        """A loader of plain values: what says to be an object of Ruby is a table."""
+
+    Loader.add_multi_constructor("!ruby/", lambda loader, _, node: loader.construct_mapping(node, deep=True))
+    found: dict[str, _Found] = {}
+    with suppress(Exception):  # the folders are graded without their names
+        assert isinstance(file, File)
+        table: dict[str, Any] = yaml.load(file.read(BYTES_MAX), Loader)
+        for folder, entry in table.items():
+            with suppress(Exception):
+                people = entry[":submitters"]
+                names, emails = (", ".join(str(each.get(key) or "") for each in people) for key in (":name", ":email"))
+                time = entry.get(":created_at")
+                time_s = time.timestamp() if isinstance(time, datetime) else None
+                found[folder] = _Found(names, {}, email=emails, time_s=time_s)
+    return found
+
+
+def _submission(found: _Found, folder: Path, taken: set[str]) -> Submission:
+    """Return a submission, its files copied into a folder of its own."""
+    name = " ".join(printable(found.name).split())[:NAME_MAX] or "nameless"
+    word = word_for(name, taken)
+    problem, time_s = found.problem, found.time_s
+    command: Command | None = None
+    texts: dict[str, str] = {}
     if not problem:
         try:
-            data = _read(tree)
-            files = {
-                str(path): text.decode("utf-8", "replace")
-                for path, text in data.items()
-                if path.suffix.lower() == ".py"
-            }
-            command = Command(_written(data, folder / word))
-        except _ProblemError as error:
+            with as_unreadable("it"):  # whatever a stranger has found out, it costs this row only
+                times = [file.time_s for _, file in files_in(found.tree) if file.time_s is not None]
+                time_s = max(times, default=None) if time_s is None else time_s
+                data = _read(found.tree)
+                programs = [path for path in data if path.suffix.lower() in PROGRAMS]
+                texts = {printable(str(path), "_"): text_of(data[path]) for path in programs}
+                problem = why_not(next(iter(data)))
+                command = None if problem else Command(_written(data, folder / word))
+        except UnreadableError as error:
             problem = str(error)
-    return Submission(plain, word, command, files, problem, participant, email)
+    return Submission(name, word, command, texts, problem, found.participant, found.email, time_s)
 
 
-def _read(tree: _Tree, *, is_nested: bool = False) -> dict[PurePosixPath, bytes]:
+def why_not(program: PurePosixPath) -> str:
+    """Return why a program cannot run here, from its name; empty if it can."""
+    return "" if program.suffix.lower() == ".py" else f"{program.name} is no program in Python"
+
+
+def _read(tree: Folder, *, is_nested: bool = False) -> dict[PurePosixPath, bytes]:
     """Return the files of a submission, within bounds, the one that runs first."""
-    tree = _descended(tree)
-    programs = [path for path in tree if path.suffix.lower() == ".py"]
-    archives = [path for path in tree if path.suffix.lower() == ".zip"]
+    tree = descended(tree)
+    here = {name: each for name, each in tree.items() if isinstance(each, File)}
+    programs = [name for name in here if Path(name).suffix.lower() in PROGRAMS]
+    archives = [name for name in here if archive_ending(name)]
     if not programs and len(archives) == 1 and not is_nested:
-        return _read(_tree_of_archive(tree[archives[0]](HAND_IN_BYTES_MAX)), is_nested=True)
-    main = next((path for name in _MAINS if (path := PurePosixPath(name)) in tree), None)
-    if main is None:
-        here = [path for path in programs if len(path.parts) == 1]
-        if len(here) != 1:
-            raise _ProblemError(
-                f"it must have one program, but it has {_listed(here)}; the one that runs is called {MAIN}"
-                if here
-                else "it has no program, a file that ends in .py"
-            )
-        (main,) = here
+        return _read(tree_of_archive(here[archives[0]].read(HAND_IN_BYTES_MAX)), is_nested=True)
+    main = PurePosixPath(_main_of(programs, tree))
+    files = dict(files_in(tree))
     if main.name == PROGRAM:
-        tree = {path: read for path, read in tree.items() if str(path) not in OF_THE_RUN}
-    if len(tree) > FILES_MAX:
-        raise _ProblemError(f"it has more than {FILES_MAX} files")
+        files = {path: file for path, file in files.items() if str(path) not in OF_THE_RUN}
+    if len(files) > FILES_MAX:
+        raise UnreadableError(f"it has more than {FILES_MAX} files")
     left, data = BYTES_MAX, {}
-    for path in sorted(tree, key=lambda path: path != main):
-        data[path] = tree[path](left)
+    for path in sorted(files, key=lambda path: path != main):
+        data[path] = files[path].read(left)
         left -= len(data[path])
     return data
 
 
-def _listed(paths: Iterable[PurePosixPath]) -> str:
-    names = sorted(str(path) for path in paths)
+def _main_of(programs: Sequence[str], tree: Folder) -> str:
+    """Return which of the programs of a submission runs."""
+    for name in _MAINS:
+        if name in programs:
+            return name
+    for ending in PROGRAMS:
+        kind = [name for name in programs if name.lower().endswith(ending)]
+        if len(kind) > 1:
+            raise UnreadableError(
+                f"it must have one program, but it has {_listed(kind)}; the one that runs is called __main__{ending}"
+            )
+        if kind:
+            return kind[0]
+    for each in tree.values():
+        if isinstance(each, File):
+            each.read(HAND_IN_BYTES_MAX)  # what cannot be read says why
+    raise UnreadableError(
+        f"it has no program, a file that ends in {', '.join(PROGRAMS)}: "
+        + (f"there is {_listed(tree)}" if tree else "its folder is empty")
+    )
+
+
+def _listed(names: Iterable[str]) -> str:
+    names = sorted(map(printable, names))
     return ", ".join(names[:5]) + (" and more" if len(names) > 5 else "")
 
 
 def _written(data: dict[PurePosixPath, bytes], folder: Path) -> Path:
     """Write the files of a program below a folder; return the program."""
     try:
-        return ProgramFiles.unpack({str(path): text for path, text in data.items()}, folder)
+        # A name that is no text would end a run that records it.
+        return ProgramFiles.unpack({printable(str(path), "_"): text for path, text in data.items()}, folder)
     except (OSError, ValueError) as error:
-        raise _ProblemError(f"its files cannot be written ({error})") from None
+        raise UnreadableError(f"its files cannot be written ({error})") from None

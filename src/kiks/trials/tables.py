@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 from kiks.errors import counted, figure
 from kiks.table import Table
 from kiks.trials.grading import Grade, Graded
+from kiks.trials.marking import AS_POINTS
+from kiks.trials.submissions import Submission
 from kiks.trials.trial import CRASHED, ENDLESS, OUT_OF_TIME, RUNNING, STOPPED, Outcome
 
 COUNTED = (CRASHED, ENDLESS, OUT_OF_TIME, STOPPED)
@@ -65,33 +68,62 @@ def likenesses_of(graded: Graded) -> list[str]:
 def grades_csv(graded: Graded) -> str:
     """Return a row for each submission, with the points in each case."""
     cases = [case.name for case in graded.cases]
-    head = ["name", "points", "solved", "cases", *COUNTED, "time_s", "like", "said_last", *cases]
+    counts = ("points", "solved", "cases", *COUNTED, "time_s")
+    head = ["name", "grade", "days_late", *counts, "like", "said_last", *cases]
     rows = []
     for grade in graded.grades:
+        own = (grade.submission.name, _blank(grade.mark), _blank(grade.days_late))
+        numbers: list[object] = [grade.points, grade.solved, len(cases), *map(grade.count, COUNTED), grade.time_s]
         points: list[object] = [outcome.points for outcome in grade.outcomes]
-        points = points or [""] * len(cases)
-        counts = [grade.count(how) for how in COUNTED]
-        told = (likeness_of(grade), grade.said_last)
-        rows.append(
-            (grade.submission.name, grade.points, grade.solved, len(cases), *counts, grade.time_s, *told, *points)
-        )
+        if grade.problem:
+            # What was not graded is no zero.
+            numbers, points = [""] * len(counts), [""] * len(cases)
+        rows.append((*own, *numbers, likeness_of(grade), grade.said_last, *points))
     return Table(head, rows).csv()
 
 
 def moodle_csv(graded: Graded) -> str:
     """Return the grades as Moodle's grading worksheet has them, which also its import of grades reads.
 
-    Moodle finds a student by the number that its export has in the names of files.
+    Moodle finds a student by the number that its exports have, and leaves a grade alone that is empty here. Students
+    read the feedback, so it says nothing of hidden cases.
     """
     head = ("Identifier", "Full name", "Email address", "Grade", "Last modified (grade)", "Feedback comments")
     rows = []
     for grade in graded.grades:
-        submission = grade.submission
-        participant = f"Participant {submission.participant}" if submission.participant else submission.name
-        solved = f"{grade.solved} of {len(graded.cases)} cases solved"
-        said = f"{solved}. {grade.said_last}" if grade.said_last else f"{solved}."
-        rows.append((participant, submission.name, submission.email, grade.points, "", said))
+        who = grade.submission
+        participant = f"Participant {who.participant}" if who.participant else ""
+        rows.append((participant, who.name, who.email, _blank(grade.mark), who.last_graded, feedback_of(graded, grade)))
     return Table(head, rows).csv()
+
+
+def feedback_of(graded: Graded, grade: Grade) -> str:
+    """Return what a student is told in a line."""
+    if grade.problem:
+        return f"Not graded: {grade.problem}."
+    seen = graded.seen_by(grade)
+    (shown,) = seen.grades
+    hidden = len(graded.cases) - len(seen.cases)
+    solved = f"{shown.solved} of {len(seen.cases)} cases solved" + f", beside {counted(hidden, 'hidden case')}" * (
+        hidden > 0
+    )
+    late = f"{counted(grade.days_late, 'day')} late" if grade.days_late else ""
+    return ". ".join(filter(None, (solved, late, shown.said_last.rstrip(".")))) + "."
+
+
+def feedback_name(who: Submission) -> str:
+    """Return how a page of feedback is called in the archive that Moodle takes, which names files as it exports them.
+
+    Example:
+        >>> feedback_name(Submission("Ann Lee", "Ann-Lee", None, participant="1201"))
+        'Ann Lee_1201_assignsubmission_file_feedback.html'
+    """
+    plain = re.sub(r"[_/\\]", " ", who.name)
+    return f"{plain}_{who.participant}_assignsubmission_file_feedback.html" if who.participant else f"{who.id}.html"
+
+
+def _blank(number: float | None) -> float | str:
+    return "" if number is None else number
 
 
 def gradescope_results(graded: Graded, grade: Grade) -> dict[str, Any]:
@@ -116,7 +148,7 @@ def gradescope_results(graded: Graded, grade: Grade) -> dict[str, Any]:
         )
     return {
         "score": grade.points,
-        "output": grade.submission.problem or f"{grade.solved} of {count} cases solved.",
+        "output": grade.problem or f"{grade.solved} of {count} cases solved.",
         "output_format": "text",
         "tests": tests,
         "leaderboard": [
@@ -128,15 +160,22 @@ def gradescope_results(graded: Graded, grade: Grade) -> dict[str, Any]:
 
 
 def ranked(graded: Graded) -> list[Grade]:
-    """Return the grades, the best first; of equal ones, the one that took less time."""
-    return sorted(graded.grades, key=lambda each: (-each.points, -each.solved, each.time_s, each.submission.name))
+    """Return the grades, the best first; of equal ones, the one that took less time; last what was not graded."""
+    return sorted(
+        graded.grades,
+        key=lambda each: (each.mark is None, -(each.mark or 0.0), -each.solved, each.time_s, each.submission.name),
+    )
 
 
-def rows_of(graded: Graded) -> list[list[str]]:
-    """Return what a terminal shows of each submission, the best first."""
+def table_of(graded: Graded) -> Table:
+    """Return what a terminal shows of each submission, the best first: how it ended and its last words in one text."""
+    is_marked = graded.marking != AS_POINTS
     rows = []
     for grade in ranked(graded):
-        counts = [str(count) if (count := grade.count(how)) else "" for how in COUNTED]
-        solved = f"{grade.solved}/{len(graded.cases)}"
-        rows.append([grade.submission.name, figure(grade.points), solved, *counts, grade.said_last])
-    return rows
+        endings = ", ".join(f"{count} {how}" for how in COUNTED if (count := grade.count(how)))
+        text = ": ".join(filter(None, (endings, grade.said_last)))
+        points, solved = figure(grade.points), f"{grade.solved}/{len(graded.cases)}"
+        numbers = ("", "", "") if grade.mark is None else (figure(grade.mark) * is_marked, points, solved)
+        late = str(grade.days_late or "")
+        rows.append((grade.submission.name, *numbers, late, text))
+    return Table(("name", "grade", "points", "solved", "days late", "how it went"), rows, ends_in_text=True)

@@ -18,14 +18,11 @@ from kiks.errors import ParameterError, counted, library, shown
 from kiks.model.project import Project, ProjectRobot, project_file
 from kiks.ports.program_process import Command, supervisor_of
 from kiks.trials.runner import run_trials
-from kiks.trials.submissions import Submission
+from kiks.trials.submissions import Submission, cut_to_bytes
 from kiks.trials.trial import FAILURES, Outcome, ProgramEnd, Trial, limit_of
 
 GAMES_MAX = 20_000
 """Most games of a tournament."""
-
-NAME_MAX = 60
-"""Most characters of a game's name, which with an ending is that of a file: 255 bytes at most, four a character."""
 
 INTERVAL_SIGMAS = 2.0
 """Half the width of the interval in which a rating lies, in standard deviations: it holds in 95 of 100 cases."""
@@ -238,7 +235,7 @@ class Match:
         )
         commands = tuple(_driving(player, robot) for player, robot in zip(own, self.project.robots, strict=True))
         project = replace(self.project, robots=robots, seed=game.seed, speed=None)
-        name = f"{number:04}-{'-'.join(player.id for player in own)}"[:NAME_MAX]
+        name = cut_to_bytes(f"{number:04}-{'-'.join(player.id for player in own)}")
         return Trial(name, project, self.folder, commands, is_trusted=is_trusted)
 
 

@@ -6,9 +6,10 @@ import hashlib
 import json
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
-from typing import Any
+
+from pydantic import TypeAdapter
 
 from kiks.errors import ParameterError
 from kiks.model.atomic_files import inside
@@ -166,9 +167,9 @@ class Outcome:
     name: str
     is_solved: bool
     is_failed: bool
-    points: float
+    points: int | float
     time_s: float
-    score: dict[str, float | str]
+    score: dict[str, int | float | str]
     ends: tuple[ProgramEnd, ...]
     state: str
     recording: str
@@ -201,9 +202,9 @@ class Outcome:
         Raises:
             ValueError: If it is none.
         """
-        fields: dict[str, Any] = json.loads(line)
-        try:
-            ends = tuple(ProgramEnd(**end | {"printed": tuple(end["printed"])}) for end in fields.pop("ends"))
-            return cls(**fields, ends=ends)
-        except (TypeError, KeyError, AttributeError) as error:
-            raise ValueError(f"no outcome: {error}") from None
+        return _reader().validate_json(line)
+
+
+@cache
+def _reader() -> TypeAdapter[Outcome]:
+    return TypeAdapter(Outcome)

@@ -33,3 +33,6 @@ function frameOf(id) {
 
 for (const row of rows)
   row.querySelector("button").addEventListener("click", () => show(row.classList.contains("open") ? null : row));
+
+// The page for one student has no names to click.
+for (const place of document.querySelectorAll(".details:not([hidden]) .run-player")) place.replaceChildren(frameOf(place.dataset.run));
