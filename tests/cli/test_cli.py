@@ -79,7 +79,7 @@ def test_the_command_alone_says_what_to_try_and_demonstrations_are_listed() -> N
 @pytest.mark.parametrize(
     ("line", "expected"),
     [
-        ("kiks ex", ["examples", "exercise", "export"]),
+        ("kiks ex", ["examples", "export", "exercise"]),
         ("kiks demo ", [*demonstrations()]),
         ("kiks demo av", ["avoid"]),
         ("kiks demo avoid --des", ["--desk"]),
