@@ -79,7 +79,7 @@ def test_the_command_alone_says_what_to_try_and_demonstrations_are_listed() -> N
 @pytest.mark.parametrize(
     ("line", "expected"),
     [
-        ("kiks ex", ["examples", "export"]),
+        ("kiks ex", ["examples", "export", "exercise"]),
         ("kiks demo ", [*demonstrations()]),
         ("kiks demo av", ["avoid"]),
         ("kiks demo avoid --des", ["--desk"]),
@@ -270,8 +270,8 @@ def test_a_mistake_ends_in_one_line_and_exit_code_2(tmp_path: Path) -> None:
 
 NO_RESULTS = """
     run.program desk.folder champion.folder ghosts.folder compare.folders info.file replay.file export.files serve.link
-    session.listen examples.out grade.exercise grade.submissions grade.out tournament.players tournament.out
-    room.exercise room.students room.folder
+    session.listen examples.out check.exercise check.solution grade.exercise grade.submissions grade.out
+    tournament.players tournament.out room.exercise room.students room.folder
 """
 """Paths that are read, and those that are written when a command begins."""
 

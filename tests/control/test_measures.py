@@ -61,7 +61,10 @@ class Trace:
             *(each.final_x_mm, each.final_y_mm, each.avoidance, each.touching_share, each.contacts, each.light_mm),
             *(each.beside_wall_share("right", counts=200), each.near_light_share(RADIUS_MM), each.light_approach),
             *(each.light_stay_s(RADIUS_MM), each.goal_mm(*PLACE_MM), each.closest_mm(*PLACE_MM), each.spread_mm),
-            *(each.reached_s(*PLACE_MM, radius_mm=RADIUS_MM), each.gathered(*PLACE_MM, radius_mm=RADIUS_MM)),
+            *(
+                each.reached_s(*PLACE_MM, radius_mm=RADIUS_MM, missed_s=99),
+                each.gathered(*PLACE_MM, radius_mm=RADIUS_MM),
+            ),
         ]
         self.batch = kiks.Batch(arena(), worlds=WORLDS, seed=4)
         parameters = kiks.controllers.random_parameters(FULL, WORLDS, seed=5)
@@ -120,7 +123,7 @@ def test_place_measures(trace: Trace) -> None:
     np.testing.assert_allclose(trace.of["closest_mm"], far_mm.min(axis=1))
     for world in range(WORLDS):
         arrived = np.flatnonzero(far_mm[world] <= RADIUS_MM)
-        assert trace.of["reached_s"][world] == trace.times_s[world, arrived[0] if len(arrived) else -1]
+        assert trace.of["reached_s"][world] == (trace.times_s[world, arrived[0]] if len(arrived) else 99)
     lamp_mm = trace.far_mm(100, 350)
     np.testing.assert_allclose(trace.of["light_mm"], lamp_mm[:, -1])
     np.testing.assert_allclose(trace.of["near_light_share"], (lamp_mm <= RADIUS_MM).mean(axis=1))
@@ -272,7 +275,7 @@ def test_ready_measures_are_finite_where_nothing_is_about_but_lamps_that_a_task_
     for world in (room, unlit):
         values = kiks.Batch(world, 2, seed=1).run(FULL, ahead, seconds=1, measures=watching)
         broken = {name for k, name in enumerate(values.measures) if not np.isfinite(values.values[..., k]).all()}
-        assert broken == {"light_mm"}
+        assert broken == {"light_mm", "reached_s"}
         task = small(arenas=world, measures=[kiks.measures.light_mm], axes=())
         refused("'light_mm' was inf. No lamp burned", task.evaluate, np.zeros((1, 18)), np.zeros(1, np.int64), 1)
 

@@ -151,7 +151,7 @@ def test_lecturer_saves_a_world_as_an_exercise_and_opens_it(visitor: Visitor, tm
     visitor.click("dialog-yes", told="solved must be a formula")
     visitor.at("goal-solved").fill("light_mm < 80")
     expect(visitor.page.get_by_text("must be a formula")).to_have_count(0)
-    visitor.fill({"limit": "30", "case-0-seed": "1..20", "case-0-start": "100, 100; 100, 300, 90"})
+    visitor.fill({"limit": "30", "case-0-seed": "1..2", "case-0-start": "100, 100; 100, 300, 90"})
     visitor.at("add-case").click()
     visitor.at("case-1-family").fill("1, 2")
     visitor.at("case-1-is_hidden").click()
@@ -169,8 +169,22 @@ def test_lecturer_saves_a_world_as_an_exercise_and_opens_it(visitor: Visitor, tm
     made = Project.load(tmp_path / "find.kiks")
     assert made.exercise == Exercise("Find it", text=TEXT, template=DRIVE)
     assert (made.goal.solved, made.seconds) == ("light_mm < 80", 30)
-    assert [len(cases_of([each])) for each in made.cases] == [40, 2]
+    assert [len(cases_of([each])) for each in made.cases] == [4, 2]
     assert Project.load(tmp_path / "find-students.kiks").cases == made.cases[:1]
+
+    # The dialog says what `kiks exercise check` finds.
+    check = visitor.at("exercise-check")
+    expect(check).to_contain_text("--solution PROGRAM", timeout=100_000)
+    expect(check).to_contain_text("The template solves it.")
+    visitor.at("goal-solved").fill("contacts == 0")
+    visitor.click("dialog-yes")
+    visitor.page.get_by_role("button", name="Yes").click()
+    expect(check).to_have_text(
+        re.compile("^The goal is solved before anything has moved, with 1 point"), timeout=100_000
+    )
+    check_access(visitor.page, "a checked exercise")
+    visitor.picture("exercise-checked")
+    visitor.at("dialog-no").click()
 
     open_file(visitor, "find-s", "find-students.kiks")
     expect(visitor.page.get_by_role("heading", name="Find it")).to_be_visible()

@@ -30,8 +30,9 @@ from kiks.desk.server.server import SERVER
 from kiks.desk.server.show import Driver, Shown
 from kiks.errors import LinkError, ParameterError
 from kiks.model.project import Project, ProjectRobot
+from kiks.ports import messages
 from kiks.ports.joining import PATH, Address, HostedPort, HostLink
-from kiks.ports.messages import Inbox, Kind, packed
+from kiks.ports.messages import Asked, Inbox, Kind, ProtocolError, packed
 from kiks.ports.program_process import Command
 from kiks.ports.programs import Programs
 from kiks.sim.simulation import Simulation
@@ -406,9 +407,56 @@ LIES: list[tuple[list[str | bytes], str]] = [
     ([json.dumps(WELCOME), b"\xff" * 100], "must answer as KiKS does, but it does not"),
     ([json.dumps(WELCOME), packed((1,))], "must answer as KiKS does, but it does not"),
     ([json.dumps(WELCOME), packed((1, -5, None, 0, ""))], "must answer as KiKS does, but it does not"),
+    ([json.dumps(WELCOME), packed((1, 9, b"\x1b[31m", 0, ""))], "must answer as KiKS does, but it does not"),
+    ([json.dumps(WELCOME), packed((1, 1 << 40, None, 0, "\x1b[31mred\r\n" + "!" * 9999))], " [31mred  !!!"),
+    ([json.dumps(WELCOME), packed((7, 9, None, 0, ""))], "must answer as KiKS does, but it does not"),
+    ([json.dumps(WELCOME | {"offered": ["\x1b[31m"]})], "offered[0] must be printable, but it was '\\x1b[31m'"),
+    (["[" * 99_999], "both computers must have the same KiKS, but"),
     ([json.dumps(WELCOME), "text"], "must be there, but has gone"),
     ([], "must let the program in, but it does not"),
 ]
+
+
+def results(kind: int, *given: object) -> tuple[list[bool], messages.Request]:
+    """Return which results a program takes that has asked for something at 5 ns, and what it has asked for."""
+    request, taken = messages.Request(kind, 1, 5, 1, 0, ARGUMENTS.get(kind, ())), []
+    for result in given:
+        asked = Asked()
+        asked.note(request)
+        try:
+            asked.answer((1, 9, result, 0, ""))
+            taken.append(True)
+        except ProtocolError:
+            taken.append(False)
+    return taken, request
+
+
+ARGUMENTS = {Kind.READ: (5, b"\n", 9, 0), Kind.WAIT: (((1, 1, None), (2, 1, None)), 9)}
+RESULTS: dict[int, tuple[list[object], list[object]]] = {
+    Kind.MEET: ([None], [0, "", ()]),
+    Kind.FIND: ([1, 1000], [0, -1, 1001, True, None, "1"]),
+    Kind.COUNT: ([0, 99], [-1, 1 << 40, 0.0]),
+    Kind.BAUD: ([9600], [0, 1 << 40, None]),
+    Kind.ROOM: ([0, 1 << 40], [1 << 80, None]),
+    Kind.WAIT: ([(True, False)], [(), (1, 0), (True,), 5]),
+    Kind.READ: (
+        [(b"b\t\xe9\r\n", 7), (b"12345", -1)],
+        # Too early to be in vain, too long, no characters of a robot, and no read.
+        [(b"", 7), (b"1234", 7), (b"123456\n", 7), (b"\x1b[1\n", 7), (b"\x9b\n", 7), ("text\n", 7), (b"\n",), None],
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", RESULTS)
+def test_an_answer_of_a_host_has_a_result_of_its_kind(kind: int) -> None:
+    right, wrong = RESULTS[kind]
+    taken, request = results(kind, *right, *wrong)
+    assert taken == [True] * len(right) + [False] * len(wrong)
+    for fields in ((1, 4, right[0], 0, ""), (1, 9, right[0], -1, ""), (2, 9, right[0], 0, "")):
+        asked = Asked()
+        asked.note(request)
+        with pytest.raises(ProtocolError):
+            asked.answer(fields)
 
 
 def test_a_host_is_not_trusted_either() -> None:
@@ -427,3 +475,8 @@ def test_a_host_is_not_trusted_either() -> None:
         for lie[:], message in LIES:
             with pytest.raises(LinkError, match=re.escape(message)):
                 kiks.Khepera(f"kiks://{place}/1?token=x")
+            if lie[1:] and "gone" not in message:
+                done = forked.run("run", "--join", f"kiks://{place}/1?token=x", DRIVE, "COM1")
+                said = [line for line in done.stderr.splitlines() if "thinking none." not in line]
+                assert (done.returncode > 0, len(said), "\x1b" in done.stderr) == (True, 1, False), done.stderr
+                assert "must answer as KiKS does, but it does not" in said[0]  # it has answered before it was asked

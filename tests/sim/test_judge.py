@@ -78,7 +78,7 @@ EXPECTED: dict[str, Callable[[Looks], float]] = {
     "light_mm": lambda looks: away_mm(looks, *LAMP_MM)[-1],
     "goal_mm(250, 200)": lambda looks: away_mm(looks, *PLACE_MM)[-1],
     "closest_mm(250, 200)": lambda looks: away_mm(looks, *PLACE_MM).min(),
-    "reached_s(250, 200, radius_mm=60)": lambda looks: LOOK_S * (1 + np.argmax(away_mm(looks, *PLACE_MM) <= 60)),
+    "reached_s(250, 200, missed_s=99)": lambda looks: LOOK_S * (1 + np.argmax(away_mm(looks, *PLACE_MM) <= 50)),
     "near_light_share(200)": lambda looks: np.mean(away_mm(looks, *LAMP_MM) <= 200),
     "light_stay_s(300)": lambda looks: last_run_s(away_mm(looks, *LAMP_MM) <= 300),
     "coverage": lambda looks: len({(each.x_mm // 100, each.y_mm // 100) for each in looks}) / 20,
@@ -152,6 +152,10 @@ def test_a_run_of_a_controller_is_judged_by_what_a_batch_measures() -> None:
 
 # ---- how a run ends ----
 
+ABSENT = dict.fromkeys(("neighbour_mm", "escaped_share"), "another robot") | dict.fromkeys(
+    ("spread_mm", "closeness", "largest_group", "gathered(9, 9)", "taken_out"), "a ball or a cylinder"
+)
+ABSENT |= dict.fromkeys(("light_approach", "light_stay_s(9)", "near_light_share"), "a lamp")
 
 COUNTS_LAPS = """
 def supervise(sim):
@@ -243,16 +247,54 @@ def test_what_is_wrong_is_said_before_the_run_in_one_line() -> None:
         ("held_s(time) > 3", "must name measures, but 'time' is none. Did you mean 'time_s'?"),
         ("1 / contacts > 2", "must be a number, but '1 / contacts > 2' has none at 0.0 s: float division by zero"),
         ("min() > 2", "must be a number, but 'min() > 2' has none at 0.0 s"),
-        ("light_mm - light_mm", "the goal's solved must be from -1e9 to 1e9, but it was nan"),
+        ("60 - reached_s(9, 9)", "has none at 0.0 s: it is -inf, as what is not reached is infinite."),
+        ("light_mm - light_mm", "has none at 0.0 s: it is nan, as what is not reached is infinite. Add 'if is_solved"),
         ("round(light_mm - light_mm, light_mm)", "the goal's solved must be a number"),
+        *(
+            (f"{name} < 9", f"must ask for what is there, but '{name}' is about {each}")
+            for name, each in ABSENT.items()
+        ),
     ):
-        sim = Simulation(Arena.box(500, 500), seed=1)
+        unlit = () if text.split()[0] in ABSENT else (Lamp(*LAMP_MM, is_on=False),)
+        sim = Simulation(replace(Arena.box(500, 500), lamps=unlit), seed=1)
         sim.set_score("laps", "many")
         with pytest.raises(ParameterError) as caught:
             Judge(sim, Goal(solved=text))
         assert message in str(caught.value)
         assert "\n" not in str(caught.value)
         assert len(str(caught.value)) < 500
+
+
+def test_what_was_never_reached_is_infinite_and_what_holds_before_anything_moved_is_doubted() -> None:
+    """A robot that stands still beside a lamp that does not burn solves nothing that a sentence says."""
+    arena = replace(Arena.box(500, 400), lamps=(Lamp(60, 60, is_on=False),), starts=(Pose(60, 60, 0.0),))
+    for text, is_true_at_once in (
+        ("reached_s(400, 300) < 30", False),
+        ("reached_s(400, 300) < 30 or reached_s(400, 300, radius_mm=20) < 30", False),
+        ("max(reached_s(400, 300), reached_s(60, 60)) < 30", False),
+        ("light_mm < 80", False),
+        ("time_s - reached_s(400, 300) > 5", False),
+        ("held_s(reached_s(400, 300) < 30) > 1", False),
+        ("reached_s(400, 300, missed_s=9) < 30", True),
+        ("reached_s(60, 60) < 30", True),
+        ("contacts == 0", True),
+    ):
+        for name in ("solved", "failed"):
+            sim = Simulation(arena, seed=1)
+            supervision = Supervision(sim, goal=Goal(**{name: text}))
+            sentence = f"the goal's {name}, {text!r}, is true before anything has moved."
+            assert supervision.doubts == (sentence,) * is_true_at_once
+            sim.run(3)
+            assert (supervision.judge.judgement is not None) is is_true_at_once, text
+
+
+def test_a_goal_may_ask_for_what_its_supervisor_puts_in_and_counts(tmp_path: Path) -> None:
+    goal = Goal(solved="spread_mm < 9 and held_s(score('laps') > 3) > 1")
+    with pytest.raises(ParameterError, match=r"score\('laps'\) is counted by none\. Name the supervisor"):
+        supervised(goal, tmp_path)
+    supervised(goal, tmp_path, COUNTS_LAPS.replace("while", "sim.add_ball(99, 99)\n    while"))
+    with pytest.raises(ParameterError, match="'spread_mm' is about a ball or a cylinder"):
+        supervised(goal, tmp_path, COUNTS_LAPS)
 
 
 # ---- what a run leaves ----

@@ -267,8 +267,8 @@ def _control(rng: random.Random) -> Subject:
         "neurons": 2, "period_s": 0.1, "time_constant_s": 0.4, "senses": ("proximity",), "speed_limit": 5.0,
         "units": 2, "feedback": False, "per": "neuron",
         "hidden": (3,), "controller": _controller(), "count": 2, "seed": 1, "folder": ".", "recipe": {"kind": "linear"},
-        "arena": _box(), "square_mm": 50.0, "x_mm": 50.0, "y_mm": 50.0, "radius_mm": 50.0, "side": "left",
-        "counts": 300.0,
+        "arena": _box(), "square_mm": 50.0, "x_mm": 50.0, "y_mm": 50.0, "radius_mm": 50.0, "missed_s": 9.0,
+        "side": "left", "counts": 300.0,
     }  # fmt: skip
     found = {}
     wanted = (*KINDS, "random_parameters", "from_recipe", "recipe_for")

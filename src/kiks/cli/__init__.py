@@ -17,6 +17,7 @@ from kiks.cli.desk import desk
 from kiks.cli.doctor import doctor
 from kiks.cli.evolve import evolve
 from kiks.cli.examples import DemoCommand, examples
+from kiks.cli.exercise import exercise
 from kiks.cli.export import export
 from kiks.cli.fit import fit
 from kiks.cli.ghosts import ghosts
@@ -87,6 +88,7 @@ for _command in (
     if _command is run:
         app.command("demo", cls=DemoCommand, help=DEMO_HELP)(with_options(run))
 app.add_typer(arena, name="arena")
+app.add_typer(exercise, name="exercise")
 
 
 def _print_version(wanted: bool) -> None:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from kiks.cli.options import parse_words, say
 from kiks.ending import INTERRUPTED, noting_endings
-from kiks.errors import ParameterError
+from kiks.errors import LinkError, ParameterError
 
 
 def run_joined(address: str, words: Sequence[str]) -> int:
@@ -50,11 +50,16 @@ def run_joined(address: str, words: Sequence[str]) -> int:
                 process.interrupt()
 
         with noting_endings(pass_on):
-            relay(link, here)
-            if link.farewell:
-                say(f"the host has ended the program: {link.farewell}")
+            try:
+                relay(link, here)
+                if link.farewell:
+                    say(f"the host has ended the program: {link.farewell}")
+                    process.kill()
+            except LinkError:
                 process.kill()
-            process.wait()
+                raise
+            finally:
+                process.wait()
     if signals:
         return INTERRUPTED
     code = process.code or 0

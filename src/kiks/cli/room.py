@@ -10,7 +10,7 @@ import typer
 
 from kiks.cli.desk import wait_for
 from kiks.cli.engine_start import ready_engine
-from kiks.cli.options import Address, Trusted, public_address_of
+from kiks.cli.options import Address, Trusted, public_address_of, say
 from kiks.ending import end_as_with_ctrl_c
 
 
@@ -49,11 +49,15 @@ def room(
     ready_engine()
     from kiks.desk.room.page import open_room
     from kiks.desk.room.room import Room
+    from kiks.ports.program_process import supervisor_of
     from kiks.sim.from_project import simulation_of
-    from kiks.sim.judge import Judge
+    from kiks.sim.supervision import Supervision
 
-    if project.goal is not None:
-        Judge(simulation_of(project, home), project.goal)  # says what is wrong with the goal before a class has come
+    # What is wrong with the goal is said before a class has come.
+    supervision = Supervision(simulation_of(project, home), supervisor_of(project, home), project.goal)
+    for doubt in supervision.doubts:
+        say(doubt)
+    supervision.close()
     opened = Room(project, home, names, folder, code=code, address=public, is_trusted=trusted)
     with open_room(opened, host=host, port=port):
         end_as_with_ctrl_c()

@@ -184,6 +184,8 @@ def run(
         at_the_end.enter_context(recorded(sim, record, export, job.texts))
         supervision = Supervision(sim, job.supervisor, project.goal)
         at_the_end.callback(supervision.close)
+        for goal_doubt in supervision.doubts:
+            say(goal_doubt)
         end_as_with_ctrl_c()
         try:
             if len(commands) == 1 and commands[0] is not None:

@@ -52,6 +52,16 @@ Moment: Any = namedtuple(
 * poses: x [mm], y [mm] and heading [rad] of all robots of its world at this instant, float64 [robot, 3].
 """
 
+NEIGHBOUR, BODY, LAMP = "another robot", "a ball or a cylinder", "a lamp"
+
+NEEDS: dict[str, Callable[[Any], bool]] = {
+    "": lambda moment: True,
+    NEIGHBOUR: lambda moment: len(moment.poses) > 1,
+    BODY: lambda moment: len(moment.bodies) > 0,
+    LAMP: lambda moment: len(moment.lamps) > 0,
+}
+"""What a measure may be about, and whether its world has one."""
+
 Result = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
 
@@ -72,6 +82,8 @@ class Measure(Compiled):
             are rejected.
         names: Names of its values, if it has several.
         advice: What to do if a value is not finite, which a task refuses.
+        needs: What it is about, 'another robot', 'a ball or a cylinder' or 'a lamp': a goal refuses it in a world
+            without one. Empty if it has a meaning in each world.
 
     Example:
         >>> import kiks
@@ -95,6 +107,7 @@ class Measure(Compiled):
         senses: AnySense | Sequence[AnySense] = (),
         names: Sequence[str] = (),
         advice: str = "Check its divisions.",
+        needs: str = "",
     ) -> None:
         super().__init__(function)
         self.own_names = tuple(check_kind("each of names", each, str) for each in names)
@@ -104,6 +117,9 @@ class Measure(Compiled):
         self.result = result
         self.senses = check_senses(senses)
         self.advice = check_kind("advice", advice, str)
+        if needs not in NEEDS:
+            raise ParameterError(f"needs must be one of {[*NEEDS]}, but it was {shown(needs)}.")
+        self.needs = needs
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} {self.name!r}>"

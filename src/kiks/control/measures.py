@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field
 
 from kiks.control.arguments import made_once
-from kiks.control.measure import Measure, measure
+from kiks.control.measure import BODY, LAMP, NEIGHBOUR, Measure, measure
 from kiks.engine.compiling import kernel
 from kiks.errors import ParameterError
 from kiks.model.arena import Arena
@@ -503,8 +503,14 @@ def closest_mm(x_mm: Place, y_mm: Place) -> Measure:
 
 
 @made_once
-def reached_s(x_mm: Place, y_mm: Place, *, radius_mm: Radius = 50.0) -> Measure:
-    """When it first came within a radius of a place [s]; if it never did, how long it has tried.
+def reached_s(x_mm: Place, y_mm: Place, *, radius_mm: Radius = 50.0, missed_s: Positive | None = None) -> Measure:
+    """When it first came within a radius of a place [s].
+
+    Args:
+        x_mm: Where the place is [mm].
+        y_mm: Where it is [mm].
+        radius_mm: The radius [mm].
+        missed_s: What counts for a robot that never did [s]; infinite if left out, which a task refuses.
 
     Example:
         >>> import kiks
@@ -515,12 +521,15 @@ def reached_s(x_mm: Place, y_mm: Place, *, radius_mm: Radius = 50.0) -> Measure:
         >>> round(rollouts.values.item(), 2)
         0.13
     """
+    missing_s = np.inf if missed_s is None else missed_s
 
-    @measure(notes=2)
+    def arrival_s(notes: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.where(notes[..., 1] > 0, notes[..., 0], missing_s)
+
+    @measure(notes=2, result=arrival_s, advice="It never got there: give missed_s, such as the time of a trial.")
     def reached_s(moment: Any, notes: Any) -> None:
-        if notes[1] == 0.0:
-            notes[0] = moment.time_s
-            notes[1] = 1.0 if distance_mm(moment, x_mm, y_mm) <= radius_mm else 0.0
+        if notes[1] == 0.0 and distance_mm(moment, x_mm, y_mm) <= radius_mm:
+            notes[0], notes[1] = moment.time_s, 1.0
 
     return reached_s
 
@@ -544,7 +553,7 @@ def escaped_share(*, radius_mm: Radius = 57.0) -> Measure:
         array([1., 1.])
     """
 
-    @measure(notes=3, result=mean)
+    @measure(notes=3, result=mean, needs=NEIGHBOUR)
     def escaped_share(moment: Any, notes: Any) -> None:
         for other in range(moment.poses.shape[0]):
             is_near = distance_mm(moment, moment.poses[other, 0], moment.poses[other, 1]) <= radius_mm
@@ -560,8 +569,9 @@ def escaped_share(*, radius_mm: Radius = 57.0) -> Measure:
 
 
 @measure(
+    needs=LAMP,
     advice="No lamp burned at the end of a trial: take goal_mm(x_mm, y_mm) of its place, light_approach or "
-    "near_light_share."
+    "near_light_share.",
 )
 def light_mm(moment: Any, notes: Any) -> None:
     """How far the nearest lamp that burns is [mm]; infinite if there is none, which a task refuses.
@@ -577,7 +587,7 @@ def light_mm(moment: Any, notes: Any) -> None:
     notes[0] = nearest_lamp_mm(moment)
 
 
-@measure(notes=2, result=mean)
+@measure(notes=2, result=mean, needs=LAMP)
 def light_approach(moment: Any, notes: Any) -> None:
     """Mean share of the way to the nearest lamp that it has made: 0 if it stands still, near 1 if it soon stays there.
 
@@ -611,7 +621,7 @@ def light_stay_s(radius_mm: Radius = 100.0) -> Measure:
         1.93
     """
 
-    @measure
+    @measure(needs=LAMP)
     def light_stay_s(moment: Any, notes: Any) -> None:
         notes[0] = notes[0] + moment.period_s if nearest_lamp_mm(moment) <= radius_mm else 0.0
 
@@ -632,7 +642,7 @@ def near_light_share(radius_mm: Radius = 100.0) -> Measure:
         1.0
     """
 
-    @measure(notes=2, result=mean)
+    @measure(notes=2, result=mean, needs=LAMP)
     def near_light_share(moment: Any, notes: Any) -> None:
         notes[0] += 1.0 if nearest_lamp_mm(moment) <= radius_mm else 0.0
         notes[1] += 1.0
@@ -654,7 +664,7 @@ def gathered(x_mm: Place, y_mm: Place, *, radius_mm: Radius = 150.0) -> Measure:
         2.0
     """
 
-    @measure
+    @measure(needs=BODY)
     def gathered(moment: Any, notes: Any) -> None:
         notes[0] = 0.0
         for body in moment.bodies:
@@ -678,7 +688,7 @@ def largest_group(radius_mm: Radius = 100.0) -> Measure:
         2.0
     """
 
-    @measure
+    @measure(needs=BODY)
     def largest_group(moment: Any, notes: Any) -> None:
         notes[0] = 0.0
         for body in moment.bodies:
@@ -691,7 +701,7 @@ def largest_group(radius_mm: Radius = 100.0) -> Measure:
     return largest_group
 
 
-@measure
+@measure(needs=BODY)
 def closeness(moment: Any, notes: Any) -> None:
     """How close balls and cylinders are, the mean of 1 / (1 + (d / 100 mm)^2) over pairs at a distance d; 0 of none.
 
@@ -715,9 +725,9 @@ def closeness(moment: Any, notes: Any) -> None:
     notes[0] = total / max(0.5 * count * (count - 1), 1.0)
 
 
-@measure
+@measure(needs=NEIGHBOUR)
 def neighbour_mm(moment: Any, notes: Any) -> None:
-    """How far the nearest other robot is, from middle to middle [mm]; 0 of a lone robot.
+    """How far the nearest other robot is, from middle to middle [mm]; 0 of a lone robot, of which no goal may ask.
 
     Example:
         >>> import kiks
@@ -735,7 +745,7 @@ def neighbour_mm(moment: Any, notes: Any) -> None:
     notes[0] = nearest if nearest < np.inf else 0.0
 
 
-@measure
+@measure(needs=BODY)
 def spread_mm(moment: Any, notes: Any) -> None:
     """How far balls and cylinders are from the middle of them all [mm], root mean square; 0 of none.
 
@@ -757,7 +767,7 @@ def spread_mm(moment: Any, notes: Any) -> None:
     notes[0] = np.sqrt(squares)
 
 
-@measure
+@measure(needs=BODY)
 def taken_out(moment: Any, notes: Any) -> None:
     """Number of balls and cylinders that grippers have dropped beyond the edge of the arena.
 

@@ -46,7 +46,7 @@ _BY_NAME = {*sys.stdlib_module_names, "kiks", "numpy", "numba", "scipy"}
 _DOORS = {"__import__", "eval", "exec", "globals", "input", "open", "vars"}
 """Functions of Python that lead to what no code names."""
 
-_LABELS = {"kernel", "recipe", "advice", "__wrapped__", *functools.WRAPPER_ASSIGNMENTS}
+_LABELS = {"kernel", "recipe", "advice", "needs", "__wrapped__", *functools.WRAPPER_ASSIGNMENTS}
 """Attributes of controllers and measures that follow from the others, name a file, or are for people."""
 
 _WITHOUT = ", without "

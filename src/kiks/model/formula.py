@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import re
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
@@ -114,6 +114,13 @@ class Formula:
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.text!r})"
+
+    def all_terms(self) -> Iterator[Term]:
+        """Yield the terms in it and in the conditions of its timers."""
+        for term in self.terms:
+            yield term
+            if term.condition is not None:
+                yield from term.condition.all_terms()
 
     def value(self, values: list[Any]) -> Any:
         """Return its value for those of its terms.

@@ -55,3 +55,13 @@ class Goal:
             ['failed', 'points', 'solved']
         """
         return {name: Formula(getattr(self, name)) for name in ("solved", "failed", "points")}
+
+    def counts(self) -> set[float | str]:
+        """Return the entries of the score that its formulas ask for.
+
+        Example:
+            >>> Goal(solved='held_s(score("laps") >= 3) > 1').counts()
+            {'laps'}
+        """
+        terms = [term for formula in self.formulas().values() for term in formula.all_terms()]
+        return {term.arguments[0] for term in terms if term.name == "score" and term.arguments}

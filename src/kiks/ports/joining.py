@@ -16,15 +16,28 @@ from contextlib import ExitStack, suppress
 from typing import Annotated, Any, NamedTuple
 from urllib.parse import urlsplit
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
 from kiks.clock.program_clock import ProgramClock
-from kiks.errors import LinkError, shown
+from kiks.errors import LinkError, ParameterError, shown
 from kiks.model.checks import ROBOTS_MAX
 from kiks.model.data_file import Number, Switch, Text, Whole, check, record
 from kiks.model.limits import MESSAGE_BYTES_MAX
 from kiks.model.settings import ThinkingPolicy
-from kiks.ports.messages import RECEIVE_SIZE, Answer, Kind, ProtocolError, Start, checked_answer
+from kiks.ports.messages import (
+    ANSWER_BYTES_MAX,
+    RECEIVE_SIZE,
+    REQUEST_BYTES_MAX,
+    Answer,
+    Asked,
+    Inbox,
+    Kind,
+    ProtocolError,
+    Request,
+    Start,
+    checked_request,
+    packed,
+)
 from kiks.ports.remote_link import RemoteLine, SocketConnection
 from kiks.sim.port import VirtualPort
 from kiks.units import NS_PER_S
@@ -43,6 +56,15 @@ _ROBOT = re.compile(r"/(?P<robot>[0-9]{1,4})/?\?token=(?P<token>[A-Za-z0-9_-]+)"
 
 SLICE_NS = NS_PER_S
 """Simulated time that passes in one piece while a program pauses [ns]: an interrupted pause ends after it."""
+
+
+def _check_printable(text: str) -> str:
+    if not text.isprintable():
+        raise ParameterError(f"must be printable, but it was {shown(text)}")
+    return text
+
+
+Printable = Annotated[Text, AfterValidator(_check_printable)]
 
 
 @record
@@ -65,7 +87,7 @@ class Welcome:
     is_late: Switch
     end_ns: Annotated[Whole, Field(ge=0, lt=1 << 64)]
     thinking: ThinkingPolicy
-    offered: Annotated[tuple[Text, ...], Field(max_length=ROBOTS_MAX)]
+    offered: Annotated[tuple[Printable, ...], Field(max_length=ROBOTS_MAX)]
     seed: Text
     pulse_mm: Annotated[Number, Field(gt=0, le=1000)]
 
@@ -167,7 +189,7 @@ class HostLink:
     def _welcomed(self, first: object, address: Address) -> Welcome:
         try:
             told = json.loads(first) if isinstance(first, str) else None
-        except ValueError:
+        except (ValueError, RecursionError):
             told = None
         version = told.get("version") if isinstance(told, dict) else None
         if version != __version__:
@@ -184,6 +206,11 @@ class HostLink:
                 "whole address that kiks host prints."
             )
         return welcome
+
+    def strange(self) -> LinkError:
+        """Close the connection to a host that does not answer as KiKS does; return the error."""
+        self.close()
+        return LinkError(f"the host at {shown(self.place)} must answer as KiKS does, but it does not. Is it kiks host?")
 
     def sendall(self, data: bytes) -> None:
         """Send bytes.
@@ -243,8 +270,12 @@ class HostedConnection(SocketConnection):
         super().__init__(link, is_late=link.start.is_late, end_ns=link.start.end_ns)
         self._link = link
         self._check_awaited = check_awaited
+        self._asked = Asked()
+        self.answer_of = self._asked.answer
 
-    answer_of = staticmethod(checked_answer)
+    def _transmit(self, request: Request) -> None:
+        self._asked.note(request)
+        super()._transmit(request)
 
     def ask(self, kind: int, robot: int = 0, *arguments: Any) -> Answer:
         """Send a request and wait for the answer.
@@ -255,10 +286,7 @@ class HostedConnection(SocketConnection):
         try:
             return super().ask(kind, robot, *arguments)
         except ProtocolError:
-            self._link.close()
-            raise LinkError(
-                f"the host at {shown(self._link.place)} must answer as KiKS does, but it does not. Is it kiks host?"
-            ) from None
+            raise self._link.strange() from None
 
     def take(self) -> bytes:
         """Return the next bytes of the host."""
@@ -331,16 +359,29 @@ class HostedPort(VirtualPort):
 
 
 def relay(link: HostLink, connection: socket.socket) -> None:
-    """Carry the bytes of a program at the end of a socket, until it or the host ends."""
+    """Carry the messages of a program at the end of a socket, until it or the host ends.
+
+    Raises:
+        LinkError: If the host does not answer as KiKS does; the program, which trusts its socket, gets none of that.
+    """
+    asked, requests, answers = Asked(), Inbox(REQUEST_BYTES_MAX), Inbox(ANSWER_BYTES_MAX)
 
     def to_host() -> None:
-        with suppress(OSError):
+        with suppress(OSError, ProtocolError):
             while data := connection.recv(RECEIVE_SIZE):
+                for fields in requests.take(data):
+                    asked.note(checked_request(fields))
                 link.sendall(data)
         link.close()
 
     threading.Thread(target=to_host, name="kiks relay", daemon=True).start()
-    with suppress(OSError):
+    try:
         while data := link.recv():
-            connection.sendall(data)
-        connection.shutdown(socket.SHUT_RDWR)
+            connection.sendall(b"".join(packed(asked.answer(fields)) for fields in answers.take(data)))
+    except ProtocolError:
+        raise link.strange() from None
+    except OSError:
+        pass  # the program has ended
+    finally:
+        with suppress(OSError):
+            connection.shutdown(socket.SHUT_RDWR)

@@ -19,8 +19,8 @@ from typing import Any, NamedTuple
 import msgpack
 
 from kiks.clock.serial_timing import BACKLOG_LIMIT
-from kiks.errors import KiksError
-from kiks.model.checks import CLOCK_END_NS
+from kiks.errors import KiksError, printable
+from kiks.model.checks import CLOCK_END_NS, ROBOTS_MAX
 from kiks.sim.port import BAUD_MAX, BAUD_MIN
 from kiks.sim.read_completion import NEVER_NS
 
@@ -35,6 +35,9 @@ REQUEST_BYTES_MAX = 1 << 16
 
 ANSWER_BYTES_MAX = 2 << 20
 """Longest answer: the characters that a line keeps for its reader (`OUTPUT_LIMIT`), and more."""
+
+ERROR_MAX = 1000
+"""Most characters of the error of a world that is not trusted."""
 
 DOUBT_MAX = 200
 """Longest reason why a program might do something else next time [characters]."""
@@ -246,7 +249,7 @@ def checked_request(fields: Any) -> Request:
 
 
 def checked_answer(fields: Any) -> Answer:
-    """Return the fields of a message as an answer; what it results in depends on the request.
+    """Return the fields of a message as an answer, whose error, if any, is a line; see `Asked` for its result.
 
     Raises:
         ProtocolError: If they are none.
@@ -257,9 +260,36 @@ def checked_answer(fields: Any) -> Answer:
             ticket.__class__ is now_ns.__class__ is ahead_count.__class__ is int
             and error.__class__ is str
             and 0 <= now_ns <= CLOCK_END_NS
+            and 0 <= ahead_count <= ANSWER_BYTES_MAX
         ):
-            return Answer._make(fields)
+            return Answer._make(fields)._replace(error=printable(error[:ERROR_MAX]))
     raise ProtocolError("sent something to the program that is no answer")
+
+
+class Asked:
+    """The requests of a program to a world that it does not trust, each of which has one answer of its kind."""
+
+    def __init__(self) -> None:
+        self._open: dict[int, Request] = {}
+
+    def note(self, request: Request) -> None:
+        """Note a request that was sent."""
+        if request.kind in ASKING:
+            self._open[request.ticket] = request
+
+    def answer(self, fields: Any) -> Answer:
+        """Return the fields of a message as the answer to a request.
+
+        Raises:
+            ProtocolError: If they are none.
+        """
+        answer = checked_answer(fields)
+        if (request := self._open.pop(answer.ticket, None)) is not None:
+            passed_ns = answer.now_ns - min(request.at_ns, CLOCK_END_NS)
+            is_right = _RESULTS[request.kind]
+            if passed_ns >= 0 and (answer.error or is_right(answer.result, passed_ns, *request.arguments)):
+                return answer
+        raise ProtocolError("sent something to the program that answers none of its requests")
 
 
 _as_request: Callable[[type[Request], tuple[Any, ...]], Request] = tuple.__new__
@@ -327,3 +357,36 @@ _ARGUMENTS: dict[int, Callable[[tuple[Any, ...]], bool]] = {
     ),
 }
 """Whether the arguments of a kind are right."""
+
+_STEERING = bytes({*range(0x20), *range(0x7F, 0xA0)} - {*b"\t\r\n"})
+"""Characters that steer terminals; no robot sends them."""
+
+
+def _is_read(
+    result: Any, passed_ns: int, size: int | None, terminator: bytes | None, timeout_ns: int | None, _poll_ns: int
+) -> bool:
+    if not (result.__class__ is tuple and len(result) == 2 and result[0].__class__ is bytes and _is_span(result[1])):
+        return False
+    data = result[0]
+    is_complete = len(data) == size or (terminator is not None and data.endswith(terminator))
+    is_in_vain = timeout_ns is not None and passed_ns >= timeout_ns
+    # An incomplete read would be asked for again without an end.
+    return (
+        (is_complete or is_in_vain) and data.translate(None, _STEERING) == data and (size is None or len(data) <= size)
+    )
+
+
+def _is_within(least: int, most: int) -> Callable[..., bool]:
+    return lambda result, *_: result.__class__ is int and least <= result <= most
+
+
+_RESULTS: dict[int, Callable[..., bool]] = {
+    **dict.fromkeys((Kind.MEET, Kind.CLAIM), lambda result, *_: result is None),
+    **dict.fromkeys((Kind.ROOM, Kind.SENT), lambda result, *_: _is_span(result)),
+    Kind.FIND: _is_within(1, ROBOTS_MAX),
+    Kind.COUNT: _is_within(0, ANSWER_BYTES_MAX),
+    Kind.BAUD: _is_within(BAUD_MIN, BAUD_MAX),
+    Kind.READ: _is_read,
+    Kind.WAIT: lambda result, _, reads, __: result.__class__ is tuple and [*map(type, result)] == [bool] * len(reads),
+}
+"""Whether the result of a kind is right, for the time that has passed [ns] and for its arguments."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import math
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 from typing import Any, cast
@@ -10,7 +11,7 @@ from typing import Any, cast
 import numpy as np
 
 from kiks.control import measures
-from kiks.control.measure import Measure, Moment
+from kiks.control.measure import NEEDS, Measure, Moment
 from kiks.control.senses import AnySense, sense_of
 from kiks.errors import KiksError, ParameterError, shown
 from kiks.meant import nearest
@@ -94,6 +95,7 @@ class Judge:
 
     Attributes:
         judgement: How the run has done; None until it is decided.
+        doubts: Sentences about formulas that hold before anything has moved.
 
     Example:
         >>> from kiks import Arena, Khepera, Simulation
@@ -117,8 +119,12 @@ class Judge:
         # What is wrong with a formula is said before the run, of which this look is no part.
         terms = self._terms_of(goal)
         terms.look(0)
-        for name, formula in self._formulas.items():
-            terms.number(formula, name)
+        values = {name: terms.number(formula, name) for name, formula in self._formulas.items()}
+        self.doubts = tuple(
+            f"the goal's {name}, {shown(self._formulas[name].text)}, is true before anything has moved."
+            for name in ("solved", "failed")
+            if values[name]
+        )
         self._terms = self._terms_of(goal)
 
     def _terms_of(self, goal: Goal) -> _Terms:
@@ -226,7 +232,10 @@ class _Terms:
         own = self._own
         values = [tell() if (tell := own.get(str(term))) else self._values[term] for term in formula.terms]
         try:
-            return check_number(f"the goal's {name}", float(formula.value(values)), -SCORE_MAX, SCORE_MAX)
+            value = float(formula.value(values))
+            if not math.isfinite(value):
+                raise ValueError(f"it is {value:g}, as what is not reached is infinite. Add 'if is_solved else 0'")
+            return check_number(f"the goal's {name}", value, -SCORE_MAX, SCORE_MAX)
         except (ArithmeticError, TypeError, ValueError) as error:
             if isinstance(error, KiksError):
                 raise
@@ -248,7 +257,12 @@ class _Terms:
         if term.name == "score" and len(term.arguments) == 1 and not (named or isinstance(term.arguments[0], float)):
             what = term.arguments[0]
             return lambda _: _counted(sim, what)
-        return self._measured(_measure(term, named, sim.arena), robot)
+        measure = _measure(term, named, sim.arena)
+        if not NEEDS[measure.needs](_moment(sim, robot, (), 0.0)):
+            raise ParameterError(
+                f"must ask for what is there, but {shown(str(term))} is about {measure.needs}, and this world has none."
+            )
+        return self._measured(measure, robot)
 
     def _measured(self, measure: Measure, robot: int) -> Watch:
         """Return what lets a measure look at a robot."""

@@ -16,7 +16,7 @@ from kiks.errors import KiksError, ParameterError, counted
 from kiks.model.checks import SECONDS_MAX, check_number
 from kiks.model.goal import Goal
 from kiks.model.program_files import ProgramFiles
-from kiks.sim.judge import Judge
+from kiks.sim.judge import POINTS, RESULT, Judge
 from kiks.sim.read_completion import NEVER_NS
 from kiks.sim.simulation import Simulation
 from kiks.units import ns_from_s
@@ -35,7 +35,7 @@ class Supervision:
 
     The file has a generator `supervise(sim)`. Its first part runs at once. Then it yields the time until it acts again
     [s of simulated time]; when it returns then, the run ends. `close` runs its `finally`, which may print a result.
-    The judge acts after it at each instant.
+    The judge begins after it, so a goal may ask for what it puts in and counts, and acts after it at each instant.
 
     Args:
         sim: The world.
@@ -52,18 +52,19 @@ class Supervision:
     def __init__(self, sim: Simulation, file: Path | None = None, goal: Goal | None = None) -> None:
         self._sim, self._file = sim, file
         self.end: Callable[[int, str], object] = lambda code, message: None
-        self.judge = None if goal is None else Judge(sim, goal)
+        self.judge: Judge | None = None
         self._modules = None if file is None else _ModulesBeside(file)
         self._acts: dict[str, Acts] = {}
         self._due_ns: dict[str, int] = {}
         try:
             if file is not None:
                 with self._importing(REFEREE):
-                    self._acts[REFEREE] = _supervise_of(file)(sim)
-            if self.judge is not None:
-                self._acts[JUDGE] = self.judge.supervise(sim)
-            for who in self._acts:
-                self._begin(who)
+                    acts = _supervise_of(file)(sim)
+                self._begin(REFEREE, acts)
+            if goal is not None:
+                self._check_counts(goal)
+                self.judge = Judge(sim, goal)
+                self._begin(JUDGE, self.judge.supervise(sim))
         except KiksError:
             raise
         except Exception as error:
@@ -77,7 +78,17 @@ class Supervision:
         if self._acts:
             sim.loop.supervisor = self
 
-    def _begin(self, who: str) -> None:
+    def _check_counts(self, goal: Goal) -> None:
+        """Check that there is something that counts what a goal asks for."""
+        missing = sorted(map(repr, goal.counts() - {POINTS, RESULT, *self._sim.score}))
+        if missing and self._file is None:
+            raise ParameterError(
+                f"the goal must ask for what a supervisor counts, but score({missing[0]}) is counted by none. Name the "
+                'supervisor: supervisor = "referee.py".'
+            )
+
+    def _begin(self, who: str, acts: Acts) -> None:
+        self._acts[who] = acts
         try:
             self._prepare(who, self._sim.now_ns)
         except StopIteration:
@@ -109,6 +120,11 @@ class Supervision:
                 name = f" {self._file.name}" if self._file is not None and who == REFEREE else ""
                 self._finish(1, f"{who}{name} has failed: {error}")
         self.next_ns = min(self._due_ns.values())
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """Sentences about a goal that holds before anything has moved."""
+        return () if self.judge is None else self.judge.doubts
 
     def decide(self) -> str:
         """Let the judge decide, and return its judgement in a sentence; an empty text without a goal."""

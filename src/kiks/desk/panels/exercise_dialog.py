@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+import tempfile
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from pathlib import PurePosixPath
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 from nicegui import ui
@@ -16,11 +17,14 @@ from kiks.desk.panels.widgets import agrees, heading, icon_button, named, text_b
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.folder import Folder
 from kiks.desk.server.scripts import NEW
-from kiks.errors import ParameterError
-from kiks.model.exercise import STUDENT, Cases, Exercise
+from kiks.errors import ParameterError, counted
+from kiks.model.exercise import STUDENT, Cases, Exercise, cases_of
 from kiks.model.goal import Goal
 from kiks.model.project import Project
+from kiks.ports.resources import processor_count
 from kiks.sim.judge import Judge, goal_names
+from kiks.trials.exercise_check import check_exercise, programs_for
+from kiks.trials.grading import load_exercise
 
 STUDENTS = "-students"
 """What the name of the students' file has at its end."""
@@ -48,6 +52,7 @@ CSS = """
 .exercise-dialog { width: 880px; max-width: 94vw !important }
 .exercise-dialog > * { flex: none }
 .exercise-dialog .desk-properties > * { min-width: 0 }
+.exercise-check { white-space: pre-line; overflow-wrap: anywhere }
 .exercise-names { display: grid; grid-template-columns: max-content 1fr; gap: 3px 14px; font-size: 13px }
 .exercise-names code { white-space: nowrap }
 .exercise-case { border: 1px solid rgba(127, 140, 155, .5); border-radius: 6px; padding: 10px; width: 100% }
@@ -72,6 +77,7 @@ class ExerciseDialog:
     def __init__(self, desk: Desk, template: Template) -> None:
         self._desk, self._template = desk, template
         self._folder = Folder(desk.folder)
+        self._checks = 0
         ui.add_css(CSS)
 
     async def open(self) -> None:
@@ -139,8 +145,10 @@ class ExerciseDialog:
         self._also.bind_text_from(
             self._name, "value", lambda name: f"Also save {_stem(name)}{STUDENTS}.kiks, without hidden cases"
         )
+        self._said = named(ui.label().classes("exercise-check text-body2").props("role=status"), "exercise-check")
         with ui.row().classes("w-full justify-end"):
-            ui.button("Cancel", on_click=lambda: self._dialog.submit(None)).props("flat no-caps data-testid=dialog-no")
+            self._close = ui.button("Cancel", on_click=lambda: self._dialog.submit(None))
+            self._close.props("flat no-caps data-testid=dialog-no")
             save = ui.button("Save", on_click=told(self._save)).props("no-caps unelevated data-testid=dialog-yes")
             save.tooltip(f"Save in {self._desk.folder}")
 
@@ -198,7 +206,32 @@ class ExerciseDialog:
             agreed = bool(question)
             await asyncio.to_thread(self._folder.save, data, name, "an exercise", may_replace=agreed, beside=beside)
         ui.notify(f"Saved as {' and '.join(files)} in {self._desk.folder}.", type="positive")
-        self._dialog.submit(None)
+        self._close.text = "Close"
+        await self._check(self._desk.folder / next(iter(files)))
+
+    async def _check(self, file: Path) -> None:
+        """Check a saved exercise, as `kiks exercise check` does, until the dialog is closed or saves another one."""
+        project, home = load_exercise(file)
+        cases = counted(len(cases_of(project.cases)), "case")
+        self._said.text = f"Saved. Trying the template and programs that do nothing in {cases} ..."
+        self._checks += 1
+        number = self._checks
+        with tempfile.TemporaryDirectory(prefix="kiks-check-") as folder:
+            out = Path(folder)
+            checked = await asyncio.to_thread(
+                check_exercise,
+                project,
+                home,
+                programs_for(project, out / "programs"),
+                out,
+                is_trusted=self._desk.sandbox is None,
+                workers=max(processor_count() - 1, 1),
+                goes_on=lambda: bool(self._dialog.value) and number == self._checks,
+            )
+        if checked.grades:
+            nothing = f"A check in {cases} has found nothing to be looked at. Can it be solved?"
+            command = f"kiks exercise check {file.name} --solution PROGRAM tries a solution."
+            self._said.text = "\n".join([*(checked.findings or [nothing]), command])
 
 
 def _without_students_program(project: Project) -> Project:

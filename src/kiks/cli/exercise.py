@@ -1,0 +1,94 @@
+"""`kiks exercise`: checks exercises."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from kiks.cli.command_line import Group
+from kiks.cli.engine_start import ready_engine
+from kiks.cli.options import Trusted, Workers, progress_bar
+from kiks.cli.outputs import Command, has_results, shows_progress, tell_results
+from kiks.ending import end_as_with_ctrl_c
+from kiks.errors import counted, figure, printable
+from kiks.table import Table
+
+exercise = typer.Typer(
+    cls=Group,
+    help="Check exercises.",
+    no_args_is_help=True,
+    subcommand_metavar="COMMAND ...",
+    options_metavar="",
+    rich_markup_mode=None,
+)
+
+
+@exercise.callback()
+def _exercise() -> None:
+    """Keep the name of the command, although there is one alone."""
+
+
+@exercise.command(cls=Command)
+@has_results
+@shows_progress
+def check(
+    context: typer.Context,
+    exercise: Annotated[
+        Path, typer.Argument(help="A project with a goal and a time limit (.kiks), or the folder of an exercise.")
+    ],
+    solution: Annotated[
+        Path | None, typer.Option(help="A program that should solve all cases: a file, or a folder with a __main__.py.")
+    ] = None,
+    workers: Workers = None,
+    trusted: Trusted = False,
+) -> None:
+    """Check an exercise before a class gets it.
+
+    A program that ends at once, one that waits, the template and, with --solution, a solution run in all cases, as
+    kiks grade would run them. Lines tell what is to be looked at: points for nothing, a goal that holds before anything
+    has moved, cases that the solution does not solve in time, scores that nothing counts. Then the exit code is 1.
+
+    Example: kiks exercise check exercises/wall --solution wall.py
+    """
+    from kiks.model.exercise import cases_of
+    from kiks.ports.program_process import Command as Program
+    from kiks.trials.exercise_check import check_exercise, programs_for
+    from kiks.trials.grading import load_exercise
+
+    project, home = load_exercise(exercise)
+    program = None if solution is None else Program(solution)
+    if program is not None:
+        program.check_file()
+    with tempfile.TemporaryDirectory(prefix="kiks-check-") as out, progress_bar("exercise") as show:
+        programs = programs_for(project, Path(out, "programs"), program)
+        run_count = len(programs) * len(cases_of(project.cases))
+        ready_engine()
+        end_as_with_ctrl_c()
+        checked = check_exercise(
+            project,
+            home,
+            programs,
+            Path(out),
+            is_trusted=trusted,
+            workers=workers,
+            on_outcome=lambda _, count: show(count, run_count),
+        )
+    rows = [
+        (each.submission.name, figure(each.points), f"{each.solved}/{len(checked.cases)}", each.said_last)
+        for each in checked.grades
+    ]
+    results: dict[str, Any] = {
+        "cases": [case.name for case in checked.cases],
+        "programs": [
+            {"name": each.submission.name, "points": each.points, "solved": each.solved} for each in checked.grades
+        ],
+        "findings": list(checked.findings),
+    }
+    table = Table(("program", "points", "solved", "said last"), rows, ends_in_text=True).for_output()
+    without = "" if program is not None else " Whether it can be solved says --solution PROGRAM."
+    end = f"{counted(len(checked.findings), 'finding')} in {counted(len(checked.cases), 'case')}.{without}"
+    tell_results(context, results, [table, *map(printable, checked.findings), end])
+    raise typer.Exit(bool(checked.findings))
