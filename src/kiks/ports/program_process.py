@@ -23,6 +23,7 @@ from typing import IO, Any, NamedTuple
 from kiks.errors import KiksError, ParameterError, shown
 from kiks.meant import nearest_file
 from kiks.model.atomic_files import program_in
+from kiks.model.program_kinds import A_PROGRAM, ProgramKind
 from kiks.model.project import Project
 from kiks.ports.environment_marks import HASH_SEED
 from kiks.ports.messages import Start
@@ -89,7 +90,7 @@ class Command:
         """Check that the program's file exists."""
         if not self.file.is_file():
             raise ParameterError(
-                f"a program must be a Python file, but there is none at {str(self.program)!r}. Save it first."
+                f"a program must be {A_PROGRAM}, but there is none at {str(self.program)!r}. Save it first."
                 f"{nearest_file(self.file)}"
             )
 
@@ -104,7 +105,8 @@ def commands_of(project: Project, folder: Path) -> list[Command | None]:
 
 def supervisor_of(project: Project, folder: Path) -> Path | None:
     """Return the file of the supervisor of a project in a folder; None if it has none."""
-    return None if project.supervisor is None else program_in(folder, project.supervisor)
+    name = project.supervisor
+    return None if name is None else program_in(folder, name, "supervisor", [ProgramKind.PYTHON])
 
 
 def module_command(module: str, arguments: Sequence[str]) -> Command:

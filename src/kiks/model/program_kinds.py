@@ -1,0 +1,56 @@
+"""What kind of program a file is: the one table of the endings of programs, and their texts for people."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import PurePath
+
+from kiks.errors import ParameterError
+from kiks.model.notebook import code_cells
+
+
+class ProgramKind(StrEnum):
+    """In what a program is written, which decides how it runs."""
+
+    PYTHON = "Python"
+    NOTEBOOK = "notebook"
+    OCTAVE = "Octave"
+
+
+ENDINGS = {".py": ProgramKind.PYTHON, ".ipynb": ProgramKind.NOTEBOOK, ".m": ProgramKind.OCTAVE}
+"""Kinds of programs by the ending of their file."""
+
+A_PROGRAM = "a file of Python (.py), Jupyter (.ipynb) or Octave (.m)"
+"""What messages call a program's file."""
+
+
+def program_kind(file: PurePath) -> ProgramKind:
+    """Return the kind of a program; folders, archives and files with other endings are of Python.
+
+    Example:
+        >>> from pathlib import Path
+        >>> print(program_kind(Path("lab.ipynb")), program_kind(Path("ann.m")), program_kind(Path("ann")))
+        notebook Octave Python
+    """
+    return ENDINGS.get(file.suffix.lower(), ProgramKind.PYTHON)
+
+
+def program_text(file: PurePath, data: bytes) -> str:
+    """Return the text of a program for people and for comparisons: of a notebook, its cells of code.
+
+    Args:
+        file: The program's file, whose ending tells its kind.
+        data: The bytes of the file.
+
+    Example:
+        >>> from pathlib import Path
+        >>> program_text(Path("ann.py"), b"print(1)")
+        'print(1)'
+    """
+    if program_kind(file) is ProgramKind.NOTEBOOK:
+        try:
+            cells = code_cells(data, file.name)
+            return "\n\n".join(f"# cell {number}\n{cell}" for number, cell in enumerate(cells, 1))
+        except ParameterError:
+            pass  # its start will tell
+    return data.decode("utf-8", errors="replace")
