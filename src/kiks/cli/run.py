@@ -188,7 +188,7 @@ def run(
         at_the_end.callback(supervision.close)
         end_as_with_ctrl_c()
         try:
-            if len(commands) == 1 and commands[0] is not None:
+            if len(commands) == 1 and commands[0] is not None and commands[0].runs_here:
                 code = _run_one(sim, commands[0], mapping, thoughts, limits)
                 doubt = limits.doubt or sim.program.doubt
             else:

@@ -23,7 +23,7 @@ from typing import IO, Any, NamedTuple
 from kiks.errors import KiksError, ParameterError, shown
 from kiks.meant import nearest_file
 from kiks.model.atomic_files import program_in
-from kiks.model.program_kinds import A_PROGRAM, ProgramKind
+from kiks.model.program_kinds import A_PROGRAM, ProgramKind, program_kind
 from kiks.model.project import Project
 from kiks.ports.environment_marks import HASH_SEED
 from kiks.ports.messages import Start
@@ -80,6 +80,11 @@ class Command:
     def name(self) -> str:
         """Its name for people."""
         return self.module or self.program.name
+
+    @property
+    def runs_here(self) -> bool:
+        """Whether it can run in this process: Octave has one of its own."""
+        return program_kind(self.program) is not ProgramKind.OCTAVE
 
     @property
     def file(self) -> Path:
