@@ -17,12 +17,17 @@ try
     source(getenv('KIKS_PROGRAM'));
 catch kiks_failure
     % Like Python, the places from the outermost on, and the message in the last line.
+    kiks_toolbox = fileparts(fileparts(mfilename('fullpath')));
     for place = flipud(kiks_failure.stack(:))'
-        if ~strncmp(place.file, fileparts(fileparts(mfilename('fullpath'))), 5)
-            fprintf(stderr, '  %s, line %d, in %s\n', place.file, place.line, place.name);
+        if ~strncmp(place.file, kiks_toolbox, numel(kiks_toolbox))
+            [~, name, ending] = fileparts(place.file);
+            fprintf(stderr, '  %s%s, line %d, in %s\n', name, ending, place.line, place.name);
         end
     end
     [first, rest] = strtok(kiks_failure.message, char(10));
-    fprintf(stderr, '%serror: %s\n', rest, first);
+    if ~isempty(rest)
+        fprintf(stderr, '%s\n', strtrim(rest));
+    end
+    fprintf(stderr, 'error: %s\n', first);
     exit(1);
 end

@@ -192,7 +192,8 @@ def run(
                 code = _run_one(sim, commands[0], mapping, thoughts, limits)
                 doubt = limits.doubt or sim.program.doubt
             else:
-                tell = say if labels is None else labels.say
+                # A program alone tells its end itself.
+                tell = labels.say if labels is not None else (lambda text: None) if is_alone else say
                 programs = Programs(sim, commands, thinking=thinking, say=tell, labels=labels, **rules)
                 with limits.kept(sim, programs.end, programs.end_soon):
                     code = programs.run()

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import shutil
 from enum import StrEnum
 from pathlib import PurePath
 
-from kiks.errors import ParameterError
+from kiks.errors import ParameterError, shown
 from kiks.model.notebook import code_cells
 
 
@@ -33,6 +34,26 @@ def program_kind(file: PurePath) -> ProgramKind:
         notebook Octave Python
     """
     return ENDINGS.get(file.suffix.lower(), ProgramKind.PYTHON)
+
+
+def why_not(file: PurePath) -> str:
+    """Return why a program cannot run on this computer, as its name tells; empty if it can.
+
+    Example:
+        >>> from pathlib import Path
+        >>> why_not(Path("ann.py")), why_not(Path("ann.c"))
+        ('', "'ann.c' is no file of Python (.py), Jupyter (.ipynb) or Octave (.m)")
+    """
+    if file.suffix.lower() not in ENDINGS:
+        return f"{shown(file.name)} is no {A_PROGRAM.removeprefix('a ')}"
+    if program_kind(file) is ProgramKind.OCTAVE and octave() is None:
+        return f"{shown(file.name)} needs Octave, but there is no octave-cli in the folders of PATH"
+    return ""
+
+
+def octave() -> str | None:
+    """Return the command of Octave for programs; None if it is not installed."""
+    return shutil.which("octave-cli")
 
 
 def program_text(file: PurePath, data: bytes) -> str:

@@ -11,15 +11,16 @@ from __future__ import annotations
 import hashlib
 import os
 import platform
-import shutil
 import struct
 import subprocess
+from pathlib import Path
 
 from kiks.clock.program_clock import ProgramClock
 from kiks.ending import end_with_parent
 from kiks.errors import KiksError
 from kiks.model.package import shipped
-from kiks.ports.messages import Start
+from kiks.model.program_kinds import octave, why_not
+from kiks.ports.messages import Kind, Start
 from kiks.ports.remote_link import Connection
 from kiks.toolbox.framing import Exchange
 from kiks.toolbox.given_robot import GivenRobot
@@ -41,17 +42,13 @@ def run_octave(connection: Connection, start: Start, program: ProgramClock) -> i
     Raises:
         KiksError: If there is no Octave.
     """
-    octave = shutil.which("octave-cli")
-    if octave is None:
-        raise KiksError(
-            "a program that ends in .m must have Octave to run, but there is no octave-cli in the folders of PATH. "
-            "Install it (Debian: sudo apt-get install octave)."
-        )
+    if why := why_not(Path(start.program)):
+        raise KiksError(f"a program must have what runs it, but {why}. Install it (Debian: sudo apt-get install octave).")
     session = Session(given=GivenRobot(connection, start, program))
     requests, to_session = os.pipe()
     from_session, answers = os.pipe()
     process = subprocess.Popen(
-        [octave, *OPTIONS, str(shipped("matlab/private/run_program.m")), *start.arguments],
+        [str(octave()), *OPTIONS, str(shipped("matlab/private/run_program.m")), *start.arguments],
         pass_fds=[from_session, to_session],
         env=os.environ | _environment(start, from_session, to_session),
         preexec_fn=end_with_parent,
@@ -62,6 +59,8 @@ def run_octave(connection: Connection, start: Start, program: ProgramClock) -> i
     client = SessionClient(session, 1, exchange)
     try:
         for line in exchange.lines():
+            if not connection.known_ns:
+                connection.tell(Kind.REACHED)  # the toolbox is there: the world may begin
             exchange.reply(answer(client, line))
     except BrokenPipeError:
         pass  # Octave has ended
