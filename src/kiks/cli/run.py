@@ -84,8 +84,9 @@ def run(
     program: Annotated[
         Path,
         typer.Argument(
-            help="A Python program that talks to a Khepera through pyserial: a file (.py), a notebook (.ipynb), a folder "
-            "with a __main__.py, or -m and the name of a module; or a program of Octave (.m), a project (.kiks), a demonstration, or a champion's file or folder.",
+            help="A Python program that talks to a Khepera through pyserial: a file (.py), a notebook (.ipynb), a "
+            "folder with a __main__.py, or -m and the name of a module; or a program of Octave (.m), a project "
+            "(.kiks), a demonstration, or a champion's file or folder.",
             autocompletion=_names,
         ),
     ],

@@ -350,7 +350,9 @@ def within(folder: Path, text: str, what: str) -> Path:
     return path
 
 
-def program_in(folder: Path, name: str, what: str = "program", kinds: Collection[ProgramKind] = ProgramKind) -> Path:
+def program_in(
+    folder: Path, name: str, what: str = "program", kinds: Collection[ProgramKind] = tuple(ProgramKind)
+) -> Path:
     """Return the path of a program, of one of some kinds, in a folder or below that a file or a browser names."""
     endings = [ending for ending, kind in ENDINGS.items() if kind in kinds]
     path = inside(folder, name, what)

@@ -23,7 +23,7 @@ from typing import IO, Any, NamedTuple
 from kiks.errors import KiksError, ParameterError, shown
 from kiks.meant import nearest_file
 from kiks.model.atomic_files import program_in
-from kiks.model.program_kinds import A_PROGRAM, ProgramKind, program_kind
+from kiks.model.program_kinds import A_PROGRAM, ENDINGS, ProgramKind, program_kind
 from kiks.model.project import Project
 from kiks.ports.environment_marks import HASH_SEED
 from kiks.ports.messages import Start
@@ -80,6 +80,11 @@ class Command:
     def name(self) -> str:
         """Its name for people."""
         return self.module or self.program.name
+
+    @property
+    def title(self) -> str:
+        """The same without the ending of its file."""
+        return self.program.stem if self.name.endswith(tuple(ENDINGS)) else self.name
 
     @property
     def runs_here(self) -> bool:

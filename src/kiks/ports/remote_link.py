@@ -107,7 +107,7 @@ class Connection(ABC):
             raise LinkError(answer.error)
         return answer
 
-    # ---- what a session of Octave asks for ----
+    # ---- what a session of Octave asks for; there is nothing to do where its process has the connection alone ----
 
     def meet(self) -> None:
         """Wait until the world has come to the program's time."""
@@ -117,16 +117,16 @@ class Connection(ABC):
         """Note that the program has no open port; return whether the connection stays."""
         return True
 
-    def wake(self) -> None:
+    def wake(self) -> None:  # noqa: B027
         """Note that it opens one again."""
 
-    def cancel(self) -> None:
+    def cancel(self) -> None:  # noqa: B027
         """Note that it waits for no answer any more; from any thread."""
 
-    def halt(self) -> None:
+    def halt(self) -> None:  # noqa: B027
         """Leave the world at once."""
 
-    def close(self) -> None:
+    def close(self) -> None:  # noqa: B027
         """Leave the world; earlier requests are still done."""
 
     def live(self, time_ns: int) -> bool:

@@ -18,7 +18,7 @@ from time import monotonic
 from typing import Protocol, cast
 
 from kiks.ending import postponing_endings
-from kiks.errors import ParameterError
+from kiks.errors import KiksError, ParameterError
 from kiks.model.atomic_files import path_of
 from kiks.model.checks import check_kind
 from kiks.model.data_file import read_file

@@ -10,9 +10,9 @@ import socket
 import sys
 from pathlib import Path
 
+from kiks import upwards
 from kiks.clock.program_clock import ProgramClock
 from kiks.clock.thinking import save_thinking
-from kiks import upwards
 from kiks.ending import end_with_parent
 from kiks.errors import KiksError
 from kiks.model.program_kinds import ProgramKind, program_kind

@@ -60,7 +60,7 @@ def _compiled(cell: str, file: str, what: str) -> Iterator[CodeType]:
     linecache.cache[file] = len(cell), None, [f"{line}\n" for line in cell.split("\n")], file
     made: Callable[..., CodeType] = partial(compile, filename=file, dont_inherit=True)
     try:
-        tree: ast.Module = compile(cell, file, "exec", ast.PyCF_ONLY_AST, dont_inherit=True)
+        tree: Any = compile(cell, file, "exec", ast.PyCF_ONLY_AST, dont_inherit=True)
         shown_last = []
         if tree.body and isinstance(tree.body[-1], ast.Expr) and not cell.rstrip().endswith(";"):
             shown_last.append(tree.body.pop())

@@ -27,7 +27,10 @@ class GivenRobot:
         why_not: Why the program cannot see or change the world.
     """
 
-    why_not = "the world must be of this program's making for that, but it was there before it. Drive the robot with commands."
+    why_not = (
+        "this program must have begun the world for that, but the world was there before it. Drive the robot with "
+        "commands."
+    )
 
     def __init__(self, connection: Connection, start: Start, program: ProgramClock) -> None:
         self._connection = connection

@@ -1,9 +1,9 @@
 """A program of Octave in a world that is there already: `kiks run ann.m`, and what a class hands in.
 
-The process that KiKS starts for each program (`script/child_main.py`) is the session here. It starts Octave, with a pipe
-in each direction, and answers the requests of the toolbox. They reach the world by the connection that a program of
-Python has, so the world treats both alike. Its clock is the world's from the start, and its thinking time is that of the
-world, so a run repeats.
+The process that KiKS starts for each program (`script/child_main.py`) is the session here. It starts Octave, with a
+pipe in each direction, and answers the requests of the toolbox. They reach the world by the connection that a program
+of Python has, so the world treats both alike. Its clock is the world's from the start, and its thinking time is that of
+the world, so a run repeats.
 """
 
 from __future__ import annotations
@@ -43,7 +43,9 @@ def run_octave(connection: Connection, start: Start, program: ProgramClock) -> i
         KiksError: If there is no Octave.
     """
     if why := why_not(Path(start.program)):
-        raise KiksError(f"a program must have what runs it, but {why}. Install it (Debian: sudo apt-get install octave).")
+        raise KiksError(
+            f"a program must have what runs it, but {why}. Install it (Debian: sudo apt-get install octave)."
+        )
     session = Session(given=GivenRobot(connection, start, program))
     requests, to_session = os.pipe()
     from_session, answers = os.pipe()

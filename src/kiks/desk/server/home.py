@@ -14,6 +14,7 @@ from kiks.errors import ParameterError, shown
 from kiks.model.atomic_files import inside, program_in
 from kiks.model.data_file import parse_toml, read_file
 from kiks.model.limits import PICTURE_FILE_BYTES_MAX
+from kiks.model.program_kinds import ENDINGS
 from kiks.model.project import Project, ProjectRobot
 from kiks.model.thinking_policy import split_thinking
 from kiks.ports.program_process import Command, commands_of, supervisor_of
@@ -80,7 +81,7 @@ class Home:
 
         def name_there(command: Command) -> str | None:
             path = command.program.resolve()
-            if command.module or path.suffix != ".py" or not path.is_file():
+            if command.module or path.suffix not in ENDINGS or not path.is_file():
                 return None
             return _name_in(files.folder, path) or files.add_program(path, _name_in(self.folder, path) or path.name)
 
