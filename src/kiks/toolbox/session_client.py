@@ -118,6 +118,7 @@ class SessionClient:
         self.last_line = 0
         self.typed: deque[str] = deque()
         self._given = session.given
+        self._program = ProgramClock("none") if self._given is None else self._given.program
         self.clock = SessionClock() if self._given is None else self._given.clock
         self._place: object = None
         self._connection: Connection | None = None
