@@ -87,6 +87,7 @@ class Graded:
         cases: The cases in which programs were tried.
         grades: The grades, in the order of the submissions.
         likenesses: Pairs of programs that are alike.
+        is_trusted: Whether the programs ran without a sandbox, which would keep them from what hidden cases tell.
     """
 
     title: str
@@ -95,6 +96,7 @@ class Graded:
     cases: tuple[Case, ...]
     grades: tuple[Grade, ...]
     likenesses: tuple[Likeness, ...]
+    is_trusted: bool = False
 
 
 def load_exercise(path: Path) -> tuple[Project, Path]:
@@ -117,7 +119,13 @@ def load_exercise(path: Path) -> tuple[Project, Path]:
 
 
 def trials_of(
-    project: Project, folder: Path, submissions: Sequence[Submission], *, is_trusted: bool = False, command: str = ""
+    project: Project,
+    folder: Path,
+    submissions: Sequence[Submission],
+    *,
+    is_trusted: bool = False,
+    command: str = "",
+    user: str = "",
 ) -> list[Trial]:
     """Return a trial for each submission in each case of an exercise; the submission drives robot 1.
 
@@ -127,6 +135,7 @@ def trials_of(
         submissions: What was handed in.
         is_trusted: Whether the programs run without a sandbox.
         command: The command that has begun it, for the recordings.
+        user: See `Trial`.
     """
     cases = cases_of(project.cases)
     worlds = [in_case(project, case, folder) for case in cases]
@@ -138,7 +147,7 @@ def trials_of(
         for number, world in enumerate(worlds, 1):
             others = commands_of(world, folder)[1:]
             name = f"{submission.id}/{number:0{width}}"
-            trials.append(Trial(name, world, folder, (submission.command, *others), is_trusted, command))
+            trials.append(Trial(name, world, folder, (submission.command, *others), is_trusted, command, user))
     return trials
 
 
@@ -151,6 +160,7 @@ def grade(
     title: str = "",
     is_trusted: bool = False,
     command: str = "",
+    user: str = "",
     workers: int | None = None,
     on_outcome: Callable[[Outcome, int], object] = lambda outcome, count: None,
 ) -> Graded:
@@ -164,10 +174,11 @@ def grade(
         title: Its title if it says none.
         is_trusted: Whether the programs run without a sandbox.
         command: The command that has begun it, for the recordings.
+        user: See `Trial`.
         workers: See `run_trials`.
         on_outcome: See `run_trials`.
     """
-    trials = trials_of(project, folder, submissions, is_trusted=is_trusted, command=command)
+    trials = trials_of(project, folder, submissions, is_trusted=is_trusted, command=command, user=user)
     outcomes = iter(run_trials(trials, out, workers=workers, on_outcome=on_outcome))
     cases = cases_of(project.cases)
     grades = []
@@ -189,4 +200,5 @@ def grade(
         tuple(cases),
         tuple(replace(each, like=tuple(like.get(each.submission.id, ()))) for each in grades),
         tuple(Likeness(names[each.first], names[each.second], each.share) for each in likenesses),
+        is_trusted,
     )

@@ -36,7 +36,9 @@ class Sandboxes:
             # A program that drives several robots has a sandbox for each.
             key = (command.program.absolute(), robot, trial.is_trusted)
             if key not in self._kept:
-                self._kept[key] = Sandbox([command.program], limits=self._limits, is_trusted=trial.is_trusted)
+                self._kept[key] = Sandbox(
+                    [command.program], limits=self._limits, is_trusted=trial.is_trusted, user=trial.user
+                )
             self._kept.move_to_end(key)
             found[robot] = self._kept[key]
         while len(self._kept) > max(KEPT, len(found)):
