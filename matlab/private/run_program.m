@@ -1,7 +1,7 @@
 % run_program  Run the program of Octave that KIKS_PROGRAM names in a world that is there already.
 %
-%   KiKS starts this script (src/kiks/toolbox/octave_program.py). KIKS_PIPES has the two ends of its pipes, and KIKS_CHANCE
-%   the numbers from which all random numbers follow.
+%   KiKS starts this script (src/kiks/toolbox/octave_program.py). KIKS_PIPES has the two ends of its pipes, and
+%   KIKS_CHANCE the numbers from which all random numbers follow.
 
 page_screen_output(false);
 page_output_immediately(true);
@@ -18,7 +18,7 @@ try
 catch kiks_failure
     % Like Python, the places from the outermost on, and the message in the last line.
     kiks_toolbox = fileparts(fileparts(mfilename('fullpath')));
-    for place = flipud(kiks_failure.stack(:))'
+    for place = kiks_failure.stack(end:-1:1)'
         if ~strncmp(place.file, kiks_toolbox, numel(kiks_toolbox))
             [~, name, ending] = fileparts(place.file);
             fprintf(stderr, '  %s%s, line %d, in %s\n', name, ending, place.line, place.name);
