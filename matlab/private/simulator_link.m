@@ -16,7 +16,9 @@ function [result, link] = simulator_link(what, varargin)
 result = [];
 switch what
     case 'open'
-        if exist('OCTAVE_VERSION', 'builtin') && ~strcmp(getenv('KIKS_TRANSPORT'), 'tcp')
+        if ~isempty(getenv('KIKS_PIPES'))
+            result = open_given(sscanf(getenv('KIKS_PIPES'), '%d'));
+        elseif exist('OCTAVE_VERSION', 'builtin') && ~strcmp(getenv('KIKS_TRANSPORT'), 'tcp')
             result = open_pipes(varargin{1});
         else
             result = open_connection(varargin{1});
@@ -61,6 +63,12 @@ if isempty(door_of(first))
     refuse(first, command);
 end
 unfinished = [];
+end
+
+function link = open_given(pipes)
+% KiKS has started this Octave itself, and answers at the other ends of these two pipes.
+link = struct('is_pipe', true, 'is_polled', nproc() > 1, 'to', fopen(sprintf('/dev/fd/%d', pipes(2)), 'w'), ...
+    'from', fopen(sprintf('/dev/fd/%d', pipes(1)), 'r'), 'process', [], 'is_joined', true);
 end
 
 function link = open_connection(options)
@@ -276,6 +284,13 @@ if ~link.is_pipe
     return
 end
 let_reads_wait(link, true);
+if isempty(link.process)
+    send(link, ['close 0' char(10)]);
+    next_frame(link, '');
+    fclose(link.to);
+    fclose(link.from);
+    return
+end
 % Send an explicit end, as other processes that Octave has started may keep the pipe open.
 try
     fputs(link.to, char([4 10]));

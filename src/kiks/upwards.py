@@ -99,6 +99,9 @@ plot_simulation = Hook("kiks.export.notebook", "plot_run")
 plot_recordings = Hook("kiks.export.notebook", "plot")
 """Draws figures of recordings."""
 
+run_octave = Hook("kiks.toolbox.octave_program", "run_octave")
+"""Runs a program of Octave to its end."""
+
 save_columns = Hook("kiks.export.tables", "save_columns")
 """Writes a table of any columns."""
 

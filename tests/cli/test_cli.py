@@ -18,6 +18,7 @@ from typer.testing import CliRunner, Result
 
 from kiks.cli import app
 from kiks.errors import KiksError, ParameterError
+from kiks.model.program_kinds import A_PROGRAM
 from kiks.model.shipped import demonstrations
 from kiks.version import PYTHONS
 
@@ -264,8 +265,8 @@ def test_live_thinking_is_recorded_and_replayed(tmp_path: Path) -> None:
 
 def test_a_mistake_ends_in_one_line_and_exit_code_2(tmp_path: Path) -> None:
     result = forked.run("run", "nowhere.py", cwd=tmp_path)  # more of them stand in slips.txt
-    message = "kiks: PROGRAM must be a Python file, but there is no file 'nowhere.py'. Give its path before its own"
-    assert (result.returncode, result.stderr) == (2, f"{message} arguments.\n")
+    message = f"PROGRAM must be {A_PROGRAM}, but there is no file 'nowhere.py'. Give its path before its own arguments."
+    assert (result.returncode, result.stderr) == (2, f"kiks: {message}\n")
 
 
 NO_RESULTS = """

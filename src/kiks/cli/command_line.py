@@ -13,6 +13,7 @@ from typer.core import TyperCommand, TyperGroup
 
 from kiks.errors import ParameterError, shown
 from kiks.meant import nearest
+from kiks.model.program_kinds import ENDINGS
 
 ARENAS = (".toml", ".png", ".kad", ".yaml")
 """Endings of files that an arena may have; none of them is a program's."""
@@ -62,7 +63,7 @@ class Group(TyperGroup):
 
 def opening(file: Path) -> str:
     """Return the command for a file that was named without one; empty if there is no such file."""
-    verbs = {".py": "run", ".kiks": "desk", ".mcap": "replay"} | dict.fromkeys(ARENAS, "desk --arena")
+    verbs = {".kiks": "desk", ".mcap": "replay"} | dict.fromkeys(ENDINGS, "run") | dict.fromkeys(ARENAS, "desk --arena")
     verb = verbs.get(file.suffix.lower())
     return f"{verb} {file}" if verb and file.is_file() else ""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shlex
 import sys
 from collections import Counter
@@ -14,7 +15,7 @@ from kiks.cli.engine_start import ready_engine
 from kiks.cli.options import Trusted, Workers, progress_bar, say, tell_taken
 from kiks.cli.outputs import has_results, leave_out, shows_progress, tell_results
 from kiks.ending import end_as_with_ctrl_c
-from kiks.errors import counted, figure, printable
+from kiks.errors import ParameterError, counted, figure, printable
 
 if TYPE_CHECKING:
     from kiks.trials.grading import Graded
@@ -75,6 +76,12 @@ def grade(
     ] = None,
     workers: Workers = None,
     trusted: Trusted = False,
+    user: Annotated[
+        str | None,
+        typer.Option(
+            help="Run the program as this user where no sandbox can be made, as in Gradescope's container; for root."
+        ),
+    ] = None,
 ) -> None:
     """Grade programs: run each in all cases of an exercise, and judge it by its goal.
 
@@ -88,6 +95,7 @@ def grade(
     Example: kiks grade exercises/wall moodle_export.zip --students worksheet.csv --max 100 --due 2026-11-28T23:59
     """
     from kiks.model.atomic_files import alone_in
+    from kiks.ports.other_user import OtherUser
     from kiks.ports.sandbox import check_sandbox
     from kiks.trials.grading import grade as graded_of
     from kiks.trials.grading import load_exercise, trials_of
@@ -102,11 +110,22 @@ def grade(
         leave_out(context, "without --due", "penalty")
     marking = marking_for(project, maximum, full, due, penalty)
     listed = None if students is None else read_students(students)
-    if not trusted:
+    other = None if user is None else OtherUser(user)
+    if other is not None:
+        other.check_unreadable([exercise, folder])
+        os.umask(0o077)  # nor may it read what comes out
+    elif not trusted:
         check_sandbox()  # Without one nothing is copied or compiled.
     out = Path(f"grades-{exercise.stem}") if out is None else out
     with alone_in(out, "--out", OUTCOMES):
         found = submissions_in(submissions, out / "programs")
+        if other is not None:
+            if len(found) != 1:
+                raise ParameterError(
+                    f"--user must have one submission, for programs of one user can reach each other, but there are "
+                    f"{len(found)}. Grade each one alone."
+                )
+            other.let_read(out / "programs")
         found, strangers = (found, []) if listed is None else with_students(found, listed)
         count = len(trials_of(project, folder, found))
         ready_engine()
@@ -123,10 +142,15 @@ def grade(
 
         options: dict[str, Any] = {"title": exercise.stem, "marking": marking, "attempts": attempts}
         options |= {"is_trusted": trusted, "workers": workers, "on_taken": note_taken}
+        if other is not None:
+            # One worker: at the end of a sandbox all processes of that user are killed.
+            options |= {"is_trusted": True, "user": other.name, "workers": 1}
         try:
             with progress_bar(counted(len(found), "submission")) as show:
                 command = shlex.join(["kiks", *sys.argv[1:]])
-                graded = graded_of(project, folder, found, out, command=command, **options)
+                graded = graded_of(project, folder, found, out, command=command, on_outcome=note, **options)
+            if other is not None:
+                other.end_all()
             with progress_bar("report") as show_report:
                 save_grades(graded, out, workers=workers, on_progress=show_report)
         except KeyboardInterrupt:

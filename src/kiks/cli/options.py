@@ -21,6 +21,7 @@ from kiks.meant import nearest_file
 from kiks.model.atomic_files import make_folder, path_of
 from kiks.model.checks import ROBOTS_MAX
 from kiks.model.package import where_from
+from kiks.model.program_kinds import A_PROGRAM, ENDINGS
 
 if TYPE_CHECKING:
     from kiks.desk.server.public_address import PublicAddress
@@ -28,8 +29,8 @@ if TYPE_CHECKING:
     from kiks.model.project import Project
     from kiks.ports.program_process import Command
 
-OTHERS = (*ARENAS, ".mcap", ".csv", ".ipynb", ".c", ".java", ".m")
-"""Endings of files that are no programs of Python."""
+OTHERS = (*ARENAS, ".mcap", ".csv", ".c", ".java")
+"""Endings of files that are no programs which KiKS runs."""
 
 OTHER_LANGUAGES = "Programs in other languages reach robots by kiks serve."
 
@@ -275,8 +276,8 @@ def show_log(*, is_quiet: bool = False) -> None:
 def parse_words(words: list[str]) -> list[Command]:
     """Return the programs that a command line names, each with its arguments.
 
-    A word that names a .py file begins a program. A word with blanks that is no file is split like in a shell; if it
-    begins with a .py file or -m, it is a program with all its arguments, which may be .py files themselves. The first
+    A word that names a file of Python, Jupyter or Octave begins a program. A word with blanks that is no file is split
+    like in a shell; if it begins with such a file or -m, it is a program with all its arguments. The first
     program may also be -m and a module's name in words of their own, another file, or a folder with a `__main__.py`.
     """
     from kiks.model.shipped import demonstrations, shipped_arenas
@@ -294,14 +295,14 @@ def parse_words(words: list[str]) -> list[Command]:
             raise ParameterError(
                 f"a project must come first, but {shown(word)} stands among the programs. Put it before them."
             )
-        if Command(Path(word)).file.is_file() and (word.endswith(".py") or not commands):
+        if Command(Path(word)).file.is_file() and (_is_program(word) or not commands):
             if Path(word).suffix.lower() in OTHERS:
                 hint = f"Did you mean 'kiks {meant}'?" if (meant := opening(Path(word))) else OTHER_LANGUAGES
-                raise ParameterError(f"PROGRAM must be a Python file, but {shown(word)} is none. {hint}")
+                raise ParameterError(f"PROGRAM must be {A_PROGRAM}, but {shown(word)} is none. {hint}")
             commands.append(Command(Path(word)))
         elif len(parts) > 1 and parts[0] == "-m":
             commands.append(module_command(parts[1], parts[2:]))
-        elif len(parts) > 1 and parts[0].endswith(".py") and Path(parts[0]).is_file():
+        elif len(parts) > 1 and _is_program(parts[0]) and Path(parts[0]).is_file():
             commands.append(Command(Path(parts[0]), parts[1:]))
         elif commands:
             commands[-1].arguments.append(word)
@@ -311,11 +312,15 @@ def parse_words(words: list[str]) -> list[Command]:
                 f"{shown(word)} is a folder without a __main__.py" if is_folder else f"there is no file {shown(word)}"
             )
             raise ParameterError(
-                f"PROGRAM must be a Python file, but {found}. "
+                f"PROGRAM must be {A_PROGRAM}, but {found}. "
                 f"{where_from(word, 'Give its path before its own arguments.')}"
                 f"{nearest_file(Path(word), [*demonstrations(), *(f'--arena {name}' for name in shipped_arenas())])}"
             )
     return commands
+
+
+def _is_program(word: str) -> bool:
+    return Path(word).suffix in ENDINGS
 
 
 def _split(word: str) -> list[str]:

@@ -84,14 +84,17 @@ def run(
     program: Annotated[
         Path,
         typer.Argument(
-            help="A Python program that talks to a Khepera through pyserial: a file, a folder with a __main__.py, or "
-            "-m and the name of a module; or a project (.kiks), a demonstration, or a champion's file or folder.",
+            help="A Python program that talks to a Khepera through pyserial: a file (.py), a notebook (.ipynb), a "
+            "folder with a __main__.py, or -m and the name of a module; or a program of Octave (.m), a project "
+            "(.kiks), a demonstration, or a champion's file or folder.",
             autocompletion=_names,
         ),
     ],
     arguments: Annotated[
         list[str] | None,
-        typer.Argument(help="The program's arguments; each .py file, and each quoted '-m MODULE', begins another."),
+        typer.Argument(
+            help="The program's arguments; each program's file, and each quoted '-m MODULE', begins another."
+        ),
     ] = None,
     thinking: Annotated[
         str | None,
@@ -188,11 +191,12 @@ def run(
             say(goal_doubt)
         end_as_with_ctrl_c()
         try:
-            if len(commands) == 1 and commands[0] is not None:
+            if len(commands) == 1 and commands[0] is not None and commands[0].runs_here:
                 code = _run_one(sim, commands[0], mapping, thoughts, limits)
                 doubt = limits.doubt or sim.program.doubt
             else:
-                tell = say if labels is None else labels.say
+                # A program alone tells its end itself.
+                tell = labels.say if labels is not None else (lambda text: None) if is_alone else say
                 programs = Programs(sim, commands, thinking=thinking, say=tell, labels=labels, **rules)
                 with limits.kept(sim, programs.end, programs.end_soon):
                     code = programs.run()

@@ -16,6 +16,7 @@ from kiks.errors import ParameterError, shown
 from kiks.meant import nearest
 from kiks.model.atomic_files import path_of, program_in
 from kiks.model.data_file import Rule, Text, record
+from kiks.model.program_kinds import ProgramKind
 
 
 @record
@@ -56,7 +57,7 @@ def find(recipe: FunctionRecipe, folder: str | Path) -> Any:
     """Return what a recipe of a user's own controller names. The module or file is run, as by `import`."""
     place, _, name = recipe.function.rpartition(":")
     if place.endswith(".py"):
-        path = program_in(Path(folder), place, "the recipe's file")
+        path = program_in(Path(folder), place, "the recipe's file", [ProgramKind.PYTHON])
         found, where = module_in(path), f"file {str(path)!r}"
     else:
         where = f"module {shown(place)}"

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import shlex
 from collections import Counter
+from pathlib import PurePath
 from typing import Any
 
 from markupsafe import Markup
 from pygments import highlight
 from pygments.formatters import HtmlFormatter
-from pygments.lexers import PythonLexer, TextLexer
+from pygments.lexers import OctaveLexer, PythonLexer, TextLexer
 
 from kiks.errors import counted
 from kiks.export.findings import Findings
 from kiks.export.run_frames import RunFrames
+from kiks.model.program_kinds import ProgramKind, program_kind
 from kiks.recording.recording import Recording
 from kiks.recording.tables import Table
 from kiks.units import clock_text
@@ -143,8 +145,10 @@ def _programs(recording: Recording) -> list[dict[str, Any]]:
         # Lines of blanks take Pygments time that grows with the square of their number.
         clean = "\n".join(line.rstrip() for line in text[:PROGRAM_CHARACTERS_MAX].splitlines())
         character_count += len(clean)
-        is_coloured = name.endswith(".py") and character_count <= COLOURED_CHARACTERS_MAX
-        lexer: Any = (PythonLexer if is_coloured else TextLexer)(stripnl=False, ensurenl=False)
+        is_octave = program_kind(PurePath(name)) is ProgramKind.OCTAVE
+        colours: Any = OctaveLexer if is_octave else PythonLexer
+        colours = colours if character_count <= COLOURED_CHARACTERS_MAX else TextLexer
+        lexer = colours(stripnl=False, ensurenl=False)
         markup = Markup(highlight(clean, lexer, HtmlFormatter(nowrap=True)))  # it has escaped the text
         is_cut = len(text) > PROGRAM_CHARACTERS_MAX
         programs.append({"name": name, "drivers": ", ".join(numbers), "text": markup, "is_cut": is_cut})

@@ -5,13 +5,14 @@ from __future__ import annotations
 import importlib
 import os
 import stat
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import ExitStack, closing, contextmanager, suppress
 from pathlib import Path, PurePosixPath
 from typing import IO, Any, BinaryIO, cast
 
 from kiks.errors import KiksError, ParameterError, shown
 from kiks.meant import nearest
+from kiks.model.program_kinds import ENDINGS, ProgramKind
 
 fcntl: Any = None
 with suppress(ModuleNotFoundError):  # Windows has none: there files are written as on a drive without locks
@@ -349,13 +350,16 @@ def within(folder: Path, text: str, what: str) -> Path:
     return path
 
 
-def program_in(folder: Path, name: str, what: str = "program") -> Path:
-    """Return the path of a Python program in a folder or below it that a file or a browser names."""
+def program_in(
+    folder: Path, name: str, what: str = "program", kinds: Collection[ProgramKind] = tuple(ProgramKind)
+) -> Path:
+    """Return the path of a program, of one of some kinds, in a folder or below that a file or a browser names."""
+    endings = [ending for ending, kind in ENDINGS.items() if kind in kinds]
     path = inside(folder, name, what)
     for parts in (PurePosixPath(name).parts, path.relative_to(folder.resolve()).parts):
-        if not parts[-1].endswith(".py") or any(part.startswith(".") for part in parts):
+        if PurePosixPath(parts[-1]).suffix not in endings or any(part.startswith(".") for part in parts):
             raise ParameterError(
-                f"{what} must be a .py file in no folder whose name begins with a dot, but it was {shown(name)}. "
-                "Rename it, or start it at a terminal."
+                f"{what} must be a {' or '.join(endings)} file in no folder whose name begins with a dot, but it was "
+                f"{shown(name)}. Rename it, or start it at a terminal."
             )
     return path

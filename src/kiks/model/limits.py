@@ -36,6 +36,9 @@ TEXT_COLUMN_BYTES_MAX = 1 << 30
 UPLOAD_BYTES_MAX = 32 << 20
 """A file that a browser uploads."""
 
+NOTEBOOK_BYTES_MAX = 32 << 20
+"""A notebook of Jupyter, with the pictures in it."""
+
 PROGRAM_BYTES_MAX = 200_000
 """A program in the desk's editor."""
 

@@ -132,11 +132,13 @@ class ProgramFiles:
             ValueError: If a name cannot be that of a file.
         """
         main = next(iter(packed))
+        # Python runs a folder; a notebook and a program of Octave stay what they are.
+        is_folder = main == MAIN or (len(packed) > 1 and main.endswith(".py"))
         for name, data in packed.items():
-            path = folder / (MAIN if name == main and len(packed) > 1 else name)
+            path = folder / (MAIN if name == main and is_folder else name)
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(data)
-        return folder if len(packed) > 1 or main == MAIN else folder / main
+        return folder if is_folder else folder / main
 
     # ---- inside ----
 

@@ -60,6 +60,7 @@ from kiks.model.kad import load_kad
 from kiks.model.limits import PROJECT_FILE_BYTES_MAX
 from kiks.model.package import where_from
 from kiks.model.picture import Pixels, decode_picture, encode_picture
+from kiks.model.program_kinds import ENDINGS
 from kiks.model.robot import Baud, Brightness, Response, RobotSpec, robot_names
 from kiks.model.ros_map import load_ros_map
 from kiks.model.settings import Seconds, Seed, Speed, ThinkingPolicy
@@ -361,7 +362,7 @@ _READERS: dict[str, Callable[[Path], Arena]] = {
 }
 
 
-NO_WORLDS = {".py": "a program", ".m": "a program", ".mcap": "a recording", ".zip": "an archive", ".txt": "a text"}
+NO_WORLDS = dict.fromkeys(ENDINGS, "a program") | {".mcap": "a recording", ".zip": "an archive", ".txt": "a text"}
 """Endings of files that are neither a project nor an arena, and what they are."""
 
 EXERCISE_FILE = "exercise.kiks"

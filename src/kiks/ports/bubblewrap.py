@@ -12,6 +12,7 @@ from pathlib import Path
 
 import kiks
 from kiks.errors import KiksError
+from kiks.model.package import shipped
 
 _SYSTEM_FOLDERS = ("/bin", "/sbin", "/lib", "/lib32", "/lib64", "/libx32")
 _SYSTEM_FILES = ("/etc/ld.so.cache", "/etc/alternatives", "/etc/localtime")
@@ -68,6 +69,7 @@ def bubblewrap_line(files: Sequence[str], size: int) -> list[str]:
 def python_folders() -> list[Path]:
     """Return the folders that this Python and KiKS need, none of which may hold the home folder."""
     names = {sys.prefix, sys.exec_prefix, sys.base_prefix, sys.base_exec_prefix, *kiks.__path__}
+    names.add(str(shipped("matlab")))
     names |= {*site.getsitepackages(), *([site.getusersitepackages()] if site.ENABLE_USER_SITE else [])}
     folders = {Path(name).resolve() for name in names} | {Path(name) for name in names}
     home = Path.home()

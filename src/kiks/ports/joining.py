@@ -315,10 +315,6 @@ class HostedConnection(SocketConnection):
             self.meet()
         super().pass_to(time_ns)
 
-    def meet(self) -> None:
-        """Wait until the world has come to the program's time."""
-        self.ask(Kind.MEET)
-
     def leave(self) -> None:
         """Leave the world; earlier requests are still done."""
         with suppress(LinkError):

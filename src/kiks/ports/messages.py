@@ -157,6 +157,7 @@ class Start(NamedTuple):
         module: Name of a module to run in place of the file, as `python -m` does; empty for none.
         program: Its file, or a folder or an archive with a `__main__.py`.
         arguments: What it finds in `sys.argv` after its name.
+        pulse_mm: Way of its robot's wheels for a pulse of their encoders [mm].
     """
 
     is_late: bool
@@ -168,6 +169,7 @@ class Start(NamedTuple):
     module: str = ""
     program: str = ""
     arguments: list[str] = []  # noqa: RUF012  (replaced, never changed)
+    pulse_mm: float = 0.0
 
 
 _LENGTH = struct.Struct("<I")

@@ -24,6 +24,7 @@ from kiks.errors import KiksError, ParameterError, shown
 from kiks.meant import nearest_file
 from kiks.model.atomic_files import program_in
 from kiks.model.program_files import ProgramFiles
+from kiks.model.program_kinds import A_PROGRAM, ENDINGS, ProgramKind, program_kind
 from kiks.model.project import Project
 from kiks.ports.environment_marks import HASH_SEED
 from kiks.ports.messages import Start
@@ -82,6 +83,16 @@ class Command:
         return self.module or self.program.name
 
     @property
+    def title(self) -> str:
+        """The same without the ending of its file."""
+        return self.program.stem if self.name.endswith(tuple(ENDINGS)) else self.name
+
+    @property
+    def runs_here(self) -> bool:
+        """Whether it can run in this process: Octave has one of its own."""
+        return program_kind(self.program) is not ProgramKind.OCTAVE
+
+    @property
     def file(self) -> Path:
         """The file that Python reads first."""
         return self.program / "__main__.py" if self.program.is_dir() else self.program
@@ -94,7 +105,7 @@ class Command:
         """Check that the program's file exists."""
         if not self.file.is_file():
             raise ParameterError(
-                f"a program must be a Python file, but there is none at {str(self.program)!r}. Save it first."
+                f"a program must be {A_PROGRAM}, but there is none at {str(self.program)!r}. Save it first."
                 f"{nearest_file(self.file)}"
             )
 
@@ -109,7 +120,8 @@ def commands_of(project: Project, folder: Path) -> list[Command | None]:
 
 def supervisor_of(project: Project, folder: Path) -> Path | None:
     """Return the file of the supervisor of a project in a folder; None if it has none."""
-    return None if project.supervisor is None else program_in(folder, project.supervisor)
+    name = project.supervisor
+    return None if name is None else program_in(folder, name, "supervisor", [ProgramKind.PYTHON])
 
 
 def module_command(module: str, arguments: Sequence[str]) -> Command:

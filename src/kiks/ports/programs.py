@@ -546,6 +546,7 @@ class Programs:
             thinking=thinking,
             offered=self._names.offered(),
             seed=chance_seed(self.sim.seed, robot),
+            pulse_mm=self.sim.specs[robot - 1].body.pulse_mm,
         )
 
     def _record_line(self, robot: int, line: str) -> None:

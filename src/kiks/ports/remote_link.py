@@ -107,6 +107,32 @@ class Connection(ABC):
             raise LinkError(answer.error)
         return answer
 
+    # ---- what a session of Octave asks for; there is nothing to do where its process has the connection alone ----
+
+    def meet(self) -> None:
+        """Wait until the world has come to the program's time."""
+        self.ask(Kind.MEET)
+
+    def rest(self) -> bool:
+        """Note that the program has no open port; return whether the connection stays."""
+        return True
+
+    def wake(self) -> None:  # noqa: B027
+        """Note that it opens one again."""
+
+    def cancel(self) -> None:  # noqa: B027
+        """Note that it waits for no answer any more; from any thread."""
+
+    def halt(self) -> None:  # noqa: B027
+        """Leave the world at once."""
+
+    def close(self) -> None:  # noqa: B027
+        """Leave the world; earlier requests are still done."""
+
+    def live(self, time_ns: int) -> bool:
+        """Let time pass [ns] while the program computes; return whether it did: here its own process sees to that."""
+        return False
+
     def _send(self, kind: int, robot: int, ticket: int, arguments: tuple[Any, ...]) -> None:
         request = Request(kind, robot, self._now_ns, ticket, self._thought_ns, arguments)
         self._told_ns = self._now_ns

@@ -34,6 +34,7 @@ from kiks.model.thinking_policy import split_thinking
 from kiks.ports.bubblewrap import WRITABLE, bubblewrap_line, complaint_of, python_folders
 from kiks.ports.environment_marks import HASH_SEED
 from kiks.ports.messages import Start
+from kiks.ports.other_user import OtherUser
 from kiks.ports.process_table import ProcessorTime, ProcessTable
 from kiks.ports.program_process import Child, python_line
 from kiks.ports.system_calls import system_call_filter
@@ -108,16 +109,20 @@ class Sandbox:
         limits: What the programs may take, together.
         is_trusted: Whether the programs may do what this user may: then it needs no `bwrap`, and its limits hold as far
             as the system lets them.
+        user: Name of another user as whom trusted programs run; empty for this one.
 
     Example:
         >>> with Sandbox([Path("ann")]) as sandbox:  # doctest: +SKIP
         ...     Programs(sim, [Command(Path("ann/program.py"))], sandbox=sandbox).run()
     """
 
-    def __init__(self, files: Sequence[Path] = (), *, limits: Limits | None = None, is_trusted: bool = False) -> None:
+    def __init__(
+        self, files: Sequence[Path] = (), *, limits: Limits | None = None, is_trusted: bool = False, user: str = ""
+    ) -> None:
         self.files = [Path(os.path.abspath(each)) for each in files]
         self.limits = limits or Limits()
         self.is_trusted = is_trusted
+        self.user = OtherUser(user) if user else None
         self._lock = threading.Lock()
         self._processes: _Processes | None = None
 
@@ -241,10 +246,12 @@ class _Processes:
         self.is_over = False
         self.sample_s = TRUSTED_SAMPLE_S if sandbox.is_trusted else SAMPLE_S
         self._lock = threading.Lock()
-        self._is_trusted = sandbox.is_trusted
+        self._is_trusted, self._user = sandbox.is_trusted, sandbox.user
         self._programs: dict[int, SandboxedProgram] = {}
         self._count = 0
         self._scratch = tempfile.mkdtemp(prefix="kiks-sandbox-") if sandbox.is_trusted else ""
+        if self._user is not None:
+            self._user.give(self._scratch)
         self._control, there = socket.socketpair()
         self._sending = threading.Lock()
         self._is_ready = threading.Event()
@@ -320,7 +327,8 @@ class _Processes:
             # With threads. It holds for no superuser, and a watcher outside is late where hundreds compute.
             each["RLIMIT_NPROC"] = THREADS * limits.processes
         line = python_line("-m", "kiks.script.nursery", str(there.fileno()), json.dumps([folders, seen, each]))
-        environment = HASH_SEED | os.environ | STREAMS if self._is_trusted else HASH_SEED | _ENVIRONMENT | STREAMS
+        is_own = self._is_trusted and self._user is None
+        environment = HASH_SEED | (os.environ if is_own else _ENVIRONMENT) | STREAMS
         passed, info = [there.fileno()], None
         if not self._is_trusted:
             words = bubblewrap_line(seen, int(limits.files_mb * _MEGABYTE))
@@ -348,6 +356,7 @@ class _Processes:
                     stderr=errors_there,
                     env=environment,
                     start_new_session=True,
+                    **({} if self._user is None else self._user.options),
                 )
             except OSError as error:
                 self._complaint = f"Cannot start a sandbox: {error}. End other programs."
@@ -465,6 +474,8 @@ class _Processes:
                     with contextlib.suppress(ProcessLookupError, PermissionError):
                         os.kill(sample.process, signal.SIGKILL)
         popen.kill()
+        if self._user is not None:
+            self._user.end_all()
 
 
 def check_sandbox() -> None:

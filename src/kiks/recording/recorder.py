@@ -18,10 +18,13 @@ from time import monotonic
 from typing import Protocol, cast
 
 from kiks.ending import postponing_endings
-from kiks.errors import ParameterError
+from kiks.errors import KiksError, ParameterError
 from kiks.model.atomic_files import path_of
 from kiks.model.checks import check_kind
+from kiks.model.data_file import read_file
+from kiks.model.limits import NOTEBOOK_BYTES_MAX
 from kiks.model.program_files import ProgramFiles
+from kiks.model.program_kinds import program_text
 from kiks.recording.entries import ENTRIES_MAX, FIELD_COUNT, RECORDED_LAYOUT, block_of, characters_in
 from kiks.recording.mcap_file import McapFile
 from kiks.sim.read_completion import NEVER_NS
@@ -258,10 +261,10 @@ def program_texts(programs: Iterable[Path]) -> dict[str, str]:
 
 def _text_of(program: Path) -> str:
     try:
-        with program.open(encoding="utf-8", errors="replace") as file:
-            text = file.read(PROGRAM_CHARACTERS_MAX)
-    except OSError:
+        data = read_file(program, "The program", bytes_max=NOTEBOOK_BYTES_MAX)
+    except KiksError:
         return ""  # its start will tell
+    text = program_text(program, data)[:PROGRAM_CHARACTERS_MAX]
     return "" if "\0" in text else text
 
 

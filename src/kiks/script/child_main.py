@@ -10,10 +10,12 @@ import socket
 import sys
 from pathlib import Path
 
+from kiks import upwards
 from kiks.clock.program_clock import ProgramClock
 from kiks.clock.thinking import save_thinking
 from kiks.ending import end_with_parent
 from kiks.errors import KiksError
+from kiks.model.program_kinds import ProgramKind, program_kind
 from kiks.ports.messages import Kind, Start
 from kiks.ports.remote_link import RemoteLine, SocketConnection
 from kiks.script.runner import run_program
@@ -41,6 +43,8 @@ def main(descriptor: int, start: Start) -> int:
     try:
         # Blocked since the start of the process; what came meanwhile acts here.
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+        if program_kind(Path(start.program)) is ProgramKind.OCTAVE:
+            return int(upwards.run_octave(connection, start, policy))
         return run_program(
             Path(start.program),
             start.arguments,
@@ -51,6 +55,9 @@ def main(descriptor: int, start: Start) -> int:
             start.seed,
             module=start.module,
         )
+    except KiksError as error:
+        print(f"kiks: {error}", file=sys.stderr)
+        return 1
     except KeyboardInterrupt:
         return 130
     finally:

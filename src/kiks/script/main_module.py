@@ -17,7 +17,9 @@ from types import ModuleType
 from typing import Any
 from warnings import catch_warnings
 
+from kiks.model.program_kinds import ProgramKind, program_kind
 from kiks.script.cpython import run_source
+from kiks.script.notebook import run_notebook
 
 
 @contextmanager
@@ -46,7 +48,8 @@ def main_module(program: Path, arguments: list[str], module: str) -> Iterator[Ca
         run = partial(as_main, "__main__", alter_argv=False)
     else:
         sys.path.insert(0, os.path.dirname(os.path.realpath(path)))
-        run = partial(_run_file, path, main)
+        is_notebook = program_kind(program) is ProgramKind.NOTEBOOK
+        run = partial(run_notebook, path, vars(main)) if is_notebook else partial(_run_file, path, main)
     try:
         yield run
     finally:

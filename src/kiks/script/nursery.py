@@ -25,6 +25,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, NoReturn
 
+from kiks.model.program_kinds import ProgramKind, program_kind
 from kiks.ports.messages import Start
 from kiks.script import child_main
 from kiks.script.main_module import clear_names
@@ -43,6 +44,9 @@ WARM = (
 
 WARM_FOR = {b"numpy": "numpy", b"kiks": "kiks.client"}
 """What a program imports, perhaps, whose text has a word in it."""
+
+OCTAVE = "kiks.toolbox.octave_program"
+"""What the process of a program of Octave imports."""
 
 TEXT_MAX = 1 << 20
 """Most bytes that are read of a program's text."""
@@ -222,6 +226,10 @@ class Nursery:
 def _warm_for(start: Start) -> None:
     """Import what a program will import, as far as its text tells: forked processes have it then."""
     program = Path(start.program)
+    if program_kind(program) is ProgramKind.OCTAVE:
+        import_module(OCTAVE)
+        gc.freeze()
+        return
     with contextlib.suppress(OSError), open(program / "__main__.py" if program.is_dir() else program, "rb") as file:
         text = file.read(TEXT_MAX)
         for word, module in WARM_FOR.items():

@@ -139,6 +139,9 @@ def _world(client: SessionClient, words: str) -> str:
     session = client.session
     kind, _, rest = words.partition(" ")
     moves: list[str] = []
+    if session.given is not None:
+        client.close(0)
+        return escape(f"The arena has no effect: {session.given.why_not}")
     if kind == "default":
         session.begin_arena(Arena.default())
     elif kind == "file":

@@ -35,9 +35,6 @@ class ElsewhereConnection(HostedConnection):
         self._ended()
         super().end()
 
-    def wake(self) -> None:
-        """Do nothing: the host waits for the program as soon as it acts."""
-
     def rest(self) -> bool:
         """Leave the world.
 
@@ -48,13 +45,6 @@ class ElsewhereConnection(HostedConnection):
         return False
 
     close = halt = HostedConnection.leave
-
-    def cancel(self) -> None:
-        """Do nothing: the program's thread looks itself whether its answer was cancelled."""
-
-    def live(self, time_ns: int) -> bool:
-        """Return False: the host lets time pass."""
-        return False
 
 
 class RobotElsewhere:
@@ -68,10 +58,16 @@ class RobotElsewhere:
         pulse_mm: Way of its wheels for a pulse of their encoders [mm].
         thinking: The policy for the program's thinking time.
         visit: What open ports belong to: another object when the host has ended the connection.
+        why_not: Why the program cannot see or change the world.
 
     Raises:
         LinkError: If the host does not let the program in.
     """
+
+    why_not = (
+        "the world must be on this computer for that, but the joined robot is on another one. Drive it with commands: "
+        "its host sees and changes the world. kiks_quit leaves it."
+    )
 
     def __init__(self, address: str) -> None:
         self._address = Address.parse(address)

@@ -20,6 +20,7 @@ from kiks.ports.programs import Programs
 from kiks.recording.recorder import RunRecorder
 from kiks.sim.from_project import simulation_of, spec_of
 from kiks.sim.simulation import Simulation
+from kiks.toolbox.given_robot import GivenRobot
 from kiks.toolbox.preferences import Settings
 from kiks.toolbox.robot_elsewhere import RobotElsewhere
 from kiks.units import NS_PER_S
@@ -62,20 +63,29 @@ class Session:
     Args:
         ready: Prepares the engine; called once, before the first world.
         has_window: Whether the desk is shown in a browser.
+        given: See the attribute.
 
     Attributes:
         settings: Settings of the next world.
         desk: The desk of the world; None before the first.
-        elsewhere: The robot on another computer that its program drives in place of a world; None without one.
+        given: The robot of its only program in a world that is there already; None: it begins worlds.
+        elsewhere: That one, or the robot on another computer that its program drives in place of a world; else None.
         clients: The programs that take part.
         owners: The client that owns each robot, by the robot's number.
         lock: Held while a client creates a world or takes a robot.
     """
 
-    def __init__(self, *, ready: Callable[[], None] = lambda: None, has_window: bool = False) -> None:
+    def __init__(
+        self,
+        *,
+        ready: Callable[[], None] = lambda: None,
+        has_window: bool = False,
+        given: GivenRobot | None = None,
+    ) -> None:
         self.settings = Settings()
         self.desk: Desk | None = None
-        self.elsewhere: RobotElsewhere | None = None
+        self.given = given
+        self.elsewhere: RobotElsewhere | GivenRobot | None = given
         self.clients: list[Client] = []
         self.owners: dict[int, object] = {}
         self.lock = threading.RLock()
@@ -125,8 +135,8 @@ class Session:
                     "a robot elsewhere must be the first that a session has, but this one has begun. Call kiks_quit "
                     "first."
                 )
-            self.elsewhere = RobotElsewhere(address)
-            return self.elsewhere.robot
+            self.elsewhere = elsewhere = RobotElsewhere(address)
+            return elsewhere.robot
 
     @property
     def url(self) -> str:
@@ -350,10 +360,7 @@ class Session:
 
     def _check_is_here(self) -> None:
         if self.elsewhere is not None:
-            raise LinkError(
-                "the world must be on this computer for that, but the joined robot is on another one. Drive it with "
-                "commands: its host sees and changes the world. kiks_quit leaves it."
-            )
+            raise LinkError(self.elsewhere.why_not)
 
     def _present_desk(self) -> Desk:
         self._check_is_here()

@@ -18,11 +18,10 @@ from kiks.errors import KiksError, LinkError, ParameterError
 from kiks.model.arena import Arena
 from kiks.ports.local_link import LocalConnection
 from kiks.ports.messages import AwaitedAnswer
-from kiks.ports.remote_link import RemoteLine
+from kiks.ports.remote_link import Connection, RemoteLine
 from kiks.sim.port import VirtualPort
 from kiks.sim.simulation import Simulation
 from kiks.toolbox.own_turrets import OwnTurret, TurretOrder, turret_of
-from kiks.toolbox.robot_elsewhere import ElsewhereConnection
 from kiks.toolbox.session import Session
 from kiks.toolbox.session_clock import SessionClock
 from kiks.toolbox.session_film import SessionFilm
@@ -118,9 +117,11 @@ class SessionClient:
         self.turrets: dict[int, str] = {}
         self.last_line = 0
         self.typed: deque[str] = deque()
-        self.clock = SessionClock()
+        self._given = session.given
+        self._program = ProgramClock("none") if self._given is None else self._given.program
+        self.clock = SessionClock() if self._given is None else self._given.clock
         self._place: object = None
-        self._connection: LocalConnection | ElsewhereConnection | None = None
+        self._connection: Connection | None = None
         self._pace = 1.0, 1.0
         session.clients.append(self)
 
@@ -147,21 +148,21 @@ class SessionClient:
         if not self.ports:
             self._connection.wake()
             # A new clock, so that the time without an open port does not count as thinking.
-            self._program = ProgramClock(session.thinking)
+            self._program = ProgramClock(session.thinking) if self._given is None else self._given.program
         try:
             self.ports[number] = self.openings[number] = self._open(number, baud, self._connection)
         finally:
             self._rest_if_idle()
         self.asked = number
 
-    def _connect(self, number: int) -> LocalConnection | ElsewhereConnection:
+    def _connect(self, number: int) -> Connection:
         session = self.session
         if session.elsewhere is not None:
             return session.elsewhere.connect(number, self.awaited)
         assert session.desk is not None
         return LocalConnection(session.desk.programs, self.name, self.number, self.awaited, SILENCE_ADVICE)
 
-    def _open(self, number: int, baud: int, connection: LocalConnection | ElsewhereConnection) -> OpenPort:
+    def _open(self, number: int, baud: int, connection: Connection) -> OpenPort:
         elsewhere = self.session.elsewhere
         robot = self._robot_here(number) if elsewhere is None else elsewhere.robot_of(number)
         port = VirtualPort(RemoteLine(connection, robot), self._program)
@@ -377,8 +378,8 @@ class SessionClient:
 
     def ask_clock(self) -> SessionClock:
         """Return the program's clock; looking at it may take simulated time, as a poll does."""
-        if self.ports:
-            self.opened(next(iter(self.ports))).port.ask_ns()
+        if (port := self._timer()) is not None:
+            port.ask_ns()
         self._set_clock()
         return self.clock
 
@@ -386,7 +387,7 @@ class SessionClient:
         """Return whether a real pause of the program lets the right time pass: it is measured, and not scaled."""
         desk = self.session.desk
         is_paced = desk is not None and desk.present.gate.speed is not None
-        return not self.ports or (self._program.is_real_time and not is_paced)
+        return self._timer() is None or (self._program.is_real_time and not is_paced)
 
     def pause(self, seconds: float) -> None:
         """Let simulated time pass [s].
@@ -394,10 +395,12 @@ class SessionClient:
         Raises:
             LinkError: If no port is open.
         """
-        if not self.ports:
+        port = self._timer()
+        if port is None:
             raise LinkError("a port must be open for simulated time to pass, but none is. Call kiks_kopen first.")
-        self.opened(next(iter(self.ports))).port.sleep(seconds)
-        self._meet()
+        port.sleep(seconds)
+        if self._connection is not None:
+            self._meet()
 
     def live(self, time_ns: int) -> bool:
         """Let time pass [ns] while the program thinks; return whether it did."""
@@ -448,9 +451,16 @@ class SessionClient:
         """Return the preferred robot of a port: the ports of program 1 begin with robot 1, and so on."""
         return self.number + number - 1
 
+    def _timer(self) -> VirtualPort | None:
+        """Return a port that tells the program's time; None while that is the computer's."""
+        if self.ports:
+            return self.opened(next(iter(self.ports))).port
+        return None if self._given is None else self._given.timer
+
     def _set_clock(self) -> None:
         """Let the program's clock follow the world while a port is open; called after each request."""
-        self.clock.follow(self._connection if self.ports else None)
+        if self._given is None:
+            self.clock.follow(self._connection if self.ports else None)
 
     def _meet(self) -> None:
         """Advance the world to the program's time."""

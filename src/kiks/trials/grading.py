@@ -104,6 +104,7 @@ class Graded:
         grades: The grades, in the order of the submissions.
         likenesses: Pairs of programs that are alike.
         marking: How points became grades.
+        is_trusted: Whether the programs ran without a sandbox, which would keep them from what hidden cases tell.
     """
 
     title: str
@@ -113,6 +114,7 @@ class Graded:
     grades: tuple[Grade, ...]
     likenesses: tuple[Likeness, ...]
     marking: Marking = AS_POINTS
+    is_trusted: bool = False
 
     def seen_by(self, grade: Grade) -> Graded:
         """Return what the student of a grade may see: nothing of hidden cases and of others."""
@@ -158,7 +160,13 @@ def load_exercise(path: Path) -> tuple[Project, Path]:
 
 
 def trials_of(
-    project: Project, folder: Path, submissions: Sequence[Submission], *, is_trusted: bool = False, command: str = ""
+    project: Project,
+    folder: Path,
+    submissions: Sequence[Submission],
+    *,
+    is_trusted: bool = False,
+    command: str = "",
+    user: str = "",
 ) -> list[Trial]:
     """Return a trial for each submission in each case of an exercise; the submission drives robot 1.
 
@@ -168,6 +176,7 @@ def trials_of(
         submissions: What was handed in.
         is_trusted: Whether the programs run without a sandbox.
         command: The command that has begun it, for the recordings.
+        user: See `Trial`.
     """
     cases = cases_of(project.cases)
     worlds = [in_case(project, case, folder) for case in cases]
@@ -179,7 +188,7 @@ def trials_of(
         for number, world in enumerate(worlds, 1):
             others = commands_of(world, folder)[1:]
             name = f"{submission.id}/{number:0{width}}"
-            trials.append(Trial(name, world, folder, (submission.command, *others), is_trusted, command))
+            trials.append(Trial(name, world, folder, (submission.command, *others), is_trusted, command, user))
     return trials
 
 
@@ -194,6 +203,7 @@ def grade(
     attempts: Attempts | None = None,
     is_trusted: bool = False,
     command: str = "",
+    user: str = "",
     workers: int | None = None,
     on_outcome: Callable[[Outcome, int], object] = lambda outcome, count: None,
     on_taken: Callable[[int], object] = lambda count: None,
@@ -210,11 +220,12 @@ def grade(
         attempts: Which one of the submissions of a student counts; each is a grade of its own if left out.
         is_trusted: Whether the programs run without a sandbox.
         command: The command that has begun it, for the recordings.
+        user: See `Trial`.
         workers: See `run_trials`.
         on_outcome: See `run_trials`.
         on_taken: See `run_trials`.
     """
-    trials = trials_of(project, folder, submissions, is_trusted=is_trusted, command=command)
+    trials = trials_of(project, folder, submissions, is_trusted=is_trusted, command=command, user=user)
     outcomes = iter(run_trials(trials, out, workers=workers, on_outcome=on_outcome, on_taken=on_taken))
     cases = cases_of(project.cases)
     grades = []
@@ -242,6 +253,7 @@ def grade(
         tuple(replace(each, like=tuple(like.get(each.submission.id, ()))) for each in grades),
         tuple(Likeness(names[each.first], names[each.second], each.share) for each in likenesses),
         marking,
+        is_trusted,
     )
 
 

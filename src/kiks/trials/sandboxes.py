@@ -21,7 +21,7 @@ class Sandboxes:
 
     def __init__(self, limits: Limits | None = None) -> None:
         self._limits = limits
-        self._kept: OrderedDict[tuple[tuple[Path, ...], int, bool], Sandbox] = OrderedDict()
+        self._kept: OrderedDict[tuple[tuple[Path, ...], int, bool, str], Sandbox] = OrderedDict()
 
     def of(self, trial: Trial) -> dict[int, Sandbox]:
         """Return the sandbox of each robot's program, which runs when this returns.
@@ -35,9 +35,9 @@ class Sandboxes:
                 continue
             # A program that drives several robots has a sandbox for each.
             files = tuple(command.files().shown)
-            key = (files, robot, trial.is_trusted)
+            key = (files, robot, trial.is_trusted, trial.user)
             if key not in self._kept:
-                self._kept[key] = Sandbox(files, limits=self._limits, is_trusted=trial.is_trusted)
+                self._kept[key] = Sandbox(files, limits=self._limits, is_trusted=trial.is_trusted, user=trial.user)
             self._kept.move_to_end(key)
             found[robot] = self._kept[key]
         while len(self._kept) > max(KEPT, len(found)):

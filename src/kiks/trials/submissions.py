@@ -14,7 +14,6 @@ from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from datetime import datetime
-from importlib.util import decode_source
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -22,6 +21,7 @@ from kiks.errors import ParameterError, printable, shown
 from kiks.meant import nearest_file
 from kiks.model.atomic_files import explained
 from kiks.model.program_files import BYTES_MAX, FILES_MAX, MAIN, ProgramFiles
+from kiks.model.program_kinds import ENDINGS, program_text, why_not
 from kiks.ports.program_process import Command
 from kiks.trials.file_tree import (
     File,
@@ -43,14 +43,11 @@ SUBMISSIONS_MAX = 2000
 NAME_MAX = 80
 """Most characters of a submission's name, and most bytes of its word in paths."""
 
-PROGRAMS = (".py", ".ipynb", ".m")
-"""Endings of programs; of several kinds, the first counts."""
-
 _MARK = "ABOUT.txt"
 """File of a folder of copies, which may be deleted."""
 
-_MAINS = [f"{name}{ending}" for ending in PROGRAMS for name in ("__main__", "program", "main")]
-"""Names of the file that runs, the first one that is there."""
+_MAINS = [f"{name}{ending}" for ending in ENDINGS for name in ("__main__", "program", "main")]
+"""Names of the file that runs, the first one that is there; of several kinds of programs, the first one counts."""
 
 _MOODLE = re.compile(r"(?P<name>.+?)_(?P<id>\d+)_assignsubmission_(?P<kind>[a-z]+)_?(?P<file>.*)", re.DOTALL)
 """How Moodle names what it exports: folders or files, for each student one for each kind of hand-in."""
@@ -160,21 +157,6 @@ def cut_to_bytes(name: str) -> str:
     return name.encode("utf-8", "ignore")[:NAME_MAX].decode("utf-8", "ignore")
 
 
-def text_of(program: bytes) -> str:
-    r"""Return the text of a program as Python reads it, or nearly so if Python cannot.
-
-    Example:
-        >>> text_of("\ufeffgo = 1\r\n".encode()), text_of("go = 1\n".encode("utf-16"))
-        ('go = 1\n', 'go = 1\n')
-    """
-    with suppress(SyntaxError, UnicodeError, LookupError):
-        if b"\0" not in program:
-            return decode_source(program)
-    wide = program.startswith((b"\xff\xfe", b"\xfe\xff"))
-    text = program.decode("utf-16" if wide else "utf-8-sig", "replace")
-    return text.replace("\r\n", "\n").replace("\r", "\n")
-
-
 def _found_in(path: Path, what: str) -> list[_Found]:
     """Return the submissions in a path."""
     if path.is_dir():
@@ -265,8 +247,8 @@ def _submission(found: _Found, folder: Path, taken: set[str]) -> Submission:
                 times = [file.time_s for _, file in files_in(found.tree) if file.time_s is not None]
                 time_s = max(times, default=None) if time_s is None else time_s
                 data = _read(found.tree)
-                programs = [path for path in data if path.suffix.lower() in PROGRAMS]
-                texts = {printable(str(path), "_"): text_of(data[path]) for path in programs}
+                programs = [path for path in data if path.suffix.lower() in ENDINGS]
+                texts = {printable(str(path), "_"): program_text(path, data[path]) for path in programs}
                 problem = why_not(next(iter(data)))
                 command = None if problem else Command(_written(data, folder / word))
         except UnreadableError as error:
@@ -274,16 +256,11 @@ def _submission(found: _Found, folder: Path, taken: set[str]) -> Submission:
     return Submission(name, word, command, texts, problem, found.participant, found.email, time_s)
 
 
-def why_not(program: PurePosixPath) -> str:
-    """Return why a program cannot run here, from its name; empty if it can."""
-    return "" if program.suffix.lower() == ".py" else f"{program.name} is no program in Python"
-
-
 def _read(tree: Folder, *, is_nested: bool = False) -> dict[PurePosixPath, bytes]:
     """Return the files of a submission, within bounds, the one that runs first."""
     tree = descended(tree)
     here = {name: each for name, each in tree.items() if isinstance(each, File)}
-    programs = [name for name in here if Path(name).suffix.lower() in PROGRAMS]
+    programs = [name for name in here if Path(name).suffix.lower() in ENDINGS]
     archives = [name for name in here if archive_ending(name)]
     if not programs and len(archives) == 1 and not is_nested:
         return _read(tree_of_archive(here[archives[0]].read(HAND_IN_BYTES_MAX)), is_nested=True)
@@ -305,7 +282,7 @@ def _main_of(programs: Sequence[str], tree: Folder) -> str:
     for name in _MAINS:
         if name in programs:
             return name
-    for ending in PROGRAMS:
+    for ending in ENDINGS:
         kind = [name for name in programs if name.lower().endswith(ending)]
         if len(kind) > 1:
             raise UnreadableError(
@@ -317,7 +294,7 @@ def _main_of(programs: Sequence[str], tree: Folder) -> str:
         if isinstance(each, File):
             each.read(HAND_IN_BYTES_MAX)  # what cannot be read says why
     raise UnreadableError(
-        f"it has no program, a file that ends in {', '.join(PROGRAMS)}: "
+        f"it has no program, a file that ends in {', '.join(ENDINGS)}: "
         + (f"there is {_listed(tree)}" if tree else "its folder is empty")
     )
 

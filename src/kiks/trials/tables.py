@@ -129,13 +129,19 @@ def _blank(number: float | None) -> float | str:
 def gradescope_results(graded: Graded, grade: Grade) -> dict[str, Any]:
     """Return the results of a submission as Gradescope's autograder reads them, with its leaderboard.
 
-    A case counts the mean's share of its points, so their sum is the submission's.
+    A case counts the mean's share of its points, so their sum is the submission's. Of an exercise with hidden cases it
+    tells what a program said only if a sandbox kept the program from seeing them, in the exercise or in another run.
     """
     count = len(graded.cases)
+    is_quiet = graded.is_trusted and any(case.is_hidden for case in graded.cases)
     tests = []
     for case, outcome in zip(graded.cases, grade.outcomes, strict=False):
         end = outcome.end_of()
-        lines = [how_it_went(outcome), *([end.detail] if end.detail else []), *end.printed]
+        lines = [how_it_went(outcome)]
+        if is_quiet:
+            lines.append("What the program printed is not shown, as the exercise has hidden cases.")
+        else:
+            lines += [*([end.detail] if end.detail else []), *end.printed]
         tests.append(
             {
                 "name": case.name,

@@ -76,6 +76,7 @@ class Trial:
         programs: The program of each robot; None for a robot without one.
         is_trusted: Whether the programs may do what this user may; otherwise each runs in a sandbox.
         command: The command that has begun it, for its recording; empty for none.
+        user: Name of another user as whom its trusted programs run; empty for this one.
 
     Example:
         >>> from kiks.ports.program_process import Command
@@ -89,6 +90,7 @@ class Trial:
     programs: tuple[Command | None, ...]
     is_trusted: bool = False
     command: str = ""
+    user: str = ""
 
     @property
     def recording(self) -> str:
@@ -98,7 +100,7 @@ class Trial:
     @cached_property
     def key(self) -> str:
         """A digest of all that its outcome depends on: its world, all files of its programs, the version of KiKS."""
-        digest = hashlib.sha256(f"{__version__}\0{self.is_trusted}\0".encode())
+        digest = hashlib.sha256(f"{__version__}\0{self.is_trusted}\0{self.user}\0".encode())
         for data in self._parts():
             digest.update(b"%d\0" % len(data))
             digest.update(data)

@@ -27,15 +27,15 @@ def packed(trial: Trial, folder: Path) -> str:
     """Return a trial as text for a worker, with the output folder."""
     programs = [each and [str(each.program), each.arguments, each.module] for each in trial.programs]
     text = trial.project.to_bytes().decode()
-    fields = [str(folder), trial.name, text, str(trial.folder), programs, trial.is_trusted, trial.command, trial.key]
-    return json.dumps(fields)
+    fields = [str(folder), trial.name, text, str(trial.folder), programs, trial.is_trusted, trial.command, trial.user]
+    return json.dumps([*fields, trial.key])
 
 
 def unpacked(text: str) -> tuple[Trial, Path]:
     """Return the trial and the output folder of a text of `packed`."""
-    folder, name, project, home, programs, is_trusted, command, key = json.loads(text)
+    folder, name, project, home, programs, is_trusted, command, user, key = json.loads(text)
     commands = tuple(each and Command(Path(each[0]), each[1], each[2]) for each in programs)
-    trial = Trial(name, Project.from_bytes(project.encode()), Path(home), commands, is_trusted, command)
+    trial = Trial(name, Project.from_bytes(project.encode()), Path(home), commands, is_trusted, command, user)
     vars(trial)["key"] = key  # its digest would take longer than to read it
     return trial, Path(folder)
 

@@ -18,6 +18,7 @@ from kiks.desk.server.desk import Desk
 from kiks.desk.server.scripts import EXAMPLES, NEW
 from kiks.errors import KiksError, ParameterError
 from kiks.model.exercise import STUDENT, Exercise
+from kiks.model.program_kinds import ProgramKind, program_kind
 from kiks.ports.program_process import Command
 from kiks.ports.programs import Handle
 
@@ -320,6 +321,7 @@ class ProgramsPanel(Panel):
     def _edit(self, script: Path | None, name: str, text: str) -> None:
         self._script = script
         self._name.value = name
+        self._editor.set_language("Octave" if program_kind(Path(name)) is ProgramKind.OCTAVE else "Python")
         self._editor.value = text
         self._check()
 
@@ -363,7 +365,7 @@ class ProgramsPanel(Panel):
             name = folder.full_name(script.name if script is not None else self._name.value or "")
             if script is not None:
                 folder.question(name)
-            data = scripts.encode_script(text)
+            data = scripts.encode_script(text, name)
             await asyncio.to_thread(folder.save, data, name, "a program", may_replace=script is not None)
         except KiksError:
             return  # "Save" says what is wrong
@@ -379,7 +381,7 @@ class ProgramsPanel(Panel):
     def _check(self) -> bool:
         """Mark the first mistake of the program, and return whether there is one."""
         self._checked = self._editor.value or ""
-        mistake = scripts.find_mistake(self._checked)
+        mistake = scripts.find_mistake(self._checked, self._name.value or "")
         self._mistake.text = "" if mistake is None else str(mistake)
         marks: list[dict[str, Any]] = []
         if mistake is not None:
@@ -395,7 +397,7 @@ class ProgramsPanel(Panel):
         """Save the program under its name and return its file; None if another one would be replaced and is to stay."""
         script, text, folder = self._script, self._editor.value or "", self._folder
         name = self._name.value or ""
-        encoded: Encoded = scripts.encode_script(text), {}
+        encoded: Encoded = scripts.encode_script(text, name), {}
         is_own = script == folder.path / folder.full_name(name)
         saved = await save_in(folder, encoded, name, "a program", is_own=is_own)
         if saved is None:
@@ -432,8 +434,8 @@ class ProgramsPanel(Panel):
             raise ParameterError(f"The program has a mistake. {self._mistake.text}")
         arguments = scripts.split_arguments(self._arguments.value or "")
         script = self._script
-        is_from_elsewhere = script is not None and script.parent != self._folder.path
-        if script is None or not is_from_elsewhere or self._editor.value != scripts.read_script(script):
+        is_kept = script is not None and (script.parent != self._folder.path or scripts.is_notebook(script.name))
+        if script is None or not is_kept or self._editor.value != scripts.read_script(script):
             script = await self._stored()
         return None if script is None else Command(script, arguments)
 

@@ -276,7 +276,7 @@ class Desk:
         found = []
         for number, name in enumerate(self.names(), 1):
             command = running.get(number, self.attached(number))
-            program = f"robot {number}" if command is None else command.name.removesuffix(".py")
+            program = f"robot {number}" if command is None else command.title
             found.append(program if name == str(number) else name)
         return [f"{name} {number}" if found.count(name) > 1 else name for number, name in enumerate(found, 1)]
 
@@ -469,7 +469,7 @@ class Desk:
         pairs = zip(self.home.commands(changed), project.robots, strict=True)
         if left := [command.name for command, robot in pairs if command is not None and robot.program is None]:
             self.say(
-                f"Not saved with the project: {', '.join(left)}. A project's program is a .py file, which may import "
+                f"Not saved with the project: {', '.join(left)}. A project's program is a file, which may import "
                 "the folder or module."
             )
         return replace(project, arena=replace(project.arena, name=path.stem)), beside

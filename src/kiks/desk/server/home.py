@@ -11,6 +11,7 @@ from pathlib import Path, PurePosixPath
 from kiks.errors import ParameterError
 from kiks.model.atomic_files import inside, program_in
 from kiks.model.program_files import ProgramFiles
+from kiks.model.program_kinds import ENDINGS
 from kiks.model.project import Project, ProjectRobot
 from kiks.model.project_files import bytes_of, files_named
 from kiks.ports.program_process import Command, commands_of, supervisor_of
@@ -77,7 +78,7 @@ class Home:
 
         def name_there(command: Command) -> str | None:
             path = command.program.resolve()
-            if command.module or path.suffix != ".py" or not path.is_file():
+            if command.module or path.suffix not in ENDINGS or not path.is_file():
                 return None
             return _name_in(files.folder, path) or files.add_program(path, _name_in(self.folder, path) or path.name)
 

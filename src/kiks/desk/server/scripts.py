@@ -1,4 +1,4 @@
-"""The Python programs of a desk: listed, read, and checked before they run."""
+"""The programs of a desk: listed, read, and checked before they run."""
 
 from __future__ import annotations
 
@@ -7,14 +7,16 @@ import shlex
 import unicodedata
 import warnings
 from collections.abc import Iterable
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import NamedTuple
 
 from kiks.desk.server.folder import Folder
 from kiks.errors import ParameterError, shown
 from kiks.model.atomic_files import program_in
-from kiks.model.limits import PROGRAM_BYTES_MAX
+from kiks.model.data_file import read_file
+from kiks.model.limits import NOTEBOOK_BYTES_MAX, PROGRAM_BYTES_MAX
 from kiks.model.package import shipped
+from kiks.model.program_kinds import ENDINGS, ProgramKind, program_kind, program_text
 from kiks.ports.program_process import Command
 
 EXAMPLES = shipped("examples/demos").resolve()
@@ -34,14 +36,14 @@ with serial.Serial("/dev/ttyUSB0", 9600, timeout=1) as port:
 class ProgramFolder(Folder):
     """A folder whose files are programs; those in folders below it are not offered."""
 
-    opened = saved = (".py",)
+    opened = saved = tuple(ENDINGS)
     depth_max = 0
 
 
 def offered(folder: Folder, commands: Iterable[Command] = ()) -> dict[Path, str]:
     """Return the programs of a folder, those of its project and the examples, with what the list calls them."""
     own = {folder.path / name: name for name in folder.names()}
-    files = {each.program.resolve() for each in commands if each.program.suffix == ".py"}
+    files = {each.program.resolve() for each in commands if each.program.suffix in ENDINGS}
     attached = {path: f"{path.name} of the project" for path in sorted(files - own.keys()) if path.is_file()}
     examples = {path: f"example: {path.stem.replace('_', ' ')}" for path in sorted(EXAMPLES.glob("[!_]*.py"))}
     return own | examples | attached
@@ -59,9 +61,12 @@ def name_of(title: str) -> str:
 
 
 def read_script(path: Path) -> str:
-    """Return the text of a program."""
+    """Return the text of a program; of a notebook, that of its cells."""
     path, name = program_in(path.parent, path.name), path.name
     try:
+        if is_notebook(name):
+            what = f"The notebook {shown(name)}"
+            return program_text(path, read_file(path, what, bytes_max=NOTEBOOK_BYTES_MAX))[:PROGRAM_BYTES_MAX]
         if path.stat().st_size > PROGRAM_BYTES_MAX:
             raise ParameterError(
                 f"a program must have at most {PROGRAM_BYTES_MAX} bytes to be edited here, but "
@@ -72,8 +77,18 @@ def read_script(path: Path) -> str:
         raise ParameterError(f"a program must be readable text, but {shown(name)} is not: {error}.") from None
 
 
-def encode_script(text: str) -> bytes:
-    """Return the bytes of a program's file."""
+def is_notebook(name: str) -> bool:
+    """Return whether a program is a notebook, which the desk shows and runs, but does not change."""
+    return program_kind(PurePath(name)) is ProgramKind.NOTEBOOK
+
+
+def encode_script(text: str, name: str = "") -> bytes:
+    """Return the bytes of a program's file, of which the name tells the kind."""
+    if is_notebook(name):
+        raise ParameterError(
+            f"a notebook must be changed in Jupyter, but {shown(name)} was changed here. Save this text as another "
+            "program, under a name that ends in .py."
+        )
     data = text.encode("utf-8", errors="replace")
     if len(data) > PROGRAM_BYTES_MAX:
         raise ParameterError(f"a program must have at most {PROGRAM_BYTES_MAX} bytes, but this one has {len(data)}.")
@@ -99,13 +114,19 @@ class Mistake(NamedTuple):
         return f"Line {self.line}: {self.message}"
 
 
-def find_mistake(text: str) -> Mistake | None:
+def find_mistake(text: str, name: str = "") -> Mistake | None:
     r"""Return the first syntax error of a program, which is compiled and not executed; None if it has none.
+
+    Args:
+        text: The program.
+        name: The name of its file: in Octave's language nothing is looked for.
 
     Example:
         >>> print(find_mistake("x = 1\nif x = 2:\n    pass\n"))
         Line 2: invalid syntax. Maybe you meant '==' or ':=' instead of '='?
     """
+    if program_kind(PurePath(name)) is ProgramKind.OCTAVE:
+        return None
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")

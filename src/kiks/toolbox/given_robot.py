@@ -1,0 +1,51 @@
+"""The robot of a program of Octave in a world that the program has not begun."""
+
+from __future__ import annotations
+
+from kiks.clock.program_clock import EPOCH_S, ProgramClock
+from kiks.ports.messages import AwaitedAnswer, Kind, Start
+from kiks.ports.remote_link import Connection, RemoteLine
+from kiks.sim.port import VirtualPort
+from kiks.toolbox.session_clock import SessionClock
+from kiks.units import NS_PER_S
+
+
+class GivenRobot:
+    """The robot of a program in a world that the program has not begun; it stands in for a `RobotElsewhere`.
+
+    Args:
+        connection: The connection to the world.
+        start: What the program finds.
+        program: The cost of its thinking.
+
+    Attributes:
+        visit: What open ports belong to.
+        timer: A port that tells the program's time.
+        clock: What the clocks of the program tell.
+        pulse_mm: Way of the wheels for a pulse of their encoders [mm].
+        program: The cost of its thinking.
+        why_not: Why the program cannot see or change the world.
+    """
+
+    why_not = (
+        "this program must have begun the world for that, but the world was there before it. Drive the robot with "
+        "commands."
+    )
+
+    def __init__(self, connection: Connection, start: Start, program: ProgramClock) -> None:
+        self._connection = connection
+        self.pulse_mm, self.thinking, self.program = start.pulse_mm, start.thinking, program
+        self.visit = object()
+        self.timer = VirtualPort(RemoteLine(connection, 1), program)
+        self.clock = SessionClock(wall_ns=lambda: connection.now_ns, date_ns=EPOCH_S * NS_PER_S)
+
+    def robot_of(self, number: int) -> int:
+        """Return the robot of a port: the program's own, then those that are free."""
+        return int(self._connection.ask(Kind.FIND, 0, f"port -{number}").result)
+
+    def connect(self, number: int, awaited: AwaitedAnswer) -> Connection:
+        """Return the connection, which stays until the program ends."""
+        return self._connection
+
+    def close(self) -> None:
+        """Do nothing: the world waits for the program until it ends."""
