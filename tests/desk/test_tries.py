@@ -1,18 +1,30 @@
 """A program tried in all cases from the desk: in the visible ones, until a person stops it, or with a message."""
 
+import asyncio
+import json
+import re
+import threading
 from dataclasses import replace
+from functools import partial
+from io import BytesIO
 from pathlib import Path
+from zipfile import ZipFile
 
 import pytest
 from tests.guard import wait_until
 
-from kiks.desk.server.tries import _TURNS, Tries
+from kiks.desk.server import tries as module
+from kiks.desk.server.desk import Desk
+from kiks.desk.server.tries import Tries
+from kiks.desk.server.turns import Share, Turns
 from kiks.errors import ParameterError
 from kiks.model.arena import Arena
 from kiks.model.exercise import Cases, Exercise
 from kiks.model.goal import Goal
 from kiks.model.project import Project
 from kiks.ports.program_process import Command
+from kiks.sim.from_project import simulation_of
+from kiks.trials.hand_in import PAGE, PROGRAM, RECORDING, SCORE
 
 CASES = Cases(seed=(1, 2)), Cases("mine", is_hidden=True)
 GOAL = Goal(solved="path_mm > 20")
@@ -26,13 +38,15 @@ def program(folder: Path, text: str) -> Command:
     return Command(folder / "drive.py")
 
 
-def test_tries_are_those_of_a_program_wait_for_others_and_can_be_stopped(tmp_path: Path) -> None:
-    tries, drive, turns = Tries(), program(tmp_path, DRIVE), 0
-    while _TURNS.acquire(blocking=False):
-        turns += 1
+def test_tries_are_those_of_a_program_wait_for_others_and_can_be_stopped(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "TRIES", turns := Turns(1))
+    tries, drive, is_over = Tries(), program(tmp_path, DRIVE), threading.Event()
+    turns.start(is_over.wait, Share())
     tries.begin(PROJECT, tmp_path, drive, has_hidden=False)
     wait_until(lambda: tries.is_waiting)
-    _TURNS.release(turns)
+    is_over.set()
     tries.wait()
     assert (tries.is_waiting, tries.is_whole, tries.error) == (False, True, "")
     assert ([case.seed for case in tries.cases], tries.grade.points, tries.grade.solved) == ([1, 2], 1, 2)
@@ -47,9 +61,51 @@ def test_tries_are_those_of_a_program_wait_for_others_and_can_be_stopped(tmp_pat
     tries.stop()
     wait_until(lambda: not tries.is_running)
     assert (len(tries.cases), tries.outcomes, tries.is_whole) == (3, {}, False)
-    with pytest.raises(ParameterError, match="All cases must have come out"):
-        tries.packed()
+    assert tries.error == ""
     tries.close()
+
+
+def test_the_next_turn_is_for_who_has_had_the_least() -> None:
+    turns, is_over, done = Turns(1), threading.Event(), []
+    busy = turns.start(is_over.wait, Share())
+    shares = {"much": Share(60.0), "nothing": Share(), "little": Share(1.0), "nothing, too": Share()}
+    ends = []
+    for name, share in shares.items():
+        ends.append(turns.start(partial(done.append, name), share))
+        wait_until(lambda share=share: share.is_waiting)
+    left = turns.start(partial(done.append, "left"), Share(), lambda: False)
+    assert left.result() is None
+    is_over.set()
+    assert [end.result() for end in (busy, *ends)] == [True, None, None, None, None]
+    assert done == ["nothing", "nothing, too", "little", "much"]
+
+
+def test_a_program_is_handed_in_at_once_and_then_with_its_run_and_a_long_turn_ends(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    files: list[dict[str, bytes]] = []
+
+    def take(data: bytes, name: str = "drive.zip", *, is_again: bool = False) -> None:
+        with ZipFile(BytesIO(data)) as archive:
+            files.append({each: archive.read(each) for each in archive.namelist()})
+
+    folder = tmp_path / "desk"
+    folder.mkdir()
+    desk = Desk(simulation_of(PROJECT), project=PROJECT, folder=folder, may_run_programs=True, is_for_others=True)
+    desk.hand_in = take
+    asyncio.run(desk.give(program(folder, DRIVE), "drive.zip"))
+    assert [*files[0]] == [PROGRAM, SCORE]
+    desk.tries.wait()
+    assert (desk.tries.error, [*files[1]]) == ("", [PROGRAM, SCORE, RECORDING, PAGE])
+    assert files[0][PROGRAM] == files[1][PROGRAM] == DRIVE.encode()
+    assert json.loads(files[1][SCORE])["solved"] == 2
+
+    monkeypatch.setattr(module, "TURN_S", 0.0)
+    asyncio.run(desk.give(program(folder, "while True:\n    pass\n"), "drive.zip"))
+    desk.tries.wait()
+    assert (len(files), desk.tries.is_handed_in) == (3, True)
+    assert re.fullmatch(r"All cases must come out .* after that 2 cases had not\. .*", desk.tries.error)
+    desk.close()
 
 
 def test_what_cannot_be_tried_is_said(tmp_path: Path) -> None:
@@ -58,6 +114,5 @@ def test_what_cannot_be_tried_is_said(tmp_path: Path) -> None:
         tries.begin(replace(PROJECT, robots=()), tmp_path, drive, has_hidden=False)
     tries.begin(replace(PROJECT, seconds=None), tmp_path, drive, has_hidden=False)
     tries.wait()
-    with pytest.raises(ParameterError, match=r"'0' cannot begin: a project .* must have a time limit"):
-        tries.packed()
+    assert re.match(r"'0' cannot begin: a project .* must have a time limit", tries.error)
     tries.close()

@@ -17,21 +17,22 @@ HAND_IN_BYTES_MAX = 64 << 20
 _DATE = (1980, 1, 1, 0, 0, 0)  # the same content makes the same file
 
 
-def packed(program: bytes, score: Mapping[str, Any], *, recording: bytes, page: bytes) -> bytes:
+def packed(program: bytes, score: Mapping[str, Any], *, recording: bytes = b"", page: bytes = b"") -> bytes:
     """Return the file; `kiks.trials.submissions` reads it. Its score is what the student saw: graders run the program.
 
     Args:
         program: The program.
         score: How it has done in the visible cases, for JSON.
-        recording: The recording of one of the runs.
-        page: The page of that recording.
+        recording: The recording of one of the runs; none if left out.
+        page: The page of that recording; none if left out.
 
     Example:
-        >>> data = packed(b"print(1)", {"points": 3}, recording=b"", page=b"")
+        >>> data = packed(b"print(1)", {"points": 3})
         >>> zipfile.ZipFile(io.BytesIO(data)).namelist()
-        ['program.py', 'score.json', 'recording.mcap', 'run.html']
+        ['program.py', 'score.json']
     """
-    files = {PROGRAM: program, SCORE: json.dumps(score, indent=1).encode(), RECORDING: recording, PAGE: page}
+    files = {PROGRAM: program, SCORE: json.dumps(score, indent=1).encode()}
+    files |= {name: data for name, data in ((RECORDING, recording), (PAGE, page)) if data}
     made = io.BytesIO()
     with zipfile.ZipFile(made, "w") as archive:
         for name, data in files.items():
