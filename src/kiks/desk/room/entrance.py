@@ -61,8 +61,8 @@ OF_ONE, OF_ALL = Rate(20, 0.5), Rate(200, 5.0)
 KiKS makes is one of a thousand million."""
 
 PAUSE_MAX_S = 2.0
-"""Longest pause before a code is looked at [s]. A connection without a token has one code looked at at a time, and there
-are few of those (`STRANGERS_MAX`): a guesser needs half a year for half of all codes."""
+"""Longest pause before a code is looked at [s]. Connections without a token are few (`STRANGERS_MAX`), each with a code
+at a time: a guesser needs half a year for half of all codes."""
 
 
 class Guesses:

@@ -143,12 +143,10 @@ class Room:
             SERVER.run(self._leave())
         for each in self.desks.values():
             each.stop()
-        # Each may have to wait for its programs.
+        # Each may have to wait for its programs, and these end with their sandboxes.
         with ThreadPoolExecutor(CLOSERS, "kiks room") as closers:
-            for close in [each.close for each in self.desks.values()]:
-                closers.submit(close)
-        for sandbox in self._sandboxes:
-            sandbox.close()
+            for each in (*self.desks.values(), *self._sandboxes):
+                closers.submit(each.close)
 
     async def _leave(self) -> None:
         async with self._turn:  # nobody is coming in

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+import os
 import subprocess
+import sys
 import tempfile
+import threading
 import time
 from collections.abc import Callable
 from concurrent.futures import Future, wait
@@ -30,6 +33,9 @@ from kiks.version import __version__
 
 TURN_S = 120.0
 """Longest turn of one student in a room, in all cases together [s of real time]."""
+
+NICE = 10
+"""How much they leave the processors to others, from 0 to 19."""
 
 END_S = 2.0
 """Longest wait for the end of what has been stopped [s]."""
@@ -128,6 +134,9 @@ class Tries:
         programs[STUDENT - 1] = command
 
         def run() -> None:
+            if self._is_for_others and sys.platform == "linux":
+                # Of this thread alone, and so of the processes that it starts: pages come first.
+                os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), NICE)
             try:
                 if not self.is_whole:
                     self._try(project, home, tuple(programs))
