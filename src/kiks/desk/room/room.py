@@ -141,8 +141,8 @@ class Room:
         self._starter.shutdown(cancel_futures=True)
         if SERVER.is_running:
             SERVER.run(self._leave())
-        for each in self.desks.values():
-            each.stop()
+        for desk in self.desks.values():
+            desk.stop()
         # Each may have to wait for its programs, and these end with their sandboxes.
         with ThreadPoolExecutor(CLOSERS, "kiks room") as closers:
             for each in (*self.desks.values(), *self._sandboxes):
