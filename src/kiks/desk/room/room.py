@@ -145,8 +145,9 @@ class Room:
             desk.stop()
         # Each may have to wait for its programs, and these end with their sandboxes.
         with ThreadPoolExecutor(CLOSERS, "kiks room") as closers:
-            for each in (*self.desks.values(), *self._sandboxes):
-                closers.submit(each.close)
+            closes = [desk.close for desk in self.desks.values()] + [sandbox.close for sandbox in self._sandboxes]
+            for close in closes:
+                closers.submit(close)
 
     async def _leave(self) -> None:
         async with self._turn:  # nobody is coming in
