@@ -86,7 +86,7 @@ class Person:
         self._place = f"/{answer.url.path.split('/')[1]}"
         found = re.search(r"""client_id['"]: ?['"]([0-9a-f-]{36})""", answer.text)
         assert found is not None
-        self._page = found[1]
+        self._page, self.text = found[1], answer.text
         return answer.url.path
 
     def _socket(self, path: str) -> connect:

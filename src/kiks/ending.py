@@ -64,14 +64,20 @@ def end_with_parent() -> None:
 
 def leave_threads() -> None:
     """End an interrupted process without a wait for threads of it that are in code that does not return."""
-    import atexit
     import threading
 
     if any(not thread.daemon and thread is not threading.current_thread() for thread in threading.enumerate()):
-        atexit._run_exitfuncs()
-        for stream in (sys.stdout, sys.stderr):
-            stream.flush()
-        os._exit(INTERRUPTED)
+        leave_interrupted()
+
+
+def leave_interrupted() -> NoReturn:
+    """End an interrupted process after what is due at its end, and take no memory apart: that may be long."""
+    import atexit
+
+    atexit._run_exitfuncs()
+    for stream in (sys.stdout, sys.stderr):
+        stream.flush()
+    os._exit(INTERRUPTED)
 
 
 def leave(code: int, line: str) -> NoReturn:

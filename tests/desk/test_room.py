@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 from urllib.parse import urlencode
 
@@ -19,12 +20,13 @@ from tests.namespaces import needs_sandbox
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection
 
+from kiks.desk.room import entrance
 from kiks.desk.room.entrance import Guesses, check_code
 from kiks.desk.room.names import folder_name, read_names
 from kiks.desk.room.page import open_room
 from kiks.desk.room.room import SPEED_MAX, Room
 from kiks.desk.server import fair_share
-from kiks.desk.server.access import KEY
+from kiks.desk.server.access import KEY, STRANGERS_MAX
 from kiks.desk.server.server import SERVER
 from kiks.desk.server.token import COOKIE, Token
 from kiks.errors import KiksError, ParameterError
@@ -172,15 +174,24 @@ def test_messages_reach_pages_of_the_same_token_alone(room: Room) -> None:
     assert ada.ask(upload, "POST", "x", content_length="1")[0] == 404
 
 
-def test_a_student_who_asks_too_much_is_refused_and_a_guesser_has_to_wait(room: Room) -> None:
+def test_a_student_who_asks_too_much_is_refused_and_a_guesser_shuts_nobody_out(
+    room: Room, monkeypatch: pytest.MonkeyPatch
+) -> None:
     ada, bob = entered("Ada", "Bob")
     answers = [ada.page("desk/1/unknown")[0] for _ in range(40)]
     assert (answers[:15], answers[-1]) == ([404] * 15, 429)
     assert bob.page("desk/2")[0] == OWNER.page("desk/1")[0] == 200
-    guesser = Browser()
-    answers = [guesser.ask("/?code=AAAAA" + letter)[0] for letter in "BCDEFGHIJKLMNOPQRSTUVWXYZ"]
-    assert (answers[:10], answers[-1]) == ([403] * 10, 429)
-    assert guesser.enter("Ada") == 429
+    pauses = []
+
+    async def sleep(pause_s: float) -> None:
+        pauses.append(pause_s)
+
+    monkeypatch.setattr(entrance, "asyncio", SimpleNamespace(sleep=sleep))
+    wrong = ["AAAAA" + letter for letter in "BCDEFGHIJKLMNOPQRSTUVWXYZ"]
+    assert {Browser().ask("/?code=" + code)[0] for code in wrong} == {403}
+    assert Browser().enter("../etc") == 200
+    assert len(pauses) >= 2
+    assert max(pauses) <= entrance.PAUSE_MAX_S
 
 
 def test_a_browser_that_goes_on_asking_too_much_is_served_at_its_rate(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -206,16 +217,17 @@ def test_a_browser_that_goes_on_asking_too_much_is_served_at_its_rate(monkeypatc
 
 
 def test_wrong_codes_are_few() -> None:
+    """All that strangers can do is to wait with each of their connections before each of their codes."""
     now = [0.0]
-    guesses = Guesses(wall_s=lambda: now[0])
-    borne = 0
-    for second in range(600):
-        now[0] = float(second)
-        for _ in range(100):
-            if not guesses.must_wait(f"192.0.2.{second % 200}"):
-                borne += 1
-                guesses.note_wrong(f"192.0.2.{second % 200}")
-    assert borne <= 200 + 5 * 600
+    guesses, borne = Guesses(wall_s=lambda: now[0]), 0
+    while now[0] < 600:
+        address = f"192.0.2.{borne % 200}"
+        pause_s = guesses.pause_s(address)
+        for _ in range(STRANGERS_MAX):
+            guesses.note_wrong(address)
+            borne += 1
+        now[0] += pause_s
+    assert borne <= 400 + 600 / entrance.PAUSE_MAX_S * STRANGERS_MAX
 
 
 def test_a_wrong_file_of_names_gets_one_line(tmp_path: Path) -> None:

@@ -1,15 +1,20 @@
 """A room in Chromium: three students and the lecturer, from the first click to what is handed in."""
 
+import socket
+import subprocess
+import sys
 from contextlib import ExitStack, closing
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from tests.at_length import cases
+from tests.at_length import at_length, cases
 from tests.desk import visitor
 from tests.desk.test_exercise import DRIVE, make_exercise
 from tests.desk.test_proxies import PathProxy
 from tests.desk.visitor import FIRST_PICTURE, Browser, NewPage, Page, check_access, check_reach, expect, leave_picture
+from tests.guard import wait_until
 
 NAMES = ["Ada Lovelace", "Alan Turing", "Grace <b>Hopper</b>", "J\xf6rg M\xfcller"]
 
@@ -121,3 +126,43 @@ def test_a_class_comes_solves_and_hands_in(
         students[0].wait_for_function(FIRST_PICTURE)
         assert students[0].url.endswith("/desk/1")
         students[2].context.close()
+        expect(lecturer.get_by_test_id(f"seat-{NAMES[2]}").get_by_test_id("state")).to_have_text("away")
+
+
+KEPT = "() => Object.keys(localStorage).filter((key) => key.startsWith('kiks-typed'))"
+
+
+@pytest.mark.slow
+@at_length
+def test_a_page_finds_its_room_again_after_a_kill_with_all_that_was_typed(tmp_path: Path, browser: Browser) -> None:
+    make_exercise().save(tmp_path / "lamp.kiks")
+    (tmp_path / "names.txt").write_text(NAMES[0])
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port = free.getsockname()[1]
+    command = [sys.executable, "-m", "kiks", "room", "lamp.kiks", "--students", "names.txt", "--trusted"]
+    command += ["--port", str(port), "--code", "KX7Q2M"]
+    file = tmp_path / "room" / "desks" / NAMES[0] / "to_the_lamp.py"
+    page = browser.new_page()
+    with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, text=True) as first:
+        assert first.stdout is not None
+        first.stdout.readline()
+        come_in(page, SimpleNamespace(address=f"http://127.0.0.1:{port}/", code="KX7Q2M"), NAMES[0])
+        page.get_by_test_id("tab-programs").click()
+        visitor.write(page, "# saved\n")
+        wait_until(lambda: file.is_file() and file.read_text().startswith("# saved"))
+        page.wait_for_function(f"() => !({KEPT})().length")
+        first.kill()
+    before = file.read_text()
+    page.keyboard.insert_text("# typed while it was away\n")
+    page.wait_for_function(f"() => ({KEPT})().length")
+    file.write_text("# by the lecturer\n" + before)
+    with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, text=True) as second:
+        expect(page.get_by_text("What you typed while the connection was away is saved")).to_be_visible()
+        expect(page.locator(".cm-content")).to_contain_text("# typed while it was away")
+        page.wait_for_function(f"() => !({KEPT})().length")
+        second.terminate()
+    assert (
+        file.read_text()
+        == f"# by the lecturer\n# saved\n# typed while it was away\n{before.removeprefix('# saved')[1:]}"
+    )
+    page.close()

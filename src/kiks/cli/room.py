@@ -11,7 +11,7 @@ import typer
 from kiks.cli.desk import wait_for
 from kiks.cli.engine_start import ready_engine
 from kiks.cli.options import Address, Trusted, public_address_of, say
-from kiks.ending import end_as_with_ctrl_c
+from kiks.ending import end_as_with_ctrl_c, leave_interrupted
 
 
 def room(
@@ -59,8 +59,11 @@ def room(
         say(doubt)
     supervision.close()
     opened = Room(project, home, names, folder, code=code, address=public, is_trusted=trusted)
-    with open_room(opened, host=host, port=port):
-        end_as_with_ctrl_c()
-        typer.echo(f"For the class: {opened.address}   The code: {opened.code}")
-        typer.echo(f"For you alone: {opened.lecturer_address}   Ctrl-C ends the room.")
-        wait_for(threading.Event())
+    try:
+        with open_room(opened, host=host, port=port):
+            end_as_with_ctrl_c()
+            typer.echo(f"For the class: {opened.address}   The code: {opened.code}")
+            typer.echo(f"For you alone: {opened.lecturer_address}   Ctrl-C ends the room.")
+            wait_for(threading.Event())
+    except KeyboardInterrupt:
+        leave_interrupted()

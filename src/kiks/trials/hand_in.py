@@ -23,27 +23,30 @@ DATE = (1980, 1, 1, 0, 0, 0)
 """The date of what is in an archive, so that the same content makes the same file."""
 
 
-def packed(program: Mapping[str, bytes], score: Mapping[str, Any], *, recording: bytes, page: bytes) -> bytes:
+def packed(
+    program: Mapping[str, bytes], score: Mapping[str, Any], *, recording: bytes = b"", page: bytes = b""
+) -> bytes:
     """Return the file; `kiks.trials.submissions` reads it. Its score is what the student saw: graders run the program.
 
     Args:
         program: The program's files by their names, the one that runs first (`ProgramFiles.pack`).
         score: How it has done in the visible cases, for JSON.
-        recording: The recording of one of the runs.
-        page: The page of that recording.
+        recording: The recording of one of the runs; none if left out.
+        page: The page of that recording; none if left out.
 
     Raises:
         ParameterError: If another file of the program has one of these names.
 
     Example:
-        >>> data = packed({"drive.py": b"import speeds", "speeds.py": b""}, {"points": 3}, recording=b"", page=b"")
+        >>> data = packed({"drive.py": b"import speeds", "speeds.py": b""}, {"points": 3})
         >>> zipfile.ZipFile(io.BytesIO(data)).namelist()
-        ['program.py', 'score.json', 'recording.mcap', 'run.html', 'speeds.py']
+        ['program.py', 'score.json', 'speeds.py']
     """
     main, *others = program.items()
-    files = {PROGRAM: main[1], SCORE: json.dumps(score, indent=1).encode(), RECORDING: recording, PAGE: page}
+    files = {PROGRAM: main[1], SCORE: json.dumps(score, indent=1).encode()}
+    files |= {name: data for name, data in ((RECORDING, recording), (PAGE, page)) if data}
     for name, data in others:
-        if name in files:
+        if name in (PROGRAM, *OF_THE_RUN):
             raise ParameterError(
                 f"a file of a program that is handed in must not be called {name}, as a file of the run is. Rename it."
             )

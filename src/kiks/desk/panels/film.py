@@ -10,6 +10,7 @@ from nicegui import ui
 
 from kiks.desk.panels.widgets import NumberField, dialog, select, told
 from kiks.desk.server.desk import Desk
+from kiks.desk.server.turns import FILMS
 from kiks.errors import ParameterError, library
 from kiks.export.film import FPS, save_film
 from kiks.export.kinds import KINDS
@@ -93,7 +94,9 @@ class FilmDialog:
         self._done, self._is_given_up = 0.0, False
         self._make_button.disable()
         try:
-            ui.download.content(await asyncio.to_thread(film), name)
+            done = FILMS.start(film, self._desk.share, lambda: not self._is_given_up)
+            if (data := await asyncio.wrap_future(done)) is not None:
+                ui.download.content(data, name)
         finally:
             self._done = 0.0
             self._make_button.enable()

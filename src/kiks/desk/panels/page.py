@@ -7,11 +7,13 @@ from functools import partial
 from typing import TypeVar
 
 from nicegui import ui
+from nicegui.events import GenericEventArguments
 
 from kiks.desk.panels.arena_view import ArenaView, Place, Points
 from kiks.desk.panels.board import ScoreBoard
 from kiks.desk.panels.editor import EditorPanel
 from kiks.desk.panels.exercise import ExercisePanel
+from kiks.desk.panels.kept_text import KeptText, kept_of
 from kiks.desk.panels.monitor import MonitorPanel
 from kiks.desk.panels.octave import OctavePanel
 from kiks.desk.panels.programs import ProgramsPanel
@@ -86,6 +88,7 @@ class Page:
             TimePanel(desk, feed)
             ui.space()
             tools = ui.row().classes("items-center no-wrap gap-1")
+        self._kept = KeptText().on("offer", self._take_kept) if desk.is_for_others else None
         known = remembered("split")  # other servers of the computer may have set anything
         split = float(known) if known.replace(".", "", 1).isdecimal() else SPLIT
         split = min(max(split, SPLITS[0]), SPLITS[1])
@@ -146,7 +149,7 @@ class Page:
             ("robot", "Robot", lambda: MonitorPanel(desk, feed)),
             ("wire", "Wire", lambda: WirePanel(desk)),
             ("arena", "Arena", lambda: EditorPanel(desk, self._editing, self._view, self._template)),
-            ("programs", "Programs", lambda: ProgramsPanel(desk)),
+            ("programs", "Programs", lambda: ProgramsPanel(desk, self._kept)),
             ("settings", "Settings", lambda: SettingsPanel(desk)),
         ]
         if desk.outside.interpreters():
@@ -213,6 +216,16 @@ class Page:
             return
         self._tabs.value = "arena"
         await self._panel("arena", EditorPanel).properties.show(selected, has_focus=True)
+
+    @told
+    async def _take_kept(self, event: GenericEventArguments) -> None:
+        """Take a program that was typed while the connection was away, and show it."""
+        if (kept := kept_of(event.args)) is not None and self._desk.may_run_programs:
+            panel = self._panel("programs", ProgramsPanel)
+            with self._places["programs"]:
+                is_new = await panel.take(kept)
+            if is_new:
+                self._tabs.value = "programs"
 
     async def _draw(self, kind: str, points: Points) -> None:
         """Pass a stroke to the editor."""

@@ -12,9 +12,11 @@ from typing import Any, Final
 from nicegui import background_tasks, ui
 
 from kiks.desk.panels.files import Encoded, save_in
+from kiks.desk.panels.kept_text import Kept, KeptText
 from kiks.desk.panels.widgets import LogBox, Panel, icon_button, named, offer_robots, select, told, with_props
 from kiks.desk.server import scripts
 from kiks.desk.server.desk import Desk
+from kiks.desk.server.merging import merged
 from kiks.desk.server.scripts import EXAMPLES, NEW
 from kiks.errors import KiksError, ParameterError
 from kiks.model.exercise import STUDENT, Exercise
@@ -71,10 +73,12 @@ class ProgramsPanel(Panel):
 
     Args:
         desk: The desk.
+        kept: Keeps in the browser what is typed; None: it is not kept.
     """
 
-    def __init__(self, desk: Desk) -> None:
+    def __init__(self, desk: Desk, kept: KeptText | None = None) -> None:
         super().__init__(desk, REFRESH_S)
+        self._kept = kept
         self._folder = scripts.ProgramFolder(desk.folder)
         self._folder.count_max = OTHERS_FILES_MAX if desk.is_for_others else None
         self._drawn: object = None
@@ -323,7 +327,13 @@ class ProgramsPanel(Panel):
         self._name.value = name
         self._editor.set_language("Octave" if program_kind(Path(name)) is ProgramKind.OCTAVE else "Python")
         self._editor.value = text
+        self._tell_saved()
         self._check()
+
+    def _tell_saved(self) -> None:
+        """Tell the browser which text is saved, so that it keeps any other."""
+        if self._kept is not None:
+            self._kept.know(self._editor, self._name.value or "", self._text)
 
     def _note_draft(self) -> None:
         self._drafts.pop(self._script, None)
@@ -377,6 +387,7 @@ class ProgramsPanel(Panel):
             with self._list:
                 self._offer()
                 self._choice.value = self._script
+                self._tell_saved()
 
     def _check(self) -> bool:
         """Mark the first mistake of the program, and return whether there is one."""
@@ -407,7 +418,37 @@ class ProgramsPanel(Panel):
         self._name.value = saved
         self._offer()
         self._choice.value = self._script
+        self._tell_saved()
         return self._script
+
+    async def take(self, kept: Kept) -> bool:
+        """Save what was typed while the connection was away, with what was saved here meanwhile, and show it.
+
+        Returns:
+            Whether there was something that had not come here.
+        """
+        folder = self._folder
+        file = folder.path / folder.full_name(kept.name)
+        is_open = self._script == file or (self._script is None and self._name.value == kept.name)
+        if is_open and kept.text == self._editor.value != self._text:
+            return False  # it has come, and is saved at the next pause
+        there = scripts.read_script(file) if file.is_file() else kept.base or ""
+        text = merged(there if kept.base is None else kept.base, kept.text, there)
+        is_new = text != there
+        if is_new:
+            folder.question(file.name)
+            data = scripts.encode_script(text)
+            await asyncio.to_thread(folder.save, data, file.name, "a program", may_replace=True)
+            for script in (file, None) if is_open else (file,):
+                self._drafts.pop(script, None)
+            self._offer()
+            self._text = text
+            self._edit(file, file.name, text)
+            self._choice.value = file
+            ui.notify(f"What you typed while the connection was away is saved in {file.name}.", type="positive")
+        if self._kept is not None:
+            self._kept.forget(kept)
+        return is_new
 
     @told
     async def _save(self) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import Awaitable, Callable
 from functools import partial
 from pathlib import PurePosixPath
@@ -55,7 +54,7 @@ class TriesPanel(Panel):
         super().__init__(desk)
         self._program = program
         self._drawn: object = None
-        self._is_packing = False
+        self._is_giving = False
         ui.add_css(CSS)
         with ui.row().classes("w-full items-center gap-2"):
             self._try = ui.button("Try all", icon="playlist_play", on_click=self.acting(self._begin))
@@ -77,8 +76,8 @@ class TriesPanel(Panel):
         is_shown = tries.project is not None and tries.project.exercise == desk.project.exercise
         self._try.set_enabled(not is_running)
         self._stop.set_visibility(is_running)
-        self._hand_in.set_enabled(desk.may_hand_in and not (is_running or self._is_packing))
-        told = tries.error, tries.is_waiting, desk.may_hand_in, self._is_packing
+        self._hand_in.set_enabled(desk.may_hand_in and not self._is_giving)
+        told = tries.error, tries.is_waiting, desk.may_hand_in, tries.is_packing, tries.is_handed_in
         drawn = is_shown, is_running, len(tries.outcomes), told
         if drawn == self._drawn:
             return
@@ -86,7 +85,8 @@ class TriesPanel(Panel):
         self._said.text = "" if desk.may_hand_in else CLOSED
         self._table.clear()
         if is_shown:
-            self._said.text = self._state() or self._said.text
+            handed_in = "Handed in. " if tries.is_handed_in and desk.hand_in is not None else ""
+            self._said.text = f"{handed_in}{self._state()}"
             if tries.outcomes:
                 with self._table:
                     self._build_table()
@@ -100,10 +100,10 @@ class TriesPanel(Panel):
             return f"Stopped; {counted(len(tries.cases), 'case')} not tried."
         if tries.is_waiting:
             return "Others are trying their programs; yours is next after them."
+        if tries.is_packing:
+            return "Writing its page ..."
         if tries.is_running:
             return f"{len(tries.outcomes)} of {counted(len(tries.cases), 'case')} tried."
-        if self._is_packing:
-            return "Writing what is handed in ..."
         of = "" if tries.is_whole else f", {len(tries.cases) - len(tries.outcomes)} not tried"
         count = tries.taken_count
         taken = f" {counted(count, 'case')} taken from earlier: nothing has changed." if count else ""
@@ -142,34 +142,38 @@ class TriesPanel(Panel):
 
     async def _end(self) -> None:
         self._desk.tries.stop()
-        await asyncio.to_thread(self._desk.tries.wait)
+        await self._desk.tries.ended()
 
     async def _show(self, number: int) -> None:
         await self._desk.looking.show_run(self._desk.tries.recording(number))
 
     async def _give(self) -> None:
-        desk, tries = self._desk, self._desk.tries
-        if not desk.may_hand_in:
+        if not self._desk.may_hand_in:
             raise ParameterError(CLOSED)
         if (command := await self._program()) is None:
             return
-        if not tries.is_of(desk.project, command):
-            desk.try_all(command)
-            self.refresh()
-            await asyncio.to_thread(tries.wait)
-        self._is_packing = True
+        self._is_giving = True
         self.refresh()
         try:
-            data = await asyncio.to_thread(tries.packed)
+            await self._hand_over(command, f"{PurePosixPath(command.name).stem}.zip")
         finally:
-            self._is_packing = False
-        name = f"{PurePosixPath(command.name).stem}.zip"
-        if desk.hand_in is None:
+            self._is_giving = False
+
+    async def _hand_over(self, command: Command, name: str) -> None:
+        desk, tries = self._desk, self._desk.tries
+        if desk.hand_in is not None:
+            await desk.give(command, name)
+            ui.notify("Handed in. Now it is tried in all cases.", type="positive")
+            return
+        made: list[bytes] = []
+        desk.try_all(command, made.append)
+        self.refresh()
+        await tries.ended()
+        if tries.error:
+            raise ParameterError(tries.error)
+        for data in made:
             ui.download.content(data, name)
             ui.notify(f"{name} is in your browser's downloads. Send it to your lecturer.", type="positive")
-        else:
-            await asyncio.to_thread(desk.hand_in, data, name)
-            ui.notify(f"Handed in: {self._state()}", type="positive")
 
 
 def _detail(outcome: Outcome) -> str:

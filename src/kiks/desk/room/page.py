@@ -118,12 +118,13 @@ class _Card:
         if opened is None:
             words.append("has not come yet")
         else:
-            is_running = any(each.is_running for each in opened.desk.programs.handles)
             if seat.points is not None:
                 words.append(counted(seat.points, "point"))
             if seat.handed_in:
                 words.append("handed in")
-            words.append("no browser" if seat.key is None else "a program runs" if is_running else "at the desk")
+            if any(each.is_running for each in opened.desk.programs.handles):
+                words.append("a program runs")
+            words.append("no browser" if seat.key is None else _whereabouts(opened.gateway.away_s))
         shown = (words, seat.is_solved, seat.number, opened is None, seat.key is None)
         if shown == self._shown:
             return
@@ -144,6 +145,18 @@ class _Card:
         if await agrees(f"Give the name {name} free?", told, yes="Give free"):
             await self._room.give_free(name)
             self.refresh()
+
+
+def _whereabouts(away_s: float | None) -> str:
+    """Return where a student is whose page has been closed for a while [s]; None: it was not open since the room is.
+
+    Example:
+        >>> [_whereabouts(away_s) for away_s in (0.0, 20.0, 730.0, None)]
+        ['at the desk', 'away', 'away for 12 min', 'away']
+    """
+    if away_s == 0:
+        return "at the desk"
+    return "away" if away_s is None or away_s < 60 else f"away for {away_s // 60:.0f} min"
 
 
 @contextmanager

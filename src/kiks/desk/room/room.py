@@ -39,6 +39,9 @@ SPEED_MAX = 5.0
 DESKS, HANDED_IN = "desks", "handed-in"
 """Folders of the room's folder: one below the first for each student; what students hand in."""
 
+CLOSERS = 32
+"""How many desks are closed at a time."""
+
 LOOK_S = 1.0
 """Period at which the room looks how the desks do [s]."""
 
@@ -137,10 +140,13 @@ class Room:
         self._starter.shutdown(cancel_futures=True)
         if SERVER.is_running:
             SERVER.run(self._leave())
-        for each in self.desks.values():
-            each.close()
-        for sandbox in self._sandboxes:
-            sandbox.close()
+        for desk in self.desks.values():
+            desk.stop()
+        # Each may have to wait for its programs, and these end with their sandboxes.
+        with ThreadPoolExecutor(CLOSERS, "kiks room") as closers:
+            closes = [desk.close for desk in self.desks.values()] + [sandbox.close for sandbox in self._sandboxes]
+            for close in closes:
+                closers.submit(close)
 
     async def _leave(self) -> None:
         async with self._turn:  # nobody is coming in
@@ -240,6 +246,7 @@ class Room:
             supervisor=supervisor_of(self.project, self._home),
             is_held=True,
         )
+        desk.secret = seat.secret  # so that a page finds its desk when the room is back
         desk.hand_in, desk.may_hand_in = partial(self._take_in, seat), self.may_hand_in
         opened = Shown(desk, number=seat.number)
         opened.drive()
@@ -257,9 +264,9 @@ class Room:
         except KiksError as error:
             desk.say(str(error))
 
-    def _take_in(self, seat: Seat, data: bytes, name: str) -> None:
+    def _take_in(self, seat: Seat, data: bytes, name: str, *, is_again: bool = False) -> None:
         """Take what a student hands in; the latest counts."""
-        if not self.may_hand_in:
+        if not (self.may_hand_in or is_again):
             raise ParameterError("Handing in must be open, but your teacher has closed it. Ask your teacher.")
         ending = PurePosixPath(name).suffix.lower()
         if not re.fullmatch(r"\.[a-z0-9]{1,8}", ending) or len(data) > HAND_IN_BYTES_MAX:

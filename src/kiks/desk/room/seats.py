@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+import secrets
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -32,6 +33,7 @@ class SavedSeat:
         points: The most points on the desk; None before a run was judged.
         is_solved: Whether the goal was reached on the desk.
         handed_in: What was handed in, a file's name; empty before.
+        secret: What the pages of the desk know it by; empty before.
     """
 
     number: Annotated[Whole, Field(ge=0)] = 0
@@ -40,6 +42,7 @@ class SavedSeat:
     points: Number | None = None
     is_solved: Switch = False
     handed_in: Text = ""
+    secret: Annotated[Text, Field(max_length=100)] = ""
 
 
 @record
@@ -64,6 +67,7 @@ class Seat:
     points: float | None = None
     is_solved: bool = False
     handed_in: str = ""
+    secret: str = field(default_factory=secrets.token_urlsafe)
 
     @property
     def folder(self) -> str:
@@ -93,7 +97,7 @@ def read_seats(folder: Path, names: list[str]) -> tuple[dict[str, Seat], str]:
         taken |= {each.number} - {0}
         if (seat := seats.get(name)) is not None:
             seat.number, seat.points, seat.is_solved = each.number, each.points, each.is_solved
-            seat.handed_in = each.handed_in
+            seat.handed_in, seat.secret = each.handed_in, each.secret or seat.secret
             if each.token and each.place and each.number:
                 seat.key = Token(each.token, each.place, desk=each.number)
     return seats, saved.code
@@ -109,6 +113,7 @@ def write_seats(folder: Path, seats: dict[str, Seat], code: str) -> None:
             "points": seat.points,
             "is_solved": seat.is_solved,
             "handed_in": seat.handed_in,
+            "secret": seat.secret,
         }
         for name, seat in seats.items()
     }

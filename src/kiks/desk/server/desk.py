@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import secrets
 import threading
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
@@ -17,7 +19,8 @@ from kiks.desk.server.home import Home
 from kiks.desk.server.looking_back import LookingBack
 from kiks.desk.server.player import Player
 from kiks.desk.server.scripts import EXAMPLES
-from kiks.desk.server.tries import Tries
+from kiks.desk.server.tries import Tries, packed_untried
+from kiks.desk.server.turns import Share
 from kiks.errors import KiksError, LinkError, ParameterError
 from kiks.model.arena import Arena
 from kiks.model.checks import CLOCK_END_NS
@@ -75,6 +78,22 @@ class Showing(Protocol):
         """Return what the board shows of it."""
 
 
+class HandIn(Protocol):
+    """Takes a file that a person hands in."""
+
+    def __call__(self, data: bytes, name: str, *, is_again: bool = False) -> None:
+        """Take it, so that it is on the disk when this returns.
+
+        Args:
+            data: The file.
+            name: Its name.
+            is_again: Whether it was taken before, and now has its run and its score.
+
+        Raises:
+            ParameterError: If it is not taken, with a message for that person.
+        """
+
+
 def usual_programs(
     desk: Desk, sim: Simulation, commands: Sequence[Command | None], gate: Gate, /, **options: Any
 ) -> Programs:
@@ -125,10 +144,11 @@ class Desk:
         log: These and what programs of Octave and MATLAB tell, each line with the time of day, the newest last.
         drafts: What people have written in programs and not saved, by file; None: in a new one. The newest is the last.
         tries: How a person's program has done in all cases of the exercise.
-        hand_in: Takes a file that a person hands in, its bytes and its name; None: the browser downloads it. Raises
-            a `ParameterError` with a message for that person if it is not taken.
+        hand_in: Takes what a person hands in; None: the browser downloads it.
         may_hand_in: Whether a file would be taken now.
         hall: The tournament whose games are shown; None without one.
+        share: What its people have had of the processors for films.
+        secret: What a page knows it by after the connection was lost.
     """
 
     def __init__(
@@ -166,9 +186,11 @@ class Desk:
         self.news: RingBuffer[str] = RingBuffer(NEWS_LIMIT)
         self.log: RingBuffer[str] = RingBuffer(log_limit)
         self.outside = OutsidePrograms()
-        self.hand_in: Callable[[bytes, str], None] | None = None
+        self.hand_in: HandIn | None = None
         self.may_hand_in = True
         self.hall: Showing | None = None
+        self.share = Share()
+        self.secret = secrets.token_urlsafe()
         self.drafts: dict[Path | None, str] = {}
         self.tries = Tries(is_for_others=is_for_others, is_trusted=sandbox is None)
         self.is_seen = threading.Event()
@@ -334,11 +356,30 @@ class Desk:
         if self.is_locked:
             raise ParameterError(LOCKED)
 
-    def try_all(self, command: Command) -> None:
-        """Try a person's program in all cases of the project, while the world goes on; see `tries`."""
+    def try_all(self, command: Command, hand_in: Callable[[bytes], object] | None = None) -> None:
+        """Try a person's program in all cases of the project, while the world goes on; see `tries`.
+
+        Args:
+            command: The program.
+            hand_in: Takes the file that is handed in, when all cases have come out; called in another thread.
+        """
         self._permission().check(command)
         has_hidden = self.may_edit or not self.is_locked
-        self.tries.begin(self.home.alone(self.project), self.home.folder, command, has_hidden=has_hidden)
+        project = self.home.alone(self.project)
+        self.tries.begin(project, self.home.folder, command, has_hidden=has_hidden, hand_in=hand_in)
+
+    async def give(self, command: Command, name: str) -> None:
+        """Hand a program in at once, and then try it: what comes out takes the place of what was handed in.
+
+        Raises:
+            ParameterError: If it is not taken.
+        """
+        hand_in = self.hand_in
+        assert hand_in is not None
+        self.tries.stop()
+        await self.tries.ended()
+        await asyncio.to_thread(hand_in, packed_untried(self.project, command), name)
+        self.try_all(command, partial(hand_in, name=name, is_again=True))
 
     # ---- another world ----
 

@@ -9,12 +9,13 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
-import secrets
+import time
 from collections.abc import Callable
 from typing import Any
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
+from kiks.desk.server.access import KEY
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.live_editing import Editing
 from kiks.desk.server.marks import Mark, thinned
@@ -120,7 +121,8 @@ class Gateway:
         self._count = 0
         self._wake = asyncio.Event()
         self._has_moved = False
-        self._secret = secrets.token_urlsafe()
+        self._student_count = 0
+        self._left_s: float | None = None
         self._seen: tuple[Any, ...] = ()
         self._seeking: set[asyncio.Task[None]] = set()
         # The scene, its shapes, the time bar and the board, by their kinds.
@@ -130,6 +132,13 @@ class Gateway:
         self._picture: tuple[Arena | None, bytes] = (None, b"")
         self._bar_source: tuple[list[Mark], dict[str, Any]] | None = None
         self._frame_count = 0
+
+    @property
+    def away_s(self) -> float | None:
+        """For how long its student has had no page open [s]: 0 while there is one, None before the first."""
+        if self._student_count:
+            return 0.0
+        return None if self._left_s is None else time.monotonic() - self._left_s
 
     # ---- sending ----
 
@@ -170,7 +179,11 @@ class Gateway:
             self._scene_number += 1
             scene = describe_scene(sim, self._scene_number, desk.names())
             scene["arena"]["picture"] = f"{self.number}/arena/{self._scene_number}.png"
-            looks = {"secret": self._secret, "has_old_coordinates": desk.has_old_coordinates}
+            looks = {
+                "secret": desk.secret,
+                "is_room": desk.is_for_others,
+                "has_old_coordinates": desk.has_old_coordinates,
+            }
             self._news |= {"scene": {**scene, **looks}, "shapes": describe_shapes(sim)}
             self._arena = sim.arena
         self._frame_count += 1
@@ -254,12 +267,16 @@ class Gateway:
         self._count += 1
         viewer = Viewer(f"browser {self._count}")
         self._viewers.add(viewer)
+        is_students = socket.scope[KEY].desk is not None
+        self._student_count += is_students
         sending = asyncio.create_task(viewer.send_all(socket))
         hearing = asyncio.create_task(self._hear(viewer, socket))
         try:
             await asyncio.wait([sending, hearing], return_when=asyncio.FIRST_COMPLETED)
         finally:
             self._viewers.discard(viewer)
+            self._student_count -= is_students
+            self._left_s = time.monotonic() if is_students else self._left_s
             for task in (sending, hearing):
                 task.cancel()
             await asyncio.gather(sending, hearing, return_exceptions=True)

@@ -137,11 +137,16 @@ class Shown:
         if browser:
             self.browse()
 
+    def stop(self) -> None:
+        """Let all that goes on here end, without a wait."""
+        self.desk.tries.stop()
+        if self._driver is not None:
+            self._driver.stop()
+
     def close(self) -> None:
         """Close the desk and release the world."""
         logging.getLogger("kiks").removeHandler(self._news)
-        if self._driver is not None:
-            self._driver.stop()
+        self.stop()
         if self._thread is not None:
             # It may be in a long step; as a daemon thread it does not block the end of the process.
             self._thread.join(STOP_S)

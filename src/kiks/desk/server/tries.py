@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
+import asyncio
+import os
 import shutil
 import subprocess
+import sys
 import tempfile
 import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
+import time
+from collections.abc import Callable
+from concurrent.futures import Future, wait
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
-from kiks.errors import KiksError, ParameterError, WorkError
+from kiks.desk.server.turns import TRIES, Share
+from kiks.errors import KiksError, ParameterError, WorkError, counted
 from kiks.model.exercise import STUDENT, Case, cases_of
 from kiks.model.program_files import ProgramFiles
 from kiks.model.project import Project
 from kiks.ports.program_process import Command, commands_of, python_line
 from kiks.ports.resources import processor_count
 from kiks.sim.from_project import in_case
-from kiks.trials.crew import ASK_S
 from kiks.trials.grading import Grade
 from kiks.trials.hand_in import PAGE, packed
 from kiks.trials.runner import run_trials
@@ -26,8 +31,14 @@ from kiks.trials.submissions import Submission
 from kiks.trials.trial import Outcome, Trial
 from kiks.version import __version__
 
-_TURNS = threading.BoundedSemaphore(max(processor_count() - 1, 1))
-"""One turn for each core but one, which is the server's: thirty students of a room may press 'Try all' at once."""
+TURN_S = 120.0
+"""Longest turn of one student in a room, in all cases together [s of real time]."""
+
+NICE = 10
+"""How much they leave the processors to others, from 0 to 19."""
+
+END_S = 2.0
+"""Longest wait for the end of what has been stopped [s]."""
 
 
 class Tries:
@@ -42,31 +53,38 @@ class Tries:
         project: The exercise; None before the first try.
         cases: The cases, in order.
         outcomes: What has come out so far, by numbers of the cases, from 0.
-        error: Why they cannot begin; empty if they can.
+        error: Why they have come to no end; empty if they have, or go on.
         taken_count: How many of the outcomes are those of earlier tries, as nothing has changed on which they depend.
-        is_waiting: Whether others have their turns first.
+        is_packing: Whether what is handed in is made now.
+        is_handed_in: Whether the program of these tries has been handed in.
     """
 
     def __init__(self, *, is_for_others: bool = False, is_trusted: bool = True) -> None:
-        self._is_trusted = is_trusted
+        self._is_trusted, self._is_for_others = is_trusted, is_for_others
         self.workers = 1 if is_for_others else max(processor_count() - 1, 1)
         self.project: Project | None = None
         self.cases: list[Case] = []
         self.outcomes: dict[int, Outcome] = {}
         self.error = ""
         self.taken_count = 0
-        self.is_waiting = False
+        self.is_packing = self.is_handed_in = False
+        self._share = Share()
         self._command: Command | None = None
         self._files: dict[str, bytes] = {}
-        self._packed = b""
         self._folder: tempfile.TemporaryDirectory[str] | None = None
-        self._thread: threading.Thread | None = None
+        self._end: Future[None] | None = None
+        self._exporting: subprocess.Popen[bytes] | None = None
         self._is_wanted = False
 
     @property
     def is_running(self) -> bool:
         """Whether some are under way."""
-        return self._thread is not None and self._thread.is_alive()
+        return self._end is not None and not self._end.done()
+
+    @property
+    def is_waiting(self) -> bool:
+        """Whether others have their turns first."""
+        return self._share.is_waiting
 
     @property
     def is_whole(self) -> bool:
@@ -85,7 +103,15 @@ class Tries:
         same = self.is_whole and (self.project, self._command) == (project, command)
         return same and self._files == command.files().pack()
 
-    def begin(self, project: Project, home: Path, command: Command, *, has_hidden: bool) -> None:
+    def begin(
+        self,
+        project: Project,
+        home: Path,
+        command: Command,
+        *,
+        has_hidden: bool,
+        hand_in: Callable[[bytes], object] | None = None,
+    ) -> None:
         """Begin to try a program.
 
         Args:
@@ -93,55 +119,63 @@ class Tries:
             home: The folder of the exercise.
             command: The program.
             has_hidden: Whether to try it in hidden cases, too.
+            hand_in: Takes the file that is handed in, when all cases have come out; called in another thread.
         """
         if self.is_running:
             raise ParameterError("These tries must end first. Wait, or stop them.")
         if len(project.robots) < STUDENT:
             raise ParameterError("A world must have a robot for a program to be tried in it. Place one.")
+        if not (hand_in is not None and self.is_of(project, command)):
+            self.outcomes, self.taken_count = {}, 0
         command.check_file()
         self.project, self._command, self._files = project, command, command.files().pack()
         self.cases = [case for case in cases_of(project.cases) if has_hidden or not case.is_hidden]
-        self.outcomes, self.error, self._is_wanted, self._packed, self.taken_count = {}, "", True, b"", 0
+        self.error, self._is_wanted, self.is_handed_in = "", True, hand_in is not None
         if self._folder is None:
             self._folder = tempfile.TemporaryDirectory(prefix="kiks-tries-", ignore_cleanup_errors=True)
         programs = commands_of(project, home)
-        self._thread = threading.Thread(target=self._run, args=(project, home, command, programs), daemon=True)
-        self._thread.start()
 
-    def _run(self, project: Project, home: Path, command: Command, programs: list[Command | None]) -> None:
-        try:
-            # What is handed in is what is tried, with nothing beside it.
-            folder = self._path() / "program"
-            shutil.rmtree(folder, ignore_errors=True)
-            copy = ProgramFiles.unpack(self._files, folder / command.program.stem)
-            programs[STUDENT - 1] = Command(copy, command.arguments)
-            trials = [
-                Trial(str(number), in_case(project, case, home), home, tuple(programs), self._is_trusted)
-                for number, case in enumerate(self.cases)
-            ]
-            with self._turn():
-                run_trials(
-                    trials,
-                    self._path(),
-                    workers=self.workers,
-                    on_outcome=self._take,
-                    on_taken=self._note_taken,
-                    goes_on=lambda: self._is_wanted,
-                )
-        except (KiksError, OSError) as error:
-            self.error = str(error)
+        def run() -> None:
+            if self._is_for_others and sys.platform == "linux":
+                # Of this thread alone, and so of the processes that it starts: pages come first.
+                os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), NICE)
+            try:
+                if not self.is_whole:
+                    self._try(project, home, command, programs)
+                if hand_in is not None and self.is_whole:
+                    self.is_packing = True
+                    hand_in(self._packed(project))
+            except (KiksError, OSError) as error:
+                self.error = str(error) if self._is_wanted else ""
+            finally:
+                self.is_packing = False
 
-    @contextmanager
-    def _turn(self) -> Iterator[None]:
-        """Wait for a turn, unless these tries are stopped meanwhile."""
-        while not (has_turn := _TURNS.acquire(timeout=ASK_S)) and self._is_wanted:
-            self.is_waiting = True
-        self.is_waiting = False
-        try:
-            yield
-        finally:
-            if has_turn:
-                _TURNS.release()
+        self._end = TRIES.start(run, self._share, lambda: self._is_wanted)
+
+    def _try(self, project: Project, home: Path, command: Command, programs: list[Command | None]) -> None:
+        # What is handed in is what is tried, with nothing beside it.
+        folder = self._path() / "program"
+        shutil.rmtree(folder, ignore_errors=True)
+        copy = ProgramFiles.unpack(self._files, folder / command.program.stem)
+        programs[STUDENT - 1] = Command(copy, command.arguments)
+        trials = [
+            Trial(str(number), in_case(project, case, home), home, tuple(programs), self._is_trusted)
+            for number, case in enumerate(self.cases)
+        ]
+        end_s = time.monotonic() + TURN_S if self._is_for_others else float("inf")
+        run_trials(
+            trials,
+            self._path(),
+            workers=self.workers,
+            on_outcome=self._take,
+            on_taken=self._note_taken,
+            goes_on=lambda: self._is_wanted and time.monotonic() < end_s,
+        )
+        if self._is_wanted and not self.is_whole:
+            raise WorkError(
+                f"All cases must come out within {TURN_S:g} s of real time, as others wait, but after that "
+                f"{counted(len(self.cases) - len(self.outcomes), 'case')} had not. Let the program end earlier."
+            )
 
     def _take(self, outcome: Outcome, _count: int) -> None:
         self.outcomes[int(outcome.name)] = outcome
@@ -156,11 +190,18 @@ class Tries:
     def stop(self) -> None:
         """Let those under way end; what has come out stays."""
         self._is_wanted = False
+        if (exporting := self._exporting) is not None:
+            exporting.kill()
 
-    def wait(self) -> None:
+    def wait(self, timeout_s: float | None = None) -> None:
         """Wait until none is under way."""
-        if self._thread is not None:
-            self._thread.join()
+        if self._end is not None:
+            wait([self._end], timeout_s)
+
+    async def ended(self) -> None:
+        """Wait until none is under way, without a thread."""
+        if self._end is not None:
+            await asyncio.wrap_future(self._end)
 
     def recording(self, number: int) -> Path:
         """Return the recording of a case that has come out."""
@@ -168,43 +209,52 @@ class Tries:
             raise ParameterError("A try must have a recording to be shown, but this one was lost. Try all again.")
         return self._path() / name
 
-    def packed(self) -> bytes:
+    def _packed(self, project: Project) -> bytes:
         """Return the file that is handed in when all cases have come out; its run is the one with the fewest points."""
-        if self.error:
-            raise ParameterError(self.error)
-        if not self.is_whole:
-            raise ParameterError("All cases must have come out before a program is handed in. Hand it in again.")
-        if self._packed:
-            return self._packed
-        grade, exercise = self.grade, None if self.project is None else self.project.exercise
+        grade = self.grade
         assert grade.worst is not None
         worst = int(grade.worst.name)
         file, page = self.recording(worst), self._path() / PAGE
-        title = "" if exercise is None else exercise.title
-        self._write_page(file, page, f"{title}: {self.cases[worst].name}")
+        self._write_page(file, page, f"{_title(project)}: {self.cases[worst].name}")
         score = {
-            "kiks": __version__,
-            "exercise": title,
             "points": grade.points,
             "solved": grade.solved,
             "cases": len(self.cases),
             "each": [{**asdict(outcome), "name": self.cases[int(outcome.name)].name} for outcome in grade.outcomes],
         }
-        self._packed = packed(self._files, score, recording=file.read_bytes(), page=page.read_bytes())
-        return self._packed
+        return packed(self._files, _score(project) | score, recording=file.read_bytes(), page=page.read_bytes())
 
     def _write_page(self, recording: Path, page: Path, title: str) -> None:
         """Write the page of a recording in a process of its own: figures would take the time of the desk."""
         line = python_line("-m", "kiks", "export", str(recording), str(page), "--force", f"--title={title}")
-        with self._turn():
-            made = subprocess.run(line, stdin=subprocess.DEVNULL, capture_output=True, check=False)
+        with subprocess.Popen(
+            line, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE
+        ) as made:
+            self._exporting = made
+            if not self._is_wanted:
+                made.kill()  # it was stopped just before
+            _, said = made.communicate()
+        self._exporting = None
         if made.returncode:
-            said = made.stderr.decode(errors="replace").strip().splitlines()
-            raise WorkError(f"Cannot write the page of the run: {said[-1] if said else 'its process has ended'}.")
+            lines = said.decode(errors="replace").strip().splitlines()
+            raise WorkError(f"Cannot write the page of the run: {lines[-1] if lines else 'its process has ended'}.")
 
     def close(self) -> None:
         """End all, and forget what has come out."""
         self.stop()
-        self.wait()
+        self.wait(END_S)
         if self._folder is not None:
             self._folder.cleanup()
+
+
+def packed_untried(project: Project, command: Command) -> bytes:
+    """Return the file that is handed in before its program was tried."""
+    return packed(command.files().pack(), _score(project))
+
+
+def _title(project: Project) -> str:
+    return "" if project.exercise is None else project.exercise.title
+
+
+def _score(project: Project) -> dict[str, Any]:
+    return {"kiks": __version__, "exercise": _title(project)}

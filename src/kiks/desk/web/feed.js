@@ -8,8 +8,8 @@
    feed.frame       the newest frame (see frame.js) or null; it always belongs to feed.scene
    feed.bar         the newest description of the time bar (see time_bar.js) or null
    feed.board       the newest score (see board.js) or null
-   feed.connection  "connecting", "open", "lost" (it reconnects by itself) or "gone" (the desk is closed, or lost for
-                    a minute: nothing reconnects)
+   feed.connection  "connecting", "open", "lost" (it reconnects by itself), "away" (the same, of a desk in a room that is
+                    closed or lost for a minute) or "gone" (another desk is closed or lost for so long: nothing reconnects)
    feed.on(what, callback) subscribes to "scene", "shapes", "bar", "board", "frame", "connection" or "error" (a message of the
                     server) and returns a function that unsubscribes.
    feed.send(object) sends a message and returns whether there was a connection.
@@ -79,8 +79,9 @@ export class Feed {
       window.socket?.disconnect();
       this._lost_ms ??= performance.now();
       if (this.connection === "gone") return;
-      if (performance.now() - this._lost_ms > LONGEST_LOSS_MS) return this._leave();
-      this._say("lost");
+      const isLong = performance.now() - this._lost_ms > LONGEST_LOSS_MS;
+      if (isLong && !this._isRoom) return this._leave();
+      this._say(isLong || this.connection === "away" ? "away" : "lost");
       this._timer = setTimeout(() => this._connect(), this._pause_ms);
       this._pause_ms = Math.min(2 * this._pause_ms, LONGEST_PAUSE_MS);
     };
@@ -90,6 +91,7 @@ export class Feed {
     const message = JSON.parse(text);
     if (message.kind === "scene") {
       if (this.connection !== "open" && !this._welcome(message.secret)) return;
+      this._isRoom = message.is_room;
       this.scene = message;
       // If no thing has appeared or disappeared, keep the last frame, to avoid flicker.
       const { robot_count, body_count } = this.frame ?? {};
@@ -104,7 +106,9 @@ export class Feed {
     } else if (message.kind === "error") {
       this._tell("error", message.text);
     } else if (message.kind === "gone") {
-      this._leave();
+      // A room is opened again, maybe on another day.
+      if (this._isRoom) this._say("away");
+      else this._leave();
     }
   }
 
@@ -117,7 +121,7 @@ export class Feed {
     }
     this._pause_ms = FIRST_PAUSE_MS;
     this._lost_ms = null;
-    if (this.connection === "lost") window.socket?.connect();
+    if (["lost", "away"].includes(this.connection)) window.socket?.connect();
     this._say("open");
     return true;
   }

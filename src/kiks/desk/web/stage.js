@@ -17,6 +17,7 @@ const OBJECTION_MS = 5000;
 const SAY = {
   connecting: "Connecting to KiKS …",
   lost: "No connection to KiKS. Trying again …",
+  away: "The room has ended, or cannot be reached. What you type stays in this browser. This page goes on by itself when the room is back.",
   gone: "KiKS has ended, or this page has lost it. Open the address that KiKS prints when you start it.",
 };
 
