@@ -10,11 +10,12 @@ from pathlib import Path
 import pytest
 
 from kiks.errors import ParameterError
+from kiks.model.program_kinds import program_text
 from kiks.trials import hand_in
 from kiks.trials.file_tree import BYTES_MAX
 from kiks.trials.similarity import alike
 from kiks.trials.students import NOTHING, read_students, with_students
-from kiks.trials.submissions import Submission, submissions_in, text_of
+from kiks.trials.submissions import Submission, submissions_in
 
 TEXT = "print('hello')\n"
 
@@ -251,7 +252,7 @@ def test_programs_are_alike_whatever_their_names_comments_and_layout_are() -> No
         "no coding": b"# \xe9\r" + one.replace("\n", "\r").encode(),
         "wide": one.encode("utf-16"),
     }
-    pairs = alike({"a": one} | {name: text_of(data) for name, data in texts.items()})
+    pairs = alike({"a": one} | {name: program_text(Path("a.py"), data) for name, data in texts.items()})
     assert [pair.share for pair in pairs] == [1] * 10
     # What all were given, or what is no Python, is no likeness.
     assert alike({"a": given, "b": given}, given) == []
