@@ -55,7 +55,7 @@ PROGRAMS = {
     "computes in C": 'print("ready", flush=True)\n0 in itertools.repeat(1)',
     "a query": 'print("ready", flush=True)\nsqlite3.connect(":memory:").execute(\n'
     '    "WITH RECURSIVE c(x) AS (SELECT 1 UNION ALL SELECT x + 1 FROM c) SELECT max(x) FROM c").fetchall()',
-    "a pipe that nobody opens": 'os.mkfifo("pipe")\nprint("ready", flush=True)\n'
+    "a pipe without a writer": 'os.mkfifo("pipe")\nprint("ready", flush=True)\n'
     'threading.Thread(target=open, args=("pipe",)).start()\ntime.sleep(1)',
     "catches everything": 'print("ready", flush=True)\nwhile True:\n    try: time.sleep(1)\n    except: pass',
     "ignores signals": "for each in (signal.SIGINT, signal.SIGTERM): signal.signal(each, signal.SIG_IGN)" + DRIVES,
@@ -76,7 +76,7 @@ def read_to(terminal: int, word: bytes) -> bytes:
     while word not in shown:
         try:
             piece = os.read(terminal, 1 << 16)
-        except OSError:  # nobody has the other end any more
+        except OSError:  # the other end is closed
             break
         shown += piece
     return shown

@@ -106,7 +106,7 @@ def _padded(text: str, width: int, *, is_left: bool) -> str:
 def _safe(cell: object) -> object:
     """Return a cell of a CSV: of a text a line, with an apostrophe where a spreadsheet would take it for a formula.
 
-    What somebody else has written may be a formula that sends what is in the table elsewhere.
+    What another person has written may be a formula that sends what is in the table elsewhere.
 
     Example:
         >>> _safe("=1+1"), _safe("ann"), _safe(-2.5)

@@ -11,7 +11,7 @@ from tests.script.conftest import Run, programs_of
 pytestmark = pytest.mark.slow
 
 TELL = """
-import asyncio, os, signal, socket, sqlite3, sys, threading, time, warnings
+import asyncio, gc, os, signal, socket, sqlite3, sys, threading, time, warnings
 def tell(*acts):
     for act in acts:
         try: print(type(act()).__name__)
@@ -45,6 +45,7 @@ tell(made[0].commit)
 # From Python 3.13 on, one that is not closed is warned of; only its own thread could close this one.
 warnings.simplefilter("ignore", ResourceWarning)
 made.clear()
+gc.collect()
 free.close()
 === handlers of signals are set in the main thread
 acts = (lambda: signal.signal(signal.SIGUSR1, print), lambda: signal.set_wakeup_fd(-1), lambda: signal.getsignal(2),

@@ -153,7 +153,7 @@ def test_program_with_windows(claim: str, tmp_path: Path, screen: dict[str, str]
 
 
 def on_terminal(folder: Path, name: str) -> tuple[int, str]:
-    """Run a program on a terminal on which nobody types; return its exit code, and what it and KiKS have said."""
+    """Run a program on a terminal without input; return its exit code, and what it and KiKS have said."""
     (folder / "program.py").write_text(ON_TERMINAL[name][0])
     words = [*forked.kiks_command(), "run", str(folder / "program.py")]
     done = called(sys.executable, PROGRAMS / "on_terminal.py", *words)

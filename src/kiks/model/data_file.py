@@ -180,10 +180,11 @@ def _parsed(data: bytes, kind: str, load: Callable[[str], Any], what: str, error
         ) from None
 
 
+# Python 3.11.2, that of Debian 12, matches a possessive group wrongly: only single characters are repeated so.
 _STRINGS_AND_COMMENTS = re.compile(
     r"""
-    \"{3}(?:[^\\"]|\\.|"(?!""))*+\"{3} | '{3}(?:[^']|'(?!''))*+'{3}
-    | "(?:[^"\\\n]|\\.)*+" | '[^'\n]*+' | \#[^\n]*+
+    \"{3}(?:[^\\"]++|\\.|"(?!""))*\"{3} | '{3}(?:[^']++|'(?!''))*'{3}
+    | "(?:[^"\\\n]++|\\.)*" | '[^'\n]*+' | \#[^\n]*+
     """,
     re.DOTALL | re.VERBOSE,
 )

@@ -29,7 +29,7 @@ LOOPBACK = frozenset({"127.0.0.1", "localhost", "::1"})
 
 
 def is_private(host: str, public: PublicAddress | None) -> bool:
-    """Return whether this computer alone reaches a server there, so that whoever opens its pages may start programs."""
+    """Return whether only this computer reaches a server there, so that all who open its pages may start programs."""
     return host in LOOPBACK and public is None
 
 
