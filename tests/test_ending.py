@@ -10,6 +10,8 @@ import pytest
 from tests.at_length import cases
 from tests.guard import GUARD_S
 
+from kiks import ending
+
 ROOT = Path(__file__).parents[1]
 WANDER = str(ROOT / "tests" / "programs" / "wander.py")
 
@@ -282,3 +284,26 @@ def test_who_notes_a_signal_and_waits_on_has_heard_it() -> None:
             assert process.stdout.readline() == "noted\n"
         assert process.communicate("ended", timeout=GUARD_S)[0] == "ended\n"
     assert process.returncode == 0
+
+
+def test_the_wait_for_a_processor_is_no_reason_to_kill(monkeypatch: pytest.MonkeyPatch) -> None:
+    answers, answerer = os.pipe()
+    waits_s = iter((5.0, 5.0 + 2 * GUARD_S))
+
+    def waited_s(_process: int) -> float:
+        waited = next(waits_s)
+        if waited > 5:
+            os.write(answerer, b"!")
+        return waited
+
+    monkeypatch.setattr(ending, "UNHEARD_S", 0.0)
+    monkeypatch.setattr(ending, "_waited_s", waited_s)
+    assert ending._is_heard(os.getpid(), answers)
+    monkeypatch.setattr(ending, "_waited_s", lambda _process: 5.0)
+    assert not ending._is_heard(os.getpid(), answers)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells it")
+def test_the_time_that_a_process_waits_for_a_processor_is_known() -> None:
+    assert ending._waited_s(os.getpid()) > 0
+    assert ending._waited_s(-1) == 0
