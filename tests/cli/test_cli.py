@@ -271,7 +271,7 @@ def test_a_mistake_ends_in_one_line_and_exit_code_2(tmp_path: Path) -> None:
 
 NO_RESULTS = """
     run.program desk.folder champion.folder ghosts.folder compare.folders info.file replay.file export.files serve.link
-    session.listen examples.out check.exercise check.solution grade.exercise grade.submissions grade.out
+    session.listen examples.out check.exercise check.solution grade.exercise grade.submissions grade.students grade.out
     tournament.players tournament.out room.exercise room.students room.folder
 """
 """Paths that are read, and those that are written when a command begins."""

@@ -74,7 +74,7 @@ class ProgramFiles:
             self._add(self.main)
             for path in self._all_in(self.main.parent):
                 self._add(path)
-        elif "site-packages" in self.folder.parts:
+        elif self.folder.name in ("site-packages", "dist-packages"):
             self._add(self.main)  # beside an installed module lie those of others
         else:
             self._add_named(self.main)

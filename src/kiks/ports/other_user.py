@@ -7,7 +7,6 @@ and the programs run as a user who can read neither the exercise nor the results
 from __future__ import annotations
 
 import os
-import pwd
 import signal
 import subprocess
 import sys
@@ -35,6 +34,8 @@ class OtherUser:
     """
 
     def __init__(self, name: str) -> None:
+        import pwd  # here, for systems without it
+
         try:
             found = pwd.getpwnam(name)
         except (KeyError, ValueError):

@@ -19,7 +19,6 @@ from warnings import catch_warnings
 
 from kiks.model.program_kinds import ProgramKind, program_kind
 from kiks.script.cpython import run_source
-from kiks.script.notebook import run_notebook
 
 
 @contextmanager
@@ -48,8 +47,11 @@ def main_module(program: Path, arguments: list[str], module: str) -> Iterator[Ca
         run = partial(as_main, "__main__", alter_argv=False)
     else:
         sys.path.insert(0, os.path.dirname(os.path.realpath(path)))
-        is_notebook = program_kind(program) is ProgramKind.NOTEBOOK
-        run = partial(run_notebook, path, vars(main)) if is_notebook else partial(_run_file, path, main)
+        run = partial(_run_file, path, main)
+        if program_kind(program) is ProgramKind.NOTEBOOK:
+            from kiks.script.notebook import run_notebook  # here, for it needs NumPy, which programs may not load
+
+            run = partial(run_notebook, path, vars(main))
     try:
         yield run
     finally:
