@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import threading
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -108,22 +109,12 @@ def tournament(
         _show(chosen, playing, out, played)
         return
     end_as_with_ctrl_c()
-    done = 0
-    try:
-        with progress_bar(counted(len(playing), "player")) as show:
-
-            def note(played: Played, count: int) -> None:
-                nonlocal done
-                done += 1
-                show(done, count)
-
-            made = played(note)
-        with progress_bar("page") as show:
-            assert chosen.project.seconds is not None
-            save_tournament(made, out, chosen.project.seconds, workers=workers, on_progress=show)
-    except KeyboardInterrupt:
-        say(f"stopped after {counted(done, 'game')}. The same command goes on from there.")
-        raise
+    with progress_bar(counted(len(playing), "player"), "game") as show:
+        numbers = itertools.count(1)
+        made = played(lambda _, count: show(next(numbers), count))
+    with progress_bar("page", "game") as show:
+        assert chosen.project.seconds is not None
+        save_tournament(made, out, chosen.project.seconds, workers=workers, on_progress=show)
     typer.echo(Table(HEADS, rows_of(made)).for_output())
     for each_played in made.played:
         for text in each_played.notes:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 from pathlib import Path
 from typing import Literal
 
@@ -14,7 +15,6 @@ from kiks.model.project import Project, project_file
 from kiks.ports.program_process import commands_of
 from kiks.sim.from_project import in_case
 from kiks.trials.marking import AS_POINTS, Marking
-from kiks.trials.runner import run_trials
 from kiks.trials.similarity import Likeness, alike
 from kiks.trials.students import identities
 from kiks.trials.submissions import Submission
@@ -194,44 +194,31 @@ def trials_of(
 
 def grade(
     project: Project,
-    folder: Path,
     submissions: Sequence[Submission],
-    out: Path,
+    outcomes: Sequence[Outcome],
     *,
     title: str = "",
     marking: Marking = AS_POINTS,
     attempts: Attempts | None = None,
     is_trusted: bool = False,
-    command: str = "",
-    user: str = "",
-    workers: int | None = None,
-    on_outcome: Callable[[Outcome, int], object] = lambda outcome, count: None,
-    on_taken: Callable[[int], object] = lambda count: None,
 ) -> Graded:
-    """Grade submissions: run each in all cases of an exercise; see `run_trials`.
+    """Grade submissions by what has come out of their trials.
 
     Args:
         project: The exercise.
-        folder: Where it lies.
         submissions: What was handed in.
-        out: Where outcomes and recordings go.
+        outcomes: Those of the trials that `trials_of` returned for these submissions.
         title: Its title if it says none.
         marking: How points become grades.
         attempts: Which one of the submissions of a student counts; each is a grade of its own if left out.
-        is_trusted: Whether the programs run without a sandbox.
-        command: The command that has begun it, for the recordings.
-        user: See `Trial`.
-        workers: See `run_trials`.
-        on_outcome: See `run_trials`.
-        on_taken: See `run_trials`.
+        is_trusted: Whether the programs ran without a sandbox.
     """
-    trials = trials_of(project, folder, submissions, is_trusted=is_trusted, command=command, user=user)
-    outcomes = iter(run_trials(trials, out, workers=workers, on_outcome=on_outcome, on_taken=on_taken))
+    rest = iter(outcomes)
     cases = cases_of(project.cases)
     grades = []
     for submission in submissions:
         count = 0 if submission.command is None else len(cases)
-        made = Grade(submission, tuple(next(outcomes) for _ in range(count)))
+        made = Grade(submission, tuple(islice(rest, count)))
         late = marking.days_late(submission)
         mark = None if made.problem else marking.grade_of(made.points, late)
         grades.append(replace(made, mark=mark, days_late=late))
