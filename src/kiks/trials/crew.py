@@ -32,12 +32,12 @@ class Order:
     Attributes:
         name: Its name; no other order has it.
         kind: What is to be done, one of those in `worker.py`.
-        told: What is needed for it.
+        arguments: What is needed for it.
     """
 
     name: str
     kind: str
-    told: Any
+    arguments: tuple[Any, ...]
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ class _Worker:
         """Hand an order over."""
         self.order = order
         with contextlib.suppress(OSError):  # it has died, which is seen when its answer is read
-            self.connection.send((order.kind, order.told))
+            self.connection.send((order.kind, order.arguments))
 
     def close(self) -> str:
         """End it; return how it has ended."""

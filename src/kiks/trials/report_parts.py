@@ -33,7 +33,7 @@ def shown_runs(
         workers: How many processes; one for each core if left out.
         on_progress: Called with how many are ready, and of how many.
     """
-    orders = [Order(name, SHOW, path.absolute()) for name, path in recordings.items()]
+    orders = [Order(name, SHOW, (path.absolute(),)) for name, path in recordings.items()]
     runs = {}
     for done, (name, answer) in enumerate(answers_of(orders, workers), 1):
         on_progress(done, len(orders))

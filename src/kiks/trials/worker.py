@@ -8,9 +8,9 @@ import signal
 import sys
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Any
 
 from kiks.ending import end_with_parent
 from kiks.errors import KiksError
@@ -40,13 +40,13 @@ def main() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     logging.getLogger("kiks").setLevel(logging.CRITICAL)
     sandboxes = Sandboxes()
-    kinds: dict[str, Callable[[Any], object]] = {RUN: lambda told: run_trial(*told, sandboxes=sandboxes), SHOW: _show}
+    kinds: dict[str, Callable[..., object]] = {RUN: partial(run_trial, sandboxes=sandboxes), SHOW: _show}
     gc.freeze()
     with suppress(EOFError), Connection(int(sys.argv[1])) as connection:
         while True:
-            kind, told = connection.recv()
+            kind, arguments = connection.recv()
             try:
-                answer = Answer(kinds[kind](told))
+                answer = Answer(kinds[kind](*arguments))
             except KiksError as error:
                 answer = Answer(error=str(error))
             connection.send(answer)
