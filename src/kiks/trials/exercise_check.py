@@ -44,8 +44,8 @@ def programs_for(project: Project, folder: Path, solution: Command | None = None
     for name, text in texts.items():
         file = folder / f"{name.replace(' ', '_')}.py"
         file.write_text(text, encoding="utf-8")
-        programs.append(Submission(name, file.stem, Command(file)))
-    return programs + ([] if solution is None else [Submission(SOLUTION, SOLUTION, solution)])
+        programs.append(Submission(name, id=file.stem, command=Command(file)))
+    return programs + ([] if solution is None else [Submission(SOLUTION, id=SOLUTION, command=solution)])
 
 
 def findings_of(project: Project, graded: Graded) -> list[str]:

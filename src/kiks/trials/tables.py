@@ -115,7 +115,7 @@ def feedback_name(who: Submission) -> str:
     """Return how a page of feedback is called in the archive that Moodle takes, which names files as it exports them.
 
     Example:
-        >>> feedback_name(Submission("Ann Lee", "Ann-Lee", None, participant="1201"))
+        >>> feedback_name(Submission("Ann Lee", "1201", id="Ann-Lee"))
         'Ann Lee_1201_assignsubmission_file_feedback.html'
     """
     plain = re.sub(r"[_/\\]", " ", who.name)
