@@ -19,11 +19,7 @@ class ElsewhereConnection(HostedConnection):
     """
 
     def __init__(self, link: HostLink, awaited: AwaitedAnswer, ended: Callable[[], None]) -> None:
-        def check_awaited() -> None:
-            if awaited.is_given_up:
-                raise LinkError("the answer must be waited for, but the program was interrupted. Ask again.")
-
-        super().__init__(link, check_awaited)
+        super().__init__(link, awaited.check)
         self._ended = ended
 
     def end(self) -> None:

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import threading
-from collections import deque
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from kiks.clock.gate import Gate
 from kiks.errors import LinkError, ParameterError
@@ -28,6 +27,7 @@ from kiks.units import NS_PER_S
 if TYPE_CHECKING:
     from kiks.desk.server.desk import Desk
     from kiks.desk.server.show import Shown
+    from kiks.toolbox.session_client import SessionClient
 
 WAIT_S = 0.05
 """Longest wait of one round [s of real time]."""
@@ -43,50 +43,28 @@ COMMAND_MAX = 10_000
 """Longest command for Octave or MATLAB [characters]."""
 
 
-class Client(Protocol):
-    """A client as the session sees it."""
-
-    number: int
-    name: str
-    typed: deque[str]
-
-    def halt(self) -> None:
-        """Stop the program."""
-
-    def live(self, time_ns: int) -> bool:
-        """Let time pass [ns] while the program thinks; return whether it did."""
-
-
 class Session:
     """A world on a desk, with or without a browser.
 
     Args:
         ready: Prepares the engine; called once, before the first world.
         has_window: Whether the desk is shown in a browser.
-        given: See the attribute.
 
     Attributes:
         settings: Settings of the next world.
         desk: The desk of the world; None before the first.
-        given: The robot of its only program in a world that is there already; None: it begins worlds.
-        elsewhere: That one, or the robot on another computer that its program drives in place of a world; else None.
+        elsewhere: The robot that its only program drives in a world that is there already, here or on another
+            computer; None: it begins worlds.
         clients: The programs that take part.
         owners: The client that owns each robot, by the robot's number.
         lock: Held while a client creates a world or takes a robot.
     """
 
-    def __init__(
-        self,
-        *,
-        ready: Callable[[], None] = lambda: None,
-        has_window: bool = False,
-        given: GivenRobot | None = None,
-    ) -> None:
+    def __init__(self, *, ready: Callable[[], None] = lambda: None, has_window: bool = False) -> None:
         self.settings = Settings()
         self.desk: Desk | None = None
-        self.given = given
-        self.elsewhere: RobotElsewhere | GivenRobot | None = given
-        self.clients: list[Client] = []
+        self.elsewhere: RobotElsewhere | GivenRobot | None = None
+        self.clients: list[SessionClient] = []
         self.owners: dict[int, object] = {}
         self.lock = threading.RLock()
         self._ready = ready
