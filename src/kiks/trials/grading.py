@@ -246,15 +246,12 @@ def grade(
 
 def _chosen(grades: Sequence[Grade], attempts: Attempts) -> list[Grade]:
     """Return of each student the grade that counts; one that was not graded does so only if there is no other."""
+
+    def rank(grade: Grade) -> tuple[bool, float]:
+        return grade.mark is not None, (grade.mark if attempts == "best" else grade.submission.time_s) or 0.0
+
     chosen: dict[str, Grade] = {}
     for grade in grades:
         student = identities(grade.submission)[0]
-        before = chosen.setdefault(student, grade)
-        ranks = [_rank(each, attempts) for each in (before, grade)]
-        if ranks[1] >= ranks[0]:
-            chosen[student] = grade
+        chosen[student] = max(grade, chosen.get(student, grade), key=rank)  # the later one of equal ones
     return [*chosen.values()]
-
-
-def _rank(grade: Grade, attempts: Attempts) -> tuple[bool, float]:
-    return grade.mark is not None, (grade.mark if attempts == "best" else grade.submission.time_s) or 0.0
