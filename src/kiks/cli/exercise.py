@@ -10,7 +10,7 @@ import typer
 
 from kiks.cli.command_line import Group
 from kiks.cli.engine_start import ready_engine
-from kiks.cli.options import Trusted, Workers, progress_bar
+from kiks.cli.options import ExerciseFile, Trusted, Workers, progress_bar
 from kiks.cli.outputs import Command, has_results, shows_progress, tell_results
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import counted, figure, printable
@@ -36,9 +36,7 @@ def _exercise() -> None:
 @shows_progress
 def check(
     context: typer.Context,
-    exercise: Annotated[
-        Path, typer.Argument(help="A project with a goal and a time limit (.kiks), or the folder of an exercise.")
-    ],
+    exercise: ExerciseFile,
     solution: Annotated[
         Path | None, typer.Option(help="A program that should solve all cases: a file, or a folder with a __main__.py.")
     ] = None,

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from kiks.cli.engine_start import ready_engine
-from kiks.cli.options import Trusted, Workers, progress_bar, say, tell_taken
+from kiks.cli.options import ExerciseFile, Trusted, Workers, progress_bar, say, tell_taken
 from kiks.cli.outputs import has_results, leave_out, shows_progress, tell_results
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import ParameterError, counted, figure, printable
@@ -25,9 +25,7 @@ if TYPE_CHECKING:
 @shows_progress
 def grade(
     context: typer.Context,
-    exercise: Annotated[
-        Path, typer.Argument(help="A project with a goal and a time limit (.kiks), or the folder of an exercise.")
-    ],
+    exercise: ExerciseFile,
     submissions: Annotated[
         list[Path],
         typer.Argument(
@@ -143,13 +141,7 @@ def grade(
         if other is not None:
             other.end_all()
         graded = graded_of(
-            project,
-            found,
-            outcomes,
-            title=exercise.stem,
-            marking=marking,
-            attempts=attempts,
-            is_trusted=is_trusted,
+            project, found, outcomes, title=exercise.stem, marking=marking, attempts=attempts, is_trusted=is_trusted
         )
         with progress_bar("report", "page") as show:
             save_grades(graded, out, workers=workers, on_progress=show)

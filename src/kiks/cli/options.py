@@ -212,6 +212,9 @@ def is_project(file: str | Path) -> bool:
     return str(file).lower().endswith(".kiks") or (Path(file) / "exercise.kiks").is_file()
 
 
+ExerciseFile = Annotated[
+    Path, typer.Argument(help="A project with a goal and a time limit (.kiks), or the folder of an exercise.")
+]
 Workers = Annotated[int | None, typer.Option(help="Worlds at once; one for each core if left out.", min=1, max=1000)]
 Trusted = Annotated[
     bool, typer.Option("--trusted", help="Run the programs without a sandbox: they may do all that you may.")

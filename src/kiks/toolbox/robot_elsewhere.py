@@ -68,7 +68,7 @@ class RobotElsewhere:
     def __init__(self, address: str) -> None:
         self._address = Address.parse(address)
         self._link: HostLink | None = HostLink(self._address)
-        self.robot, self.pulse_mm = self._link.robot, self._link.pulse_mm
+        self.robot, self.pulse_mm = self._link.robot, self._link.start.pulse_mm
         self.thinking = self._link.start.thinking
         self.visit = object()
 

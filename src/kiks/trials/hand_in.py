@@ -42,14 +42,15 @@ def packed(
         >>> zipfile.ZipFile(io.BytesIO(data)).namelist()
         ['program.py', 'score.json', 'speeds.py']
     """
-    (_, main), *others = program.items()
-    if taken := {PROGRAM, *OF_THE_RUN}.intersection(dict(others)):
-        raise ParameterError(
-            f"a file of a program that is handed in must not be called {min(taken)}, as a file of the run is. "
-            "Rename it."
-        )
-    of_the_run = {SCORE: json.dumps(score, indent=1).encode(), RECORDING: recording, PAGE: page}
-    files = {PROGRAM: main} | {name: data for name, data in of_the_run.items() if data} | dict(others)
+    main, *others = program.items()
+    files = {PROGRAM: main[1], SCORE: json.dumps(score, indent=1).encode()}
+    files |= {name: data for name, data in ((RECORDING, recording), (PAGE, page)) if data}
+    for name, data in others:
+        if name in (PROGRAM, *OF_THE_RUN):
+            raise ParameterError(
+                f"a file of a program that is handed in must not be called {name}, as a file of the run is. Rename it."
+            )
+        files[name] = data
     made = io.BytesIO()
     with zipfile.ZipFile(made, "w") as archive:
         for name, data in files.items():
