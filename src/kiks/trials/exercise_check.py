@@ -17,7 +17,7 @@ from kiks.ports.program_process import Command
 from kiks.sim.judge import LOOK_S, POINTS, RESULT
 from kiks.trials.grading import Graded
 from kiks.trials.submissions import Submission
-from kiks.trials.trial import FAILURES, Outcome
+from kiks.trials.trial import Outcome
 
 ENDS, WAITS, TEMPLATE, SOLUTION = "ends at once", "does nothing", "template", "solution"
 """The programs that are tried; those that are nobody's are `_IDLE`."""
@@ -89,7 +89,7 @@ def _in_a_case(project: Project, outcomes: dict[str, Outcome]) -> Iterator[str]:
     if (template := outcomes.get(TEMPLATE)) is not None:
         if template.is_solved and not idle.is_solved:
             yield "The template solves it."
-        if (end := template.end_of(STUDENT)).how in FAILURES:
+        if (end := template.end_of(STUDENT)).has_failed:
             yield f"The template fails: {end}."
     solution = outcomes.get(SOLUTION)
     has_solved = project.goal is not None and bool(project.goal.formulas()["solved"].terms)
@@ -102,7 +102,7 @@ def _in_a_case(project: Project, outcomes: dict[str, Outcome]) -> Iterator[str]:
 def _of_the_world(outcome: Outcome) -> Iterator[str]:
     """Yield a sentence about each program of the exercise that has failed, and about a run that may differ."""
     for end in outcome.ends:
-        if end.robot != STUDENT and end.how in FAILURES:
+        if end.robot != STUDENT and end.has_failed:
             yield f"The program of robot {end.robot}, {end.name}, fails: {end}."
     if outcome.doubt:
         yield f"A run may come out differently next time: {outcome.doubt}."

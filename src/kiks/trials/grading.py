@@ -18,7 +18,7 @@ from kiks.trials.marking import AS_POINTS, Marking
 from kiks.trials.similarity import Likeness, alike
 from kiks.trials.students import identities
 from kiks.trials.submissions import Submission
-from kiks.trials.trial import CRASHED, ENDLESS, FAILURES, OUT_OF_TIME, STOPPED, Outcome, Trial, limit_of
+from kiks.trials.trial import End, Outcome, Trial, limit_of
 
 Attempts = Literal["best", "last"]
 """Which one counts of the submissions of a student."""
@@ -66,14 +66,13 @@ class Grade:
 
     def count(self, how: str) -> int:
         """Return in how many cases it ended so; at the time limit, only those that were not solved count."""
-        return sum(
-            outcome.end_of().how == how and not (how == OUT_OF_TIME and outcome.is_solved) for outcome in self.outcomes
-        )
+        ended = [outcome for outcome in self.outcomes if outcome.end_of().how == how]
+        return sum(not (how == End.OUT_OF_TIME and outcome.is_solved) for outcome in ended)
 
     @property
     def worst(self) -> Outcome | None:
         """The case with the fewest points; of several, one in which the program did not end as it should."""
-        rank = {STOPPED: 0, ENDLESS: 1, CRASHED: 2}
+        rank = {End.STOPPED: 0, End.ENDLESS: 1, End.CRASHED: 2}
         return min(
             self.outcomes,
             key=lambda each: (each.points, each.is_solved, rank.get(each.end_of().how, 3), -each.time_s),
@@ -131,7 +130,7 @@ class Graded:
             (end.robot, end.name, str(end))
             for outcome in outcomes
             for end in outcome.ends
-            if end.robot != STUDENT and end.how in FAILURES
+            if end.robot != STUDENT and end.has_failed
         )
         return [
             f"{name}, the exercise's program of robot {robot}, failed in {count} of {len(outcomes)} runs ({how}). No "

@@ -13,7 +13,7 @@ from pathlib import Path
 from kiks.errors import KiksError, ParameterError, shown
 from kiks.model.atomic_files import explained, make_folder, replace_file
 from kiks.trials.crew import Order, answers_of
-from kiks.trials.trial import STOPPED, Outcome, ProgramEnd, Trial
+from kiks.trials.trial import End, Outcome, ProgramEnd, Trial
 from kiks.trials.worker import RUN
 
 OUTCOMES = "outcomes.jsonl"
@@ -123,6 +123,6 @@ def _stands_for(outcome: Outcome, trial: Trial, folder: Path) -> bool:
 def _lost(trial: Trial, why: str) -> Outcome:
     """Return the outcome of a trial that took its worker with it."""
     ends = tuple(
-        ProgramEnd(robot, command.name, STOPPED, why) for robot, command in enumerate(trial.programs, 1) if command
+        ProgramEnd(robot, command.name, End.STOPPED, why) for robot, command in enumerate(trial.programs, 1) if command
     )
     return Outcome(trial.key, trial.name, False, False, 0, 0.0, {}, ends, "", "", why)

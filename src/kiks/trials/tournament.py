@@ -19,7 +19,7 @@ from kiks.model.project import Project, ProjectRobot, project_file
 from kiks.ports.program_process import Command, supervisor_of
 from kiks.trials.runner import run_trials
 from kiks.trials.submissions import Submission, cut_to_bytes
-from kiks.trials.trial import FAILURES, Outcome, ProgramEnd, Trial, limit_of
+from kiks.trials.trial import Outcome, ProgramEnd, Trial, limit_of
 
 GAMES_MAX = 20_000
 """Most games of a tournament."""
@@ -66,7 +66,7 @@ class Played:
     @cached_property
     def failures(self) -> tuple[ProgramEnd | None, ...]:
         """How each program has failed; None if it has not."""
-        ends = {end.robot: end for end in self.outcome.ends if end.how in FAILURES}
+        ends = {end.robot: end for end in self.outcome.ends if end.has_failed}
         return tuple(ends.get(robot) for robot in range(1, len(self.names) + 1))
 
     @cached_property
