@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import threading
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -21,7 +22,7 @@ from kiks.table import Table
 
 if TYPE_CHECKING:
     from kiks.trials.submissions import Submission
-    from kiks.trials.tournament import Match, Played, Tournament
+    from kiks.trials.tournament import Match, Tournament
 
 
 @has_results
@@ -91,19 +92,8 @@ def tournament(
     playing = [each for each in found if each.command is not None]
     first = chosen.project.seed if seed is None else seed
     ready_engine()
-
-    def played(on_played: Callable[[Played, int], object]) -> Tournament:
-        return play(
-            chosen,
-            playing,
-            out,
-            rounds=rounds,
-            seeds=range(first, first + seeds),
-            is_trusted=trusted,
-            workers=workers,
-            on_played=on_played,
-        )
-
+    drawn = range(first, first + seeds)
+    played = partial(play, chosen, playing, out, rounds=rounds, seeds=drawn, is_trusted=trusted, workers=workers)
     if desk:
         leave_out(context, "with --desk, where the games are shown", "json")
         _show(chosen, playing, out, played)
@@ -111,7 +101,7 @@ def tournament(
     end_as_with_ctrl_c()
     with progress_bar(counted(len(playing), "player"), "game") as show:
         numbers = itertools.count(1)
-        made = played(lambda _, count: show(next(numbers), count))
+        made = played(on_played=lambda _, count: show(next(numbers), count))
     with progress_bar("page", "game") as show:
         assert chosen.project.seconds is not None
         save_tournament(made, out, chosen.project.seconds, workers=workers, on_progress=show)
@@ -128,12 +118,7 @@ def tournament(
     )
 
 
-def _show(
-    match: Match,
-    players: Sequence[Submission],
-    out: Path,
-    play: Callable[[Callable[[Played, int], object]], Tournament],
-) -> None:
+def _show(match: Match, players: Sequence[Submission], out: Path, play: Callable[..., Tournament]) -> None:
     """Show the games on a desk until Ctrl-C, while they are played ahead in another thread."""
     from kiks.cli.desk import open_desk
     from kiks.desk.server.desk import Desk
@@ -152,7 +137,7 @@ def _show(
 
     def work() -> None:
         try:
-            save_tournament(play(hall.note), out, seconds)
+            save_tournament(play(on_played=hall.note), out, seconds)
             say(f"all games are played: {out / PAGE}.")
         except KiksError as error:
             desk.say(f"The tournament has ended: {error}")
