@@ -24,9 +24,10 @@ from kiks.model.goal import Goal
 from kiks.model.project import Project, ProjectRobot
 from kiks.ports.program_process import Command
 from kiks.sim.from_project import simulation_of
-from kiks.trials.grading import grade as graded
+from kiks.trials.grading import Graded, grade, trials_of
 from kiks.trials.hand_in import PAGE, PROGRAM, RECORDING, SCORE
-from kiks.trials.submissions import submissions_in
+from kiks.trials.runner import run_trials
+from kiks.trials.submissions import Submission, submissions_in
 
 CASES = Cases(seed=(1, 2)), Cases("mine", is_hidden=True)
 GOAL = Goal(solved="path_mm > 20")
@@ -42,6 +43,10 @@ robot.set_speed(speeds.SPEED, int(open("turn.txt").read()))
 print("driving", file=open("log.txt", "w"))
 robot.pause(1)
 """
+
+
+def graded(project: Project, home: Path, found: list[Submission], out: Path) -> Graded:
+    return grade(project, found, run_trials(trials_of(project, home, found, is_trusted=True), out))
 
 
 def program(folder: Path, text: str) -> Command:
@@ -152,8 +157,8 @@ def test_what_is_tried_is_what_is_handed_in_with_all_its_files(tmp_path: Path) -
         "turn.txt",
         "log.txt",
     }
-    (grade,) = graded(PROJECT, home, [found], tmp_path / "graded", is_trusted=True).grades
-    assert [each.points for each in grade.outcomes[:2]] == [each.points for each in tries.grade.outcomes]
+    (own,) = graded(PROJECT, home, [found], tmp_path / "graded").grades
+    assert [each.points for each in own.outcomes[:2]] == [each.points for each in tries.grade.outcomes]
     (home / "score.json").write_text("")
     program(home, "open('score.json')")
     tries.begin(PROJECT, home, drive, has_hidden=False, hand_in=handed_in.append)
@@ -169,7 +174,7 @@ def test_a_program_of_the_exercise_that_fails_is_said(tmp_path: Path) -> None:
         (tmp_path / name).write_text(text)
     project = replace(PROJECT, robots=(ProjectRobot(), ProjectRobot(program="other.py")), cases=())
     found = submissions_in([tmp_path / "ann" / "drive.py"], tmp_path / "copies")
-    assert graded(project, tmp_path, found, tmp_path / "out", is_trusted=True).faults == []
+    assert graded(project, tmp_path, found, tmp_path / "out").faults == []
     (tmp_path / "brain.py").write_text("")
-    (fault,) = graded(project, tmp_path, found, tmp_path / "out", is_trusted=True).faults
+    (fault,) = graded(project, tmp_path, found, tmp_path / "out").faults
     assert fault.startswith("other.py, the exercise's program of robot 2, failed in 1 of 1 runs (crashed: AttributeErr")

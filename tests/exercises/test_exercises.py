@@ -13,7 +13,7 @@ from kiks.model.project import Project
 from kiks.ports.program_process import Command
 from kiks.sim.from_project import in_case
 from kiks.trials.runner import run_trials
-from kiks.trials.trial import CRASHED, ENDLESS, Outcome, Trial
+from kiks.trials.trial import End, Outcome, Trial
 
 SOLUTIONS = Path(__file__).parent / "solutions"
 
@@ -57,7 +57,7 @@ def trials_of(name: str) -> Iterator[Trial]:
 def test_solutions_solve_them_and_less_than_that_earns_less(tmp_path: Path) -> None:
     outcomes: dict[tuple[str, str], list[Outcome]] = {}
     for outcome in run_trials([trial for name in NAMES for trial in trials_of(name)], tmp_path):
-        assert outcome.end_of().how not in (CRASHED, ENDLESS), outcome
+        assert outcome.end_of().how not in (End.CRASHED, End.ENDLESS), outcome
         assert not outcome.doubt
         assert 0 <= outcome.points <= POINTS_MAX
         name, program, _ = outcome.name.split("/")

@@ -20,7 +20,7 @@ from kiks.ports.sandbox import Limits
 from kiks.trials.one_run import run_trial
 from kiks.trials.runner import OUTCOMES, run_trials
 from kiks.trials.sandboxes import Sandboxes
-from kiks.trials.trial import CRASHED, ENDED, ENDLESS, OUT_OF_TIME, RUNNING, STOPPED, Outcome, Trial
+from kiks.trials.trial import End, Outcome, Trial
 
 PROGRAMS = {
     "drives": """
@@ -89,7 +89,7 @@ def sandboxes() -> Iterator[Sandboxes]:
 def test_a_trial_says_how_the_program_has_ended_and_what_it_scored(outcomes: list[Outcome]) -> None:
     drives, _, goes_on = outcomes
     crash = outcomes[1].end_of()
-    assert [each.end_of().how for each in outcomes] == [ENDED, CRASHED, RUNNING]
+    assert [each.end_of().how for each in outcomes] == [End.ENDED, End.CRASHED, End.RUNNING]
     assert drives.end_of().printed[0].startswith("done")
     assert (crash.detail, crash.printed[0]) == ("ValueError: no <b>wall</b>", "about to")
     assert (drives.is_solved, goes_on.is_solved, goes_on.points, goes_on.time_s) == (False, True, 2, 1.3)
@@ -117,7 +117,7 @@ def test_the_same_comes_out_of_two_workers_in_another_order_after_kills_of_runne
     write(home, "killer", "import os\ndef supervise(sim):\n    yield 0.1\n    os.kill(os.getpid(), 9)")
     killer = replace(trials[0], name="killer", project=replace(trials[0].project, supervisor="killer.py"))
     killed, *others = run_trials([killer, *trials[::-1]], folder, workers=2)
-    assert (others, killed.end_of().how) == (outcomes[::-1], STOPPED)
+    assert (others, killed.end_of().how) == (outcomes[::-1], End.STOPPED)
     assert "by signal 9, 2 times" in killed.doubt
     assert kept.stat().st_mtime_ns == kept_at
     assert lost.stat().st_size > 0
@@ -162,7 +162,7 @@ def test_what_lets_no_time_pass_is_stopped_and_named(tmp_path: Path, sandboxes: 
     for command, words in ((loop, "computed for 0.3 s"), (still, "waited for 0.3 s")):
         trial = Trial(command.name, project, tmp_path, (command,), is_trusted=True)
         outcome = run_trial(trial, tmp_path, sandboxes)
-        assert (outcome.end_of().how, outcome.doubt) == (ENDLESS, "")
+        assert (outcome.end_of().how, outcome.doubt) == (End.ENDLESS, "")
         assert outcome.end_of().detail.startswith(words)
 
 
@@ -171,7 +171,7 @@ def test_nothing_counts_of_a_run_that_a_faster_computer_would_have_had_more_of(t
     project = Project(goal=Goal(points="1 + time_s"), seconds=10.0)
     trial = Trial("a", project, tmp_path, (program,), is_trusted=True)
     outcome = run_trial(trial, tmp_path, Sandboxes(Limits(processor_s=0.1)))
-    assert outcome.end_of().how == STOPPED
+    assert outcome.end_of().how == End.STOPPED
     assert re.fullmatch(r"computed for \d+ s in all", outcome.end_of().detail)
     assert (outcome.points, outcome.time_s, outcome.state) == (0, 0.0, "")
 
@@ -179,4 +179,4 @@ def test_nothing_counts_of_a_run_that_a_faster_computer_would_have_had_more_of(t
 def test_a_program_that_waits_runs_out_of_simulated_time(tmp_path: Path, sandboxes: Sandboxes) -> None:
     program = write(tmp_path, "sleeps", "import time\nwhile True: time.sleep(1)")
     outcome = run_trial(Trial("a", Project(seconds=7.0), tmp_path, (program,), is_trusted=True), tmp_path, sandboxes)
-    assert (outcome.end_of().how, outcome.time_s) == (OUT_OF_TIME, 7.0)
+    assert (outcome.end_of().how, outcome.time_s) == (End.OUT_OF_TIME, 7.0)

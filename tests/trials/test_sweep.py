@@ -5,12 +5,12 @@ import pytest
 from kiks.errors import ParameterError
 from kiks.model.ranges import numbers_of, seeds_in
 from kiks.trials.sweep import Axes, Sweep, Tried
-from kiks.trials.trial import CRASHED, RUNNING, Outcome, ProgramEnd
+from kiks.trials.trial import End, Outcome, ProgramEnd
 
 
-def tried(thinking_ms: float, points: float = 1.0, *, baud=9600, robot: int = 1, end: str = RUNNING) -> Tried:
+def tried(thinking_ms: float, points: float = 1.0, *, baud=9600, robot: int = 1, end: End = End.RUNNING) -> Tried:
     """Return a case, solved if it has points."""
-    ends = (ProgramEnd(1, "drive.py", end, "no wall" if end == CRASHED else ""),)
+    ends = (ProgramEnd(1, "drive.py", end, "no wall" if end == End.CRASHED else ""),)
     name, time_s = f"{baud}/{thinking_ms}/{robot}", 9.0 if points else 3.0
     outcome = Outcome(name, name, points > 0, points == 0, points, time_s, {}, ends, "", f"runs/{name}.mcap")
     return Tried(baud, thinking_ms, robot, 0, outcome)
@@ -45,7 +45,7 @@ def test_a_share_of_the_runs_may_fail_if_a_person_says_so() -> None:
 
 
 def test_a_program_that_crashes_has_not_solved_anything() -> None:
-    verdict = Sweep((tried(0, 5.0, end=CRASHED, baud=None),)).verdict
+    verdict = Sweep((tried(0, 5.0, end=End.CRASHED, baud=None),)).verdict
     worst = "worst: seed 0, robot 1 with 0 ms (drive.py crashed: no wall)"
     assert verdict == f"does not hold, not even with 0 ms of thinking; {worst}"
     # The worst of what holds everywhere has the fewest points.

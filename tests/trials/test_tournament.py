@@ -11,7 +11,7 @@ from kiks.cli import app
 from kiks.errors import ParameterError
 from kiks.model.project import Project
 from kiks.trials.tournament import Game, Match, Played, Tournament, play, round_robin, swiss
-from kiks.trials.trial import CRASHED, RUNNING, Outcome, ProgramEnd
+from kiks.trials.trial import End, Outcome, ProgramEnd
 
 NAMES = ("ann", "bob", "eve")
 
@@ -19,7 +19,7 @@ NAMES = ("ann", "bob", "eve")
 def played(players: tuple[int, ...], score: tuple[float, ...], crashed: tuple[int, ...] = ()) -> Played:
     """Return a game with its score; some players have crashed."""
     names = tuple(NAMES[player] for player in players)
-    how = [(CRASHED, "no ball") if player in crashed else (RUNNING, "") for player in players]
+    how = [(End.CRASHED, "no ball") if player in crashed else (End.RUNNING, "") for player in players]
     ends = tuple(ProgramEnd(robot, "player.py", *each) for robot, each in enumerate(how, 1))
     counted: dict[str, float | str] = {str(robot): value for robot, value in enumerate(score, 1)}
     name = "-".join(names)

@@ -10,7 +10,7 @@ import typer
 
 from kiks.cli.command_line import Group
 from kiks.cli.engine_start import ready_engine
-from kiks.cli.options import Trusted, Workers, progress_bar
+from kiks.cli.options import ExerciseFile, Trusted, Workers, progress_bar
 from kiks.cli.outputs import Command, has_results, shows_progress, tell_results
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import counted, figure, printable
@@ -36,9 +36,7 @@ def _exercise() -> None:
 @shows_progress
 def check(
     context: typer.Context,
-    exercise: Annotated[
-        Path, typer.Argument(help="A project with a goal and a time limit (.kiks), or the folder of an exercise.")
-    ],
+    exercise: ExerciseFile,
     solution: Annotated[
         Path | None, typer.Option(help="A program that should solve all cases: a file, or a folder with a __main__.py.")
     ] = None,
@@ -53,10 +51,10 @@ def check(
 
     Example: kiks exercise check exercises/wall --solution wall.py
     """
-    from kiks.model.exercise import cases_of
     from kiks.ports.program_process import Command as Program
-    from kiks.trials.exercise_check import check_exercise, programs_for
-    from kiks.trials.grading import load_exercise
+    from kiks.trials.exercise_check import findings_of, programs_for
+    from kiks.trials.grading import grade, load_exercise, trials_of
+    from kiks.trials.runner import run_trials
 
     project, home = load_exercise(exercise)
     program = None if solution is None else Program(solution)
@@ -64,18 +62,12 @@ def check(
         program.check_file()
     with tempfile.TemporaryDirectory(prefix="kiks-check-") as out, progress_bar("exercise") as show:
         programs = programs_for(project, Path(out, "programs"), program)
-        run_count = len(programs) * len(cases_of(project.cases))
+        trials = trials_of(project, home, programs, is_trusted=trusted)
         ready_engine()
         end_as_with_ctrl_c()
-        checked = check_exercise(
-            project,
-            home,
-            programs,
-            Path(out),
-            is_trusted=trusted,
-            workers=workers,
-            on_outcome=lambda _, count: show(count, run_count),
-        )
+        outcomes = run_trials(trials, Path(out), workers=workers, on_outcome=lambda _, count: show(count, len(trials)))
+    checked = grade(project, programs, outcomes)
+    findings = findings_of(project, checked)
     rows = [
         (each.submission.name, figure(each.points), f"{each.solved}/{len(checked.cases)}", each.said_last)
         for each in checked.grades
@@ -85,10 +77,10 @@ def check(
         "programs": [
             {"name": each.submission.name, "points": each.points, "solved": each.solved} for each in checked.grades
         ],
-        "findings": list(checked.findings),
+        "findings": findings,
     }
     table = Table(("program", "points", "solved", "said last"), rows, ends_in_text=True).for_output()
     without = "" if program is not None else " Whether it can be solved says --solution PROGRAM."
-    end = f"{counted(len(checked.findings), 'finding')} in {counted(len(checked.cases), 'case')}.{without}"
-    tell_results(context, results, [table, *map(printable, checked.findings), end])
-    raise typer.Exit(bool(checked.findings))
+    end = f"{counted(len(findings), 'finding')} in {counted(len(checked.cases), 'case')}.{without}"
+    tell_results(context, results, [table, *map(printable, findings), end])
+    raise typer.Exit(bool(findings))

@@ -12,23 +12,20 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from kiks.cli.engine_start import ready_engine
-from kiks.cli.options import Trusted, Workers, progress_bar, say, tell_taken
+from kiks.cli.options import ExerciseFile, Trusted, Workers, progress_bar, say, tell_taken
 from kiks.cli.outputs import has_results, leave_out, shows_progress, tell_results
 from kiks.ending import end_as_with_ctrl_c
 from kiks.errors import ParameterError, counted, figure, printable
 
 if TYPE_CHECKING:
     from kiks.trials.grading import Graded
-    from kiks.trials.trial import Outcome
 
 
 @has_results
 @shows_progress
 def grade(
     context: typer.Context,
-    exercise: Annotated[
-        Path, typer.Argument(help="A project with a goal and a time limit (.kiks), or the folder of an exercise.")
-    ],
+    exercise: ExerciseFile,
     submissions: Annotated[
         list[Path],
         typer.Argument(
@@ -101,7 +98,7 @@ def grade(
     from kiks.trials.grading import load_exercise, trials_of
     from kiks.trials.marking import marking_for
     from kiks.trials.report import save_grades
-    from kiks.trials.runner import OUTCOMES
+    from kiks.trials.runner import OUTCOMES, run_trials
     from kiks.trials.students import read_students, with_students
     from kiks.trials.submissions import submissions_in
 
@@ -127,35 +124,27 @@ def grade(
                 )
             other.let_read(out / "programs")
         found, strangers = (found, []) if listed is None else with_students(found, listed)
-        count = len(trials_of(project, folder, found))
+        is_trusted = trusted or other is not None
+        command = shlex.join(["kiks", *sys.argv[1:]])
+        trials = trials_of(project, folder, found, is_trusted=is_trusted, command=command, user=user or "")
         ready_engine()
         end_as_with_ctrl_c()
-        done = 0
-
-        def note(outcome: Outcome, number: int) -> None:
-            nonlocal done
-            done = number
-            show(number, count)
-
-        def note_taken(number: int) -> None:
-            tell_taken(number, count, out)
-
-        options: dict[str, Any] = {"title": exercise.stem, "marking": marking, "attempts": attempts}
-        options |= {"is_trusted": trusted, "workers": workers, "on_taken": note_taken}
+        with progress_bar(counted(len(found), "submission"), "run") as show:
+            outcomes = run_trials(
+                trials,
+                out,
+                # At the end of a sandbox all processes of another user are killed.
+                workers=workers if other is None else 1,
+                on_outcome=lambda _, done: show(done, len(trials)),
+                on_taken=lambda taken: tell_taken(taken, len(trials), out),
+            )
         if other is not None:
-            # One worker: at the end of a sandbox all processes of that user are killed.
-            options |= {"is_trusted": True, "user": other.name, "workers": 1}
-        try:
-            with progress_bar(counted(len(found), "submission")) as show:
-                command = shlex.join(["kiks", *sys.argv[1:]])
-                graded = graded_of(project, folder, found, out, command=command, on_outcome=note, **options)
-            if other is not None:
-                other.end_all()
-            with progress_bar("report") as show_report:
-                save_grades(graded, out, workers=workers, on_progress=show_report)
-        except KeyboardInterrupt:
-            say(f"stopped after {done} of {counted(count, 'run')}. The same command goes on from there.")
-            raise
+            other.end_all()
+        graded = graded_of(
+            project, found, outcomes, title=exercise.stem, marking=marking, attempts=attempts, is_trusted=is_trusted
+        )
+        with progress_bar("report", "page") as show:
+            save_grades(graded, out, workers=workers, on_progress=show)
     tell_results(context, _results(graded, out))
     _tell(graded, out)
     if strangers:

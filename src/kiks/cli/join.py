@@ -33,12 +33,7 @@ def run_joined(address: str, words: Sequence[str]) -> int:
     command.check_file()
     link = HostLink(Address.parse(address))
     say(f"robot {link.robot} at {link.place}, thinking {link.start.thinking}.")
-    start = link.start._replace(
-        module=command.module,
-        program=str(command.program),
-        arguments=list(command.arguments),
-        pulse_mm=link.pulse_mm,
-    )
+    start = link.start._replace(module=command.module, program=str(command.program), arguments=list(command.arguments))
     with opening("the program's line"):
         here, there = socket.socketpair()
     with here:

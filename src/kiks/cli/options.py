@@ -212,6 +212,9 @@ def is_project(file: str | Path) -> bool:
     return str(file).lower().endswith(".kiks") or (Path(file) / "exercise.kiks").is_file()
 
 
+ExerciseFile = Annotated[
+    Path, typer.Argument(help="A project with a goal and a time limit (.kiks), or the folder of an exercise.")
+]
 Workers = Annotated[int | None, typer.Option(help="Worlds at once; one for each core if left out.", min=1, max=1000)]
 Trusted = Annotated[
     bool, typer.Option("--trusted", help="Run the programs without a sandbox: they may do all that you may.")
@@ -230,15 +233,27 @@ def tell_taken(taken: int, count: int, folder: Path) -> None:
 
 
 @contextmanager
-def progress_bar(work: str) -> Iterator[Callable[..., None]]:
-    """Yield a function that shows on a terminal how much is done, as a share or of a number, unless --quiet."""
+def progress_bar(work: str, each: str = "") -> Iterator[Callable[..., None]]:
+    """Yield a function that shows on a terminal how much is done, as a share or of a number, unless --quiet.
+
+    Args:
+        work: What is done.
+        each: What is counted, if the same command goes on after Ctrl-C: then people read how far it has come.
+    """
     from rich.console import Console
     from rich.progress import Progress
 
     console = Console(stderr=True)
-    with Progress(console=console, transient=True, disable=is_quiet() or not console.is_terminal) as progress:
-        bar = progress.add_task(work, total=None)
-        yield lambda done, count=1: progress.update(bar, completed=done, total=count)
+    progress = Progress(console=console, transient=True, disable=is_quiet() or not console.is_terminal)
+    bar = progress.add_task(work, total=None)
+    try:
+        with progress:
+            yield lambda done, count=1: progress.update(bar, completed=done, total=count)
+    except KeyboardInterrupt:
+        if each and (count := progress.tasks[bar].total) is not None:
+            done = progress.tasks[bar].completed
+            say(f"stopped after {done:.0f} of {counted(count, each)}. The same command goes on from there.")
+        raise
 
 
 def parse_turret(entry: str, robot_count: int) -> tuple[str, int | None]:

@@ -110,7 +110,7 @@ def sweep(
     ready_engine()
     if not is_quiet():
         say(f"{counted(count, 'run')} of {project.seconds:g} s at most. Goal: {goal.text or goal.solved}.")
-    with progress_bar("runs") as progress:
+    with progress_bar("runs", "run") as progress:
         found = swept(
             project,
             job.home,

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import threading
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -20,7 +22,7 @@ from kiks.table import Table
 
 if TYPE_CHECKING:
     from kiks.trials.submissions import Submission
-    from kiks.trials.tournament import Match, Played, Tournament
+    from kiks.trials.tournament import Match, Tournament
 
 
 @has_results
@@ -90,40 +92,19 @@ def tournament(
     playing = [each for each in found if each.command is not None]
     first = chosen.project.seed if seed is None else seed
     ready_engine()
-
-    def played(on_played: Callable[[Played, int], object]) -> Tournament:
-        return play(
-            chosen,
-            playing,
-            out,
-            rounds=rounds,
-            seeds=range(first, first + seeds),
-            is_trusted=trusted,
-            workers=workers,
-            on_played=on_played,
-        )
-
+    drawn = range(first, first + seeds)
+    played = partial(play, chosen, playing, out, rounds=rounds, seeds=drawn, is_trusted=trusted, workers=workers)
     if desk:
         leave_out(context, "with --desk, where the games are shown", "json")
         _show(chosen, playing, out, played)
         return
     end_as_with_ctrl_c()
-    done = 0
-    try:
-        with progress_bar(counted(len(playing), "player")) as show:
-
-            def note(played: Played, count: int) -> None:
-                nonlocal done
-                done += 1
-                show(done, count)
-
-            made = played(note)
-        with progress_bar("page") as show:
-            assert chosen.project.seconds is not None
-            save_tournament(made, out, chosen.project.seconds, workers=workers, on_progress=show)
-    except KeyboardInterrupt:
-        say(f"stopped after {counted(done, 'game')}. The same command goes on from there.")
-        raise
+    with progress_bar(counted(len(playing), "player"), "game") as show:
+        numbers = itertools.count(1)
+        made = played(on_played=lambda _, count: show(next(numbers), count))
+    with progress_bar("page", "game") as show:
+        assert chosen.project.seconds is not None
+        save_tournament(made, out, chosen.project.seconds, workers=workers, on_progress=show)
     typer.echo(Table(HEADS, rows_of(made)).for_output())
     for each_played in made.played:
         for text in each_played.notes:
@@ -137,12 +118,7 @@ def tournament(
     )
 
 
-def _show(
-    match: Match,
-    players: Sequence[Submission],
-    out: Path,
-    play: Callable[[Callable[[Played, int], object]], Tournament],
-) -> None:
+def _show(match: Match, players: Sequence[Submission], out: Path, play: Callable[..., Tournament]) -> None:
     """Show the games on a desk until Ctrl-C, while they are played ahead in another thread."""
     from kiks.cli.desk import open_desk
     from kiks.desk.server.desk import Desk
@@ -161,7 +137,7 @@ def _show(
 
     def work() -> None:
         try:
-            save_tournament(play(hall.note), out, seconds)
+            save_tournament(play(on_played=hall.note), out, seconds)
             say(f"all games are played: {out / PAGE}.")
         except KiksError as error:
             desk.say(f"The tournament has ended: {error}")

@@ -30,7 +30,7 @@ from kiks.export.kinds import KINDS
 from kiks.export.looks import CYLINDER_COLOUR, robot_colour
 from kiks.export.panel import draw_sign
 from kiks.export.pictures import save_image
-from kiks.export.sheet import FLOOR, LAMP_MM, ground_picture, mixed
+from kiks.export.sheet import FLOOR, mixed
 from kiks.export.stage import MARGIN, OUTSIDE, TRAIL_PIXELS, Canvas, Pixels
 from kiks.export.video_file import GIF, MP4, VideoFile
 from kiks.model.arena import Arena
@@ -175,16 +175,11 @@ def _ground(scene: Ghosts, size: tuple[int, int]) -> tuple[Canvas, Canvas]:
     """Return the floor with walls and lamps, and the empty picture around it."""
     arena, (width, height) = scene.arena, size
     scale = (1 - 2 * MARGIN) * min(width / arena.width_mm, height / arena.height_mm)
-    inner = max(round(arena.width_mm * scale), 1), max(round(arena.height_mm * scale), 1)
     lamps = np.array([(each.x_mm, each.y_mm, each.power_w, each.is_on) for each in arena.lamps], float).reshape(-1, 4)
-    pixels = np.array(ground_picture(arena, lamps, scene.spec, inner))
-    ground = Canvas(pixels, scale, 0.0, arena.height_mm)
-    for x_mm, y_mm, _, is_on in lamps.tolist():
-        with ground.patch([(x_mm, y_mm)], LAMP_MM) as sheet:
-            sheet.lamp((x_mm, y_mm), is_on=bool(is_on))
+    ground = Canvas.of_ground(arena, lamps, scene.spec, scale)
     for x_mm, y_mm, radius_mm, *_ in (*arena.balls, *arena.cylinders):
         with ground.patch([(x_mm, y_mm)], radius_mm) as sheet:
             sheet.ring((x_mm, y_mm), radius_mm, (*CYLINDER_COLOUR, 255))
-    left, top = (width - inner[0]) // 2, (height - inner[1]) // 2
+    left, top = (width - ground.pixels.shape[1]) // 2, (height - ground.pixels.shape[0]) // 2
     empty = np.full((height, width, 3), OUTSIDE, np.uint8)
     return ground, Canvas(empty, scale, -left / scale, arena.height_mm + top / scale)

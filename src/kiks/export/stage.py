@@ -8,7 +8,7 @@ as large as itself.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 
 import numpy as np
@@ -31,6 +31,7 @@ from kiks.export.sheet import (
     pen_on,
 )
 from kiks.model.arena import Arena
+from kiks.model.robot import RobotSpec
 from kiks.recording.moments import LEAP_MM, Moment
 
 Pixels = NDArray[np.uint8]
@@ -62,6 +63,22 @@ class Canvas:
     def __init__(self, pixels: Pixels, scale: float, left_mm: float, top_mm: float) -> None:
         self.pixels, self.scale, self.left_mm, self.top_mm = pixels, scale, left_mm, top_mm
 
+    @classmethod
+    def of_ground(cls, arena: Arena, lamps: NDArray[np.float64], spec: RobotSpec | None, scale: float) -> Canvas:
+        """Return a picture of a whole arena's floor, walls and lamps.
+
+        Args:
+            arena: The arena.
+            lamps: See `kiks.control.measure.Moment`.
+            spec: The robot for whose sensors the light is drawn; a Khepera if None.
+            scale: Pixels a millimetre.
+        """
+        canvas = cls(np.array(ground_picture(arena, lamps, spec, size_of(arena, scale))), scale, 0.0, arena.height_mm)
+        for x_mm, y_mm, _, is_on in lamps.tolist():
+            with canvas.patch([(x_mm, y_mm)], LAMP_MM) as sheet:
+                sheet.lamp((x_mm, y_mm), is_on=bool(is_on))
+        return canvas
+
     @contextmanager
     def patch(self, places: Sequence[Sequence[float]], margin_mm: float) -> Iterator[Sheet]:
         """Yield a sheet of the picture around places [mm] and a margin; what was drawn on it comes back."""
@@ -80,6 +97,20 @@ class Canvas:
         image = Image.fromarray(part).resize((FINER * (right - left), FINER * (bottom - top)), Image.Resampling.NEAREST)
         yield Sheet(pen_on(image), FINER * self.scale, self.left_mm + left / self.scale, self.top_mm - top / self.scale)
         part[...] = np.asarray(image.reduce(FINER))
+
+    def draw_moving(self, bodies: NDArray[np.void], poses: NDArray[np.float64], specs: Iterable[RobotSpec]) -> None:
+        """Draw balls and cylinders, and then the robots."""
+        for body in bodies:
+            with self.patch([(float(body["x_mm"]), float(body["y_mm"]))], float(body["radius_mm"])) as sheet:
+                sheet.body(body)
+        for index, (pose, spec) in enumerate(zip(poses.tolist(), specs, strict=False)):
+            with self.patch([pose[:2]], spec.body.radius_mm) as sheet:
+                sheet.robot(pose, spec.body, index)
+
+
+def size_of(arena: Arena, scale: float) -> tuple[int, int]:
+    """Return width and height of a picture of a whole arena [pixels]."""
+    return max(round(arena.width_mm * scale), 1), max(round(arena.height_mm * scale), 1)
 
 
 class Ground:
@@ -117,17 +148,14 @@ class Ground:
     def _draw_still(self, moment: Moment, scale: float) -> None:
         """Draw walls, light and lamps; trails stay where they are."""
         arena = moment.saved.arena
-        size = max(round(arena.width_mm * scale), 1), max(round(arena.height_mm * scale), 1)
+        size = size_of(arena, scale)
         if size[0] * size[1] > BASE_PIXELS_MAX:
             raise ParameterError(
                 f"the whole arena must have at most {BASE_PIXELS_MAX} pixels, but it would have {size[0]} x {size[1]}. "
                 "Zoom less, or make the film smaller."
             )
-        lamps, spec = moment.saved.lamps, next(iter(moment.saved.specs), None)
-        clean = Canvas(np.array(ground_picture(arena, lamps, spec, size)), scale, 0.0, arena.height_mm)
-        for x_mm, y_mm, _, is_on in lamps.tolist():
-            with clean.patch([(x_mm, y_mm)], LAMP_MM) as sheet:
-                sheet.lamp((x_mm, y_mm), is_on=bool(is_on))
+        lamps = moment.saved.lamps
+        clean = Canvas.of_ground(arena, lamps, next(iter(moment.saved.specs), None), scale)
         pixels = clean.pixels.copy()
         if self.arena is not None and self._clean.shape == pixels.shape:
             is_trail = (self.canvas.pixels != self._clean).any(axis=-1)
@@ -194,12 +222,7 @@ class Stage:
         whole = min(width / arena.width_mm, height / arena.height_mm)
         self._ground.draw(moment, share, (1 - 2 * MARGIN) * whole * self._zoom)
         view = self._view(moment, picture)
-        for body in moment.bodies:
-            with view.patch([(float(body["x_mm"]), float(body["y_mm"]))], float(body["radius_mm"])) as sheet:
-                sheet.body(body)
-        for index, (pose, spec) in enumerate(zip(moment.poses.tolist(), moment.saved.specs, strict=False)):
-            with view.patch([pose[:2]], spec.body.radius_mm) as sheet:
-                sheet.robot(pose, spec.body, index)
+        view.draw_moving(moment.bodies, moment.poses, moment.saved.specs)
         if self._has_bar:
             if self._bar[1] != view.scale:
                 self._bar = self._scale_picture(view.scale), view.scale

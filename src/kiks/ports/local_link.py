@@ -60,7 +60,7 @@ class LocalConnection(Connection):
             while (answer := participant.answer) is None or answer.ticket != ticket:
                 if participant.is_closed:
                     raise LinkError("the world must be there to answer, but it has ended. Open the port again.")
-                self._check_awaited()
+                self._awaited.check()
                 wait_s = programs.move()
                 if participant.answer is None or participant.answer.ticket != ticket:
                     programs.wait(POLL_S if wait_s is None else min(wait_s, POLL_S))
@@ -89,10 +89,10 @@ class LocalConnection(Connection):
             LinkError: If the answer was cancelled.
         """
         self._programs.wait(0)
-        self._check_awaited()
+        self._awaited.check()
         while self._awaited.is_held:
             self._programs.wait(POLL_S)
-            self._check_awaited()
+            self._awaited.check()
 
     def cancel(self) -> None:
         """Make the program's thread check its awaited answer at once, even in a paused world; for any thread."""
@@ -107,11 +107,7 @@ class LocalConnection(Connection):
             assert gate is not None
             gate.leave(self._check_at_gate)
         if is_own:
-            self._check_awaited()
-
-    def _check_awaited(self) -> None:
-        if self._awaited.is_given_up:
-            raise LinkError("the answer must be waited for, but the program was interrupted. Ask again.")
+            self._awaited.check()
 
     @property
     def is_alone(self) -> bool:

@@ -46,7 +46,8 @@ def run_octave(connection: Connection, start: Start, program: ProgramClock) -> i
         raise KiksError(
             f"a program must have what runs it, but {why}. Install it (Debian: sudo apt-get install octave)."
         )
-    session = Session(given=GivenRobot(connection, start, program))
+    session = Session()
+    session.elsewhere = GivenRobot(connection, start, program)
     requests, to_session = os.pipe()
     from_session, answers = os.pipe()
     process = subprocess.Popen(

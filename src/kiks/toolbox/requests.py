@@ -11,22 +11,12 @@ from kiks.model.arena import Arena
 from kiks.model.arena_file import save_arena
 from kiks.model.kad import save_kad
 from kiks.sim.from_project import spec_of
+from kiks.toolbox.given_robot import GivenRobot
 from kiks.toolbox.matlab_arenas import arena_of, settled
 from kiks.toolbox.own_turrets import TurretOrder, turrets_of
 from kiks.toolbox.session_client import SessionClient
 from kiks.toolbox.wire_format import escape, matrices_of, matrix_text, number_text, numbers_of, numbers_text, unescape
-from kiks.toolbox.world_requests import (
-    ask_delete,
-    ask_distances,
-    ask_objects,
-    ask_path,
-    ask_pose,
-    ask_pulse,
-    ask_set_object,
-    ask_set_robot,
-    ask_spawn,
-    port_of,
-)
+from kiks.toolbox.world_requests import WORLD_REQUESTS, port_of
 from kiks.version import __version__
 
 WORDS_MAX = 100_000
@@ -139,9 +129,9 @@ def _world(client: SessionClient, words: str) -> str:
     session = client.session
     kind, _, rest = words.partition(" ")
     moves: list[str] = []
-    if session.given is not None:
+    if isinstance(session.elsewhere, GivenRobot):
         client.close(0)
-        return escape(f"The arena has no effect: {session.given.why_not}")
+        return escape(f"The arena has no effect: {session.elsewhere.why_not}")
     if kind == "default":
         session.begin_arena(Arena.default())
     elif kind == "file":
@@ -315,14 +305,6 @@ REQUESTS: dict[str, Act] = {
     "tic": _tic,
     "toc": _toc,
     "pace": lambda client, words: numbers_text(100.0 * speed for speed in client.pace()),
-    "pulse": ask_pulse,
-    "pose": ask_pose,
-    "path": ask_path,
-    "distances": ask_distances,
-    "set_robot": ask_set_robot,
-    "objects": ask_objects,
-    "set_object": ask_set_object,
-    "spawn": ask_spawn,
-    "delete": ask_delete,
+    **WORLD_REQUESTS,
 }
 """Handlers of requests by name."""

@@ -19,11 +19,7 @@ class ElsewhereConnection(HostedConnection):
     """
 
     def __init__(self, link: HostLink, awaited: AwaitedAnswer, ended: Callable[[], None]) -> None:
-        def check_awaited() -> None:
-            if awaited.is_given_up:
-                raise LinkError("the answer must be waited for, but the program was interrupted. Ask again.")
-
-        super().__init__(link, check_awaited)
+        super().__init__(link, awaited.check)
         self._ended = ended
 
     def end(self) -> None:
@@ -72,7 +68,7 @@ class RobotElsewhere:
     def __init__(self, address: str) -> None:
         self._address = Address.parse(address)
         self._link: HostLink | None = HostLink(self._address)
-        self.robot, self.pulse_mm = self._link.robot, self._link.pulse_mm
+        self.robot, self.pulse_mm = self._link.robot, self._link.start.pulse_mm
         self.thinking = self._link.start.thinking
         self.visit = object()
 

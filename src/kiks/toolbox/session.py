@@ -63,29 +63,21 @@ class Session:
     Args:
         ready: Prepares the engine; called once, before the first world.
         has_window: Whether the desk is shown in a browser.
-        given: See the attribute.
 
     Attributes:
         settings: Settings of the next world.
         desk: The desk of the world; None before the first.
-        given: The robot of its only program in a world that is there already; None: it begins worlds.
-        elsewhere: That one, or the robot on another computer that its program drives in place of a world; else None.
+        elsewhere: The robot that its only program drives in a world that is there already, here or on another
+            computer; None: it begins worlds.
         clients: The programs that take part.
         owners: The client that owns each robot, by the robot's number.
         lock: Held while a client creates a world or takes a robot.
     """
 
-    def __init__(
-        self,
-        *,
-        ready: Callable[[], None] = lambda: None,
-        has_window: bool = False,
-        given: GivenRobot | None = None,
-    ) -> None:
+    def __init__(self, *, ready: Callable[[], None] = lambda: None, has_window: bool = False) -> None:
         self.settings = Settings()
         self.desk: Desk | None = None
-        self.given = given
-        self.elsewhere: RobotElsewhere | GivenRobot | None = given
+        self.elsewhere: RobotElsewhere | GivenRobot | None = None
         self.clients: list[Client] = []
         self.owners: dict[int, object] = {}
         self.lock = threading.RLock()

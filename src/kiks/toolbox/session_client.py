@@ -21,6 +21,7 @@ from kiks.ports.messages import AwaitedAnswer
 from kiks.ports.remote_link import Connection, RemoteLine
 from kiks.sim.port import VirtualPort
 from kiks.sim.simulation import Simulation
+from kiks.toolbox.given_robot import GivenRobot
 from kiks.toolbox.own_turrets import OwnTurret, TurretOrder, turret_of
 from kiks.toolbox.session import Session
 from kiks.toolbox.session_clock import SessionClock
@@ -117,7 +118,7 @@ class SessionClient:
         self.turrets: dict[int, str] = {}
         self.last_line = 0
         self.typed: deque[str] = deque()
-        self._given = session.given
+        self._given = session.elsewhere if isinstance(session.elsewhere, GivenRobot) else None
         self._program = ProgramClock("none") if self._given is None else self._given.program
         self.clock = SessionClock() if self._given is None else self._given.clock
         self._place: object = None

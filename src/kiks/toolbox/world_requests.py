@@ -268,3 +268,17 @@ def _is_done(act: Callable[[], object]) -> str:
 def _check_angle(angle: float) -> None:
     if abs(angle) > ANGLE_MAX:
         raise ParameterError(f"an angle must be from -{ANGLE_MAX:g} to {ANGLE_MAX:g} rad, but it was {angle:g}.")
+
+
+WORLD_REQUESTS: dict[str, Callable[[SessionClient, str], str | None]] = {
+    "pulse": ask_pulse,
+    "pose": ask_pose,
+    "path": ask_path,
+    "distances": ask_distances,
+    "set_robot": ask_set_robot,
+    "objects": ask_objects,
+    "set_object": ask_set_object,
+    "spawn": ask_spawn,
+    "delete": ask_delete,
+}
+"""Handlers of the requests about a world, by name."""

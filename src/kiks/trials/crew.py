@@ -6,12 +6,13 @@ A worker whose order takes it with it, such as one that is killed for its memory
 from __future__ import annotations
 
 import contextlib
-import json
-import selectors
+import multiprocessing
 import subprocess
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from multiprocessing.connection import wait
+from typing import Any
 
 from kiks.errors import WorkError
 from kiks.ports.program_process import python_line
@@ -23,8 +24,6 @@ ASK_S = 0.2
 ATTEMPTS = 2
 """How often an order is begun whose worker dies."""
 
-_READ_SIZE = 1 << 20
-
 
 @dataclass(frozen=True)
 class Order:
@@ -33,12 +32,12 @@ class Order:
     Attributes:
         name: Its name; no other order has it.
         kind: What is to be done, one of those in `worker.py`.
-        told: What is needed for it.
+        arguments: What is needed for it.
     """
 
     name: str
     kind: str
-    told: str
+    arguments: tuple[Any, ...]
 
 
 @dataclass(frozen=True)
@@ -51,7 +50,7 @@ class Answer:
         lost: How the worker has died; empty if it has not.
     """
 
-    result: str = ""
+    result: Any = None
     error: str = ""
     lost: str = ""
 
@@ -87,48 +86,29 @@ class _Worker:
     """
 
     def __init__(self) -> None:
-        line = python_line("-m", "kiks.trials.worker")
+        self.connection, there = multiprocessing.Pipe()
+        line = python_line("-m", "kiks.trials.worker", str(there.fileno()))
         try:
-            self.process = subprocess.Popen(line, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+            with there:
+                # What a supervisor prints goes nowhere.
+                self.process = subprocess.Popen(
+                    line, pass_fds=[there.fileno()], stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL
+                )
         except OSError as error:
             raise WorkError(f"Cannot start a worker: {error.strerror or error}. End other programs.") from None
         self.order: Order | None = None
-        self._pieces: list[bytes] = []
-        assert self.process.stdout is not None
-        self.answers = self.process.stdout
 
     def begin(self, order: Order) -> None:
         """Hand an order over."""
         self.order = order
-        assert self.process.stdin is not None
-        with contextlib.suppress(OSError):  # it has died, which the other pipe tells
-            self.process.stdin.write(json.dumps([order.kind, order.told]).encode() + b"\n")
-            self.process.stdin.flush()
-
-    def take(self) -> Answer | None:
-        """Return its answer if that is complete, else None.
-
-        Raises:
-            EOFError: If it has died.
-        """
-        piece = self.answers.read1(_READ_SIZE)  # type: ignore[attr-defined]
-        if not piece:
-            raise EOFError
-        self._pieces.append(piece)
-        if not piece.endswith(b"\n"):
-            return None
-        line = b"".join(self._pieces)
-        self._pieces.clear()
-        return Answer(**json.loads(line))
+        with contextlib.suppress(OSError):  # it has died, which is seen when its answer is read
+            self.connection.send((order.kind, order.arguments))
 
     def close(self) -> str:
         """End it; return how it has ended."""
         self.process.kill()
         code = self.process.wait()
-        for pipe in (self.process.stdin, self.process.stdout):
-            assert pipe is not None
-            with contextlib.suppress(OSError):
-                pipe.close()
+        self.connection.close()
         return f"by signal {-code}" if code < 0 else f"with exit code {code}"
 
 
@@ -138,41 +118,36 @@ class _Crew:
     def __init__(self, orders: Sequence[Order]) -> None:
         self._left = deque(orders)
         self._attempts: dict[str, int] = {}
-        self._workers: set[_Worker] = set()
-        self._selector = selectors.DefaultSelector()
+        self._workers: dict[object, _Worker] = {}  # by their connections
 
     @property
     def is_busy(self) -> bool:
         """Whether a worker has an order."""
-        return any(worker.order is not None for worker in self._workers)
+        return any(worker.order is not None for worker in self._workers.values())
 
     def hire(self) -> None:
         """Start a worker, with the next order."""
         worker = _Worker()
-        self._workers.add(worker)
-        self._selector.register(worker.answers, selectors.EVENT_READ, worker)
+        self._workers[worker.connection] = worker
         self._hand_out(worker)
 
     def hear(self) -> Iterator[tuple[str, Answer]]:
         """Wait for answers, and yield them."""
-        for key, _ in self._selector.select(ASK_S):
-            worker: _Worker = key.data
+        for connection in wait([worker.connection for worker in self._workers.values()], ASK_S):
+            worker = self._workers[connection]
             order = worker.order
             try:
-                answer = worker.take()
-            except EOFError:
+                answer: Answer | None = worker.connection.recv()
+                self._hand_out(worker)
+            except (EOFError, OSError):
                 answer = self._replace(worker)
-            else:
-                if answer is not None:
-                    self._hand_out(worker)
             if answer is not None and order is not None:
                 yield order.name, answer
 
     def close(self) -> None:
         """End all workers."""
-        for worker in self._workers:
+        for worker in self._workers.values():
             worker.close()
-        self._selector.close()
 
     def _hand_out(self, worker: _Worker) -> None:
         worker.order = None
@@ -182,8 +157,7 @@ class _Crew:
     def _replace(self, worker: _Worker) -> Answer | None:
         """Put another worker in the place of one that has died; return the answer if its order is lost."""
         order = worker.order
-        self._selector.unregister(worker.answers)
-        self._workers.discard(worker)
+        del self._workers[worker.connection]
         how = worker.close()
         answer = None
         if order is not None:

@@ -6,20 +6,18 @@ program that does nothing, the template and a solution get says more about a goa
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from kiks.errors import counted, shown
 from kiks.model.atomic_files import make_folder
-from kiks.model.exercise import STUDENT, Case, cases_of
+from kiks.model.exercise import STUDENT
 from kiks.model.project import Project
 from kiks.ports.program_process import Command
 from kiks.sim.judge import LOOK_S, POINTS, RESULT
-from kiks.trials.grading import Grade, trials_of
-from kiks.trials.runner import run_trials
+from kiks.trials.grading import Graded
 from kiks.trials.submissions import Submission
-from kiks.trials.trial import FAILURES, Outcome
+from kiks.trials.trial import Outcome
 
 ENDS, WAITS, TEMPLATE, SOLUTION = "ends at once", "does nothing", "template", "solution"
 """The programs that are tried; those that are nobody's are `_IDLE`."""
@@ -28,21 +26,6 @@ _IDLE = {ENDS: "", WAITS: "import time\n\nwhile True:\n    time.sleep(60)\n"}
 
 NAMED_MAX = 3
 """Most cases that a finding names."""
-
-
-@dataclass(frozen=True)
-class Checked:
-    """What a check has found.
-
-    Attributes:
-        cases: The cases of the exercise.
-        grades: How each program has done in them.
-        findings: Sentences about what is to be looked at; none if nothing is.
-    """
-
-    cases: tuple[Case, ...]
-    grades: tuple[Grade, ...]
-    findings: tuple[str, ...]
 
 
 def programs_for(project: Project, folder: Path, solution: Command | None = None) -> list[Submission]:
@@ -61,54 +44,35 @@ def programs_for(project: Project, folder: Path, solution: Command | None = None
     for name, text in texts.items():
         file = folder / f"{name.replace(' ', '_')}.py"
         file.write_text(text, encoding="utf-8")
-        programs.append(Submission(name, file.stem, Command(file)))
-    return programs + ([] if solution is None else [Submission(SOLUTION, SOLUTION, solution)])
+        programs.append(Submission(name, id=file.stem, command=Command(file)))
+    return programs + ([] if solution is None else [Submission(SOLUTION, id=SOLUTION, command=solution)])
 
 
-def check_exercise(
-    project: Project,
-    home: Path,
-    programs: Sequence[Submission],
-    out: Path,
-    *,
-    is_trusted: bool = False,
-    workers: int | None = None,
-    on_outcome: Callable[[Outcome, int], object] = lambda outcome, count: None,
-    goes_on: Callable[[], bool] = lambda: True,
-) -> Checked:
-    """Try programs in all cases of an exercise; return what is to be looked at, nothing if it was stopped.
+def findings_of(project: Project, graded: Graded) -> list[str]:
+    """Return sentences about what is to be looked at in an exercise; none if nothing is.
 
     Args:
         project: The exercise.
-        home: Where it lies.
-        programs: What `programs_for` returned.
-        out: Where recordings go.
-        is_trusted: Whether the programs run without a sandbox.
-        workers: See `run_trials`.
-        on_outcome: See `run_trials`.
-        goes_on: See `run_trials`.
+        graded: How the programs that `programs_for` returned have done in it.
 
     Example:
         >>> import tempfile
         >>> from kiks.model.goal import Goal
+        >>> from kiks.trials.grading import grade, trials_of
+        >>> from kiks.trials.runner import run_trials
         >>> folder = Path(tempfile.mkdtemp())
         >>> project = Project(seconds=1.0, goal=Goal(solved="contacts == 0"))
-        >>> check_exercise(project, folder, programs_for(project, folder), folder / "out", is_trusted=True).findings
-        ('The goal is solved before anything has moved, with 1 point.',)
+        >>> programs = programs_for(project, folder)
+        >>> outcomes = run_trials(trials_of(project, folder, programs, is_trusted=True), folder / "out")
+        >>> findings_of(project, grade(project, programs, outcomes))
+        ['The goal is solved before anything has moved, with 1 point.']
     """
-    cases = tuple(cases_of(project.cases))
-    trials = trials_of(project, home, programs, is_trusted=is_trusted)
-    outcomes = run_trials(trials, out, workers=workers, on_outcome=on_outcome, goes_on=goes_on)
-    if len(outcomes) < len(trials):
-        return Checked(cases, (), ())
-    rest = iter(outcomes)
-    grades = tuple(Grade(each, tuple(next(rest) for _ in cases)) for each in programs)
     of_cases: dict[str, list[str]] = {}
-    for number, case in enumerate(cases):
-        for sentence in _in_a_case(project, {each.submission.name: each.outcomes[number] for each in grades}):
+    for number, case in enumerate(graded.cases):
+        for sentence in _in_a_case(project, {each.submission.name: each.outcomes[number] for each in graded.grades}):
             of_cases.setdefault(sentence, []).append(case.name)
-    found = [_where(names, len(cases)) + sentence for sentence, names in of_cases.items()]
-    return Checked(cases, grades, (*found, *_never_counted(project, outcomes)))
+    found = [_where(names, len(graded.cases)) + sentence for sentence, names in of_cases.items()]
+    return [*found, *_never_counted(project, graded)]
 
 
 def _in_a_case(project: Project, outcomes: dict[str, Outcome]) -> Iterator[str]:
@@ -125,7 +89,7 @@ def _in_a_case(project: Project, outcomes: dict[str, Outcome]) -> Iterator[str]:
     if (template := outcomes.get(TEMPLATE)) is not None:
         if template.is_solved and not idle.is_solved:
             yield "The template solves it."
-        if (end := template.end_of(STUDENT)).how in FAILURES:
+        if (end := template.end_of(STUDENT)).has_failed:
             yield f"The template fails: {end}."
     solution = outcomes.get(SOLUTION)
     has_solved = project.goal is not None and bool(project.goal.formulas()["solved"].terms)
@@ -138,7 +102,7 @@ def _in_a_case(project: Project, outcomes: dict[str, Outcome]) -> Iterator[str]:
 def _of_the_world(outcome: Outcome) -> Iterator[str]:
     """Yield a sentence about each program of the exercise that has failed, and about a run that may differ."""
     for end in outcome.ends:
-        if end.robot != STUDENT and end.how in FAILURES:
+        if end.robot != STUDENT and end.has_failed:
             yield f"The program of robot {end.robot}, {end.name}, fails: {end}."
     if outcome.doubt:
         yield f"A run may come out differently next time: {outcome.doubt}."
@@ -152,9 +116,9 @@ def _where(names: Sequence[str], case_count: int) -> str:
     return f"{', '.join(map(shown, names[:NAMED_MAX]))}{f' and {more} more' if more > 0 else ''}: "
 
 
-def _never_counted(project: Project, outcomes: Sequence[Outcome]) -> Iterator[str]:
+def _never_counted(project: Project, graded: Graded) -> Iterator[str]:
     """Yield a sentence about each entry of the score that the goal asks for and no run has."""
     wanted = set() if project.goal is None else project.goal.counts()
-    there = {POINTS, RESULT}.union(*(outcome.score for outcome in outcomes))
+    there = {POINTS, RESULT}.union(*(outcome.score for each in graded.grades for outcome in each.outcomes))
     for what in sorted(map(repr, (each for each in wanted if str(each) not in there))):
         yield f"score({what}) was counted in none of these runs, so it is 0: does the supervisor call it so?"

@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from datetime import datetime
+from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import NoReturn
 
@@ -259,12 +260,8 @@ def _in_tar(file: Path | io.BytesIO) -> Iterator[tuple[str, File | Folder]]:
                 raise UnreadableError(f"its archive has more than {UNPACKED_MAX >> 20} MiB; a .zip may have more")
             content = archive.extractfile(entry) if entry.isfile() else None
             if content is not None:
-                yield entry.name, File(_reader_of(content.read(HAND_IN_BYTES_MAX + 1)), entry.mtime or None)
+                yield entry.name, File(partial(_bounded, content.read(HAND_IN_BYTES_MAX + 1)), entry.mtime or None)
             elif entry.isdir():
                 yield entry.name, {}
             else:
                 yield entry.name, _refused(f"its archive has a link, {shown(entry.name)}")
-
-
-def _reader_of(data: bytes) -> Callable[[int], bytes]:
-    return lambda most: _bounded(data, most)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 from pathlib import Path
 from typing import Literal
 
@@ -14,11 +15,10 @@ from kiks.model.project import Project, project_file
 from kiks.ports.program_process import commands_of
 from kiks.sim.from_project import in_case
 from kiks.trials.marking import AS_POINTS, Marking
-from kiks.trials.runner import run_trials
 from kiks.trials.similarity import Likeness, alike
 from kiks.trials.students import identities
 from kiks.trials.submissions import Submission
-from kiks.trials.trial import CRASHED, ENDLESS, FAILURES, OUT_OF_TIME, STOPPED, Outcome, Trial, limit_of
+from kiks.trials.trial import End, Outcome, Trial, limit_of
 
 Attempts = Literal["best", "last"]
 """Which one counts of the submissions of a student."""
@@ -66,14 +66,13 @@ class Grade:
 
     def count(self, how: str) -> int:
         """Return in how many cases it ended so; at the time limit, only those that were not solved count."""
-        return sum(
-            outcome.end_of().how == how and not (how == OUT_OF_TIME and outcome.is_solved) for outcome in self.outcomes
-        )
+        ended = [outcome for outcome in self.outcomes if outcome.end_of().how == how]
+        return sum(not (how == End.OUT_OF_TIME and outcome.is_solved) for outcome in ended)
 
     @property
     def worst(self) -> Outcome | None:
         """The case with the fewest points; of several, one in which the program did not end as it should."""
-        rank = {STOPPED: 0, ENDLESS: 1, CRASHED: 2}
+        rank = {End.STOPPED: 0, End.ENDLESS: 1, End.CRASHED: 2}
         return min(
             self.outcomes,
             key=lambda each: (each.points, each.is_solved, rank.get(each.end_of().how, 3), -each.time_s),
@@ -131,7 +130,7 @@ class Graded:
             (end.robot, end.name, str(end))
             for outcome in outcomes
             for end in outcome.ends
-            if end.robot != STUDENT and end.how in FAILURES
+            if end.robot != STUDENT and end.has_failed
         )
         return [
             f"{name}, the exercise's program of robot {robot}, failed in {count} of {len(outcomes)} runs ({how}). No "
@@ -194,44 +193,31 @@ def trials_of(
 
 def grade(
     project: Project,
-    folder: Path,
     submissions: Sequence[Submission],
-    out: Path,
+    outcomes: Sequence[Outcome],
     *,
     title: str = "",
     marking: Marking = AS_POINTS,
     attempts: Attempts | None = None,
     is_trusted: bool = False,
-    command: str = "",
-    user: str = "",
-    workers: int | None = None,
-    on_outcome: Callable[[Outcome, int], object] = lambda outcome, count: None,
-    on_taken: Callable[[int], object] = lambda count: None,
 ) -> Graded:
-    """Grade submissions: run each in all cases of an exercise; see `run_trials`.
+    """Grade submissions by what has come out of their trials.
 
     Args:
         project: The exercise.
-        folder: Where it lies.
         submissions: What was handed in.
-        out: Where outcomes and recordings go.
+        outcomes: Those of the trials that `trials_of` returned for these submissions.
         title: Its title if it says none.
         marking: How points become grades.
         attempts: Which one of the submissions of a student counts; each is a grade of its own if left out.
-        is_trusted: Whether the programs run without a sandbox.
-        command: The command that has begun it, for the recordings.
-        user: See `Trial`.
-        workers: See `run_trials`.
-        on_outcome: See `run_trials`.
-        on_taken: See `run_trials`.
+        is_trusted: Whether the programs ran without a sandbox.
     """
-    trials = trials_of(project, folder, submissions, is_trusted=is_trusted, command=command, user=user)
-    outcomes = iter(run_trials(trials, out, workers=workers, on_outcome=on_outcome, on_taken=on_taken))
+    rest = iter(outcomes)
     cases = cases_of(project.cases)
     grades = []
     for submission in submissions:
         count = 0 if submission.command is None else len(cases)
-        made = Grade(submission, tuple(next(outcomes) for _ in range(count)))
+        made = Grade(submission, tuple(islice(rest, count)))
         late = marking.days_late(submission)
         mark = None if made.problem else marking.grade_of(made.points, late)
         grades.append(replace(made, mark=mark, days_late=late))
@@ -259,15 +245,12 @@ def grade(
 
 def _chosen(grades: Sequence[Grade], attempts: Attempts) -> list[Grade]:
     """Return of each student the grade that counts; one that was not graded does so only if there is no other."""
+
+    def rank(grade: Grade) -> tuple[bool, float]:
+        return grade.mark is not None, (grade.mark if attempts == "best" else grade.submission.time_s) or 0.0
+
     chosen: dict[str, Grade] = {}
     for grade in grades:
         student = identities(grade.submission)[0]
-        before = chosen.setdefault(student, grade)
-        ranks = [_rank(each, attempts) for each in (before, grade)]
-        if ranks[1] >= ranks[0]:
-            chosen[student] = grade
+        chosen[student] = max(grade, chosen.get(student, grade), key=rank)  # the later one of equal ones
     return [*chosen.values()]
-
-
-def _rank(grade: Grade, attempts: Attempts) -> tuple[bool, float]:
-    return grade.mark is not None, (grade.mark if attempts == "best" else grade.submission.time_s) or 0.0

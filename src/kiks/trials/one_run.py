@@ -17,18 +17,7 @@ from kiks.sim.judge import POINTS, Judgement
 from kiks.sim.simulation import Simulation
 from kiks.sim.supervision import JUDGE, Supervision
 from kiks.trials.sandboxes import Sandboxes
-from kiks.trials.trial import (
-    CRASHED,
-    ENDED,
-    ENDLESS,
-    OUT_OF_TIME,
-    RUNNING,
-    STOPPED,
-    Outcome,
-    ProgramEnd,
-    Trial,
-    limit_of,
-)
+from kiks.trials.trial import End, Outcome, ProgramEnd, Trial, limit_of
 from kiks.units import ns_from_s
 
 LINES = 10
@@ -94,7 +83,7 @@ def run_trial(trial: Trial, folder: Path, sandboxes: Sandboxes) -> Outcome:
         recording=trial.recording,
         doubt=run.doubt or ("" if any(handle.reason for handle in programs.handles) else programs.doubt),
     )
-    if any(end.how == STOPPED for end in ends):
+    if any(end.how == End.STOPPED for end in ends):
         # When that was depends on the computer, so nothing of it counts.
         return replace(made, is_solved=False, is_failed=True, points=0, time_s=0.0, score={}, state="")
     return made
@@ -107,11 +96,11 @@ class _Run:
 
     def __init__(self, sim: Simulation) -> None:
         self._sim = sim
-        self.how = RUNNING
+        self.how = End.RUNNING
         self.doubt = ""
 
     def end_by_time(self) -> NoReturn:
-        self.how = OUT_OF_TIME
+        self.how = End.OUT_OF_TIME
         self.programs.end(0, "")
 
     def judgement(self, supervision: Supervision) -> Judgement:
@@ -130,7 +119,7 @@ class _Run:
         self.programs.end(code, message)
 
 
-def _end_of(handle: Handle, how: str) -> ProgramEnd:
+def _end_of(handle: Handle, how: End) -> ProgramEnd:
     """Return how a program has ended.
 
     Args:
@@ -141,13 +130,13 @@ def _end_of(handle: Handle, how: str) -> ProgramEnd:
     detail = ""
     if handle.reason:
         # At which simulated time that was is the same on every computer only if it let no time pass.
-        how, detail = ENDLESS if handle.reason.endswith(IDLE) else STOPPED, handle.reason
+        how, detail = End.ENDLESS if handle.reason.endswith(IDLE) else End.STOPPED, handle.reason
     elif not handle.is_stopped:
-        how = CRASHED if handle.code else ENDED
+        how = End.CRASHED if handle.code else End.ENDED
         if handle.code:
             errors = [line.text for line in lines if line.is_error and line.text.strip()]
             detail = _cut(errors[-1].removeprefix("kiks: ")) if errors else handle.how
-    printed = () if how == STOPPED else tuple(_cut(line.text) for line in lines[-LINES:])
+    printed = () if how == End.STOPPED else tuple(_cut(line.text) for line in lines[-LINES:])
     return ProgramEnd(handle.robot, handle.command.name, how, detail, printed)
 
 

@@ -16,22 +16,11 @@ from zipfile import ZIP_DEFLATED as DEFLATED
 from kiks.errors import figure
 from kiks.export.page import page_template
 from kiks.model.atomic_files import make_folder, replace_file, writing
+from kiks.trials import tables
 from kiks.trials.grading import Graded
 from kiks.trials.hand_in import DATE
 from kiks.trials.marking import AS_POINTS
 from kiks.trials.report_parts import Run, page_parts, shown_runs
-from kiks.trials.tables import (
-    COUNTED,
-    feedback_name,
-    feedback_of,
-    grades_csv,
-    gradescope_results,
-    how_it_went,
-    likeness_of,
-    likenesses_of,
-    moodle_csv,
-    ranked,
-)
 
 REPORT = "report.html"
 """The report's name in the output folder."""
@@ -65,8 +54,8 @@ def save_grades(
         workers: Processes that prepare the players of the pages; one for each core if left out.
         on_progress: Called with how many players are ready, and of how many.
     """
-    replace_file(out / "grades.csv", grades_csv(graded), "grades")
-    replace_file(out / "moodle.csv", moodle_csv(graded), "grades")
+    replace_file(out / "grades.csv", tables.grades_csv(graded), "grades")
+    replace_file(out / "moodle.csv", tables.moodle_csv(graded), "grades")
     seen = {each.submission.id: graded.seen_by(each) for each in graded.grades}
     worst = [each.worst for each in (*graded.grades, *(grade for each in seen.values() for grade in each.grades))]
     recordings = {each.name: out / each.recording for each in worst if each is not None and each.recording}
@@ -76,15 +65,15 @@ def save_grades(
     with writing(out / f"{FEEDBACK}.zip", FEEDBACK) as beside, zipfile.ZipFile(beside.file, "w", DEFLATED) as archive:
         for each in graded.grades:
             name, own = each.submission.id, seen[each.submission.id]
-            results = json.dumps(gradescope_results(graded, each), indent=2) + "\n"
+            results = json.dumps(tables.gradescope_results(graded, each), indent=2) + "\n"
             replace_file(out / RESULTS / f"{name}.json", results, RESULTS)
             if len(graded.grades) == 1:
                 # Where Gradescope itself runs the command, for one submission.
                 replace_file(out / "results.json", results, RESULTS)
-            said = feedback_of(graded, each)
+            said = tables.feedback_of(graded, each)
             page = _page("feedback.html", own, runs, out, grade=own.grades[0], said=said, is_for_student=True)
             replace_file(out / FEEDBACK / f"{name}.html", page, FEEDBACK)
-            archive.writestr(zipfile.ZipInfo(feedback_name(each.submission), DATE), page, DEFLATED)
+            archive.writestr(zipfile.ZipInfo(tables.feedback_name(each.submission), DATE), page, DEFLATED)
     for folder in (RESULTS, FEEDBACK, "runs"):
         _prune(out / folder, seen)
     replace_file(out / REPORT, _report(graded, runs, out), "the report")
@@ -104,9 +93,9 @@ def _report(graded: Graded, runs: dict[str, Run], out: Path) -> bytes:
         graded,
         runs,
         out,
-        likenesses=likenesses_of(graded),
-        ranked=ranked(graded),
-        counted=[how for how in COUNTED if any(each.count(how) for each in graded.grades)],
+        likenesses=tables.likenesses_of(graded),
+        ranked=tables.ranked(graded),
+        counted=[how for how in tables.COUNTED if any(each.count(how) for each in graded.grades)],
         low=low,
         high=high,
         spread=spread,
@@ -126,9 +115,9 @@ def _page(template: str, graded: Graded, runs: dict[str, Run], out: Path, **valu
     page = page_template(template).render(
         graded=graded,
         figure=figure,
-        how=how_it_went,
+        how=tables.how_it_went,
         is_marked=graded.marking != AS_POINTS,
-        likeness=likeness_of,
+        likeness=tables.likeness_of,
         names=names,
         **values,
         **page_parts(own, out),

@@ -6,7 +6,6 @@ their hashes.
 
 from __future__ import annotations
 
-import json
 import shlex
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -34,12 +33,12 @@ def shown_runs(
         workers: How many processes; one for each core if left out.
         on_progress: Called with how many are ready, and of how many.
     """
-    orders = [Order(name, SHOW, str(path.absolute())) for name, path in recordings.items()]
+    orders = [Order(name, SHOW, (path.absolute(),)) for name, path in recordings.items()]
     runs = {}
     for done, (name, answer) in enumerate(answers_of(orders, workers), 1):
         on_progress(done, len(orders))
         if answer.result:
-            runs[name] = json.loads(answer.result)
+            runs[name] = answer.result
     # As they come is not in the same order each time.
     return {name: runs[name] for name in recordings if name in runs}
 

@@ -13,8 +13,8 @@ from pathlib import Path
 from kiks.errors import KiksError, ParameterError, shown
 from kiks.model.atomic_files import explained, make_folder, replace_file
 from kiks.trials.crew import Order, answers_of
-from kiks.trials.trial import STOPPED, Outcome, ProgramEnd, Trial
-from kiks.trials.worker import RUN, packed
+from kiks.trials.trial import End, Outcome, ProgramEnd, Trial
+from kiks.trials.worker import RUN
 
 OUTCOMES = "outcomes.jsonl"
 """The file of the outcomes in the output folder."""
@@ -87,12 +87,12 @@ def run_trials(
         with explained(file, "outcomes"), file.open("ab") as lines:
             lines.write(b"\n")
         trials_by_name = {trial.name: trial for trial in missing}
-        orders = [Order(trial.name, RUN, packed(trial, folder.absolute())) for trial in missing]
+        orders = [Order(trial.name, RUN, (trial, folder.absolute())) for trial in missing]
         for name, answer in answers_of(orders, workers, goes_on):
             trial = trials_by_name[name]
             if answer.error:
                 raise KiksError(f"{shown(name)} cannot begin: {answer.error}")
-            take(_lost(trial, answer.lost) if answer.lost else Outcome.from_line(answer.result))
+            take(_lost(trial, answer.lost) if answer.lost else answer.result)
     made = [outcomes[trial.name] for trial in trials if trial.name in outcomes]
     replace_file(file, "".join(f"{outcome.to_line()}\n" for outcome in made), "outcomes")
     return made
@@ -123,6 +123,6 @@ def _stands_for(outcome: Outcome, trial: Trial, folder: Path) -> bool:
 def _lost(trial: Trial, why: str) -> Outcome:
     """Return the outcome of a trial that took its worker with it."""
     ends = tuple(
-        ProgramEnd(robot, command.name, STOPPED, why) for robot, command in enumerate(trial.programs, 1) if command
+        ProgramEnd(robot, command.name, End.STOPPED, why) for robot, command in enumerate(trial.programs, 1) if command
     )
     return Outcome(trial.key, trial.name, False, False, 0, 0.0, {}, ends, "", "", why)

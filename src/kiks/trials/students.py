@@ -8,13 +8,14 @@ import re
 import unicodedata
 from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
+from typing import Any
 
 from kiks.errors import ParameterError, printable
 from kiks.model.data_file import read_file
-from kiks.trials.submissions import Submission, word_for
+from kiks.trials.submissions import Student, Submission, word_for
 
 BYTES_MAX = 1 << 20
 """Most bytes of a file with students."""
@@ -34,27 +35,6 @@ _COLUMNS = {
 """What the columns are called that are read, by Moodle, Gradescope and people."""
 
 _MOODLE_TIME = "%A, %d %B %Y, %I:%M %p"
-
-
-@dataclass(frozen=True)
-class Student:
-    """A student on a list.
-
-    Attributes:
-        name: The name.
-        line: The number of its line.
-        email: The address; empty if the list has none.
-        participant: The number in Moodle; empty if the list is not Moodle's grading worksheet.
-        time_s: When the student handed in last, if Moodle says so, in seconds since 1970.
-        last_graded: See `Submission`.
-    """
-
-    name: str
-    line: int
-    email: str = ""
-    participant: str = ""
-    time_s: float | None = None
-    last_graded: str = ""
 
 
 def read_students(path: Path) -> list[Student]:
@@ -86,7 +66,7 @@ def read_students(path: Path) -> list[Student]:
             "name and last name, in its first line. Write name;email, for instance."
         )
     lines = ((number, _plain(line)) for number, line in enumerate(text.splitlines(), 1))
-    return [Student(line, number) for number, line in lines if line]
+    return [Student(line, line=number) for number, line in lines if line]
 
 
 def _of_table(rows: csv._reader) -> list[Student]:  # type: ignore[name-defined, unused-ignore]
@@ -101,9 +81,8 @@ def _of_table(rows: csv._reader) -> list[Student]:  # type: ignore[name-defined,
         with suppress(ValueError):
             time_s = datetime.strptime(cells.get("time", ""), _MOODLE_TIME).timestamp()
         participant = "".join(re.findall(r"\d+$", cells.get("participant", "")))
-        found.append(
-            Student(name, rows.line_num, cells.get("email", ""), participant, time_s, cells.get("last_graded", ""))
-        )
+        last_graded = cells.get("last_graded", "")
+        found.append(Student(name, participant, cells.get("email", ""), time_s, last_graded, rows.line_num))
     return found
 
 
@@ -117,11 +96,11 @@ def _plain(text: str) -> str:
     return " ".join(unicodedata.normalize("NFC", text).split())
 
 
-def identities(who: Submission | Student) -> list[str]:
+def identities(who: Student) -> list[str]:
     """Return what tells whose something is, the surest first: number in Moodle, address, words of the name.
 
     Example:
-        >>> identities(Student("Lovelace, Ada", 1)) == identities(Student("ada_lovelace", 2))
+        >>> identities(Student("Lovelace, Ada")) == identities(Student("ada_lovelace"))
         True
     """
     words = sorted(re.findall(r"[^\W_]+", unicodedata.normalize("NFC", who.name).casefold()))
@@ -149,31 +128,18 @@ def with_students(
         matches = next((match for key in identities(each) if (match := known.get(key))), [])
         seen.update(student.line for student in (shared or matches[:1] if len(matches) < 2 else []))
         if len(matches) == 1:
-            (student,) = matches
-            each = replace(
-                each,
-                name=printable(student.name),
-                email=student.email or each.email,
-                participant=student.participant or each.participant,
-                time_s=student.time_s or each.time_s,
-                last_graded=student.last_graded,
-            )
+            each = replace(each, **_known_of(matches[0]))
         elif not shared:
             strangers.append(each)
         found.append(each)
     taken = {each.id.lower() for each in submissions}
     for student in students:
         if student.line not in seen:
-            name = printable(student.name)
-            found.append(
-                Submission(
-                    name,
-                    word_for(name, taken),
-                    None,
-                    problem=NOTHING,
-                    participant=student.participant,
-                    email=student.email,
-                    last_graded=student.last_graded,
-                )
-            )
+            who = _known_of(student) | {"time_s": None}
+            found.append(Submission(**who, id=word_for(student.name, taken), problem=NOTHING))
     return found, strangers
+
+
+def _known_of(student: Student) -> dict[str, Any]:
+    """Return what a list says of a student."""
+    return {what: value for what, value in vars(student).items() if value} | {"name": printable(student.name)}

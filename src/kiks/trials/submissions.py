@@ -57,42 +57,50 @@ _GRADESCOPE = re.compile(r"submission_metadata\.ya?ml")
 
 
 @dataclass(frozen=True)
-class Submission:
-    """A program that was handed in, or that a student has not handed in.
+class Student:
+    """What is known of a student, from a list or from what was handed in.
 
     Attributes:
-        name: Whose it is, from the name of its file or folder, or from the list of students.
-        id: A word for it in paths, which no other submission has.
-        command: The program; None if there is none to be graded.
-        files: Texts of its programs' files, by their names.
-        problem: Why it cannot be graded; empty if it can.
-        participant: Its student's number in Moodle; empty if it is not known.
-        email: Its student's address; empty if it is not known.
-        time_s: When it was handed in, in seconds since 1970; None if that is not known.
-        last_graded: When Moodle has last changed its grade, as Moodle writes it; empty if that is not known.
+        name: The name.
+        participant: The number in Moodle; empty if it is not known.
+        email: The address; empty if it is not known.
+        time_s: When the student handed in last, in seconds since 1970; None if that is not known.
+        last_graded: When Moodle has last changed the grade, as Moodle writes it; empty if that is not known.
+        line: The number of the line on the list; 0 without one.
     """
 
     name: str
-    id: str
-    command: Command | None
-    files: dict[str, str] = field(default_factory=dict)
-    problem: str = ""
     participant: str = ""
     email: str = ""
     time_s: float | None = None
     last_graded: str = ""
+    line: int = 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Submission(Student):
+    """A program that was handed in, or that a student has not handed in.
+
+    Attributes:
+        id: A word for it in paths, which no other submission has.
+        command: The program; None if there is none to be graded.
+        files: Texts of its programs' files, by their names.
+        problem: Why it cannot be graded; empty if it can.
+    """
+
+    id: str
+    command: Command | None = None
+    files: dict[str, str] = field(default_factory=dict)
+    problem: str = ""
 
 
 @dataclass
 class _Found:
-    """A submission whose files are not copied yet; the fields are those of `Submission`."""
+    """A submission whose files are not copied yet."""
 
-    name: str
+    who: Student
     tree: Folder
     problem: str = ""
-    participant: str = ""
-    email: str = ""
-    time_s: float | None = None
 
 
 def submissions_in(paths: Sequence[Path], folder: Path, what: str = "SUBMISSIONS") -> list[Submission]:
@@ -161,13 +169,13 @@ def _found_in(path: Path, what: str) -> list[_Found]:
     """Return the submissions in a path."""
     if path.is_dir():
         tree = tree_of_folder(path)
-        return [_Found(path.name, tree)] if MAIN in tree else _split(tree)
+        return [_Found(Student(path.name), tree)] if MAIN in tree else _split(tree)
     if not path.is_file():
         raise ParameterError(
             f"{what} must be files or folders, but there is no {shown(str(path))}.{nearest_file(path)}"
         )
     file = file_at(path)
-    found = _Found(_stem(path.name), {path.name: file}, time_s=file.time_s)
+    found = _Found(Student(_stem(path.name), time_s=file.time_s), {path.name: file})
     if not archive_ending(path.name):
         return [found]
     try:
@@ -188,31 +196,28 @@ def _stem(name: str) -> str:
 def _split(tree: Folder) -> list[_Found]:
     """Return the submissions in a tree: one for each entry, but those that Moodle marks as one student's."""
     tree = descended(tree, _MOODLE.fullmatch)
-    listed: dict[str, _Found] = {}
+    listed: dict[str, Student] = {}
     for name in [each for each in tree if _GRADESCOPE.fullmatch(each)]:
         listed |= _listed_by_gradescope(tree.pop(name))
     found: dict[str, _Found] = {}
     for name, entry in sorted(tree.items()):
         if moodle := _MOODLE.fullmatch(name):
-            student = found.setdefault(
-                f"participant/{moodle['id']}", _Found(moodle["name"], {}, participant=moodle["id"])
-            )
+            student = found.setdefault(f"participant/{moodle['id']}", _Found(Student(moodle["name"], moodle["id"]), {}))
             if moodle["kind"] != "file":
                 # A text that was written beside the files; as an id cannot have it, the row is the student's.
                 student.problem = student.problem or "it has a text that was written online, and no file"
                 continue
             student.tree.update({moodle["file"] or PROGRAM: entry} if isinstance(entry, File) else entry)
         elif isinstance(entry, File):
-            found[name] = _Found(_stem(name), {name: entry})
+            found[name] = _Found(Student(_stem(name)), {name: entry})
         else:
-            found[name] = listed.get(name) or _Found(name, {})
-            found[name].tree = entry
+            found[name] = _Found(listed.get(name) or Student(name), entry)
     for each in found.values():
         each.problem = "" if each.tree else each.problem
     return [*found.values()]
 
 
-def _listed_by_gradescope(file: File | Folder) -> dict[str, _Found]:
+def _listed_by_gradescope(file: File | Folder) -> dict[str, Student]:
     """Return the students of a list that Gradescope exports, by their folders; nothing of an entry that is none."""
     import yaml
 
@@ -220,7 +225,7 @@ def _listed_by_gradescope(file: File | Folder) -> dict[str, _Found]:
         """A loader of plain values: what says to be an object of Ruby is a table."""
 
     Loader.add_multi_constructor("!ruby/", lambda loader, _, node: loader.construct_mapping(node, deep=True))
-    found: dict[str, _Found] = {}
+    found: dict[str, Student] = {}
     with suppress(Exception):  # the folders are graded without their names
         assert isinstance(file, File)
         table: dict[str, Any] = yaml.load(file.read(BYTES_MAX), Loader)
@@ -230,15 +235,15 @@ def _listed_by_gradescope(file: File | Folder) -> dict[str, _Found]:
                 names, emails = (", ".join(str(each.get(key) or "") for each in people) for key in (":name", ":email"))
                 time = entry.get(":created_at")
                 time_s = time.timestamp() if isinstance(time, datetime) else None
-                found[folder] = _Found(names, {}, email=emails, time_s=time_s)
+                found[folder] = Student(names, email=emails, time_s=time_s)
     return found
 
 
 def _submission(found: _Found, folder: Path, taken: set[str]) -> Submission:
     """Return a submission, its files copied into a folder of its own."""
-    name = " ".join(printable(found.name).split())[:NAME_MAX] or "nameless"
+    name = " ".join(printable(found.who.name).split())[:NAME_MAX] or "nameless"
     word = word_for(name, taken)
-    problem, time_s = found.problem, found.time_s
+    problem, time_s = found.problem, found.who.time_s
     command: Command | None = None
     texts: dict[str, str] = {}
     if not problem:
@@ -253,7 +258,8 @@ def _submission(found: _Found, folder: Path, taken: set[str]) -> Submission:
                 command = None if problem else Command(_written(data, folder / word))
         except UnreadableError as error:
             problem = str(error)
-    return Submission(name, word, command, texts, problem, found.participant, found.email, time_s)
+    who = vars(found.who) | {"name": name, "time_s": time_s}
+    return Submission(**who, id=word, command=command, files=texts, problem=problem)
 
 
 def _read(tree: Folder, *, is_nested: bool = False) -> dict[PurePosixPath, bytes]:

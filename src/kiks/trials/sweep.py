@@ -20,7 +20,7 @@ from kiks.model.thinking_policy import split_thinking
 from kiks.ports.program_process import Command
 from kiks.sim.from_project import in_case
 from kiks.trials.runner import run_trials
-from kiks.trials.trial import FAILURES, Outcome, ProgramEnd, Trial
+from kiks.trials.trial import Outcome, ProgramEnd, Trial
 
 GETTING_ABOUT = Goal(
     "Touch nothing, and get about",
@@ -85,7 +85,7 @@ class Tried:
 
     @property
     def _failure(self) -> ProgramEnd | None:
-        return next((end for end in self.outcome.ends if end.how in FAILURES), None)
+        return next((end for end in self.outcome.ends if end.has_failed), None)
 
     @property
     def how(self) -> str:

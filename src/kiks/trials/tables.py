@@ -10,9 +10,9 @@ from kiks.table import Table
 from kiks.trials.grading import Grade, Graded
 from kiks.trials.marking import AS_POINTS
 from kiks.trials.submissions import Submission
-from kiks.trials.trial import CRASHED, ENDLESS, OUT_OF_TIME, RUNNING, STOPPED, Outcome
+from kiks.trials.trial import End, Outcome
 
-COUNTED = (CRASHED, ENDLESS, OUT_OF_TIME, STOPPED)
+COUNTED = (End.CRASHED, End.ENDLESS, End.OUT_OF_TIME, End.STOPPED)
 """How programs end that the tables count."""
 
 LIKENESSES_MAX = 20
@@ -22,7 +22,7 @@ LIKENESSES_MAX = 20
 def how_it_went(outcome: Outcome) -> str:
     """Return in a few words how a case went."""
     how = outcome.end_of().how
-    return str(outcome.judgement) if outcome.is_solved or how == RUNNING else f"{how} after {outcome.time_s:.1f} s"
+    return str(outcome.judgement) if outcome.is_solved or how == End.RUNNING else f"{how} after {outcome.time_s:.1f} s"
 
 
 def likeness_of(grade: Grade) -> str:
@@ -115,7 +115,7 @@ def feedback_name(who: Submission) -> str:
     """Return how a page of feedback is called in the archive that Moodle takes, which names files as it exports them.
 
     Example:
-        >>> feedback_name(Submission("Ann Lee", "Ann-Lee", None, participant="1201"))
+        >>> feedback_name(Submission("Ann Lee", "1201", id="Ann-Lee"))
         'Ann Lee_1201_assignsubmission_file_feedback.html'
     """
     plain = re.sub(r"[_/\\]", " ", who.name)

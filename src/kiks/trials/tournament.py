@@ -19,7 +19,7 @@ from kiks.model.project import Project, ProjectRobot, project_file
 from kiks.ports.program_process import Command, supervisor_of
 from kiks.trials.runner import run_trials
 from kiks.trials.submissions import Submission, cut_to_bytes
-from kiks.trials.trial import FAILURES, Outcome, ProgramEnd, Trial, limit_of
+from kiks.trials.trial import Outcome, ProgramEnd, Trial, limit_of
 
 GAMES_MAX = 20_000
 """Most games of a tournament."""
@@ -66,7 +66,7 @@ class Played:
     @cached_property
     def failures(self) -> tuple[ProgramEnd | None, ...]:
         """How each program has failed; None if it has not."""
-        ends = {end.robot: end for end in self.outcome.ends if end.how in FAILURES}
+        ends = {end.robot: end for end in self.outcome.ends if end.has_failed}
         return tuple(ends.get(robot) for robot in range(1, len(self.names) + 1))
 
     @cached_property
@@ -147,22 +147,15 @@ class Tournament:
         ratings = self._ratings()
         found = []
         for number, name in enumerate(self.players):
-            won = drawn = lost = failed = 0
-            scored = conceded = total = 0.0
-            for each in self.played:
-                for place, player in enumerate(each.game.players):
-                    if player != number:
-                        continue
-                    share = each.shares[place]
-                    total += share
-                    won, lost = won + (share == 1), lost + (share == 0)
-                    drawn += 0 < share < 1
-                    scored += each.score[place]
-                    conceded += sum(each.score) - each.score[place]
-                    failed += each.failures[place] is not None
-            count = won + drawn + lost
+            own = [(each, each.game.players.index(number)) for each in self.played if number in each.game.players]
+            shares = [each.shares[place] for each, place in own]
+            count, won, lost = len(own), shares.count(1), shares.count(0)
+            drawn = count - won - lost
+            scored = math.fsum(each.score[place] for each, place in own)
+            conceded = math.fsum(sum(each.score) for each, _ in own) - scored
+            failed = sum(each.failures[place] is not None for each, place in own)
             mu, sigma = ratings[number]
-            share = round(total / count, 4) if count else 0.0
+            share = round(sum(shares) / count, 4) if count else 0.0
             interval = round(INTERVAL_SIGMAS * sigma, 2)
             sums = (round(scored, 3), round(conceded, 3))
             found.append(Standing(name, count, won, drawn, lost, *sums, share, round(mu, 2), interval, failed))
@@ -315,21 +308,18 @@ def _outcome(
     on_played: Callable[[Played, int], object],
 ) -> Tournament:
     """Play games, and return what has come out of all: those of earlier rounds are among them, and known."""
-    names = {
-        trial.name: tuple(before.players[player] for player in game.players)
+    by_name = {
+        trial.name: (game, tuple(before.players[player] for player in game.players))
         for trial, game in zip(trials, games, strict=True)
     }
-    by_name = {trial.name: game for trial, game in zip(trials, games, strict=True)}
     known = {each.outcome.name for each in before.played}
-
-    def played(outcome: Outcome) -> Played:
-        return Played(by_name[outcome.name], names[outcome.name], outcome)
 
     def note(outcome: Outcome, _: int) -> None:
         if outcome.name not in known:
-            on_played(played(outcome), len(games))
+            on_played(Played(*by_name[outcome.name], outcome), len(games))
 
-    return replace(before, played=tuple(map(played, run_trials(trials, out, workers=workers, on_outcome=note))))
+    outcomes = run_trials(trials, out, workers=workers, on_outcome=note)
+    return replace(before, played=tuple(Played(*by_name[each.name], each) for each in outcomes))
 
 
 def _next_groups(found: Tournament, sides: int) -> list[tuple[int, ...]]:

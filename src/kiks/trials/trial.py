@@ -6,6 +6,7 @@ import hashlib
 import json
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
+from enum import StrEnum
 from functools import cache, cached_property
 from pathlib import Path
 
@@ -21,26 +22,27 @@ from kiks.ports.program_process import Command, supervisor_of
 from kiks.sim.judge import Judgement
 from kiks.version import __version__
 
-ENDED = "ended"
-"""A program has ended by itself."""
 
-RUNNING = "running"
-"""It still ran when the goal ended the run."""
+class End(StrEnum):
+    """How a program of a trial has ended."""
 
-OUT_OF_TIME = "out of time"
-"""It still ran at the time limit of the project."""
+    ENDED = "ended"
+    """It has ended by itself."""
 
-CRASHED = "crashed"
-"""It has ended with an error."""
+    RUNNING = "running"
+    """It still ran when the goal ended the run."""
 
-ENDLESS = "endless"
-"""It computed, or waited in real time, and let no simulated time pass: it was stopped."""
+    OUT_OF_TIME = "out of time"
+    """It still ran at the time limit of the project."""
 
-STOPPED = "stopped"
-"""The sandbox has stopped it, or the process of its world has died: then nothing of the run counts."""
+    CRASHED = "crashed"
+    """It has ended with an error."""
 
-FAILURES = (CRASHED, ENDLESS, STOPPED)
-"""Ends of a program that has failed."""
+    ENDLESS = "endless"
+    """It computed, or waited in real time, and let no simulated time pass: it was stopped."""
+
+    STOPPED = "stopped"
+    """The sandbox has stopped it, or the process of its world has died: then nothing of the run counts."""
 
 
 def limit_of(project: Project, kind: str, name: str) -> float:
@@ -132,16 +134,21 @@ class ProgramEnd:
     Attributes:
         robot: Number of its robot.
         name: The program's name.
-        how: One of `ENDED`, `RUNNING`, `OUT_OF_TIME`, `CRASHED`, `ENDLESS`, `STOPPED`.
+        how: What has happened to it.
         detail: The last line of its error, or why it was stopped ('used more than 512 MB of memory'); empty if neither.
         printed: The last lines that it has printed.
     """
 
     robot: int
     name: str
-    how: str
+    how: End
     detail: str = ""
     printed: tuple[str, ...] = ()
+
+    @property
+    def has_failed(self) -> bool:
+        """Whether that was a failure of the program."""
+        return self.how in (End.CRASHED, End.ENDLESS, End.STOPPED)
 
     def __str__(self) -> str:
         return f"{self.how}: {self.detail}" if self.detail else self.how

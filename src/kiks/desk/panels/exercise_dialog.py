@@ -23,8 +23,9 @@ from kiks.model.goal import Goal
 from kiks.model.project import Project
 from kiks.ports.resources import processor_count
 from kiks.sim.judge import Judge, goal_names
-from kiks.trials.exercise_check import check_exercise, programs_for
-from kiks.trials.grading import load_exercise
+from kiks.trials.exercise_check import findings_of, programs_for
+from kiks.trials.grading import grade, load_exercise, trials_of
+from kiks.trials.runner import run_trials
 
 STUDENTS = "-students"
 """What the name of the students' file has at its end."""
@@ -218,20 +219,21 @@ class ExerciseDialog:
         number = self._checks
         with tempfile.TemporaryDirectory(prefix="kiks-check-") as folder:
             out = Path(folder)
-            checked = await asyncio.to_thread(
-                check_exercise,
-                project,
-                home,
-                programs_for(project, out / "programs"),
+            programs = programs_for(project, out / "programs")
+            trials = trials_of(project, home, programs, is_trusted=self._desk.sandbox is None)
+            outcomes = await asyncio.to_thread(
+                run_trials,
+                trials,
                 out,
-                is_trusted=self._desk.sandbox is None,
                 workers=max(processor_count() - 1, 1),
                 goes_on=lambda: bool(self._dialog.value) and number == self._checks,
             )
-        if checked.grades:
+        if len(outcomes) == len(trials):
             nothing = f"A check in {cases} has found nothing to be looked at. Can it be solved?"
             command = f"kiks exercise check {file.name} --solution PROGRAM tries a solution."
-            self._said.text = "\n".join([*(checked.findings or [nothing]), command])
+            self._said.text = "\n".join(
+                [*(findings_of(project, grade(project, programs, outcomes)) or [nothing]), command]
+            )
 
 
 def _without_students_program(project: Project) -> Project:

@@ -13,18 +13,18 @@ from kiks.desk.server.desk import Desk
 from kiks.errors import ParameterError, counted
 from kiks.model.exercise import STUDENT
 from kiks.ports.program_process import Command
-from kiks.trials.trial import CRASHED, ENDED, ENDLESS, OUT_OF_TIME, RUNNING, STOPPED, Outcome
+from kiks.trials.trial import End, Outcome
 
 CLOSED = "Handing in is closed now. Ask your lecturer to open it."
 """What people read who cannot hand in."""
 
 ENDS = {
-    ENDED: "The program ended by itself",
-    RUNNING: "The program still ran when this was decided",
-    OUT_OF_TIME: "The program still ran at the time limit",
-    CRASHED: "The program crashed",
-    ENDLESS: "The program let no time pass",
-    STOPPED: "The program was stopped",
+    End.ENDED: "The program ended by itself",
+    End.RUNNING: "The program still ran when this was decided",
+    End.OUT_OF_TIME: "The program still ran at the time limit",
+    End.CRASHED: "The program crashed",
+    End.ENDLESS: "The program let no time pass",
+    End.STOPPED: "The program was stopped",
 }
 """What people read of how a program has ended."""
 
@@ -180,5 +180,5 @@ def _detail(outcome: Outcome) -> str:
     """Return how the program has ended, and what it has printed last."""
     end = outcome.end_of(STUDENT)
     lines = [f"{ENDS[end.how]}: {end.detail}" if end.detail else f"{ENDS[end.how]}."]
-    lines += [f"Printed last: {line}" for line in end.printed[-1:] if end.how != CRASHED]
+    lines += [f"Printed last: {line}" for line in end.printed[-1:] if end.how != End.CRASHED]
     return "\n".join([*lines, *filter(None, [outcome.doubt])])

@@ -96,7 +96,7 @@ class Tries:
         """What has come out so far, as a grade: `kiks grade` would give the same in these cases."""
         name = "" if self._command is None else self._command.name
         outcomes = tuple(outcome for _, outcome in sorted(self.outcomes.items()))
-        return Grade(Submission(name, name, self._command), outcomes)
+        return Grade(Submission(name, id=name, command=self._command), outcomes)
 
     def is_of(self, project: Project, command: Command) -> bool:
         """Return whether these are all tries of a program, as it is now, in an exercise."""
