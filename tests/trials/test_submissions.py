@@ -39,13 +39,17 @@ def test_files_and_folders(tmp_path: Path) -> None:
         (home / name).write_text(TEXT)
     for name in (b"caf\xe9.py", b"fay.m", b"gil.rar", b"ida.tar.gz", b"kim.zip"):
         Path(os.fsdecode(os.fsencode(home) + b"/" + name)).write_text(TEXT)
+    for name, text in {"drive.py": "import speeds", "speeds.py": TEXT, "test_drive.py": "import drive"}.items():
+        (home / "lea" / name).parent.mkdir(exist_ok=True)
+        (home / "lea" / name).write_text(text)
     (home / "empty" / "__pycache__").mkdir(parents=True)
     (home / "link.py").symlink_to("/etc/passwd")
     with tarfile.open(home / "joe.tar.gz", "w:gz") as archive:
         archive.add(home / "dora", "dora")
     found = {each.name: each for each in found_in(tmp_path, tmp_path / "ann.py", home)}
-    assert {each.command.file.read_text() for each in found.values() if each.command} == {TEXT}
-    assert {name for name, each in found.items() if each.command} == {"ann", "bob", "caf", "carl", "dora", "fay", "joe"}
+    texts = {name: each.command.file.read_text() for name, each in found.items() if each.command}
+    assert (texts.pop("lea"), {*texts.values()}) == ("import speeds", {TEXT})
+    assert set(texts) == {"ann", "bob", "caf", "carl", "dora", "fay", "joe"}
     assert (found["ann"].time_s is None, found["joe"].command.program.is_dir()) == (False, True)
     assert set(found["dora"].files) == {"main.py", "own/helper.py"}
     problems = {

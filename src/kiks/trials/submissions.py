@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 import shutil
+import tempfile
 import unicodedata
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
@@ -279,11 +280,14 @@ def _read(tree: Folder, *, is_nested: bool = False) -> dict[PurePosixPath, bytes
 
 def _main_of(programs: Sequence[str], tree: Folder) -> str:
     """Return which of the programs of a submission runs."""
+    by_name = {name.lower(): name for name in programs}
     for name in _MAINS:
-        if name in programs:
-            return name
+        if name in by_name:
+            return by_name[name]
     for ending in ENDINGS:
         kind = [name for name in programs if name.lower().endswith(ending)]
+        if len(kind) > 1 and len(first := _of_no_other(kind, tree)) == 1:
+            return first[0]
         if len(kind) > 1:
             raise UnreadableError(
                 f"it must have one program, but it has {_listed(kind)}; the one that runs is called __main__{ending}"
@@ -297,6 +301,17 @@ def _main_of(programs: Sequence[str], tree: Folder) -> str:
         f"it has no program, a file that ends in {', '.join(ENDINGS)}: "
         + (f"there is {_listed(tree)}" if tree else "its folder is empty")
     )
+
+
+def _of_no_other(programs: Sequence[str], tree: Folder) -> list[str]:
+    """Return those of several programs that belong to no other one; tests are none."""
+    programs = [name for name in programs if not name.startswith("test_")]
+    with tempfile.TemporaryDirectory() as home:
+        for name in programs:
+            if isinstance(file := tree[name], File):
+                Path(home, name).write_bytes(file.read(BYTES_MAX))
+        used = {each for name in programs for each in ProgramFiles(Path(home, name)).files if each != name}
+    return [name for name in programs if name not in used]
 
 
 def _listed(names: Iterable[str]) -> str:
