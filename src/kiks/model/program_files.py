@@ -3,8 +3,8 @@
 Need: a program is often more than a file. What belongs to it is handed in with it, seen in its sandbox, kept in its
 recording and saved with its project; and where one of these files has changed, earlier outcomes do not count. All of
 its folder would be too much: there are the programs of others, solutions, results. Method: its text is read, and that
-of its modules. To it belong the modules beside it or below that it imports, of Octave the functions there whose names it
-has; the files there that a text in it names (`"table.csv"`, `"*.csv"`, `f"map{n}.txt"`); and all files in a folder there
+of its modules. To it belong the modules beside it or below that it imports (in Octave, functions whose names it has);
+the files there that a text in it names (`"table.csv"`, `"*.csv"`, `f"map{n}.txt"`); and all files in a folder there
 that a text names (`"data"`). So the answer is there before the first run, and the same in each place. A folder with a
 `__main__.py` is a program with all that is in it.
 """
@@ -39,10 +39,6 @@ _SEEN_MAX = 5000
 _NAME_MAX = 200
 _GAP = re.compile(r"%[-+ #0-9.]*[a-zA-Z]|\{[^{}]*\}|\*+|\?")
 """Where a text leaves a part of a name open: a conversion, a field, a wildcard."""
-
-_OF_JUPYTER = re.compile(r"^\s*[%!].*", re.MULTILINE)
-_OCTAVE_NAME = re.compile(r"[A-Za-z_]\w*")
-_OCTAVE_FILE = re.compile(r"[\w./-]+\.\w+")
 
 
 class ProgramFiles:
@@ -227,12 +223,12 @@ def _names_in(kind: ProgramKind, source: bytes) -> tuple[list[tuple[int, str]], 
     if kind is ProgramKind.OCTAVE:
         text = source.decode("utf-8", "replace")
         # A quote may transpose, so each piece between two of them may be a text; commands need none: load table.txt
-        named = [*re.split(r"['\"\n]", text), *_OCTAVE_FILE.findall(text)]
-        functions = [f"{folder}{name}.m" for name in set(_OCTAVE_NAME.findall(text)) for folder in ("", "private/")]
-        return [], sorted({*functions, *(name for piece in named for name in _file_names(piece))})
+        pieces = [*re.split(r"['\"\n]", text), *re.findall(r"[\w./-]+\.\w+", text)]
+        functions = {f"{folder}{name}.m" for name in re.findall(r"\b[A-Za-z]\w*", text) for folder in ("", "private/")}
+        return [], sorted(functions.union(*map(_file_names, pieces)))
     if kind is ProgramKind.NOTEBOOK:
         with suppress(ParameterError):
-            source = _OF_JUPYTER.sub("", "\n".join(code_cells(source, ""))).encode("utf-8", "replace")
+            source = re.sub(r"(?m)^\s*[%!].*", "", "\n".join(code_cells(source, ""))).encode("utf-8", "replace")
     modules: dict[tuple[int, str], None] = {}
     texts: dict[str, None] = {}
     try:
