@@ -15,6 +15,14 @@ evalc('kiks(''--join'')');
 clear generator;
 try
     source(getenv('KIKS_PROGRAM'));
+    % A file that begins with a function which nothing in it calls is called, as by the button Run of MATLAB.
+    kiks_text = fileread(getenv('KIKS_PROGRAM'));
+    kiks_text(kiks_text > 127) = ' ';  % in any encoding
+    kiks_text = regexprep(kiks_text, '[%#][^\n]*', '');
+    kiks_first = regexp(kiks_text, '^\W*function\s+(?:[^=(\n]*=)?\s*(\w+)', 'tokens', 'once');
+    if ~isempty(kiks_first) && numel(regexp(kiks_text, ['\<' kiks_first{1} '\>'])) == 1
+        feval(kiks_first{1});
+    end
 catch kiks_failure
     % Like Python, the places from the outermost on, and the message in the last line.
     kiks_toolbox = fileparts(fileparts(mfilename('fullpath')));

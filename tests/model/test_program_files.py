@@ -1,5 +1,6 @@
 """What belongs to a program: what it imports and names of its folder, and nothing else, wherever it is asked for."""
 
+import json
 import os
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from kiks.model.program_files import BYTES_MAX, ProgramFiles
 
 FOLDER = (
     *("helper.py", "other.py", "lib/__init__.py", "lib/maths.py", "lib/table.csv", "space/deep.py", "solution.py"),
+    *("go.m", "private/turn.m"),
     *("table.csv", "map1.txt", "map2.txt", "data/a.bin", "data/more/b.bin", "data/.hidden", ".secret", "notes.txt"),
 )
 
@@ -65,6 +67,16 @@ def test_what_is_imported_and_named_belongs_to_a_program_and_nothing_else(home: 
     (home / "__main__.py").write_text("")
     assert {*ProgramFiles(home).files} == {"__main__.py", "drive.py", *FOLDER} - {"data/.hidden", ".secret"}
     assert ProgramFiles(home).shown == [home]
+
+
+def test_a_program_of_octave_and_a_notebook_have_files_too(home: Path) -> None:
+    octave = "y = x';\ngo(y), turn; load table.csv\nd = load('map1.txt'); % notes"
+    (home / "lab.m").write_text(octave)
+    assert {*ProgramFiles(home / "lab.m").files} == {"lab.m", "go.m", "private/turn.m", "table.csv", "map1.txt"}
+    cells = ["%matplotlib inline\nimport helper", "!ls\nopen('table.csv')"]
+    made = [{"cell_type": "code", "source": cell} for cell in cells]
+    (home / "lab.ipynb").write_text(json.dumps({"nbformat": 4, "cells": made}))
+    assert [*ProgramFiles(home / "lab.ipynb").files] == ["lab.ipynb", "helper.py", "table.csv"]
 
 
 def test_a_change_of_what_belongs_to_it_and_of_nothing_else_is_another_digest(home: Path) -> None:

@@ -35,7 +35,8 @@ ENDS = [
     # program, how it ends, the detail
     ("x = 1;\nx(3)", "crashed", "error: x(3): out of bound 1 (dimensions are 1x1)"),
     ("y = (2\nz = 3", "crashed", "error: parse error near line 2 of file"),
-    ("function go()\n  disp(1)\nend", "ended", ""),
+    ("% GO starts\n\nfunction go(speed)\n  disp(1); error('called')\nend", "crashed", "error: called"),
+    ("function go()\n  disp(1)\nend\ngo(); exit(4)", "crashed", "with exit code 4"),
     ("kiks_siminfo_robotpos", "crashed", "error: this program must have begun the world for that, but the world was"),
     ("exit(3)", "crashed", "with exit code 3"),
     ("kopen(1:7)", "crashed", "error: port must be [number baud timeout] or a name, but it was"),

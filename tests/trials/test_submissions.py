@@ -37,21 +37,29 @@ def test_files_and_folders(tmp_path: Path) -> None:
     for name in ("bob.py", "carl/robot.py", "dora/main.py", "dora/own/helper.py", "eve/a.py", "eve/b.py", ".git/x.py"):
         (home / name).parent.mkdir(parents=True, exist_ok=True)
         (home / name).write_text(TEXT)
+    (home / "hal.ipynb").write_text("{")
+    (home / "ina.py").write_text("\n")
     for name in (b"caf\xe9.py", b"fay.m", b"gil.rar", b"ida.tar.gz", b"kim.zip"):
         Path(os.fsdecode(os.fsencode(home) + b"/" + name)).write_text(TEXT)
+    for name, text in {"drive.py": "import speeds", "speeds.py": TEXT, "test_drive.py": "import drive"}.items():
+        (home / "lea" / name).parent.mkdir(exist_ok=True)
+        (home / "lea" / name).write_text(text)
     (home / "empty" / "__pycache__").mkdir(parents=True)
     (home / "link.py").symlink_to("/etc/passwd")
     with tarfile.open(home / "joe.tar.gz", "w:gz") as archive:
         archive.add(home / "dora", "dora")
     found = {each.name: each for each in found_in(tmp_path, tmp_path / "ann.py", home)}
-    assert {each.command.file.read_text() for each in found.values() if each.command} == {TEXT}
-    assert {name for name, each in found.items() if each.command} == {"ann", "bob", "caf", "carl", "dora", "fay", "joe"}
+    texts = {name: each.command.file.read_text() for name, each in found.items() if each.command}
+    assert (texts.pop("lea"), {*texts.values()}) == ("import speeds", {TEXT})
+    assert set(texts) == {"ann", "bob", "caf", "carl", "dora", "fay", "joe"}
     assert (found["ann"].time_s is None, found["joe"].command.program.is_dir()) == (False, True)
     assert set(found["dora"].files) == {"main.py", "own/helper.py"}
     problems = {
         "empty": "it has no program, a file that ends in .py, .ipynb, .m: its folder is empty",
         "eve": "it must have one program, but it has a.py, b.py; the one that runs is called __main__.py",
         "gil": "it has no program, a file that ends in .py, .ipynb, .m: there is gil.rar",
+        "hal": "it cannot be read (hal.ipynb must be a notebook of Jupyter",
+        "ina": "ina.py has no code",
         "ida": "its archive cannot be read (",
         "kim": "its archive cannot be read (",
         "link": "'link.py' is a link, which is not followed",
@@ -137,6 +145,11 @@ def test_what_an_archive_of_a_stranger_may_hold_is_named_and_reaches_nothing(tmp
     data = bytearray(paths[-1].read_bytes())
     data[100] ^= 255
     paths[-1].write_bytes(data)
+    held["secret"] = ("main.py", TEXT, "its archive has an encrypted file, 'main.py'")
+    paths.append(zipped(tmp_path / "secret.zip", {"main.py": TEXT}))
+    data = bytearray(paths[-1].read_bytes())
+    data[data.find(b"PK\1\2") + 8] |= 1
+    paths[-1].write_bytes(data)
     before = set(tmp_path.rglob("*"))
     found = found_in(tmp_path, tmp_path / "link.zip", *paths)
     assert not any(each.command for each in found)
@@ -182,11 +195,17 @@ def test_students_are_found_on_lists_as_platforms_write_them(tmp_path: Path) -> 
     for data, names in (
         ("Ann Lee\nJörg\n\nCy\n", ["Ann Lee", "Jörg", "Cy"]),
         ("\ufeffName;E-Mail\r\nAnn Lee;a@x\r\nJörg;\r\nCy;\r\n".encode(), ["Ann Lee", "Jörg", "Cy"]),
+        ("sep=;\n\nFörnamn;Efternamn;E-postadress\nAnn;Lee;\nJörg;;\nCy;;", ["Ann Lee", "Jörg", "Cy"]),
         ("First name\tLast name\nAnn\tLee\n\tJörg\nCy\t\n".encode("utf-16"), ["Ann Lee", "Jörg", "Cy"]),
         ('"Full name",Email\n"Lee, Ann",a@x\nJo\u0308rg,j\nCy,c'.encode(), ["Lee, Ann", "Jörg", "Cy"]),
         (
             "Identifier,Full name,Email address,Status,Last modified (submission),Last modified (grade)\n"
             f'Participant 7,Ann Lee,a@x,Submitted,"{late}",-\nParticipant 8,Jörg,j@x,,-,\nParticipant 9,Cy,,,-,-\n',
+            ["Ann Lee", "Jörg", "Cy"],
+        ),
+        (
+            "ID,Vollständiger Name,E-Mail-Adresse,Zuletzt geändert (Bewertung)\n"
+            "Teilnehmer/in7,Ann Lee,a@x,-\nTeilnehmer/in8,Jörg,j@x,\nTeilnehmer/in9,Cy,,",
             ["Ann Lee", "Jörg", "Cy"],
         ),
     ):
@@ -201,6 +220,7 @@ def test_students_are_found_on_lists_as_platforms_write_them(tmp_path: Path) -> 
             assert [(each.name, each.email, each.last_graded) for each in rows if each.participant == "7"] == [
                 ("Ann Lee", "a@x", "-")
             ] * 2
+        if late.encode() in (tmp_path / "names.csv").read_bytes():
             assert rows[0].time_s == datetime(2026, 11, 28, 17, 6).timestamp()
     (tmp_path / "names.csv").write_text("Ann;a@x\n")
     with pytest.raises(ParameterError, match="must begin with the names of its columns"):

@@ -3,10 +3,10 @@
 Need: a program is often more than a file. What belongs to it is handed in with it, seen in its sandbox, kept in its
 recording and saved with its project; and where one of these files has changed, earlier outcomes do not count. All of
 its folder would be too much: there are the programs of others, solutions, results. Method: its text is read, and that
-of its modules. To it belong the modules beside it or below that it imports; the files there that a text in it names
-(`"table.csv"`, `"*.csv"`, `f"map{n}.txt"`); and all files in a folder there that a text names (`"data"`). So the answer
-is there before the first run, and the same in each place. A folder with a `__main__.py` is a program with all that is
-in it.
+of its modules. To it belong the modules beside it or below that it imports (in Octave, functions whose names it has);
+the files there that a text in it names (`"table.csv"`, `"*.csv"`, `f"map{n}.txt"`); and all files in a folder there
+that a text names (`"data"`). So the answer is there before the first run, and the same in each place. A folder with a
+`__main__.py` is a program with all that is in it.
 """
 
 from __future__ import annotations
@@ -21,6 +21,8 @@ from functools import lru_cache
 from pathlib import Path, PurePosixPath
 
 from kiks.errors import ParameterError, shown
+from kiks.model.notebook import code_cells
+from kiks.model.program_kinds import ENDINGS, ProgramKind, program_kind
 
 MAIN = "__main__.py"
 """The file that runs of a folder that is a program."""
@@ -159,12 +161,12 @@ class ProgramFiles:
 
     def _add_named(self, path: Path) -> None:
         """Add a file, and what it imports and names."""
-        if not self._add(path) or path.suffix != ".py":
+        if not self._add(path) or path.suffix.lower() not in ENDINGS:
             return
         source = b""
         with suppress(OSError):
             source = path.read_bytes()
-        modules, texts = _names_in(source)
+        modules, texts = _names_in(program_kind(path), source)
         package = path.parent.relative_to(self.folder).parts
         for level, module in modules:
             parts = module.split(".") if module else []
@@ -216,8 +218,17 @@ def _matching(home: Path, text: str) -> list[Path]:
 
 
 @lru_cache(maxsize=256)
-def _names_in(source: bytes) -> tuple[list[tuple[int, str]], list[str]]:
-    """Return what a Python text imports, each with its level of relative imports, and what may name files."""
+def _names_in(kind: ProgramKind, source: bytes) -> tuple[list[tuple[int, str]], list[str]]:
+    """Return what a program imports, each with its level of relative imports, and what may name files."""
+    if kind is ProgramKind.OCTAVE:
+        text = source.decode("utf-8", "replace")
+        # A quote may transpose, so each piece between two of them may be a text; commands need none: load table.txt
+        pieces = [*re.split(r"['\"\n]", text), *re.findall(r"[\w./-]+\.\w+", text)]
+        functions = {f"{folder}{name}.m" for name in re.findall(r"\b[A-Za-z]\w*", text) for folder in ("", "private/")}
+        return [], sorted(functions.union(*map(_file_names, pieces)))
+    if kind is ProgramKind.NOTEBOOK:
+        with suppress(ParameterError):
+            source = re.sub(r"(?m)^\s*[%!].*", "", "\n".join(code_cells(source, ""))).encode("utf-8", "replace")
     modules: dict[tuple[int, str], None] = {}
     texts: dict[str, None] = {}
     try:

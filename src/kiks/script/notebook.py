@@ -20,6 +20,9 @@ from kiks.model.notebook import code_cells
 _OF_JUPYTER = re.compile(r"\s*(?:[%!?]|[A-Za-z_][\w., ]*=\s*[%!]|[\w.]+\?{1,2}\s*$)")
 """How a line begins that Python does not know: a magic, a command for the shell, a question."""
 
+_OF_THE_PAGE = re.compile(r"\s*(?:%(?:matplotlib|config|load_ext|autoreload)|[%!]\s*(?:pip|conda)|%%time|%%capture)\b")
+"""Those that prepare a page or a computer, and without which a program does the same."""
+
 
 def run_notebook(path: str, names: dict[str, Any]) -> None:
     """Run the cells of a notebook; as in Jupyter, the value of a last line is shown, here by its text.
@@ -29,7 +32,8 @@ def run_notebook(path: str, names: dict[str, Any]) -> None:
         names: The globals that all cells share.
 
     Raises:
-        ParameterError: If it is no notebook of Python, or a cell has a line of Jupyter; then no cell has run.
+        ParameterError: If it is no notebook of Python, or a cell has a line of Jupyter on which a run depends; then no
+            cell has run.
         SyntaxError: If a cell is no Python; then no cell has run.
     """
     name = path.rpartition("/")[2]
@@ -67,8 +71,14 @@ def _compiled(cell: str, file: str, what: str) -> Iterator[CodeType]:
         yield made(tree, mode="exec")
         if shown_last:
             yield made(ast.Interactive(shown_last), mode="single")
-    except SyntaxError:
-        for number, line in enumerate(cell.split("\n"), 1):
+    except SyntaxError as error:
+        lines, at = cell.split("\n"), (error.lineno or 1) - 1
+        if at < len(lines) and _OF_THE_PAGE.match(lines[at]):
+            print(f"kiks: {what}, line {at + 1} is left out: {shown(lines[at].strip())}", file=sys.stderr)
+            lines[at] = re.sub(r"\S.*", "pass", lines[at])
+            yield from _compiled("\n".join(lines), file, what)
+            return
+        for number, line in enumerate(lines, 1):
             if _OF_JUPYTER.match(line):
                 raise ParameterError(
                     f"{what}, line {number} must be Python, but it is {shown(line.strip())}, which only Jupyter knows. "

@@ -236,8 +236,9 @@ def _in_zip(file: Path | io.BytesIO) -> Iterator[tuple[str, File | Folder]]:
     for entry in archive.infolist():
         if entry.is_dir():
             yield entry.filename, {}
-        elif stat.S_ISLNK(entry.external_attr >> 16):
-            yield entry.filename, _refused(f"its archive has a link, {shown(entry.filename)}")
+        elif (is_link := stat.S_ISLNK(entry.external_attr >> 16)) or entry.flag_bits & 1:
+            what = "a link" if is_link else "an encrypted file"
+            yield entry.filename, _refused(f"its archive has {what}, {shown(entry.filename)}")
         else:
             yield entry.filename, File(reader(entry), _time_s(entry))
 
@@ -260,7 +261,8 @@ def _in_tar(file: Path | io.BytesIO) -> Iterator[tuple[str, File | Folder]]:
                 raise UnreadableError(f"its archive has more than {UNPACKED_MAX >> 20} MiB; a .zip may have more")
             content = archive.extractfile(entry) if entry.isfile() else None
             if content is not None:
-                yield entry.name, File(partial(_bounded, content.read(HAND_IN_BYTES_MAX + 1)), entry.mtime or None)
+                time_s = entry.mtime if 0 < entry.mtime < 1e11 else None  # it may say infinity
+                yield entry.name, File(partial(_bounded, content.read(HAND_IN_BYTES_MAX + 1)), time_s)
             elif entry.isdir():
                 yield entry.name, {}
             else:

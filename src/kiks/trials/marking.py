@@ -11,8 +11,6 @@ from kiks.model.formula_range import range_of
 from kiks.model.project import Project
 from kiks.trials.submissions import Submission
 
-_DAY_S = 86400
-
 
 @dataclass(frozen=True)
 class Marking:
@@ -40,7 +38,8 @@ class Marking:
         """Return how many days have begun between the due time and a hand-in; None if its time is not known."""
         if self.due_s is None or submission.time_s is None:
             return None
-        return max(0, math.ceil((submission.time_s - self.due_s) / _DAY_S))
+        handed_in, due = map(datetime.fromtimestamp, (submission.time_s, self.due_s))  # by clocks: a day may have 25 h
+        return max(0, math.ceil((handed_in - due) / timedelta(days=1)))
 
     def grade_of(self, points: float, days_late: int | None) -> float:
         """Return the grade for points, from 0 to the maximum, if there is one."""

@@ -24,13 +24,13 @@ NOTHING = "nothing was handed in"
 """Why a student who is on the list alone has no grade."""
 
 _COLUMNS = {
-    "name": ("name", "full name", "student", "student name", "vollständiger name", "nom complet"),
-    "first": ("first name", "given name", "vorname", "prénom", "nombre"),
-    "last": ("last name", "surname", "family name", "nachname", "nom", "apellido", "apellidos"),
-    "email": ("email", "e-mail", "email address", "e-mail-adresse", "mail"),
-    "participant": ("identifier",),
-    "time": ("last modified (submission)",),
-    "last_graded": ("last modified (grade)",),
+    "name": "name|full name|student|student name|vollständiger name|nom complet|namn|fullständigt namn|nombre completo",
+    "first": "first name|given name|vorname|prénom|nombre|förnamn",
+    "last": "last name|surname|family name|nachname|nom|apellido|apellidos|efternamn",
+    "email": "email|e-mail|email address|e-mail-adresse|mail|e-post|e-postadress",
+    "participant": "identifier|id|identifierare",
+    "time": "last modified (submission)",
+    "last_graded": "last modified (grade)|zuletzt geändert (bewertung)",
 }
 """What the columns are called that are read, by Moodle, Gradescope and people."""
 
@@ -52,20 +52,21 @@ def read_students(path: Path) -> list[Student]:
         text = data.decode("utf-16" if data.startswith((b"\xff\xfe", b"\xfe\xff")) else "utf-8-sig")
     except UnicodeDecodeError:
         raise ParameterError(f"{what} must be text in UTF-8, but it is not. Save it as such.") from None
-    first = next(iter(text.splitlines()), "")
+    table = re.sub(r"\A(?:\s|sep=.\r?$)+", "", text, flags=re.MULTILINE)  # a spreadsheet may say how it separates
+    first = next(iter(table.splitlines()), "")
     for mark in ";\t,":
         known = {_column(cell) for cell in first.split(mark)}
         if "name" in known or {"first", "last"} <= known:
             try:
-                return _of_table(csv.reader(io.StringIO(text, newline=""), delimiter=mark, strict=True))
+                return _of_table(csv.reader(io.StringIO(table, newline=""), delimiter=mark, strict=True))
             except csv.Error as error:
                 raise ParameterError(f"{what} must be a CSV, but it is not ({error}). Save it as such.") from None
-    if re.search(r"[;\t@]", first):
+    if re.search(r"[;\t@]", text):
         raise ParameterError(
             f"{what} must begin with the names of its columns if it has several, but there is no name, or no first "
             "name and last name, in its first line. Write name;email, for instance."
         )
-    lines = ((number, _plain(line)) for number, line in enumerate(text.splitlines(), 1))
+    lines = ((number, _plain(line.strip('"'))) for number, line in enumerate(text.splitlines(), 1))
     return [Student(line, line=number) for number, line in lines if line]
 
 
@@ -80,7 +81,8 @@ def _of_table(rows: csv._reader) -> list[Student]:  # type: ignore[name-defined,
         time_s = None
         with suppress(ValueError):
             time_s = datetime.strptime(cells.get("time", ""), _MOODLE_TIME).timestamp()
-        participant = "".join(re.findall(r"\d+$", cells.get("participant", "")))
+        # "Participant 1201", in any language; a number alone is one of another list.
+        participant = "".join(re.findall(r"(?<=\D)\d+$", cells.get("participant", "")))
         last_graded = cells.get("last_graded", "")
         found.append(Student(name, participant, cells.get("email", ""), time_s, last_graded, rows.line_num))
     return found
@@ -89,7 +91,7 @@ def _of_table(rows: csv._reader) -> list[Student]:  # type: ignore[name-defined,
 def _column(cell: str) -> str:
     """Return which of the columns that are read this one is; empty for all others."""
     plain = _plain(cell.strip().strip('"')).casefold()
-    return next((column for column, names in _COLUMNS.items() if plain in names), "")
+    return next((column for column, names in _COLUMNS.items() if plain in names.split("|")), "")
 
 
 def _plain(text: str) -> str:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 import shutil
+import tempfile
 import unicodedata
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
@@ -20,8 +21,9 @@ from typing import Any
 from kiks.errors import ParameterError, printable, shown
 from kiks.meant import nearest_file
 from kiks.model.atomic_files import explained
+from kiks.model.notebook import code_cells
 from kiks.model.program_files import BYTES_MAX, FILES_MAX, MAIN, ProgramFiles
-from kiks.model.program_kinds import ENDINGS, program_text, why_not
+from kiks.model.program_kinds import ENDINGS, ProgramKind, program_kind, program_text, why_not
 from kiks.ports.program_process import Command
 from kiks.trials.file_tree import (
     File,
@@ -254,7 +256,10 @@ def _submission(found: _Found, folder: Path, taken: set[str]) -> Submission:
                 data = _read(found.tree)
                 programs = [path for path in data if path.suffix.lower() in ENDINGS]
                 texts = {printable(str(path), "_"): program_text(path, data[path]) for path in programs}
-                problem = why_not(next(iter(data)))
+                main = next(iter(data))
+                if program_kind(main) is ProgramKind.NOTEBOOK:
+                    code_cells(data[main], main.name)
+                problem = why_not(main) if program_text(main, data[main]).strip() else f"{main} has no code"
                 command = None if problem else Command(_written(data, folder / word))
         except UnreadableError as error:
             problem = str(error)
@@ -285,17 +290,17 @@ def _read(tree: Folder, *, is_nested: bool = False) -> dict[PurePosixPath, bytes
 
 def _main_of(programs: Sequence[str], tree: Folder) -> str:
     """Return which of the programs of a submission runs."""
-    for name in _MAINS:
-        if name in programs:
-            return name
+    if mains := [each for name in _MAINS for each in programs if each.lower() == name]:
+        return mains[0]
     for ending in ENDINGS:
         kind = [name for name in programs if name.lower().endswith(ending)]
-        if len(kind) > 1:
+        first = kind if len(kind) < 2 else _of_no_other(kind, tree)
+        if len(first) == 1:
+            return first[0]
+        if kind:
             raise UnreadableError(
                 f"it must have one program, but it has {_listed(kind)}; the one that runs is called __main__{ending}"
             )
-        if kind:
-            return kind[0]
     for each in tree.values():
         if isinstance(each, File):
             each.read(HAND_IN_BYTES_MAX)  # what cannot be read says why
@@ -303,6 +308,17 @@ def _main_of(programs: Sequence[str], tree: Folder) -> str:
         f"it has no program, a file that ends in {', '.join(ENDINGS)}: "
         + (f"there is {_listed(tree)}" if tree else "its folder is empty")
     )
+
+
+def _of_no_other(programs: Sequence[str], tree: Folder) -> list[str]:
+    """Return those of several programs that belong to no other one; tests are none."""
+    programs = [name for name in programs if not name.startswith("test_")]
+    with tempfile.TemporaryDirectory() as home:
+        for name in programs:
+            if isinstance(file := tree[name], File):
+                Path(home, name).write_bytes(file.read(BYTES_MAX))
+        used = {each for name in programs for each in ProgramFiles(Path(home, name)).files if each != name}
+    return [name for name in programs if name not in used]
 
 
 def _listed(names: Iterable[str]) -> str:
