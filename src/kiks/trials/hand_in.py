@@ -12,7 +12,7 @@ from typing import Any
 from kiks.errors import ParameterError
 
 PROGRAM, RECORDING, PAGE, SCORE = "program.py", "recording.mcap", "run.html", "score.json"
-"""The files in it, beside those that belong to the program; that of Octave is `program.m`, a notebook `program.ipynb`."""
+"""The files in it, beside those that belong to the program; of Octave it is `program.m`, a notebook `program.ipynb`."""
 
 OF_THE_RUN = (RECORDING, PAGE, SCORE)
 """Those of them that are no part of the program."""
