@@ -13,7 +13,7 @@ from nicegui import background_tasks, ui
 
 from kiks.desk.panels.files import Encoded, save_in
 from kiks.desk.panels.kept_text import Kept, KeptText
-from kiks.desk.panels.widgets import LogBox, Panel, icon_button, named, offer_robots, select, told, with_props
+from kiks.desk.panels.widgets import LogBox, Panel, icon_button, named, offer_robots, select, telling, told, with_props
 from kiks.desk.server import scripts
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.merging import merged
@@ -305,17 +305,17 @@ class ProgramsPanel(Panel):
         attached = [command for number in range(1, desk.sim.robot_count + 1) if (command := desk.attached(number))]
         self._choice.set_options(scripts.offered(self._folder, attached))
 
-    @told
-    async def _open(self) -> None:
-        """Show the selected program with its unsaved changes."""
+    def _open(self) -> None:
+        """Show the selected program with its unsaved changes; at once, as it may be handed in with the next step."""
         script = self._choice.value
         if script is None or script == self._script:
             return
-        draft = self._drafts.get(script)
-        self._text = scripts.read_script(script) if draft is None else None
-        if draft is None and script.parent == self._folder.path:
-            self._folder.open(script.name)
-        self._edit(script, script.name, draft or self._text or "")
+        with telling():
+            draft = self._drafts.get(script)
+            self._text = scripts.read_script(script) if draft is None else None
+            if draft is None and script.parent == self._folder.path:
+                self._folder.open(script.name)
+            self._edit(script, script.name, draft or self._text or "")
 
     def _new(self, name: str = "mine.py", text: str = NEW) -> None:
         self._choice.value = None
