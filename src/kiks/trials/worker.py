@@ -74,8 +74,11 @@ def main() -> None:
             answer = {"result": kinds[kind](told)}
         except KiksError as error:
             answer = {"error": str(error)}
-        answers.write(json.dumps(answer).encode() + b"\n")
-        answers.flush()
+        try:
+            answers.write(json.dumps(answer).encode() + b"\n")
+            answers.flush()
+        except BrokenPipeError:
+            break  # who has asked was killed
     sandboxes.close()
 
 
