@@ -380,7 +380,7 @@ class ProgramsPanel(Panel):
             is_own = script is not None or self._is_of_exercise(name)
             saved = text
             if is_own:
-                _, saved = self._joined(folder.path / name, self._text, text)
+                saved = self._joined(folder.path / name, self._text, text)[1]
                 folder.question(name)
             data = scripts.encode_script(saved, name)
             await asyncio.to_thread(folder.save, data, name, "a program", may_replace=is_own)

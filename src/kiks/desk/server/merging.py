@@ -43,7 +43,8 @@ def merged(before: str, one: str, other: str) -> str:
     ours, others = ([line.removeprefix(ALSO) for each in side for line in each.lines] for side in sides)
     # Two pages may have kept the same text: what was put together before stays as it is.
     for new, there, version in ((ours, others, other), (others, ours, one)):
-        if new and _has_all(there, new):
+        left = iter(there)
+        if new and all(line in left for line in new):
             return version
     changes = sorted([*sides[0], *sides[1]])
     made: list[str] = []
@@ -70,12 +71,6 @@ def _changes(lines: list[str], text: str, version: int) -> list[_Change]:
         return [] if new == lines else [_Change(0, len(lines), version, new)]
     found = SequenceMatcher(None, lines, new, autojunk=False).get_opcodes()
     return [_Change(i1, i2, version, new[j1:j2]) for what, i1, i2, j1, j2 in found if what != "equal"]
-
-
-def _has_all(lines: list[str], of: list[str]) -> bool:
-    """Return whether some lines have all of others, in their order."""
-    left = iter(lines)
-    return all(line in left for line in of)
 
 
 def _changed(lines: list[str], begin: int, end: int, changes: Iterable[_Change]) -> list[str]:
