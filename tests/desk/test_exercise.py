@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from tests.desk.visitor import Visitor, check_access, check_reach, expect, make_project
+from tests.desk.visitor import FIRST_PICTURE, Visitor, check_access, check_reach, expect, make_project
 
 from kiks.model.arena import Arena
 from kiks.model.arena_objects import Lamp, Pose
@@ -105,6 +105,8 @@ def test_exercise_is_read_solved_tried_and_handed_in(visitor: Visitor, tmp_path:
         assert archive.read(PAGE).startswith(b"<!DOCTYPE html>")
     given = []
     visitor.desk.hand_in = lambda data, name, is_again=False: given.append((name, data))
+    visitor.page.reload()
+    visitor.page.wait_for_function(FIRST_PICTURE)
     visitor.click("hand-in", told="Handed in. Now it is tried in all cases.")
     expect(visitor.at("tries-state")).to_have_text("Handed in. 2 of 2 solved, 10 points.")
     assert ([name for name, _ in given], given[1][1]) == (["to_the_lamp.zip"] * 2, file)

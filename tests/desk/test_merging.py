@@ -17,6 +17,14 @@ def test_each_line_that_somebody_wrote_is_there(before: str, one: str, other: st
     assert merged(before, before, other) == other
 
 
+@given(TEXTS, TEXTS)
+def test_what_two_pages_offer_twice_is_there_once(typed: str, other: str) -> None:
+    before = "x\ny\nz"
+    one, other = f"{typed}\n{before}", f"{before}\n{other}"
+    both = merged(before, other, merged(before, one, before))
+    assert merged(before, one, both) == merged(before, other, both) == both
+
+
 def test_long_programs_are_not_compared_line_by_line() -> None:
     long = "a\n" * 50 * LINES_MAX
     assert merged(long, long + "one", long) == long + "one"

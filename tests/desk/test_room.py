@@ -3,6 +3,7 @@
 import asyncio
 import json
 import re
+import threading
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
@@ -10,12 +11,13 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 from urllib.parse import urlencode
+from zipfile import ZipFile
 
 import pytest
 import socketio
 from nicegui import Client as Page
 from tests.desk.clients import OWNER, Client
-from tests.guard import GUARD_S
+from tests.guard import GUARD_S, wait_until
 from tests.namespaces import needs_sandbox
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection
@@ -25,16 +27,20 @@ from kiks.desk.room.entrance import Guesses, check_code
 from kiks.desk.room.names import folder_name, read_names
 from kiks.desk.room.page import open_room
 from kiks.desk.room.room import SPEED_MAX, Room
-from kiks.desk.server import fair_share
+from kiks.desk.server import fair_share, tries
 from kiks.desk.server.access import KEY, STRANGERS_MAX
+from kiks.desk.server.desk import Desk
 from kiks.desk.server.server import SERVER
 from kiks.desk.server.token import COOKIE, Token
+from kiks.desk.server.turns import Share, Turns
 from kiks.errors import KiksError, ParameterError
 from kiks.model.arena import Arena
 from kiks.model.exercise import Cases, Exercise
 from kiks.model.goal import Goal
 from kiks.model.project import Project, ProjectRobot
 from kiks.ports.program_process import Command
+from kiks.trials.hand_in import SCORE, has_run
+from kiks.trials.submissions import submissions_in
 
 NAMES = ["Ada", "Bob", "../etc", "<b>Eve</b>"]
 CODE = "KX7Q2M"
@@ -299,6 +305,41 @@ def test_a_room_comes_up_again(tmp_path: Path) -> None:
     (tmp_path / "room" / "room.json").write_text("{")
     with pytest.raises(ParameterError, match="file of the room"):
         Room(exercise(), tmp_path, NAMES, tmp_path / "room", is_trusted=True)
+
+
+def test_the_later_of_two_hand_ins_counts_and_is_tried_when_the_room_is_back(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two pages of a student hand in at the same time, and the room ends before there was a turn."""
+    is_over, file = threading.Event(), tmp_path / "room" / "handed-in" / "Ada.zip"
+    for is_first in (True, False):
+        monkeypatch.setattr(tries, "TRIES", turns := Turns(1))
+        room = Room(replace(exercise(), seconds=2.0), tmp_path, NAMES, tmp_path / "room", code=CODE, is_trusted=True)
+        with open_room(room, port=0):
+            if is_first:
+                turns.start(is_over.wait, Share())
+                entered("Ada")
+                desk = room.desks["Ada"].desk
+
+                async def give(name: str, desk: Desk = desk) -> None:
+                    (desk.folder / name).write_text(
+                        f"import kiks, time\nkiks.Khepera('COM1').set_speed(9, 9)\ntime.sleep(1)\nprint({name!r})"
+                    )
+                    await desk.give(Command(desk.folder / name), "drive.zip")
+
+                async def give_both() -> None:
+                    await asyncio.gather(give("one.py"), give("other.py"))
+
+                SERVER.run(give_both())
+                handed_in = submissions_in([file], tmp_path / "copies")
+                assert not has_run(file)
+            else:
+                wait_until(lambda: has_run(file))
+        is_over.set()
+    (again,) = submissions_in([file], tmp_path / "copies")
+    assert again.files == handed_in[0].files
+    with ZipFile(file) as archive:
+        assert json.loads(archive.read(SCORE))["solved"] == 2
 
 
 def test_a_desk_stays_with_the_exercise_without_hidden_cases_and_has_a_highest_speed(room: Room) -> None:

@@ -124,6 +124,10 @@ def test_a_file_of_the_page_alone_and_within_an_export(tmp_path: Path) -> None:
     export = zipped(tmp_path / "all.zip", {"Bob_7_assignsubmission_file_/lamp.zip": data})
     for each in found_in(tmp_path, tmp_path / "ann.zip", export):
         assert each.command.file.read_bytes() == TEXT.encode()
+    for name, kept in {"lamp.m": "program.m", "lamp.ipynb": "program.ipynb", "__main__.py": "program.py"}.items():
+        (tmp_path / "ann.zip").write_bytes(hand_in.packed({name: b"{}", "table.csv": b""}, {}, page=b"<html>"))
+        (each,) = found_in(tmp_path, tmp_path / "ann.zip")
+        assert [*each.files] == [kept]
 
 
 def test_what_an_archive_of_a_stranger_may_hold_is_named_and_reaches_nothing(tmp_path: Path) -> None:

@@ -6,12 +6,13 @@ import io
 import json
 import zipfile
 from collections.abc import Mapping
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 from kiks.errors import ParameterError
 
 PROGRAM, RECORDING, PAGE, SCORE = "program.py", "recording.mcap", "run.html", "score.json"
-"""The files in it, beside those that belong to the program."""
+"""The files in it, beside those that belong to the program; of Octave it is `program.m`, a notebook `program.ipynb`."""
 
 OF_THE_RUN = (RECORDING, PAGE, SCORE)
 """Those of them that are no part of the program."""
@@ -43,10 +44,11 @@ def packed(
         ['program.py', 'score.json', 'speeds.py']
     """
     main, *others = program.items()
-    files = {PROGRAM: main[1], SCORE: json.dumps(score, indent=1).encode()}
+    first = str(PurePosixPath(PROGRAM).with_suffix(PurePosixPath(main[0]).suffix.lower()))
+    files = {first: main[1], SCORE: json.dumps(score, indent=1).encode()}
     files |= {name: data for name, data in ((RECORDING, recording), (PAGE, page)) if data}
     for name, data in others:
-        if name in (PROGRAM, *OF_THE_RUN):
+        if name in (first, *OF_THE_RUN):
             raise ParameterError(
                 f"a file of a program that is handed in must not be called {name}, as a file of the run is. Rename it."
             )
@@ -56,3 +58,12 @@ def packed(
         for name, data in files.items():
             archive.writestr(zipfile.ZipInfo(name, DATE), data, zipfile.ZIP_DEFLATED)
     return made.getvalue()
+
+
+def has_run(file: Path) -> bool:
+    """Return whether a file that was handed in has a run in it; it has none before its program was tried."""
+    try:
+        with zipfile.ZipFile(file) as archive:
+            return RECORDING in archive.namelist()
+    except (OSError, zipfile.BadZipFile):
+        return False

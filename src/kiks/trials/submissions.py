@@ -277,7 +277,7 @@ def _read(tree: Folder, *, is_nested: bool = False) -> dict[PurePosixPath, bytes
         return _read(tree_of_archive(here[archives[0]].read(HAND_IN_BYTES_MAX)), is_nested=True)
     main = PurePosixPath(_main_of(programs, tree))
     files = dict(files_in(tree))
-    if main.name == PROGRAM:
+    if main.stem == PurePosixPath(PROGRAM).stem:
         files = {path: file for path, file in files.items() if str(path) not in OF_THE_RUN}
     if len(files) > FILES_MAX:
         raise UnreadableError(f"it has more than {FILES_MAX} files")

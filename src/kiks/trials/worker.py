@@ -42,7 +42,8 @@ def main() -> None:
     sandboxes = Sandboxes()
     kinds: dict[str, Callable[..., object]] = {RUN: partial(run_trial, sandboxes=sandboxes), SHOW: _show}
     gc.freeze()
-    with suppress(EOFError), Connection(int(sys.argv[1])) as connection:
+    # Who has asked may have been killed.
+    with suppress(EOFError, ConnectionError), Connection(int(sys.argv[1])) as connection:
         while True:
             kind, arguments = connection.recv()
             try:

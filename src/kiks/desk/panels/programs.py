@@ -13,7 +13,7 @@ from nicegui import background_tasks, ui
 
 from kiks.desk.panels.files import Encoded, save_in
 from kiks.desk.panels.kept_text import Kept, KeptText
-from kiks.desk.panels.widgets import LogBox, Panel, icon_button, named, offer_robots, select, told, with_props
+from kiks.desk.panels.widgets import LogBox, Panel, icon_button, named, offer_robots, select, telling, told, with_props
 from kiks.desk.server import scripts
 from kiks.desk.server.desk import Desk
 from kiks.desk.server.merging import merged
@@ -305,17 +305,17 @@ class ProgramsPanel(Panel):
         attached = [command for number in range(1, desk.sim.robot_count + 1) if (command := desk.attached(number))]
         self._choice.set_options(scripts.offered(self._folder, attached))
 
-    @told
-    async def _open(self) -> None:
-        """Show the selected program with its unsaved changes."""
+    def _open(self) -> None:
+        """Show the selected program with its unsaved changes; at once, as it may be handed in with the next step."""
         script = self._choice.value
         if script is None or script == self._script:
             return
-        draft = self._drafts.get(script)
-        self._text = scripts.read_script(script) if draft is None else None
-        if draft is None and script.parent == self._folder.path:
-            self._folder.open(script.name)
-        self._edit(script, script.name, draft or self._text or "")
+        with telling():
+            draft = self._drafts.get(script)
+            self._text = scripts.read_script(script) if draft is None else None
+            if draft is None and script.parent == self._folder.path:
+                self._folder.open(script.name)
+            self._edit(script, script.name, draft or self._text or "")
 
     def _new(self, name: str = "mine.py", text: str = NEW) -> None:
         self._choice.value = None
@@ -351,7 +351,8 @@ class ProgramsPanel(Panel):
     def _follow_file(self, *, is_still: bool) -> None:
         """Keep editor and file the same: what a person types is saved, and what another page saves is shown.
 
-        So nothing is lost when a room ends, and student and lecturer see the same program; the last who types wins.
+        So nothing is lost when a room ends, and student and lecturer see the same program; what both type at the same
+        time is put together.
 
         Args:
             is_still: Whether the person has stopped to type.
@@ -367,27 +368,51 @@ class ProgramsPanel(Panel):
                 folder.open(script.name)
                 self._text = scripts.read_script(script)
                 self._edit(script, script.name, self._text)
+        elif script is None and self._is_of_exercise(name := self._name.value or "") and (folder.path / name).is_file():
+            self._offer()
+            self._choice.value = folder.path / name  # another page of this desk has begun it
 
     async def _save_silently(self) -> None:
         """Save the program under its name, if no other one has it."""
         script, text, folder = self._script, self._editor.value or "", self._folder
         try:
             name = folder.full_name(script.name if script is not None else self._name.value or "")
-            if script is not None:
+            is_own = script is not None or self._is_of_exercise(name)
+            saved = text
+            if is_own:
+                saved = self._joined(folder.path / name, self._text, text)[1]
                 folder.question(name)
-            data = scripts.encode_script(text, name)
-            await asyncio.to_thread(folder.save, data, name, "a program", may_replace=script is not None)
+            data = scripts.encode_script(saved, name)
+            await asyncio.to_thread(folder.save, data, name, "a program", may_replace=is_own)
         except KiksError:
             return  # "Save" says what is wrong
         finally:
             self._is_saving = False
         if self._script == script and not self._list.is_deleted:
             self._drafts.pop(script, None)
-            self._script, self._text = folder.path / name, text
+            self._script, self._text = folder.path / name, saved
             with self._list:
                 self._offer()
                 self._choice.value = self._script
-                self._tell_saved()
+                if saved == text:
+                    self._tell_saved()
+                else:  # with what was typed since
+                    self._edit(self._script, name, merged(text, self._editor.value or "", saved))
+
+    @staticmethod
+    def _joined(file: Path, base: str | None, text: str) -> tuple[str, str]:
+        """Return what a program's file has now, and that together with what was typed.
+
+        Args:
+            file: The file.
+            base: What both began with; None if that is not known.
+            text: The program as it was typed.
+        """
+        there = scripts.read_script(file) if file.is_file() else base or ""
+        return there, merged(there if base is None else base, text, there)
+
+    def _is_of_exercise(self, name: str) -> bool:
+        return self._exercise is not None and name == self._name_of_exercise(self._exercise)
 
     def _check(self) -> bool:
         """Mark the first mistake of the program, and return whether there is one."""
@@ -432,18 +457,19 @@ class ProgramsPanel(Panel):
         is_open = self._script == file or (self._script is None and self._name.value == kept.name)
         if is_open and kept.text == self._editor.value != self._text:
             return False  # it has come, and is saved at the next pause
-        there = scripts.read_script(file) if file.is_file() else kept.base or ""
-        text = merged(there if kept.base is None else kept.base, kept.text, there)
+        there, text = self._joined(file, kept.base, kept.text)
         is_new = text != there
         if is_new:
             folder.question(file.name)
-            data = scripts.encode_script(text)
+            data = scripts.encode_script(text, file.name)
             await asyncio.to_thread(folder.save, data, file.name, "a program", may_replace=True)
             for script in (file, None) if is_open else (file,):
                 self._drafts.pop(script, None)
             self._offer()
+            before = self._text if is_open else None
+            shown = text if before is None else merged(before, self._editor.value or "", text)
             self._text = text
-            self._edit(file, file.name, text)
+            self._edit(file, file.name, shown)
             self._choice.value = file
             ui.notify(f"What you typed while the connection was away is saved in {file.name}.", type="positive")
         if self._kept is not None:

@@ -32,12 +32,19 @@ def told(act: Callable[Given, Awaitable[object]]) -> Callable[Given, Awaitable[N
 
     @functools.wraps(act)
     async def acted(*args: Given.args, **kwargs: Given.kwargs) -> None:
-        try:
+        with telling():
             await act(*args, **kwargs)
-        except KiksError as error:
-            ui.notify(str(error), type="negative", multi_line=True, close_button="OK", timeout=10_000)
 
     return acted
+
+
+@contextmanager
+def telling() -> Iterator[None]:
+    """Show a `KiksError` to the person who has caused it, and go on."""
+    try:
+        yield
+    except KiksError as error:
+        ui.notify(str(error), type="negative", multi_line=True, close_button="OK", timeout=10_000)
 
 
 class Panel:

@@ -9,6 +9,7 @@ import secrets
 import threading
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from functools import partial
 from pathlib import Path, PurePosixPath
 
@@ -31,7 +32,7 @@ from kiks.ports.program_process import commands_of, supervisor_of
 from kiks.ports.resources import processor_count
 from kiks.ports.sandbox import Sandbox, check_sandbox
 from kiks.sim.from_project import simulation_of
-from kiks.trials.hand_in import HAND_IN_BYTES_MAX
+from kiks.trials.hand_in import HAND_IN_BYTES_MAX, has_run
 
 SPEED_MAX = 5.0
 """Highest speed of a desk in a room [simulated seconds per real second]."""
@@ -131,6 +132,15 @@ class Room:
             if seat.key is not None:
                 SERVER.door.add(seat.key)
         background_tasks.create(self._watch(), name="kiks room")
+        background_tasks.create(self._try_again(), name="kiks room")
+
+    async def _try_again(self) -> None:
+        """Try what was handed in and not yet tried when the room was last open."""
+        for name, opened in tuple(self.desks.items()):
+            file = self.folder / HANDED_IN / self.seats[name].handed_in
+            if file.is_file() and not has_run(file):
+                with suppress(KiksError):  # a grade will say why
+                    await opened.desk.give_again(file)
 
     def close(self) -> None:
         """Close all desks, and let no student in."""

@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, Protocol, TypeVar
 
 from kiks.clock.gate import Gate
@@ -34,6 +35,7 @@ from kiks.sim.judge import Judgement
 from kiks.sim.ring_buffer import RingBuffer
 from kiks.sim.simulation import Simulation
 from kiks.sim.supervision import Supervision
+from kiks.trials.submissions import submissions_in
 from kiks.units import ns_from_s
 
 NEWS_LIMIT = 200
@@ -192,6 +194,7 @@ class Desk:
         self.share = Share()
         self.secret = secrets.token_urlsafe()
         self.drafts: dict[Path | None, str] = {}
+        self._giving = asyncio.Lock()
         self.tries = Tries(is_for_others=is_for_others, is_trusted=sandbox is None)
         self.is_seen = threading.Event()
         self.looking = LookingBack(lambda: self.present, self.say)
@@ -364,6 +367,9 @@ class Desk:
             hand_in: Takes the file that is handed in, when all cases have come out; called in another thread.
         """
         self._permission().check(command)
+        self._try(command, hand_in)
+
+    def _try(self, command: Command, hand_in: Callable[[bytes], object] | None) -> None:
         has_hidden = self.may_edit or not self.is_locked
         project = self.home.alone(self.project)
         self.tries.begin(project, self.home.folder, command, has_hidden=has_hidden, hand_in=hand_in)
@@ -376,10 +382,21 @@ class Desk:
         """
         hand_in = self.hand_in
         assert hand_in is not None
-        self.tries.stop()
-        await self.tries.ended()
-        await asyncio.to_thread(hand_in, packed_untried(self.project, command), name)
-        self.try_all(command, partial(hand_in, name=name, is_again=True))
+        data = await asyncio.to_thread(packed_untried, self.project, command)
+        async with self._giving:  # another page may hand in, too, and the later program counts
+            self.tries.stop()
+            await self.tries.ended()
+            await asyncio.to_thread(hand_in, data, name)
+            self.try_all(command, partial(hand_in, name=name, is_again=True))
+
+    async def give_again(self, file: Path) -> None:
+        """Try what was handed in when this desk was last open, and was not tried to the end then."""
+        assert self.hand_in is not None
+        with TemporaryDirectory(prefix="kiks-again-") as place:
+            (found,) = await asyncio.to_thread(submissions_in, [file], Path(place, "copies"))
+            async with self._giving:
+                if found.command is not None and self.tries.project is None:  # else its student was faster
+                    self._try(found.command, partial(self.hand_in, name=file.name, is_again=True))
 
     # ---- another world ----
 

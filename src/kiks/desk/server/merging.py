@@ -39,7 +39,14 @@ def merged(before: str, one: str, other: str) -> str:
     if other in (before, one):
         return one
     lines = before.split("\n")
-    changes = sorted([*_changes(lines, one, 0), *_changes(lines, other, 1)])
+    sides = _changes(lines, one, 0), _changes(lines, other, 1)
+    ours, others = ([line.removeprefix(ALSO) for each in side for line in each.lines] for side in sides)
+    # Two pages may have kept the same text: what was put together before stays as it is.
+    for new, there, version in ((ours, others, other), (others, ours, one)):
+        left = iter(there)
+        if new and all(line in left for line in new):
+            return version
+    changes = sorted([*sides[0], *sides[1]])
     made: list[str] = []
     done = 0
     while changes:
