@@ -18,7 +18,14 @@ from kiks.ports.bubblewrap import WRITABLE
 THREAD_BYTES = 1 << 15
 """What the kernel keeps for each thread [bytes]: its stack, and more."""
 
-_SIZES = re.compile(r"^(VmRSS|VmSwap|VmPTE|Threads|Pss|Pss_Shmem|SwapPss):\s*(\d+)", re.MULTILINE)
+DESCRIPTOR_BYTES = 1 << 15
+"""Most that it keeps for each descriptor [bytes]: a full pipe has two."""
+
+MAP_BYTES = 1 << 10
+"""Most that it keeps for each map of memory [bytes], with its chains to forked processes."""
+
+_MAPS_MAX = 65530
+_SIZES = re.compile(r"^(VmRSS|VmSize|VmSwap|VmPTE|FDSize|Threads|Pss|Pss_Shmem|SwapPss):\s*(\d+)", re.MULTILINE)
 
 
 class Sample(NamedTuple):
@@ -31,8 +38,8 @@ class Sample(NamedTuple):
         own_s: Its processor time [s].
         children_s: That of its children which have ended, as far as they were waited for [s].
         threads: Number of its threads.
-        memory: Its memory, also what is swapped out, and of shared pages all [bytes].
-        kernel_memory: What the kernel keeps for it [bytes].
+        memory: Its memory, also what is swapped out, and of shared pages all; with most that its maps may take [bytes].
+        kernel_memory: What the kernel keeps for it besides [bytes].
     """
 
     process: int
@@ -98,7 +105,8 @@ class ProcessTable:
         if "Pss" not in sizes:
             return sample.memory
         files = sizes.get("Pss_Shmem", 0) if self._is_namespace else 0
-        return (sizes["Pss"] - files + sizes.get("SwapPss", 0)) * 1024
+        maps = _read(self._folder, f"{sample.process}/maps").count("\n")
+        return (sizes["Pss"] - files + sizes.get("SwapPss", 0)) * 1024 + maps * MAP_BYTES
 
     def memory_outside(self) -> int:
         """Return how much memory of a namespace is at most in no process [bytes]: files in memory, and in sockets."""
@@ -171,9 +179,20 @@ def _sample(folder: int, process: int) -> Sample | None:
     own_s, children_s = (sum(map(int, fields[at : at + 2])) / ticks_a_second for at in (11, 13))
     sizes = _sizes(folder, f"{process}/status")
     threads = sizes.get("Threads", 1)
+    if threads > 1 and "VmRSS" not in sizes:
+        # Its first thread has ended, and only the others tell of their memory.
+        sizes = max((_sizes(folder, name) for name in _threads(folder, process)), key=len, default=sizes)
     memory = (sizes.get("VmRSS", 0) + sizes.get("VmSwap", 0)) * 1024
-    kernel_memory = sizes.get("VmPTE", 0) * 1024 + threads * THREAD_BYTES
+    memory += min(sizes.get("VmSize", 0) // 4, _MAPS_MAX) * MAP_BYTES
+    kernel_memory = sizes.get("VmPTE", 0) * 1024 + threads * THREAD_BYTES + sizes.get("FDSize", 0) * DESCRIPTOR_BYTES
     return Sample(process, int(fields[1]), fields[0] == "R", own_s, children_s, threads, memory, kernel_memory)
+
+
+def _threads(folder: int, process: int) -> list[str]:
+    try:
+        return [f"{process}/task/{name}/status" for name in os.listdir(f"/proc/self/fd/{folder}/{process}/task")]
+    except OSError:  # it has ended
+        return []
 
 
 def _sizes(folder: int, name: str) -> dict[str, int]:
