@@ -43,8 +43,8 @@ _MACHINES: dict[str, tuple[int, dict[str, tuple[int, ...]], dict[str, int]]] = {
     ),
 }
 _NEWER = 424
-"""The first system call that is newer than Linux 5.0. None of these is known here, whatever a later Linux adds (io_uring,
-mounts by descriptors, Landlock, x32's): libraries go on without. So `clone`, whose flags a filter sees, is for `clone3`."""
+"""The first system call that is newer than Linux 5.0. None of these is known here, such as io_uring, mounts by
+descriptors and Landlock: libraries go on without. They take `clone`, whose flags a filter sees, instead of `clone3`."""
 _SHARED, _OF_NO_FILE = 0x01, 0x20  # MAP_SHARED, MAP_ANONYMOUS
 _FAMILIES = (1, 2, 10)
 """AF_UNIX, AF_INET and AF_INET6. Namespaces do not separate all others: AF_VSOCK leads out of a virtual machine."""
