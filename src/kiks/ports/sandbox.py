@@ -428,9 +428,11 @@ class _Processes:
                 *lines, rest = (rest + data).split(b"\n")
                 for what, number, *values in map(json.loads, lines):
                     if what == "ended":
+                        code, was_last = values
                         with self._lock:
+                            self.is_over = self.is_over or was_last
                             program = self._programs.pop(number)
-                        program.end(*values)
+                        program.end(code)
             if self._programs and is_due:
                 passed_s = since.waited_s()
                 since.renew()
