@@ -363,7 +363,8 @@ def test_program_is_the_same_as_in_a_process_of_its_own(is_trusted, alone):
 
 
 def test_each_start_finds_an_empty_working_folder_with_the_files_of_the_program(tmp_path: Path) -> None:
-    text = "import os\nprint(sorted(os.listdir()))\nopen('left', 'w')\nos.mkdir('/tmp/left')\nopen('/tmp/left/x', 'w')\nos.chmod('/tmp/left', 0)"
+    text = "import os\nprint(sorted(os.listdir()))\nopen('left', 'w')"
+    text += "\nos.mkdir('/tmp/left')\nopen('/tmp/left/x', 'w')\nos.chmod('/tmp/left', 0)"
     command = write(tmp_path / "first" / "program.py", text)
     (tmp_path / "first" / "map.txt").write_text("here")
     with Sandbox([tmp_path / "first"]) as sandbox:
