@@ -106,6 +106,16 @@ with open("/tmp/x", "w") as file:
     signal.pause()
 """
 
+LEADERLESS = """
+import ctypes, threading, time
+def keep():
+    kept = [bytes(b"x") * 4_000_000 for _ in range(60) if not time.sleep(0.02)]
+    time.sleep(60)
+threading.Thread(target=keep).start()
+time.sleep(0.1)
+ctypes.CDLL(None).syscall({"x86_64": 60, "aarch64": 93}[__import__("os").uname().machine], 0)
+"""
+
 HOSTILE = {
     # What KiKS sees of forks it refuses, as a program in simulated time is one process. The pause spares the other
     # tests: where they run as the superuser, only the sandbox counts processes.
@@ -126,6 +136,7 @@ HOSTILE = {
     "made more than 300 files or locks of files, as locks": plain(LOCKS),
     "used more than 150 MB of memory, in sockets": plain(UNREAD),
     "used more than 150 MB of memory, in files": plain(FILES),
+    "used more than 150 MB of memory, after its first thread": plain(LEADERLESS),
     "started more than 64 threads": plain(
         "from threading import *\nfor _ in range(99): Thread(target=Event().wait).start()"
     ),
@@ -254,6 +265,13 @@ attempt("large buffers", lambda: socket.socket(socket.AF_UNIX).setsockopt(socket
 attempt("locks of no process", lambda: fcntl.fcntl(0, 37, bytes(32)))
 attempt("pages in a pipe", lambda: made(libc.vmsplice(os.pipe()[1], (ctypes.c_void_p * 2)(0, 0), 1, 0)))
 attempt("the host of a virtual machine", lambda: socket.socket(40, socket.SOCK_STREAM))
+attempt("lists of descriptors", lambda: __import__("select").epoll())
+attempt("a terminal", lambda: os.openpty())
+attempt("rules of no process", lambda: made(libc.syscall(444, None, 0, 1)))
+attempt("a protocol that is seldom used", lambda: socket.socket(socket.AF_INET, socket.SOCK_STREAM, 262))
+attempt("large pipes", lambda: fcntl.fcntl(os.pipe()[1], 1031, 1 << 20))
+attempt("limits of its parent", lambda: resource.prlimit(os.getppid(), resource.RLIMIT_NOFILE, (1, 1)))
+attempt("what the kernel tells the superuser", lambda: open("/proc/slabinfo").read())
 attempt("the kernel's log", lambda: made(libc.klogctl(10, None, 0)))
 attempt("stands back", lambda: os.nice(1))
 attempt("settings of the kernel", lambda: open("/proc/sys/kernel/core_pattern", "r+"))
@@ -345,7 +363,8 @@ def test_program_is_the_same_as_in_a_process_of_its_own(is_trusted, alone):
 
 
 def test_each_start_finds_an_empty_working_folder_with_the_files_of_the_program(tmp_path: Path) -> None:
-    text = "import os\nprint(sorted(os.listdir()))\nopen('left', 'w')\nopen('/tmp/left', 'w')"
+    text = "import os\nprint(sorted(os.listdir()))\nopen('left', 'w')"
+    text += "\nos.mkdir('/tmp/left')\nopen('/tmp/left/x', 'w')\nos.chmod('/tmp/left', 0)"
     command = write(tmp_path / "first" / "program.py", text)
     (tmp_path / "first" / "map.txt").write_text("here")
     with Sandbox([tmp_path / "first"]) as sandbox:

@@ -57,6 +57,13 @@ def bubblewrap_line(files: Sequence[str], size: int) -> list[str]:
         words += ["--ro-bind-try", file, file]
     # No zeros that processes map together: such memory would be none's. What is read from /dev/full is zeros, too.
     words += ["--proc", "/proc", "--dev", "/dev", "--dev-bind", "/dev/full", "/dev/zero"]
+    # No terminals: their number is that of the whole computer.
+    words += ["--tmpfs", "/dev/pts", "--remount-ro", "/dev/pts"]
+    if os.geteuid() == 0:
+        # What the kernel tells the superuser alone, such as /proc/timer_list, is not for a program of the superuser.
+        for entry in os.scandir("/proc"):
+            if entry.is_file() and not entry.stat().st_mode & 0o004:
+                words += ["--ro-bind", "/dev/null", entry.path]
     for folder in WRITABLE:
         words += ["--size", str(size), "--tmpfs", folder]
     for file in files:

@@ -18,7 +18,19 @@ from kiks.ports.bubblewrap import WRITABLE
 THREAD_BYTES = 1 << 15
 """What the kernel keeps for each thread [bytes]: its stack, and more."""
 
-_SIZES = re.compile(r"^(VmRSS|VmSwap|VmPTE|Threads|Pss|Pss_Shmem|SwapPss):\s*(\d+)", re.MULTILINE)
+DESCRIPTOR_BYTES = 1 << 15
+"""Most that it keeps for each descriptor [bytes]: a full pipe has two."""
+
+FILE_BYTES = 1 << 11
+"""What it keeps for each file in memory beside its content [bytes]: a long name, and more."""
+
+MAP_BYTES, MANY_MAPS_BYTES = 1 << 9, 1 << 25
+"""What it keeps for each map of memory, and most for as many as a process may have [bytes]."""
+
+MAPS_READ_BYTES = 1 << 18
+"""Most that is read of a process's list of maps [bytes]: some thousands."""
+
+_SIZES = re.compile(r"^(VmRSS|VmSwap|VmPTE|FDSize|Threads|Pss|Pss_Shmem|SwapPss):\s*(\d+)", re.MULTILINE)
 
 
 class Sample(NamedTuple):
@@ -33,6 +45,7 @@ class Sample(NamedTuple):
         threads: Number of its threads.
         memory: Its memory, also what is swapped out, and of shared pages all [bytes].
         kernel_memory: What the kernel keeps for it [bytes].
+        has_many_maps: Whether its memory is in more pieces than can be looked at in a short time.
     """
 
     process: int
@@ -43,6 +56,7 @@ class Sample(NamedTuple):
     threads: int
     memory: int
     kernel_memory: int
+    has_many_maps: bool
 
 
 class ProcessTable:
@@ -94,7 +108,7 @@ class ProcessTable:
 
     def own_memory(self, sample: Sample) -> int:
         """Return the memory of a process, of shared pages its share; in a namespace without files in memory."""
-        sizes = _sizes(self._folder, f"{sample.process}/smaps_rollup")
+        sizes = {} if sample.has_many_maps else _sizes(self._folder, f"{sample.process}/smaps_rollup")
         if "Pss" not in sizes:
             return sample.memory
         files = sizes.get("Pss_Shmem", 0) if self._is_namespace else 0
@@ -104,7 +118,9 @@ class ProcessTable:
         """Return how much memory of a namespace is at most in no process [bytes]: files in memory, and in sockets."""
         if not self._is_namespace:
             return 0
-        used = [(each.f_blocks - each.f_bfree) * each.f_frsize for each in map(_space, self._written)]
+        spaces = list(map(_space, self._written))
+        used = [(each.f_blocks - each.f_bfree) * each.f_frsize for each in spaces]
+        used += [(each.f_files - each.f_ffree) * FILE_BYTES for each in spaces]
         lines = [_read(self._folder, f"1/net/{name}") for name in ("sockstat", "sockstat6")]
         counts = dict(re.findall(r"^(sockets|TCP6?): (?:used|inuse) (\d+)", "\n".join(lines), re.MULTILINE))
         streams = int(counts.get("TCP", 0)) + int(counts.get("TCP6", 0))
@@ -171,9 +187,25 @@ def _sample(folder: int, process: int) -> Sample | None:
     own_s, children_s = (sum(map(int, fields[at : at + 2])) / ticks_a_second for at in (11, 13))
     sizes = _sizes(folder, f"{process}/status")
     threads = sizes.get("Threads", 1)
+    if threads > 1 and "VmRSS" not in sizes:
+        # Its first thread has ended, and only the others tell of their memory.
+        sizes = max((_sizes(folder, name) for name in _threads(folder, process)), key=len, default=sizes)
     memory = (sizes.get("VmRSS", 0) + sizes.get("VmSwap", 0)) * 1024
-    kernel_memory = sizes.get("VmPTE", 0) * 1024 + threads * THREAD_BYTES
-    return Sample(process, int(fields[1]), fields[0] == "R", own_s, children_s, threads, memory, kernel_memory)
+    maps = _read(folder, f"{process}/maps", MAPS_READ_BYTES)
+    # It can hide them.
+    has_many_maps = "VmRSS" in sizes and len(maps) in (0, MAPS_READ_BYTES)
+    kernel_memory = MANY_MAPS_BYTES if has_many_maps else maps.count("\n") * MAP_BYTES
+    kernel_memory += sizes.get("VmPTE", 0) * 1024
+    kernel_memory += threads * THREAD_BYTES + sizes.get("FDSize", 0) * DESCRIPTOR_BYTES
+    is_running = fields[0] == "R"
+    return Sample(process, int(fields[1]), is_running, own_s, children_s, threads, memory, kernel_memory, has_many_maps)
+
+
+def _threads(folder: int, process: int) -> list[str]:
+    try:
+        return [f"{process}/task/{name}/status" for name in os.listdir(f"/proc/self/fd/{folder}/{process}/task")]
+    except OSError:  # it has ended
+        return []
 
 
 def _sizes(folder: int, name: str) -> dict[str, int]:
@@ -181,10 +213,10 @@ def _sizes(folder: int, name: str) -> dict[str, int]:
     return {key: int(value) for key, value in _SIZES.findall(_read(folder, name))}
 
 
-def _read(folder: int, name: str) -> str:
+def _read(folder: int, name: str, most: int = -1) -> str:
     try:
         with open(name, "rb", opener=lambda path, flags: os.open(path, flags, dir_fd=folder)) as file:
-            return file.read().decode(errors="replace")
+            return file.read(most).decode("latin-1")
     except OSError:
         return ""
 

@@ -63,6 +63,7 @@ _log = logging.getLogger("kiks.run")
 _ENVIRONMENT = {"PATH": "/usr/bin:/bin", "LANG": "C.UTF-8", "HOME": "/tmp", "TMPDIR": "/tmp"}
 _ADDRESS_SPACE_BYTES = 4 << 30
 _DESCRIPTORS_MAX = 256
+_SIGNALS_MAX = 1024  # with timers
 _MEGABYTE = 1_000_000
 
 
@@ -322,6 +323,7 @@ class _Processes:
             "RLIMIT_FSIZE": int(limits.files_mb * _MEGABYTE),
             "RLIMIT_NOFILE": _DESCRIPTORS_MAX,
             "RLIMIT_CORE": 0,
+            "RLIMIT_SIGPENDING": _SIGNALS_MAX,
         }
         if not self._is_trusted and _counts_by_namespace():
             # With threads. It holds for no superuser, and a watcher outside is late where hundreds compute.
@@ -426,9 +428,11 @@ class _Processes:
                 *lines, rest = (rest + data).split(b"\n")
                 for what, number, *values in map(json.loads, lines):
                     if what == "ended":
+                        code, was_last = values
                         with self._lock:
+                            self.is_over = self.is_over or was_last
                             program = self._programs.pop(number)
-                        program.end(*values)
+                        program.end(code)
             if self._programs and is_due:
                 passed_s = since.waited_s()
                 since.renew()

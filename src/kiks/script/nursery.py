@@ -95,7 +95,8 @@ class Nursery:
                 for key, _ in selector.select():
                     if key.fileobj is self._wake:
                         self._wake.recv(1 << 12)
-                        self._take_ends()
+                        if self._take_ends():
+                            return None
                         continue
                     data, descriptors, _, _ = socket.recv_fds(self._control, 1 << 16, 16)
                     self._descriptors += descriptors
@@ -122,8 +123,6 @@ class Nursery:
         connection, *streams = descriptors[:3]
         if is_replay:
             start = start._replace(thinking=f"replay:/dev/fd/{descriptors[3]}")
-        if not self._programs:
-            self._clean()
         folder = self._working_folder(start)
         _warm_for(start)
         if process := os.fork():
@@ -175,8 +174,11 @@ class Nursery:
             if each == number:
                 _kill_group(process, signal_number)
 
-    def _take_ends(self) -> None:
-        """Tell of the programs that have ended, and end the processes that they have left."""
+    def _take_ends(self) -> bool:
+        """Tell of the programs that have ended, and end what they have left; return whether they were the last ones.
+
+        No program follows those that have left files which cannot be removed, such as in folders without rights.
+        """
         ends = []
         while True:
             try:
@@ -188,10 +190,10 @@ class Nursery:
             if process in self._programs:
                 ends.append((self._programs.pop(process)[0], os.waitstatus_to_exitcode(status)))
                 _kill_group(process, signal.SIGKILL)
-        if ends and not self._programs:
-            _kill_all()
+        are_last = bool(ends) and not self._programs and not self._clean()
         for number, code in ends:
-            self._tell("ended", number, code)
+            self._tell("ended", number, code, are_last)
+        return are_last
 
     def _close(self) -> None:
         """End all programs and remove what they have written: what has started the nursery may have been killed."""
@@ -201,15 +203,19 @@ class Nursery:
             for folder in self._folders:
                 shutil.rmtree(folder, ignore_errors=True)
 
-    def _clean(self) -> None:
-        """Remove all that earlier programs have written: a run depends on no other."""
+    def _clean(self) -> bool:
+        """Remove all that earlier programs have written, as a run depends on no other; return whether that went."""
         if os.getpid() == 1:
             _kill_all()
             with contextlib.suppress(ChildProcessError):
                 while True:
                     os.waitpid(-1, 0)
-        for folder in self._folders:
-            self._empty(folder)
+        try:
+            for folder in self._folders:
+                self._empty(folder)
+        except (OSError, RecursionError):
+            return False
+        return True
 
     def _empty(self, folder: str) -> None:
         for entry in os.scandir(folder):
