@@ -106,6 +106,13 @@ class ProcessTable:
             family += children.get(process, [])
         return [found[process] for process in family]
 
+    def namespace_count(self) -> int:
+        """Return how many processes its namespace has; 0 without one."""
+        try:
+            return sum(map(str.isdigit, os.listdir(self._folder))) if self._is_namespace and self._folder >= 0 else 0
+        except OSError:  # another thread has closed it meanwhile
+            return 0
+
     def own_memory(self, sample: Sample) -> int:
         """Return the memory of a process, of shared pages its share; in a namespace without files in memory."""
         sizes = {} if sample.has_many_maps else _sizes(self._folder, f"{sample.process}/smaps_rollup")

@@ -20,6 +20,7 @@ import shutil
 import signal
 import socket
 import subprocess
+import sys
 import tempfile
 import threading
 from collections.abc import Callable, Sequence
@@ -32,6 +33,7 @@ from kiks.clock.patience import Patience
 from kiks.errors import KiksError
 from kiks.model.thinking_policy import split_thinking
 from kiks.ports.bubblewrap import WRITABLE, bubblewrap_line, complaint_of, python_folders
+from kiks.ports.control_group import ControlGroup
 from kiks.ports.environment_marks import HASH_SEED
 from kiks.ports.messages import Start
 from kiks.ports.other_user import OtherUser
@@ -65,6 +67,8 @@ _ADDRESS_SPACE_BYTES = 4 << 30
 _DESCRIPTORS_MAX = 256
 _SIGNALS_MAX = 1024  # with timers
 _MEGABYTE = 1_000_000
+_NURSERY_BYTES = 100 * _MEGABYTE
+"""What the nursery itself may take beside its programs."""
 
 
 Progress = Callable[[], tuple[int, bool]]
@@ -259,6 +263,8 @@ class _Processes:
         self._complaint = ""
         self._table: ProcessTable | None = None
         self._time = ProcessorTime()
+        self._memory_reason = f"used more than {self.limits.memory_mb:g} MB of memory"
+        self._group, self._namespace = _group_for(self.limits), -1
         try:
             with there:
                 self._begin(sandbox, there)
@@ -326,7 +332,7 @@ class _Processes:
             "RLIMIT_SIGPENDING": _SIGNALS_MAX,
         }
         if not self._is_trusted and _counts_by_namespace():
-            # With threads. It holds for no superuser, and a watcher outside is late where hundreds compute.
+            # With threads. It holds for no superuser: there a control group does.
             each["RLIMIT_NPROC"] = THREADS * limits.processes
         line = python_line("-m", "kiks.script.nursery", str(there.fileno()), json.dumps([folders, seen, each]))
         is_own = self._is_trusted and self._user is None
@@ -342,7 +348,7 @@ class _Processes:
                 words += ["--seccomp", str(calls)]
             os.close(calls_there)
             passed.append(calls)
-            line = [*words, "--info-fd", str(info_there), "--", *line]
+            line = self._group.line([*words, "--info-fd", str(info_there), "--", *line])
         errors, errors_there = os.pipe()
         has_started = threading.Event()
 
@@ -382,6 +388,10 @@ class _Processes:
 
     def _watch(self, errors: int, info: int | None) -> None:
         """Hear what the nursery says, and look at the processes, to the end."""
+        if sys.platform == "linux":
+            # Linux limits the number of processes of no superuser: this thread must get a processor among thousands.
+            with contextlib.suppress(OSError):
+                os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), -20)
         try:
             if self._hear_ready(info):
                 self._is_ready.set()
@@ -393,8 +403,14 @@ class _Processes:
                 self.is_over = True
             self._kill()
             self._popen.wait()
+            why = self._memory_reason if self._group.is_out_of_memory else "ended its sandbox"
+            if self._namespace >= 0:
+                # Its first process ends last.
+                select.select([self._namespace], [], [], START_PATIENCE_S)
+                os.close(self._namespace)
+            self._group.close()
             for program in self._programs.values():
-                program.reason = program.reason or "ended its sandbox"
+                program.reason = program.reason or why
                 program.end(-signal.SIGKILL)
             if self._table is not None:
                 self._table.close()
@@ -410,6 +426,9 @@ class _Processes:
             return False
         self._control.settimeout(None)
         first = self._popen.pid if info is None else json.loads(os.read(info, 1 << 12))["child-pid"]
+        if self._group.folders:
+            with contextlib.suppress(OSError):
+                self._namespace = os.pidfd_open(first)
         self._table = ProcessTable(first, is_namespace=info is not None)
         return True
 
@@ -432,6 +451,8 @@ class _Processes:
                         with self._lock:
                             self.is_over = self.is_over or was_last
                             program = self._programs.pop(number)
+                        if self._group.is_out_of_memory:
+                            self.kill(self._memory_reason, program)
                         program.end(code)
             if self._programs and is_due:
                 passed_s = since.waited_s()
@@ -444,6 +465,9 @@ class _Processes:
     def _broken_limit(self, passed_s: float) -> tuple[str, SandboxedProgram | None]:
         """Look at all processes; return which limit is broken, empty if none, and by which program if that is known."""
         assert self._table is not None
+        if self._table.namespace_count() > self.limits.processes + 1:
+            # At once: to look at each of thousands would take seconds.
+            return f"started more than {self.limits.processes} processes", None
         if not (samples := self._table.samples()):
             return "", None
         first, *others = samples
@@ -462,7 +486,7 @@ class _Processes:
         if besides + sum(each.memory for each in others) > most_memory and (
             besides + sum(self._table.own_memory(each) for each in others) > most_memory
         ):
-            return f"used more than {limits.memory_mb:g} MB of memory", None
+            return self._memory_reason, None
         for program in list(self._programs.values()):
             reason = program.broken_limit(idle_s)
             if reason:
@@ -499,8 +523,19 @@ def check_sandbox() -> None:
 
 def limits_in_force() -> str:
     """Return by what the limits of a sandbox hold on this computer, for a person."""
+    group = _group_for(Limits())
+    group.close()
+    counted = f"all counted {1 / SAMPLE_S:.0f} times a second"
+    if group.folders:
+        counted += ", and a control group"
+    elif os.geteuid() == 0:
+        counted += "; but Linux limits no processes of the superuser outside of a control group, which cannot be made"
     calls = "" if system_call_filter() else f", but no filter of system calls on {os.uname().machine}"
-    return f"limits of each process, all counted {1 / SAMPLE_S:.0f} times a second{calls}"
+    return f"limits of each process, {counted}{calls}"
+
+
+def _group_for(limits: Limits) -> ControlGroup:
+    return ControlGroup(THREADS * limits.processes, int(limits.memory_mb * _MEGABYTE) + _NURSERY_BYTES)
 
 
 def _counts_by_namespace() -> bool:
