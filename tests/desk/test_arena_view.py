@@ -205,7 +205,7 @@ def test_a_page_leaves_a_desk_that_has_ended(new_page: NewPage, shown: Shown, en
     page.wait_for_function("() => window.socket.connected")
     is_closed = end == "closed"
     if end == "replaced":
-        shown.gateway._secret = "that of another desk"
+        shown.desk.secret = "that of another desk"
         number = visitor.answer("kiksDesk.scene().scene")
         shown.desk.tell()
         page.wait_for_function("(number) => kiksDesk.scene().scene > number", arg=number)
