@@ -9,6 +9,7 @@ and runs trials in this process.
 * `grading.overhead_ms`: real time of a run in which the program says one command and ends, in a warm worker and a warm
   sandbox: what a run costs beyond what it simulates; a median;
 * `grading.run_ms`: real time of a run of two minutes there; a median;
+* `grading.octave_overhead_ms`, `grading.octave_run_ms`: the same with programs of Octave, if `octave-cli` is there;
 * `grading.sandbox_ms`: real time of the start of a sandbox, of which each program has one; a median.
 """
 
@@ -16,6 +17,7 @@ from __future__ import annotations
 
 import argparse
 import resource
+import shutil
 import statistics
 import subprocess
 import tempfile
@@ -63,6 +65,21 @@ port.write(b"D,5,5\\n")
 port.readline()
 """
 
+IN_OCTAVE = {
+    "octave_overhead": "ref = kiks_kopen([-1 9600 1]);\nkSetSpeed(ref, 5, 5);\n",
+    "octave_run": """
+ref = kiks_kopen([-1 9600 1]);
+while true
+    readings = kProximity(ref);
+    if max(readings(2:5)) > 120
+        kSetSpeed(ref, 3, -3);
+    else
+        kSetSpeed(ref, 5, 5);
+    end
+end
+""",
+}
+
 GOAL = Goal("Drive far without a contact", points="path_mm / 1000 - contacts")
 
 
@@ -85,7 +102,12 @@ def single_runs(home: Path, *, is_trusted: bool) -> list[tuple[str, float, str]]
     (home / "one.py").write_text(ONE_COMMAND)
     figures = []
     sandboxes = Sandboxes()
-    for name, file, count in (("overhead", home / "one.py", 21), ("run", home / "class" / "student00.py", 5)):
+    runs = [("overhead", home / "one.py", 21), ("run", home / "class" / "student00.py", 5)]
+    for (name, text), count in zip(IN_OCTAVE.items(), (21, 3), strict=True):
+        if shutil.which("octave-cli"):
+            (home / f"{name}.m").write_text(text)
+            runs.append((name, home / f"{name}.m", count))
+    for name, file, count in runs:
         taken_ms = []
         for number in range(count):
             trial = Trial(f"{name}{number}", replace(project, seed=number), home, (Command(file),), is_trusted)

@@ -55,7 +55,8 @@ def python_line(*words: str) -> list[str]:
 
     -I would leave out what users have set, too, such as PYTHONPATH.
     """
-    return [sys.executable, "-P", *words]
+    # Without "..", as in ../.venv/bin/python: a sandbox has only the folders that Python needs.
+    return [os.path.abspath(sys.executable), "-P", *words]
 
 
 def chance_seed(world_seed: int, robot: int) -> str:
