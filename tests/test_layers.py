@@ -35,7 +35,18 @@ LAYERS = [
 
 # What of the standard library only some layers may touch.
 CLOCKS = {"time", "datetime"}
-MAY_SEE_THE_WALL_CLOCK = {"clock", "recording", "script", "client", "learn", "trials", "desk", "toolbox", "cli"}
+MAY_SEE_THE_WALL_CLOCK = {
+    "ending",
+    "clock",
+    "recording",
+    "script",
+    "client",
+    "learn",
+    "trials",
+    "desk",
+    "toolbox",
+    "cli",
+}
 RANDOM = {"random", "secrets"}
 MAY_HAVE_SECRETS = {"desk", "toolbox"}
 
