@@ -8,7 +8,7 @@ from __future__ import annotations
 from base64 import b64decode, b64encode
 from collections.abc import Callable
 from dataclasses import fields, replace
-from functools import partial
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -268,12 +268,8 @@ class Project:
                 lines += ["", head, *(f"{name} = {toml(value)}" for name, value in table_of(table).items())]
         lines += place_lines(self.arena)
         lines += ["", "[walls]"]
-        raster, mm_per_cell = self.arena.ground, self.arena.mm_per_cell
-        if mm_per_cell == 1.0 and (box := Box.of_raster(raster)) is not None:
-            lines.append(f"size_mm = [{box.width_mm}, {box.height_mm}]")
-            lines += [f"{name} = {getattr(box, name)}" for name in ("wall_mm", "rounded_mm", "brightness")]
-        else:
-            lines += [f"mm_per_cell = {mm_per_cell!r}", f"png = {_packed(raster)}"]
+        raster = self.arena.ground
+        lines += _wall_lines(raster.tobytes(), raster.shape, self.arena.mm_per_cell)
         if self.arena.floor is not None:
             lines.append(f"floor = {_packed(self.arena.floor)}")
         return ("\n".join(lines) + "\n").encode("utf-8", errors="replace")
@@ -307,6 +303,16 @@ class ProjectWalls(Walls):
         if self.floor is None:
             return arena
         return replace(arena, floor=floor_of(_unpacked(self.floor, "floor", mm_per_cell), mm_per_cell, arena))
+
+
+@lru_cache(maxsize=4)  # a class is graded in few arenas, and to draw one takes 5 ms
+def _wall_lines(cells: bytes, shape: tuple[int, int], mm_per_cell: float) -> list[str]:
+    """Return the lines of the walls: those of a box if they are one, else a picture."""
+    raster = np.frombuffer(cells, np.uint8).reshape(shape)
+    if mm_per_cell == 1.0 and (box := Box.of_raster(raster)) is not None:
+        names = ("wall_mm", "rounded_mm", "brightness")
+        return [f"size_mm = [{box.width_mm}, {box.height_mm}]", *(f"{name} = {getattr(box, name)}" for name in names)]
+    return [f"mm_per_cell = {mm_per_cell!r}", f"png = {_packed(raster)}"]
 
 
 def _packed(raster: NDArray[np.uint8]) -> str:
