@@ -1,7 +1,5 @@
 """A recorded run is the same as one that is not, is made again to the bit, and can be gone on with from any time."""
 
-import json
-import math
 import random
 import resource
 import threading
@@ -19,7 +17,6 @@ from tests.demos.shown import run, shown, world_of
 import kiks
 from kiks import Arena, Khepera, ParameterError, Recording, Simulation
 from kiks.clock.gate import Gate
-from kiks.export import foxglove
 from kiks.firmware.general_io import GeneralIO
 from kiks.firmware.turret import Orders, Turret
 from kiks.model.arena import Lamp
@@ -375,36 +372,6 @@ def test_a_score_is_recorded_with_its_times(file: Path) -> None:
 def test_a_score_in_a_file_keeps_the_rules_of_one_that_is_set(data: str) -> None:
     with pytest.raises(ParameterError, match=r"the score of a recording: \["):
         score_of(Entry(Kind.SCORE, 0, 0, 0, 0, data.encode()))
-
-
-def test_foxglove_opens_it(file: Path) -> None:
-    import jsonschema
-    from mcap.reader import make_reader
-
-    sim = Simulation(Arena.box(300, 200), robots=2, seed=1)
-    sim.add_ball(50, 50)
-    sim.place(1, *sim.pose(1)[:2], 2.0)
-    sim.place(2, *sim.pose(2)[:2], -2.0)
-    with sim.record(file) as recorder:
-        sim.run(3.0)
-        recorder.mark("a note")
-        sim.run(1.0)
-    foxglove.save_foxglove(Recording(file), file.parent / "out.mcap")
-    counts: dict[str, int] = {}
-    turns: dict[str, dict[str, float]] = {}
-    with (file.parent / "out.mcap").open("rb") as opened:
-        for schema, channel, message in make_reader(opened, validate_crcs=True).iter_messages():
-            counts[channel.topic] = counts.get(channel.topic, 0) + 1
-            assert schema.name.startswith("foxglove.")
-            jsonschema.validate(json.loads(message.data), json.loads(schema.data))
-            assert message.log_time <= sim.now_ns
-            each = json.loads(message.data)
-            turns |= {one["child_frame_id"]: one["rotation"] for one in each.get("transforms", ())}
-    for robot in (1, 2):
-        turn = turns[f"robot {robot}"]  # a unit quaternion around the z axis
-        assert math.hypot(turn["z"], turn["w"]) == pytest.approx(1)
-        assert 2 * math.atan2(turn["z"], turn["w"]) == pytest.approx(sim.pose(robot)[2])
-    assert counts == {"/walls": 1, "/scene": 1, "/tf": 41, "/log": 1}
 
 
 def test_mistakes_get_a_clear_error(file: Path) -> None:

@@ -42,7 +42,6 @@ KINDS = {
     "photo": Kind("photo", "save_photo", (".png", ".jpg")),
     "table": Kind("tables", "save_table", (".csv", ".parquet", ".mat")),
     "page": Kind("page", "save_page", (".html",)),
-    "foxglove": Kind("foxglove", "save_foxglove", (".mcap",)),
 }
 """All kinds; of several with one ending, the first is the usual one."""
 
