@@ -107,8 +107,11 @@ def test_tables_enter_pandas_and_are_the_same_in_each_kind_of_file(recording: Re
         twice.columns()
 
 
+OF_RECORDINGS = [name for name, kind in KINDS.items() if not kind.is_of_evolution]
+
+
 @pytest.mark.parametrize(
-    ("kind", "ending"), [(kind, ending) for kind in KINDS if kind != "photo" for ending in KINDS[kind].endings]
+    ("kind", "ending"), [(kind, ending) for kind in OF_RECORDINGS if kind != "photo" for ending in KINDS[kind].endings]
 )
 def test_what_an_export_has_written_may_be_replaced(
     recording: Recording, tmp_path: Path, kind: str, ending: str
@@ -132,7 +135,8 @@ def test_a_recording_is_not_replaced_by_what_is_made_of_it(recording: Recording)
 
 
 def test_each_ending_has_a_kind_whose_options_are_those_of_its_function() -> None:
-    assert {kind_of(f"run{ending}") for ending in ENDINGS} == KINDS.keys() - {"figures", "photo"}
+    assert {kind_of(f"run{ending}") for ending in ENDINGS} == {*OF_RECORDINGS} - {"figures", "photo"}
+    assert [kind_of(f"run{each}", is_of_evolution=True) for each in (".gif", ".html")] == ["ghosts", "ghost page"]
     assert options_of("picture") == ["time_s"]
     assert kind_of("run.PNG", "photo") == "photo"
 

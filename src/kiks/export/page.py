@@ -21,7 +21,7 @@ from kiks.export.bundle import bundle
 from kiks.export.figures import NO_ROBOT, panels_of
 from kiks.export.findings import findings_of
 from kiks.export.page_contents import contents_of
-from kiks.export.run_frames import PERIOD_NS, RunFrames
+from kiks.export.run_frames import PERIOD_NS, Frames, RunFrames
 from kiks.model.atomic_files import replace_file
 from kiks.recording.recording import Recording
 from kiks.units import clock_text, s_from_ns
@@ -85,7 +85,7 @@ def save_page(
     replace_file(path, page.encode("utf-8", "replace"), "a page")
 
 
-def player_values(frames: RunFrames) -> dict[str, Any]:
+def player_values(frames: Frames) -> dict[str, Any]:
     """Return what `web/run_player.html` needs to show a run, by name."""
     return {
         "begin_s": s_from_ns(frames.begin_ns),
