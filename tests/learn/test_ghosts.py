@@ -73,9 +73,9 @@ def test_the_frames_of_a_page_have_the_poses_of_all_generations(folder: Path, tm
     heads = [np.frombuffer(each, HEAD, 1)[0] for each in frames.frames]
     assert [int(each["scene"]) for each in heads] == sorted([0, 1] * (len(heads) // 2))
     assert {int(each["robot_count"]) for each in heads} == {5}
-    for frame, ways in ((frames.frames[0], scenes[0].trajectories), (frames.frames[len(heads) // 2], scenes[1].trajectories)):
-        poses = np.frombuffer(frame, ROBOT, 5, HEAD.itemsize)["pose"]
-        np.testing.assert_allclose(poses, ways[:, 0], atol=1e-3)
+    for first, scene in zip((0, len(heads) // 2), scenes, strict=True):
+        poses = np.frombuffer(frames.frames[first], ROBOT, 5, HEAD.itemsize)["pose"]
+        np.testing.assert_allclose(poses, scene.trajectories[:, 0], atol=1e-3)
     done = CliRunner().invoke(app, ["export", str(folder), str(tmp_path / "ghosts.html")])
     assert done.exit_code == 0, done.output
     page = (tmp_path / "ghosts.html").read_text("utf-8")

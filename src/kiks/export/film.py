@@ -110,10 +110,15 @@ def save_film(
     return len(times_ns)
 
 
+def check_film(path: str | Path) -> str:
+    """Return the ending of a film's file."""
+    library("av", "film")
+    return ending_of(path, "a film", FILMS)
+
+
 def checked_format(path: str | Path, size: object, fps: object, speed: object) -> tuple[tuple[int, int], int, float]:
     """Return size, pictures per second and speed of a film, as files with the path's ending have them."""
-    library("av", "film")
-    ending = ending_of(path, "a film", FILMS)
+    ending = check_film(path)
     width, height = checked_size(size)
     if ending == MP4:
         # H.264 halves the resolution of colours.
