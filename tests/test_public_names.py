@@ -51,7 +51,7 @@ def sections_of(each: Any) -> dict[str, str]:
     return dict(re.findall(r"^([A-Z]\w+|):\n((?:.*\n?)*?)(?=^[A-Z]\w+:\n|\Z)", text, flags=re.MULTILINE))
 
 
-def entries_of(sections: dict[str, str], *headings: str) -> dict[str, str]:
+def unpack_entries(sections: dict[str, str], *headings: str) -> dict[str, str]:
     text = "\n".join(sections.get(heading, "") for heading in headings)
     return dict(re.findall(r"^    \*{0,2}(\w+): (.*(?:\n {5,}.*)*)", text, flags=re.MULTILINE))
 
@@ -66,7 +66,7 @@ def test_arrays_have_shapes_and_quantities_have_units_and_errors_exist() -> None
     wrong = []
     for name, each in public().items():
         sections = sections_of(each)
-        explained = entries_of(sections, "Args", "Attributes")
+        explained = unpack_entries(sections, "Args", "Attributes")
         is_record = dataclasses.is_dataclass(each)
         annotations = getattr(each.__init__ if inspect.isclass(each) and not is_record else each, "__annotations__", {})
         for argument, annotation in annotations.items():
@@ -78,7 +78,7 @@ def test_arrays_have_shapes_and_quantities_have_units_and_errors_exist() -> None
             unit = UNITS.get(argument.rpartition("_")[2]) if "_" in argument else None
             if unit and not re.search(rf"\[({unit})[\];,]|\[[^\]]*\b({unit})\b", meaning):
                 wrong.append(f"{name}: {argument}: no unit in {meaning!r}")
-        for error in entries_of(sections, "Raises"):
+        for error in unpack_entries(sections, "Raises"):
             if not (hasattr(kiks.errors, error) or hasattr(builtins, error)):
                 wrong.append(f"{name}: no {error}")
     assert not wrong, "\n".join(wrong)

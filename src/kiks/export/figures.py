@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from kiks.engine.state import BALL
 from kiks.errors import ParameterError
-from kiks.export.findings import Findings, findings_of
+from kiks.export.findings import Findings, gather_findings
 from kiks.export.kinds import KINDS
 from kiks.export.looks import LAMPLIGHT, body_colour, css, robot_colour
 from kiks.export.pictures import Picture, Trails
@@ -88,7 +88,7 @@ def save_figures(recordings: Sequence[Recording], path: str | Path, *, robot: in
         robot: Number of the robot whose readings, speeds and time are drawn; a run without a robot has paths alone.
     """
     kind = ending_of(path, "figures", KINDS["figures"].endings)[1:]
-    replace_file(path, file_of(figure_of(recordings, robot=robot), kind), "figures")
+    replace_file(path, file_of(draw_figure(recordings, robot=robot), kind), "figures")
 
 
 def save_figure(figure: Any, path: str | Path, dots_per_inch: int = 110) -> None:
@@ -152,13 +152,13 @@ def _with_plain_texts(figure: Any) -> Any:
     return figure
 
 
-def panels_of(recording: Recording, found: Findings | None = None, *, robot: int = 1) -> dict[str, bytes]:
+def draw_panels(recording: Recording, found: Findings | None = None, *, robot: int = 1) -> dict[str, bytes]:
     """Return what `save_figures` draws of one recording as single pictures, by the names of `PANELS`, in SVG."""
     from matplotlib.figure import Figure
 
     pictures = {}
     arena_inches = _arena_inches([recording]) + 0.9
-    for name, draw in _drawings(recording, found or findings_of(recording), robot).items():
+    for name, draw in _drawings(recording, found or gather_findings(recording), robot).items():
         size = (2 * COLUMN_INCHES, PANELS[name]) if PANELS[name] else (COLUMN_INCHES, arena_inches)
         figure = Figure(figsize=size, layout="constrained")
         draw(figure.subplots())
@@ -166,12 +166,12 @@ def panels_of(recording: Recording, found: Findings | None = None, *, robot: int
     return pictures
 
 
-def figure_of(recordings: Sequence[Recording], *, robot: int = 1) -> Any:
+def draw_figure(recordings: Sequence[Recording], *, robot: int = 1) -> Any:
     """Return the figure of `save_figures`, a `matplotlib.figure.Figure`."""
     from matplotlib.figure import Figure
     from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-    drawings = [_drawings(recording, findings_of(recording), robot) for recording in recordings]
+    drawings = [_drawings(recording, gather_findings(recording), robot) for recording in recordings]
     # Padding makes room for the legends between the rows.
     layout = ConstrainedLayoutEngine(h_pad=0.1)
     arena_inches = _arena_inches(recordings)
@@ -202,8 +202,8 @@ def _arena_inches(recordings: Sequence[Recording]) -> float:
     return min(max(0.8 * COLUMN_INCHES * max(shapes, default=1.0), 1.2), COLUMN_INCHES)
 
 
-def figure_of_run(sim: Simulation, *, robot: int = 1) -> Any:
-    """Return the figure of a run that is being recorded; see `figure_of`."""
+def draw_run_figure(sim: Simulation, *, robot: int = 1) -> Any:
+    """Return the figure of a run that is being recorded; see `draw_figure`."""
     writer = sim.loop.recorder
     stores = writer.stores if isinstance(writer, RunWriter) else ()
     recorders = [store for store in stores if isinstance(store, RunRecorder)]
@@ -212,7 +212,7 @@ def figure_of_run(sim: Simulation, *, robot: int = 1) -> Any:
             f"{sim} must be recorded while it is plotted, but it is not. Begin with: with sim.record('run.mcap'):"
         )
     recorders[-1].flush()
-    return figure_of([Recording(recorders[-1].path)], robot=robot)
+    return draw_figure([Recording(recorders[-1].path)], robot=robot)
 
 
 def _drawings(recording: Recording, found: Findings, robot: int) -> dict[str, Callable[[Any], None]]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from kiks.errors import ParameterError, library, shown
 from kiks.export.kinds import FILMS
-from kiks.export.panel import Panel
+from kiks.export.panel import FilmPanel
 from kiks.export.solid_stage import SolidStage
 from kiks.export.stage import Pixels, Stage
 from kiks.export.video_file import GIF, MP4, write_film
@@ -96,7 +96,7 @@ def save_film(
 
     def pictures(times_ns: Sequence[int]) -> Iterator[Pixels]:
         picture = np.zeros((height, width, 3), np.uint8)
-        panel = None if is_plain else Panel((width, height), robot=robot - 1, speed=speed, title=recording.what)
+        panel = None if is_plain else FilmPanel((width, height), robot=robot - 1, speed=speed, title=recording.what)
         left = width - (0 if panel is None else panel.width)
         index = None if follow is None else follow - 1
         stage = VIEWS[view]((left, height), follow=index, zoom=zoom, has_trails=not is_plain)

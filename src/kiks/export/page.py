@@ -18,9 +18,9 @@ import jinja2
 from markupsafe import Markup
 
 from kiks.export.bundle import bundle
-from kiks.export.figures import NO_ROBOT, panels_of
-from kiks.export.findings import findings_of
-from kiks.export.page_contents import contents_of
+from kiks.export.figures import NO_ROBOT, draw_panels
+from kiks.export.findings import gather_findings
+from kiks.export.page_contents import page_contents
 from kiks.export.run_frames import PERIOD_NS, Frames, RunFrames
 from kiks.model.atomic_files import replace_file
 from kiks.recording.recording import Recording
@@ -62,10 +62,10 @@ def save_page(
         on_progress: Called now and then with the share that is done.
     """
     frames = RunFrames(recording.log)
-    found = findings_of(recording, frames.pieces(on_progress))
-    figures = panels_of(recording, found, robot=robot)
+    found = gather_findings(recording, frames.pieces(on_progress))
+    figures = draw_panels(recording, found, robot=robot)
     page = page_template("run_page.html").render(
-        contents_of(recording, found, frames, robot),
+        page_contents(recording, found, frames, robot),
         title=title,
         robot=robot,
         figures=[

@@ -43,7 +43,7 @@ ROBOTS_MAX = 100
 """Most robots in the table of numbers."""
 
 
-def contents_of(recording: Recording, found: Findings, frames: RunFrames, robot: int) -> dict[str, Any]:
+def page_contents(recording: Recording, found: Findings, frames: RunFrames, robot: int) -> dict[str, Any]:
     """Return what `web/run_page.html` needs to tell of a recording, by name."""
     events, wire = found.tables["events"], found.tables["wire"]
     programs, file = _programs(recording), recording.log.reader.path.name

@@ -23,7 +23,7 @@ from kiks.model.replaceable import MADE_BY
 from kiks.model.robot import Body, RobotSpec
 from kiks.recording.moments import moments
 from kiks.recording.recording import Recording
-from kiks.recording.rerun import Piece
+from kiks.recording.rerun import RunPiece
 from kiks.sim.simulation import Simulation
 from kiks.units import NS_PER_S, s_from_ns
 
@@ -105,7 +105,7 @@ class Picture:
         return cls(arena, lamps.reshape(-1, 4), bodies, starts.reshape(-1, 3), robots, title=title)
 
     @classmethod
-    def of_recording(cls, recording: Recording, time_ns: int, pieces: Iterable[Piece] | None = None) -> Picture:
+    def of_recording(cls, recording: Recording, time_ns: int, pieces: Iterable[RunPiece] | None = None) -> Picture:
         """Return the picture of a recorded world at a time [ns], with the paths up to it; see `moments` for pieces."""
         begin_ns = recording.log.begin_ns
         step_ns = max(POINT_NS, (time_ns - begin_ns) // POINTS_MAX)

@@ -19,7 +19,7 @@ from kiks.export.frames import arena_picture, describe_scene, describe_shapes, p
 from kiks.model.arena import Arena
 from kiks.recording.log import RecordedLog
 from kiks.recording.replay import Replay
-from kiks.recording.rerun import Piece, run_again
+from kiks.recording.rerun import RunPiece, run_again
 from kiks.sim.simulation import Simulation
 from kiks.units import TICK_NS, s_from_ns
 
@@ -118,7 +118,7 @@ class RunFrames(Frames):
             pass
         return frames
 
-    def pieces(self, on_progress: Callable[[float], None] = lambda share: None) -> Iterator[Piece]:
+    def pieces(self, on_progress: Callable[[float], None] = lambda share: None) -> Iterator[RunPiece]:
         """Make the run again, take the frames, and yield its pieces, as `run_again` does.
 
         Args:

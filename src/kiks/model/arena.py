@@ -25,7 +25,7 @@ from kiks.model.checks import check_kind, check_number
 from kiks.model.maze import draw_maze
 from kiks.model.raster import MAX_CELLS, PAD, SIZE_MIN_MM, between, cells_per_pixel
 from kiks.model.room import draw_room
-from kiks.model.wall_tables import WallTables, tables_of
+from kiks.model.wall_tables import WallTables, wall_tables
 from kiks.model.walls import AnyShape, Wall, Zone, painted
 
 __all__ = ["MAX_CELLS", "PAD", "SIZE_MIN_MM", "Arena", "Ball", "Cylinder", "Lamp", "LampSwitch", "Pose", "Wall", "Zone"]
@@ -118,7 +118,7 @@ class Arena:
         object.__setattr__(self, "walls", walls)
         object.__setattr__(self, "brightness", raster)
         object.__setattr__(self, "mm_per_cell", float(self.mm_per_cell))
-        object.__setattr__(self, "_tables", tables_of(raster, self.mm_per_cell))
+        object.__setattr__(self, "_tables", wall_tables(raster, self.mm_per_cell))
         for switch in self.lamp_switches:
             check_kind("each of lamp_switches", switch, LampSwitch)
         object.__setattr__(self, "lamp_switches", tuple(sorted(self.lamp_switches, key=lambda each: each.time_s)))

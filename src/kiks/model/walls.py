@@ -43,7 +43,7 @@ _Paint = Annotated[
 
 
 @record
-class Shape:
+class PaintedShape:
     """What is painted on a raster: a line, a box or a disc; later ones cover earlier ones."""
 
     label: ClassVar[str]
@@ -104,7 +104,7 @@ class Shape:
 
 
 @record
-class Wall(Shape):
+class Wall(PaintedShape):
     """A wall with a shape, of which it has one; later walls cover earlier ones.
 
     Args:
@@ -129,7 +129,7 @@ class Wall(Shape):
 
 
 @record
-class Zone(Shape):
+class Zone(PaintedShape):
     """A zone of the floor with a shape, of which it has one; later zones cover earlier ones.
 
     Args:

@@ -59,7 +59,7 @@ class Recording:
     def __init__(self, source: str | Path | Source) -> None:
         self.log = RecordedLog(McapReader(source) if isinstance(source, str | Path) else source)
         self._reader = self.log.reader
-        self.about: Mapping[str, str] = self._reader.told
+        self.about: Mapping[str, str] = self._reader.about
 
     def __repr__(self) -> str:
         return f"<{self._reader.what}: {counted(len(self.robots), 'robot')}, {self.duration_s:.3f} s>"
