@@ -41,12 +41,7 @@ def robot_colour(index: int, *, is_dark: bool = False) -> Colour:
 
 
 def robot_colours(index: int) -> dict[str, str]:
-    """Return the colour of a robot on light and on dark ground, for browsers.
-
-    Example:
-        >>> robot_colours(0)
-        {'light': '#1a579e', 'dark': '#63a4ee'}
-    """
+    """Return the colour of a robot on light and on dark ground, for browsers."""
     return {name: css(robot_colour(index, is_dark=name == "dark")) for name in ("light", "dark")}
 
 
@@ -58,12 +53,7 @@ def body_colour(body: Any) -> Colour:
 
 
 def css(colour: Colour) -> str:
-    """Return a colour as HTML has it.
-
-    Example:
-        >>> css(BALL_COLOUR)
-        '#f58228'
-    """
+    """Return a colour as HTML has it."""
     return f"#{bytes(colour[:3]).hex()}"
 
 

@@ -80,12 +80,7 @@ class PaintedShape:
 
     @property
     def thick_mm(self) -> float:
-        """How thick a line is [mm].
-
-        Example:
-            >>> Wall(line_mm=((100, 50), (100, 90))).thick_mm
-            10.0
-        """
+        """How thick a line is [mm]."""
         return 10.0 if self.width_mm is None else self.width_mm
 
     def cells(self, shape: tuple[int, int], mm_per_cell: float) -> Iterable[Area]:

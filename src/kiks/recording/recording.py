@@ -75,19 +75,7 @@ class Recording:
 
     @property
     def is_whole(self) -> bool:
-        """Whether the run that wrote it came to its end.
-
-        Example:
-            >>> import tempfile
-            >>> from pathlib import Path
-            >>> import kiks
-            >>> file = Path(tempfile.mkdtemp(), "run.mcap")
-            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
-            >>> with sim.record(file):
-            ...     sim.run(1.5)
-            >>> kiks.Recording(file).is_whole
-            True
-        """
+        """Whether the run that wrote it came to its end."""
         return not isinstance(self._reader, McapReader) or self._reader.is_whole
 
     @cached_property
@@ -109,36 +97,14 @@ class Recording:
 
     @property
     def what(self) -> str:
-        """What ran: its programs, the arena, and the seed.
-
-        Example:
-            >>> import tempfile, kiks
-            >>> file = tempfile.mkdtemp() + "/run.mcap"
-            >>> sim = kiks.Simulation(kiks.Arena.load("office"), seed=1)
-            >>> with sim.record(file):
-            ...     sim.run(2.5)
-            >>> kiks.Recording(file).what
-            'Office, seed 1'
-        """
+        """What ran: its programs, the arena, and the seed."""
         programs = ", ".join(dict.fromkeys(name.partition("-")[2] or name for name in self.programs))
         ran = " in ".join(filter(None, (programs, self.start.arena.name)))
         return ", ".join(filter(None, (ran, f"seed {self.start.head.seed}")))
 
     @property
     def title(self) -> str:
-        """What ran, and for how long.
-
-        Example:
-            >>> import tempfile
-            >>> from pathlib import Path
-            >>> import kiks
-            >>> file = Path(tempfile.mkdtemp(), "run.mcap")
-            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
-            >>> with sim.record(file):
-            ...     sim.run(1.5)
-            >>> kiks.Recording(file).title
-            'box, seed 1, 1.5 s'
-        """
+        """What ran, and for how long."""
         return f"{self.what}, {self.duration_s:.1f} s"
 
     def project_at(self, time_s: float) -> Project:
@@ -157,17 +123,7 @@ class Recording:
 
     @property
     def robots(self) -> range:
-        """Numbers of the robots that it has in the end.
-
-        Example:
-            >>> import tempfile, kiks
-            >>> file = tempfile.mkdtemp() + "/run.mcap"
-            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
-            >>> with sim.record(file):
-            ...     sim.run(2.5)
-            >>> list(kiks.Recording(file).robots)
-            [1]
-        """
+        """Numbers of the robots that it has in the end."""
         return range(1, len(self.log.state_before(self.log.end_ns).specs) + 1)
 
     def check_robot(self, robot: object, advice: str = "", name: str = "robot") -> int:
@@ -190,17 +146,7 @@ class Recording:
 
     @property
     def duration_s(self) -> float:
-        """How long it is [s of simulated time].
-
-        Example:
-            >>> import tempfile, kiks
-            >>> file = tempfile.mkdtemp() + "/run.mcap"
-            >>> sim = kiks.Simulation(kiks.Arena.box(500, 500), seed=1)
-            >>> with sim.record(file):
-            ...     sim.run(2.5)
-            >>> kiks.Recording(file).duration_s
-            2.5
-        """
+        """How long it is [s of simulated time]."""
         return s_from_ns(self.log.end_ns - self.log.begin_ns)
 
     # ---- tables ----
