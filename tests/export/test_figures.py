@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from kiks import Arena, Khepera, ParameterError, Recording, Simulation
-from kiks.export.figures import NO_ROBOT, PANELS, draw_figure, draw_panels, save_figures
+from kiks.export.figures import NO_ROBOT, ROWS, draw_figure, draw_panels, save_figures
 from kiks.export.findings import gather_findings
 from kiks.recording.analysis import odometry
 from kiks.recording.recorder import RunRecorder
@@ -70,7 +70,7 @@ def test_a_run_is_plotted_while_it_is_recorded(tmp_path: Path) -> None:
 
 def test_panels_are_the_rows_of_the_figure(recording: Recording) -> None:
     panels = draw_panels(recording)
-    assert list(panels) == list(PANELS)
+    assert list(panels) == list(ROWS)
     for name, legend in (("paths", "odometry"), ("readings", "7"), ("speeds", "asked for"), ("time", "thinking")):
         assert legend in panels[name].decode(), name
     assert panels == draw_panels(recording)
@@ -100,8 +100,8 @@ def test_a_run_without_a_robot_has_the_arena_and_says_so(recording: Recording, t
     none = Recording(tmp_path / "none.mcap")
     assert list(draw_panels(none)) == ["paths"]
     figure = draw_figure([none, recording])
-    said = [[text.get_text() for text in axes.texts if text.get_text()] for axes in figure.axes[: 2 * len(PANELS) : 2]]
-    assert said == [[]] + [[NO_ROBOT]] * (len(PANELS) - 1)
+    said = [[text.get_text() for text in axes.texts if text.get_text()] for axes in figure.axes[: 2 * len(ROWS) : 2]]
+    assert said == [[]] + [[NO_ROBOT]] * (len(ROWS) - 1)
     save_figures([none], tmp_path / "none.png")
 
 

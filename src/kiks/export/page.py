@@ -18,7 +18,7 @@ import jinja2
 from markupsafe import Markup
 
 from kiks.export.bundle import bundle
-from kiks.export.figures import NO_ROBOT, draw_panels
+from kiks.export.figures import NO_ROBOT, ROWS, draw_panels
 from kiks.export.findings import gather_findings
 from kiks.export.page_contents import page_contents
 from kiks.export.run_frames import PERIOD_NS, Frames, RunFrames
@@ -30,15 +30,6 @@ from kiks.version import __version__
 WEB = Path(__file__).parents[1] / "desk" / "web"
 
 STYLES = ("arena_view.css", "monitor_view.css", "run_page.css")
-
-FIGURES = {
-    "paths": ("Paths", "Where robots drove, and where the wheels of a lone robot say that it did"),
-    "places": ("Places", "How long robots were in which part of the arena"),
-    "readings": ("Readings", "What the program read of the proximity sensors of robot {robot}"),
-    "speeds": ("Speeds", "How fast the wheels of robot {robot} turned, and how fast they should"),
-    "time": ("Time", "Where the milliseconds of robot {robot} went"),
-}
-"""Title of each figure, and a sentence."""
 
 _SAFE = " !$()*+,/:;=?@[]"
 """What stands in the address of a figure as it is, beside letters, numbers and -._~: most of a figure is numbers."""
@@ -69,9 +60,8 @@ def save_page(
         title=title,
         robot=robot,
         figures=[
-            (name, head, text.format(robot=robot), quote(figures[name], safe=_SAFE))
-            for name, (head, text) in FIGURES.items()
-            if name in figures
+            (name, ROWS[name].title, ROWS[name].text.format(robot=robot), quote(figure, safe=_SAFE))
+            for name, figure in figures.items()
         ],
         **player_values(frames),
         frames=frames,

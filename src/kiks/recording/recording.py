@@ -15,11 +15,12 @@ from kiks.errors import ParameterError, counted
 from kiks.model.checks import check_count, check_number
 from kiks.model.columns import Columns, columns_of
 from kiks.model.project import Project
-from kiks.recording import tables
 from kiks.recording.log import RecordedLog, Source
 from kiks.recording.mcap_file import McapReader
 from kiks.recording.recorder import PROGRAMS
 from kiks.recording.replay import Replay
+from kiks.recording.rerun import run_again
+from kiks.recording.tables import TableParts
 from kiks.sim.from_project import described
 from kiks.sim.saved_state import SavedState
 from kiks.sim.simulation import Simulation
@@ -164,7 +165,10 @@ class Recording:
             >>> len(events)
             0
         """
-        return tables.tables(self.log, names)
+        parts = TableParts(names)
+        for piece in run_again(self.log):
+            parts.add(piece)
+        return parts.tables(self.log)
 
     def table(self, name: str, robot: int | None = None) -> NDArray[np.void]:
         """Return a table: an array of records, [row].

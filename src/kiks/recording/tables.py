@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,7 +17,7 @@ from kiks.recording.entries import Entry
 from kiks.recording.events import contacts_in, notes_in
 from kiks.recording.log import RecordedLog
 from kiks.recording.motion import each_tick
-from kiks.recording.rerun import RunPiece, run_again
+from kiks.recording.rerun import RunPiece
 from kiks.sim.run_log import Kind
 from kiks.units import TICK_NS, s_from_ns
 
@@ -49,19 +49,6 @@ _COMMAND = re.compile("[A-Z]|T,[0-9]{1,3},[A-Z]")
 
 _NUMBERS = re.compile(rb"([a-z]|t,[0-9]{1,3},[a-z])((?:,-?[0-9]{1,18})+),?\s*")
 """A reply of whole numbers."""
-
-
-def tables(log: RecordedLog, names: Sequence[str]) -> list[Table]:
-    """Return tables of a recording; the run is made again once for all of them.
-
-    Args:
-        log: The log of the recording.
-        names: As for `kind_of`.
-    """
-    parts = TableParts(names)
-    for piece in run_again(log):
-        parts.add(piece)
-    return parts.tables(log)
 
 
 class TableParts:
