@@ -63,7 +63,7 @@ def shown_in_notebooks(module: str, name: str) -> Callable[[type[Kind]], type[Ki
     return decorate
 
 
-class Recorder(Protocol):
+class OpenRecording(Protocol):
     """Records a simulation into a file until `close`, or the end of `with`."""
 
     def __enter__(self) -> Self: ...

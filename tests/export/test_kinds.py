@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from kiks import Arena, Batch, Khepera, ParameterError, Recording, Simulation, controllers, measures
-from kiks.export.kinds import ENDINGS, KINDS, export, kind_of, options_of
+from kiks.export.kinds import ENDINGS, KINDS, export, export_kind, option_names
 from kiks.export.pictures import Picture
 from kiks.learn.exam import ExamResult
 from kiks.model.replaceable import RECORDING, is_replaceable
@@ -135,10 +135,10 @@ def test_a_recording_is_not_replaced_by_what_is_made_of_it(recording: Recording)
 
 
 def test_each_ending_has_a_kind_whose_options_are_those_of_its_function() -> None:
-    assert {kind_of(f"run{ending}") for ending in ENDINGS} == {*OF_RECORDINGS} - {"figures", "photo"}
-    assert [kind_of(f"run{each}", is_of_evolution=True) for each in (".gif", ".html")] == ["ghosts", "ghost page"]
-    assert options_of("picture") == ["time_s"]
-    assert kind_of("run.PNG", "photo") == "photo"
+    assert {export_kind(f"run{ending}") for ending in ENDINGS} == {*OF_RECORDINGS} - {"figures", "photo"}
+    assert [export_kind(f"run{each}", is_of_evolution=True) for each in (".gif", ".html")] == ["ghosts", "ghost page"]
+    assert option_names("picture") == ["time_s"]
+    assert export_kind("run.PNG", "photo") == "photo"
 
 
 def test_mistakes_get_a_clear_error(recording: Recording, tmp_path: Path) -> None:

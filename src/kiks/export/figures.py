@@ -21,7 +21,7 @@ from kiks.export.findings import Findings, gather_findings
 from kiks.export.kinds import KINDS
 from kiks.export.looks import LAMPLIGHT, body_colour, css, robot_colour
 from kiks.export.pictures import Picture, Trails
-from kiks.export.vector_pen import file_of
+from kiks.export.vector_pen import figure_bytes
 from kiks.model.arena import Arena
 from kiks.model.atomic_files import ending_of, replace_file
 from kiks.recording.analysis import odometry
@@ -108,13 +108,13 @@ def save_figures(recordings: Sequence[Recording], path: str | Path, *, robot: in
         robot: Number of the robot whose readings, speeds and time are drawn; a run without a robot has paths alone.
     """
     kind = ending_of(path, "figures", KINDS["figures"].endings)[1:]
-    replace_file(path, file_of(draw_figure(recordings, robot=robot), kind), "figures")
+    replace_file(path, figure_bytes(draw_figure(recordings, robot=robot), kind), "figures")
 
 
 def save_figure(figure: Any, path: str | Path, dots_per_inch: int = 110) -> None:
     """Write a figure, whose texts become plain: .png, .svg or .pdf."""
     kind = ending_of(path, "the picture", KINDS["figures"].endings)[1:]
-    replace_file(path, file_of(_with_plain_texts(figure), kind, dots_per_inch), "the picture")
+    replace_file(path, figure_bytes(_with_plain_texts(figure), kind, dots_per_inch), "the picture")
 
 
 @contextmanager
@@ -183,7 +183,7 @@ def draw_panels(recording: Recording, found: Findings | None = None, *, robot: i
         size = (COLUMN_INCHES, arena_inches) if inches is None else (2 * COLUMN_INCHES, inches)
         figure = Figure(figsize=size, layout="constrained")
         draw(figure.subplots())
-        pictures[name] = file_of(_with_plain_texts(figure), "svg")
+        pictures[name] = figure_bytes(_with_plain_texts(figure), "svg")
     return pictures
 
 

@@ -54,7 +54,7 @@ class GhostFrames(Frames):
         scene = describe_scene(looks, number)
         scene["arena"] = describe_arena(ghosts.arena) | {
             "name": ghosts.title,
-            "picture": self.picture_of(ghosts.arena),
+            "picture": self.add_picture(ghosts.arena),
         }
         for index, robot in enumerate(scene["robots"]):
             robot["reach_mm"] = 0.0  # they sense worlds of their own

@@ -75,8 +75,8 @@ def export(
         >>> (folder / "run.csv").read_text()[:12]
         'time_s,robot'
     """
-    kind = kind_of(path, kind, is_of_evolution=isinstance(source, str | Path))
-    known = options_of(kind)
+    kind = export_kind(path, kind, is_of_evolution=isinstance(source, str | Path))
+    known = option_names(kind)
     for name, value in options.items():
         if name not in known:
             raise ParameterError(
@@ -92,7 +92,7 @@ def export(
     KINDS[kind].write(source, path, **options)
 
 
-def kind_of(path: str | Path, kind: str | None = None, *, is_of_evolution: bool = False) -> str:
+def export_kind(path: str | Path, kind: str | None = None, *, is_of_evolution: bool = False) -> str:
     """Return which kind a file is: the given one, or the usual one of its ending."""
     known = {name: each for name, each in KINDS.items() if each.is_of_evolution == is_of_evolution}
     if kind is None:
@@ -105,7 +105,7 @@ def kind_of(path: str | Path, kind: str | None = None, *, is_of_evolution: bool 
     return kind
 
 
-def options_of(kind: str) -> list[str]:
+def option_names(kind: str) -> list[str]:
     """Return the names of the options that a kind has."""
     parameters = signature(KINDS[kind].write.function()).parameters.values()
     return [each.name for each in parameters if each.kind is Parameter.KEYWORD_ONLY]

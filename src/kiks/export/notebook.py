@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from kiks.batch.number_table import NumberTable
 from kiks.export.figures import COLUMN_INCHES, draw_figure, draw_run_figure
 from kiks.export.pictures import Picture
-from kiks.export.vector_pen import file_of
+from kiks.export.vector_pen import figure_bytes
 from kiks.model.arena import Arena
 from kiks.recording.recording import Recording
 from kiks.sim.explanation import Explanation, LightExplanation
@@ -100,7 +100,7 @@ def image(picture: Image) -> Bundle:
 
 def figure(given: Any, inches: float) -> Bundle:
     """Return a figure of Matplotlib, and how wide it is shown."""
-    return _png(file_of(given, "png"), {"width": round(inches * PIXELS_PER_INCH)})
+    return _png(figure_bytes(given, "png"), {"width": round(inches * PIXELS_PER_INCH)})
 
 
 def _png(data: bytes, size: dict[str, int]) -> Bundle:

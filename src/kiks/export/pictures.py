@@ -16,7 +16,7 @@ from kiks.export.caption import Caption, Sign, letter_pixels, scale_bar
 from kiks.export.kinds import KINDS
 from kiks.export.looks import Colour, body_colour, robot_colour
 from kiks.export.sheet import FINER, LAMP_MM, WHITE, Place, Sheet, ground_picture, path_colour, path_mm, pen_on
-from kiks.export.vector_pen import UNIT_POINTS, VectorPen, file_of
+from kiks.export.vector_pen import UNIT_POINTS, VectorPen, figure_bytes
 from kiks.model.arena import Arena, Ball
 from kiks.model.atomic_files import ending_of, replace_file
 from kiks.model.replaceable import MADE_BY
@@ -145,7 +145,7 @@ class Picture:
         """Write it to a file, with its caption: with lines that stay sharp if it ends in .svg or .pdf."""
         kind = ending_of(path, "a picture", PICTURES)
         if kind in (".svg", ".pdf"):
-            replace_file(path, file_of(self._figure(), kind[1:]), "a picture")
+            replace_file(path, figure_bytes(self._figure(), kind[1:]), "a picture")
         else:
             save_image(self.captioned(), path)
 

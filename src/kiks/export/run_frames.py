@@ -61,7 +61,7 @@ class Frames:
         while (self.end_ns - self.begin_ns) // self.period_ns * frame_bytes > FRAME_BYTES_MAX:
             self.period_ns *= 2
 
-    def picture_of(self, arena: Arena) -> int:
+    def add_picture(self, arena: Arena) -> int:
         """Return the index of the picture of an arena's walls, which is added if it is not there."""
         if (picture := arena_picture(arena)) not in self.pictures:
             self.pictures.append(picture)
@@ -158,7 +158,7 @@ class RunFrames(Frames):
     def _take_scene(self, sim: Simulation) -> None:
         """Add the present scene if it differs from the last one."""
         if sim.arena is not self._arena:
-            self._arena, self._picture = sim.arena, self.picture_of(sim.arena)
+            self._arena, self._picture = sim.arena, self.add_picture(sim.arena)
         number = len(self.scenes)
         scene = describe_scene(sim, number)
         scene["arena"]["picture"] = self._picture

@@ -78,7 +78,7 @@ def _chosen(folder: str | Path, generations: Sequence[int] | None) -> Sequence[i
     """Return the numbers of the generations that are shown."""
     if generations is None:
         count = max(Folder(folder).generation_count(), 1)
-        return np.unique(np.linspace(1, count, SHOWN).round().astype(int)).tolist()
+        return [int(each) for each in np.unique(np.linspace(1, count, SHOWN).round())]
     if not len(generations):
         raise ParameterError("ghosts must be of one generation at least, but there was none.")
     return generations

@@ -52,10 +52,10 @@ _NUMBERS = re.compile(rb"([a-z]|t,[0-9]{1,3},[a-z])((?:,-?[0-9]{1,18})+),?\s*")
 
 
 class TableParts:
-    """Tables that are put together while a run is made again; `names` are those that `kind_of` knows."""
+    """Tables that are put together while a run is made again; `names` are those that `table_kind` knows."""
 
     def __init__(self, names: Iterable[str]) -> None:
-        self._parts: list[tuple[TableKind, list[Any]]] = [(kind_of(name), []) for name in names]
+        self._parts: list[tuple[TableKind, list[Any]]] = [(table_kind(name), []) for name in names]
 
     def add(self, piece: RunPiece) -> None:
         """Add what is in a piece of the run."""
@@ -185,7 +185,7 @@ TABLES: Mapping[str, TableKind] = {
 """The tables by name."""
 
 
-def kind_of(name: str) -> TableKind:
+def table_kind(name: str) -> TableKind:
     """Return a kind of table: of `TABLES`, or of the numbers replied to a command, such as 'T,2,N', or to a sense."""
     if name in TABLES:
         return TABLES[name]
