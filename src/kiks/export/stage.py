@@ -175,10 +175,10 @@ class Ground:
         """Let trails grow to where robots, balls and cylinders are."""
         lines: dict[tuple[str, int], list[Place]] = {}
         least_mm = PIECE_PIXELS / self.canvas.scale
-        ways = [(tick.poses, tick.bodies, tick.places) for tick in moment.passed] or [
+        ticks = [(tick.poses, tick.bodies, tick.places) for tick in moment.passed] or [
             (moment.poses, moment.bodies, np.column_stack([moment.bodies["x_mm"], moment.bodies["y_mm"]]))
         ]
-        for poses, bodies, places in ways:
+        for poses, bodies, places in ticks:
             things = [("robot", index, pose) for index, pose in enumerate(poses.tolist())]
             things += [("body", *thing) for thing in zip(bodies["number"].tolist(), places.tolist(), strict=True)]
             for what, number, (x_mm, y_mm, *_) in things:

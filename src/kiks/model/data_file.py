@@ -86,8 +86,8 @@ def table_of(made: Any) -> dict[str, Any]:
         >>> table_of(Circle(radius_mm=2.0))
         {'radius_mm': 2.0}
     """
-    told = ((each, getattr(made, each.name)) for each in dataclasses.fields(made))
-    return {each.name: _plain(value) for each, value in told if value != each.default}
+    values = ((each, getattr(made, each.name)) for each in dataclasses.fields(made))
+    return {each.name: _plain(value) for each, value in values if value != each.default}
 
 
 def _plain(value: Any) -> Any:

@@ -263,7 +263,7 @@ def _text_of(program: Path) -> str:
     try:
         data = read_file(program, "The program", bytes_max=NOTEBOOK_BYTES_MAX)
     except KiksError:
-        return ""  # its start will tell
+        return ""  # reported when the program starts
     text = program_text(program, data)[:PROGRAM_CHARACTERS_MAX]
     return "" if "\0" in text else text
 

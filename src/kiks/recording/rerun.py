@@ -129,7 +129,7 @@ class _Observer:
         """Take a sample, and listen to wires that are new; what their turrets of users answer was recorded."""
         self.motion.look(self.sim.world.state)
         for wire in self.sim.wires:
-            wire.on_act = None if has_user_turret(wire.firmware) else self._hear
+            wire.on_act = None if has_user_turret(wire.firmware) else self._note_act
 
-    def _hear(self, entry: NotedEntry) -> None:
+    def _note_act(self, entry: NotedEntry) -> None:
         self._acts.append(Entry(*entry))

@@ -30,7 +30,7 @@ from kiks.engine.sensing.disc_rays import (
     seen_by,
     sees,
 )
-from kiks.engine.sensing.ray_packets import WAY_SIZE, enter, met, nothing_met, step_all
+from kiks.engine.sensing.ray_packets import PACKET_SIZE, enter, met, nothing_met, step_all
 from kiks.engine.sensing.rays import leap_at
 from kiks.engine.sensing.responses import REFLECTION, light_of, reflection_count, respond
 from kiks.engine.simd.lanes import LANES, floor, greatest, lane_of, load, store, wide
@@ -78,7 +78,7 @@ _FOUND_LIMIT = 256
 _DIAGONAL = 1.4142135623730951
 _ENDS_COUNT = READERS + 1
 _PACKET_COUNT = READERS * SENSOR_COUNT
-_PACKETS_SIZE = _PACKET_COUNT * WAY_SIZE
+_PACKETS_SIZE = _PACKET_COUNT * PACKET_SIZE
 _VIEW_SIZE = 4 * LANES
 _VIEWS_SIZE = READERS * _VIEW_SIZE
 _TURNS_SIZE = READERS * LANES
