@@ -118,13 +118,12 @@ def save_figure(figure: Any, path: str | Path, dots_per_inch: int = 110) -> None
 
 
 @contextmanager
-def column_figure(path: str | Path, height_mm: float, width_mm: float = COLUMN_MM, **layout: Any) -> Iterator[Any]:
+def column_figure(path: str | Path, height_mm: float, **layout: Any) -> Iterator[Any]:
     """Yield the axes of a figure as wide as a column of a journal, and write it: .png, .svg or .pdf.
 
     Args:
         path: File of the figure.
         height_mm: Its height [mm].
-        width_mm: Its width [mm].
         layout: Arguments of `Figure.subplots`, such as `nrows`.
 
     Example:
@@ -140,7 +139,7 @@ def column_figure(path: str | Path, height_mm: float, width_mm: float = COLUMN_M
 
     ending_of(path, "the picture", KINDS["figures"].endings)
     with rc_context(COLUMN_STYLE):
-        figure = Figure(figsize=(width_mm / MM_IN_AN_INCH, height_mm / MM_IN_AN_INCH), layout="constrained")
+        figure = Figure(figsize=(COLUMN_MM / MM_IN_AN_INCH, height_mm / MM_IN_AN_INCH), layout="constrained")
         yield figure.subplots(**layout)
         save_figure(figure, path, 200)
 

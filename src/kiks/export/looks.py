@@ -57,8 +57,8 @@ def css(colour: Colour) -> str:
     return f"#{bytes(colour[:3]).hex()}"
 
 
-def robot_shapes(body: Body, colour: str = "") -> list[Shape]:
-    """Return the shapes of a robot without turrets, from the lowest to the nose; x is ahead, the ring has `colour`."""
+def robot_shapes(body: Body) -> list[Shape]:
+    """Return the shapes of a robot without turrets, from the lowest to the nose; x is ahead, the ring has no colour."""
     radius_mm, size = body.radius_mm, body.radius_mm / _RADIUS_MM
     wheel_mm = body.wheel_base_mm / 2 / size - 1.5
     rim_mm = radius_mm - (STRIPES_MM if body.stripe_count else 0.0)
@@ -69,7 +69,7 @@ def robot_shapes(body: Body, colour: str = "") -> list[Shape]:
             angles_rad = np.linspace(begin, end, 2 + int((end - begin) / ROUND_RAD))
             rim = radius_mm * np.column_stack([np.cos(angles_rad), np.sin(angles_rad)])
             shapes.append(Shape(((0.0, 0.0), *map(tuple, rim.round(3).tolist())), _WHITE))
-    shapes += [_disc(rim_mm, colour), _disc(rim_mm - RIM_MM, _BOARD)]
+    shapes += [_disc(rim_mm, ""), _disc(rim_mm - RIM_MM, _BOARD)]
     boxes = [((-8.0, side * wheel_mm - 2.4, 16.0, 4.8), _WHEEL) for side in (-1, 1)]
     boxes += [(pins, _PIN) for pins in _PINS] + [(chip, _CHIP) for chip in _CHIPS]
     for (x_mm, y_mm, length_mm, width_mm), paint in boxes:

@@ -166,9 +166,9 @@ def parse_toml(data: bytes, what: str, *, error: type[KiksError] = ParameterErro
     return table
 
 
-def parse_json(data: bytes, what: str, *, error: type[KiksError] = ParameterError) -> Any:
+def parse_json(data: bytes, what: str) -> Any:
     """Return the content of a JSON file."""
-    return _parsed(data, "JSON", json.loads, what, error)
+    return _parsed(data, "JSON", json.loads, what, ParameterError)
 
 
 def _parsed(data: bytes, kind: str, load: Callable[[str], Any], what: str, error: type[KiksError]) -> Any:
