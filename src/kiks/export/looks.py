@@ -43,7 +43,7 @@ EVENT_LOOKS = {
     "change": EventLook("Changes", "#b85c00", "#ff9f45", 12),
     "contact": EventLook("Contacts", "#d0281e", "#ff7366", 6),
 }
-"""By kinds of `kiks.recording.events.Event`, in their priority: events that are shown as one have the first one's look."""
+"""By kinds of `kiks.recording.events.Event`, by priority: those that are shown as one have the look of the first."""
 
 STRIPES_MM, RIM_MM = 3.0, 2.2
 """Width of the stripes around a robot, and of the ring in its colour [mm]."""
